@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_dsp/adc_cube.h"
+#include "mmradartwin_dsp/radar_config.h"
+
+namespace mmradartwin {
+
+/// Bytes of one frame in the capture's layout -> cube samples. `bytes` holds radar.bytes_per_frame().
+void decodeFrame(const RadarConfig& radar, const std::uint8_t* bytes, std::vector<std::int16_t>& samples);
+/// The inverse of decodeFrame.
+std::vector<std::uint8_t> encodeFrame(const RadarConfig& radar, const std::vector<std::int16_t>& samples);
+
+/// A capture file: frames back to back, their number from the file's size.
+class CaptureReader {
+ public:
+  /// Throws InputError: missing file, or a size that is no whole number of frames (says how many whole ones there are).
+  CaptureReader(const RadarConfig& radar, const std::string& file);
+  int frames() const;
+  /// Frame i with stamp first_stamp_ns + i*frame_period; all chirps valid.
+  AdcCube frame(int i, std::int64_t first_stamp_ns) const;
+  /// Whole frames as raw bytes.
+  std::vector<std::uint8_t> bytes(int i) const;
+
+ private:
+  RadarConfig radar_;
+  std::string file_;
+  int frames_ = 0;
+};
+
+/// Writes cubes back to back in the radar's layout; lost chirps are written as the zeros they hold.
+void writeCapture(const RadarConfig& radar, const std::vector<AdcCube>& cubes, const std::string& file);
+
+}  // namespace mmradartwin

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "mmradartwin_dsp/range_angle.h"
+
+namespace mmradartwin {
+
+/// Closed outline in polar coordinates with a label, drawn over a fan.
+struct FanBox {
+  double range_m, azimuth_rad;         ///< centre
+  double half_range_m, half_azimuth_rad;
+  cv::Scalar color_bgr;
+  std::string label;
+};
+
+struct FanStyle {
+  double min_db = -50, max_db = 0;     ///< colour limits
+  bool normalise = true;               ///< to the peak beyond 0.16 m and within +-60 deg
+  bool diverging = false;              ///< residual maps: blue - white - red around 0
+  double max_range_m = 10;
+  int height_px = 600;
+  std::string title;
+};
+
+/// A fan seen from above (boresight up, left is left) with range arcs, spokes and a colour bar.
+cv::Mat drawFan(const RangeAngleAxes& axes, const RealGrid& power_db, const FanStyle& style,
+                const std::vector<FanBox>& boxes = {});
+/// CSV `range_m,azimuth_deg,power_db`, a row per cell, not normalised.
+void writeMapCsv(const RangeAngleMap& map, const std::string& file);
+void writePicture(const cv::Mat& picture, const std::string& file);
+
+}  // namespace mmradartwin

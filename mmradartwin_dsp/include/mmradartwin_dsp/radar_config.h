@@ -1,0 +1,63 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace mmradartwin {
+
+constexpr double kSpeedOfLight_m_per_s = 299792458.0;
+
+enum class CaptureLayout {
+  kFourLane,  ///< AWR2243, xWR1243/1443: per sample I rx0..rx3, then Q rx0..rx3
+  kTwoLane    ///< xWR16xx/18xx/68xx: per chirp RX-major, groups I[n] I[n+1] Q[n] Q[n+1]
+};
+enum class IqOrder { kIq, kQi };
+
+/// The radar: what radar.yaml says. SI units; positions in radar_link (x boresight, y left, z up).
+struct RadarConfig {
+  std::string device;
+  double carrier_hz = 0;        ///< at the start of the ramp
+  double slope_hz_per_s = 0;
+  int samples_per_chirp = 0;    ///< N
+  double sample_rate_hz = 0;
+  double adc_start_s = 0;       ///< from the start of the ramp to sample 0
+  int loops_per_frame = 0;
+  double frame_period_s = 0;
+  std::vector<Eigen::Vector3d> tx_position_m;  ///< one per TDM slot
+  std::vector<Eigen::Vector3d> rx_position_m;
+  CaptureLayout layout = CaptureLayout::kFourLane;
+  IqOrder iq_order = IqOrder::kIq;
+  // Optional: NaN or empty where radar.yaml does not say.
+  double idle_s, ramp_end_s, rx_gain_db, tx_backoff_db;
+  std::vector<double> if_highpass_hz;
+  std::vector<std::vector<int>> tx_enable;  ///< device's TX numbers, one list per slot
+  std::vector<int> rx_enable;
+
+  RadarConfig();
+
+  int slots() const { return static_cast<int>(tx_position_m.size()); }
+  int receivers() const { return static_cast<int>(rx_position_m.size()); }
+  int channels() const { return slots() * receivers(); }  ///< M
+  int chirps_per_frame() const { return loops_per_frame * slots(); }
+  /// Position sum tx+rx of virtual element k = receivers*slot + rx, metres.
+  Eigen::Vector3d virtual_element_m(int k) const;
+  std::size_t bytes_per_frame() const;          ///< in a capture: chirps x samples x rx x 4
+  double bandwidth_hz() const;                  ///< B = slope N / f_s
+  double range_bin_m() const;                   ///< c / (2B)
+  double max_range_m() const;                   ///< N c / (2B)
+  double sample_time_s(int n) const;            ///< t_n = adc_start + n/f_s, from the ramp's start
+  double window_center_s() const;               ///< t_c = adc_start + N/(2 f_s)
+  double center_frequency_hz() const;           ///< carrier + slope t_c
+  double wavelength_m() const;                  ///< lambda_c, at the centre of the ADC window
+  /// Pitch d of the virtual array, which must be a uniform line along y in order of k. Throws InputError otherwise.
+  double virtual_pitch_m() const;
+};
+
+/// Reads radar.yaml strictly. Throws InputError.
+RadarConfig loadRadarConfig(const std::string& file);
+RadarConfig parseRadarConfig(const std::string& yaml_text, const std::string& name);
+/// The text of a radar.yaml that reads back as `radar`.
+std::string toYaml(const RadarConfig& radar);
+
+}  // namespace mmradartwin

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <geometry_msgs/Pose.h>
+#include <mmradartwin_msgs/AdcCube.h>
+#include <mmradartwin_msgs/RadarConfig.h>
+#include <mmradartwin_msgs/RangeAngleMap.h>
+#include <mmradartwin_msgs/ReceiveGrid.h>
+
+#include <cstdint>
+
+#include "mmradartwin_dsp/adc_cube.h"
+#include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/receive_grid.h"
+
+namespace mmradartwin {
+
+ros::Time toRosTime(std::int64_t stamp_ns);
+std::int64_t toNanoseconds(const ros::Time& stamp);
+geometry_msgs::Pose toMsg(const Eigen::Isometry3d& T);
+Eigen::Isometry3d fromMsg(const geometry_msgs::Pose& pose);
+
+mmradartwin_msgs::RadarConfig toMsg(const RadarConfig& radar);
+RadarConfig fromMsg(const mmradartwin_msgs::RadarConfig& msg);
+/// First 8 bytes, little endian, of the SHA-256 of the serialised message with a zeroed header.
+std::uint64_t radarHash(const mmradartwin_msgs::RadarConfig& msg);
+std::uint64_t radarHash(const RadarConfig& radar);
+
+/// The caller sets header.frame_id; stamp and hash are filled.
+mmradartwin_msgs::AdcCube toMsg(const AdcCube& cube, std::uint64_t radar_hash);
+AdcCube fromMsg(const mmradartwin_msgs::AdcCube& msg);
+mmradartwin_msgs::ReceiveGrid toMsg(const ReceiveGrid& grid, std::uint64_t radar_hash);
+ReceiveGrid fromMsg(const mmradartwin_msgs::ReceiveGrid& msg);
+mmradartwin_msgs::RangeAngleMap toMsg(const RangeAngleMap& map, std::uint64_t radar_hash);
+RangeAngleMap fromMsg(const mmradartwin_msgs::RangeAngleMap& msg);
+
+}  // namespace mmradartwin

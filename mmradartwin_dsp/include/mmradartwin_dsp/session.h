@@ -1,0 +1,85 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_dsp/adc_cube.h"
+#include "mmradartwin_dsp/radar_config.h"
+
+namespace mmradartwin {
+
+struct Pose {
+  std::string name;
+  std::string location;
+  std::int64_t stamp_ns = 0;            ///< start of the first frame
+  Eigen::Isometry3d T_map_radar = Eigen::Isometry3d::Identity();
+};
+
+/// What was left out or is wrong with one pose; the others go on.
+struct PoseProblem {
+  std::string pose;
+  std::string message;                  ///< one line for the user
+};
+
+/// A recorded session, whatever it was read from: a session directory, a bag, a bare capture.
+struct Recording {
+  std::string source;                            ///< path it was read from
+  std::string name;                              ///< of the session
+  RadarConfig radar;
+  std::string radar_file;                        ///< path or label, for errors
+  std::optional<std::string> scene_file;         ///< absolute path of scene.yaml, where the session names one
+  std::optional<std::string> twin_file;          ///< absolute path of twin.yaml, where the session names one
+  std::optional<double> gain_db;                 ///< of a simulated session
+  std::vector<Pose> poses;                       ///< in file order, duplicates and unusable ones left out
+  std::vector<std::string> duplicates;           ///< names of excluded poses (10 cm, 2 cm, 1 deg of an earlier one)
+  std::vector<PoseProblem> problems;             ///< poses that cannot be used (NaN, unreadable, ...)
+  /// Visits the frames of a pose in order. Throws InputError where its capture is missing or damaged.
+  std::function<void(const Pose&, const std::function<void(const AdcCube&)>&)> forEachFrame;
+};
+
+/// Reads a session directory (or its session.yaml). Throws InputError for what makes the whole session unusable
+/// (unknown keys, missing radar.yaml, unreadable poses.csv, poses that overlap in time); what concerns one pose only
+/// goes to `problems`. `check_overlap` needs captures; without captures (simulate) poses are not checked for it.
+struct SessionOptions {
+  bool need_captures = true;
+  bool exclude_duplicates = true;
+};
+Recording openSession(const std::string& path, const SessionOptions& options = {});
+
+/// A bare capture: one pose named after the file, at the origin.
+Recording openCapture(const std::string& file, const RadarConfig& radar);
+
+/// Resolves a path of a session file: relative to `base_file`'s folder, absolute, or package://pkg/rest
+/// (looked up in ROS_PACKAGE_PATH and CMAKE_PREFIX_PATH).
+std::string resolvePath(const std::string& path, const std::string& base_file);
+
+/// Writes a session directory that openSession reads back.
+class SessionWriter {
+ public:
+  struct Files {                                 ///< texts; scene and twin optional
+    std::string radar_yaml;
+    std::optional<std::string> scene;            ///< path as it is to stand in session.yaml
+    std::optional<std::string> twin;
+    std::optional<double> gain_db;
+  };
+  SessionWriter(const std::string& directory, const RadarConfig& radar, const Files& files);
+  void add(const Pose& pose, const std::vector<AdcCube>& cubes);
+  /// Writes poses.csv and session.yaml; last, so that an unfinished session is recognisable.
+  void finish();
+
+ private:
+  std::string directory_;
+  RadarConfig radar_;
+  Files files_;
+  std::vector<Pose> poses_;
+};
+
+/// Stamps are read and written exactly: "1700000000.25" <-> 1700000000250000000.
+std::int64_t parseStamp_ns(const std::string& text);
+std::string formatStamp(std::int64_t stamp_ns);
+
+}  // namespace mmradartwin

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_dsp/receive_grid.h"
+#include "mmradartwin_sim/path_record.h"
+#include "mmradartwin_sim/scene.h"
+
+namespace mmradartwin {
+
+enum class ParameterKind { kNumber, kInteger, kText, kNumbers, kTexts };
+
+/// A parameter that a mechanism has. Ranges are checked before the mechanism sees a value.
+struct ParameterSpec {
+  std::string name;                         ///< with its unit as in causes.md, e.g. yaw_deg
+  std::string unit;                         ///< "deg", "m", "dB", "1", "" for texts
+  ParameterKind kind = ParameterKind::kNumber;
+  double min = 0, max = 0;
+  bool required = true;
+  std::variant<double, std::string, std::vector<double>, std::vector<std::string>> default_value = 0.0;
+  std::string meaning;                      ///< one line
+};
+
+/// Checked values by name; every parameter of the mechanism is present unless it is optional without default.
+class Parameters {
+ public:
+  using Value = std::variant<double, std::string, std::vector<double>, std::vector<std::string>>;
+  void set(const std::string& name, Value value);
+  bool has(const std::string& name) const;
+  double number(const std::string& name) const;
+  const std::string& text(const std::string& name) const;
+  const std::vector<double>& numbers(const std::string& name) const;
+  const std::vector<std::string>& texts(const std::string& name) const;
+  const std::map<std::string, Value>& all() const { return values_; }
+
+ private:
+  std::map<std::string, Value> values_;
+};
+
+/// Everything a mechanism may look at for one pose.
+struct PoseContext {
+  const RadarConfig& radar;
+  const Scene& scene;
+  const RayCaster& rays;
+  Eigen::Isometry3d T_map_radar;            ///< where the twin's radar is, after all pose() calls
+  double frequency_hz;                      ///< of the coefficients: the window's centre
+  /// Base field of view of emission and arrival: |azimuth| < 90 deg, |elevation| <= 20 deg of a direction in radar_link.
+  bool inFieldOfView(const Eigen::Vector3d& direction_radar) const;
+  double max_range_m;                       ///< paths with length/2 beyond are left out
+  std::uint64_t seed;                       ///< of what is random by nature (phases of scatter points)
+  /// Strongest A_p of the session's poses, for levels that are relative to it.
+  std::function<double()> strongest_amplitude;
+};
+
+/// One unit of the physical model (DESIGN section 4). Implementations override the stages they act in; all stages are
+/// const and may be called for several poses at once.
+class Mechanism {
+ public:
+  virtual ~Mechanism() = default;
+  virtual const std::string& name() const = 0;
+  virtual std::vector<ParameterSpec> parameters() const = 0;
+  /// Takes checked parameters; throws InputError where they do not fit the scene or radar (an unknown actor, say).
+  virtual void configure(const Parameters& values, const Scene& scene, const RadarConfig& radar) = 0;
+
+  // Stages, in the order in which a simulation runs them.
+  virtual void editScene(Scene&) const {}                                           ///< once, on loading
+  virtual Eigen::Isometry3d pose(const Eigen::Isometry3d& T_map_radar) const { return T_map_radar; }
+  virtual void addPaths(const PoseContext&, std::vector<PathRecord>&) const {}
+  virtual void reweight(const PoseContext&, PathRecord&) const {}                   ///< every path of every mechanism
+  virtual void receive(const PoseContext&, ComplexGrid&) const {}                   ///< on the propagated grid
+  /// True where receive() does something: then the grid is more than its records.
+  virtual bool hasReceiveStage() const { return false; }
+};
+
+/// Mechanisms are found by name. A user's package registers one from its own plug-in library.
+class MechanismRegistry {
+ public:
+  using Factory = std::function<std::unique_ptr<Mechanism>()>;
+  static MechanismRegistry& instance();
+  void add(const std::string& name, Factory factory);
+  /// Throws InputError naming the known mechanisms.
+  std::unique_ptr<Mechanism> create(const std::string& name) const;
+  std::vector<std::string> names() const;
+
+ private:
+  std::map<std::string, Factory> factories_;
+};
+
+}  // namespace mmradartwin

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_sim/material.h"
+
+namespace mmradartwin {
+
+/// A planar polygon of one actor: coplanar, connected triangles merged. Coordinates in map, metres.
+struct Facet {
+  int actor = -1;                            ///< index into Scene::actors
+  int id = -1;                               ///< index into Scene::facets
+  Eigen::Vector3d origin;                    ///< a corner of the bounding rectangle
+  Eigen::Vector3d e1, e2, normal;            ///< orthonormal; normal = e1 x e2 (its side means nothing)
+  double size1_m = 0, size2_m = 0;           ///< bounding rectangle: origin + [0,size1] e1 + [0,size2] e2
+  double area_m2 = 0;
+  bool rectangle = false;                    ///< fills its bounding rectangle
+  std::vector<std::vector<Eigen::Vector2d>> loops;  ///< boundary loops in (e1, e2), outer ones and holes
+  bool reflects = true;                      ///< false where the normal lies within 45 deg of the vertical: it only occludes
+
+  double planeDistance(const Eigen::Vector3d& p) const { return normal.dot(p - origin); }
+  bool contains(const Eigen::Vector3d& p_on_plane, double tolerance_m = 0) const;
+  /// Point of the facet nearest to p (p anywhere), at least inset_m inside its boundary where it is large enough.
+  Eigen::Vector3d nearest(const Eigen::Vector3d& p, double inset_m = 0) const;
+};
+
+/// A named thing with one surface material.
+struct Actor {
+  std::string name;
+  std::string material_tag;
+  Material material;
+  std::vector<Eigen::Vector3d> vertices;         ///< map, metres
+  std::vector<std::array<int, 3>> triangles;
+  std::vector<int> facets;                       ///< ids
+  Eigen::AlignedBox3d bounds;
+};
+
+struct Scene {
+  std::string file;                              ///< scene.yaml
+  std::vector<Actor> actors;
+  std::vector<Facet> facets;
+
+  int actorIndex(const std::string& name) const;  ///< -1 where absent
+};
+
+/// Reads scene.yaml strictly, its meshes (assimp) and materials, and builds facets. Throws InputError naming file and key
+/// (unknown material, two actors of one name, no triangles, NaN or huge coordinates, material outside its frequency range).
+Scene loadScene(const std::string& scene_yaml, double frequency_hz);
+/// Rebuilds facets after actors were added, moved or removed.
+void rebuildFacets(Scene& scene);
+
+/// Occlusion queries, thread-safe. Embree behind it; no invalid ray reaches it.
+class RayCaster {
+ public:
+  explicit RayCaster(const Scene& scene);
+  ~RayCaster();
+  RayCaster(RayCaster&&) noexcept;
+  /// True where the open segment a-b meets nothing, both ends shortened by gap_m.
+  bool visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m = 1e-3) const;
+  struct Hit { double distance_m; int actor; int facet; Eigen::Vector3d point; };
+  std::optional<Hit> firstHit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double max_m) const;
+  /// True where p lies inside a closed actor (odd crossings in most directions); names the actor.
+  std::optional<int> insideActor(const Eigen::Vector3d& p) const;
+
+ private:
+  struct Embree;
+  std::unique_ptr<Embree> embree_;
+};
+
+}  // namespace mmradartwin
