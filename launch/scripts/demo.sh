@@ -1,0 +1,77 @@
+#!/usr/bin/env bash
+# The demo: generate a session, play it over UDP through the live loop, evaluate what was recorded.
+# usage: demo.sh OUTPUT [POSES]
+set -euo pipefail
+
+out=$1
+locations=${DEMO_LOCATIONS:-10}
+headings=${DEMO_HEADINGS:-2}
+frames=${DEMO_FRAMES:-100}
+say() { printf '== %s\n' "$*" >&2; }
+
+mkdir -p "$out"
+rm -rf "$out/session" "$out/report" "$out/demo.bag" "$out/demo.bag.active" "$out/rviz.png"
+
+say "1/4 generating a measured session: $locations places x $headings headings, $frames frames each"
+rosrun mmradartwin_tests make_session.py --output "$out/session" --locations "$locations" --headings "$headings" \
+  --frames "$frames" --seed "${DEMO_SEED:-$RANDOM}" --truth "$out/truth.json"
+
+# A window where there is a display, a virtual one otherwise.
+xvfb=
+if [ -z "${DISPLAY:-}" ]; then
+  for n in $(seq 90 120); do [ -e "/tmp/.X11-unix/X$n" ] || break; done
+  Xvfb ":$n" -screen 0 1600x960x24 +extension GLX >/dev/null 2>&1 &
+  xvfb=$!
+  export DISPLAY=:$n LIBGL_ALWAYS_SOFTWARE=1
+  say "no display: rviz runs on a virtual one (:$n)"
+fi
+picture() {
+  if [ -n "$xvfb" ]; then
+    import -window root "$1" 2>/dev/null
+  else
+    local id
+    id=$(xwininfo -root -tree 2>/dev/null | awk '/- RViz"/ {print $1; exit}')
+    [ -n "$id" ] && import -window "$id" "$1" 2>/dev/null
+  fi
+}
+
+launch=
+cleanup() {
+  [ -n "$launch" ] && kill -INT "$launch" 2>/dev/null && wait "$launch" 2>/dev/null
+  [ -n "$xvfb" ] && kill "$xvfb" 2>/dev/null
+  return 0
+}
+trap cleanup EXIT
+trap 'exit 130' INT TERM
+
+# A master of its own, so that the demo disturbs no other.
+port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+export ROS_MASTER_URI=http://127.0.0.1:$port ROS_IP=127.0.0.1
+
+say "2/4 playing it over UDP at the real pace: driver, signal chain, twin, attribution and rviz run live"
+roslaunch -p "$port" mmradartwin_launch demo.launch session:="$out/session" bag:="$out/demo.bag" \
+  average_frames:="$frames" ${DEMO_ARGS:-} &
+launch=$!
+# The last picture taken while the loop runs is the one that stays.
+while kill -0 "$launch" 2>/dev/null; do
+  sleep 3
+  picture "$out/.rviz.png" && mv -f "$out/.rviz.png" "$out/rviz.png" || true
+done
+wait "$launch" || true
+launch=
+
+bag=$out/demo.bag
+[ -f "$bag" ] || { printf 'error: %s was not recorded; the messages above say why\n' "$bag" >&2; exit 1; }
+
+say "3/4 evaluating the recording"
+status=0
+rosrun mmradartwin_attribution evaluate "$bag" --output "$out/report" || status=$?
+
+say "4/4 done"
+cat >&2 <<TEXT
+   report         $out/report/index.html
+   rviz           $out/rviz.png
+   recording      $bag        (replay: ./run.sh exec roslaunch mmradartwin_launch replay.launch bag:=$bag)
+   session        $out/session
+TEXT
+exit "$status"
