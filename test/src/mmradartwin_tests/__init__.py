@@ -1,0 +1,1 @@
+"""Measured-session generator for tests: an indoor radar's raw samples by closed forms, independent of the simulator."""
