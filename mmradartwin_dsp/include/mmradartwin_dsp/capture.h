@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,10 +12,10 @@ namespace mmradartwin {
 
 /// Bytes of one frame in the capture's layout -> cube samples. `bytes` holds radar.bytes_per_frame().
 void decodeFrame(const RadarConfig& radar, const std::uint8_t* bytes, std::vector<std::int16_t>& samples);
-/// The inverse of decodeFrame.
+/// The inverse of decodeFrame. Throws InputError where the number of samples is not the radar's.
 std::vector<std::uint8_t> encodeFrame(const RadarConfig& radar, const std::vector<std::int16_t>& samples);
 
-/// A capture file: frames back to back, their number from the file's size.
+/// A capture file: frames back to back, their number from the file's size. Reading is safe from several threads.
 class CaptureReader {
  public:
   /// Throws InputError: missing file, or a size that is no whole number of frames (says how many whole ones there are).
@@ -28,6 +29,7 @@ class CaptureReader {
  private:
   RadarConfig radar_;
   std::string file_;
+  std::shared_ptr<const int> descriptor_;
   int frames_ = 0;
 };
 

@@ -30,9 +30,9 @@ class CoherentAverage {
   struct Frame {
     std::vector<std::int32_t> sum;      // [M][N][2]
     std::vector<std::int32_t> weight;   // [slot] valid chirps
-    std::int64_t stamp_ns;
+    std::int64_t stamp_ns = 0;
   };
-  Frame sumOverLoops(const AdcCube& cube) const;
+  void sumOverLoops(const AdcCube& cube, Frame& frame) const;
 
   RadarConfig radar_;
   int max_frames_;

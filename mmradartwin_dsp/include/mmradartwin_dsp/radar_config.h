@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -42,7 +44,12 @@ struct RadarConfig {
   int chirps_per_frame() const { return loops_per_frame * slots(); }
   /// Position sum tx+rx of virtual element k = receivers*slot + rx, metres.
   Eigen::Vector3d virtual_element_m(int k) const;
-  std::size_t bytes_per_frame() const;          ///< in a capture: chirps x samples x rx x 4
+  /// Receivers that a capture has room for: four lanes always carry four, those not in use as zeros (SWRA581B).
+  int capture_receivers() const;
+  std::size_t bytes_per_chirp() const;          ///< in a capture: samples x capture_receivers x 4
+  std::size_t bytes_per_frame() const;          ///< in a capture: chirps x bytes_per_chirp
+  /// Start of frame i after that of frame 0, rounded once, so that it does not drift.
+  std::int64_t frame_offset_ns(std::int64_t i) const;
   double bandwidth_hz() const;                  ///< B = slope N / f_s
   double range_bin_m() const;                   ///< c / (2B)
   double max_range_m() const;                   ///< N c / (2B)

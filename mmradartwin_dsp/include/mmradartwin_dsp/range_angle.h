@@ -22,7 +22,7 @@ struct RangeAngleMap {
   std::int64_t stamp_ns = 0;
   Branch source = Branch::kMeasured;
   RangeAngleAxes axes;
-  RealGrid power_db;                 ///< [N][64] dBFS, not normalised
+  RealGrid power_db;                 ///< [N][64] dBFS, not normalised; -400 where nothing is, NaN where azimuth is
   int frames = 0;
   bool pose_valid = false;
   Eigen::Isometry3d T_map_radar = Eigen::Isometry3d::Identity();
@@ -33,13 +33,15 @@ constexpr int kAngleBins = 64;
 /// Periodic Hann, w[n] = (1 - cos(2 pi n/N))/2.
 std::vector<double> hannWindow(int samples);
 
-/// The one signal chain of both branches: window, range FFT, spatial FFT, level (DESIGN section 3).
+/// The one signal chain of both branches: window, range FFT, spatial FFT, level (DESIGN section 3). Const functions may
+/// be called from several threads at once (FFT plans and scratch space are per thread and kept).
 class SignalChain {
  public:
   /// Throws InputError where the virtual array is no uniform line along y.
   explicit SignalChain(const RadarConfig& radar);
   ~SignalChain();
   SignalChain(SignalChain&&) noexcept;
+  SignalChain& operator=(SignalChain&&) noexcept;
 
   const RadarConfig& radar() const;
   const RangeAngleAxes& axes() const;

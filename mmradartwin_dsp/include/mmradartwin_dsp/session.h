@@ -53,6 +53,11 @@ Recording openSession(const std::string& path, const SessionOptions& options = {
 /// A bare capture: one pose named after the file, at the origin.
 Recording openCapture(const std::string& file, const RadarConfig& radar);
 
+/// True within 10 cm horizontally, 2 cm in height and 1 deg in heading: a duplicate (DESIGN section 5).
+bool sameView(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b);
+/// Moves the later of each such pair from poses to duplicates.
+void excludeDuplicates(Recording& recording);
+
 /// Resolves a path of a session file: relative to `base_file`'s folder, absolute, or package://pkg/rest
 /// (looked up in ROS_PACKAGE_PATH and CMAKE_PREFIX_PATH).
 std::string resolvePath(const std::string& path, const std::string& base_file);
@@ -81,5 +86,7 @@ class SessionWriter {
 /// Stamps are read and written exactly: "1700000000.25" <-> 1700000000250000000.
 std::int64_t parseStamp_ns(const std::string& text);
 std::string formatStamp(std::int64_t stamp_ns);
+/// Shortest decimal that reads back as exactly `value`.
+std::string formatExact(double value);
 
 }  // namespace mmradartwin

@@ -37,6 +37,9 @@ class YamlMap {
   std::vector<std::string> texts(const std::string& key);
   /// List of lists of numbers, each of `columns` entries.
   std::vector<std::vector<double>> rows(const std::string& key, std::size_t columns, double min, double max);
+  /// List of lists of whole numbers, of any lengths.
+  std::vector<std::vector<long long>> integerLists(const std::string& key, long long min, long long max);
+  /// A nested mapping ("key:" without a value is an empty one). It has its own rejectUnknownKeys().
   YamlMap map(const std::string& key);
   std::vector<YamlMap> maps(const std::string& key);
 
@@ -54,5 +57,10 @@ class YamlMap {
   explicit YamlMap(std::shared_ptr<State> state);
   std::shared_ptr<State> state_;
 };
+
+/// `text` as a double-quoted YAML scalar.
+std::string yamlText(const std::string& text);
+/// Shortest decimal that reads back as exactly `value`, such that YAML 1.1 takes it for a number too (7.7e+10, 1.0e-06).
+std::string yamlNumber(double value);
 
 }  // namespace mmradartwin

@@ -1,0 +1,171 @@
+#include "mmradartwin_dsp/capture.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin {
+namespace {
+
+static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "captures are little endian; this reads them as they lie");
+
+// Both layouts are read and written through one walk: `move(capture, cube)` copies one int16 between the two indices.
+// Sources: SWRA581B figures 9 and 11, SWRA555A figure 22.
+
+template <typename Move>
+void walkFourLane(std::size_t samples, std::size_t receivers, std::size_t lanes, std::size_t i_at, Move move) {
+  const std::size_t q_at = i_at ^ 1;
+  for (std::size_t n = 0; n < samples; ++n) {
+    for (std::size_t rx = 0; rx < receivers; ++rx) {
+      move((2 * n + i_at) * lanes + rx, 2 * (n * receivers + rx));
+      move((2 * n + q_at) * lanes + rx, 2 * (n * receivers + rx) + 1);
+    }
+  }
+}
+
+template <typename Move>
+void walkTwoLane(std::size_t samples, std::size_t receivers, std::size_t i_at, Move move) {
+  const std::size_t q_at = i_at ^ 1;
+  for (std::size_t rx = 0; rx < receivers; ++rx) {
+    for (std::size_t n = 0; n < samples; n += 2) {
+      const std::size_t group = 2 * (rx * samples + n);
+      for (std::size_t odd = 0; odd < 2; ++odd) {
+        move(group + 2 * i_at + odd, 2 * ((n + odd) * receivers + rx));
+        move(group + 2 * q_at + odd, 2 * ((n + odd) * receivers + rx) + 1);
+      }
+    }
+  }
+}
+
+/// The paper's receiver, four lanes all in use, with constant strides that the compiler turns into shuffles.
+template <typename Move>
+void walkChirp(const RadarConfig& radar, Move move) {
+  const auto samples = static_cast<std::size_t>(radar.samples_per_chirp);
+  const auto receivers = static_cast<std::size_t>(radar.receivers());
+  const std::size_t i_at = radar.iq_order == IqOrder::kIq ? 0 : 1;
+  if (radar.layout == CaptureLayout::kTwoLane) {
+    walkTwoLane(samples, receivers, i_at, move);
+  } else if (receivers == 4 && i_at == 0) {
+    walkFourLane(samples, 4, 4, 0, move);
+  } else {
+    walkFourLane(samples, receivers, static_cast<std::size_t>(radar.capture_receivers()), i_at, move);
+  }
+}
+
+std::size_t cubeSize(const RadarConfig& radar) {
+  return static_cast<std::size_t>(radar.chirps_per_frame()) * static_cast<std::size_t>(radar.samples_per_chirp) *
+         static_cast<std::size_t>(radar.receivers()) * 2;
+}
+
+std::int16_t load(const std::uint8_t* bytes, std::size_t index) {
+  std::int16_t value;
+  std::memcpy(&value, bytes + 2 * index, 2);
+  return value;
+}
+
+}  // namespace
+
+void decodeFrame(const RadarConfig& radar, const std::uint8_t* bytes, std::vector<std::int16_t>& samples) {
+  samples.resize(cubeSize(radar));
+  const auto chirps = static_cast<std::size_t>(radar.chirps_per_frame());
+  const std::size_t stride = samples.size() / chirps;
+  for (std::size_t chirp = 0; chirp < chirps; ++chirp) {
+    const std::uint8_t* in = bytes + chirp * radar.bytes_per_chirp();
+    std::int16_t* out = samples.data() + chirp * stride;
+    walkChirp(radar, [in, out](std::size_t capture, std::size_t cube) { out[cube] = load(in, capture); });
+  }
+}
+
+std::vector<std::uint8_t> encodeFrame(const RadarConfig& radar, const std::vector<std::int16_t>& samples) {
+  if (samples.size() != cubeSize(radar)) {
+    throw InputError("a frame of " + std::to_string(samples.size()) + " samples does not fit the radar, whose frames have " +
+                     std::to_string(cubeSize(radar)));
+  }
+  std::vector<std::uint8_t> bytes(radar.bytes_per_frame(), 0);
+  const auto chirps = static_cast<std::size_t>(radar.chirps_per_frame());
+  const std::size_t stride = samples.size() / chirps;
+  for (std::size_t chirp = 0; chirp < chirps; ++chirp) {
+    std::uint8_t* out = bytes.data() + chirp * radar.bytes_per_chirp();
+    const std::int16_t* in = samples.data() + chirp * stride;
+    walkChirp(radar, [in, out](std::size_t capture, std::size_t cube) {
+      std::memcpy(out + 2 * capture, in + cube, 2);
+    });
+  }
+  return bytes;
+}
+
+CaptureReader::CaptureReader(const RadarConfig& radar, const std::string& file) : radar_(radar), file_(file) {
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    throw InputError(file + ": capture cannot be opened (" + std::strerror(errno) +
+                     "); put the recorded file there or take its pose out of poses.csv");
+  }
+  descriptor_.reset(new int(descriptor), [](const int* d) {
+    ::close(*d);
+    delete d;
+  });
+  struct stat status = {};
+  if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
+    throw InputError(file + ": is no capture file; give a .bin with the recorded bytes");
+  }
+  const auto size = static_cast<std::size_t>(status.st_size);
+  const std::size_t whole = size / radar_.bytes_per_frame();
+  if (size == 0 || size % radar_.bytes_per_frame() != 0) {
+    throw InputError(file + ": capture is truncated or not from this radar: " + std::to_string(size) + " bytes are " +
+                     std::to_string(whole) + " whole frames of " + std::to_string(radar_.bytes_per_frame()) +
+                     " bytes and " + std::to_string(size % radar_.bytes_per_frame()) +
+                     " bytes over; cut it to whole frames, record it anew, or correct radar.yaml");
+  }
+  frames_ = static_cast<int>(whole);
+}
+
+int CaptureReader::frames() const { return frames_; }
+
+std::vector<std::uint8_t> CaptureReader::bytes(int i) const {
+  if (i < 0 || i >= frames_) {
+    throw std::out_of_range(file_ + ": frame " + std::to_string(i) + " of " + std::to_string(frames_));
+  }
+  std::vector<std::uint8_t> bytes(radar_.bytes_per_frame());
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const auto offset = static_cast<off_t>(static_cast<std::size_t>(i) * bytes.size() + done);
+    const ssize_t got = ::pread(*descriptor_, bytes.data() + done, bytes.size() - done, offset);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) {
+      throw InputError(file_ + ": frame " + std::to_string(i) + " cannot be read (" +
+                       (got < 0 ? std::strerror(errno) : "the file has become shorter") + ")");
+    }
+    done += static_cast<std::size_t>(got);
+  }
+  return bytes;
+}
+
+AdcCube CaptureReader::frame(int i, std::int64_t first_stamp_ns) const {
+  AdcCube cube;
+  cube.stamp_ns = first_stamp_ns + radar_.frame_offset_ns(i);
+  cube.sequence = static_cast<std::uint32_t>(i);
+  cube.chirps = radar_.chirps_per_frame();
+  cube.samples = radar_.samples_per_chirp;
+  cube.receivers = radar_.receivers();
+  decodeFrame(radar_, bytes(i).data(), cube.data);
+  cube.chirp_valid.assign(static_cast<std::size_t>(cube.chirps), 1);
+  return cube;
+}
+
+void writeCapture(const RadarConfig& radar, const std::vector<AdcCube>& cubes, const std::string& file) {
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  for (const AdcCube& cube : cubes) {
+    const std::vector<std::uint8_t> bytes = encodeFrame(radar, cube.data);
+    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  }
+  out.close();
+  if (!out) throw std::runtime_error(file + ": capture cannot be written; check folder, rights and free space");
+}
+
+}  // namespace mmradartwin

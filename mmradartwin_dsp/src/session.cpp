@@ -1,0 +1,327 @@
+#include "mmradartwin_dsp/session.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+#include <set>
+#include <sstream>
+
+#include "mmradartwin_dsp/capture.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/strict_yaml.h"
+
+namespace mmradartwin {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kPoseColumns[] = "pose,location,stamp,x,y,z,qx,qy,qz,qw";
+constexpr double kDuplicateHorizontal_m = 0.10;
+constexpr double kDuplicateHeight_m = 0.02;
+constexpr double kDuplicateHeading_rad = M_PI / 180;
+constexpr double kQuaternionTolerance = 1e-3;
+/// Stamps typed with microseconds are rounded; poses recorded back to back must not fail for it.
+constexpr std::int64_t kOverlapTolerance_ns = 1000;
+
+std::string trimmed(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r");
+  if (begin == std::string::npos) return "";
+  return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+}
+
+std::vector<std::string> splitCsv(const std::string& line) {
+  std::vector<std::string> fields;
+  std::istringstream in(line);
+  for (std::string field; std::getline(in, field, ',');) fields.push_back(trimmed(field));
+  if (!line.empty() && line.back() == ',') fields.emplace_back();
+  return fields;
+}
+
+std::optional<double> parseDouble(const std::string& text) {
+  double value = 0;
+  const char* begin = text.data() + (!text.empty() && text.front() == '+' ? 1 : 0);
+  const char* end = text.data() + text.size();
+  const auto result = std::from_chars(begin, end, value);
+  if (result.ec != std::errc() || result.ptr != end) return std::nullopt;
+  return value;
+}
+
+/// Empty where `name` may name a file, else why not.
+std::string unusableName(const std::string& name) {
+  if (name.empty()) return "has no name";
+  if (name.front() == '.') return "has a name that begins with a dot; captures and maps are files of that name";
+  if (name.find_first_of("/\\") != std::string::npos) {
+    return "has a slash in its name; captures and maps are files of that name";
+  }
+  return "";
+}
+
+/// Reads the numeric part of a row. Returns what is wrong with it, or "".
+std::string readRow(const std::vector<std::string>& fields, Pose& pose) {
+  static const char* const kNames[] = {"x", "y", "z", "qx", "qy", "qz", "qw"};
+  pose.location = fields[1];
+  if (pose.location.empty()) return "location is empty; name the spot, poses of one spot share it";
+  try {
+    pose.stamp_ns = parseStamp_ns(fields[2]);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  double values[7];
+  for (std::size_t i = 0; i < 7; ++i) {
+    const std::optional<double> value = parseDouble(fields[3 + i]);
+    if (!value) return std::string(kNames[i]) + " '" + fields[3 + i] + "' is no number; correct or remove the row";
+    if (!std::isfinite(*value)) return std::string(kNames[i]) + " is " + fields[3 + i] + "; correct or remove the row";
+    values[i] = *value;
+  }
+  const Eigen::Quaterniond q(values[6], values[3], values[4], values[5]);
+  if (std::abs(q.norm() - 1) > kQuaternionTolerance) {
+    std::ostringstream message;
+    message << "quaternion qx,qy,qz,qw has norm " << q.norm() << "; allowed: 0.999 to 1.001; correct or remove the row";
+    return message.str();
+  }
+  pose.T_map_radar = Eigen::Translation3d(values[0], values[1], values[2]) * q.normalized();
+  return "";
+}
+
+void readPoses(const std::string& file, Recording& recording) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in || fs::is_directory(file)) {
+    throw InputError(file + ": poses cannot be read; put the file there or correct key poses in session.yaml");
+  }
+  std::string line;
+  std::getline(in, line);
+  if (line.compare(0, 3, "\xEF\xBB\xBF") == 0) line.erase(0, 3);  // spreadsheets put a byte order mark
+  if (splitCsv(trimmed(line)) != splitCsv(kPoseColumns)) {
+    throw InputError(file + ": line 1: header is '" + trimmed(line).substr(0, 80) + "'; it must be '" + kPoseColumns + "'");
+  }
+  std::set<std::string> names;
+  for (int number = 2; std::getline(in, line); ++number) {
+    if (trimmed(line).empty()) continue;
+    const std::vector<std::string> fields = splitCsv(line);
+    const std::string where = file + ": line " + std::to_string(number) + ": ";
+    if (fields.size() != 10) {
+      throw InputError(where + std::to_string(fields.size()) + " fields; a row has 10, " + kPoseColumns);
+    }
+    Pose pose;
+    pose.name = fields[0];
+    const std::string unusable = unusableName(pose.name);
+    if (!unusable.empty()) throw InputError(where + "pose '" + pose.name + "' " + unusable);
+    if (!names.insert(pose.name).second) {
+      throw InputError(where + "pose '" + pose.name + "' stands twice; every pose needs a name of its own");
+    }
+    const std::string problem = readRow(fields, pose);
+    if (problem.empty()) {
+      recording.poses.push_back(pose);
+    } else {
+      recording.problems.push_back({pose.name, where + "pose '" + pose.name + "': " + problem});
+    }
+  }
+  if (names.empty()) throw InputError(file + ": holds no poses; write one row per pose");
+}
+
+std::string captureFile(const std::string& pattern, const std::string& pose) {
+  std::string file = pattern;
+  return file.replace(file.find("{pose}"), 6, pose);
+}
+
+/// Whole frames a capture seems to hold; 0 where it is missing (reading it says so).
+std::int64_t framesBySize(const RadarConfig& radar, const std::string& file) {
+  std::error_code error;
+  const auto size = fs::file_size(file, error);
+  return error ? 0 : static_cast<std::int64_t>(size / radar.bytes_per_frame());
+}
+
+void rejectOverlap(const Recording& recording, const std::string& pattern, const std::string& poses_file) {
+  std::vector<const Pose*> by_time;
+  for (const Pose& pose : recording.poses) by_time.push_back(&pose);
+  std::stable_sort(by_time.begin(), by_time.end(),
+                   [](const Pose* a, const Pose* b) { return a->stamp_ns < b->stamp_ns; });
+  for (std::size_t i = 0; i + 1 < by_time.size(); ++i) {
+    const Pose& pose = *by_time[i];
+    const Pose& next = *by_time[i + 1];
+    const std::int64_t frames = framesBySize(recording.radar, captureFile(pattern, pose.name));
+    const std::int64_t end_ns = pose.stamp_ns + recording.radar.frame_offset_ns(frames);
+    if (next.stamp_ns < end_ns - kOverlapTolerance_ns) {
+      throw InputError(poses_file + ": poses '" + pose.name + "' and '" + next.name + "' overlap in time: " +
+                       std::to_string(frames) + " frames from " + formatStamp(pose.stamp_ns) + " last until " +
+                       formatStamp(end_ns) + ", the next begins at " + formatStamp(next.stamp_ns) +
+                       "; correct the stamps or frame_period_s");
+    }
+  }
+}
+
+}  // namespace
+
+bool sameView(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  const Eigen::Vector3d step = a.translation() - b.translation();
+  const Eigen::Vector3d ahead_a = a.linear().col(0), ahead_b = b.linear().col(0);
+  const double turn = std::atan2(ahead_a.y(), ahead_a.x()) - std::atan2(ahead_b.y(), ahead_b.x());
+  return step.head<2>().norm() <= kDuplicateHorizontal_m && std::abs(step.z()) <= kDuplicateHeight_m &&
+         std::abs(std::remainder(turn, 2 * M_PI)) <= kDuplicateHeading_rad;
+}
+
+void excludeDuplicates(Recording& recording) {
+  std::vector<std::size_t> by_time(recording.poses.size());
+  std::iota(by_time.begin(), by_time.end(), 0);
+  std::stable_sort(by_time.begin(), by_time.end(), [&](std::size_t a, std::size_t b) {
+    return recording.poses[a].stamp_ns < recording.poses[b].stamp_ns;
+  });
+  std::vector<std::size_t> kept;
+  std::set<std::size_t> excluded;
+  for (const std::size_t i : by_time) {
+    const bool duplicate = std::any_of(kept.begin(), kept.end(), [&](std::size_t earlier) {
+      return sameView(recording.poses[earlier].T_map_radar, recording.poses[i].T_map_radar);
+    });
+    duplicate ? (void)excluded.insert(i) : kept.push_back(i);
+  }
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < recording.poses.size(); ++i) {
+    if (excluded.count(i)) {
+      recording.duplicates.push_back(recording.poses[i].name);
+    } else {
+      poses.push_back(recording.poses[i]);
+    }
+  }
+  recording.poses = std::move(poses);
+}
+
+Recording openSession(const std::string& path, const SessionOptions& options) {
+  const fs::path file = fs::is_directory(path) ? fs::path(path) / "session.yaml" : fs::path(path);
+  if (!fs::exists(file)) {
+    throw InputError(file.string() + ": no such session; give a folder that holds a session.yaml (an unfinished recording has none)");
+  }
+  YamlMap yaml = YamlMap::load(file.string());
+  yaml.choice("format", {"mmradartwin_session/1"});
+  Recording recording;
+  recording.source = path;
+  recording.name = fs::weakly_canonical(fs::absolute(file)).parent_path().filename().string();
+  recording.radar_file = resolvePath(yaml.text("radar"), file.string());
+  const std::string poses_file = resolvePath(yaml.text("poses"), file.string());
+  if (yaml.has("scene")) recording.scene_file = resolvePath(yaml.text("scene"), file.string());
+  if (yaml.has("twin")) recording.twin_file = resolvePath(yaml.text("twin"), file.string());
+  if (yaml.has("gain_db")) recording.gain_db = yaml.number("gain_db", -400, 400);
+  std::string pattern;
+  if (yaml.has("captures") || options.need_captures) {
+    pattern = yaml.text("captures");
+    if (pattern.find("{pose}") == std::string::npos) {
+      yaml.fail("captures", "'" + pattern + "' must contain {pose}, the place of the pose's name");
+    }
+    pattern = resolvePath(pattern, file.string());
+  }
+  yaml.rejectUnknownKeys();
+  recording.radar = loadRadarConfig(recording.radar_file);
+  readPoses(poses_file, recording);
+  if (options.need_captures) rejectOverlap(recording, pattern, poses_file);
+  if (options.exclude_duplicates) excludeDuplicates(recording);
+
+  recording.forEachFrame = [radar = recording.radar, pattern, source = file.string()](
+                               const Pose& pose, const std::function<void(const AdcCube&)>& visit) {
+    if (pattern.empty()) throw InputError(source + ": pose '" + pose.name + "': the session names no captures");
+    try {
+      const CaptureReader reader(radar, captureFile(pattern, pose.name));
+      for (int i = 0; i < reader.frames(); ++i) visit(reader.frame(i, pose.stamp_ns));
+    } catch (const InputError& error) {
+      throw InputError("pose '" + pose.name + "': " + error.what());
+    }
+  };
+  return recording;
+}
+
+Recording openCapture(const std::string& file, const RadarConfig& radar) {
+  const CaptureReader reader(radar, file);
+  Recording recording;
+  recording.source = file;
+  recording.name = fs::path(file).stem().string();
+  recording.radar = radar;
+  recording.radar_file = file;
+  Pose pose;
+  pose.name = pose.location = recording.name;
+  recording.poses.push_back(pose);
+  recording.forEachFrame = [reader](const Pose& pose, const std::function<void(const AdcCube&)>& visit) {
+    for (int i = 0; i < reader.frames(); ++i) visit(reader.frame(i, pose.stamp_ns));
+  };
+  return recording;
+}
+
+std::int64_t parseStamp_ns(const std::string& text) {
+  const auto bad = [&text](const std::string& why) {
+    return InputError("stamp '" + text.substr(0, 40) + "' " + why + "; write seconds as in 1700000000.25, allowed: 0 to 4294967295");
+  };
+  const std::size_t point = text.find('.');
+  const std::string whole = text.substr(0, point);
+  std::string fraction = point == std::string::npos ? "" : text.substr(point + 1);
+  const auto digits = [](const std::string& s) {
+    return std::all_of(s.begin(), s.end(), [](char c) { return c >= '0' && c <= '9'; });
+  };
+  if (whole.empty() || !digits(whole) || !digits(fraction)) throw bad("is no decimal number of seconds");
+  // Beyond nanoseconds is rounding noise of whoever printed a double.
+  const bool round_up = fraction.size() > 9 && fraction[9] >= '5';
+  fraction.resize(9, '0');
+  std::int64_t seconds = 0;
+  const auto result = std::from_chars(whole.data(), whole.data() + whole.size(), seconds);
+  if (result.ec != std::errc() || seconds > 4294967295LL) throw bad("is out of range");
+  return seconds * 1000000000LL + std::stoll(fraction) + (round_up ? 1 : 0);
+}
+
+std::string formatStamp(std::int64_t stamp_ns) {
+  std::string fraction = std::to_string(1000000000LL + stamp_ns % 1000000000LL).substr(1);
+  fraction.erase(fraction.find_last_not_of('0') + 1);
+  return std::to_string(stamp_ns / 1000000000LL) + (fraction.empty() ? "" : "." + fraction);
+}
+
+std::string formatExact(double value) {
+  char buffer[64];
+  return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
+}
+
+namespace {
+
+void writeText(const fs::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  out << text;
+  out.close();
+  if (!out) throw std::runtime_error(file.string() + ": cannot be written; check folder, rights and free space");
+}
+
+}  // namespace
+
+SessionWriter::SessionWriter(const std::string& directory, const RadarConfig& radar, const Files& files)
+    : directory_(directory), radar_(radar), files_(files) {
+  std::error_code error;
+  fs::create_directories(fs::path(directory) / "captures", error);
+  if (error) throw InputError(directory + ": folder cannot be made (" + error.message() + "); give one that can be written");
+  fs::remove(fs::path(directory) / "session.yaml", error);
+  writeText(fs::path(directory) / "radar.yaml", files_.radar_yaml);
+}
+
+void SessionWriter::add(const Pose& pose, const std::vector<AdcCube>& cubes) {
+  const std::string unusable = unusableName(pose.name);
+  if (!unusable.empty() || pose.name.find(',') != std::string::npos) {
+    throw InputError("pose '" + pose.name + "' " + (unusable.empty() ? "has a comma in its name" : unusable));
+  }
+  writeCapture(radar_, cubes, (fs::path(directory_) / "captures" / (pose.name + ".bin")).string());
+  poses_.push_back(pose);
+}
+
+void SessionWriter::finish() {
+  std::string csv = std::string(kPoseColumns) + "\n";
+  for (const Pose& pose : poses_) {
+    const Eigen::Vector3d& p = pose.T_map_radar.translation();
+    const Eigen::Quaterniond q(pose.T_map_radar.linear());
+    csv += pose.name + "," + pose.location + "," + formatStamp(pose.stamp_ns);
+    for (const double value : {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}) csv += "," + formatExact(value);
+    csv += "\n";
+  }
+  writeText(fs::path(directory_) / "poses.csv", csv);
+  std::string yaml = "format: mmradartwin_session/1\nradar: radar.yaml\n";
+  if (files_.scene) yaml += "scene: " + yamlText(*files_.scene) + "\n";
+  if (files_.twin) yaml += "twin: " + yamlText(*files_.twin) + "\n";
+  yaml += "poses: poses.csv\ncaptures: captures/{pose}.bin\n";
+  if (files_.gain_db) yaml += "gain_db: " + formatExact(*files_.gain_db) + "\n";
+  writeText(fs::path(directory_) / "session.yaml", yaml);
+}
+
+}  // namespace mmradartwin
