@@ -1,0 +1,80 @@
+"""The interface of hidden effects and their table."""
+import numpy as np
+
+EFFECTS = {}
+
+
+def effect(cls):
+    """Class decorator: enters an effect into the table under its name."""
+    EFFECTS[cls.name] = cls
+    return cls
+
+
+class Effect:
+    """One hidden effect. `defaults`: parameters with typical values; `main`: the one that a strength scales.
+
+    A session calls the stages in the order below; each returns its input unless the effect acts there.
+    """
+    name = ""
+    defaults = {}
+    main = None
+
+    def __init__(self, **parameters):
+        unknown = set(parameters) - set(self.defaults)
+        if unknown:
+            raise ValueError(f"effect {self.name} has no parameter {', '.join(sorted(unknown))}; it has {', '.join(self.defaults)}")
+        self.p = {**self.defaults, **parameters}
+
+    def scale(self, strength):
+        """Multiplies the main parameter."""
+        if self.main is None:
+            raise ValueError(f"effect {self.name} has no strength; it is there or not")
+        value = self.p[self.main]
+        self.p[self.main] = [strength * v for v in value] if isinstance(value, list) else strength * value
+
+    def prepare(self, measurement):
+        """Draws what was not given, once per session, before anything is traced."""
+
+    def room(self, measurement, actors, materials):
+        """The true room's actors and materials."""
+        return actors, materials
+
+    def pose(self, measurement, station):
+        """The radar's true pose."""
+        return station.true
+
+    def echoes(self, measurement, station, echoes):
+        """Changes the echoes of one pose in place."""
+
+    def if_response(self, measurement, beat_hz):
+        """Complex amplitude response of the IF chain at a beat frequency."""
+        return np.ones_like(np.asarray(beat_hz, float))
+
+    def receive(self, measurement, index, station, x):
+        """The received grid [M, N] of one pose, in amplitude units."""
+        return x
+
+    def after_gain(self, measurement, grids):
+        """Changes measurement.gain or noise_rms once all poses are known."""
+
+    def frames(self, measurement, index, station, frames, rng):
+        """Grids of all frames [F, M, N] before noise; read only, return a new array."""
+        return frames
+
+    def payload(self, measurement, index, station, payload, rng):
+        """Bytes of the capture."""
+        return payload
+
+    def truth(self, measurement):
+        """Parameters as a finding should name them."""
+        return dict(self.p)
+
+
+def make_effect(name, parameters=None, strength=None):
+    """An effect by its name. ValueError with the known names for an unknown one."""
+    if name not in EFFECTS:
+        raise ValueError(f"unknown effect '{name}'; known: {', '.join(sorted(EFFECTS))}")
+    made = EFFECTS[name](**(parameters or {}))
+    if strength is not None:
+        made.scale(strength)
+    return made
