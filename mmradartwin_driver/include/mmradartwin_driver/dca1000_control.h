@@ -1,0 +1,58 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_driver/dca1000_protocol.h"
+#include "mmradartwin_driver/udp_socket.h"
+
+namespace mmradartwin {
+
+/// The command port. Replies are matched by command code; status datagrams that come in between are kept and handed out
+/// by takeStatus(). One thread at a time.
+class Dca1000Control {
+ public:
+  struct Options {
+    std::chrono::milliseconds reply_timeout{300};
+    int attempts = 3;
+    std::chrono::milliseconds deaf_limit{5000};  ///< after CONFIG_FPGA_GEN the card does not listen for a while
+  };
+
+  /// Binds host_ip:port, talks to card_ip:port. Throws RigError, InputError.
+  Dca1000Control(const std::string& host_ip, const std::string& card_ip, std::uint16_t port);
+  Dca1000Control(const std::string& host_ip, const std::string& card_ip, std::uint16_t port, const Options& options);
+
+  // Each throws RigError where the card does not answer after all attempts or answers that it failed.
+  void connect();           ///< SYSTEM_CONNECT: is it there?
+  bool answers();           ///< connect() once, without an exception
+  void resetFpga();
+  void resetRadar();
+  FpgaVersion readVersion();
+  /// Sets lanes and format, then asks until the card listens again.
+  void configureFpga(int lanes);
+  void configurePackets(double delay_us, std::uint16_t packet_bytes = 1470);
+  void startRecord();
+  void stopRecord();
+
+  /// Next status datagram, waiting up to the given time for one.
+  std::optional<std::uint16_t> takeStatus(std::chrono::milliseconds wait);
+
+ private:
+  Dca1000Reply command(Dca1000Command command, const std::vector<std::uint8_t>& body, int attempts);
+  void done(Dca1000Command command, const std::vector<std::uint8_t>& body = {});
+  void send(Dca1000Command command, const std::vector<std::uint8_t>& body);
+  /// Next datagram of the card until `deadline`; foreign and malformed ones are skipped.
+  std::optional<Dca1000Reply> receive(std::chrono::steady_clock::time_point deadline);
+
+  Options options_;
+  std::string card_ip_;
+  sockaddr_in card_{};
+  UdpSocket socket_;
+  std::deque<std::uint16_t> statuses_;
+};
+
+}  // namespace mmradartwin

@@ -1,0 +1,130 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "mmradartwin_driver/dca1000_protocol.h"
+#include "mmradartwin_driver/frame_clock.h"
+#include "mmradartwin_dsp/adc_cube.h"
+#include "mmradartwin_dsp/radar_config.h"
+
+namespace mmradartwin {
+
+/// Puts the payload of data packets together to frames, each byte at its absolute offset in the recording: byte b belongs
+/// to frame b / bytes_per_frame. A byte that never arrives is zero in the cube, counted in lost_bytes, and its chirp is
+/// not valid; the other half of a 16-bit word that was torn goes with it. Packets may have any length, span any number
+/// of frames and come late, twice, cut short or not at all.
+///
+/// Frames are handed out in order: a complete one at once, one with holes as soon as data arrive that lie further than
+/// the reorder window behind its end, or at flush(). Frames of which not a single byte came are left out (a gap in the
+/// sequence). Bytes for frames already handed out are counted as late and dropped.
+///
+/// A packet that cannot belong to the running count (before it and no reordering, in conflict with bytes that are here,
+/// or implausibly far ahead) is held back until `confirm_packets` of them continue each other: then the count has been
+/// restarted, which ends all open frames and begins anew with frame 0 (a new epoch), or has really jumped ahead. A
+/// restart whose first packets are lost and which lands ahead of the old count cannot be told from loss; arming through
+/// restart() leaves no such doubt.
+class FrameAssembler {
+ public:
+  struct Options {
+    int window_frames = 2;                                   ///< at least; in the data, not in time
+    std::size_t window_bytes = 4 * 1472;                     ///< at least
+    std::uint64_t plausible_gap_bytes = 64u << 20;           ///< ahead of the newest byte
+    std::int64_t reorder_ns = 20'000'000;                    ///< a packet late by more than this was not reordered
+    int confirm_packets = 4;
+  };
+  struct Counters {
+    std::uint64_t packets = 0;
+    std::uint64_t bytes = 0;             ///< that found their place
+    std::uint64_t lost_bytes = 0;        ///< in frames that are over, those never received included
+    std::uint64_t duplicate_packets = 0;
+    std::uint64_t late_packets = 0;      ///< wholly or in part for frames already handed out
+    std::uint64_t reordered_packets = 0; ///< behind the newest byte, but in time
+    std::uint64_t rejected_packets = 0;  ///< fitted no count, and nothing continued them
+    std::uint64_t frames = 0;            ///< handed out
+    std::uint64_t incomplete_frames = 0; ///< of these
+    std::uint64_t missing_frames = 0;    ///< of which nothing came before later data
+    std::uint64_t epochs = 1;            ///< restarts + 1
+  };
+  using Output = std::function<void(AdcCube&&)>;
+
+  FrameAssembler(const RadarConfig& radar, Output output);  ///< with default options
+  FrameAssembler(const RadarConfig& radar, Output output, const Options& options);
+
+  void add(const DataPacket& packet);
+  /// Hands out whatever has begun. Packets may follow; those for frames handed out here are late.
+  void flush();
+  /// A recording has been armed: what is open ends, the next packet counts from byte 0 and frame 0.
+  void restart();
+
+  const Counters& counters() const { return counters_; }
+  /// Data of a frame arrived that has not been handed out.
+  bool open() const { return next_byte_ > base_frame_ * frame_bytes_ || !suspects_.empty(); }
+
+ private:
+  struct Interval {
+    std::size_t begin, end;
+  };
+  struct Slot {
+    bool begun = false;
+    std::vector<std::uint8_t> bytes;
+    std::vector<Interval> received;                 ///< sorted, disjoint, not touching
+    std::size_t received_bytes = 0;
+    std::optional<std::int64_t> observed_start_ns;  ///< by the packet with the frame's first byte
+    std::int64_t rough_start_ns = 0;                ///< by the first packet that brought anything
+  };
+  struct Suspect {
+    std::uint32_t sequence;
+    std::uint64_t byte_count;
+    std::int64_t stamp_ns;
+    bool ahead;
+    std::vector<std::uint8_t> payload;
+  };
+  /// What is kept of a packet to recognise a copy of it.
+  struct Fingerprint {
+    std::uint32_t sequence = 0;
+    std::uint64_t byte_count = 0;
+    std::size_t size = 0;  ///< 0: none
+    std::array<std::uint8_t, 64> head{};
+  };
+  enum class Fit { kPlace, kDuplicate, kBehind, kAhead };
+
+  Slot& slot(std::uint64_t frame) { return slots_[frame % slots_.size()]; }
+  std::uint64_t absoluteOffset(std::uint64_t byte_count) const;
+  Fit fit(const DataPacket& packet, std::uint64_t offset) const;
+  bool overlapsReceived(std::uint64_t offset, std::size_t size) const;
+  const Fingerprint* findCopy(const DataPacket& packet) const;
+  void suspect(const DataPacket& packet, bool ahead);
+  bool suspectsCredible() const;
+  void acceptSuspects();
+  void place(const DataPacket& packet, std::uint64_t offset);
+  void remember(const DataPacket& packet);
+  std::size_t copyMissing(Slot& slot, std::size_t begin, const std::uint8_t* from, std::size_t size);
+  void closeBefore(std::uint64_t frame);
+  void handOut(std::uint64_t frame);
+  void handOutComplete();
+  void beginEpoch();
+
+  RadarConfig radar_;
+  Output output_;
+  Options options_;
+  std::uint64_t frame_bytes_, window_bytes_;
+  FrameClock clock_;
+  Counters counters_;
+
+  std::vector<Slot> slots_;
+  std::uint64_t base_frame_ = 0;   ///< first one not handed out
+  std::uint64_t next_byte_ = 0;    ///< end of the data seen in this epoch
+  bool begun_ = false;             ///< a packet of this epoch has been placed
+  std::uint32_t newest_sequence_ = 0;
+  std::int64_t newest_stamp_ns_ = 0;
+  std::size_t longest_payload_ = 0;
+  std::vector<Suspect> suspects_;
+  std::vector<Fingerprint> recent_;
+  std::size_t recent_next_ = 0;
+};
+
+}  // namespace mmradartwin

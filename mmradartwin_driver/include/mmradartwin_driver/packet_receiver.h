@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_driver/dca1000_protocol.h"
+#include "mmradartwin_driver/udp_socket.h"
+
+namespace mmradartwin {
+
+/// The data port: reads the card's datagrams in batches, with the kernel's receive time.
+class PacketReceiver {
+ public:
+  struct Options {
+    std::size_t buffer_bytes = 32u << 20;  ///< of the socket; 0.4 s at the card's fastest
+    int batch = 64;                        ///< datagrams read in one call at most
+  };
+  struct Counters {
+    std::uint64_t packets = 0;       ///< of the card
+    std::uint64_t bytes = 0;         ///< datagram payload of these, headers included
+    std::uint64_t kernel_drops = 0;  ///< thrown away by the kernel, because the socket's buffer was full
+    std::uint64_t foreign = 0;       ///< from another address than the card's
+    std::uint64_t malformed = 0;     ///< too short for a header and a sample, or longer than Ethernet carries
+  };
+
+  /// Binds host_ip:port; takes only what comes from card_ip, whatever its port. Throws RigError, InputError.
+  PacketReceiver(const std::string& host_ip, std::uint16_t port, const std::string& card_ip);
+  PacketReceiver(const std::string& host_ip, std::uint16_t port, const std::string& card_ip, const Options& options);
+  ~PacketReceiver();
+
+  /// Waits up to timeout_ms for data, then visits what is there, one batch. Returns the number of packets visited.
+  /// The payload is valid during the visit only. Throws RigError where the socket fails.
+  int receive(int timeout_ms, const std::function<void(const DataPacket&)>& visit);
+  /// Throws away what waits in the socket: datagrams of an earlier recording.
+  void drain();
+
+  const Counters& counters() const { return counters_; }
+  /// What the kernel granted, bytes as asked for (it books twice that). Less than asked: raise net.core.rmem_max.
+  std::size_t buffer_bytes() const { return granted_bytes_; }
+
+ private:
+  struct Batch;
+  UdpSocket socket_;
+  in_addr card_;
+  std::unique_ptr<Batch> batch_;
+  Counters counters_;
+  std::size_t granted_bytes_ = 0;
+  std::uint32_t overflow_ = 0;
+};
+
+}  // namespace mmradartwin

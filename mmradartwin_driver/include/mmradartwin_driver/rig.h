@@ -1,0 +1,95 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "mmradartwin_driver/dca1000_control.h"
+#include "mmradartwin_driver/frame_assembler.h"
+#include "mmradartwin_driver/packet_receiver.h"
+#include "mmradartwin_dsp/radar_config.h"
+
+namespace mmradartwin {
+
+struct RigOptions {
+  std::string host_ip = "192.168.33.30";
+  std::string card_ip = "192.168.33.180";
+  std::uint16_t config_port = kDca1000ConfigPort;
+  std::uint16_t data_port = kDca1000DataPort;
+  double packet_delay_us = 25;
+  bool configure_card = true;  ///< false: another program configures and arms it, only the data port is opened
+  PacketReceiver::Options receiver;
+  FrameAssembler::Options assembler;
+};
+
+/// What the rig is doing, for people and diagnostics.
+struct RigState {
+  enum class Phase { kConnecting, kArmed, kStreaming };
+  Phase phase = Phase::kConnecting;
+  std::string problem;                      ///< one line that says the next thing to do; empty while all is well
+  std::optional<FpgaVersion> version;
+  std::optional<std::uint16_t> last_status; ///< of the card, since it was armed
+  std::uint64_t armings = 0;
+  double silent_s = 0;                      ///< since the last packet, or since arming
+  std::size_t buffer_bytes = 0;             ///< of the data socket, as granted
+  FrameAssembler::Counters frames;
+  PacketReceiver::Counters packets;
+};
+
+/// The capture card, from its configuration to cubes. One thread of its own: opens the sockets, configures and arms the
+/// card, receives, and does all of that again when the card or the network was gone, when the recording is completed,
+/// or when the card says that it threw samples away (after which its count no longer tells the place of a byte).
+class Rig {
+ public:
+  enum class Level { kInfo, kWarning, kError };
+  using CubeSink = std::function<void(AdcCube&&)>;
+  using EventSink = std::function<void(Level, const std::string&)>;
+
+  /// The sinks are called from the rig's thread. Throws InputError for options out of range.
+  Rig(const RadarConfig& radar, const RigOptions& options, CubeSink cubes, EventSink events);
+  ~Rig();  ///< ends the thread and the recording
+  RigState state() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void run();
+  void open();
+  void configure();
+  void arm();
+  /// Receives until the card must be armed anew.
+  void stream();
+  /// True where the status ends the recording.
+  bool handleStatus(std::uint16_t status);
+  void finishRecording();
+  bool receiveBatch(int timeout_ms);
+  void report(const std::string& problem);
+  void setPhase(RigState::Phase phase);
+  void publishState();
+  void waitToRetry();
+
+  RadarConfig radar_;
+  RigOptions options_;
+  EventSink events_;
+  FrameAssembler assembler_;
+  std::unique_ptr<PacketReceiver> receiver_;
+  std::unique_ptr<Dca1000Control> control_;
+  PacketReceiver::Counters earlier_;  ///< of receivers that were closed
+  bool configured_ = false;
+  Clock::time_point last_data_{};
+  Clock::time_point last_report_{};
+
+  mutable std::mutex mutex_;
+  RigState state_;
+  Clock::time_point silent_since_{};
+
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace mmradartwin

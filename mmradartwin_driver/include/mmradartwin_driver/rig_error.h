@@ -1,0 +1,15 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace mmradartwin {
+
+/// Something about host, network or card that a person can put right: the message is one line that says what it is and
+/// what to do next. Trying again later is sensible, unlike with InputError.
+class RigError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace mmradartwin

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <netinet/in.h>
+
+#include <cstdint>
+#include <string>
+
+namespace mmradartwin {
+
+/// A bound IPv4 datagram socket; closes itself. Never connected: the card answers from another port than it listens on.
+class UdpSocket {
+ public:
+  /// Binds host_ip:port. `purpose` stands in errors ("samples", "commands"). Throws RigError: no such address on this
+  /// host, port in use, not permitted; InputError for an address that is none.
+  UdpSocket(const std::string& host_ip, std::uint16_t port, const std::string& purpose);
+  ~UdpSocket();
+  UdpSocket(const UdpSocket&) = delete;
+  UdpSocket& operator=(const UdpSocket&) = delete;
+
+  int fd() const { return fd_; }
+  /// Waits until a datagram can be read; false after timeout_ms.
+  bool waitReadable(int timeout_ms) const;
+
+ private:
+  int fd_ = -1;
+};
+
+/// Throws InputError where `ip` is no dotted IPv4 address.
+in_addr parseIpv4(const std::string& ip);
+
+}  // namespace mmradartwin

@@ -1,0 +1,236 @@
+#include "mmradartwin_driver/rig.h"
+
+#include <utility>
+
+#include "mmradartwin_driver/rig_error.h"
+
+namespace mmradartwin {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr milliseconds kRetryAfter{2000};
+constexpr seconds kRepeatProblemAfter{10};
+constexpr milliseconds kAskWhileSilent{2000};
+/// The card sends the rest of a recording about 2 s after its last sample; what is silent for longer has ended.
+constexpr milliseconds kStreamEnded{3500};
+constexpr int kReceiveTimeout_ms = 50;
+
+PacketReceiver::Counters sum(const PacketReceiver::Counters& a, const PacketReceiver::Counters& b) {
+  return {a.packets + b.packets, a.bytes + b.bytes, a.kernel_drops + b.kernel_drops, a.foreign + b.foreign,
+          a.malformed + b.malformed};
+}
+
+}  // namespace
+
+Rig::Rig(const RadarConfig& radar, const RigOptions& options, CubeSink cubes, EventSink events)
+    : radar_(radar),
+      options_(options),
+      events_(std::move(events)),
+      assembler_(radar, std::move(cubes), options.assembler) {
+  packetDelayTicks(options_.packet_delay_us);
+  parseIpv4(options_.host_ip);
+  parseIpv4(options_.card_ip);
+  silent_since_ = Clock::now();
+  thread_ = std::thread([this] { run(); });
+}
+
+Rig::~Rig() {
+  stop_ = true;
+  thread_.join();
+}
+
+RigState Rig::state() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  RigState state = state_;
+  state.silent_s = std::chrono::duration<double>(Clock::now() - silent_since_).count();
+  return state;
+}
+
+void Rig::run() {
+  while (!stop_) {
+    try {
+      open();
+      configure();
+      arm();
+      stream();
+    } catch (const RigError& error) {
+      report(error.what());
+      assembler_.flush();
+      configured_ = false;
+      waitToRetry();
+    }
+  }
+  assembler_.flush();
+  publishState();
+  if (!control_ || !configured_) return;
+  try {
+    control_->stopRecord();
+  } catch (const RigError&) {
+    // The card is gone: nothing to stop.
+  }
+}
+
+void Rig::open() {
+  setPhase(RigState::Phase::kConnecting);
+  if (!receiver_) {
+    receiver_ = std::make_unique<PacketReceiver>(options_.host_ip, options_.data_port, options_.card_ip,
+                                                 options_.receiver);
+    const std::size_t granted = receiver_->buffer_bytes();
+    if (granted < options_.receiver.buffer_bytes) {
+      events_(Level::kWarning, "the kernel grants " + std::to_string(granted >> 10) + " kB of " +
+                                   std::to_string(options_.receiver.buffer_bytes >> 10) +
+                                   " kB for the data socket: sysctl -w net.core.rmem_max=" +
+                                   std::to_string(options_.receiver.buffer_bytes) + " keeps packets from being lost");
+    }
+  }
+  if (options_.configure_card && !control_) {
+    control_ = std::make_unique<Dca1000Control>(options_.host_ip, options_.card_ip, options_.config_port);
+  }
+}
+
+void Rig::configure() {
+  if (!options_.configure_card || configured_) return;
+  control_->connect();
+  const FpgaVersion version = control_->readVersion();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    state_.version = version;
+  }
+  control_->resetFpga();
+  control_->configureFpga(radar_.layout == CaptureLayout::kTwoLane ? 2 : 4);
+  control_->configurePackets(options_.packet_delay_us);
+  configured_ = true;
+  events_(Level::kInfo, "DCA1000 at " + options_.card_ip + " configured, FPGA " + std::to_string(version.major) + "." +
+                            std::to_string(version.minor));
+}
+
+void Rig::arm() {
+  if (options_.configure_card) {
+    // What an earlier recording left in the socket would be taken for the start of this one.
+    receiver_->drain();
+    while (control_->takeStatus(milliseconds(0))) {
+    }
+    assembler_.restart();
+    control_->startRecord();
+  }
+  last_data_ = Clock::now();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    silent_since_ = last_data_;
+    state_.last_status.reset();
+    state_.problem.clear();
+    ++state_.armings;
+  }
+  setPhase(RigState::Phase::kArmed);
+  events_(Level::kInfo, options_.configure_card ? "armed: waiting for the radar's frames"
+                                                : "listening for a card that another program configures");
+}
+
+bool Rig::receiveBatch(int timeout_ms) {
+  const int packets = receiver_->receive(timeout_ms, [this](const DataPacket& packet) { assembler_.add(packet); });
+  if (packets > 0) last_data_ = Clock::now();
+  return packets > 0;
+}
+
+void Rig::stream() {
+  bool any_data = false, ended = false;
+  Clock::time_point asked = Clock::now();
+  while (!stop_) {
+    if (receiveBatch(kReceiveTimeout_ms)) {
+      if (!any_data || ended) {
+        setPhase(RigState::Phase::kStreaming);
+        events_(Level::kInfo, "samples arrive");
+      }
+      any_data = true;
+      ended = false;
+    }
+    publishState();
+    const auto silent = Clock::now() - last_data_;
+    if (any_data && !ended && silent > kStreamEnded) {
+      ended = true;
+      assembler_.flush();
+      setPhase(RigState::Phase::kArmed);
+      events_(Level::kWarning, "samples have stopped");
+      if (options_.configure_card) return finishRecording();
+    }
+    if (!options_.configure_card) continue;
+    while (const auto status = control_->takeStatus(milliseconds(0))) {
+      if (handleStatus(*status)) return finishRecording();
+    }
+    if (silent > kAskWhileSilent && Clock::now() - asked > kAskWhileSilent) {
+      asked = Clock::now();
+      control_->connect();  // throws where the card is gone; it is configured anew when it is back
+    }
+  }
+}
+
+bool Rig::handleStatus(std::uint16_t status) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    state_.last_status = status;
+  }
+  if (status & kFatalStatus) {
+    assembler_.flush();
+    events_(Level::kError, "the card threw samples away (" + describeStatus(status) +
+                               "): frames of the last moments may be shifted; arming it anew. Should it happen again, "
+                               "lower packet_delay_us or send fewer samples per second");
+    return true;
+  }
+  if (status & kRecordCompleted) {
+    events_(Level::kInfo, "the card has completed its recording: the radar's frames have ended");
+    return true;
+  }
+  if (status != 0) events_(Level::kWarning, "status of the card: " + describeStatus(status));
+  return false;
+}
+
+/// Takes what is still on its way, and ends the recording on the card.
+void Rig::finishRecording() {
+  while (receiveBatch(20) && !stop_) {
+  }
+  assembler_.flush();
+  control_->stopRecord();
+  publishState();
+}
+
+void Rig::report(const std::string& problem) {
+  bool repeated;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    repeated = state_.problem == problem;
+    state_.problem = problem;
+    state_.phase = RigState::Phase::kConnecting;
+  }
+  if (repeated && Clock::now() - last_report_ < kRepeatProblemAfter) return;
+  last_report_ = Clock::now();
+  events_(Level::kError, problem);
+}
+
+void Rig::setPhase(RigState::Phase phase) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  state_.phase = phase;
+}
+
+void Rig::publishState() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  state_.frames = assembler_.counters();
+  if (receiver_) {
+    state_.packets = sum(earlier_, receiver_->counters());
+    state_.buffer_bytes = receiver_->buffer_bytes();
+  }
+  silent_since_ = last_data_;
+}
+
+/// Closes the sockets, so that the next try finds addresses and ports as they are then.
+void Rig::waitToRetry() {
+  if (receiver_) earlier_ = sum(earlier_, receiver_->counters());
+  receiver_.reset();
+  control_.reset();
+  for (auto until = Clock::now() + kRetryAfter; Clock::now() < until && !stop_;) {
+    std::this_thread::sleep_for(milliseconds(50));
+  }
+}
+
+}  // namespace mmradartwin
