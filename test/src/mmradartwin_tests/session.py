@@ -189,6 +189,7 @@ class Measurement:
         directory = settings.output
         os.makedirs(os.path.join(directory, "captures"), exist_ok=True)
         jobs = settings.jobs or min(len(self.stations), os.cpu_count() or 1)
+        self.tracer.diffuse(self.stations[0].true)   # the scatter points are then shared by all processes
         if jobs > 1:
             with multiprocessing.get_context("fork").Pool(jobs, _limit_threads) as pool:
                 results = pool.map(self.propagate, self.stations, chunksize=2)

@@ -117,10 +117,11 @@ class Tracer:
         self._is_corner = np.zeros_like(faces)
         for a, b in corner_pairs:
             self._is_corner[a, b] = True
-        self._prepare_scatter(scatter_density_per_m2, speckle_seed)
+        self._scatter_settings = (scatter_density_per_m2, speckle_seed)
+        self._scatter_points = None
 
-    def _prepare_scatter(self, density, seed):
-        room = self.room
+    def _prepare_scatter(self):
+        room, (density, seed) = self.room, self._scatter_settings
         points, area, facet = [], [], []
         for f in np.flatnonzero(room.reflects):
             if not room.material[room.actor[f]].scattering:
@@ -152,7 +153,7 @@ class Tracer:
         tx, rx = pose.to_map(self.radar.tx), pose.to_map(self.radar.rx)
         out = np.linalg.norm(points[:, None, :] - tx, axis=2)
         back = np.linalg.norm(points[:, None, :] - rx, axis=2)
-        return (out[:, :, None] + back[:, None, :]).reshape(len(points), -1)
+        return (out[:, :, None] + back[:, None, :]).reshape(len(points), self.radar.channels)
 
     def image_lengths(self, pose, facets):
         """[M] path lengths by images of each transmitter over the facets in order."""
@@ -325,6 +326,8 @@ class Tracer:
 
     def diffuse(self, pose):
         """Scatter points seen from one pose."""
+        if self._scatter_points is None:
+            self._prepare_scatter()
         room, wavelength, p = self.room, self.radar.wavelength_m, pose.position
         ray = self._scatter_points - p
         r = np.linalg.norm(ray, axis=1)
