@@ -112,6 +112,7 @@ void readPoses(const std::string& file, Recording& recording) {
     if (!names.insert(pose.name).second) {
       throw InputError(where + "pose '" + pose.name + "' stands twice; every pose needs a name of its own");
     }
+    recording.pose_names.push_back(pose.name);
     const std::string problem = readRow(fields, pose);
     if (problem.empty()) {
       recording.poses.push_back(pose);
@@ -199,6 +200,7 @@ Recording openSession(const std::string& path, const SessionOptions& options) {
   recording.source = path;
   recording.name = fs::weakly_canonical(fs::absolute(file)).parent_path().filename().string();
   recording.radar_file = resolvePath(yaml.text("radar"), file.string());
+  if (!options.radar_file.empty()) recording.radar_file = options.radar_file;
   const std::string poses_file = resolvePath(yaml.text("poses"), file.string());
   if (yaml.has("scene")) recording.scene_file = resolvePath(yaml.text("scene"), file.string());
   if (yaml.has("twin")) recording.twin_file = resolvePath(yaml.text("twin"), file.string());
@@ -213,6 +215,8 @@ Recording openSession(const std::string& path, const SessionOptions& options) {
   }
   yaml.rejectUnknownKeys();
   recording.radar = loadRadarConfig(recording.radar_file);
+  if (options.layout) recording.radar.layout = *options.layout;
+  recording.capture_pattern = pattern;
   readPoses(poses_file, recording);
   if (options.need_captures) rejectOverlap(recording, pattern, poses_file);
   if (options.exclude_duplicates) excludeDuplicates(recording);
@@ -239,6 +243,7 @@ Recording openCapture(const std::string& file, const RadarConfig& radar) {
   recording.radar_file = file;
   Pose pose;
   pose.name = pose.location = recording.name;
+  recording.pose_names.push_back(pose.name);
   recording.poses.push_back(pose);
   recording.forEachFrame = [reader](const Pose& pose, const std::function<void(const AdcCube&)>& visit) {
     for (int i = 0; i < reader.frames(); ++i) visit(reader.frame(i, pose.stamp_ns));

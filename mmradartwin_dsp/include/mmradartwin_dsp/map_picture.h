@@ -20,13 +20,15 @@ struct FanBox {
 struct FanStyle {
   double min_db = -50, max_db = 0;     ///< colour limits
   bool normalise = true;               ///< to the peak beyond 0.16 m and within +-60 deg
-  bool diverging = false;              ///< residual maps: blue - white - red around 0
+  /// Residual maps: blue (negative) - white - red (positive), never normalised, limits made symmetric.
+  bool diverging = false;
   double max_range_m = 10;
   int height_px = 600;
   std::string title;
 };
 
 /// A fan seen from above (boresight up, left is left) with range arcs, spokes and a colour bar.
+/// NaN cells and the sectors that the array cannot see are grey.
 cv::Mat drawFan(const RangeAngleAxes& axes, const RealGrid& power_db, const FanStyle& style,
                 const std::vector<FanBox>& boxes = {});
 /// CSV `range_m,azimuth_deg,power_db`, a row per cell, not normalised.

@@ -37,6 +37,8 @@ struct Recording {
   std::vector<Pose> poses;                       ///< in file order, duplicates and unusable ones left out
   std::vector<std::string> duplicates;           ///< names of excluded poses (10 cm, 2 cm, 1 deg of an earlier one)
   std::vector<PoseProblem> problems;             ///< poses that cannot be used (NaN, unreadable, ...)
+  std::vector<std::string> pose_names;           ///< every pose that the session names, in its order
+  std::string capture_pattern;                   ///< path of a capture with {pose} for the name; empty where there are no files
   /// Visits the frames of a pose in order. Throws InputError where its capture is missing or damaged.
   std::function<void(const Pose&, const std::function<void(const AdcCube&)>&)> forEachFrame;
 };
@@ -47,6 +49,8 @@ struct Recording {
 struct SessionOptions {
   bool need_captures = true;
   bool exclude_duplicates = true;
+  std::string radar_file;                        ///< instead of the one that the session names
+  std::optional<CaptureLayout> layout;           ///< instead of the radar's
 };
 Recording openSession(const std::string& path, const SessionOptions& options = {});
 

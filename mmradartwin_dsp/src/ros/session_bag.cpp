@@ -1,0 +1,292 @@
+#include <mmradartwin_msgs/Session.h>
+#include <openssl/evp.h>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "mmradartwin_dsp/capture.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/ros/bag.h"
+#include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/session_files.h"
+
+namespace mmradartwin {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Sha256 {
+ public:
+  Sha256() : context_(EVP_MD_CTX_new(), EVP_MD_CTX_free) { EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr); }
+  void add(const void* bytes, std::size_t size) { EVP_DigestUpdate(context_.get(), bytes, size); }
+  std::string hex() {
+    unsigned char digest[EVP_MAX_MD_SIZE];
+    unsigned int size = 0;
+    EVP_DigestFinal_ex(context_.get(), digest, &size);
+    std::string text;
+    for (unsigned int i = 0; i < size; ++i) {
+      text += "0123456789abcdef"[digest[i] >> 4];
+      text += "0123456789abcdef"[digest[i] & 15];
+    }
+    return text;
+  }
+
+ private:
+  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
+};
+
+std::string captureOf(const std::string& pattern, const std::string& pose) {
+  std::string file = pattern;
+  return file.replace(file.find("{pose}"), 6, pose);
+}
+
+std::string readBytes(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << in.rdbuf();
+  return bytes.str();
+}
+
+std::string sha256(const std::string& bytes) {
+  Sha256 hash;
+  hash.add(bytes.data(), bytes.size());
+  return hash.hex();
+}
+
+/// Writes a message that `rosbag play` publishes latched.
+template <typename Message>
+void writeLatched(rosbag::Bag& bag, const std::string& topic, const ros::Time& time, const Message& message) {
+  const auto header = boost::make_shared<ros::M_string>();
+  (*header)["callerid"] = "/session_to_bag";
+  (*header)["latching"] = "1";
+  (*header)["md5sum"] = ros::message_traits::md5sum(message);
+  (*header)["message_definition"] = ros::message_traits::definition(message);
+  (*header)["topic"] = topic;
+  (*header)["type"] = ros::message_traits::datatype(message);
+  bag.write(topic, time, message, header);
+}
+
+ros::Time recordTime(std::int64_t stamp_ns) { return toRosTime(std::max<std::int64_t>(1, stamp_ns)); }
+
+/// True where cubes give back the capture bit for bit.
+bool survivesCubes(const RadarConfig& radar, const CaptureReader& reader) {
+  std::vector<std::int16_t> samples;
+  for (int i = 0; i < reader.frames(); ++i) {
+    const std::vector<std::uint8_t> bytes = reader.bytes(i);
+    decodeFrame(radar, bytes.data(), samples);
+    if (encodeFrame(radar, samples) != bytes) return false;
+  }
+  return true;
+}
+
+class SessionBagWriter {
+ public:
+  SessionBagWriter(const Recording& recording, rosbag::Bag& bag)
+      : recording_(recording), bag_(bag), hash_(radarHash(recording.radar)) {}
+
+  /// Returns true where the pose's capture went into the bag as cubes.
+  bool add(const Pose& pose) {
+    try {
+      const CaptureReader reader(recording_.radar, captureOf(recording_.capture_pattern, pose.name));
+      if (!survivesCubes(recording_.radar, reader)) return false;
+      const std::int64_t quarter = recording_.radar.frame_offset_ns(1) / 4;
+      writePose(pose, pose.stamp_ns - quarter);
+      for (int i = 0; i < reader.frames(); ++i) {
+        mmradartwin_msgs::AdcCube cube = toMsg(reader.frame(i, pose.stamp_ns), hash_);
+        cube.header.frame_id = "radar_link";
+        bag_.write("/radar/adc", recordTime(pose.stamp_ns + recording_.radar.frame_offset_ns(i)), cube);
+      }
+      writePose(pose, pose.stamp_ns + recording_.radar.frame_offset_ns(reader.frames() - 1) + quarter);
+      return true;
+    } catch (const InputError&) {  // missing or truncated: reading the bag will say so, as reading the session does
+      return false;
+    }
+  }
+
+ private:
+  void writePose(const Pose& pose, std::int64_t stamp_ns) {
+    tf2_msgs::TFMessage tf;
+    tf.transforms.resize(1);
+    geometry_msgs::TransformStamped& T = tf.transforms.front();
+    T.header.stamp = recordTime(stamp_ns);
+    T.header.frame_id = "map";
+    T.child_frame_id = "radar_link";
+    const geometry_msgs::Pose msg = toMsg(pose.T_map_radar);
+    T.transform.translation.x = msg.position.x;
+    T.transform.translation.y = msg.position.y;
+    T.transform.translation.z = msg.position.z;
+    T.transform.rotation = msg.orientation;
+    bag_.write("/tf", T.header.stamp, tf);
+  }
+
+  const Recording& recording_;
+  rosbag::Bag& bag_;
+  std::uint64_t hash_;
+};
+
+}  // namespace
+
+namespace {
+
+boost::shared_ptr<mmradartwin_msgs::Session> readSessionMessage(const std::string& bag_file) {
+  const rosbag::Bag bag(bag_file, rosbag::bagmode::Read);
+  rosbag::View view(bag, rosbag::TypeQuery("mmradartwin_msgs/Session"));
+  boost::shared_ptr<mmradartwin_msgs::Session> session;
+  for (const rosbag::MessageInstance& message : view) session = message.instantiate<mmradartwin_msgs::Session>();
+  return session;
+}
+
+/// Writes the frames of a pose back to back; returns the SHA-256 of what was written.
+std::string writeFrames(const Recording& recording, const Pose& pose, const std::string& file) {
+  fs::create_directories(fs::path(file).parent_path());
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  Sha256 hash;
+  recording.forEachFrame(pose, [&](const AdcCube& cube) {
+    const std::vector<std::uint8_t> bytes = encodeFrame(recording.radar, cube.data);
+    hash.add(bytes.data(), bytes.size());
+    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  });
+  out.close();
+  if (!out) throw std::runtime_error(file + ": cannot be written; check folder, rights and free space");
+  return hash.hex();
+}
+
+void restoreSession(const mmradartwin_msgs::Session& message, const std::string& bag, const std::string& directory,
+                    const PoseProgress& progress) {
+  std::vector<StoredFile> files;
+  for (const mmradartwin_msgs::SessionFile& file : message.files) {
+    files.push_back({file.name, std::string(file.data.begin(), file.data.end())});
+  }
+  const auto has_file = [&files](const std::string& name) {
+    return std::any_of(files.begin(), files.end(), [&](const StoredFile& file) { return file.name == name; });
+  };
+  if (!has_file("session.yaml")) throw InputError(bag + ": its session message holds no session.yaml; record it anew");
+  const auto session_yaml = std::find_if(files.begin(), files.end(), [](const StoredFile& f) { return f.name == "session.yaml"; });
+  const std::string pattern = storedCapturePattern(session_yaml->bytes);
+  BagOptions options;
+  options.exclude_duplicates = false;
+  const Recording recording = openBag(bag, options);
+  const std::size_t total = recording.pose_names.size();
+  std::vector<std::string> different;
+  for (std::size_t i = 0; i < total; ++i) {
+    const std::string& name = recording.pose_names[i];
+    const std::string expected = i < message.capture_sha256.size() ? message.capture_sha256[i] : "";
+    const auto pose = std::find_if(recording.poses.begin(), recording.poses.end(), [&](const Pose& p) { return p.name == name; });
+    if (!expected.empty() && !has_file(captureOf(pattern, name))) {
+      std::string found;
+      try {
+        if (pose != recording.poses.end()) {
+          found = writeFrames(recording, *pose, (fs::path(directory) / captureOf(pattern, name)).string());
+        }
+      } catch (const InputError&) {  // no frames: counted below, as any other difference
+        fs::remove(fs::path(directory) / captureOf(pattern, name));
+      }
+      if (found != expected) different.push_back(name);
+    }
+    if (progress) progress(static_cast<int>(i) + 1, static_cast<int>(total));
+  }
+  restoreSessionFiles(files, directory);
+  if (different.empty()) return;
+  throw InputError(bag + ": pose '" + different.front() + "'" +
+                   (different.size() > 1 ? " and " + std::to_string(different.size() - 1) + " more" : "") +
+                   ": the bag's frames are not the whole capture (lost on the way, or cut out); the rest of the session was written to " +
+                   directory);
+}
+
+void writeFoundSession(const std::string& bag, const std::string& directory, const PoseProgress& progress) {
+  BagOptions options;
+  options.exclude_duplicates = false;
+  options.unpack_to = directory;
+  const Recording recording = openBag(bag, options);
+  SessionWriter::Files files;
+  files.radar_yaml = toYaml(recording.radar);
+  files.scene = recording.scene_file;
+  if (recording.twin_file) files.twin = fs::path(*recording.twin_file).filename().string();
+  SessionWriter writer(directory, recording.radar, files);
+  for (std::size_t i = 0; i < recording.poses.size(); ++i) {
+    std::vector<AdcCube> cubes;
+    recording.forEachFrame(recording.poses[i], [&cubes](const AdcCube& cube) { cubes.push_back(cube); });
+    writer.add(recording.poses[i], cubes);
+    if (progress) progress(static_cast<int>(i) + 1, static_cast<int>(recording.poses.size()));
+  }
+  writer.finish();
+}
+
+}  // namespace
+
+void bagToSession(const std::string& bag, const std::string& directory, const PoseProgress& progress) {
+  if (fs::exists(fs::path(directory) / "session.yaml")) {
+    throw InputError(directory + ": holds a session already; give a new folder");
+  }
+  if (!fs::is_regular_file(bag)) throw InputError(bag + ": no such bag; give a file that exists");
+  boost::shared_ptr<mmradartwin_msgs::Session> message;
+  try {
+    message = readSessionMessage(bag);
+  } catch (const rosbag::BagException&) {  // openBag says what is wrong with it
+  }
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error) throw InputError(directory + ": folder cannot be made (" + error.message() + "); give one that can be written");
+  message ? restoreSession(*message, bag, directory, progress) : writeFoundSession(bag, directory, progress);
+}
+
+void sessionToBag(const std::string& session, const std::string& bag_file, const PoseProgress& progress) {
+  SessionOptions options;
+  options.exclude_duplicates = false;
+  const Recording recording = openSession(session, options);
+  mmradartwin_msgs::Session message;
+  message.header.frame_id = "map";
+  message.name = recording.name;
+  const std::vector<StoredFile> files = gatherSessionFiles(session);
+  const std::string stored_pattern = storedCapturePattern(files.front().bytes);
+  for (const StoredFile& file : files) {
+    message.files.emplace_back();
+    message.files.back().name = file.name;
+    message.files.back().data.assign(file.bytes.begin(), file.bytes.end());
+  }
+
+  const std::string unfinished = bag_file + ".active";
+  rosbag::Bag bag;
+  try {
+    bag.open(unfinished, rosbag::bagmode::Write);
+  } catch (const rosbag::BagException& error) {
+    throw InputError(bag_file + ": bag cannot be written (" + error.what() + "); give a file in a folder that can be written");
+  }
+  std::int64_t start_ns = std::numeric_limits<std::int64_t>::max();
+  for (const Pose& pose : recording.poses) start_ns = std::min(start_ns, pose.stamp_ns);
+  if (recording.poses.empty()) start_ns = 0;
+  const ros::Time start = recordTime(start_ns - recording.radar.frame_offset_ns(1));
+  message.header.stamp = start;
+
+  SessionBagWriter writer(recording, bag);
+  const int total = static_cast<int>(recording.pose_names.size());
+  for (int i = 0; i < total; ++i) {
+    const std::string& name = recording.pose_names[static_cast<std::size_t>(i)];
+    const std::string capture = captureOf(recording.capture_pattern, name);
+    const bool exists = fs::is_regular_file(capture);
+    const std::string bytes = exists ? readBytes(capture) : "";
+    message.capture_sha256.push_back(exists ? sha256(bytes) : "");
+    const auto pose = std::find_if(recording.poses.begin(), recording.poses.end(), [&](const Pose& p) { return p.name == name; });
+    const bool in_cubes = exists && pose != recording.poses.end() && writer.add(*pose);
+    if (exists && !in_cubes) {
+      message.files.emplace_back();
+      message.files.back().name = captureOf(stored_pattern, name);
+      message.files.back().data.assign(bytes.begin(), bytes.end());
+    }
+    if (progress) progress(i + 1, total);
+  }
+  mmradartwin_msgs::RadarConfig config = toMsg(recording.radar);
+  config.header.stamp = start;
+  config.header.frame_id = "radar_link";
+  writeLatched(bag, "/radar/config", start, config);
+  writeLatched(bag, "/session", start, message);
+  bag.close();
+  fs::rename(unfinished, bag_file);
+}
+
+}  // namespace mmradartwin
