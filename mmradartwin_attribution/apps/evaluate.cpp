@@ -1,0 +1,138 @@
+// Compares a recording with its twin (or with a simulated session): the paper's table, per-pose results, pictures, a report.
+
+#include <CLI/CLI.hpp>
+#include <boost/timer/progress_display.hpp>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "mmradartwin_attribution/evaluation.h"
+#include "mmradartwin_attribution/pose_picture.h"
+#include "mmradartwin_attribution/report.h"
+#include "mmradartwin_attribution/ros/results_bag.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/map_picture.h"
+#include "mmradartwin_dsp/ros/bag.h"
+
+namespace {
+
+using namespace mmradartwin;
+
+struct Arguments {
+  std::string recording, output, twin, simulated, config, radar, layout, scene;
+  int jobs = 0;
+  bool no_pictures = false, no_bag = false;
+};
+
+Recording open(const std::string& path, const Arguments& arguments) {
+  if (std::filesystem::path(path).extension() == ".bag") return openRecording(path, arguments.radar);
+  SessionOptions options;
+  options.radar_file = arguments.radar;
+  if (arguments.layout == "4lane") options.layout = CaptureLayout::kFourLane;
+  if (arguments.layout == "2lane") options.layout = CaptureLayout::kTwoLane;
+  return openSession(path, options);
+}
+
+int run(const Arguments& arguments, const std::vector<std::string>& command) {
+  const Recording recording = open(arguments.recording, arguments);
+  std::optional<std::string> scene_file = recording.scene_file;
+  if (!arguments.scene.empty()) scene_file = arguments.scene;
+  std::string twin_file = arguments.twin;
+  if (twin_file.empty() && recording.twin_file && arguments.simulated.empty()) twin_file = *recording.twin_file;
+
+  // The twin also brings the scene that the expected regions come from.
+  Twin twin(loadTwin(arguments.simulated.empty() ? twin_file : "", scene_file, recording.radar));
+  Recording other;
+  SimulatedBranch simulated;
+  if (arguments.simulated.empty()) {
+    std::vector<Eigen::Isometry3d> poses;
+    for (const Pose& pose : recording.poses) poses.push_back(pose.T_map_radar);
+    twin.prepare(poses);
+    simulated = simulatedByTwin(twin);
+  } else {
+    other = open(arguments.simulated, arguments);
+    simulated = simulatedBySession(other);
+  }
+
+  const ReportWriter report(arguments.output);
+  EvaluationOptions options;
+  if (!arguments.config.empty()) options.config = loadAttributionConfig(arguments.config);
+  options.jobs = arguments.jobs;
+  const SignalChain chain(recording.radar);
+  const EvaluationField field(options.config, recording.radar, chain.axes());
+  std::unique_ptr<ResultsBag> bag;
+  if (!arguments.no_bag) bag = std::make_unique<ResultsBag>(arguments.output + "/results.bag", field, twin.scene());
+  options.on_pose = [&](const PoseResult& pose) {
+    if (!arguments.no_pictures) writePicture(drawPose(field, pose), report.pictureFile(pose.pose.name));
+    if (bag) bag->add(pose);
+  };
+  std::unique_ptr<boost::timer::progress_display> progress;
+  options.on_progress = [&](std::size_t, std::size_t all) {
+    if (!progress) progress = std::make_unique<boost::timer::progress_display>(all, std::cerr, "poses\n");
+    ++*progress;
+  };
+  const Evaluation evaluation = evaluate(recording, simulated, twin.scene(), twin.rays(), options);
+
+  std::vector<Pose> used;
+  for (const PoseResult& pose : evaluation.poses) {
+    if (pose.used) used.push_back(pose.pose);
+  }
+  writePicture(drawCoverage(twin.scene(), used), arguments.output + "/coverage.png");
+  if (bag) bag->finish(evaluation);
+
+  RunDescription description;
+  description.command = command;
+  description.recording = arguments.recording;
+  description.simulated = arguments.simulated.empty() ? "twin" : arguments.simulated;
+  description.version = packageVersion();
+  description.attribution_yaml = toYaml(options.config);
+  description.radar_yaml = toYaml(recording.radar);
+  std::vector<std::string> more = {arguments.config, arguments.radar, twin_file, twin.description().scene_file};
+  if (arguments.simulated.empty()) {
+    description.twin_yaml = twin.description().toYaml();
+  } else {
+    const std::vector<std::string> files = inputFiles(arguments.simulated, other, {});
+    more.insert(more.end(), files.begin(), files.end());
+  }
+  description.inputs = hashFiles(inputFiles(arguments.recording, recording, more));
+  report.write(evaluation, options.config, description);
+
+  for (const PoseProblem& problem : evaluation.problems) std::cerr << "error: " << problem.message << '\n';
+  std::cout << reportText(evaluation, options.config) << "Report: " << arguments.output << "/index.html\n";
+  return evaluation.problems.empty() ? 0 : 2;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app("Compares a recorded session with its twin and attributes what differs.");
+  app.name("evaluate");
+  app.add_option("recording", arguments.recording, "session directory, session.yaml or bag")->required();
+  app.add_option("--output", arguments.output, "folder for table, CSV, pictures and report")->required();
+  app.add_option("--twin", arguments.twin, "twin.yaml (default: the session's, or the base mechanisms)");
+  app.add_option("--scene", arguments.scene, "scene.yaml where the recording names none");
+  app.add_option("--simulated", arguments.simulated, "take the simulated maps from this session instead of a twin");
+  app.add_option("--config", arguments.config, "attribution.yaml (default: the built-in values, as shipped)");
+  app.add_option("--radar", arguments.radar, "radar.yaml for a recording without one");
+  app.add_option("--layout", arguments.layout, "byte layout of the captures, instead of radar.yaml's")
+      ->check(CLI::IsMember({"4lane", "2lane"}));
+  app.add_option("--jobs", arguments.jobs, "threads (default: one per core)")->check(CLI::Range(1, 1024));
+  app.add_flag("--no-pictures", arguments.no_pictures, "leave the per-pose pictures out");
+  app.add_flag("--no-bag", arguments.no_bag, "leave results.bag (for rviz) out");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int status = app.exit(error, std::cout, std::cerr);
+    return status == 0 ? 0 : 2;
+  }
+  try {
+    return run(arguments, std::vector<std::string>(argv, argv + argc));
+  } catch (const InputError& error) {
+    std::cerr << "error: " << error.what() << '\n';
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << "error: " << error.what() << '\n';
+    return 1;
+  }
+}

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_attribution/evaluation.h"
+
+namespace mmradartwin {
+
+/// Colour of a class, blue, green, red 0..255: five hues of Okabe and Ito that stay apart under colour blindness.
+cv::Scalar classColor_bgr(ResidualClass c);
+
+/// Measured, simulated and residual fan of one pose side by side. White boxes: expected regions where both branches respond
+/// strongly; magenta boxes: residuals, drawn on the branch that is stronger. Boxes name actors; below stands a list of the
+/// residuals with class and levels.
+cv::Mat drawPose(const EvaluationField& field, const PoseResult& result);
+
+/// Acquisition coverage: the scene from above, coloured by material, with the radar's places and headings. Horizontal
+/// surfaces above `cut_height_m` (a ceiling) are left out.
+cv::Mat drawCoverage(const Scene& scene, const std::vector<Pose>& poses, double cut_height_m = 2.0);
+
+}  // namespace mmradartwin

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_attribution/attribution_config.h"
+#include "mmradartwin_attribution/response.h"
+#include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_sim/scene.h"
+
+namespace mmradartwin {
+
+enum class RegionKind {
+  kFacing,  ///< a facet that faces the radar: foot of the perpendicular inside it
+  kCorner,  ///< concave right angle of two facets
+  kEdge,    ///< the rim of a facet, nearest to a foot that lies beside it
+  kExtent   ///< nearest visible point of an object that has none of these
+};
+const std::string& regionKindName(RegionKind kind);
+
+/// Where scene and pose alone say that a strong response should be.
+struct ResponseRegion {
+  double range_m = 0;
+  double azimuth_rad = 0;            ///< as a line array along y sees it: asin of the direction's y
+  RegionKind kind = RegionKind::kExtent;
+  std::vector<int> actors;           ///< Scene::actors; two for a corner between actors
+  std::string actor, material;       ///< names and tags, joined with ";"
+  Eigen::Vector3d point;             ///< map
+  double support_db = 0;             ///< geometric level of a perfect reflector, 20 log10(lambda/(8 pi R) aperture)
+  Field field = Field::kCentral;
+  bool measured_strong = false;      ///< filled by the comparison: a measured response >= strong in the tight window
+  bool simulated_strong = false;     ///< and a simulated one
+};
+
+/// Expected regions of one scene. What depends on the scene alone is found once; regions() is const and thread-safe.
+class RegionModel {
+ public:
+  /// Keeps references: scene and rays must outlive it.
+  RegionModel(const Scene& scene, const RayCaster& rays, const EvaluationField& field, const RadarConfig& radar);
+  /// Regions of a pose in order of range. No two of one actor lie in each other's tight window, so that none share a cell.
+  std::vector<ResponseRegion> regions(const Eigen::Isometry3d& T_map_radar) const;
+  /// Concave right-angled corners of the scene: pairs of facets with the segment they share.
+  struct Corner {
+    int first, second;                        ///< facets
+    Eigen::Vector3d begin, end;               ///< of the common segment, map
+    double toward_second, toward_first;       ///< sign of the plane distance on which the other facet lies
+    double width_first_m, width_second_m;     ///< from the line to the far end
+  };
+  const std::vector<Corner>& corners() const { return corners_; }
+
+ private:
+  struct Probe { Eigen::Vector3d point; int facet; };
+  void findCorners();
+  void placeProbes();
+  bool seen(const Eigen::Vector3d& radar_map, const Eigen::Vector3d& point, const Eigen::Vector3d& inward) const;
+  bool place(const Eigen::Isometry3d& T_map_radar, const Eigen::Vector3d& point, ResponseRegion& region) const;
+  void addFacets(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const;
+  void addCorners(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const;
+  void addExtents(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const;
+
+  const Scene& scene_;
+  const RayCaster& rays_;
+  EvaluationField field_;
+  double wavelength_m_;
+  double max_range_m_;
+  std::vector<Corner> corners_;
+  std::vector<std::vector<Probe>> probes_;    // per actor
+};
+
+/// Fresnel aperture factor of one axis, |E(u2) - E(u1)|/|1 - j| with E = C - jS: 1 for an unbounded plane. u = 2x/sqrt(lambda R)
+/// with x from the foot of the perpendicular to the facet's two ends.
+double fresnelAperture(double u1, double u2);
+
+}  // namespace mmradartwin

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <mmradartwin_msgs/Ledger.h>
+#include <mmradartwin_msgs/PathRecords.h>
+#include <mmradartwin_msgs/Residuals.h>
+#include <mmradartwin_msgs/Scene.h>
+
+#include <string>
+#include <vector>
+
+#include "mmradartwin_attribution/ledger.h"
+#include "mmradartwin_attribution/residual.h"
+
+namespace mmradartwin {
+
+/// The caller sets the headers.
+mmradartwin_msgs::Residuals toMsg(const EvaluationField& field, const PoseAttribution& pose, const std::string& name,
+                                  const Eigen::Isometry3d& T_map_radar);
+mmradartwin_msgs::Ledger toMsg(const LedgerSummary& summary, const std::vector<std::string>& duplicates);
+
+/// Records with the indices of `scene`'s actors (-1 for a name it lacks); facets are not in the message.
+std::vector<PathRecord> pathsFromMsg(const mmradartwin_msgs::PathRecords& msg, const Scene& scene);
+/// Actors with their triangles, tags and colours, facets rebuilt. Throws InputError for broken geometry (a triangle count
+/// that is no whole number, coordinates that are not finite).
+Scene sceneFromMsg(const mmradartwin_msgs::Scene& msg);
+
+}  // namespace mmradartwin

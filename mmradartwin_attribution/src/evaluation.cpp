@@ -1,0 +1,108 @@
+#include "mmradartwin_attribution/evaluation.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <mutex>
+
+#include "mmradartwin_dsp/coherent_average.h"
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin {
+
+RangeAngleMap averagedMap(const Recording& recording, const SignalChain& chain, const Pose& pose) {
+  CoherentAverage average(recording.radar, 0);
+  recording.forEachFrame(pose, [&](const AdcCube& cube) { average.add(cube); });
+  if (!average.complete()) {
+    throw InputError("pose " + pose.name + ": its capture holds no valid chirp for some TDM slot; record it again");
+  }
+  ReceiveGrid grid = average.grid();
+  grid.pose_valid = true;
+  grid.T_map_radar = pose.T_map_radar;
+  RangeAngleMap map = chain.map(grid);
+  map.frames = average.frames();
+  return map;
+}
+
+SimulatedBranch simulatedByTwin(const Twin& twin) {
+  auto chain = std::make_shared<SignalChain>(twin.radar());
+  return [&twin, chain](const Pose& pose) {
+    Simulation simulation = twin.simulate(pose.T_map_radar, pose.stamp_ns);
+    return SimulatedPose{chain->map(simulation.grid), std::move(simulation.records)};
+  };
+}
+
+SimulatedBranch simulatedBySession(const Recording& session) {
+  auto chain = std::make_shared<SignalChain>(session.radar);
+  auto reading = std::make_shared<std::mutex>();
+  return [&session, chain, reading](const Pose& pose) {
+    for (const Pose& candidate : session.poses) {
+      if (candidate.name != pose.name) continue;
+      const std::lock_guard<std::mutex> lock(*reading);
+      return SimulatedPose{averagedMap(session, *chain, candidate), {}};
+    }
+    throw InputError("pose " + pose.name + ": the simulated session " + session.source +
+                     " has no usable pose of that name");
+  };
+}
+
+Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated, const Scene& scene,
+                    const RayCaster& rays, const EvaluationOptions& options) {
+  const SignalChain chain(recording.radar);
+  const EvaluationField field(options.config, recording.radar, chain.axes());
+  const RegionModel regions(scene, rays, field, recording.radar);
+
+  Evaluation result;
+  result.duplicates = recording.duplicates;
+  result.problems = recording.problems;
+  result.poses.resize(recording.poses.size());
+  std::mutex reading, reporting;  // captures and bags are read one at a time; the rest of the work is parallel
+  std::size_t done = 0;
+  const auto work = [&](std::size_t i) {
+    PoseResult& out = result.poses[i];
+    out.index = i;
+    out.pose = recording.poses[i];
+    try {
+      RangeAngleMap measured;
+      {
+        const std::lock_guard<std::mutex> lock(reading);
+        measured = averagedMap(recording, chain, out.pose);
+      }
+      out.frames = measured.frames;
+      SimulatedPose other = simulated(out.pose);
+      out.attribution = compareMaps(field, measured, other.map, regions.regions(out.pose.T_map_radar), other.records);
+      for (const Residual& residual : out.attribution.residuals) {
+        for (int index : residual.records) out.residual_records.emplace(index, other.records[index]);
+      }
+      out.records = std::move(other.records);
+      out.used = true;
+    } catch (const InputError& error) {
+      out.problem = error.what();
+    }
+    if (options.on_pose && out.used) options.on_pose(out);
+    if (!options.keep_records) out.records = {};
+    const std::lock_guard<std::mutex> lock(reporting);
+    ++done;
+    if (options.on_progress) options.on_progress(done, result.poses.size());
+  };
+  tbb::task_arena arena(options.jobs > 0 ? options.jobs : tbb::info::default_concurrency());
+  arena.execute([&] { tbb::parallel_for(std::size_t{0}, result.poses.size(), work); });
+
+  Ledger central, outer;
+  for (const PoseResult& pose : result.poses) {
+    if (!pose.used) {
+      result.problems.push_back({pose.pose.name, pose.problem});
+      continue;
+    }
+    central.add(pose.attribution.central);
+    outer.add(pose.attribution.outer);
+    if (pose.attribution.convention.conjugatedBetter()) ++result.conjugated_better;
+  }
+  result.central = central.summary();
+  result.outer = outer.summary();
+  return result;
+}
+
+}  // namespace mmradartwin

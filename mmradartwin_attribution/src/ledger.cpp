@@ -1,0 +1,110 @@
+#include "mmradartwin_attribution/ledger.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <sstream>
+
+namespace mmradartwin {
+namespace {
+
+double share(double part, double whole) {
+  return whole > 0 ? part / whole : std::numeric_limits<double>::quiet_NaN();
+}
+
+std::string fixed(double value, int digits) {
+  if (std::isnan(value)) return "-";
+  std::ostringstream s;
+  s.setf(std::ios::fixed);
+  s.precision(digits);
+  s << value;
+  return s.str();
+}
+
+}  // namespace
+
+double quantile(std::vector<double> values, double probability) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::sort(values.begin(), values.end());
+  const double position = probability * static_cast<double>(values.size() - 1);
+  const std::size_t below = static_cast<std::size_t>(position);
+  const std::size_t above = std::min(below + 1, values.size() - 1);
+  return values[below] + (position - static_cast<double>(below)) * (values[above] - values[below]);
+}
+
+void Ledger::add(const FieldMetrics& pose) {
+  ++poses_;
+  for (int i = 0; i < 3; ++i) {
+    active_[i] += pose.active[i];
+    recalled_[i] += pose.recalled[i];
+    top_hits_[i] += pose.top_hits[i];
+    top_count_[i] += pose.top_count[i];
+  }
+  q1_sum_ += pose.q1_energy;
+  q2_sum_ += pose.q2_energy;
+  q3_db_.insert(q3_db_.end(), pose.q3_db.begin(), pose.q3_db.end());
+  q4_sum_db_ += pose.q4_sum_db;
+  q4_cells_ += pose.q4_cells;
+  for (int i = 0; i < 5; ++i) class_count_[i] += pose.class_count[i];
+}
+
+LedgerSummary Ledger::summary() const {
+  LedgerSummary s;
+  s.poses = poses_;
+  s.active = active_;
+  s.recalled = recalled_;
+  s.recall = share(std::accumulate(recalled_.begin(), recalled_.end(), 0), std::accumulate(active_.begin(), active_.end(), 0));
+  for (int i = 0; i < 3; ++i) {
+    s.recall_band[i] = share(recalled_[i], active_[i]);
+    s.top[i] = share(top_hits_[i], top_count_[i]);
+  }
+  s.q3_cells = static_cast<int>(q3_db_.size());
+  s.q3_median_db = quantile(q3_db_, 0.5);
+  s.q3_iqr_db = quantile(q3_db_, 0.75) - quantile(q3_db_, 0.25);
+  s.q1_energy = share(q1_sum_, poses_);
+  s.q2_energy = share(q2_sum_, poses_);
+  s.q4_mae_db = share(q4_sum_db_, static_cast<double>(q4_cells_));
+  s.class_count = class_count_;
+  const double residuals = std::accumulate(class_count_.begin(), class_count_.end(), 0);
+  for (int i = 0; i < 5; ++i) s.class_share[i] = share(class_count_[i], residuals);
+  return s;
+}
+
+std::vector<std::array<std::string, 3>> tableRows(const LedgerSummary& s, const std::vector<int>& top_k) {
+  std::string routing;
+  for (int i = 0; i < 5; ++i) {
+    routing += (i ? "/" : "") + (std::isnan(s.class_share[i]) ? std::string("-") : fixed(100 * s.class_share[i], 0));
+  }
+  const auto joined = [](const std::array<double, 3>& v) {
+    return fixed(v[0], 3) + "/" + fixed(v[1], 3) + "/" + fixed(v[2], 3);
+  };
+  std::string peaks = "Top-";
+  for (std::size_t i = 0; i < top_k.size(); ++i) peaks += (i ? "/" : "") + std::to_string(top_k[i]);
+  return {{"Placement", "Recall", fixed(s.recall, 3) + "; " + joined(s.recall_band)},
+          {"Peaks", peaks, joined(s.top)},
+          {"Matched amp.", "Q3 median/IQR", fixed(s.q3_median_db, 2) + "/" + fixed(s.q3_iqr_db, 2) + " dB"},
+          {"Under-pred.", "Q1 energy", fixed(s.q1_energy, 3)},
+          {"Over-pred.", "Q2 energy", fixed(s.q2_energy, 3)},
+          {"Background", "Q4 MAE", fixed(s.q4_mae_db, 2) + " dB"},
+          {"Routing", "C1/C2/C3/C4/C5", routing + "%"}};
+}
+
+std::string formatTable(const LedgerSummary& summary, const AttributionConfig& config, const std::string& title) {
+  const auto rows = tableRows(summary, config.top_k);
+  std::array<std::size_t, 3> width{6, 6, 6};
+  for (const auto& row : rows) {
+    for (int i = 0; i < 3; ++i) width[i] = std::max(width[i], row[i].size());
+  }
+  const auto line = [&](const std::array<std::string, 3>& row) {
+    std::string text;
+    for (int i = 0; i < 3; ++i) text += row[i] + (i < 2 ? std::string(width[i] - row[i].size() + 2, ' ') : "");
+    return text + "\n";
+  };
+  const std::string rule(width[0] + width[1] + width[2] + 4, '-');
+  std::string text = title + "\n" + rule + "\n" + line({"Target", "Metric", "Result"}) + rule + "\n";
+  for (const auto& row : rows) text += line(row);
+  return text + rule + "\n";
+}
+
+}  // namespace mmradartwin

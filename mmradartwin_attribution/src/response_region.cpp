@@ -1,0 +1,296 @@
+#include "mmradartwin_attribution/response_region.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <map>
+#include <set>
+
+namespace mmradartwin {
+namespace {
+
+// E(u) = C(u) - jS(u) by the auxiliary functions f, g (Abramowitz and Stegun 7.3.9, 7.3.32, 7.3.33; error < 2e-3).
+std::complex<double> fresnelE(double u) {
+  const double a = std::abs(u);
+  const double f = (1 + 0.926 * a) / (2 + 1.792 * a + 3.104 * a * a);
+  const double g = 1 / (2 + 4.142 * a + 3.492 * a * a + 6.670 * a * a * a);
+  const double phase = M_PI / 2 * a * a;
+  const double c = 0.5 + f * std::sin(phase) - g * std::cos(phase);
+  const double s = 0.5 - f * std::cos(phase) - g * std::sin(phase);
+  return (u < 0 ? -1.0 : 1.0) * std::complex<double>(c, -s);
+}
+
+std::vector<Eigen::Vector3d> boundary(const Facet& facet) {
+  std::vector<Eigen::Vector3d> points;
+  for (const auto& loop : facet.loops) {
+    for (const Eigen::Vector2d& p : loop) points.push_back(facet.origin + p.x() * facet.e1 + p.y() * facet.e2);
+  }
+  if (points.empty()) {
+    for (double a : {0.0, facet.size1_m}) {
+      for (double b : {0.0, facet.size2_m}) points.push_back(facet.origin + a * facet.e1 + b * facet.e2);
+    }
+  }
+  return points;
+}
+
+// Position along the line and least and greatest distance from it of the points that come within gap of it.
+struct Along { double begin = 1e9, end = -1e9, nearest = 1e9, farthest = 0; };
+
+Along along(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& origin, const Eigen::Vector3d& axis,
+            double gap) {
+  Along result;
+  for (const Eigen::Vector3d& p : points) {
+    const double t = axis.dot(p - origin);
+    const double distance = (p - origin - t * axis).norm();
+    result.nearest = std::min(result.nearest, distance);
+    result.farthest = std::max(result.farthest, distance);
+    if (distance > gap) continue;
+    result.begin = std::min(result.begin, t);
+    result.end = std::max(result.end, t);
+  }
+  return result;
+}
+
+// Greatest plane distance to either side; 0 where no point lies there.
+std::pair<double, double> reach(const Facet& plane, const std::vector<Eigen::Vector3d>& points) {
+  double positive = 0, negative = 0;
+  for (const Eigen::Vector3d& p : points) {
+    positive = std::max(positive, plane.planeDistance(p));
+    negative = std::max(negative, -plane.planeDistance(p));
+  }
+  return {positive, negative};
+}
+
+double level_db(double amplitude) { return 20 * std::log10(std::max(amplitude, 1e-12)); }
+
+}  // namespace
+
+double fresnelAperture(double u1, double u2) { return std::abs(fresnelE(u2) - fresnelE(u1)) / std::sqrt(2.0); }
+
+const std::string& regionKindName(RegionKind kind) {
+  static const std::string names[] = {"facing", "corner", "edge", "extent"};
+  return names[static_cast<int>(kind)];
+}
+
+RegionModel::RegionModel(const Scene& scene, const RayCaster& rays, const EvaluationField& field,
+                         const RadarConfig& radar)
+    : scene_(scene),
+      rays_(rays),
+      field_(field),
+      wavelength_m_(radar.wavelength_m()),
+      max_range_m_(radar.max_range_m()) {
+  findCorners();
+  placeProbes();
+}
+
+void RegionModel::findCorners() {
+  const double gap = field_.config().regions.corner_gap_m;
+  const double sine = std::sin(field_.config().regions.corner_tolerance_rad);
+  std::vector<std::vector<Eigen::Vector3d>> rims;
+  std::vector<Eigen::AlignedBox3d> boxes;
+  for (const Facet& f : scene_.facets) {
+    rims.push_back(boundary(f));
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& p : rims.back()) box.extend(p);
+    boxes.push_back(box);
+  }
+  for (std::size_t i = 0; i < scene_.facets.size(); ++i) {
+    const Facet& a = scene_.facets[i];
+    if (!a.reflects) continue;
+    for (std::size_t j = i + 1; j < scene_.facets.size(); ++j) {
+      const Facet& b = scene_.facets[j];
+      if (!b.reflects || std::abs(a.normal.dot(b.normal)) > sine) continue;
+      if (boxes[i].exteriorDistance(boxes[j]) > 2 * gap) continue;
+      const Eigen::Vector3d axis = a.normal.cross(b.normal).normalized();
+      // The point of both planes nearest to a's origin.
+      const Eigen::Vector3d in_a = axis.cross(a.normal);
+      const double slope = b.normal.dot(in_a);
+      const Eigen::Vector3d origin = a.origin - (b.planeDistance(a.origin) / slope) * in_a;
+      // A facet may cross the line (a cabinet stands before the middle of a wall): then its rim is far from the line, and
+      // the part of it beyond the other's plane counts by its whole extent along the line.
+      const auto span = [&](const std::vector<Eigen::Vector3d>& rim, const Facet& other) {
+        const auto [positive, negative] = reach(other, rim);
+        const bool crosses = positive > gap && negative > gap;
+        return along(rim, origin, axis, crosses ? 1e9 : gap);
+      };
+      const Along on_a = span(rims[i], b), on_b = span(rims[j], a);
+      const double begin = std::max(on_a.begin, on_b.begin), end = std::min(on_a.end, on_b.end);
+      if (end - begin < gap) continue;
+      const auto [a_positive, a_negative] = reach(b, rims[i]);
+      const auto [b_positive, b_negative] = reach(a, rims[j]);
+      for (int side_b : {1, -1}) {    // side of plane a on which b lies
+        for (int side_a : {1, -1}) {  // side of plane b on which a lies
+          const double width_a = side_a > 0 ? a_positive : a_negative, width_b = side_b > 0 ? b_positive : b_negative;
+          if (width_a <= gap || width_b <= gap) continue;
+          corners_.push_back({static_cast<int>(i), static_cast<int>(j), origin + begin * axis, origin + end * axis,
+                              static_cast<double>(side_b), static_cast<double>(side_a), width_a, width_b});
+        }
+      }
+    }
+  }
+}
+
+void RegionModel::placeProbes() {
+  constexpr double kMaxProbesPerFacet = 600;
+  probes_.resize(scene_.actors.size());
+  for (const Facet& f : scene_.facets) {
+    if (!f.reflects || f.actor < 0) continue;
+    std::vector<Probe>& probes = probes_[f.actor];
+    const double spacing =
+        std::max(field_.config().regions.extent_spacing_m, std::sqrt(f.size1_m * f.size2_m / kMaxProbesPerFacet));
+    const int n1 = std::max(1, static_cast<int>(std::ceil(f.size1_m / spacing)));
+    const int n2 = std::max(1, static_cast<int>(std::ceil(f.size2_m / spacing)));
+    bool any = false;
+    for (int i = 0; i < n1; ++i) {
+      for (int j = 0; j < n2; ++j) {
+        const Eigen::Vector3d p =
+            f.origin + (i + 0.5) / n1 * f.size1_m * f.e1 + (j + 0.5) / n2 * f.size2_m * f.e2;
+        if (!f.rectangle && !f.contains(p)) continue;
+        probes.push_back({p, f.id});
+        any = true;
+      }
+    }
+    if (!any) probes.push_back({f.nearest(f.origin + 0.5 * (f.size1_m * f.e1 + f.size2_m * f.e2), 1e-3), f.id});
+  }
+}
+
+bool RegionModel::seen(const Eigen::Vector3d& radar_map, const Eigen::Vector3d& point,
+                       const Eigen::Vector3d& inward) const {
+  return rays_.visible(radar_map, point + 2e-3 * inward, 1e-3);
+}
+
+bool RegionModel::place(const Eigen::Isometry3d& T_map_radar, const Eigen::Vector3d& point,
+                        ResponseRegion& region) const {
+  const Eigen::Vector3d p = T_map_radar.inverse() * point;
+  region.range_m = p.norm();
+  if (region.range_m < 1e-3 || region.range_m >= max_range_m_ || p.x() <= 0) return false;
+  if (std::abs(std::asin(p.z() / region.range_m)) > field_.config().regions.max_elevation_rad) return false;
+  region.azimuth_rad = std::asin(p.y() / region.range_m);
+  region.point = point;
+  region.field = field_.fieldAt(region.range_m, region.azimuth_rad);
+  return region.field != Field::kExcluded;
+}
+
+void RegionModel::addFacets(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const {
+  const Eigen::Vector3d radar = T.translation();
+  for (const Facet& f : scene_.facets) {
+    if (!f.reflects || f.actor < 0) continue;
+    const double distance = f.planeDistance(radar);
+    const double R = std::abs(distance);
+    if (R < 1e-3 || R >= max_range_m_) continue;
+    const Eigen::Vector3d foot = radar - distance * f.normal;
+    const double scale = 2 / std::sqrt(wavelength_m_ * R);
+    const double x1 = f.e1.dot(foot - f.origin), x2 = f.e2.dot(foot - f.origin);
+    const double aperture = fresnelAperture(-x1 * scale, (f.size1_m - x1) * scale) *
+                            fresnelAperture(-x2 * scale, (f.size2_m - x2) * scale);
+    ResponseRegion region;
+    region.support_db = level_db(wavelength_m_ / (8 * M_PI * R) * aperture);
+    const bool inside = f.contains(foot, 1e-6);
+    region.kind = inside ? RegionKind::kFacing : RegionKind::kEdge;
+    if (!place(T, inside ? foot : f.nearest(foot, 0.01), region)) continue;
+    if (!seen(radar, region.point, (distance > 0 ? 1.0 : -1.0) * f.normal)) continue;
+    region.actors = {f.actor};
+    out.push_back(region);
+  }
+}
+
+void RegionModel::addCorners(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const {
+  const Eigen::Vector3d radar = T.translation();
+  for (const Corner& c : corners_) {
+    const Facet &a = scene_.facets[c.first], &b = scene_.facets[c.second];
+    if (a.planeDistance(radar) * c.toward_second <= 0 || b.planeDistance(radar) * c.toward_first <= 0) continue;
+    const Eigen::Vector3d segment = c.end - c.begin;
+    const double length = segment.norm();
+    const double t = segment.dot(radar - c.begin) / length;
+    const Eigen::Vector3d foot = c.begin + t / length * segment;
+    const Eigen::Vector3d point = c.begin + std::clamp(t, std::min(0.01, length / 2), std::max(length - 0.01, length / 2)) / length * segment;
+    const double R = (foot - radar).norm();
+    if (R < 1e-3) continue;
+    const double scale = 2 / std::sqrt(wavelength_m_ * R);
+    // Each face as wide as it appears across the ray: its foot on the line lies at u = 0.
+    const Eigen::Vector3d ray = (foot - radar) / R;
+    const double across_a = c.width_first_m * std::abs(ray.dot(a.normal));
+    const double across_b = c.width_second_m * std::abs(ray.dot(b.normal));
+    const double aperture = fresnelAperture(-across_a * scale, across_b * scale) *
+                            fresnelAperture(-t * scale, (length - t) * scale);
+    ResponseRegion region;
+    region.support_db = level_db(wavelength_m_ / (8 * M_PI * R) * aperture);
+    region.kind = RegionKind::kCorner;
+    if (!place(T, point, region)) continue;
+    const Eigen::Vector3d inward = c.toward_second * a.normal + c.toward_first * b.normal;
+    if (!seen(radar, region.point, 5 * inward)) continue;  // 1 cm off either face
+    region.actors = {a.actor};
+    if (b.actor != a.actor) region.actors.push_back(b.actor);
+    out.push_back(region);
+  }
+}
+
+void RegionModel::addExtents(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const {
+  const Eigen::Vector3d radar = T.translation();
+  std::set<int> present;
+  for (const ResponseRegion& region : out) {
+    if (region.field == Field::kCentral) present.insert(region.actors.begin(), region.actors.end());
+  }
+  for (std::size_t actor = 0; actor < probes_.size(); ++actor) {
+    if (present.count(static_cast<int>(actor))) continue;
+    std::vector<std::pair<double, const Probe*>> by_distance;
+    ResponseRegion region;
+    for (const Probe& probe : probes_[actor]) {
+      if (place(T, probe.point, region) && region.field == Field::kCentral) {
+        by_distance.emplace_back(region.range_m, &probe);
+      }
+    }
+    std::sort(by_distance.begin(), by_distance.end(),
+              [](const auto& x, const auto& y) { return x.first < y.first; });
+    for (const auto& [range_m, probe] : by_distance) {
+      const Facet& f = scene_.facets[probe->facet];
+      const double side = f.planeDistance(radar) > 0 ? 1.0 : -1.0;
+      if (!seen(radar, probe->point, side * f.normal)) continue;
+      place(T, probe->point, region);
+      region.kind = RegionKind::kExtent;
+      region.actors = {static_cast<int>(actor)};
+      region.support_db = -200;
+      out.push_back(region);
+      break;
+    }
+  }
+}
+
+std::vector<ResponseRegion> RegionModel::regions(const Eigen::Isometry3d& T_map_radar) const {
+  std::vector<ResponseRegion> found;
+  addFacets(T_map_radar, found);
+  addCorners(T_map_radar, found);
+  double strongest = -1e9;
+  for (const ResponseRegion& r : found) {
+    if (r.field == Field::kCentral) strongest = std::max(strongest, r.support_db);
+  }
+  const double floor = strongest + field_.config().regions.support_floor_db;
+  found.erase(std::remove_if(found.begin(), found.end(),
+                             [floor](const ResponseRegion& r) { return r.support_db < floor; }),
+              found.end());
+  addExtents(T_map_radar, found);
+  std::stable_sort(found.begin(), found.end(),
+                   [](const ResponseRegion& a, const ResponseRegion& b) { return a.support_db > b.support_db; });
+  std::vector<ResponseRegion> kept;
+  for (ResponseRegion& r : found) {
+    const bool merged = std::any_of(kept.begin(), kept.end(), [&](const ResponseRegion& k) {
+      const bool shared = std::any_of(r.actors.begin(), r.actors.end(), [&](int actor) {
+        return std::find(k.actors.begin(), k.actors.end(), actor) != k.actors.end();
+      });
+      return shared && field_.inWindow(field_.config().tight, k.range_m, k.azimuth_rad, r.range_m, r.azimuth_rad);
+    });
+    if (!merged) kept.push_back(r);
+  }
+  for (ResponseRegion& r : kept) {
+    for (int actor : r.actors) {
+      const Actor& a = scene_.actors[actor];
+      r.actor += (r.actor.empty() ? "" : ";") + a.name;
+      r.material += (r.material.empty() ? "" : ";") + a.material_tag;
+    }
+  }
+  std::stable_sort(kept.begin(), kept.end(),
+                   [](const ResponseRegion& a, const ResponseRegion& b) { return a.range_m < b.range_m; });
+  return kept;
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,136 @@
+#include "mmradartwin_attribution/ros/conversions.h"
+
+#include <cmath>
+#include <mutex>
+#include <set>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/ros/conversions.h"
+
+namespace mmradartwin {
+namespace {
+
+const std::string* interned(const std::string& name) {
+  static std::mutex mutex;
+  static std::set<std::string> names;
+  const std::lock_guard<std::mutex> lock(mutex);
+  return &*names.insert(name).first;
+}
+
+Eigen::Vector3d vector(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
+Eigen::Vector3d vector(const geometry_msgs::Vector3& p) { return {p.x, p.y, p.z}; }
+
+}  // namespace
+
+mmradartwin_msgs::Residuals toMsg(const EvaluationField& field, const PoseAttribution& pose, const std::string& name,
+                                  const Eigen::Isometry3d& T_map_radar) {
+  mmradartwin_msgs::Residuals msg;
+  msg.pose = name;
+  msg.T_map_radar = toMsg(T_map_radar);
+  for (const ResponseRegion& r : pose.regions) {
+    mmradartwin_msgs::ResponseRegion region;
+    region.range_m = r.range_m;
+    region.azimuth_rad = r.azimuth_rad;
+    region.actor = r.actor;
+    region.kind = regionKindName(r.kind);
+    region.measured_strong = r.measured_strong;
+    region.simulated_strong = r.simulated_strong;
+    msg.regions.push_back(region);
+  }
+  for (const Residual& r : pose.residuals) {
+    mmradartwin_msgs::Residual residual;
+    residual.residual_class = static_cast<std::uint8_t>(r.residual_class);
+    residual.action = classAction(r.residual_class);
+    residual.measured_stronger = r.measured_stronger;
+    residual.range_m = r.range_m;
+    residual.azimuth_rad = r.azimuth_rad;
+    residual.measured_db = r.measured_db;
+    residual.simulated_db = r.simulated_db;
+    residual.actor = r.actor;
+    residual.material = r.material;
+    residual.records.assign(r.records.begin(), r.records.end());
+    msg.residuals.push_back(residual);
+  }
+  msg.range_m = field.axes().range_m;
+  msg.azimuth_rad = field.axes().azimuth_rad;
+  const double* begin = pose.residual_db.data();
+  msg.residual_db.assign(begin, begin + pose.residual_db.size());
+  return msg;
+}
+
+mmradartwin_msgs::Ledger toMsg(const LedgerSummary& s, const std::vector<std::string>& duplicates) {
+  mmradartwin_msgs::Ledger msg;
+  msg.poses = static_cast<std::uint32_t>(s.poses);
+  msg.excluded_duplicates = duplicates;
+  msg.recall = s.recall;
+  msg.recall_near = s.recall_band[0];
+  msg.recall_mid = s.recall_band[1];
+  msg.recall_far = s.recall_band[2];
+  msg.top1 = s.top[0];
+  msg.top3 = s.top[1];
+  msg.top5 = s.top[2];
+  msg.q3_median_db = s.q3_median_db;
+  msg.q3_iqr_db = s.q3_iqr_db;
+  msg.q1_energy = s.q1_energy;
+  msg.q2_energy = s.q2_energy;
+  msg.q4_mae_db = s.q4_mae_db;
+  for (int i = 0; i < 5; ++i) msg.class_count[i] = static_cast<std::uint32_t>(s.class_count[i]);
+  return msg;
+}
+
+std::vector<PathRecord> pathsFromMsg(const mmradartwin_msgs::PathRecords& msg, const Scene& scene) {
+  std::vector<PathRecord> records;
+  records.reserve(msg.records.size());
+  for (const mmradartwin_msgs::PathRecord& m : msg.records) {
+    PathRecord r;
+    r.event = interned(m.event);
+    for (const std::string& name : m.actors) r.actors.push_back(scene.actorIndex(name));
+    r.facets.assign(m.actors.size(), -1);
+    for (const geometry_msgs::Point& v : m.vertices) r.vertices.push_back(vector(v));
+    r.departure = vector(m.departure);
+    r.arrival = vector(m.arrival);
+    r.bounces = static_cast<int>(m.bounces);
+    r.range_bin = static_cast<int>(m.range_bin);
+    r.amplitude = m.amplitude;
+    r.phase_rad = m.phase_rad;
+    r.length_m = m.length_m;
+    if (m.c_re.size() != m.c_im.size() || m.c_re.size() != m.length_m.size()) {
+      throw InputError("path records: record " + std::to_string(records.size()) +
+                       " has contributions and lengths of different number; send one of each per virtual element");
+    }
+    for (std::size_t k = 0; k < m.c_re.size(); ++k) r.c.emplace_back(m.c_re[k], m.c_im[k]);
+    records.push_back(std::move(r));
+  }
+  return records;
+}
+
+Scene sceneFromMsg(const mmradartwin_msgs::Scene& msg) {
+  Scene scene;
+  scene.file = msg.scene_file;
+  for (const mmradartwin_msgs::SceneActor& m : msg.actors) {
+    Actor actor;
+    actor.name = m.name;
+    actor.material_tag = m.material;
+    actor.material.name = m.material;
+    for (int i = 0; i < 3; ++i) actor.material.color[i] = m.color[i];
+    if (m.triangles.size() % 3 != 0) {
+      throw InputError("scene message: actor " + m.name + " has " + std::to_string(m.triangles.size()) +
+                       " corners, which is no whole number of triangles");
+    }
+    for (const geometry_msgs::Point& p : m.triangles) {
+      const Eigen::Vector3d v = vector(p);
+      if (!v.allFinite()) throw InputError("scene message: actor " + m.name + " has a corner that is not finite");
+      actor.vertices.push_back(v);
+      actor.bounds.extend(v);
+    }
+    for (std::size_t i = 0; i < m.triangles.size() / 3; ++i) {
+      const int first = static_cast<int>(3 * i);
+      actor.triangles.push_back({first, first + 1, first + 2});
+    }
+    scene.actors.push_back(std::move(actor));
+  }
+  rebuildFacets(scene);
+  return scene;
+}
+
+}  // namespace mmradartwin

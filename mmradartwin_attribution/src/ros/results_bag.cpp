@@ -1,0 +1,92 @@
+#include "mmradartwin_attribution/ros/results_bag.h"
+
+#include <rosbag/bag.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <mutex>
+
+#include "mmradartwin_attribution/ros/conversions.h"
+#include "mmradartwin_attribution/ros/markers.h"
+#include "mmradartwin_dsp/ros/conversions.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kSecondsPerPose = 2;
+
+template <typename Message>
+boost::shared_ptr<ros::M_string> latched() {
+  auto header = boost::make_shared<ros::M_string>();
+  (*header)["type"] = ros::message_traits::datatype<Message>();
+  (*header)["md5sum"] = ros::message_traits::md5sum<Message>();
+  (*header)["message_definition"] = ros::message_traits::definition<Message>();
+  (*header)["latching"] = "1";
+  (*header)["callerid"] = "/evaluate";
+  return header;
+}
+
+}  // namespace
+
+struct ResultsBag::Impl {
+  Impl(const std::string& file, const EvaluationField& f) : field(f) {
+    try {
+      bag.open(file, rosbag::bagmode::Write);
+    } catch (const rosbag::BagException& error) {
+      throw std::runtime_error(file + ": cannot be written (" + error.what() + ")");
+    }
+    bag.setCompression(rosbag::compression::LZ4);
+  }
+  ros::Time time(std::size_t pose, double after_s = 0) const {
+    return ros::Time(1.0 + kSecondsPerPose * static_cast<double>(pose) + after_s);
+  }
+
+  EvaluationField field;
+  rosbag::Bag bag;
+  std::mutex mutex;
+};
+
+ResultsBag::ResultsBag(const std::string& file, const EvaluationField& field, const Scene& scene)
+    : impl_(std::make_unique<Impl>(file, field)) {
+  impl_->bag.write("attribution/scene_markers", impl_->time(0), sceneMarkers(scene, "map"),
+                   latched<visualization_msgs::MarkerArray>());
+}
+
+ResultsBag::~ResultsBag() = default;
+
+void ResultsBag::add(const PoseResult& pose) {
+  // Every array stands for itself: rviz may be started anywhere in the bag.
+  MarkerBuilder builder(impl_->field, {});
+  const auto markers = builder.build(pose.attribution, pose.records, pose.pose.T_map_radar, pose.pose.name);
+  auto residuals = toMsg(impl_->field, pose.attribution, pose.pose.name, pose.pose.T_map_radar);
+  residuals.header.frame_id = "radar_link";
+  residuals.header.stamp = impl_->time(pose.index);
+  geometry_msgs::TransformStamped transform;
+  transform.header.frame_id = "map";
+  transform.child_frame_id = "radar_link";
+  const geometry_msgs::Pose place = toMsg(pose.pose.T_map_radar);
+  transform.transform.translation.x = place.position.x;
+  transform.transform.translation.y = place.position.y;
+  transform.transform.translation.z = place.position.z;
+  transform.transform.rotation = place.orientation;
+
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  for (double after_s = 0; after_s < kSecondsPerPose; after_s += 0.5) {
+    const ros::Time time = impl_->time(pose.index, after_s);
+    transform.header.stamp = time;
+    tf2_msgs::TFMessage tf;
+    tf.transforms.push_back(transform);
+    impl_->bag.write("/tf", time, tf);
+  }
+  impl_->bag.write("attribution/residuals", impl_->time(pose.index, 0.05), residuals);
+  impl_->bag.write("attribution/markers", impl_->time(pose.index, 0.05), markers);
+}
+
+void ResultsBag::finish(const Evaluation& evaluation) {
+  mmradartwin_msgs::Ledger ledger = toMsg(evaluation.central, evaluation.duplicates);
+  ledger.header.frame_id = "radar_link";
+  ledger.header.stamp = impl_->time(0);
+  impl_->bag.write("attribution/ledger", impl_->time(0), ledger, latched<mmradartwin_msgs::Ledger>());
+  impl_->bag.close();
+}
+
+}  // namespace mmradartwin
