@@ -1,0 +1,112 @@
+// process: a session, a bag or a bare capture -> maps, pictures and, on request, cubes and grids for other tools.
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iostream>
+
+#include "mmradartwin_dsp/array_file.h"
+#include "mmradartwin_dsp/average_pose.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/map_picture.h"
+#include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/ros/bag.h"
+
+namespace fs = std::filesystem;
+using namespace mmradartwin;
+
+namespace {
+
+struct Options {
+  std::string input, output, radar, layout;
+  bool mat = false;
+  bool cubes = false;
+};
+
+/// cube: [frame][chirp][sample][rx] complex ADC counts; grid: [channel][sample]; map: [range][azimuth] dBFS.
+void writeMat(const Options& options, const Recording& recording, const Pose& pose, const ReceiveGrid& grid,
+              const RangeAngleMap& map) {
+  MatFile file((fs::path(options.output) / "mat" / (pose.name + ".mat")).string());
+  const auto size = [](Eigen::Index n) { return static_cast<std::size_t>(n); };
+  file.write("grid", {size(grid.x.rows()), size(grid.x.cols())}, grid.x.data());
+  file.write("full_scale", grid.full_scale);
+  file.write("frames", grid.frames);
+  file.write("stamp_s", static_cast<double>(pose.stamp_ns) * 1e-9);
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> T = pose.T_map_radar.matrix();
+  file.write("T_map_radar", {4, 4}, T.data());
+  file.write("range_m", {map.axes.range_m.size(), 1}, map.axes.range_m.data());
+  file.write("azimuth_rad", {map.axes.azimuth_rad.size(), 1}, map.axes.azimuth_rad.data());
+  file.write("power_db", {size(map.power_db.rows()), size(map.power_db.cols())}, map.power_db.data());
+  if (!options.cubes) return;
+  std::vector<std::int16_t> samples;
+  std::size_t frames = 0;
+  AdcCube last;
+  recording.forEachFrame(pose, [&](const AdcCube& cube) {
+    samples.insert(samples.end(), cube.data.begin(), cube.data.end());
+    ++frames;
+    last = cube;
+  });
+  const auto extent = [](int n) { return static_cast<std::size_t>(n); };
+  file.write("cube", {frames, extent(last.chirps), extent(last.samples), extent(last.receivers), 2}, samples.data());
+}
+
+int process(const Options& options) {
+  std::optional<CaptureLayout> layout;
+  if (!options.layout.empty()) layout = options.layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
+  const Recording recording = openRecording(options.input, options.radar, layout);
+  const SignalChain chain = [&] {
+    try {
+      return SignalChain(recording.radar);
+    } catch (const InputError& error) {
+      throw InputError(recording.radar_file + ": " + error.what());
+    }
+  }();
+  for (const char* folder : {"maps", "pictures"}) fs::create_directories(fs::path(options.output) / folder);
+  if (options.mat) fs::create_directories(fs::path(options.output) / "mat");
+
+  std::vector<std::string> problems;
+  for (const PoseProblem& problem : recording.problems) problems.push_back(problem.message);
+  ProgressBar progress(static_cast<int>(recording.poses.size()));
+  int done = 0;
+  for (const Pose& pose : recording.poses) {
+    try {
+      const ReceiveGrid grid = averagePose(recording, pose);
+      const RangeAngleMap map = chain.map(grid);
+      writeMapCsv(map, (fs::path(options.output) / "maps" / (pose.name + ".csv")).string());
+      FanStyle style;
+      style.max_range_m = recording.radar.max_range_m();
+      style.title = recording.name + ", pose " + pose.name + ", " + std::to_string(grid.frames) + " frames";
+      writePicture(drawFan(map.axes, map.power_db, style),
+                   (fs::path(options.output) / "pictures" / (pose.name + ".png")).string());
+      if (options.mat) writeMat(options, recording, pose, grid, map);
+    } catch (const InputError& error) {
+      problems.push_back(error.what());
+    }
+    progress.show(++done);
+  }
+  for (const std::string& name : recording.duplicates) {
+    std::cerr << "note: pose '" << name << "' is a duplicate of an earlier one and was left out\n";
+  }
+  for (const std::string& problem : problems) std::cerr << "error: " << problem << "\n";
+  std::cerr << recording.poses.size() + recording.problems.size() - problems.size() << " map(s) in "
+            << (fs::path(options.output) / "maps").string() << ", " << problems.size() << " pose(s) skipped\n";
+  return problems.empty() ? 0 : 2;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app("Turns a session directory, a rosbag or a bare DCA1000 capture into range-angle maps.");
+  app.add_option("INPUT", options.input, "session directory, .bag, or .bin capture")->required();
+  app.add_option("--output", options.output, "folder for maps/, pictures/ and mat/")->required();
+  app.add_option("--radar", options.radar, "radar.yaml; needed for a bare capture, else instead of the session's");
+  app.add_option("--layout", options.layout, "byte layout of the captures, instead of the radar's")
+      ->check(CLI::IsMember({"4lane", "2lane"}));
+  app.add_flag("--mat", options.mat, "also write grid and map of each pose as a MATLAB file (Octave and SciPy read it too)");
+  app.add_flag("--cubes", options.cubes, "with --mat: the raw cubes too, [frame][chirp][sample][rx][I,Q]");
+  return runProgram(app, argc, argv, [&options] {
+    if (options.cubes && !options.mat) throw InputError("--cubes says what --mat writes; give --mat too");
+    return process(options);
+  });
+}
