@@ -1,0 +1,16 @@
+#include <ros/ros.h>
+
+#include "mmradartwin_driver/ros/radar_driver.h"
+#include "mmradartwin_dsp/input_error.h"
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "radar_driver");
+  try {
+    const mmradartwin::RadarDriver driver(ros::NodeHandle(), ros::NodeHandle("~"));
+    ros::spin();
+  } catch (const mmradartwin::InputError& error) {
+    ROS_FATAL_STREAM(error.what());
+    return 2;
+  }
+  return 0;
+}

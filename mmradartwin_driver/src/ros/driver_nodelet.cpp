@@ -1,0 +1,27 @@
+#include <ros/ros.h>
+// nodelet.h needs ros.h before it.
+#include <nodelet/nodelet.h>
+#include <pluginlib/class_list_macros.hpp>
+
+#include <memory>
+
+#include "mmradartwin_driver/ros/radar_driver.h"
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin {
+
+class DriverNodelet : public nodelet::Nodelet {
+ private:
+  void onInit() override {
+    try {
+      driver_ = std::make_unique<RadarDriver>(getNodeHandle(), getPrivateNodeHandle());
+    } catch (const InputError& error) {
+      NODELET_FATAL_STREAM(error.what());
+    }
+  }
+  std::unique_ptr<RadarDriver> driver_;
+};
+
+}  // namespace mmradartwin
+
+PLUGINLIB_EXPORT_CLASS(mmradartwin::DriverNodelet, nodelet::Nodelet)

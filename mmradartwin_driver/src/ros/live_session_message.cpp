@@ -1,0 +1,96 @@
+#include "mmradartwin_driver/ros/live_session_message.h"
+
+#include <openssl/evp.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <sstream>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/session.h"
+#include "mmradartwin_dsp/session_files.h"
+#include "mmradartwin_dsp/strict_yaml.h"
+
+namespace mmradartwin {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string trimmed(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r");
+  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+}
+
+/// The rows of the poses played, in the order of `poses`, with their new stamps; other columns stay as they are.
+std::string restamp(const std::string& csv, const std::vector<LivePose>& poses) {
+  std::istringstream in(csv);
+  std::string header;
+  std::getline(in, header);
+  std::map<std::string, std::string> rows;
+  for (std::string line; std::getline(in, line);) rows[trimmed(line.substr(0, line.find(',')))] = line;
+  std::string out = trimmed(header) + "\n";
+  for (const LivePose& pose : poses) {
+    const std::string row = trimmed(rows.at(pose.name));
+    const std::size_t second = row.find(',', row.find(',') + 1);  // before the stamp
+    const std::size_t third = row.find(',', second + 1);
+    out += row.substr(0, second + 1) + formatStamp(pose.stamp_ns) + row.substr(third) + "\n";
+  }
+  return out;
+}
+
+std::string sha256OfFile(const std::string& file) {
+  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), EVP_MD_CTX_free);
+  EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr);
+  std::ifstream in(file, std::ios::binary);
+  std::vector<char> chunk(1 << 16);
+  while (in) {
+    in.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
+    EVP_DigestUpdate(context.get(), chunk.data(), static_cast<std::size_t>(in.gcount()));
+  }
+  unsigned char digest[EVP_MAX_MD_SIZE];
+  unsigned int size = 0;
+  EVP_DigestFinal_ex(context.get(), digest, &size);
+  std::string text;
+  for (unsigned int i = 0; i < size; ++i) {
+    text += "0123456789abcdef"[digest[i] >> 4];
+    text += "0123456789abcdef"[digest[i] & 15];
+  }
+  return text;
+}
+
+}  // namespace
+
+mmradartwin_msgs::Session liveSessionMessage(const std::string& session, const std::vector<LivePose>& poses) {
+  const fs::path file = fs::is_directory(session) ? fs::path(session) / "session.yaml" : fs::path(session);
+  const std::string poses_reference = YamlMap::load(file.string()).text("poses");
+  const fs::path poses_file = fs::weakly_canonical(resolvePath(poses_reference, file.string()));
+  const std::string poses_name =
+      poses_file.lexically_relative(fs::weakly_canonical(fs::absolute(file)).parent_path()).string();
+
+  mmradartwin_msgs::Session message;
+  message.name = fs::weakly_canonical(fs::absolute(file)).parent_path().filename().string();
+  bool restamped = false;
+  for (const StoredFile& stored : gatherSessionFiles(session)) {
+    mmradartwin_msgs::SessionFile entry;
+    entry.name = stored.name;
+    std::string bytes = stored.bytes;
+    if (stored.name == poses_name) {
+      bytes = restamp(bytes, poses);
+      restamped = true;
+    }
+    entry.data.assign(bytes.begin(), bytes.end());
+    message.files.push_back(std::move(entry));
+  }
+  if (!restamped) {
+    throw InputError(file.string() + ": key poses: " + poses_reference +
+                     " lies outside of the session: put it beside session.yaml to play the session");
+  }
+  for (const LivePose& pose : poses) message.capture_sha256.push_back(sha256OfFile(pose.capture));
+  if (!poses.empty()) message.header.stamp = toRosTime(poses.front().stamp_ns);
+  return message;
+}
+
+}  // namespace mmradartwin

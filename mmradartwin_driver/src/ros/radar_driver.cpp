@@ -1,0 +1,123 @@
+#include "mmradartwin_driver/ros/radar_driver.h"
+
+#include <boost/make_shared.hpp>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "mmradartwin_driver/ros/private_parameters.h"
+#include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/session.h"
+
+namespace mmradartwin {
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+void logEvent(Rig::Level level, const std::string& text) {
+  switch (level) {
+    case Rig::Level::kInfo: ROS_INFO_STREAM(text); break;
+    case Rig::Level::kWarning: ROS_WARN_STREAM(text); break;
+    case Rig::Level::kError: ROS_ERROR_STREAM(text); break;
+  }
+}
+
+std::string seconds(double value_s) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f s", value_s);
+  return text;
+}
+
+}  // namespace
+
+RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
+    : updater_(nh, private_nh, ros::this_node::getName()), diagnosed_at_(ros::WallTime::now()) {
+  PrivateParameters parameters(private_nh);
+  const std::string radar_file = parameters.requiredText("radar", "the path of the device's radar.yaml");
+  options_.host_ip = parameters.text("host_ip", options_.host_ip);
+  options_.card_ip = parameters.text("card_ip", options_.card_ip);
+  options_.config_port = parameters.integer("config_port", options_.config_port, 1, 65535);
+  options_.data_port = parameters.integer("data_port", options_.data_port, 1, 65535);
+  options_.packet_delay_us = parameters.number("packet_delay_us", options_.packet_delay_us, 0, 524.28);
+  options_.configure_card = parameters.boolean("configure_card", options_.configure_card);
+  frame_id_ = parameters.text("frame_id", "radar_link");
+  parameters.rejectUnknown();
+
+  radar_ = loadRadarConfig(resolvePath(radar_file, "./"));
+  mmradartwin_msgs::RadarConfig config = toMsg(radar_);
+  radar_hash_ = radarHash(config);
+  config.header.stamp = ros::Time::now();
+  config.header.frame_id = frame_id_;
+
+  ros::NodeHandle handle(nh);
+  config_publisher_ = handle.advertise<mmradartwin_msgs::RadarConfig>("radar/config", 1, true);
+  adc_publisher_ = handle.advertise<mmradartwin_msgs::AdcCube>("radar/adc", 100);
+  config_publisher_.publish(config);
+
+  updater_.setHardwareID("DCA1000 " + options_.card_ip);
+  updater_.add("radar stream", this, &RadarDriver::diagnose);
+  rig_ = std::make_unique<Rig>(radar_, options_, [this](AdcCube&& cube) { publish(std::move(cube)); }, logEvent);
+  // A timer, not the arrival of data: silence is what has to be reported.
+  timer_ = handle.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.update(); });
+}
+
+RadarDriver::~RadarDriver() {
+  timer_.stop();
+  rig_.reset();
+}
+
+void RadarDriver::publish(AdcCube&& cube) {
+  const auto message = boost::make_shared<mmradartwin_msgs::AdcCube>(toMsg(cube, radar_hash_));
+  message->header.frame_id = frame_id_;
+  adc_publisher_.publish(boost::shared_ptr<const mmradartwin_msgs::AdcCube>(message));
+}
+
+void RadarDriver::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const RigState state = rig_->state();
+  const ros::WallTime now = ros::WallTime::now();
+  const double elapsed_s = std::max((now - diagnosed_at_).toSec(), 1e-3);
+  const double rate_hz = static_cast<double>(state.frames.frames - diagnosed_frames_.frames) / elapsed_s;
+  const std::uint64_t lost = state.frames.lost_bytes - diagnosed_frames_.lost_bytes;
+  const std::uint64_t dropped = state.packets.kernel_drops - diagnosed_packets_.kernel_drops;
+  diagnosed_at_ = now;
+  diagnosed_frames_ = state.frames;
+  diagnosed_packets_ = state.packets;
+
+  const double silence_limit_s = std::max(1.0, 3 * radar_.frame_period_s);
+  if (!state.problem.empty()) {
+    status.summary(DiagnosticStatus::ERROR, state.problem);
+  } else if (state.phase == RigState::Phase::kConnecting) {
+    status.summary(DiagnosticStatus::WARN, "setting up the card");
+  } else if (state.silent_s > silence_limit_s) {
+    status.summary(DiagnosticStatus::ERROR,
+                   "no samples for " + seconds(state.silent_s) +
+                       ": the card is ready; start the radar's frames, and check the LVDS ribbon if they run");
+  } else if (dropped > 0) {
+    status.summary(DiagnosticStatus::WARN, "this host dropped " + std::to_string(dropped) +
+                                               " packets: raise net.core.rmem_max or free the processor");
+  } else if (lost > 0) {
+    status.summary(DiagnosticStatus::WARN, std::to_string(lost) + " bytes lost: raise packet_delay_us, check the cable");
+  } else {
+    status.summary(DiagnosticStatus::OK, "streaming");
+  }
+  status.add("frame rate [Hz]", rate_hz);
+  status.add("frame rate expected [Hz]", 1 / radar_.frame_period_s);
+  status.add("frames", state.frames.frames);
+  status.add("incomplete frames", state.frames.incomplete_frames);
+  status.add("missing frames", state.frames.missing_frames);
+  status.add("lost bytes", state.frames.lost_bytes);
+  status.add("packets", state.packets.packets);
+  status.add("duplicate packets", state.frames.duplicate_packets);
+  status.add("late packets", state.frames.late_packets);
+  status.add("packets dropped by this host", state.packets.kernel_drops);
+  status.add("packets from other addresses", state.packets.foreign);
+  status.add("socket buffer [kB]", state.buffer_bytes >> 10);
+  status.add("recordings armed", state.armings);
+  status.add("silent for [s]", state.silent_s);
+  status.add("last card status", state.last_status ? describeStatus(*state.last_status) : "none since armed");
+  status.add("FPGA version", state.version ? std::to_string(state.version->major) + "." +
+                                                 std::to_string(state.version->minor)
+                                           : "unknown");
+}
+
+}  // namespace mmradartwin
