@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <complex>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -58,6 +59,8 @@ struct PoseContext {
   std::uint64_t seed;                       ///< of what is random by nature (phases of scatter points)
   /// Strongest A_p of the session's poses, for levels that are relative to it.
   std::function<double()> strongest_amplitude;
+  /// |gain| of the receiver's filters at a path length: what a level stated after the IF filter has to make up for.
+  std::function<double(double length_m)> receiver_gain;
 };
 
 /// One unit of the physical model (DESIGN section 4). Implementations override the stages they act in; all stages are
@@ -70,14 +73,26 @@ class Mechanism {
   /// Takes checked parameters; throws InputError where they do not fit the scene or radar (an unknown actor, say).
   virtual void configure(const Parameters& values, const Scene& scene, const RadarConfig& radar) = 0;
 
+  /// What the user should know about this scene with this mechanism, a line each; asked for after build().
+  virtual std::vector<std::string> notes() const { return {}; }
+  /// Where the order of two mechanisms in one stage matters, the lower rank acts first; the file's order never matters.
+  virtual int rank() const { return 0; }
+
   // Stages, in the order in which a simulation runs them.
   virtual void editScene(Scene&) const {}                                           ///< once, on loading
+  /// Once, after all editScene(): precomputes what depends on the scene alone. The scene outlives the mechanism.
+  virtual void build(const Scene&, const RadarConfig&) {}
   virtual Eigen::Isometry3d pose(const Eigen::Isometry3d& T_map_radar) const { return T_map_radar; }
   virtual void addPaths(const PoseContext&, std::vector<PathRecord>&) const {}
   virtual void reweight(const PoseContext&, PathRecord&) const {}                   ///< every path of every mechanism
+  /// Gain of the receiver on the tone of a path of this length: filters act here, exactly, on the received grid.
+  virtual std::complex<double> toneGain(const PoseContext&, double /*length_m*/) const { return 1.0; }
+  virtual bool hasToneGain() const { return false; }
   virtual void receive(const PoseContext&, ComplexGrid&) const {}                   ///< on the propagated grid
   /// True where receive() does something: then the grid is more than its records.
   virtual bool hasReceiveStage() const { return false; }
+  /// True where addPaths() wants strongest_amplitude().
+  virtual bool needsStrongestAmplitude() const { return false; }
 };
 
 /// Mechanisms are found by name. A user's package registers one from its own plug-in library.

@@ -33,6 +33,13 @@ void accumulate(const RadarConfig& radar, const std::vector<PathRecord>& records
 /// exp(j 2 pi (f_c tau_k + mu tau_k t_c - mu tau_k^2 / 2)), amplitude = |coefficient|, phase, range_bin.
 void setContribution(const RadarConfig& radar, std::complex<double> coefficient, PathRecord& record);
 
+/// Makes a record's path longer by extra_m at all elements (a constant delay); amplitude and direction stay.
+void lengthen(const RadarConfig& radar, double extra_m, PathRecord& record);
+/// Multiplies amplitude and contribution.
+void scaleRecord(std::complex<double> factor, PathRecord& record);
+/// Nearest range bin of length/2, held within the grid.
+int rangeBin(const RadarConfig& radar, double length_m);
+
 /// What the invariants of DESIGN section 4 came out as for one pose.
 struct RecordCheck {
   double worst_amplitude_error = 0;     ///< max |sum|c|^2/(M A^2) - 1|

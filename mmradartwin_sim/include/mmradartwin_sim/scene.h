@@ -22,6 +22,8 @@ struct Facet {
   bool rectangle = false;                    ///< fills its bounding rectangle
   std::vector<std::vector<Eigen::Vector2d>> loops;  ///< boundary loops in (e1, e2), outer ones and holes
   bool reflects = true;                      ///< false where the normal lies within 45 deg of the vertical: it only occludes
+  bool present = true;                       ///< false where a mechanism took the actor away; ids stay
+  double flatness_m = 0;                     ///< largest distance of a merged vertex from the plane
 
   double planeDistance(const Eigen::Vector3d& p) const { return normal.dot(p - origin); }
   bool contains(const Eigen::Vector3d& p_on_plane, double tolerance_m = 0) const;
@@ -36,12 +38,21 @@ struct Actor {
   Material material;
   std::vector<Eigen::Vector3d> vertices;         ///< map, metres
   std::vector<std::array<int, 3>> triangles;
+  std::vector<int> triangle_facet;               ///< facet id per triangle, -1 where it has no area
   std::vector<int> facets;                       ///< ids
+  bool present = true;                           ///< false where a mechanism took it away: no paths, no occlusion
   Eigen::AlignedBox3d bounds;
+};
+
+/// When neighbouring triangles are one facet. Scans need wider limits than drawings.
+struct FacetTolerance {
+  double angle_deg = 0.5;                        ///< between a triangle's normal and the facet's
+  double offset_m = 0.001;                       ///< of a vertex from the facet's plane
 };
 
 struct Scene {
   std::string file;                              ///< scene.yaml
+  FacetTolerance tolerance;                      ///< scene.yaml's optional `facets: {angle_deg, offset_m}`
   std::vector<Actor> actors;
   std::vector<Facet> facets;
 
@@ -51,8 +62,15 @@ struct Scene {
 /// Reads scene.yaml strictly, its meshes (assimp) and materials, and builds facets. Throws InputError naming file and key
 /// (unknown material, two actors of one name, no triangles, NaN or huge coordinates, material outside its frequency range).
 Scene loadScene(const std::string& scene_yaml, double frequency_hz);
-/// Rebuilds facets after actors were added, moved or removed.
+/// Facets of all actors, ids in the order of actors and triangles. Throws InputError for an actor without area.
 void rebuildFacets(Scene& scene);
+/// Moves an actor with its facets; indices and facet-local coordinates stay.
+void moveActor(Scene& scene, int actor, const Eigen::Isometry3d& T_map_map);
+/// Takes an actor out of paths and occlusion; indices stay.
+void removeActor(Scene& scene, int actor);
+/// Reads one mesh file into actors in file coordinates (glTF's y-up turned to z-up), without material look-up or facets:
+/// OBJ object or group name = actor, glTF node name = actor, otherwise the file's stem. Throws InputError.
+std::vector<Actor> loadMesh(const std::string& file);
 
 /// Occlusion queries, thread-safe. Embree behind it; no invalid ray reaches it.
 class RayCaster {

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
 #include "mmradartwin_sim/mechanism.h"
@@ -61,6 +63,12 @@ class Twin {
   void setStrongestAmplitude(double amplitude);
   /// Poses of the session: finds the strongest amplitude where a mechanism needs it. Cheap otherwise.
   void prepare(const std::vector<Eigen::Isometry3d>& poses);
+  /// What a user should know about this scene with these mechanisms (search limits, say), a line each.
+  std::vector<std::string> notes() const;
+  /// The two halves of simulate(): all that has to be traced, and what weights, leakage and receiver make of it. Records
+  /// traced once may be weighed again by a twin that differs in mechanisms of weight and receiver alone.
+  std::vector<PathRecord> trace(const Eigen::Isometry3d& T_map_radar) const;
+  Simulation weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced, std::int64_t stamp_ns = 0) const;
   /// Throws InputError for a pose that is NaN or inside an actor (names it).
   Simulation simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
 

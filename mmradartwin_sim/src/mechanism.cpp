@@ -1,0 +1,91 @@
+#include "mmradartwin_sim/mechanism.h"
+
+#include <cmath>
+
+#include "mechanisms/builtin.h"
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin {
+
+void Parameters::set(const std::string& name, Value value) { values_[name] = std::move(value); }
+bool Parameters::has(const std::string& name) const { return values_.count(name) > 0; }
+double Parameters::number(const std::string& name) const { return std::get<double>(values_.at(name)); }
+const std::string& Parameters::text(const std::string& name) const { return std::get<std::string>(values_.at(name)); }
+const std::vector<double>& Parameters::numbers(const std::string& name) const {
+  return std::get<std::vector<double>>(values_.at(name));
+}
+const std::vector<std::string>& Parameters::texts(const std::string& name) const {
+  return std::get<std::vector<std::string>>(values_.at(name));
+}
+
+bool PoseContext::inFieldOfView(const Eigen::Vector3d& direction_radar) const {
+  static const double kSine = std::sin(20 * M_PI / 180);
+  return direction_radar.x() > 0 && std::abs(direction_radar.z()) <= kSine * direction_radar.norm();
+}
+
+MechanismRegistry& MechanismRegistry::instance() {
+  static MechanismRegistry registry = [] {
+    MechanismRegistry r;
+    r.add("specular", makeSpecular);
+    r.add("corner", makeCorner);
+    r.add("diffuse", makeDiffuse);
+    r.add("radar_yaw_offset", makeRadarYawOffset);
+    r.add("radar_position_offset", makeRadarPositionOffset);
+    r.add("range_bias", makeRangeBias);
+    r.add("range_scale", makeRangeScale);
+    r.add("material_reflectivity", makeMaterialReflectivity);
+    r.add("actor_absent", makeActorAbsent);
+    r.add("actor_moved", makeActorMoved);
+    r.add("element_pattern", makeElementPattern);
+    r.add("elevation_pattern", makeElevationPattern);
+    r.add("tx_rx_leakage", makeTxRxLeakage);
+    r.add("channel_phase_error", makeChannelPhaseError);
+    r.add("tx_imbalance", makeTxImbalance);
+    r.add("if_highpass", makeIfHighpass);
+    return r;
+  }();
+  return registry;
+}
+
+void MechanismRegistry::add(const std::string& name, Factory factory) { factories_[name] = std::move(factory); }
+
+std::unique_ptr<Mechanism> MechanismRegistry::create(const std::string& name) const {
+  const auto found = factories_.find(name);
+  if (found != factories_.end()) return found->second();
+  std::string known;
+  for (const auto& [k, factory] : factories_) known += (known.empty() ? "" : ", ") + k;
+  throw InputError("unknown mechanism " + name + "; known: " + known);
+}
+
+std::vector<std::string> MechanismRegistry::names() const {
+  std::vector<std::string> names;
+  for (const auto& [k, factory] : factories_) names.push_back(k);
+  return names;
+}
+
+int requireActor(const Scene& scene, const std::string& mechanism, const std::string& actor) {
+  const int index = scene.actorIndex(actor);
+  if (index >= 0) return index;
+  std::string known;
+  for (const Actor& a : scene.actors) known += (known.empty() ? "" : ", ") + a.name;
+  if (known.size() > 400) known = known.substr(0, 400) + ", ...";
+  throw InputError("mechanism " + mechanism + ": key actor: " + scene.file + " has no actor " + actor + "; known: " + known);
+}
+
+ElementsInMap::ElementsInMap(const PoseContext& context)
+    : p(context.T_map_radar.translation()), up(context.T_map_radar.linear().col(2)) {
+  for (const auto& t : context.radar.tx_position_m) tx.push_back(context.T_map_radar * t);
+  for (const auto& r : context.radar.rx_position_m) rx.push_back(context.T_map_radar * r);
+}
+
+std::vector<double> ElementsInMap::lengthsVia(const Eigen::Vector3d& point) const {
+  std::vector<double> lengths;
+  lengths.reserve(tx.size() * rx.size());
+  for (const auto& t : tx) {
+    const double out = (point - t).norm();
+    for (const auto& r : rx) lengths.push_back(out + (point - r).norm());
+  }
+  return lengths;
+}
+
+}  // namespace mmradartwin

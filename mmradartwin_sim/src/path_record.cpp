@@ -1,0 +1,105 @@
+#include "mmradartwin_sim/path_record.h"
+
+#include <cmath>
+#include <fstream>
+#include <iomanip>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/scene.h"
+
+namespace mmradartwin {
+namespace {
+
+/// Phase of a path of delay tau at the window's centre, in turns kept near zero so that no digits are lost.
+double phaseAtCenter_rad(const RadarConfig& radar, double tau_s) {
+  const double turns = radar.center_frequency_hz() * tau_s - 0.5 * radar.slope_hz_per_s * tau_s * tau_s;
+  return 2 * M_PI * (turns - std::round(turns));
+}
+
+}  // namespace
+
+int rangeBin(const RadarConfig& radar, double length_m) {
+  const int bin = static_cast<int>(std::lround(0.5 * length_m / radar.range_bin_m()));
+  return std::min(std::max(bin, 0), radar.samples_per_chirp - 1);
+}
+
+void accumulate(const RadarConfig& radar, const std::vector<PathRecord>& records, ComplexGrid& x) {
+  const int channels = radar.channels(), samples = radar.samples_per_chirp;
+  if (x.rows() != channels || x.cols() != samples) x = ComplexGrid::Zero(channels, samples);
+  const double turns_per_m = radar.slope_hz_per_s / kSpeedOfLight_m_per_s;
+  const double first_s = radar.sample_time_s(0) - radar.window_center_s();
+  for (const PathRecord& record : records) {
+    for (int k = 0; k < channels; ++k) {
+      const double rate = 2 * M_PI * turns_per_m * record.length_m[k];
+      // Two interleaved recurrences, each begun exactly: rounding grows with the number of steps, 64 of them stay at 1e-14.
+      const std::complex<double> step = std::polar(1.0, 2 * rate / radar.sample_rate_hz);
+      std::complex<double> even = record.c[k] * std::polar(1.0, rate * first_s);
+      std::complex<double> odd = record.c[k] * std::polar(1.0, rate * (first_s + 1 / radar.sample_rate_hz));
+      const double sr = step.real(), si = step.imag();
+      double er = even.real(), ei = even.imag(), dr = odd.real(), di = odd.imag();
+      std::complex<double>* row = &x(k, 0);
+      int n = 0;
+      for (; n + 1 < samples; n += 2) {
+        row[n] += std::complex<double>(er, ei);
+        row[n + 1] += std::complex<double>(dr, di);
+        const double er2 = er * sr - ei * si, dr2 = dr * sr - di * si;
+        ei = er * si + ei * sr;
+        di = dr * si + di * sr;
+        er = er2;
+        dr = dr2;
+      }
+      if (n < samples) row[n] += std::complex<double>(er, ei);
+    }
+  }
+}
+
+void setContribution(const RadarConfig& radar, std::complex<double> coefficient, PathRecord& record) {
+  record.amplitude = std::abs(coefficient);
+  record.c.resize(record.length_m.size());
+  for (std::size_t k = 0; k < record.c.size(); ++k) {
+    record.c[k] =
+        coefficient * std::polar(1.0, phaseAtCenter_rad(radar, record.length_m[k] / kSpeedOfLight_m_per_s));
+  }
+  record.phase_rad = std::arg(record.c[0]);
+  record.range_bin = rangeBin(radar, record.length_m[0]);
+}
+
+void lengthen(const RadarConfig& radar, double extra_m, PathRecord& record) {
+  for (std::size_t k = 0; k < record.c.size(); ++k) {
+    const double before = phaseAtCenter_rad(radar, record.length_m[k] / kSpeedOfLight_m_per_s);
+    record.length_m[k] += extra_m;
+    const double after = phaseAtCenter_rad(radar, record.length_m[k] / kSpeedOfLight_m_per_s);
+    record.c[k] *= std::polar(1.0, after - before);
+  }
+  record.phase_rad = std::arg(record.c[0]);
+  record.range_bin = rangeBin(radar, record.length_m[0]);
+}
+
+void scaleRecord(std::complex<double> factor, PathRecord& record) {
+  record.amplitude *= std::abs(factor);
+  for (auto& c : record.c) c *= factor;
+  record.phase_rad = std::arg(record.c[0]);
+}
+
+void writePathsCsv(const std::vector<PathRecord>& records, const Scene& scene, const std::string& file) {
+  std::ofstream out(file);
+  out << "length_m,azimuth_dep_deg,elevation_dep_deg,azimuth_arr_deg,elevation_arr_deg,amplitude_db,phase_rad,bounces,"
+         "event,actors,materials\n";
+  const auto degrees = [](double rad) { return rad * 180 / M_PI; };
+  for (const PathRecord& r : records) {
+    out << std::fixed << std::setprecision(6) << r.length_m[0] << ',' << std::setprecision(4)
+        << degrees(std::atan2(r.departure.y(), r.departure.x())) << ','
+        << degrees(std::asin(std::min(1.0, std::max(-1.0, r.departure.z())))) << ','
+        << degrees(std::atan2(r.arrival.y(), r.arrival.x())) << ','
+        << degrees(std::asin(std::min(1.0, std::max(-1.0, r.arrival.z())))) << ',' << 20 * std::log10(r.amplitude) << ','
+        << std::setprecision(6) << r.phase_rad << ',' << r.bounces << ',' << *r.event << ',';
+    for (std::size_t i = 0; i < r.actors.size(); ++i) out << (i ? ";" : "") << scene.actors[r.actors[i]].name;
+    out << ',';
+    for (std::size_t i = 0; i < r.actors.size(); ++i) out << (i ? ";" : "") << scene.actors[r.actors[i]].material_tag;
+    out << '\n';
+  }
+  out.close();
+  if (!out) throw std::runtime_error(file + ": cannot be written");
+}
+
+}  // namespace mmradartwin

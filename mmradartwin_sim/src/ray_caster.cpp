@@ -1,0 +1,164 @@
+#include <embree3/rtcore.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+
+#include "mmradartwin_sim/scene.h"
+
+namespace mmradartwin {
+
+struct RayCaster::Embree {
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();    // single precision inside, so coordinates stay small
+  double radius_m = 0;
+  std::vector<std::vector<int>> facet_of_triangle;     // [actor][triangle]
+  std::vector<bool> solid;                             // actors that can have an inside
+  std::vector<Eigen::AlignedBox3d> bounds;
+
+  ~Embree() {
+    if (scene) rtcReleaseScene(scene);
+    if (device) rtcReleaseDevice(device);
+  }
+};
+
+namespace {
+
+/// False where Embree would abort (Debian builds it with assertions on rays) or nothing can be met.
+bool castable(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double length) {
+  return origin.allFinite() && direction.allFinite() && direction.squaredNorm() > 0.5 && std::isfinite(length) &&
+         length > 0 && origin.cwiseAbs().maxCoeff() < 1e9;
+}
+
+void fill(RTCRay& ray, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double length) {
+  ray.org_x = static_cast<float>(origin.x());
+  ray.org_y = static_cast<float>(origin.y());
+  ray.org_z = static_cast<float>(origin.z());
+  ray.tnear = 0;
+  ray.dir_x = static_cast<float>(direction.x());
+  ray.dir_y = static_cast<float>(direction.y());
+  ray.dir_z = static_cast<float>(direction.z());
+  ray.time = 0;
+  ray.tfar = static_cast<float>(length);
+  ray.mask = static_cast<unsigned>(-1);  // Debian's Embree has ray masks on
+  ray.id = 0;
+  ray.flags = 0;
+}
+
+}  // namespace
+
+RayCaster::RayCaster(const Scene& scene) : embree_(new Embree) {
+  Embree& e = *embree_;
+  e.device = rtcNewDevice("threads=1,set_affinity=0");
+  if (!e.device) throw std::runtime_error("Embree cannot be started");
+  e.scene = rtcNewScene(e.device);
+  rtcSetSceneBuildQuality(e.scene, RTC_BUILD_QUALITY_HIGH);
+  Eigen::AlignedBox3d all;
+  for (const Actor& actor : scene.actors) {
+    for (const auto& v : actor.vertices) all.extend(v);
+  }
+  if (!all.isEmpty()) {
+    e.center = all.center();
+    e.radius_m = 0.5 * all.diagonal().norm();
+  }
+  const double volume = all.isEmpty() ? 0 : (all.sizes().array() + 0.01).prod();
+  for (std::size_t a = 0; a < scene.actors.size(); ++a) {
+    const Actor& actor = scene.actors[a];
+    e.facet_of_triangle.push_back(actor.triangle_facet);
+    e.bounds.push_back(actor.bounds);
+    // A shell that encloses most of the scene is the room itself: the radar is meant to be inside it.
+    e.solid.push_back(actor.present && !actor.bounds.isEmpty() && actor.bounds.sizes().prod() < 0.5 * volume);
+    if (!actor.present || actor.triangles.empty()) continue;
+    RTCGeometry geometry = rtcNewGeometry(e.device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                 3 * sizeof(float), actor.vertices.size()));
+    auto* triangles = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), actor.triangles.size()));
+    if (!vertices || !triangles) throw std::runtime_error("Embree has no memory for actor " + actor.name);
+    for (std::size_t i = 0; i < actor.vertices.size(); ++i) {
+      const Eigen::Vector3f v = (actor.vertices[i] - e.center).cast<float>();
+      std::memcpy(vertices + 3 * i, v.data(), 3 * sizeof(float));
+    }
+    for (std::size_t i = 0; i < actor.triangles.size(); ++i) {
+      for (int k = 0; k < 3; ++k) triangles[3 * i + k] = static_cast<unsigned>(actor.triangles[i][k]);
+    }
+    rtcSetGeometryMask(geometry, static_cast<unsigned>(-1));
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(e.scene, geometry, static_cast<unsigned>(a));
+    rtcReleaseGeometry(geometry);
+  }
+  rtcCommitScene(e.scene);
+}
+
+RayCaster::~RayCaster() = default;
+RayCaster::RayCaster(RayCaster&&) noexcept = default;
+
+bool RayCaster::visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const {
+  const Eigen::Vector3d d = b - a;
+  const double length = d.norm();
+  if (!(length > 2 * gap_m)) return true;
+  const Eigen::Vector3d unit = d / length;
+  const Eigen::Vector3d origin = a + gap_m * unit - embree_->center;
+  if (!castable(origin, unit, length - 2 * gap_m)) return false;
+  RTCRay ray;
+  fill(ray, origin, unit, length - 2 * gap_m);
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(embree_->scene, &context, &ray);
+  return ray.tfar >= 0;
+}
+
+std::optional<RayCaster::Hit> RayCaster::firstHit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                                  double max_m) const {
+  const double norm = direction.norm();
+  if (!(norm > 0)) return std::nullopt;
+  const Eigen::Vector3d unit = direction / norm, from = origin - embree_->center;
+  // Beyond the scene there is nothing, and Embree wants finite rays.
+  const double length = std::min(max_m, from.norm() + embree_->radius_m + 1);
+  if (!castable(from, unit, length)) return std::nullopt;
+  RTCRayHit query;
+  fill(query.ray, from, unit, length);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.primID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(embree_->scene, &context, &query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  Hit hit;
+  hit.distance_m = query.ray.tfar;
+  hit.actor = static_cast<int>(query.hit.geomID);
+  hit.facet = embree_->facet_of_triangle[hit.actor][query.hit.primID];
+  hit.point = origin + hit.distance_m * unit;
+  return hit;
+}
+
+std::optional<int> RayCaster::insideActor(const Eigen::Vector3d& p) const {
+  // Directions without symmetry, so that none runs along a wall.
+  static const std::array<Eigen::Vector3d, 7> kDirections = {
+      Eigen::Vector3d(0.9137, 0.3711, 0.1653), Eigen::Vector3d(-0.8321, 0.5113, 0.2149),
+      Eigen::Vector3d(0.2917, -0.9211, 0.2579), Eigen::Vector3d(-0.3571, -0.8837, -0.3023),
+      Eigen::Vector3d(0.1931, 0.4127, 0.8902), Eigen::Vector3d(0.5483, -0.3319, -0.7676),
+      Eigen::Vector3d(-0.4127, 0.6733, -0.6133)};
+  std::vector<int> votes(embree_->bounds.size(), 0);
+  for (const Eigen::Vector3d& d : kDirections) {
+    std::vector<int> crossings(votes.size(), 0);
+    Eigen::Vector3d from = p;
+    for (int i = 0; i < 4096; ++i) {
+      const auto hit = firstHit(from, d, std::numeric_limits<double>::infinity());
+      if (!hit) break;
+      ++crossings[hit->actor];
+      from = hit->point + 1e-4 * d.normalized();
+    }
+    for (std::size_t a = 0; a < votes.size(); ++a) votes[a] += crossings[a] % 2;
+  }
+  for (std::size_t a = 0; a < votes.size(); ++a) {
+    if (votes[a] >= 6 && embree_->solid[a] && embree_->bounds[a].contains(p)) return static_cast<int>(a);
+  }
+  return std::nullopt;
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,255 @@
+#include "mmradartwin_sim/twin.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <sstream>
+
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin {
+namespace {
+
+void raise(std::atomic<double>& maximum, double value) {
+  double known = maximum.load();
+  while (value > known && !maximum.compare_exchange_weak(known, value)) {
+  }
+}
+
+std::string formatPoint(const Eigen::Vector3d& p) {
+  std::ostringstream out;
+  out << '(' << p.x() << ", " << p.y() << ", " << p.z() << ") m";
+  return out.str();
+}
+
+/// Compares with phasors evaluated one by one at three samples: another arithmetic than the recurrence that made x.
+RecordCheck check(const RadarConfig& radar, const std::vector<PathRecord>& records, const ComplexGrid& x) {
+  RecordCheck result;
+  const int channels = radar.channels(), samples = radar.samples_per_chirp;
+  const std::vector<int> probes = {0, samples / 2, samples - 1};
+  Eigen::MatrixXcd direct = Eigen::MatrixXcd::Zero(channels, static_cast<Eigen::Index>(probes.size()));
+  for (const PathRecord& r : records) {
+    double power = 0;
+    for (int k = 0; k < channels; ++k) {
+      power += std::norm(r.c[k]);
+      const double rate = 2 * M_PI * radar.slope_hz_per_s * r.length_m[k] / kSpeedOfLight_m_per_s;
+      for (std::size_t i = 0; i < probes.size(); ++i) {
+        direct(k, static_cast<Eigen::Index>(i)) +=
+            r.c[k] * std::polar(1.0, rate * (radar.sample_time_s(probes[i]) - radar.window_center_s()));
+      }
+    }
+    const double expected = channels * r.amplitude * r.amplitude;
+    if (expected > 0) result.worst_amplitude_error = std::max(result.worst_amplitude_error, std::abs(power / expected - 1));
+  }
+  double difference = 0, norm = 0;
+  for (int k = 0; k < channels; ++k) {
+    for (std::size_t i = 0; i < probes.size(); ++i) {
+      difference += std::norm(x(k, probes[i]) - direct(k, static_cast<Eigen::Index>(i)));
+      norm += std::norm(x(k, probes[i]));
+    }
+  }
+  result.grid_error = norm > 0 ? std::sqrt(difference / norm) : std::sqrt(difference);
+  return result;
+}
+
+}  // namespace
+
+struct Twin::Impl {
+  TwinDescription description;
+  std::uint64_t seed;
+  Scene scene;                                    // as described
+  std::unique_ptr<RayCaster> rays;
+  std::unique_ptr<Scene> edited;                  // null where no mechanism edits the scene
+  std::unique_ptr<RayCaster> edited_rays;
+  std::vector<std::unique_ptr<Mechanism>> mechanisms;  // by rank
+  double strongest = -1;                          // of the session, where it is known
+  mutable std::atomic<double> strongest_so_far{0};
+  bool has_tone_gain = false, has_receive = false, needs_strongest = false;
+
+  const Scene& model() const { return edited ? *edited : scene; }
+  const RayCaster& modelRays() const { return edited_rays ? *edited_rays : *rays; }
+
+  Eigen::Isometry3d modelPose(const Eigen::Isometry3d& T_map_radar) const {
+    Eigen::Isometry3d T = T_map_radar;
+    for (const auto& m : mechanisms) T = m->pose(T);
+    return T;
+  }
+
+  PoseContext context(const Eigen::Isometry3d& T_map_radar) const {
+    const RadarConfig& radar = description.radar;
+    PoseContext c{radar,
+                  model(),
+                  modelRays(),
+                  modelPose(T_map_radar),
+                  radar.center_frequency_hz(),
+                  radar.max_range_m(),
+                  seed,
+                  [this] { return strongest >= 0 ? strongest : strongest_so_far.load(); },
+                  {}};
+    return c;
+  }
+
+  double toneGain(const PoseContext& c, double length_m) const {
+    double gain = 1;
+    for (const auto& m : mechanisms) {
+      if (m->hasToneGain()) gain *= std::abs(m->toneGain(c, length_m));
+    }
+    return gain;
+  }
+
+  void reweight(const PoseContext& c, std::vector<PathRecord>& records, std::size_t from) const {
+    for (std::size_t i = from; i < records.size(); ++i) {
+      for (const auto& m : mechanisms) m->reweight(c, records[i]);
+    }
+  }
+
+  double strongestOf(const PoseContext& c, const std::vector<PathRecord>& records) const {
+    double best = 0;
+    for (const PathRecord& r : records) {
+      best = std::max(best, has_tone_gain ? r.amplitude * toneGain(c, r.length_m[0]) : r.amplitude);
+    }
+    return best;
+  }
+};
+
+Twin::Twin(TwinDescription description, std::uint64_t seed) : impl_(new Impl) {
+  Impl& m = *impl_;
+  m.description = std::move(description);
+  m.seed = seed;
+  const RadarConfig& radar = m.description.radar;
+  m.scene = loadScene(m.description.scene_file, radar.center_frequency_hz());
+  m.rays = std::make_unique<RayCaster>(m.scene);
+  try {
+    for (const NamedParameters& named : m.description.mechanisms) {
+      m.mechanisms.push_back(MechanismRegistry::instance().create(named.mechanism));
+      m.mechanisms.back()->configure(named.values, m.scene, radar);
+    }
+    std::stable_sort(m.mechanisms.begin(), m.mechanisms.end(), [](const auto& a, const auto& b) {
+      return std::make_pair(a->rank(), a->name()) < std::make_pair(b->rank(), b->name());
+    });
+    m.edited = std::make_unique<Scene>(m.scene);
+    for (const auto& mechanism : m.mechanisms) mechanism->editScene(*m.edited);
+    // Whether anything was edited shows in what Embree and the facets would see.
+    bool same = m.edited->actors.size() == m.scene.actors.size();
+    for (std::size_t i = 0; same && i < m.scene.actors.size(); ++i) {
+      same = m.edited->actors[i].present == m.scene.actors[i].present && m.edited->actors[i].vertices == m.scene.actors[i].vertices &&
+             m.edited->actors[i].material_tag == m.scene.actors[i].material_tag;
+    }
+    if (same) {
+      m.edited.reset();
+    } else {
+      m.edited_rays = std::make_unique<RayCaster>(*m.edited);
+    }
+    for (const auto& mechanism : m.mechanisms) {
+      mechanism->build(m.model(), radar);
+      m.has_tone_gain = m.has_tone_gain || mechanism->hasToneGain();
+      m.has_receive = m.has_receive || mechanism->hasReceiveStage();
+      m.needs_strongest = m.needs_strongest || mechanism->needsStrongestAmplitude();
+    }
+  } catch (const InputError& e) {
+    throw InputError((m.description.file.empty() ? m.description.scene_file : m.description.file) + ": " + e.what());
+  }
+}
+
+Twin::~Twin() = default;
+Twin::Twin(Twin&&) noexcept = default;
+
+const TwinDescription& Twin::description() const { return impl_->description; }
+const RadarConfig& Twin::radar() const { return impl_->description.radar; }
+const Scene& Twin::scene() const { return impl_->scene; }
+const RayCaster& Twin::rays() const { return *impl_->rays; }
+void Twin::setStrongestAmplitude(double amplitude) { impl_->strongest = amplitude; }
+
+std::vector<std::string> Twin::notes() const {
+  std::vector<std::string> notes;
+  for (const auto& m : impl_->mechanisms) {
+    for (std::string& note : m->notes()) notes.push_back(std::move(note));
+  }
+  return notes;
+}
+
+void Twin::prepare(const std::vector<Eigen::Isometry3d>& poses) {
+  if (!impl_->needs_strongest || impl_->strongest >= 0) return;
+  std::vector<double> best(poses.size(), 0);
+  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
+    try {
+      std::vector<PathRecord> records = trace(poses[i]);
+      const PoseContext c = impl_->context(poses[i]);
+      impl_->reweight(c, records, 0);
+      best[i] = impl_->strongestOf(c, records);
+    } catch (const InputError&) {
+      // An unusable pose is reported when it is simulated.
+    }
+  });
+  for (double b : best) impl_->strongest = std::max(impl_->strongest, b);
+}
+
+std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar) const {
+  if (!T_map_radar.matrix().allFinite()) throw InputError("pose is not a number; correct x, y, z and the quaternion");
+  const PoseContext c = impl_->context(T_map_radar);
+  if (const auto inside = c.rays.insideActor(c.T_map_radar.translation())) {
+    throw InputError("pose at " + formatPoint(c.T_map_radar.translation()) + " lies inside actor " + c.scene.actors[*inside].name +
+                     "; correct the pose or the scene");
+  }
+  std::vector<PathRecord> records;
+  for (const auto& m : impl_->mechanisms) {
+    if (!m->needsStrongestAmplitude()) m->addPaths(c, records);
+  }
+  return records;
+}
+
+Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced, std::int64_t stamp_ns) const {
+  PoseContext c = impl_->context(T_map_radar);
+  c.receiver_gain = [this, &c](double length_m) { return impl_->toneGain(c, length_m); };
+  Simulation s;
+  s.stamp_ns = stamp_ns;
+  s.T_map_radar = T_map_radar;
+  s.records = std::move(traced);
+  impl_->reweight(c, s.records, 0);
+  if (impl_->needs_strongest) {
+    raise(impl_->strongest_so_far, impl_->strongestOf(c, s.records));
+    const std::size_t echoes = s.records.size();
+    for (const auto& m : impl_->mechanisms) {
+      if (m->needsStrongestAmplitude()) m->addPaths(c, s.records);
+    }
+    impl_->reweight(c, s.records, echoes);
+  }
+
+  const RadarConfig& radar = impl_->description.radar;
+  s.grid.stamp_ns = stamp_ns;
+  s.grid.source = Branch::kSimulated;
+  s.grid.full_scale = 1;
+  s.grid.frames = 1;
+  s.grid.pose_valid = true;
+  s.grid.T_map_radar = T_map_radar;
+  accumulate(radar, s.records, s.grid.x);
+  if (s.records.empty()) s.grid.x = ComplexGrid::Zero(radar.channels(), radar.samples_per_chirp);
+  s.check = check(radar, s.records, s.grid.x);
+  s.propagation_only = !impl_->has_tone_gain && !impl_->has_receive;
+  if (impl_->has_tone_gain) {
+    std::vector<PathRecord> filtered = s.records;
+    for (PathRecord& r : filtered) {
+      for (std::size_t k = 0; k < r.c.size(); ++k) {
+        for (const auto& m : impl_->mechanisms) {
+          if (m->hasToneGain()) r.c[k] *= m->toneGain(c, r.length_m[k]);
+        }
+      }
+    }
+    s.grid.x.setZero();
+    accumulate(radar, filtered, s.grid.x);
+  }
+  if (impl_->has_receive) {
+    for (const auto& m : impl_->mechanisms) {
+      if (m->hasReceiveStage()) m->receive(c, s.grid.x);
+    }
+  }
+  return s;
+}
+
+Simulation Twin::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) const {
+  return weigh(T_map_radar, trace(T_map_radar), stamp_ns);
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,157 @@
+#include <cmath>
+#include <iomanip>
+#include <sstream>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/session.h"
+#include "mmradartwin_dsp/strict_yaml.h"
+#include "mmradartwin_sim/twin.h"
+
+namespace mmradartwin {
+namespace {
+
+std::string specList(const std::vector<ParameterSpec>& specs) {
+  std::ostringstream out;
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    const ParameterSpec& s = specs[i];
+    out << (i ? ", " : "") << s.name;
+    if (s.kind == ParameterKind::kNumber || s.kind == ParameterKind::kInteger || s.kind == ParameterKind::kNumbers) {
+      out << " (" << s.unit << ", " << s.min << " to " << s.max << ")";
+    }
+  }
+  return specs.empty() ? "none" : out.str();
+}
+
+Parameters readParameters(YamlMap& yaml, const std::vector<ParameterSpec>& specs, const std::string& mechanism) {
+  Parameters values;
+  for (const std::string& key : yaml.keys()) {
+    bool known = false;
+    for (const ParameterSpec& s : specs) known = known || s.name == key;
+    if (!known) yaml.fail(key, "mechanism " + mechanism + " has no such parameter; known: " + specList(specs));
+  }
+  for (const ParameterSpec& s : specs) {
+    if (!yaml.has(s.name)) {
+      if (s.required) yaml.fail(s.name, "is missing; mechanism " + mechanism + " needs it; parameters: " + specList(specs));
+      values.set(s.name, s.default_value);
+      continue;
+    }
+    switch (s.kind) {
+      case ParameterKind::kNumber: values.set(s.name, yaml.number(s.name, s.min, s.max)); break;
+      case ParameterKind::kInteger:
+        values.set(s.name, static_cast<double>(yaml.integer(s.name, static_cast<long long>(s.min), static_cast<long long>(s.max))));
+        break;
+      case ParameterKind::kText: values.set(s.name, yaml.text(s.name)); break;
+      case ParameterKind::kNumbers: values.set(s.name, yaml.numbers(s.name, s.min, s.max)); break;
+      case ParameterKind::kTexts: values.set(s.name, yaml.texts(s.name)); break;
+    }
+  }
+  return values;
+}
+
+Parameters defaults(const std::vector<ParameterSpec>& specs) {
+  Parameters values;
+  for (const ParameterSpec& s : specs) values.set(s.name, s.default_value);
+  return values;
+}
+
+std::vector<NamedParameters> baseMechanisms() {
+  std::vector<NamedParameters> base;
+  for (const char* name : {"specular", "corner", "diffuse"}) {
+    base.push_back({name, defaults(MechanismRegistry::instance().create(name)->parameters())});
+  }
+  return base;
+}
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + "\"";
+}
+
+/// A number that reads back as the same double; with a point or exponent's sign, so that PyYAML reads a number too.
+std::string formatNumber(double v) {
+  std::ostringstream out;
+  for (int digits = 6; digits <= 17; ++digits) {
+    out.str("");
+    out << std::setprecision(digits) << v;
+    if (std::stod(out.str()) == v) break;
+  }
+  std::string text = out.str();
+  const std::size_t e = text.find('e');
+  if (e != std::string::npos && text.find('.') == std::string::npos) text.insert(e, ".0");
+  return text;
+}
+
+void write(std::ostream& out, const Parameters::Value& value) {
+  if (const auto* number = std::get_if<double>(&value)) {
+    out << formatNumber(*number);
+  } else if (const auto* text = std::get_if<std::string>(&value)) {
+    out << quoted(*text);
+  } else if (const auto* numbers = std::get_if<std::vector<double>>(&value)) {
+    out << '[';
+    for (std::size_t i = 0; i < numbers->size(); ++i) out << (i ? ", " : "") << formatNumber((*numbers)[i]);
+    out << ']';
+  } else if (const auto* texts = std::get_if<std::vector<std::string>>(&value)) {
+    out << '[';
+    for (std::size_t i = 0; i < texts->size(); ++i) out << (i ? ", " : "") << quoted((*texts)[i]);
+    out << ']';
+  }
+}
+
+}  // namespace
+
+std::string TwinDescription::toYaml() const {
+  std::ostringstream out;
+  out << "scene: " << quoted(scene_file) << "\nmechanisms:\n";
+  for (const NamedParameters& m : mechanisms) {
+    out << "  " << m.mechanism << ": {";
+    bool first = true;
+    for (const auto& [key, value] : m.values.all()) {
+      out << (first ? "" : ", ") << key << ": ";
+      write(out, value);
+      first = false;
+    }
+    out << "}\n";
+  }
+  return out.str();
+}
+
+TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::string>& default_scene,
+                         const RadarConfig& default_radar) {
+  TwinDescription twin;
+  twin.file = twin_file;
+  twin.radar = default_radar;
+  twin.scene_file = default_scene.value_or("");
+  if (twin_file.empty()) {
+    if (twin.scene_file.empty()) throw InputError("no scene to simulate: the session names none and there is no twin.yaml; add a line scene: to session.yaml");
+    twin.mechanisms = baseMechanisms();
+    return twin;
+  }
+  YamlMap yaml = YamlMap::load(twin_file);
+  if (yaml.has("scene")) twin.scene_file = resolvePath(yaml.text("scene"), twin_file);
+  if (twin.scene_file.empty()) yaml.fail("scene", "is missing, and the session names no scene either; give the path of a scene.yaml");
+  if (yaml.has("radar")) twin.radar = loadRadarConfig(resolvePath(yaml.text("radar"), twin_file));
+  if (!yaml.has("mechanisms")) {
+    twin.mechanisms = baseMechanisms();
+  } else {
+    YamlMap mechanisms = yaml.map("mechanisms");
+    for (const std::string& name : mechanisms.keys()) {
+      std::vector<ParameterSpec> specs;
+      try {
+        specs = MechanismRegistry::instance().create(name)->parameters();
+      } catch (const InputError& e) {
+        mechanisms.fail(name, e.what());
+      }
+      YamlMap parameters = mechanisms.map(name);
+      twin.mechanisms.push_back({name, readParameters(parameters, specs, name)});
+      parameters.rejectUnknownKeys();
+    }
+  }
+  yaml.rejectUnknownKeys();
+  return twin;
+}
+
+}  // namespace mmradartwin
