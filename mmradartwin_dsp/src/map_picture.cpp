@@ -127,7 +127,7 @@ void drawCells(cv::Mat& picture, const Layout& layout, const RangeAngleAxes& axe
 }
 
 void drawGraticule(cv::Mat& picture, const Layout& layout, const FanStyle& style) {
-  const double step_m = style.max_range_m <= 6 ? 1 : style.max_range_m <= 14 ? 2 : style.max_range_m <= 40 ? 5 : 10;
+  const double step_m = style.max_range_m <= 7 ? 1 : style.max_range_m <= 14 ? 2 : style.max_range_m <= 40 ? 5 : 10;
   const auto radius_px = [&](double range_m) { return cvRound(range_m * layout.px_per_m); };
   const double label = 0.42 * layout.scale;
   // Lines cross dark and light cells alike: drawn half-transparent.

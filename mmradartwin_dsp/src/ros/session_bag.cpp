@@ -100,8 +100,8 @@ class SessionBagWriter {
         mmradartwin_msgs::AdcCube cube = toMsg(reader.frame(i, pose.stamp_ns), hash_);
         cube.header.frame_id = "radar_link";
         bag_.write("/radar/adc", recordTime(pose.stamp_ns + recording_.radar.frame_offset_ns(i)), cube);
+        writePose(pose, pose.stamp_ns + recording_.radar.frame_offset_ns(i) + quarter);
       }
-      writePose(pose, pose.stamp_ns + recording_.radar.frame_offset_ns(reader.frames() - 1) + quarter);
       return true;
     } catch (const InputError&) {  // missing or truncated: reading the bag will say so, as reading the session does
       return false;

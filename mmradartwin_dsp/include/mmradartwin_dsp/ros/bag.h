@@ -36,7 +36,7 @@ using PoseProgress = std::function<void(int done, int total)>;
 
 /// Writes a session as a bag: the latched `session` message (session_files.h says which files it holds and how those from
 /// outside of the directory fare), latched `radar/config`, one `radar/adc` message per frame, and T_map_radar in /tf a quarter of
-/// a period before the first frame and after the last frame of each pose. All poses are written, duplicates too; captures
+/// a period before the first frame and after every frame of a pose, so that a replay need not wait for the pose's end. All poses are written, duplicates too; captures
 /// that cubes cannot carry (truncated ones, those of unusable poses) travel as files in the session message. Messages are
 /// recorded at their stamps. The bag appears under its name when it is complete.
 void sessionToBag(const std::string& session, const std::string& bag, const PoseProgress& progress = {});

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <mmradartwin_msgs/AdcCube.h>
+#include <mmradartwin_msgs/RadarConfig.h>
+#include <mmradartwin_msgs/ReceiveGrid.h>
+#include <ros/ros.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_listener.h>
+
+#include <deque>
+#include <optional>
+
+#include "mmradartwin_dsp/coherent_average.h"
+#include "mmradartwin_dsp/range_angle.h"
+
+namespace mmradartwin {
+
+/// radar/config, radar/adc, twin/grid -> radar/grid, radar/range_angle, twin/range_angle. The same class runs as a node and
+/// as a nodelet; callbacks must come one at a time.
+///
+/// A frame waits until tf knows T_map_radar at its stamp, `pose_timeout_s` at most; without a pose it goes on with
+/// pose_valid = false. The average begins anew when the radar has moved by more than `moved_m` or `moved_deg` since the
+/// window's first pose, when radar/config changes, and when stamps go back (a bag that loops). Frames of another radar
+/// configuration than the latched one are refused.
+class SignalChainNode {
+ public:
+  /// Throws InputError for unknown or unusable parameters.
+  SignalChainNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+
+ private:
+  struct Waiting {
+    mmradartwin_msgs::AdcCube::ConstPtr cube;
+    ros::Time since;
+  };
+
+  void readParameters(const ros::NodeHandle& private_nh);
+  void onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& config);
+  void onCube(const mmradartwin_msgs::AdcCube::ConstPtr& cube);
+  void onTwinGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid);
+  /// Takes all frames from the queue whose pose is known or will not come.
+  void drain();
+  void process(const mmradartwin_msgs::AdcCube& cube, const std::optional<Eigen::Isometry3d>& T_map_radar);
+  void publish(const std::optional<Eigen::Isometry3d>& T_map_radar);
+  void restart();
+
+  int average_frames_ = 100;
+  int publish_every_ = 1;
+  double moved_m_ = 0.02;
+  double moved_rad_ = 0;
+  double pose_timeout_s_ = 0.5;
+  std::string map_frame_ = "map";
+  std::string radar_frame_ = "radar_link";
+
+  tf2_ros::Buffer tf_buffer_;
+  std::optional<tf2_ros::TransformListener> tf_listener_;
+  ros::Publisher grid_publisher_, map_publisher_, twin_map_publisher_;
+  ros::Subscriber config_subscriber_, cube_subscriber_, twin_subscriber_;
+  ros::WallTimer timer_;
+
+  std::uint64_t radar_hash_ = 0;
+  std::optional<SignalChain> chain_;
+  std::optional<CoherentAverage> average_;
+  std::optional<Eigen::Isometry3d> window_pose_;  ///< first known pose of the window
+  std::deque<Waiting> queue_;
+  ros::Time newest_;
+  int since_published_ = 0;
+};
+
+}  // namespace mmradartwin

@@ -1,0 +1,29 @@
+#include <ros/ros.h>  // nodelet.h needs it before itself
+
+#include <nodelet/nodelet.h>
+#include <pluginlib/class_list_macros.hpp>
+
+#include <memory>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/ros/signal_chain_node.h"
+
+namespace mmradartwin_dsp {
+
+class SignalChainNodelet : public nodelet::Nodelet {
+ private:
+  void onInit() override {
+    try {
+      node_ = std::make_unique<mmradartwin::SignalChainNode>(getNodeHandle(), getPrivateNodeHandle());
+    } catch (const mmradartwin::InputError& error) {
+      NODELET_FATAL("%s", error.what());
+      throw;
+    }
+  }
+
+  std::unique_ptr<mmradartwin::SignalChainNode> node_;
+};
+
+}  // namespace mmradartwin_dsp
+
+PLUGINLIB_EXPORT_CLASS(mmradartwin_dsp::SignalChainNodelet, nodelet::Nodelet)

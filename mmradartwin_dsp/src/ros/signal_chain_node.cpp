@@ -1,0 +1,168 @@
+#include "mmradartwin_dsp/ros/signal_chain_node.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/stationary_poses.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kWarnEvery_s = 5;
+/// Frames that may wait for tf; a second at the fastest frame rates.
+constexpr std::size_t kLongestQueue = 1000;
+
+}  // namespace
+
+SignalChainNode::SignalChainNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
+  readParameters(private_nh);
+  tf_listener_.emplace(tf_buffer_, nh);
+  grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("radar/grid", 10);
+  map_publisher_ = nh.advertise<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", 10);
+  twin_map_publisher_ = nh.advertise<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", 10);
+  config_subscriber_ = nh.subscribe("radar/config", 2, &SignalChainNode::onConfig, this);
+  cube_subscriber_ = nh.subscribe("radar/adc", 200, &SignalChainNode::onCube, this);
+  twin_subscriber_ = nh.subscribe("twin/grid", 50, &SignalChainNode::onTwinGrid, this);
+  timer_ = nh.createWallTimer(ros::WallDuration(0.01), [this](const ros::WallTimerEvent&) { drain(); });
+}
+
+void SignalChainNode::readParameters(const ros::NodeHandle& private_nh) {
+  StrictParameters parameters(private_nh);
+  average_frames_ = parameters.integer("average_frames", average_frames_, 1, 1000000);
+  publish_every_ = parameters.integer("publish_every", publish_every_, 1, 1000000);
+  moved_m_ = parameters.number("moved_m", moved_m_, 1e-4, 1e3);
+  moved_rad_ = parameters.number("moved_deg", 1.0, 1e-2, 180) * M_PI / 180;
+  pose_timeout_s_ = parameters.number("pose_timeout_s", pose_timeout_s_, 0, 60);
+  map_frame_ = parameters.text("map_frame", map_frame_);
+  radar_frame_ = parameters.text("radar_frame", radar_frame_);
+  parameters.rejectUnknown();
+}
+
+void SignalChainNode::onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& config) {
+  const std::uint64_t hash = radarHash(*config);
+  if (chain_ && hash == radar_hash_) return;
+  try {
+    const RadarConfig radar = fromMsg(*config);
+    SignalChain chain(radar);
+    chain_.emplace(std::move(chain));
+    average_.emplace(radar, average_frames_);
+    radar_hash_ = hash;
+    restart();
+  } catch (const InputError& error) {
+    ROS_ERROR("radar/config refused: %s", error.what());
+  }
+}
+
+void SignalChainNode::restart() {
+  if (average_) average_->reset();
+  window_pose_.reset();
+  queue_.clear();
+  newest_ = ros::Time();
+  since_published_ = 0;
+}
+
+void SignalChainNode::onCube(const mmradartwin_msgs::AdcCube::ConstPtr& cube) {
+  if (!average_) {
+    ROS_WARN_THROTTLE(kWarnEvery_s, "frames come, but no radar/config: they are left out until it does");
+    return;
+  }
+  if (cube->radar_hash != radar_hash_) {
+    ROS_WARN_THROTTLE(kWarnEvery_s, "frame %u refused: it was taken with another radar configuration (%016lx) than radar/config's (%016lx)",
+                      cube->sequence, static_cast<unsigned long>(cube->radar_hash), static_cast<unsigned long>(radar_hash_));
+    return;
+  }
+  if (!newest_.isZero() && cube->header.stamp == newest_) {
+    ROS_WARN_THROTTLE(kWarnEvery_s, "frame %u refused: it has the stamp of the one before", cube->sequence);
+    return;
+  }
+  if (cube->header.stamp < newest_) {
+    ROS_INFO("stamps went back by %.3f s: the average begins anew", (newest_ - cube->header.stamp).toSec());
+    restart();
+    tf_buffer_.clear();  // what it holds lies in the future now, and would keep older transforms out
+  }
+  newest_ = cube->header.stamp;
+  queue_.push_back({cube, ros::Time::now()});
+  drain();
+}
+
+void SignalChainNode::drain() {
+  while (!queue_.empty()) {
+    const Waiting& front = queue_.front();
+    const ros::Time stamp = front.cube->header.stamp;
+    std::optional<Eigen::Isometry3d> T_map_radar;
+    try {
+      const geometry_msgs::Transform T = tf_buffer_.lookupTransform(map_frame_, radar_frame_, stamp).transform;
+      T_map_radar = Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
+                    Eigen::Quaterniond(T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z).normalized();
+    } catch (const tf2::TransformException& error) {
+      const double waited_s = (ros::Time::now() - front.since).toSec();
+      // Time that went back while the frame waited counts as waited out.
+      if (waited_s >= 0 && waited_s < pose_timeout_s_ && queue_.size() < kLongestQueue) return;
+      ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f goes on without a pose: %s", stamp.toSec(), error.what());
+    }
+    const mmradartwin_msgs::AdcCube::ConstPtr cube = front.cube;
+    queue_.pop_front();
+    process(*cube, T_map_radar);
+  }
+}
+
+void SignalChainNode::process(const mmradartwin_msgs::AdcCube& msg, const std::optional<Eigen::Isometry3d>& T_map_radar) {
+  try {
+    const AdcCube cube = fromMsg(msg);
+    if (T_map_radar && window_pose_ && !standsStill(*T_map_radar, *window_pose_, moved_m_, moved_rad_)) {
+      average_->reset();
+      window_pose_.reset();
+    }
+    if (T_map_radar && !window_pose_) window_pose_ = T_map_radar;
+    average_->add(cube);
+    if (++since_published_ < publish_every_) return;
+    since_published_ = 0;
+    if (!average_->complete()) {
+      ROS_WARN_THROTTLE(kWarnEvery_s, "no map: a TDM slot has no valid chirp in the last %d frame(s)", average_->frames());
+      return;
+    }
+    publish(T_map_radar);
+  } catch (const InputError& error) {
+    ROS_WARN_THROTTLE(kWarnEvery_s, "frame refused: %s", error.what());
+  }
+}
+
+void SignalChainNode::publish(const std::optional<Eigen::Isometry3d>& T_map_radar) {
+  ReceiveGrid grid = average_->grid();
+  grid.pose_valid = T_map_radar.has_value();
+  if (T_map_radar) grid.T_map_radar = *T_map_radar;
+  if (grid_publisher_.getNumSubscribers() > 0) {
+    const auto msg = boost::make_shared<mmradartwin_msgs::ReceiveGrid>(toMsg(grid, radar_hash_));
+    msg->header.frame_id = radar_frame_;
+    grid_publisher_.publish(msg);
+  }
+  if (map_publisher_.getNumSubscribers() > 0) {
+    const auto msg = boost::make_shared<mmradartwin_msgs::RangeAngleMap>(toMsg(chain_->map(grid), radar_hash_));
+    msg->header.frame_id = radar_frame_;
+    map_publisher_.publish(msg);
+  }
+}
+
+void SignalChainNode::onTwinGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& msg) {
+  if (!chain_) {
+    ROS_WARN_THROTTLE(kWarnEvery_s, "twin/grid comes, but no radar/config: it is left out until it does");
+    return;
+  }
+  if (twin_map_publisher_.getNumSubscribers() == 0) return;
+  if (msg->radar_hash != radar_hash_) {
+    // A twin may model another radar than the one that measures; both are drawn on the measured one's axes.
+    ROS_WARN_THROTTLE(60, "twin/grid was made for another radar configuration than radar/config's; its map has the measured axes");
+  }
+  try {
+    const auto map = boost::make_shared<mmradartwin_msgs::RangeAngleMap>(toMsg(chain_->map(fromMsg(*msg)), msg->radar_hash));
+    map->header.frame_id = radar_frame_;
+    twin_map_publisher_.publish(map);
+  } catch (const InputError& error) {
+    ROS_WARN_THROTTLE(kWarnEvery_s, "twin/grid refused: %s", error.what());
+  }
+}
+
+}  // namespace mmradartwin
