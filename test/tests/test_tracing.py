@@ -149,8 +149,8 @@ class Corners(unittest.TestCase):
 
     def test_office_has_its_corners(self):
         room = build_room()
-        names = sorted(tuple(sorted((room.actors[room.actor[a]].name, room.actors[room.actor[b]].name)))
-                       for a, b, *_ in Tracer(room, Radar(), scatter_density_per_m2=1.0).corners)
+        names = sorted(tuple(sorted((room.actors[room.actor[c.a]].name, room.actors[room.actor[c.b]].name)))
+                       for c in Tracer(room, Radar(), scatter_density_per_m2=1.0).corners)
         self.assertEqual(names, [("partition", "partition"), ("wall_east", "wall_north"), ("wall_east", "wall_south"),
                                  ("wall_north", "wall_west"), ("wall_south", "wall_west")])
 

@@ -12,10 +12,12 @@ def fresnel(material, cos_theta, frequency_hz):
     root = np.sqrt(eta - (1 - cos_theta**2))
     te = (cos_theta - root) / (cos_theta + root)
     tm = (eta * cos_theta - root) / (eta * cos_theta + root)
-    if material.roughness_rms_m:
-        loss = np.exp(-2 * (2 * np.pi * frequency_hz / 299792458.0 * material.roughness_rms_m * cos_theta)**2)
-        te, tm = te * loss, tm * loss
     return te, tm
+
+
+def roughness_loss(material, cos_theta, frequency_hz):
+    """Factor of the coherent amplitude, exp(-2 (k sigma cos)^2) (Ament)."""
+    return np.exp(-2 * (2 * np.pi * frequency_hz / 299792458.0 * material.roughness_rms_m * cos_theta)**2)
 
 
 def fresnel_e(u):
@@ -51,5 +53,5 @@ def reflect_field(field, k_in, normal, material, frequency_hz):
         size = np.linalg.norm(across)
     te_axis = across / size
     tm_in, tm_out = np.cross(te_axis, k_in), np.cross(te_axis, k_out)
-    te, tm = fresnel(material, abs(cosine), frequency_hz)
+    te, tm = np.array(fresnel(material, abs(cosine), frequency_hz)) * roughness_loss(material, cosine, frequency_hz)
     return te * (field @ te_axis) * te_axis + tm * (field @ tm_in) * tm_out, k_out, abs(cosine)

@@ -65,12 +65,68 @@ class Rectangle:
 
 
 @dataclasses.dataclass
+class Cylinder:
+    """Upright closed cylinder: centre [3], radius, height. It occludes; its echoes belong to whoever adds it."""
+    center: np.ndarray
+    radius: float
+    height: float
+
+    def rectangles(self):
+        """None: no flat face takes part."""
+        return []
+
+    def distance(self, p):
+        """Distance of one point to the solid cylinder, m."""
+        d = np.asarray(p) - self.center
+        side = max(0.0, math.hypot(d[0], d[1]) - self.radius)
+        return math.hypot(side, max(0.0, abs(d[2]) - self.height / 2))
+
+    def blocks(self, a, delta, gap):
+        """[P] True where the segment a + t delta passes through, ends shortened by gap (in t)."""
+        o, d = a[:, :2] - self.center[:2], delta[:, :2]
+        qa = np.maximum(np.sum(d * d, axis=1), 1e-18)
+        qb, qc = np.sum(o * d, axis=1), np.sum(o * o, axis=1) - self.radius**2
+        root = qb**2 - qa * qc
+        size = np.sqrt(np.maximum(root, 0.0))
+        dz = np.where(np.abs(delta[:, 2]) < 1e-12, 1e-12, delta[:, 2])
+        z1 = (self.center[2] - self.height / 2 - a[:, 2]) / dz
+        z2 = (self.center[2] + self.height / 2 - a[:, 2]) / dz
+        enter = np.maximum(np.maximum((-qb - size) / qa, np.minimum(z1, z2)), gap)
+        leave = np.minimum(np.minimum((-qb + size) / qa, np.maximum(z1, z2)), 1 - gap)
+        return (root > 0) & (enter < leave)
+
+
+@dataclasses.dataclass
 class Actor:
-    """A named thing of one material tag. `shell`: part of the room's convex hull, which never occludes inside it."""
+    """A named thing of one material tag.
+
+    shell: part of the room's convex hull, which never occludes inside it. clear: lets rays through, though it reflects.
+    """
     name: str
     tag: str
     parts: list
     shell: bool = False
+    clear: bool = False
+
+    def centroid(self):
+        """Mean of the corners of its parts' faces, [3]."""
+        corners = [r.origin + a * r.s1 * r.e1 + b * r.s2 * r.e2 for part in self.parts for r in part.rectangles()
+                   for a in (0, 1) for b in (0, 1)]
+        return np.mean(corners, axis=0)
+
+    def moved(self, rotation, translation, about=(0, 0, 0)):
+        """The same thing rotated about a point and shifted."""
+        about = np.asarray(about, float)
+        place = lambda p: rotation @ (p - about) + about + translation
+        parts = []
+        for part in self.parts:
+            if isinstance(part, Box):
+                parts.append(Box(place(part.center), part.size, rotation @ part.rotation))
+            elif isinstance(part, Cylinder):
+                parts.append(Cylinder(place(part.center), part.radius, part.height))
+            else:
+                parts.append(Rectangle(place(part.origin), rotation @ part.e1, rotation @ part.e2, part.s1, part.s2))
+        return dataclasses.replace(self, parts=parts)
 
 
 def box(center, size, yaw_deg=0.0):
@@ -98,13 +154,16 @@ class Room:
         names = [a.name for a in self.actors]
         if len(set(names)) != len(names):
             raise ValueError("two actors of one name")
-        rectangles, owner, closed, boxes, sheets = [], [], [], [], []
+        rectangles, owner, closed, boxes, sheets, self._cylinders = [], [], [], [], [], []
         for index, actor in enumerate(self.actors):
             for part in actor.parts:
-                if isinstance(part, Box):
-                    boxes.append(part)
-                elif not actor.shell:
-                    sheets.append(part)
+                if not actor.clear:
+                    if isinstance(part, Box):
+                        boxes.append(part)
+                    elif isinstance(part, Cylinder):
+                        self._cylinders.append(part)
+                    elif not actor.shell:
+                        sheets.append(part)
                 for r in part.rectangles():
                     rectangles.append(r)
                     owner.append(index)
@@ -173,6 +232,9 @@ class Room:
             enter = np.maximum(np.minimum(t1, t2).max(axis=1), gap[todo])
             leave = np.minimum(np.maximum(t1, t2).min(axis=1), 1 - gap[todo])
             free[todo[enter < leave]] = False
+        for cylinder in self._cylinders:
+            todo = np.flatnonzero(free)
+            free[todo[cylinder.blocks(a[todo], delta[todo], gap[todo])]] = False
         for r in self._sheets:
             todo = np.flatnonzero(free)
             n = np.cross(r.e1, r.e2)

@@ -47,10 +47,17 @@ class Echoes:
     """Everything that returns from the room at one pose. Coefficients [P] follow the radar's convention."""
     paths: list
     lengths_m: np.ndarray        # [P, M]
-    coefficients: np.ndarray     # [P] or [P, M]
+    coefficients: np.ndarray     # [P]
     scatter: object
     scatter_coefficients: np.ndarray
-    extra: list                  # of (lengths [P, M], coefficients [P] or [P, M])
+
+    def add(self, paths):
+        """Appends paths that the base model does not have."""
+        if paths:
+            lengths, coefficients = path_arrays(paths, self.lengths_m.shape[1])
+            self.paths = self.paths + list(paths)
+            self.lengths_m = np.concatenate([self.lengths_m, lengths])
+            self.coefficients = np.concatenate([self.coefficients, coefficients])
 
 
 class Measurement:
@@ -58,7 +65,11 @@ class Measurement:
 
     def __init__(self, settings):
         self.settings = settings
-        self.radar = Radar()
+        self.described_radar = Radar()
+        self.radar = self.described_radar
+        settings.effects.sort(key=lambda e: e.rank)
+        for effect in settings.effects:
+            self.radar = effect.radar(self.radar)
         self.described_actors = office.build_actors()
         self.described_materials = dict(office.MATERIALS)
         room = office.build_room(self.described_actors, self.described_materials)
@@ -83,6 +94,13 @@ class Measurement:
         self.strongest = None    # strongest path of the session, after the IF filter
         self.noise_rms = NOISE_RMS
         self.gain = None
+
+    def described_mechanisms(self):
+        """Mechanisms of the twin that the session brings, None for the base without a file."""
+        mechanisms = None
+        for effect in self.settings.effects:
+            mechanisms = effect.described_mechanisms(self, mechanisms)
+        return mechanisms
 
     def rng(self, *stream):
         """Generator of one independent stream of the session's seed."""
@@ -112,18 +130,16 @@ class Measurement:
                 lengths, coefficients = lengths + shift[:, None], coefficients * 10**(gain / 20)
             scatter.lengths_m = scatter.lengths_m + 2 * self.actor_range_m[scatter.actor][:, None]
             turned = turned * 10**(self.actor_gain_db[scatter.actor] / 20)
-        echoes = Echoes(paths, lengths, coefficients, scatter, scatter.amplitude * turned, [])
+        echoes = Echoes(paths, lengths, coefficients, scatter, scatter.amplitude * turned)
         for effect in self.settings.effects:
             effect.echoes(self, station, echoes)
         return echoes
 
     def propagate(self, station):
-        """(grid [M, N], clutter grid or None, strongest |coefficient|, rows of the path list)."""
+        """(grid [M, N], clutter grid or None, strongest |coefficient|, rows of the path list, what effects keep)."""
         echoes = self.echoes(station)
         x = self.radar.grid(echoes.lengths_m, echoes.coefficients)
         x += self.radar.grid(echoes.scatter.lengths_m, echoes.scatter_coefficients)
-        for lengths, coefficients in echoes.extra:
-            x += self.radar.grid(lengths, coefficients)
         clutter = None
         if self.clutter is not None:
             points, amplitude, phase = self.clutter
@@ -134,13 +150,9 @@ class Measurement:
             clutter = self.radar.grid(lengths, amplitude[seen] / r[seen]**2 * np.exp(1j * phase[seen]))
         strongest = 0.0
         if len(echoes.paths):
-            size = np.abs(echoes.coefficients)
-            size = size if size.ndim == 1 else np.sqrt((size**2).mean(axis=1))
-            response = np.ones_like(size)
-            for effect in self.settings.effects:
-                response = response * np.abs(effect.if_response(self, self.beat_hz(echoes.lengths_m[:, 0])))
-            strongest = float(np.max(size * response))
-        return x, clutter, strongest, self.path_rows(station, echoes)
+            strongest = float(np.max(np.abs(echoes.coefficients)))
+        auxiliary = {e.name: e.auxiliary(self, station, echoes) for e in self.settings.effects}
+        return x, clutter, strongest, self.path_rows(station, echoes), auxiliary
 
     def beat_hz(self, length_m):
         """Beat frequency of a path length."""
@@ -150,8 +162,7 @@ class Measurement:
         """Rows of the path list (specular and corner paths), strongest first."""
         if not len(echoes.paths):
             return []
-        coefficients = echoes.coefficients if echoes.coefficients.ndim == 1 else echoes.coefficients[:, 0]
-        first = self.radar.contributions(echoes.lengths_m[:, :1], coefficients)[:, 0]
+        first = self.radar.contributions(echoes.lengths_m[:, :1], echoes.coefficients)[:, 0]
         rows = []
         for i in np.argsort(-np.abs(first)):
             p = echoes.paths[i]
@@ -161,7 +172,7 @@ class Measurement:
                 angles += [math.degrees(math.atan2(d[1], d[0])), math.degrees(math.asin(max(-1.0, min(1.0, d[2]))))]
             names = [self.room.actors[a] for a in p.actors]
             rows.append([f"{echoes.lengths_m[i, 0]:.6f}", *(f"{a:.5f}" for a in angles),
-                         f"{20 * math.log10(max(abs(first[i]), 1e-30)):.5f}", f"{np.angle(first[i]):.6f}", str(len(p.facets)),
+                         f"{20 * math.log10(max(abs(first[i]), 1e-30)):.5f}", f"{np.angle(first[i]):.6f}", str(len(p.actors)),
                          p.event, ";".join(a.name for a in names), ";".join(a.tag for a in names)])
         return rows
 
@@ -183,19 +194,18 @@ class Measurement:
         samples *= self.gain * FULL_SCALE
         return np.clip(np.rint(samples), -32768, 32767).astype("<i2")
 
-    def run(self):
-        """Traces all poses and writes the session directory, truth and path lists."""
+    def receive(self):
+        """Traces all poses; returns (received grids [M, N], path lists) and fixes gain and noise. Writes nothing."""
         settings = self.settings
-        directory = settings.output
-        os.makedirs(os.path.join(directory, "captures"), exist_ok=True)
         jobs = settings.jobs or min(len(self.stations), os.cpu_count() or 1)
         self.tracer.diffuse(self.stations[0].true)   # the scatter points are then shared by all processes
         if jobs > 1:
-            with multiprocessing.get_context("fork").Pool(jobs, _limit_threads) as pool:
+            with multiprocessing.get_context("fork").Pool(jobs) as pool:
                 results = pool.map(self.propagate, self.stations, chunksize=2)
         else:
             results = [self.propagate(s) for s in self.stations]
         self.strongest = max(r[2] for r in results)
+        self.auxiliary = {e.name: [r[4][e.name] for r in results] for e in settings.effects}
         grids = [r[0] for r in results]
         if self.clutter is not None:
             echo = sum(np.sum(np.abs(g)**2) for g in grids)
@@ -211,6 +221,14 @@ class Measurement:
         self.gain = 10**(step / 20)
         for effect in settings.effects:
             effect.after_gain(self, received)
+        return received, [r[3] for r in results]
+
+    def run(self):
+        """Writes the session directory, truth and path lists; returns what receive() does."""
+        settings = self.settings
+        received, path_lists = self.receive()
+        directory = settings.output
+        os.makedirs(os.path.join(directory, "captures"), exist_ok=True)
         for i, (station, x) in enumerate(zip(self.stations, received)):
             payload = self.measure(i, x).tobytes()
             for effect in settings.effects:
@@ -220,12 +238,12 @@ class Measurement:
         write_description(directory, self)
         if settings.paths_csv:
             os.makedirs(settings.paths_csv, exist_ok=True)
-            for station, result in zip(self.stations, results):
-                write_paths(os.path.join(settings.paths_csv, f"{station.name}.csv"), result[3])
+            for station, rows in zip(self.stations, path_lists):
+                write_paths(os.path.join(settings.paths_csv, f"{station.name}.csv"), rows)
         if settings.truth:
             with open(settings.truth, "w", encoding="ascii") as out:
                 json.dump(self.truth(), out, indent=1)
-        return results
+        return received, path_lists
 
     def truth(self):
         """What a diagnosis must not see."""
@@ -236,12 +254,6 @@ class Measurement:
             "poses": {s.name: {"position_m": list(s.true.position), "quaternion_xyzw": list(campaign.quaternion(s.true.rotation))}
                       for s in self.stations},
         }
-
-
-def _limit_threads():
-    """Worker processes of a pool share the cores; nothing inside them should start threads of its own."""
-    os.environ["OMP_NUM_THREADS"] = "1"
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 
 PATHS_HEADER = ("length_m,azimuth_dep_deg,elevation_dep_deg,azimuth_arr_deg,elevation_arr_deg,amplitude_db,phase_rad,"
@@ -260,7 +272,7 @@ def write_description(directory, measurement):
     """session.yaml, radar.yaml, scene files and poses.csv: what the user believes."""
     office.write_scene(directory, measurement.described_actors, measurement.described_materials)
     with open(os.path.join(directory, "radar.yaml"), "w", encoding="ascii") as out:
-        out.write(measurement.radar.yaml())
+        out.write(measurement.described_radar.yaml())
     with open(os.path.join(directory, "poses.csv"), "w", encoding="ascii") as out:
         out.write("pose,location,stamp,x,y,z,qx,qy,qz,qw\n")
         for s in measurement.stations:
@@ -268,5 +280,12 @@ def write_description(directory, measurement):
             numbers = [*(f"{v:.6f}" for v in s.reported.position), *(f"{v:.9f}" for v in campaign.quaternion(s.reported.rotation))]
             out.write(",".join([s.name, s.location, stamp, *numbers]) + "\n")
     with open(os.path.join(directory, "session.yaml"), "w", encoding="ascii") as out:
-        out.write("format: mmradartwin_session/1\nradar: radar.yaml\nscene: scene.yaml\nposes: poses.csv\n"
-                  "captures: captures/{pose}.bin\n")
+        mechanisms = measurement.described_mechanisms()
+        twin = "" if mechanisms is None else "twin: twin.yaml\n"
+        out.write("format: mmradartwin_session/1\nradar: radar.yaml\nscene: scene.yaml\n" + twin +
+                  "poses: poses.csv\ncaptures: captures/{pose}.bin\n")
+    if mechanisms is not None:
+        with open(os.path.join(directory, "twin.yaml"), "w", encoding="ascii") as out:
+            out.write("scene: scene.yaml\nradar: radar.yaml\nmechanisms:\n")
+            for name, values in mechanisms.items():
+                out.write(f"  {name}: {{" + ", ".join(f"{k}: {v:g}" for k, v in values.items()) + "}\n")

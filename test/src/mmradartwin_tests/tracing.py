@@ -12,6 +12,7 @@ Choices where the model's text leaves room, each the most literal reading:
 """
 import dataclasses
 import math
+import zlib
 
 import numpy as np
 
@@ -48,6 +49,18 @@ class Scatter:
     actor: np.ndarray
 
 
+@dataclasses.dataclass
+class Corner:
+    """Two facets a, b that meet at a right angle: edge from start along a unit vector, and the faces' directions from it."""
+    a: int
+    b: int
+    start: np.ndarray
+    along: np.ndarray
+    extent_m: float
+    into_a: np.ndarray
+    into_b: np.ndarray
+
+
 class Pose:
     """Radar in map: position [3] and rotation [3, 3] (radar_link -> map)."""
 
@@ -70,7 +83,7 @@ class Pose:
 
 
 def find_corners(room):
-    """Pairs of reflecting facets that share an edge at a concave 90 degrees: list of (a, b, start, unit edge, length)."""
+    """Pairs of reflecting facets that share an edge at a concave 90 degrees: list of Corner."""
     found = []
     reflecting = np.flatnonzero(room.reflects)
     edges = {}
@@ -94,7 +107,13 @@ def find_corners(room):
                         continue
                     low, high = max(0.0, min(t0, t1)), min(length, max(t0, t1))
                     if high - low > 1e-3:
-                        found.append((int(a), int(b), p0 + low * along, along, high - low))
+                        start = p0 + low * along
+                        into = []
+                        for f in (a, b):
+                            v = room.center(f) - start
+                            v = v - (v @ along) * along
+                            into.append(v / np.linalg.norm(v))
+                        found.append(Corner(int(a), int(b), start, along, high - low, *into))
     return found
 
 
@@ -104,7 +123,7 @@ class Tracer:
     def __init__(self, room, radar, scatter_density_per_m2=600.0, speckle_seed=0, max_order=3):
         self.room, self.radar, self.max_order = room, radar, max_order
         self.corners = find_corners(room)
-        corner_pairs = {(a, b) for a, b, *_ in self.corners} | {(b, a) for a, b, *_ in self.corners}
+        corner_pairs = {(c.a, c.b) for c in self.corners} | {(c.b, c.a) for c in self.corners}
         ids = np.flatnonzero(room.reflects)
         corner_points = np.array([room.corners(f) for f in range(len(room.s1))])
         # heights[f, g]: how far facet g reaches to the front of facet f
@@ -122,27 +141,29 @@ class Tracer:
 
     def _prepare_scatter(self):
         room, (density, seed) = self.room, self._scatter_settings
-        points, area, facet = [], [], []
+        points, area, facet, phase = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0, int)], [np.zeros(0)]
+        first = {a: f for f, a in reversed(list(enumerate(room.actor)))}
         for f in np.flatnonzero(room.reflects):
             if not room.material[room.actor[f]].scattering:
                 continue
             n1 = max(1, int(math.ceil(room.s1[f] * math.sqrt(density))))
             n2 = max(1, int(math.ceil(room.s2[f] * math.sqrt(density))))
-            rng = np.random.default_rng([20, f])
+            # Keyed by name and place in the actor, so that adding or removing others changes nothing here.
+            key = [zlib.crc32(room.actors[room.actor[f]].name.encode()), int(f - first[room.actor[f]])]
+            rng = np.random.default_rng([20, *key])
             i, j = np.meshgrid(np.arange(n1), np.arange(n2), indexing="ij")
             u = (i.ravel() + rng.random(n1 * n2)) / n1 * room.s1[f]
             v = (j.ravel() + rng.random(n1 * n2)) / n2 * room.s2[f]
             points.append(room.origin[f] + u[:, None] * room.e1[f] + v[:, None] * room.e2[f])
             area.append(np.full(n1 * n2, room.s1[f] * room.s2[f] / (n1 * n2)))
             facet.append(np.full(n1 * n2, f))
-        self._scatter_points = np.concatenate(points) if points else np.zeros((0, 3))
-        self._scatter_area = np.concatenate(area) if area else np.zeros(0)
-        self._scatter_facet = np.concatenate(facet) if facet else np.zeros(0, int)
-        self._scatter_phase = np.random.default_rng([21, seed]).uniform(0, 2 * np.pi, len(self._scatter_points))
+            phase.append(np.random.default_rng([21, seed, *key]).uniform(0, 2 * np.pi, n1 * n2))
+        self._scatter_points, self._scatter_area = np.concatenate(points), np.concatenate(area)
+        self._scatter_facet, self._scatter_phase = np.concatenate(facet), np.concatenate(phase)
 
     def specular(self, pose):
         """All paths of the mechanisms specular and corner from one pose."""
-        paths = self._first_order(pose) + self._corner_paths(pose)
+        paths = self._first_order(pose) + self.corner_paths(pose, self.corners)
         for order in range(2, self.max_order + 1):
             paths += self._higher_order(pose, order)
         limit = 2 * self.radar.max_range_m
@@ -163,7 +184,8 @@ class Tracer:
             tx = tx - 2 * ((tx - self.room.origin[f]) @ n)[:, None] * n
         return np.linalg.norm(tx[:, None, :] - rx, axis=2).reshape(-1)
 
-    def _smooth(self, f):
+    def smooth(self, f):
+        """sqrt(1 - S^2) of facet f."""
         return math.sqrt(1 - self.room.material[self.room.actor[f]].scattering**2)
 
     def _polarised(self, pose, directions, facets):
@@ -204,32 +226,29 @@ class Tracer:
             # The perpendicular's level, also beside the facet.
             perpendicular = -math.copysign(1.0, height[i]) * room.normal[f]
             gamma, _ = self._polarised(pose, [perpendicular, -perpendicular], [f])
-            coefficient = gamma * self._smooth(f) * factor[i] * wavelength / (4 * np.pi * 2 * distance[i])
+            coefficient = gamma * self.smooth(f) * factor[i] * wavelength / (4 * np.pi * 2 * distance[i])
             lengths = self.image_lengths(pose, [f]) if inside[i] else self.point_lengths(pose, target[i:i + 1])[0]
             paths.append(Path("specular", (f,), (int(room.actor[f]),), target[i:i + 1], direction[i], direction[i],
                               float(2 * length[i]), complex(coefficient), lengths, (1.0,)))
         return paths
 
-    def _corner_paths(self, pose):
+    def corner_paths(self, pose, corners, event="corner"):
+        """Retro paths of Corners seen from one pose."""
         room, wavelength, p = self.room, self.radar.wavelength_m, pose.position
         paths = []
-        for a, b, start, along, extent in self.corners:
+        for corner in corners:
+            a, b, start, along, extent = corner.a, corner.b, corner.start, corner.along, corner.extent_m
+            into_a, into_b = corner.into_a, corner.into_b
             t = (p - start) @ along
             foot = start + t * along
             distance = np.linalg.norm(foot - p)
             perpendicular = (foot - p) / distance
-            # In front of both faces, on the side where the other face lies.
-            into_a = room.center(a) - start
-            into_a = into_a - (into_a @ along) * along
-            into_a /= np.linalg.norm(into_a)
-            into_b = room.center(b) - start
-            into_b = into_b - (into_b @ along) * along
-            into_b /= np.linalg.norm(into_b)
+            # On the side of both faces where the other one lies.
             if (p - start) @ into_a <= 1e-6 or (p - start) @ into_b <= 1e-6:
                 continue
             across = np.cross(along, perpendicular)
-            far = [max((room.corners(f) - start) @ into) * (into @ across) for f, into in ((a, into_a), (b, into_b))]
-            factor = (aperture_axis(min(far), max(far), distance, distance, wavelength) *
+            far = sorted(max((room.corners(f) - start) @ into) * (into @ across) for f, into in ((a, into_a), (b, into_b)))
+            factor = (aperture_axis(far[0], far[1], distance, distance, wavelength) *
                       aperture_axis(-t, extent - t, distance, distance, wavelength))
             inside = 0 <= t <= extent
             nearest = t if inside else min(max(t, min(INSET_M, extent / 2)), max(extent - INSET_M, extent / 2))
@@ -242,9 +261,9 @@ class Tracer:
                 continue
             between = perpendicular - 2 * (perpendicular @ room.normal[a]) * room.normal[a]
             gamma, cosines = self._polarised(pose, [perpendicular, between, -perpendicular], [a, b])
-            coefficient = gamma * self._smooth(a) * self._smooth(b) * factor * wavelength / (4 * np.pi * 2 * distance)
+            coefficient = gamma * self.smooth(a) * self.smooth(b) * factor * wavelength / (4 * np.pi * 2 * distance)
             lengths = self.image_lengths(pose, [a, b]) if inside else self.point_lengths(pose, target[None])[0]
-            paths.append(Path("corner", (a, b), (int(room.actor[a]), int(room.actor[b])), np.array([target, target]),
+            paths.append(Path(event, (a, b), (int(room.actor[a]), int(room.actor[b])), np.array([target, target]),
                               direction, direction, float(2 * length), complex(coefficient), lengths, cosines))
         return paths
 
@@ -317,12 +336,16 @@ class Tracer:
                     narrow = math.sqrt(max(0.0, 1 - (edge @ directions[i])**2))
                     x = d @ edge
                     factor *= aperture_axis(-x * narrow, (extent - x) * narrow, before, total - before, wavelength)
-                factor *= self._smooth(f)
+                factor *= self.smooth(f)
             coefficient = gamma * factor * wavelength / (4 * np.pi * total)
             paths.append(Path("specular", tuple(facets), tuple(int(room.actor[f]) for f in facets), vertices[1:-1],
                               directions[0], -directions[-1], float(total), complex(coefficient),
                               self.image_lengths(pose, facets), cosines))
         return paths
+
+    def scatter_area(self, f):
+        """Area per scatter point of facet f, m^2."""
+        return float(self._scatter_area[np.searchsorted(self._scatter_facet, f)])
 
     def diffuse(self, pose):
         """Scatter points seen from one pose."""

@@ -13,11 +13,13 @@ def effect(cls):
 class Effect:
     """One hidden effect. `defaults`: parameters with typical values; `main`: the one that a strength scales.
 
-    A session calls the stages in the order below; each returns its input unless the effect acts there.
+    A session calls the stages in the order below; each returns its input unless the effect acts there. Effects of lower
+    rank act first: 0 adds echoes, 1 is a law on all echoes, 2 acts on the received grid.
     """
     name = ""
     defaults = {}
     main = None
+    rank = 1
 
     def __init__(self, **parameters):
         unknown = set(parameters) - set(self.defaults)
@@ -32,6 +34,14 @@ class Effect:
         value = self.p[self.main]
         self.p[self.main] = [strength * v for v in value] if isinstance(value, list) else strength * value
 
+    def radar(self, radar):
+        """The radar as it truly is (what is described stays)."""
+        return radar
+
+    def described_mechanisms(self, measurement, mechanisms):
+        """Mechanisms of the session's twin.yaml; None where it has no twin.yaml."""
+        return mechanisms
+
     def prepare(self, measurement):
         """Draws what was not given, once per session, before anything is traced."""
 
@@ -45,6 +55,10 @@ class Effect:
 
     def echoes(self, measurement, station, echoes):
         """Changes the echoes of one pose in place."""
+
+    def auxiliary(self, measurement, station, echoes):
+        """Whatever receive() needs of the finished echoes; found in measurement.auxiliary[name][index]."""
+        return None
 
     def if_response(self, measurement, beat_hz):
         """Complex amplitude response of the IF chain at a beat frequency."""
