@@ -68,7 +68,23 @@ std::vector<FanBox> boxes(const EvaluationField& field, const PoseAttribution& p
       add(r.range_m, r.azimuth_rad, kWhite, spoken(r.actor));
     }
   }
+  // A label stands beyond its box: nearer ones are drawn over farther boxes.
+  std::stable_sort(result.begin(), result.end(), [](const FanBox& a, const FanBox& b) { return a.range_m > b.range_m; });
   return result;
+}
+
+// Whole metres up to beyond the last response that matters.
+double shownRange_m(const EvaluationField& field, const PoseAttribution& pose) {
+  double last = 0;
+  for (const NormalisedMap* map : {&pose.measured, &pose.simulated}) {
+    for (const Response& r : map->responses) {
+      if (r.level_db >= field.config().weak_db) last = std::max(last, r.range_m);
+    }
+  }
+  for (const ResponseRegion& r : pose.regions) {
+    if (r.measured_strong) last = std::max(last, r.range_m);
+  }
+  return std::clamp(std::ceil(last + 1), 4.0, std::max(4.0, std::ceil(field.axes().range_m.back())));
 }
 
 void put(cv::Mat& picture, const std::string& words, int x, int y, double size, const cv::Scalar& color) {
@@ -96,8 +112,7 @@ cv::Mat drawPose(const EvaluationField& field, const PoseResult& result) {
   FanStyle style;
   style.min_db = field.config().floor_db;
   style.height_px = kFanHeight_px;
-  style.max_range_m = std::max(1.0, std::round(field.axes().range_m.back()));
-  style.normalise = false;  // the maps are relative to their peak already
+  style.max_range_m = shownRange_m(field, pose);
   style.title = "measured";
   const cv::Mat measured =
       drawFan(field.axes(), pose.measured.level_db, style, boxes(field, pose, true, style.max_range_m));
@@ -201,6 +216,15 @@ cv::Mat drawCoverage(const Scene& scene, const std::vector<Pose>& poses, double 
     } else {
       cv::fillConvexPoly(picture, corners, t.color * 0.35 + cv::Scalar(255, 255, 255) * 0.65, cv::LINE_AA, kShift);
     }
+  }
+  for (const Actor& actor : scene.actors) {
+    // Names of what stands in the room; surfaces as large as the room itself go without.
+    const Eigen::Vector3d extent = actor.bounds.sizes();
+    if (extent.head<2>().maxCoeff() > 0.6 * size.maxCoeff() || actor.bounds.min().z() > cut_height_m) continue;
+    int baseline = 0;
+    const cv::Size words = cv::getTextSize(actor.name, kFont, 0.36, 1, &baseline);
+    const cv::Point2d p = at(actor.bounds.center().head<2>());
+    put(picture, actor.name, cvRound(p.x) - words.width / 2, cvRound(p.y) + 4, 0.36, kSoft);
   }
   const cv::Scalar blue(178, 114, 0);
   std::vector<std::string> locations;
