@@ -25,14 +25,14 @@ if [ -z "${DISPLAY:-}" ]; then
   export DISPLAY=:$n LIBGL_ALWAYS_SOFTWARE=1
   say "no display: rviz runs on a virtual one (:$n)"
 fi
+rviz_window() { xwininfo -root -tree 2>/dev/null | awk '/ - RViz"/ {print $1; exit}'; }
+# picture FILE: what rviz shows now; fails where there is no rviz before or after, as while it starts or ends.
 picture() {
-  if [ -n "$xvfb" ]; then
-    import -window root "$1" 2>/dev/null
-  else
-    local id
-    id=$(xwininfo -root -tree 2>/dev/null | awk '/- RViz"/ {print $1; exit}')
-    [ -n "$id" ] && import -window "$id" "$1" 2>/dev/null
-  fi
+  local id
+  id=$(rviz_window)
+  [ -n "$id" ] || return 1
+  [ -n "$xvfb" ] && id=root
+  import -window "$id" "$1" 2>/dev/null && [ -n "$(rviz_window)" ]
 }
 
 launch=
