@@ -52,7 +52,7 @@ struct Place {
 
   fs::path resolve(const fs::path& directory) const {
     if (root == Root::kAbsolute) return fs::path("/") / path;
-    if (root == Root::kSession) return directory / path;
+    if (root == Root::kSession) return (directory / path).lexically_normal();
     return resolvePath(kPackageScheme + package + "/" + path.string(), (directory / "session.yaml").string());
   }
 
