@@ -81,7 +81,9 @@ void SignalChainNode::onCube(const mmradartwin_msgs::AdcCube::ConstPtr& cube) {
   if (cube->header.stamp < newest_) {
     ROS_INFO("stamps went back by %.3f s: the average begins anew", (newest_ - cube->header.stamp).toSec());
     restart();
-    tf_buffer_.clear();  // what it holds lies in the future now, and would keep older transforms out
+    // What tf holds lies in the future now and would keep older transforms out. With simulated time its listener has
+    // seen the jump itself, and has begun to fill again.
+    if (!ros::Time::isSimTime()) tf_buffer_.clear();
   }
   newest_ = cube->header.stamp;
   queue_.push_back({cube, ros::Time::now()});

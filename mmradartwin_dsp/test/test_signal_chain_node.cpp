@@ -1,0 +1,231 @@
+// Content of what the node and the nodelet publish; signal_chain_node.test and signal_chain_nodelet.test run it.
+
+#include <gtest/gtest.h>
+#include <nodelet/NodeletUnload.h>
+#include <ros/ros.h>
+#include <tf2_ros/transform_broadcaster.h>
+
+#include <cmath>
+
+#include "mmradartwin_dsp/coherent_average.h"
+#include "mmradartwin_dsp/ros/conversions.h"
+#include "test_radar.h"
+
+namespace mmradartwin {
+namespace {
+
+template <typename Message>
+class Inbox {
+ public:
+  Inbox(ros::NodeHandle& nh, const std::string& topic)
+      : subscriber_(nh.subscribe<Message>(topic, 100, [this](const typename Message::ConstPtr& m) { messages.push_back(m); })) {}
+  /// Waits until `count` messages are there, some seconds at most.
+  bool wait(std::size_t count, double seconds = 5) {
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
+    while (messages.size() < count && ros::WallTime::now() < end) {
+      ros::spinOnce();
+      ros::WallDuration(0.005).sleep();
+    }
+    return messages.size() >= count;
+  }
+  bool connected() const { return subscriber_.getNumPublishers() > 0; }
+  std::vector<typename Message::ConstPtr> messages;
+
+ private:
+  ros::Subscriber subscriber_;
+};
+
+class SignalChainNodeTest : public ::testing::Test {
+ protected:
+  SignalChainNodeTest()
+      : radar_(paperRadar()),
+        hash_(radarHash(radar_)),
+        grids_(nh_, "radar/grid"),
+        maps_(nh_, "radar/range_angle"),
+        twin_maps_(nh_, "twin/range_angle"),
+        config_(nh_.advertise<mmradartwin_msgs::RadarConfig>("radar/config", 1, true)),
+        cubes_(nh_.advertise<mmradartwin_msgs::AdcCube>("radar/adc", 100)),
+        twin_(nh_.advertise<mmradartwin_msgs::ReceiveGrid>("twin/grid", 10)) {
+    // Each test lies an hour after the one before, so that none looks like time going back to the node.
+    static int tests = 0;
+    start_ = ros::Time(1700000000 + 3600 * tests++);
+    config_.publish(toMsg(radar_));
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10);
+    while (ros::WallTime::now() < end &&
+           !(grids_.connected() && maps_.connected() && twin_maps_.connected() && cubes_.getNumSubscribers() && twin_.getNumSubscribers())) {
+      ros::spinOnce();
+      ros::WallDuration(0.01).sleep();
+    }
+    ros::WallDuration(0.3).sleep();  // the latched configuration and tf's subscription
+  }
+
+  void sendPose(const ros::Time& stamp, double x, double yaw_deg = 0) {
+    geometry_msgs::TransformStamped T;
+    T.header.stamp = stamp;
+    T.header.frame_id = "map";
+    T.child_frame_id = "radar_link";
+    T.transform.translation.x = x;
+    T.transform.rotation.z = std::sin(yaw_deg * M_PI / 360);
+    T.transform.rotation.w = std::cos(yaw_deg * M_PI / 360);
+    broadcaster_.sendTransform(T);
+  }
+
+  /// A frame of a point target whose amplitude tells frames apart.
+  AdcCube frame(int i, double azimuth_deg = 30) const {
+    const ComplexGrid x = pointTarget(radar_, 3.0, azimuth_deg * M_PI / 180, 1000 + 100 * i);
+    AdcCube cube;
+    cube.stamp_ns = toNanoseconds(start_) + radar_.frame_offset_ns(i);
+    cube.sequence = static_cast<std::uint32_t>(i);
+    cube.chirps = 2, cube.samples = 64, cube.receivers = 4;
+    for (int chirp = 0; chirp < 2; ++chirp) {
+      for (int n = 0; n < 64; ++n) {
+        for (int rx = 0; rx < 4; ++rx) {
+          cube.data.push_back(static_cast<std::int16_t>(std::lround(x(4 * chirp + rx, n).real())));
+          cube.data.push_back(static_cast<std::int16_t>(std::lround(x(4 * chirp + rx, n).imag())));
+        }
+      }
+    }
+    cube.chirp_valid.assign(2, 1);
+    return cube;
+  }
+
+  ros::Time stamp(double frames) const { return start_ + ros::Duration(frames * 0.05); }
+  void send(int i) { cubes_.publish(toMsg(frame(i), hash_)); }
+
+  ros::NodeHandle nh_;
+  RadarConfig radar_;
+  std::uint64_t hash_;
+  ros::Time start_;
+  Inbox<mmradartwin_msgs::ReceiveGrid> grids_;
+  Inbox<mmradartwin_msgs::RangeAngleMap> maps_, twin_maps_;
+  ros::Publisher config_, cubes_, twin_;
+  tf2_ros::TransformBroadcaster broadcaster_;
+};
+
+TEST_F(SignalChainNodeTest, AveragesFramesAndPutsTheirPoseIn) {
+  sendPose(stamp(-0.5), 1.0, 20);
+  sendPose(stamp(10), 1.0, 20);
+  for (int i = 0; i < 5; ++i) send(i);
+  ASSERT_TRUE(grids_.wait(5) && maps_.wait(5));
+  CoherentAverage average(radar_, 3);
+  const SignalChain chain(radar_);
+  for (int i = 0; i < 5; ++i) {
+    average.add(frame(i));
+    const auto& grid = *grids_.messages[static_cast<std::size_t>(i)];
+    const auto& map = *maps_.messages[static_cast<std::size_t>(i)];
+    EXPECT_EQ(grid.frames, static_cast<std::uint32_t>(std::min(i + 1, 3)));
+    EXPECT_EQ(grid.header.stamp, stamp(i));
+    EXPECT_EQ(grid.header.frame_id, "radar_link");
+    EXPECT_EQ(grid.radar_hash, hash_);
+    EXPECT_TRUE(grid.pose_valid);
+    EXPECT_NEAR(grid.T_map_radar.position.x, 1.0, 1e-12);
+    EXPECT_NEAR(grid.T_map_radar.orientation.z, std::sin(10 * M_PI / 180), 1e-12);
+    EXPECT_TRUE(fromMsg(grid).x == average.grid().x) << "frame " << i;
+    const RealGrid expected = chain.map(average.grid()).power_db;
+    EXPECT_TRUE(fromMsg(map).power_db == expected.cast<float>().cast<double>()) << "frame " << i;
+    EXPECT_EQ(map.frames, grid.frames);
+  }
+  // The target stands at +30 deg, to the left.
+  Eigen::Index r, a;
+  fromMsg(*maps_.messages.back()).power_db.maxCoeff(&r, &a);
+  EXPECT_NEAR(maps_.messages.back()->azimuth_rad[static_cast<std::size_t>(a)] * 180 / M_PI, 30, 2);
+  EXPECT_NEAR(maps_.messages.back()->range_m[static_cast<std::size_t>(r)], 3.0, 0.08);
+}
+
+TEST_F(SignalChainNodeTest, BeginsAnewWhenTheRadarMovesOrTurns) {
+  sendPose(stamp(-0.5), 0);
+  sendPose(stamp(1.5), 0);
+  sendPose(stamp(1.6), 0.03);
+  sendPose(stamp(3.5), 0.03);
+  sendPose(stamp(3.6), 0.03, 1.5);
+  sendPose(stamp(10), 0.03, 1.5);
+  for (int i = 0; i < 6; ++i) send(i);
+  ASSERT_TRUE(grids_.wait(6));
+  std::vector<std::uint32_t> frames;
+  for (const auto& grid : grids_.messages) frames.push_back(grid->frames);
+  EXPECT_EQ(frames, (std::vector<std::uint32_t>{1, 2, 1, 2, 1, 2}));
+}
+
+TEST_F(SignalChainNodeTest, WaitsForThePoseAtTheStampAndGoesOnWithoutOne) {
+  sendPose(stamp(-0.5), 5);
+  send(0);
+  ros::WallDuration(0.1).sleep();
+  ros::spinOnce();
+  EXPECT_TRUE(grids_.messages.empty()) << "did not wait for tf";
+  sendPose(stamp(0.5), 6);
+  ASSERT_TRUE(grids_.wait(1));
+  EXPECT_TRUE(grids_.messages[0]->pose_valid);
+  EXPECT_NEAR(grids_.messages[0]->T_map_radar.position.x, 5.5, 1e-9);  // between the two, at the frame's stamp
+  send(1);
+  ASSERT_TRUE(grids_.wait(2));
+  EXPECT_FALSE(grids_.messages[1]->pose_valid);
+  EXPECT_EQ(grids_.messages[1]->T_map_radar.orientation.w, 1);
+}
+
+TEST_F(SignalChainNodeTest, SurvivesBadMessagesAndForeignRadars) {
+  sendPose(stamp(-0.5), 0);
+  sendPose(stamp(10), 0);
+  cubes_.publish(toMsg(frame(0), hash_ ^ 1));
+  mmradartwin_msgs::AdcCube broken = toMsg(frame(1), hash_);
+  broken.samples.resize(7);
+  cubes_.publish(broken);
+  mmradartwin_msgs::RadarConfig nonsense = toMsg(radar_);
+  nonsense.slope_hz_per_s = -1;
+  config_.publish(nonsense);
+  mmradartwin_msgs::ReceiveGrid grid;
+  grid.channels = 3;
+  twin_.publish(grid);
+  ros::WallDuration(0.2).sleep();
+  send(2);
+  ASSERT_TRUE(grids_.wait(1));
+  EXPECT_EQ(grids_.messages[0]->header.stamp, stamp(2));
+  EXPECT_EQ(grids_.messages[0]->frames, 1u);
+}
+
+TEST_F(SignalChainNodeTest, BeginsAnewWhenStampsGoBack) {
+  sendPose(stamp(-0.5), 0);
+  sendPose(stamp(10), 0);
+  for (int i = 3; i < 6; ++i) send(i);
+  ASSERT_TRUE(grids_.wait(3));
+  EXPECT_EQ(grids_.messages[2]->frames, 3u);
+  send(0);
+  sendPose(stamp(-0.5), 0);
+  sendPose(stamp(2), 0);
+  ASSERT_TRUE(grids_.wait(4));
+  EXPECT_EQ(grids_.messages[3]->frames, 1u);
+  EXPECT_EQ(grids_.messages[3]->header.stamp, stamp(0));
+}
+
+TEST_F(SignalChainNodeTest, TwinGridsGoThroughTheSameChain) {
+  ReceiveGrid grid;
+  grid.stamp_ns = toNanoseconds(stamp(0));
+  grid.source = Branch::kSimulated;
+  grid.full_scale = 1;
+  grid.frames = 1;
+  grid.x = pointTarget(radar_, 4.0, -0.4, 1e-4);
+  twin_.publish(toMsg(grid, hash_));
+  ASSERT_TRUE(twin_maps_.wait(1));
+  const RangeAngleMap map = fromMsg(*twin_maps_.messages[0]);
+  EXPECT_TRUE(map.source == Branch::kSimulated);
+  EXPECT_TRUE(map.power_db == SignalChain(radar_).map(grid).power_db.cast<float>().cast<double>());
+  EXPECT_EQ(map.stamp_ns, grid.stamp_ns);
+  EXPECT_EQ(map.axes.azimuth_rad, SignalChain(radar_).axes().azimuth_rad);
+}
+
+}  // namespace
+}  // namespace mmradartwin
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "test_signal_chain_node");
+  const ros::NodeHandle nh;
+  const int result = RUN_ALL_TESTS();
+  // A nodelet manager may abort at shutdown while nodelets are loaded.
+  std::string nodelet;
+  if (ros::NodeHandle("~").getParam("unload", nodelet)) {
+    nodelet::NodeletUnload unload;
+    unload.request.name = nodelet;
+    ros::service::call("manager/unload_nodelet", unload);
+  }
+  return result;
+}
