@@ -1,0 +1,70 @@
+#pragma once
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <mmradartwin_msgs/RadarConfig.h>
+#include <mmradartwin_msgs/ReceiveGrid.h>
+#include <mmradartwin_msgs/Session.h>
+#include <ros/ros.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_listener.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "mmradartwin_sim/twin.h"
+
+namespace mmradartwin {
+
+/// radar/config, session, radar/grid, tf -> twin/grid, twin/paths, twin/scene, diagnostics.
+///
+/// Simulates at the pose of each measured grid (the grid's own, else tf at its stamp) and at `rate_hz` along tf while no
+/// measurement comes. Records are used again while the radar stands within `reuse_m` and `reuse_deg`. Of grids that come
+/// while one is simulated the newest is taken and the others are counted as skipped. Callbacks must come one at a time.
+///
+/// The scene is that of the parameter `scene`, else of the latched session message, whose files are unpacked into a
+/// temporary folder.
+class TwinNode {
+ public:
+  /// Throws InputError for unknown or unusable parameters.
+  TwinNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  ~TwinNode();
+
+ private:
+  void readParameters(const ros::NodeHandle& private_nh);
+  void onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& config);
+  void onSession(const mmradartwin_msgs::Session::ConstPtr& session);
+  void onGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid);
+  void onPending(const ros::WallTimerEvent&);
+  void onRate(const ros::WallTimerEvent&);
+  void rebuild();
+  void simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns);
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
+
+  std::string scene_file_, twin_file_, radar_file_, map_frame_ = "map", radar_frame_ = "radar_link";
+  double rate_hz_ = 10, reuse_m_ = 1e-4, reuse_rad_ = 0, pose_timeout_s_ = 0.2;
+  std::uint64_t seed_ = 1;
+
+  std::optional<RadarConfig> radar_;
+  std::uint64_t radar_hash_ = 0;                        ///< of the twin's radar
+  std::string session_folder_;                          ///< unpacked session, "" where there is none
+  std::optional<std::string> session_scene_, session_twin_;
+  std::unique_ptr<Twin> twin_;
+  std::string problem_;                                 ///< why there is no twin, or the last pose gave nothing
+  std::optional<Simulation> last_;
+
+  mmradartwin_msgs::ReceiveGrid::ConstPtr pending_;
+  ros::WallTime pending_since_, measured_at_;
+  std::uint64_t simulated_ = 0, reused_ = 0, skipped_ = 0, without_pose_ = 0;
+  double simulate_ms_ = 0;
+
+  tf2_ros::Buffer tf_buffer_;
+  std::optional<tf2_ros::TransformListener> tf_listener_;
+  ros::Publisher grid_publisher_, paths_publisher_, scene_publisher_;
+  ros::Subscriber config_subscriber_, session_subscriber_, grid_subscriber_;
+  ros::WallTimer pending_timer_, rate_timer_, diagnostics_timer_;
+  std::unique_ptr<diagnostic_updater::Updater> updater_;
+};
+
+}  // namespace mmradartwin

@@ -1,0 +1,242 @@
+#include "mmradartwin_sim/ros/twin_node.h"
+
+#include <mmradartwin_msgs/PathRecords.h>
+#include <mmradartwin_msgs/Scene.h>
+#include <stdlib.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/session.h"
+#include "mmradartwin_dsp/session_files.h"
+#include "mmradartwin_sim/ros/conversions.h"
+
+namespace mmradartwin {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kWarnEvery_s = 5;
+constexpr double kMeasuredFor_s = 1;   // without a grid for so long the twin goes on at its own rate
+
+std::string temporaryFolder() {
+  std::string pattern = (fs::temp_directory_path() / "mmradartwin_session_XXXXXX").string();
+  if (!mkdtemp(pattern.data())) throw InputError(pattern + ": cannot be made; free some space in the temporary folder");
+  return pattern;
+}
+
+Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& T) {
+  return Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
+         Eigen::Quaterniond(T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z).normalized();
+}
+
+}  // namespace
+
+TwinNode::TwinNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
+  readParameters(private_nh);
+  tf_listener_.emplace(tf_buffer_, nh);
+  grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("twin/grid", 10);
+  paths_publisher_ = nh.advertise<mmradartwin_msgs::PathRecords>("twin/paths", 1, true);
+  scene_publisher_ = nh.advertise<mmradartwin_msgs::Scene>("twin/scene", 1, true);
+  updater_ = std::make_unique<diagnostic_updater::Updater>(nh, private_nh);
+  updater_->setHardwareID("none");
+  updater_->add("twin", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnose(status); });
+  if (!radar_file_.empty()) radar_ = loadRadarConfig(resolvePath(radar_file_, "/"));
+  config_subscriber_ = nh.subscribe("radar/config", 1, &TwinNode::onConfig, this);
+  session_subscriber_ = nh.subscribe("session", 1, &TwinNode::onSession, this);
+  grid_subscriber_ = nh.subscribe("radar/grid", 100, &TwinNode::onGrid, this);
+  pending_timer_ = nh.createWallTimer(ros::WallDuration(0.005), &TwinNode::onPending, this);
+  if (rate_hz_ > 0) rate_timer_ = nh.createWallTimer(ros::WallDuration(1 / rate_hz_), &TwinNode::onRate, this);
+  diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  if (!scene_file_.empty() && radar_) rebuild();
+}
+
+TwinNode::~TwinNode() {
+  std::error_code ignored;
+  if (!session_folder_.empty()) fs::remove_all(session_folder_, ignored);
+}
+
+void TwinNode::readParameters(const ros::NodeHandle& private_nh) {
+  StrictParameters parameters(private_nh);
+  scene_file_ = parameters.text("scene", "");
+  twin_file_ = parameters.text("twin", "");
+  radar_file_ = parameters.text("radar", "");
+  map_frame_ = parameters.text("map_frame", map_frame_);
+  radar_frame_ = parameters.text("radar_frame", radar_frame_);
+  rate_hz_ = parameters.number("rate_hz", rate_hz_, 0, 1000);
+  reuse_m_ = parameters.number("reuse_m", reuse_m_, 0, 1);
+  reuse_rad_ = parameters.number("reuse_deg", 0.01, 0, 10) * M_PI / 180;
+  pose_timeout_s_ = parameters.number("pose_timeout_s", pose_timeout_s_, 0, 10);
+  seed_ = static_cast<std::uint64_t>(parameters.integer("seed", 1, 0, 2147483647));
+  parameters.number("diagnostic_period", 1.0, 0.01, 3600);  // read by diagnostic_updater
+  parameters.boolean("diagnostic_updater_use_fqn", false);
+  parameters.rejectUnknown();
+}
+
+void TwinNode::onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& config) {
+  if (!radar_file_.empty()) return;
+  try {
+    const RadarConfig radar = fromMsg(*config);
+    if (twin_ && radar_ && radarHash(radar) == radarHash(*radar_)) return;
+    radar_ = radar;
+    rebuild();
+  } catch (const InputError& error) {
+    ROS_ERROR("radar/config refused: %s", error.what());
+  }
+}
+
+void TwinNode::onSession(const mmradartwin_msgs::Session::ConstPtr& session) {
+  if (!scene_file_.empty()) return;
+  try {
+    std::vector<StoredFile> files;
+    for (const auto& f : session->files) files.push_back({f.name, std::string(f.data.begin(), f.data.end())});
+    const std::string folder = temporaryFolder();
+    std::error_code ignored;
+    if (!session_folder_.empty()) fs::remove_all(session_folder_, ignored);
+    session_folder_ = folder;
+    restoreSessionFiles(files, folder);
+    SessionOptions options;
+    options.need_captures = false;
+    const Recording recording = openSession(folder, options);
+    session_scene_ = recording.scene_file;
+    session_twin_ = recording.twin_file;
+    if (!radar_) radar_ = recording.radar;
+    rebuild();
+  } catch (const InputError& error) {
+    problem_ = error.what();
+    ROS_ERROR("session refused: %s", error.what());
+  }
+}
+
+void TwinNode::rebuild() {
+  twin_.reset();
+  last_.reset();
+  std::optional<std::string> scene = session_scene_;
+  if (!scene_file_.empty()) scene = resolvePath(scene_file_, "/");
+  const std::string twin_file = !twin_file_.empty() ? resolvePath(twin_file_, "/") : session_twin_.value_or("");
+  if (!radar_ || (!scene && twin_file.empty())) return;
+  try {
+    auto twin = std::make_unique<Twin>(loadTwin(twin_file, scene, *radar_), seed_);
+    radar_hash_ = radarHash(twin->radar());
+    for (const std::string& note : twin->notes()) ROS_WARN("%s", note.c_str());
+    mmradartwin_msgs::Scene msg = toMsg(twin->scene(), twin->description().toYaml());
+    msg.header.frame_id = map_frame_;
+    msg.header.stamp = ros::Time::now();
+    scene_publisher_.publish(msg);
+    ROS_INFO("twin of %s: %zu actors, %zu facets", twin->scene().file.c_str(), twin->scene().actors.size(),
+             twin->scene().facets.size());
+    twin_ = std::move(twin);
+    problem_.clear();
+  } catch (const std::exception& error) {
+    problem_ = error.what();
+    ROS_ERROR("no twin: %s", error.what());
+  }
+}
+
+void TwinNode::onGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid) {
+  measured_at_ = ros::WallTime::now();
+  if (!twin_) {
+    ROS_WARN_THROTTLE(kWarnEvery_s, "grids come, but there is no twin yet: %s",
+                      !problem_.empty() ? problem_.c_str() : (radar_ ? "no scene (parameter scene, or a session message)" : "no radar/config"));
+    return;
+  }
+  if (pending_) ++skipped_;
+  pending_ = grid;
+  pending_since_ = ros::WallTime::now();
+}
+
+void TwinNode::onPending(const ros::WallTimerEvent&) {
+  if (!pending_ || !twin_) return;
+  Eigen::Isometry3d T_map_radar;
+  if (pending_->pose_valid) {
+    T_map_radar = fromMsg(pending_->T_map_radar);
+  } else {
+    try {
+      T_map_radar = toIsometry(tf_buffer_.lookupTransform(map_frame_, radar_frame_, pending_->header.stamp).transform);
+    } catch (const tf2::TransformException& error) {
+      if ((ros::WallTime::now() - pending_since_).toSec() < pose_timeout_s_) return;
+      ++without_pose_;
+      ROS_WARN_THROTTLE(kWarnEvery_s, "no pose at %.6f, nothing simulated: %s", pending_->header.stamp.toSec(), error.what());
+      pending_.reset();
+      return;
+    }
+  }
+  const std::int64_t stamp_ns = toNanoseconds(pending_->header.stamp);
+  pending_.reset();
+  simulate(T_map_radar, stamp_ns);
+}
+
+void TwinNode::onRate(const ros::WallTimerEvent&) {
+  if (!twin_ || (ros::WallTime::now() - measured_at_).toSec() < kMeasuredFor_s) return;
+  try {
+    const geometry_msgs::TransformStamped T = tf_buffer_.lookupTransform(map_frame_, radar_frame_, ros::Time(0));
+    // A static transform carries no stamp of its own.
+    const ros::Time stamp = T.header.stamp.isZero() ? ros::Time::now() : T.header.stamp;
+    simulate(toIsometry(T.transform), toNanoseconds(stamp));
+  } catch (const tf2::TransformException& error) {
+    ROS_WARN_THROTTLE(kWarnEvery_s, "waiting for the pose of %s in %s: %s", radar_frame_.c_str(), map_frame_.c_str(), error.what());
+  }
+}
+
+void TwinNode::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) {
+  const bool stands = last_ && (last_->T_map_radar.translation() - T_map_radar.translation()).norm() <= reuse_m_ &&
+                      Eigen::Quaterniond(last_->T_map_radar.linear()).angularDistance(Eigen::Quaterniond(T_map_radar.linear())) <= reuse_rad_;
+  if (stands) {
+    ++reused_;
+    last_->grid.stamp_ns = stamp_ns;
+  } else {
+    const ros::WallTime begin = ros::WallTime::now();
+    try {
+      last_ = twin_->simulate(T_map_radar, stamp_ns);
+    } catch (const InputError& error) {
+      last_.reset();
+      ++without_pose_;
+      problem_ = error.what();
+      ROS_WARN_THROTTLE(kWarnEvery_s, "pose at %.6f not simulated: %s", toRosTime(stamp_ns).toSec(), error.what());
+      return;
+    }
+    problem_.clear();
+    ++simulated_;
+    simulate_ms_ = (ros::WallTime::now() - begin).toSec() * 1e3;
+    if (!last_->check.ok()) {
+      ROS_ERROR_THROTTLE(kWarnEvery_s, "records and grid disagree: amplitudes by %g, grid by %g", last_->check.worst_amplitude_error,
+                         last_->check.grid_error);
+    }
+    mmradartwin_msgs::PathRecords paths = toMsg(*last_, twin_->scene(), radar_hash_);
+    paths.header.frame_id = map_frame_;
+    paths_publisher_.publish(paths);
+  }
+  mmradartwin_msgs::ReceiveGrid grid = toMsg(last_->grid, radar_hash_);
+  grid.header.frame_id = radar_frame_;
+  grid_publisher_.publish(grid);
+}
+
+void TwinNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  if (!twin_) {
+    status.summary(Level::ERROR, problem_.empty() ? "no radar/config or no scene yet" : problem_);
+  } else if (last_ && !last_->check.ok()) {
+    status.summary(Level::ERROR, "records and grid disagree");
+  } else if (!problem_.empty()) {
+    status.summary(Level::WARN, problem_);
+  } else if (!last_) {
+    status.summary(Level::WARN, "waiting for a pose");
+  } else {
+    status.summary(Level::OK, "simulating");
+  }
+  status.add("poses simulated", simulated_);
+  status.add("grids from records in use", reused_);
+  status.add("stamps skipped", skipped_);
+  status.add("stamps without a usable pose", without_pose_);
+  status.add("last simulation [ms]", simulate_ms_);
+  if (last_) {
+    status.add("records", last_->records.size());
+    status.add("worst |sum|c|^2/(M A^2) - 1|", last_->check.worst_amplitude_error);
+    status.add("grid against sum of records", last_->check.grid_error);
+  }
+}
+
+}  // namespace mmradartwin

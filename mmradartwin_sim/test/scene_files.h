@@ -1,0 +1,150 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_sim/twin.h"
+
+namespace mmradartwin {
+
+/// The paper's radar.
+inline RadarConfig paperRadar() {
+  RadarConfig radar;
+  radar.device = "awr2243";
+  radar.carrier_hz = 77e9;
+  radar.slope_hz_per_s = 75e12;
+  radar.samples_per_chirp = 64;
+  radar.sample_rate_hz = 5e6;
+  radar.adc_start_s = 6e-6;
+  radar.loops_per_frame = 1;
+  radar.frame_period_s = 0.05;
+  const double d = kSpeedOfLight_m_per_s / 77e9 / 2;
+  radar.tx_position_m = {{0, 0, 0}, {0, 4 * d, 0}};
+  radar.rx_position_m = {{0, 0, 0}, {0, d, 0}, {0, 2 * d, 0}, {0, 3 * d, 0}};
+  return radar;
+}
+
+/// The paper's radar with one element and its window centred on 77 GHz, for closed forms given at that frequency.
+inline RadarConfig radarAt77GHz() {
+  RadarConfig radar = paperRadar();
+  radar.carrier_hz = 77e9 - radar.slope_hz_per_s * radar.window_center_s();
+  radar.tx_position_m = {{0, 0, 0}};
+  radar.rx_position_m = {{0, 0, 0}};
+  return radar;
+}
+
+inline Eigen::Isometry3d radarPose(double x, double y, double z, double yaw_deg = 0) {
+  return Eigen::Translation3d(x, y, z) * Eigen::AngleAxisd(yaw_deg * M_PI / 180, Eigen::Vector3d::UnitZ());
+}
+
+/// Writes scenes into a temporary folder of its own.
+class SceneFiles : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (std::filesystem::temp_directory_path() / "mmradartwin_test_XXXXXX").string();
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+    write("materials.yaml",
+          "materials:\n"
+          "  Metal: {model: conductor}\n"
+          "  RoughMetal: {model: conductor, scattering_coefficient: 0.6}\n"
+          "  Concrete: {model: dielectric, relative_permittivity: 5.24, conductivity_s_per_m: 1.38}\n"
+          "  RoughConcrete: {model: dielectric, relative_permittivity: 5.24, conductivity_s_per_m: 1.38, scattering_coefficient: 0.5}\n"
+          "  Lossless: {model: dielectric, relative_permittivity: 4}\n");
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return folder_ + "/" + name; }
+  void write(const std::string& name, const std::string& text) const { std::ofstream(path(name)) << text; }
+
+  /// Adds a rectangle corner + [0,1] a + [0,1] b of n x n cells, two triangles each.
+  void addRectangle(const std::string& actor, const std::string& material, const Eigen::Vector3d& corner,
+                    const Eigen::Vector3d& a, const Eigen::Vector3d& b, int n = 1) {
+    obj_ << "o " << actor << "\nusemtl " << material << "\n" << std::setprecision(12);
+    for (int i = 0; i <= n; ++i) {
+      for (int j = 0; j <= n; ++j) {
+        obj_ << "v " << (corner + a * i / n + b * j / n).transpose() << "\n";
+      }
+    }
+    const auto index = [this, n](int i, int j) { return vertices_ + 1 + i * (n + 1) + j; };
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) {
+        obj_ << "f " << index(i, j) << " " << index(i + 1, j) << " " << index(i + 1, j + 1) << "\n";
+        obj_ << "f " << index(i, j) << " " << index(i + 1, j + 1) << " " << index(i, j + 1) << "\n";
+      }
+    }
+    vertices_ += (n + 1) * (n + 1);
+  }
+
+  /// Closed box.
+  void addBox(const std::string& actor, const std::string& material, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+    obj_ << "o " << actor << "\nusemtl " << material << "\n" << std::setprecision(12);
+    for (int i = 0; i < 8; ++i) {
+      obj_ << "v " << (i & 1 ? high : low).x() << " " << (i & 2 ? high : low).y() << " " << (i & 4 ? high : low).z() << "\n";
+    }
+    for (const auto& q : std::vector<std::array<int, 4>>{{0, 1, 3, 2}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}}) {
+      obj_ << "f " << vertices_ + 1 + q[0] << " " << vertices_ + 1 + q[1] << " " << vertices_ + 1 + q[2] << "\n";
+      obj_ << "f " << vertices_ + 1 + q[0] << " " << vertices_ + 1 + q[2] << " " << vertices_ + 1 + q[3] << "\n";
+    }
+    vertices_ += 8;
+  }
+
+  /// Vertical rectangle from a to b in the floor plane, z from low to high.
+  void addWall(const std::string& actor, const std::string& material, const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+               double low = -2, double high = 2, int n = 1) {
+    addRectangle(actor, material, {a.x(), a.y(), low}, {b.x() - a.x(), b.y() - a.y(), 0}, {0, 0, high - low}, n);
+  }
+
+  /// Writes what was added as NAME.obj and NAME.yaml; returns the scene file.
+  std::string writeScene(const std::string& name = "scene", const std::string& placement = "", const std::string& more = "") {
+    write(name + ".obj", obj_.str());
+    write(name + ".yaml", "meshes:\n  - {file: " + name + ".obj" + placement + "}\nmaterials: materials.yaml\n" + more);
+    obj_.str("");
+    vertices_ = 0;
+    return path(name + ".yaml");
+  }
+
+  Twin makeTwin(const std::string& scene, const std::string& mechanisms = "", const RadarConfig& radar = paperRadar()) const {
+    if (mechanisms.empty()) return Twin(loadTwin("", scene, radar));
+    write("twin.yaml", "mechanisms:\n" + mechanisms);
+    return Twin(loadTwin(path("twin.yaml"), scene, radar));
+  }
+
+  /// Records of one mechanism.
+  static std::vector<PathRecord> of(const Simulation& s, const std::string& event, int bounces = -1) {
+    std::vector<PathRecord> found;
+    for (const PathRecord& r : s.records) {
+      if (*r.event == event && (bounces < 0 || r.bounces == bounces)) found.push_back(r);
+    }
+    return found;
+  }
+
+  /// The message of the InputError that f throws; "" where it throws none.
+  template <typename F>
+  static std::string errorOf(F f) {
+    try {
+      f();
+    } catch (const std::exception& e) {
+      return e.what();
+    }
+    return "";
+  }
+
+  std::string folder_;
+
+ private:
+  std::ostringstream obj_;
+  int vertices_ = 0;
+};
+
+inline double db(double amplitude) { return 20 * std::log10(amplitude); }
+
+}  // namespace mmradartwin
