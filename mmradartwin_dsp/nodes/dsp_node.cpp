@@ -5,6 +5,7 @@
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "signal_chain");
+  const ros::NodeHandle keep_alive;  // with the last handle the console goes, and the error below with it
   try {
     const mmradartwin::SignalChainNode node{ros::NodeHandle(), ros::NodeHandle("~")};
     ros::spin();
