@@ -74,7 +74,7 @@ int process(const Options& options) {
       const RangeAngleMap map = chain.map(grid);
       writeMapCsv(map, (fs::path(options.output) / "maps" / (pose.name + ".csv")).string());
       FanStyle style;
-      style.max_range_m = recording.radar.max_range_m();
+      style.max_range_m = recording.radar.max_range_m() - recording.radar.range_bin_m() / 2;  // edge of the last bin
       style.title = recording.name + ", pose " + pose.name + ", " + std::to_string(grid.frames) + " frames";
       writePicture(drawFan(map.axes, map.power_db, style),
                    (fs::path(options.output) / "pictures" / (pose.name + ".png")).string());
