@@ -99,7 +99,8 @@ RayCaster::RayCaster(RayCaster&&) noexcept = default;
 bool RayCaster::visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const {
   const Eigen::Vector3d d = b - a;
   const double length = d.norm();
-  if (!(length > 2 * gap_m)) return true;
+  if (!std::isfinite(length)) return false;
+  if (length <= 2 * gap_m) return true;
   const Eigen::Vector3d unit = d / length;
   const Eigen::Vector3d origin = a + gap_m * unit - embree_->center;
   if (!castable(origin, unit, length - 2 * gap_m)) return false;
