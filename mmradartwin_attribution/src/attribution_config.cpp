@@ -51,6 +51,8 @@ AttributionConfig read(YamlMap yaml) {
     readNumber(r, "support_floor_db", -200.0, 0.0, 1.0, c.regions.support_floor_db);
     readNumber(r, "corner_tolerance_deg", 0.0, 45.0, kDegree, c.regions.corner_tolerance_rad);
     readNumber(r, "corner_gap_m", 0.0, 1.0, 1.0, c.regions.corner_gap_m);
+    readNumber(r, "extent_floor_db", -200.0, 0.0, 1.0, c.regions.extent_floor_db);
+    readNumber(r, "extent_scattering", 0.01, 1.0, 1.0, c.regions.extent_scattering);
     readNumber(r, "extent_spacing_m", 0.01, 5.0, 1.0, c.regions.extent_spacing_m);
     r.rejectUnknownKeys();
   }
@@ -94,7 +96,7 @@ AttributionConfig::AttributionConfig()
       far_limit_m(4),
       top_k{1, 3, 5},
       record_span_db(20),
-      regions{20 * kDegree, -30, 2 * kDegree, 0.03, 0.1} {}
+      regions{20 * kDegree, -30, 2 * kDegree, 0.005, -25, 0.5, 0.1} {}
 
 AttributionConfig loadAttributionConfig(const std::string& file) { return read(YamlMap::load(file)); }
 
@@ -132,6 +134,8 @@ std::string toYaml(const AttributionConfig& c) {
     << "  support_floor_db: " << number(c.regions.support_floor_db) << "\n"
     << "  corner_tolerance_deg: " << number(c.regions.corner_tolerance_rad / kDegree) << "\n"
     << "  corner_gap_m: " << number(c.regions.corner_gap_m) << "\n"
+    << "  extent_floor_db: " << number(c.regions.extent_floor_db) << "\n"
+    << "  extent_scattering: " << number(c.regions.extent_scattering) << "\n"
     << "  extent_spacing_m: " << number(c.regions.extent_spacing_m) << "\n";
   return s.str();
 }

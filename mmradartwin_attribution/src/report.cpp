@@ -12,7 +12,6 @@
 #include <set>
 #include <sstream>
 
-#include "mmradartwin_attribution/version.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/strict_yaml.h"
 

@@ -216,24 +216,21 @@ const std::string& classAction(ResidualClass c) {
 
 std::vector<int> recordsInCell(const EvaluationField& field, const std::vector<PathRecord>& records, double range_m,
                                double azimuth_rad) {
-  std::vector<int> found;
+  std::vector<std::pair<double, int>> found;  // amplitude that the record alone puts into the cell
   double strongest = 0;
   for (std::size_t i = 0; i < records.size(); ++i) {
-    const PathRecord& p = records[i];
-    if (p.length_m.empty()) continue;
-    // Half the path's length, and the mean of the two directions' sines: what a line array of virtual elements sees.
-    if (!field.inResolutionCell(p.length_m.front() / 2, (p.departure.y() + p.arrival.y()) / 2, range_m, azimuth_rad)) {
-      continue;
-    }
-    found.push_back(static_cast<int>(i));
-    strongest = std::max(strongest, p.amplitude);
+    const double share = field.recordShare(records[i], range_m, azimuth_rad);
+    if (share < 0.5) continue;
+    found.emplace_back(share * records[i].amplitude, static_cast<int>(i));
+    strongest = std::max(strongest, found.back().first);
   }
   const double least = strongest * std::pow(10.0, -field.config().record_span_db / 20);
-  found.erase(std::remove_if(found.begin(), found.end(), [&](int i) { return records[i].amplitude < least; }),
-              found.end());
-  std::stable_sort(found.begin(), found.end(),
-                   [&](int a, int b) { return records[a].amplitude > records[b].amplitude; });
-  return found;
+  std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<int> indices;
+  for (const auto& [amplitude, index] : found) {
+    if (amplitude >= least) indices.push_back(index);
+  }
+  return indices;
 }
 
 ConventionCheck checkConvention(const EvaluationField& field, const RangeAngleMap& measured,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
 #include <string>
 
@@ -71,11 +72,16 @@ bool EvaluationField::inWindow(const MatchWindow& window, double center_range_m,
          std::abs(azimuth_rad - center_azimuth_rad) <= halfAzimuth_rad(window, center_azimuth_rad);
 }
 
-bool EvaluationField::inResolutionCell(double range_m, double sine, double center_range_m,
-                                       double center_azimuth_rad) const {
-  const double half_null = 0.5 * kAngleBins / channels_;
-  return std::abs(range_m - center_range_m) <= range_bin_m_ &&
-         std::abs(wrapped((sine - std::sin(center_azimuth_rad)) / sine_bin_, kAngleBins)) <= half_null;
+double EvaluationField::recordShare(const PathRecord& record, double range_m, double azimuth_rad) const {
+  if (record.c.empty() || !(record.amplitude > 0)) return 0;
+  const double range_bins = (record.length_m.front() / 2 - range_m) / range_bin_m_;
+  if (std::abs(range_bins) > 1) return 0;
+  // exp(+j 2 pi d k sin/lambda): a bin of the sine turns the element k by 2 pi k/64.
+  const double step = 2 * M_PI * std::sin(azimuth_rad) / sine_bin_ / kAngleBins;
+  std::complex<double> sum = 0;
+  for (std::size_t k = 0; k < record.c.size(); ++k) sum += record.c[k] * std::polar(1.0, step * static_cast<double>(k));
+  return std::abs(sum) / (static_cast<double>(record.c.size()) * record.amplitude) *
+         std::sqrt(pointResponse(range_bins, 0));
 }
 
 double EvaluationField::pointResponse(double range_bins, double angle_bins) const {

@@ -146,11 +146,11 @@ void RegionModel::placeProbes() {
         const Eigen::Vector3d p =
             f.origin + (i + 0.5) / n1 * f.size1_m * f.e1 + (j + 0.5) / n2 * f.size2_m * f.e2;
         if (!f.rectangle && !f.contains(p)) continue;
-        probes.push_back({p, f.id});
+        probes.push_back({p, f.id, f.size1_m * f.size2_m / (n1 * n2)});
         any = true;
       }
     }
-    if (!any) probes.push_back({f.nearest(f.origin + 0.5 * (f.size1_m * f.e1 + f.size2_m * f.e2), 1e-3), f.id});
+    if (!any) probes.push_back({f.nearest(f.origin + 0.5 * (f.size1_m * f.e1 + f.size2_m * f.e2), 1e-3), f.id, f.area_m2});
   }
 }
 
@@ -225,42 +225,91 @@ void RegionModel::addCorners(const Eigen::Isometry3d& T, std::vector<ResponseReg
   }
 }
 
-void RegionModel::addExtents(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const {
+void RegionModel::addExtents(const Eigen::Isometry3d& T, double floor_db, std::vector<ResponseRegion>& out) const {
+  for (std::size_t actor = 0; actor < probes_.size(); ++actor) addExtentsOf(static_cast<int>(actor), T, floor_db, out);
+}
+
+void RegionModel::addExtentsOf(int actor, const Eigen::Isometry3d& T, double floor_db,
+                               std::vector<ResponseRegion>& out) const {
+  struct Visible {
+    double range_m, azimuth_rad, power;
+    Eigen::Vector3d point;
+    Field field;
+  };
   const Eigen::Vector3d radar = T.translation();
-  std::set<int> present;
-  for (const ResponseRegion& region : out) {
-    if (region.field == Field::kCentral) present.insert(region.actors.begin(), region.actors.end());
+  const double S = field_.config().regions.extent_scattering;
+  const double scale = wavelength_m_ / (4 * M_PI) * S;
+  std::vector<Visible> visible;
+  ResponseRegion place_of;
+  for (const Probe& probe : probes_[actor]) {
+    if (!place(T, probe.point, place_of)) continue;
+    const Facet& f = scene_.facets[probe.facet];
+    const double r = place_of.range_m, cosine = f.normal.dot(radar - probe.point) / r;
+    if (!seen(radar, probe.point, (cosine > 0 ? 1.0 : -1.0) * f.normal)) continue;
+    // Lambertian backscatter of a patch, power: (lambda/(4 pi r^2) S cos)^2 dA/pi.
+    visible.push_back({r, place_of.azimuth_rad,
+                       scale * scale * cosine * cosine * probe.area_m2 / (M_PI * r * r * r * r), probe.point,
+                       place_of.field});
   }
-  for (std::size_t actor = 0; actor < probes_.size(); ++actor) {
-    if (present.count(static_cast<int>(actor))) continue;
-    std::vector<std::pair<double, const Probe*>> by_distance;
-    ResponseRegion region;
-    for (const Probe& probe : probes_[actor]) {
-      if (place(T, probe.point, region) && region.field == Field::kCentral) {
-        by_distance.emplace_back(region.range_m, &probe);
+  const MatchWindow &tight = field_.config().tight, &wide = field_.config().wide;
+  // The tight window of an extent stays clear of the wide windows of the actor's other regions.
+  const auto apart = [&](const Visible& v) {
+    return std::none_of(out.begin(), out.end(), [&](const ResponseRegion& r) {
+      return std::find(r.actors.begin(), r.actors.end(), actor) != r.actors.end() &&
+             std::abs(r.range_m - v.range_m) < field_.halfRange_m(wide) + field_.halfRange_m(tight) &&
+             std::abs(r.azimuth_rad - v.azimuth_rad) < field_.halfAzimuth_rad(wide, r.azimuth_rad) +
+                                                           field_.halfAzimuth_rad(tight, v.azimuth_rad);
+    });
+  };
+  while (true) {
+    visible.erase(std::remove_if(visible.begin(), visible.end(), [&](const Visible& v) { return !apart(v); }),
+                  visible.end());
+    ResponseRegion best;
+    double best_power = 0;
+    for (const Visible& center : visible) {
+      double sum = 0, range = 0, azimuth = 0;
+      for (const Visible& v : visible) {
+        if (!field_.inWindow(tight, center.range_m, center.azimuth_rad, v.range_m, v.azimuth_rad)) continue;
+        sum += v.power;
+        range += v.power * v.range_m;
+        azimuth += v.power * v.azimuth_rad;
       }
+      if (sum <= best_power) continue;
+      best_power = sum;
+      best.range_m = range / sum;
+      best.azimuth_rad = azimuth / sum;
+      best.point = center.point;
+      best.field = field_.fieldAt(best.range_m, best.azimuth_rad);
     }
-    std::sort(by_distance.begin(), by_distance.end(),
-              [](const auto& x, const auto& y) { return x.first < y.first; });
-    for (const auto& [range_m, probe] : by_distance) {
-      const Facet& f = scene_.facets[probe->facet];
-      const double side = f.planeDistance(radar) > 0 ? 1.0 : -1.0;
-      if (!seen(radar, probe->point, side * f.normal)) continue;
-      place(T, probe->point, region);
-      region.kind = RegionKind::kExtent;
-      region.actors = {static_cast<int>(actor)};
-      region.support_db = -200;
-      out.push_back(region);
-      break;
-    }
+    best.support_db = level_db(std::sqrt(best_power));
+    if (best_power <= 0 || best.support_db < floor_db) return;
+    best.kind = RegionKind::kExtent;
+    best.actors = {actor};
+    out.push_back(best);
   }
+}
+
+std::vector<ResponseRegion> RegionModel::merged(std::vector<ResponseRegion> found) const {
+  std::stable_sort(found.begin(), found.end(),
+                   [](const ResponseRegion& a, const ResponseRegion& b) { return a.support_db > b.support_db; });
+  std::vector<ResponseRegion> kept;
+  for (ResponseRegion& r : found) {
+    const bool absorbed = std::any_of(kept.begin(), kept.end(), [&](const ResponseRegion& k) {
+      const bool shared = std::any_of(r.actors.begin(), r.actors.end(), [&](int actor) {
+        return std::find(k.actors.begin(), k.actors.end(), actor) != k.actors.end();
+      });
+      return shared && field_.inWindow(field_.config().tight, k.range_m, k.azimuth_rad, r.range_m, r.azimuth_rad);
+    });
+    if (!absorbed) kept.push_back(r);
+  }
+  return kept;
 }
 
 std::vector<ResponseRegion> RegionModel::regions(const Eigen::Isometry3d& T_map_radar) const {
   std::vector<ResponseRegion> found;
   addFacets(T_map_radar, found);
   addCorners(T_map_radar, found);
-  double strongest = -1e9;
+  double strongest = -300;
   for (const ResponseRegion& r : found) {
     if (r.field == Field::kCentral) strongest = std::max(strongest, r.support_db);
   }
@@ -268,29 +317,28 @@ std::vector<ResponseRegion> RegionModel::regions(const Eigen::Isometry3d& T_map_
   found.erase(std::remove_if(found.begin(), found.end(),
                              [floor](const ResponseRegion& r) { return r.support_db < floor; }),
               found.end());
-  addExtents(T_map_radar, found);
-  std::stable_sort(found.begin(), found.end(),
-                   [](const ResponseRegion& a, const ResponseRegion& b) { return a.support_db > b.support_db; });
-  std::vector<ResponseRegion> kept;
-  for (ResponseRegion& r : found) {
-    const bool merged = std::any_of(kept.begin(), kept.end(), [&](const ResponseRegion& k) {
-      const bool shared = std::any_of(r.actors.begin(), r.actors.end(), [&](int actor) {
-        return std::find(k.actors.begin(), k.actors.end(), actor) != k.actors.end();
-      });
-      return shared && field_.inWindow(field_.config().tight, k.range_m, k.azimuth_rad, r.range_m, r.azimuth_rad);
-    });
-    if (!merged) kept.push_back(r);
+  found = merged(std::move(found));
+  const double extent_floor = field_.config().regions.extent_floor_db;
+  addExtents(T_map_radar, strongest + extent_floor, found);
+  // Where nothing faces the radar, the strongest extent is what the others are measured by.
+  for (const ResponseRegion& r : found) {
+    if (r.field == Field::kCentral) strongest = std::max(strongest, r.support_db);
   }
-  for (ResponseRegion& r : kept) {
+  found.erase(std::remove_if(found.begin(), found.end(),
+                             [&](const ResponseRegion& r) {
+                               return r.kind == RegionKind::kExtent && r.support_db < strongest + extent_floor;
+                             }),
+              found.end());
+  for (ResponseRegion& r : found) {
     for (int actor : r.actors) {
       const Actor& a = scene_.actors[actor];
       r.actor += (r.actor.empty() ? "" : ";") + a.name;
       r.material += (r.material.empty() ? "" : ";") + a.material_tag;
     }
   }
-  std::stable_sort(kept.begin(), kept.end(),
+  std::stable_sort(found.begin(), found.end(),
                    [](const ResponseRegion& a, const ResponseRegion& b) { return a.range_m < b.range_m; });
-  return kept;
+  return found;
 }
 
 }  // namespace mmradartwin

@@ -142,17 +142,31 @@ TEST_F(ResidualTest, TheOuterFieldIsNotRouted) {
 }
 
 TEST_F(ResidualTest, RecordsAreThoseOfTheCell) {
-  const auto record = [](double range_m, double azimuth_deg, double amplitude) {
+  const double d = radar_.virtual_pitch_m();
+  // A far-field path: TX slot t at 4d, receiver r at d, departure and arrival of their own.
+  const auto record = [&](double range_m, double departure_deg, double arrival_deg, double amplitude) {
     PathRecord r;
-    r.departure = r.arrival = {std::cos(azimuth_deg * kDegree), std::sin(azimuth_deg * kDegree), 0};
     r.length_m.assign(8, 2 * range_m);
     r.amplitude = amplitude;
+    for (int k = 0; k < 8; ++k) {
+      const double path = 4 * (k / 4) * std::sin(departure_deg * kDegree) + (k % 4) * std::sin(arrival_deg * kDegree);
+      r.c.push_back(std::polar(amplitude, 0.4 - 2 * M_PI * d / radar_.wavelength_m() * path));
+    }
     return r;
   };
-  const std::vector<PathRecord> records = {record(5.02, 31, 0.2), record(5.3, 30, 1), record(4.95, 29, 0.5),
-                                           record(5, 60, 1), record(5, 30, 0.01)};
-  // 0.01 is 34 dB below the strongest in the cell, beyond the 20 dB that records reach down.
+  // 0.01 is 34 dB below the strongest in the cell, beyond the 20 dB that records reach down; 5.3 m is two bins off.
+  const std::vector<PathRecord> records = {record(5.02, 31, 31, 0.2), record(5.3, 30, 30, 1), record(4.95, 29, 29, 0.5),
+                                           record(5, 60, 60, 1), record(5, 30, 30, 0.01)};
   EXPECT_EQ(recordsInCell(field_, records, 5, 30 * kDegree), (std::vector<int>{2, 0}));
+  // Departure -40, arrival 20 deg: the mean direction, -9 deg, is a null; what it puts into the map lies elsewhere.
+  const std::vector<PathRecord> ghost = {record(5, -40, 20, 1)};
+  double strongest_deg = 0, strongest = 0;
+  for (double a = -60; a <= 60; a += 1) {
+    const double share = field_.recordShare(ghost[0], 5, a * kDegree);
+    if (share > strongest) strongest = share, strongest_deg = a;
+  }
+  EXPECT_EQ(recordsInCell(field_, ghost, 5, strongest_deg * kDegree).size(), 1u);
+  EXPECT_GT(std::abs(strongest_deg - -9), 5);
 }
 
 TEST_F(ResidualTest, ConjugationIsNoticed) {

@@ -17,6 +17,8 @@ struct RegionConfig {
   double support_floor_db;          ///< a reflecting facet counts down to this much below the pose's strongest support
   double corner_tolerance_rad;      ///< two facets form a corner where they are perpendicular within this
   double corner_gap_m;              ///< and come this close to their common line
+  double extent_floor_db;           ///< a visible rough surface down to this much below it
+  double extent_scattering;         ///< scattering coefficient S that such a surface is given: materials do not enter
   double extent_spacing_m;          ///< spacing of the points at which an object's visibility is probed
 };
 

@@ -70,7 +70,8 @@ struct PoseAttribution {
 PoseAttribution compareMaps(const EvaluationField& field, const RangeAngleMap& measured, const RangeAngleMap& simulated,
                             std::vector<ResponseRegion> regions, const std::vector<PathRecord>& records);
 
-/// Indices of the records whose own contribution peaks in the resolution cell around a place, strongest first.
+/// Indices of the records whose own contribution lies in the cell at a place (recordShare >= 1/2, -6 dB), strongest first, down
+/// to config.record_span_db below the strongest.
 std::vector<int> recordsInCell(const EvaluationField& field, const std::vector<PathRecord>& records, double range_m,
                                double azimuth_rad);
 

@@ -5,6 +5,7 @@
 #include "mmradartwin_attribution/attribution_config.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_sim/path_record.h"
 
 namespace mmradartwin {
 
@@ -43,9 +44,10 @@ class EvaluationField {
                 double azimuth_rad) const;
   double halfRange_m(const MatchWindow& window) const;
   double halfAzimuth_rad(const MatchWindow& window, double center_azimuth_rad) const;
-  /// True where a point at the first place has its own peak in the resolution cell of the chain around the second:
-  /// one range bin and half of the array's null distance to either side.
-  bool inResolutionCell(double range_m, double sine, double center_range_m, double center_azimuth_rad) const;
+  /// How much of a record's amplitude the chain puts into the map at a place, 0 to 1: its range offset through the window,
+  /// its contributions c_k steered to the azimuth. Follows a path with different departure and arrival, which has no single
+  /// direction. 0 for a record without contributions.
+  double recordShare(const PathRecord& record, double range_m, double azimuth_rad) const;
 
   /// Power of a point response (1 at its peak) `range_bins` and `angle_bins` (of 64) away from it: the periodic Hann
   /// window's transform in range and the untapered array's (Dirichlet kernel of M elements) in angle.

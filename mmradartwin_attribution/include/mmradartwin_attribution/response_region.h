@@ -15,7 +15,7 @@ enum class RegionKind {
   kFacing,  ///< a facet that faces the radar: foot of the perpendicular inside it
   kCorner,  ///< concave right angle of two facets
   kEdge,    ///< the rim of a facet, nearest to a foot that lies beside it
-  kExtent   ///< nearest visible point of an object that has none of these
+  kExtent   ///< visible surface away from those, where a rough one would scatter most
 };
 const std::string& regionKindName(RegionKind kind);
 
@@ -27,7 +27,9 @@ struct ResponseRegion {
   std::vector<int> actors;           ///< Scene::actors; two for a corner between actors
   std::string actor, material;       ///< names and tags, joined with ";"
   Eigen::Vector3d point;             ///< map
-  double support_db = 0;             ///< geometric level of a perfect reflector, 20 log10(lambda/(8 pi R) aperture)
+  /// Level by geometry alone, 20 log10 of: lambda/(8 pi R) times the aperture factor of a perfect reflector, for an extent
+  /// lambda/(4 pi) sqrt(S^2 sum(cos^2 dA/(pi r^4))) over the visible surface in the tight window, S = regions.extent_scattering.
+  double support_db = 0;
   Field field = Field::kCentral;
   bool measured_strong = false;      ///< filled by the comparison: a measured response >= strong in the tight window
   bool simulated_strong = false;     ///< and a simulated one
@@ -50,14 +52,16 @@ class RegionModel {
   const std::vector<Corner>& corners() const { return corners_; }
 
  private:
-  struct Probe { Eigen::Vector3d point; int facet; };
+  struct Probe { Eigen::Vector3d point; int facet; double area_m2; };
   void findCorners();
   void placeProbes();
   bool seen(const Eigen::Vector3d& radar_map, const Eigen::Vector3d& point, const Eigen::Vector3d& inward) const;
   bool place(const Eigen::Isometry3d& T_map_radar, const Eigen::Vector3d& point, ResponseRegion& region) const;
   void addFacets(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const;
   void addCorners(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const;
-  void addExtents(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const;
+  void addExtents(const Eigen::Isometry3d& T, double floor_db, std::vector<ResponseRegion>& out) const;
+  void addExtentsOf(int actor, const Eigen::Isometry3d& T, double floor_db, std::vector<ResponseRegion>& out) const;
+  std::vector<ResponseRegion> merged(std::vector<ResponseRegion> found) const;
 
   const Scene& scene_;
   const RayCaster& rays_;
