@@ -34,18 +34,29 @@ FrameAssembler::FrameAssembler(const RadarConfig& radar, Output output, const Op
 
 void FrameAssembler::add(const DataPacket& packet) {
   ++counters_.packets;
+  const bool after_quiet = begun_ && packet.stamp_ns - newest_stamp_ns_ > options_.reorder_ns;
+  if (after_quiet && packet.sequence == 1 && packet.byte_count == 0) {
+    suspect(packet, false);
+    return acceptSuspects();
+  }
+  // With a restart in the air, what continues it belongs to it, even where it would fit the old count as well.
+  if (!suspects_.empty() && !suspects_.front().ahead && continuesSuspects(packet)) return suspect(packet, false);
   const std::uint64_t offset = absoluteOffset(packet.byte_count);
   switch (fit(packet, offset)) {
     case Fit::kPlace:
-      counters_.rejected_packets += suspects_.size();
-      suspects_.clear();
+      rejectSuspects();
       place(packet, offset);
       break;
     case Fit::kDuplicate:
       ++counters_.duplicate_packets;
       break;
     case Fit::kBehind:
-      suspect(packet, false);
+      // A reordered packet comes soon after the one that it should have preceded, a restart does not.
+      if (after_quiet) {
+        suspect(packet, false);
+      } else {
+        ++counters_.late_packets;
+      }
       break;
     case Fit::kAhead:
       suspect(packet, true);
@@ -109,25 +120,24 @@ void FrameAssembler::remember(const DataPacket& packet) {
   std::memcpy(entry.head.data(), packet.payload, std::min(packet.size, entry.head.size()));
 }
 
+/// Near the held packets, in count and sequence alike, and not going back after a pause: that would be the next restart.
+bool FrameAssembler::continuesSuspects(const DataPacket& packet) const {
+  constexpr std::uint64_t kNear = 64 * 1472;
+  const Suspect& last = suspects_.back();
+  const bool forward = packet.byte_count >= last.byte_count;
+  const std::uint64_t distance = forward ? packet.byte_count - last.byte_count : last.byte_count - packet.byte_count;
+  if (distance > window_bytes_ + kNear) return false;
+  if (packet.sequence == last.sequence) return distance == 0;
+  return forward == sequenceAfter(packet.sequence, last.sequence) &&
+         (forward || packet.stamp_ns - last.stamp_ns <= options_.reorder_ns);
+}
+
 void FrameAssembler::suspect(const DataPacket& packet, bool ahead) {
-  if (!suspects_.empty()) {
-    const Suspect& last = suspects_.back();
-    if (packet.sequence == last.sequence && packet.byte_count == last.byte_count) {
-      ++counters_.duplicate_packets;
-      return;
-    }
-    const std::uint64_t last_end = last.byte_count + last.payload.size();
-    const bool continues = last.ahead == ahead && sequenceAfter(packet.sequence, last.sequence) &&
-                           packet.byte_count >= last_end && packet.byte_count - last_end <= window_bytes_;
-    if (!continues) {
-      counters_.rejected_packets += suspects_.size();
-      suspects_.clear();
-    }
-  }
-  // A reordered packet comes soon after the one it should have preceded, a restart with a lost head does not.
-  if (suspects_.empty() && !ahead && packet.byte_count != 0 &&
-      packet.stamp_ns - newest_stamp_ns_ <= options_.reorder_ns) {
-    ++counters_.late_packets;
+  if (!suspects_.empty() && (suspects_.front().ahead != ahead || !continuesSuspects(packet))) rejectSuspects();
+  for (Suspect& known : suspects_) {
+    if (known.sequence != packet.sequence || known.byte_count != packet.byte_count) continue;
+    ++counters_.duplicate_packets;
+    if (known.payload.size() < packet.size) known.payload.assign(packet.payload, packet.payload + packet.size);
     return;
   }
   suspects_.push_back({packet.sequence, packet.byte_count, packet.stamp_ns, ahead,
@@ -135,15 +145,17 @@ void FrameAssembler::suspect(const DataPacket& packet, bool ahead) {
   if (static_cast<int>(suspects_.size()) >= options_.confirm_packets) acceptSuspects();
 }
 
-/// At the end of the data, with fewer packets than confirm a restart: one that begins at its beginning.
-bool FrameAssembler::suspectsCredible() const {
-  return !suspects_.empty() && !suspects_.front().ahead && suspects_.front().byte_count == 0 &&
-         suspects_.front().sequence == 1;
+void FrameAssembler::rejectSuspects() {
+  counters_.rejected_packets += suspects_.size();
+  suspects_.clear();
 }
 
 void FrameAssembler::acceptSuspects() {
-  const std::vector<Suspect> accepted = std::move(suspects_);
-  suspects_.clear();
+  std::vector<Suspect> accepted;
+  accepted.swap(suspects_);
+  if (accepted.empty()) return;
+  std::stable_sort(accepted.begin(), accepted.end(),
+                   [](const Suspect& a, const Suspect& b) { return sequenceAfter(b.sequence, a.sequence); });
   if (!accepted.front().ahead) {
     closeBefore(base_frame_ + slots_.size());
     beginEpoch();
@@ -316,14 +328,7 @@ void FrameAssembler::handOut(std::uint64_t frame) {
 }
 
 void FrameAssembler::flush() {
-  const bool restarted = suspectsCredible();
-  if (!restarted) counters_.rejected_packets += suspects_.size();
-  std::vector<Suspect> pending;
-  pending.swap(suspects_);
-  closeBefore((next_byte_ + frame_bytes_ - 1) / frame_bytes_);
-  if (!restarted) return;
-  suspects_ = std::move(pending);
-  acceptSuspects();
+  rejectSuspects();
   closeBefore((next_byte_ + frame_bytes_ - 1) / frame_bytes_);
 }
 

@@ -153,11 +153,14 @@ void Rig::stream() {
       assembler_.flush();
       setPhase(RigState::Phase::kArmed);
       events_(Level::kWarning, "samples have stopped");
-      if (options_.configure_card) return finishRecording();
+      if (options_.configure_card) {
+        configured_ = false;  // it may have lost its power for a moment, and its configuration with it
+        return control_->stopRecord();
+      }
     }
     if (!options_.configure_card) continue;
     while (const auto status = control_->takeStatus(milliseconds(0))) {
-      if (handleStatus(*status)) return finishRecording();
+      if (handleStatus(*status)) return;
     }
     if (silent > kAskWhileSilent && Clock::now() - asked > kAskWhileSilent) {
       asked = Clock::now();
@@ -176,23 +179,21 @@ bool Rig::handleStatus(std::uint16_t status) {
     events_(Level::kError, "the card threw samples away (" + describeStatus(status) +
                                "): frames of the last moments may be shifted; arming it anew. Should it happen again, "
                                "lower packet_delay_us or send fewer samples per second");
+    control_->stopRecord();
     return true;
   }
   if (status & kRecordCompleted) {
     events_(Level::kInfo, "the card has completed its recording: the radar's frames have ended");
+    // The last packets may be behind the status.
+    while (receiveBatch(20) && !stop_) {
+    }
+    assembler_.flush();
+    control_->stopRecord();
+    publishState();
     return true;
   }
   if (status != 0) events_(Level::kWarning, "status of the card: " + describeStatus(status));
   return false;
-}
-
-/// Takes what is still on its way, and ends the recording on the card.
-void Rig::finishRecording() {
-  while (receiveBatch(20) && !stop_) {
-  }
-  assembler_.flush();
-  control_->stopRecord();
-  publishState();
 }
 
 void Rig::report(const std::string& problem) {

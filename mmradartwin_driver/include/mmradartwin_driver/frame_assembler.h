@@ -22,18 +22,18 @@ namespace mmradartwin {
 /// the reorder window behind its end, or at flush(). Frames of which not a single byte came are left out (a gap in the
 /// sequence). Bytes for frames already handed out are counted as late and dropped.
 ///
-/// A packet that cannot belong to the running count (before it and no reordering, in conflict with bytes that are here,
-/// or implausibly far ahead) is held back until `confirm_packets` of them continue each other: then the count has been
-/// restarted, which ends all open frames and begins anew with frame 0 (a new epoch), or has really jumped ahead. A
-/// restart whose first packets are lost and which lands ahead of the old count cannot be told from loss; arming through
-/// restart() leaves no such doubt.
+/// A packet that goes back in the count more than `reorder_ns` after the newest one is no reordered one. If it is the first
+/// of a recording (sequence 1, byte 0), or `confirm_packets` of them are near each other, then the count has been restarted:
+/// that ends all open frames, and a new epoch begins with frame 0. A packet implausibly far ahead is held back until as
+/// many are near each other. A restart whose first packets are lost and that lands ahead of the old count cannot be told
+/// from loss; arming through restart() leaves no such doubt.
 class FrameAssembler {
  public:
   struct Options {
     int window_frames = 2;                                   ///< at least; in the data, not in time
     std::size_t window_bytes = 4 * 1472;                     ///< at least
     std::uint64_t plausible_gap_bytes = 64u << 20;           ///< ahead of the newest byte
-    std::int64_t reorder_ns = 20'000'000;                    ///< a packet late by more than this was not reordered
+    std::int64_t reorder_ns = 20'000'000;                    ///< what comes later than this was not reordered
     int confirm_packets = 4;
   };
   struct Counters {
@@ -97,8 +97,9 @@ class FrameAssembler {
   Fit fit(const DataPacket& packet, std::uint64_t offset) const;
   bool overlapsReceived(std::uint64_t offset, std::size_t size) const;
   const Fingerprint* findCopy(const DataPacket& packet) const;
+  bool continuesSuspects(const DataPacket& packet) const;
   void suspect(const DataPacket& packet, bool ahead);
-  bool suspectsCredible() const;
+  void rejectSuspects();
   void acceptSuspects();
   void place(const DataPacket& packet, std::uint64_t offset);
   void remember(const DataPacket& packet);

@@ -64,9 +64,8 @@ class Rig {
   void arm();
   /// Receives until the card must be armed anew.
   void stream();
-  /// True where the status ends the recording.
+  /// True where the status ended the recording: the card has been stopped.
   bool handleStatus(std::uint16_t status);
-  void finishRecording();
   bool receiveBatch(int timeout_ms);
   void report(const std::string& problem);
   void setPhase(RigState::Phase phase);
