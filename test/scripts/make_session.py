@@ -35,6 +35,7 @@ def parse():
     parser.add_argument("--duplicates", type=int, help="repeated poses at the end (default 2 in a full campaign)")
     parser.add_argument("--tier", choices=sorted(campaign.POSE_ERROR), default="default", help="size of errors in the description")
     parser.add_argument("--speckle-seed", type=int, help="of the rough surfaces' phases alone (default: the seed)")
+    parser.add_argument("--at-reported", action="store_true", help="measure at the reported poses: the ceiling of any twin")
     parser.add_argument("--effect", action="append", default=[], help="hidden effect by its name; may be repeated")
     parser.add_argument("--strength", type=float, help="of the first effect, 1 = its typical size")
     parser.add_argument("--param", action="append", default=[], metavar="KEY=VALUE",
@@ -72,7 +73,7 @@ def main():
             output=arguments.output, seed=arguments.seed, locations=arguments.locations, headings=arguments.headings,
             frames=arguments.frames, poses=arguments.poses, tier=arguments.tier, speckle_seed=arguments.speckle_seed,
             pause_s=arguments.pause, duplicates=arguments.duplicates, effects=chosen, truth=arguments.truth,
-            paths_csv=arguments.paths_csv, jobs=arguments.jobs)
+            paths_csv=arguments.paths_csv, at_reported=arguments.at_reported, jobs=arguments.jobs)
         session.Measurement(settings).run()
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)

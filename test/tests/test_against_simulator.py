@@ -2,6 +2,7 @@
 import csv
 import math
 import os
+import re
 import subprocess
 import tempfile
 import unittest
@@ -11,13 +12,14 @@ from installed_programs import find_program
 
 from mmradartwin_tests.path_comparison import compare, match, read_paths
 from mmradartwin_tests.session import Measurement, Settings
+from mmradartwin_tests.tracing import path_arrays
 
 PROGRAM = find_program("mmradartwin_sim", "simulate")
 
 
 @unittest.skipIf(PROGRAM is None, "mmradartwin_sim simulate is not built in this workspace")
 class Simulated(unittest.TestCase):
-    """12 poses at fresh places, once with exact poses and once as measured."""
+    """12 poses with exact poses and 24 as measured, at fresh places."""
 
     @classmethod
     def setUpClass(cls):
@@ -32,7 +34,7 @@ class Simulated(unittest.TestCase):
     @classmethod
     def generate(cls, tier):
         at = lambda name: os.path.join(cls.directory.name, tier + name)
-        measurement = Measurement(Settings(output=at("_session"), seed=cls.seed, poses=12, frames=1, tier=tier, paths_csv=at("_true")))
+        measurement = Measurement(Settings(output=at("_session"), seed=cls.seed, poses=12 if tier == "exact" else 24, frames=1, tier=tier, paths_csv=at("_true")))
         measurement.run()
         run = subprocess.run([PROGRAM, at("_session"), "--output", at("_sim")], capture_output=True, text=True, check=False)
         if run.returncode != 0:
@@ -45,8 +47,9 @@ class Simulated(unittest.TestCase):
     def test_isolated_strong_paths_of_a_measured_session(self):
         result = compare(*self.folders("default"))
         self.assertGreaterEqual(result["isolated"], 8, msg=f"seed {self.seed}")
+        # Signed: the poses' own errors (3 mm, 0.3 deg each) are not the simulator's, and cancel over few poses alone.
         for key, limit in (("level_db", 0.3), ("range_m", 0.005), ("azimuth_deg", 0.3)):
-            self.assertLessEqual(result["median"][key], limit, msg=f"{key}, seed {self.seed}")
+            self.assertLessEqual(abs(result["bias"][key]), limit, msg=f"{key}, seed {self.seed}")
 
     def test_every_path_where_poses_are_exact(self):
         # One path in fifty may hang on a millimetre: a ray that grazes an edge, a factor next to the cutoff.
@@ -93,20 +96,25 @@ class Simulated(unittest.TestCase):
         self.assertLess(abs(float(np.median(ratios))), 0.1, msg=f"seed {self.seed}")
         self.assertLess(float(np.quantile(np.abs(ratios), 0.9)), 0.7, msg=f"seed {self.seed}")
 
-    def test_captures_hold_the_same_echoes(self):
-        # The simulator's samples against the generator's noise-free ones, smooth rooms apart: the strongest bins agree
-        # up to the unknown phases of rough surfaces.
+    def test_samples_agree_without_rough_surfaces(self):
+        # Specular paths and corners alone: all phases are known, so the samples themselves agree up to one gain.
+        session, other = (os.path.join(self.directory.name, name) for name in ("exact_session", "smooth"))
+        twin = os.path.join(session, "smooth.yaml")
+        with open(twin, "w", encoding="ascii") as out:
+            out.write("scene: scene.yaml\nradar: radar.yaml\nmechanisms:\n  specular: {max_bounces: 3}\n  corner: {}\n")
+        run = subprocess.run([PROGRAM, session, "--twin", twin, "--output", other], capture_output=True, text=True, check=False)
+        self.assertEqual(run.returncode, 0, msg=run.stderr)
+        with open(os.path.join(other, "session.yaml"), encoding="ascii") as file:
+            gain_db = float(re.search(r"gain_db: *(\S+)", file.read()).group(1))
         measurement = self.measurements["exact"]
-        received, _ = measurement.receive()
-        window = 0.5 * (1 - np.cos(2 * np.pi * np.arange(64) / 64))
-        level = []
-        for station, x in zip(measurement.stations, received):
-            raw = np.fromfile(os.path.join(self.directory.name, "exact_sim", "captures", station.name + ".bin"), "<i2")
-            raw = raw.reshape(-1, 2, 64, 2, 4)[0].astype(float)
-            y = (raw[:, :, 0, :] + 1j * raw[:, :, 1, :]).transpose(0, 2, 1).reshape(8, 64)
-            a, b = (np.abs(np.fft.fft(v * window, axis=1)).mean(axis=0) for v in (x, y))
-            level.append(20 * math.log10(b[a.argmax()] / a[a.argmax()]))
-        self.assertLess(float(np.median(np.abs(np.array(level) - np.median(level)))), 1.0, msg=f"seed {self.seed}")
+        errors = []
+        for station in measurement.stations:
+            x = measurement.radar.grid(*path_arrays(measurement.tracer.specular(station.true), 8))
+            raw = np.fromfile(os.path.join(other, "captures", station.name + ".bin"), "<i2").reshape(2, 64, 2, 4).astype(float)
+            y = (raw[:, :, 0, :] + 1j * raw[:, :, 1, :]).transpose(0, 2, 1).reshape(8, 64) / 32768 / 10**(gain_db / 20)
+            errors.append(float(np.linalg.norm(y - x) / np.linalg.norm(x)))
+        # One pose may hang on a grazing ray; quantisation and the mesh's 0.1 um leave a per cent.
+        self.assertLess(sorted(errors)[-2], 0.03, msg=f"seed {self.seed}: {errors}")
 
 
 if __name__ == "__main__":

@@ -54,8 +54,8 @@ def isolated(row, rows):
 def compare(true_directory, other_directory, floor_db=-140.0):
     """Differences over all poses of two directories of path lists.
 
-    Returns a dictionary: poses, pairs (all matched), isolated (count), and for the isolated strong ones the medians and
-    for all pairs the worst of |level_db|, |range_m|, |azimuth_deg|; missing and extra: (pose, row) above floor_db.
+    Returns a dictionary: poses, pairs (all matched), isolated (count), and for the isolated strong ones the medians of
+    |level_db|, |range_m|, |azimuth_deg| and, as bias, of the signed differences; for all pairs the worst; missing and extra: (pose, row) above floor_db.
     """
     names = sorted(n for n in os.listdir(true_directory) if n.endswith(".csv"))
     everything, strong, missing, extra = [], [], [], []
@@ -67,11 +67,13 @@ def compare(true_directory, other_directory, floor_db=-140.0):
                           abs(a["azimuth_arr_deg"] - b["azimuth_arr_deg"]))
             everything.append((*difference, name, a))
             if isolated(a, ours):
-                strong.append(difference)
+                strong.append((*difference, b["amplitude_db"] - a["amplitude_db"], (b["length_m"] - a["length_m"]) / 2,
+                               b["azimuth_arr_deg"] - a["azimuth_arr_deg"]))
         missing += [(name, row) for row in alone if row["amplitude_db"] > floor_db]
         extra += [(name, row) for row in others if row["amplitude_db"] > floor_db]
-    median = np.median(np.array(strong), axis=0) if strong else [math.nan] * 3
+    median = np.median(np.array(strong), axis=0) if strong else [math.nan] * 6
     worst = np.max(np.array([e[:3] for e in everything]), axis=0) if everything else [math.nan] * 3
     return {"poses": len(names), "pairs": everything, "isolated": len(strong), "missing": missing, "extra": extra,
-            "median": dict(zip(("level_db", "range_m", "azimuth_deg"), map(float, median))),
+            "median": dict(zip(("level_db", "range_m", "azimuth_deg"), map(float, median[:3]))),
+            "bias": dict(zip(("level_db", "range_m", "azimuth_deg"), map(float, median[3:]))),
             "worst": dict(zip(("level_db", "range_m", "azimuth_deg"), map(float, worst)))}

@@ -40,6 +40,7 @@ class Settings:
     truth: str = None
     paths_csv: str = None
     jobs: int = None
+    at_reported: bool = False   # measure where the poses say: what a twin without any error could know
 
 
 @dataclasses.dataclass
@@ -79,6 +80,9 @@ class Measurement:
             duplicates = 2 if settings.poses is None else 0
         self.stations = campaign.plan(room, self.rng(1), settings.locations, settings.headings, settings.poses,
                                       settings.frames, self.radar.frame_period_s, settings.tier, settings.pause_s, duplicates)
+        if settings.at_reported:
+            for station in self.stations:
+                station.true = station.reported
         actors, materials = office.build_actors(), dict(office.MATERIALS)
         for effect in settings.effects:
             effect.prepare(self)

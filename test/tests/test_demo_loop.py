@@ -1,0 +1,97 @@
+#!/usr/bin/env python3
+"""The demo on a small session, as a user runs it: emulator, UDP, driver, tf, signal chain, twin, attribution, rviz, report."""
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import numpy
+import rosbag
+import rospkg
+
+POSES, FRAMES = 3, 60
+
+
+def picture_pixels(file):
+    """[height, width, 3] uint8 of a PNG."""
+    header = subprocess.run(["identify", "-format", "%w %h", file], check=True, capture_output=True, text=True).stdout
+    width, height = map(int, header.split())
+    raw = subprocess.run(["convert", file, "-depth", "8", "rgb:-"], check=True, capture_output=True).stdout
+    return numpy.frombuffer(raw, numpy.uint8).reshape(height, width, 3).astype(int)
+
+
+def fan_columns(pixels):
+    """Columns that hold the floor of a fan's colour map, viridis(0) = (68, 1, 84): stretches of at least 100 columns."""
+    floor = (numpy.abs(pixels - numpy.array([68, 1, 84])).sum(axis=2) < 24).sum(axis=0) > 40
+    edges = numpy.flatnonzero(numpy.diff(numpy.concatenate([[0], floor.astype(int), [0]])))
+    return [(a, b) for a, b in zip(edges[::2], edges[1::2]) if b - a >= 100]
+
+
+class DemoLoop(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.out = tempfile.mkdtemp(prefix="mmradartwin_demo_")
+        script = os.path.join(rospkg.RosPack().get_path("mmradartwin_launch"), "scripts", "demo.sh")
+        environment = dict(os.environ, DEMO_LOCATIONS=str(POSES), DEMO_HEADINGS="1", DEMO_FRAMES=str(FRAMES), DEMO_SEED="11")
+        environment.pop("DISPLAY", None)
+        cls.run = subprocess.run([script, cls.out], env=environment, capture_output=True, text=True, timeout=240)
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.out, ignore_errors=True)
+
+    def path(self, *parts):
+        return os.path.join(self.out, *parts)
+
+    def test_ends_with_status_zero(self):
+        self.assertEqual(self.run.returncode, 0, self.run.stderr[-3000:])
+
+    def test_every_frame_of_the_session_came_through_udp_bit_for_bit(self):
+        with open(self.path("session", "poses.csv")) as file:
+            names = [line.split(",")[0] for line in file][1:]
+        sent = []
+        for name in names[:POSES]:
+            sent.append(numpy.fromfile(self.path("session", "captures", name + ".bin"), "<i2").reshape(FRAMES, 2, 64, 2, 4))
+        sent = numpy.concatenate(sent).transpose(0, 1, 2, 4, 3)  # [frame][chirp][sample][rx][I, Q]
+        received, lost = [], 0
+        with rosbag.Bag(self.path("demo.bag")) as bag:
+            for _, message, _ in bag.read_messages("radar/adc"):
+                received.append(numpy.array(message.samples, "<i2").reshape(2, 64, 4, 2))
+                lost += message.lost_bytes
+        self.assertEqual(lost, 0)
+        self.assertEqual(len(received), len(sent))
+        self.assertTrue(numpy.array_equal(numpy.array(received), sent))
+
+    def test_live_ledger_and_offline_evaluation_agree(self):
+        with rosbag.Bag(self.path("demo.bag")) as bag:
+            ledger = [message for _, message, _ in bag.read_messages("attribution/ledger")][-1]
+        with open(self.path("report", "summary.json")) as file:
+            central = json.load(file)["central"]
+        self.assertEqual(ledger.poses, POSES)
+        self.assertEqual(central["poses"], POSES)
+        self.assertAlmostEqual(ledger.recall, central["recall"], places=6)
+        self.assertAlmostEqual(ledger.q1_energy, central["q1_energy"], places=3)
+        self.assertAlmostEqual(ledger.q3_median_db, central["q3_median_db"], delta=0.1)
+
+    def test_rviz_shows_both_fans(self):
+        pixels = picture_pixels(self.path("rviz.png"))
+        fans = fan_columns(pixels)
+        self.assertGreaterEqual(len(fans), 2, f"fans found in columns {fans}")
+        # Each holds more than the floor's colour: the strongest echo is yellow, viridis(1) = (253, 231, 37).
+        bright = numpy.abs(pixels - numpy.array([253, 231, 37])).sum(axis=2) < 60
+        middle = (fans[0][1] + fans[1][0]) // 2
+        self.assertGreater(bright[:, fans[0][0]:middle].sum(), 20)
+        self.assertGreater(bright[:, middle:].sum(), 20)
+
+    def test_report_names_every_pose(self):
+        with open(self.path("report", "index.html")) as file:
+            page = file.read()
+        for name in ("coverage.png", "001.png", "002.png", "003.png"):
+            self.assertIn(name, page)
+            self.assertTrue(os.path.exists(self.path("report", name)) or os.path.exists(self.path("report", "pictures", name)))
+
+
+if __name__ == "__main__":
+    unittest.main()
