@@ -6,10 +6,9 @@ import subprocess
 import sys
 import tempfile
 
-sys.path[:0] = [os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", folder) for folder in ("src", "tests")]
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
-from installed_programs import find_program  # noqa: E402
-
+from mmradartwin_tests.installed_programs import find_program  # noqa: E402
 from mmradartwin_tests.path_comparison import compare  # noqa: E402
 from mmradartwin_tests.session import Measurement, Settings  # noqa: E402
 

@@ -8,8 +8,8 @@ import tempfile
 import unittest
 
 import numpy as np
-from installed_programs import find_program
 
+from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.path_comparison import compare, match, read_paths
 from mmradartwin_tests.session import Measurement, Settings
 from mmradartwin_tests.tracing import path_arrays

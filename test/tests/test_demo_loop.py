@@ -36,7 +36,7 @@ class DemoLoop(unittest.TestCase):
         script = os.path.join(rospkg.RosPack().get_path("mmradartwin_launch"), "scripts", "demo.sh")
         environment = dict(os.environ, DEMO_LOCATIONS=str(POSES), DEMO_HEADINGS="1", DEMO_FRAMES=str(FRAMES), DEMO_SEED="11")
         environment.pop("DISPLAY", None)
-        cls.run = subprocess.run([script, cls.out], env=environment, capture_output=True, text=True, timeout=240)
+        cls.demo = subprocess.run([script, cls.out], env=environment, capture_output=True, text=True, timeout=240)
 
     @classmethod
     def tearDownClass(cls):
@@ -46,7 +46,7 @@ class DemoLoop(unittest.TestCase):
         return os.path.join(self.out, *parts)
 
     def test_ends_with_status_zero(self):
-        self.assertEqual(self.run.returncode, 0, self.run.stderr[-3000:])
+        self.assertEqual(self.demo.returncode, 0, self.demo.stderr[-3000:])
 
     def test_every_frame_of_the_session_came_through_udp_bit_for_bit(self):
         with open(self.path("session", "poses.csv")) as file:
