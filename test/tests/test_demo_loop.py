@@ -79,11 +79,12 @@ class DemoLoop(unittest.TestCase):
         pixels = picture_pixels(self.path("rviz.png"))
         fans = fan_columns(pixels)
         self.assertGreaterEqual(len(fans), 2, f"fans found in columns {fans}")
-        # Each holds more than the floor's colour: the strongest echo is yellow, viridis(1) = (253, 231, 37).
-        bright = numpy.abs(pixels - numpy.array([253, 231, 37])).sum(axis=2) < 60
+        # Each holds echoes too: the upper half of viridis, teal to yellow, has more green than blue or red in it.
+        red, green, blue = pixels[..., 0], pixels[..., 1], pixels[..., 2]
+        echo = (green > 130) & (green > blue) & (green - numpy.minimum(red, blue) > 40)
         middle = (fans[0][1] + fans[1][0]) // 2
-        self.assertGreater(bright[:, fans[0][0]:middle].sum(), 20)
-        self.assertGreater(bright[:, middle:].sum(), 20)
+        self.assertGreater(echo[:, fans[0][0]:middle].sum(), 100)
+        self.assertGreater(echo[:, middle:fans[1][1]].sum(), 100)
 
     def test_report_names_every_pose(self):
         with open(self.path("report", "index.html")) as file:
