@@ -30,20 +30,39 @@ struct Options {
 struct Preset {
   const char* tag;
   const char* yaml;
-  std::vector<const char*> words;   // in names of actors and tags, lower case
+  std::vector<const char*> words;  // in names of actors and tags, lower case
 };
 
 // The shipped physical table's values (ITU-R P.2040 at 77 GHz), and the words by which people name such things.
 const std::vector<Preset>& presets() {
   static const std::vector<Preset> list = {
-      {"Metal", "{model: conductor, color: [0.55, 0.60, 0.68]}", {"metal", "steel", "alumin", "iron", "radiator", "cabinet", "locker", "fridge"}},
-      {"Glass", "{model: dielectric, relative_permittivity: 6.31, conductivity_s_per_m: 1.211, color: [0.55, 0.80, 0.88]}", {"glass", "window", "mirror", "screen", "monitor", "tv", "display"}},
-      {"Wood", "{model: dielectric, relative_permittivity: 1.99, conductivity_s_per_m: 0.494, color: [0.62, 0.43, 0.24]}", {"wood", "door", "shelf", "bookcase", "wardrobe", "drawer", "chair"}},
-      {"TableTop", "{model: dielectric, relative_permittivity: 2.58, conductivity_s_per_m: 0.643, color: [0.80, 0.68, 0.50]}", {"table", "desk", "counter", "worktop"}},
-      {"Carpet", "{model: dielectric, relative_permittivity: 2.08, conductivity_s_per_m: 0.0317, scattering_coefficient: 0.4, extrapolated: true, color: [0.38, 0.42, 0.55]}", {"carpet", "rug", "sofa", "couch", "curtain", "fabric", "cushion", "bed"}},
-      {"Plastic", "{model: dielectric, relative_permittivity: 2.57, conductivity_s_per_m: 0.49, color: [0.85, 0.85, 0.80]}", {"plastic", "acryl", "bin", "printer"}},
-      {"Plasterboard", "{model: dielectric, relative_permittivity: 2.73, conductivity_s_per_m: 0.503, scattering_coefficient: 0.2, color: [0.88, 0.87, 0.84]}", {"plaster", "gypsum", "drywall", "partition"}},
-      {"Concrete", "{model: dielectric, relative_permittivity: 5.24, conductivity_s_per_m: 1.38, scattering_coefficient: 0.5, color: [0.70, 0.69, 0.66]}", {"concrete", "wall", "floor", "ceiling", "column", "pillar", "cement"}}};
+      {"Metal",
+       "{model: conductor, color: [0.55, 0.60, 0.68]}",
+       {"metal", "steel", "alumin", "iron", "radiator", "cabinet", "locker", "fridge"}},
+      {"Glass",
+       "{model: dielectric, relative_permittivity: 6.31, conductivity_s_per_m: 1.211, color: [0.55, 0.80, 0.88]}",
+       {"glass", "window", "mirror", "screen", "monitor", "tv", "display"}},
+      {"Wood",
+       "{model: dielectric, relative_permittivity: 1.99, conductivity_s_per_m: 0.494, color: [0.62, 0.43, 0.24]}",
+       {"wood", "door", "shelf", "bookcase", "wardrobe", "drawer", "chair"}},
+      {"TableTop",
+       "{model: dielectric, relative_permittivity: 2.58, conductivity_s_per_m: 0.643, color: [0.80, 0.68, 0.50]}",
+       {"table", "desk", "counter", "worktop"}},
+      {"Carpet",
+       "{model: dielectric, relative_permittivity: 2.08, conductivity_s_per_m: 0.0317, scattering_coefficient: 0.4, "
+       "extrapolated: true, color: [0.38, 0.42, 0.55]}",
+       {"carpet", "rug", "sofa", "couch", "curtain", "fabric", "cushion", "bed"}},
+      {"Plastic",
+       "{model: dielectric, relative_permittivity: 2.57, conductivity_s_per_m: 0.49, color: [0.85, 0.85, 0.80]}",
+       {"plastic", "acryl", "bin", "printer"}},
+      {"Plasterboard",
+       "{model: dielectric, relative_permittivity: 2.73, conductivity_s_per_m: 0.503, scattering_coefficient: 0.2, "
+       "color: [0.88, 0.87, 0.84]}",
+       {"plaster", "gypsum", "drywall", "partition"}},
+      {"Concrete",
+       "{model: dielectric, relative_permittivity: 5.24, conductivity_s_per_m: 1.38, scattering_coefficient: 0.5, "
+       "color: [0.70, 0.69, 0.66]}",
+       {"concrete", "wall", "floor", "ceiling", "column", "pillar", "cement"}}};
   return list;
 }
 
@@ -59,7 +78,9 @@ const Preset* guess(const std::string& name) {
     if (text == lower(p.tag)) return &p;
   }
   for (const Preset& p : presets()) {
-    if (std::any_of(p.words.begin(), p.words.end(), [&text](const char* w) { return text.find(w) != std::string::npos; })) return &p;
+    if (std::any_of(p.words.begin(), p.words.end(),
+                    [&text](const char* w) { return text.find(w) != std::string::npos; }))
+      return &p;
   }
   return nullptr;
 }
@@ -68,7 +89,8 @@ const Preset& find(const std::string& tag) {
   for (const Preset& p : presets()) {
     if (tag == p.tag) return p;
   }
-  throw InputError("--material " + tag + ": unknown; known: Metal, Glass, Wood, TableTop, Carpet, Plastic, Plasterboard, Concrete");
+  throw InputError("--material " + tag +
+                   ": unknown; known: Metal, Glass, Wood, TableTop, Carpet, Plastic, Plasterboard, Concrete");
 }
 
 std::string quoted(const std::string& text) {
@@ -82,11 +104,12 @@ std::string quoted(const std::string& text) {
 
 int makeScene(const Options& options) {
   const Preset& fallback = find(options.material);
-  const fs::path scene_file = fs::path(options.output) / "scene.yaml", materials_file = fs::path(options.output) / "materials.yaml";
+  const fs::path scene_file = fs::path(options.output) / "scene.yaml",
+                 materials_file = fs::path(options.output) / "materials.yaml";
   for (const fs::path& f : {scene_file, materials_file}) {
     if (fs::exists(f)) throw InputError(f.string() + ": is there already; choose another --output or remove it");
   }
-  std::map<std::string, std::string> overrides;   // actor -> tag
+  std::map<std::string, std::string> overrides;  // actor -> tag
   std::set<std::string> used, actors;
   std::ostringstream meshes;
   Eigen::AlignedBox3d bounds;
@@ -94,9 +117,11 @@ int makeScene(const Options& options) {
   fs::create_directories(options.output);
   for (const std::string& mesh : options.meshes) {
     std::string path = fs::proximate(fs::weakly_canonical(mesh), fs::weakly_canonical(options.output)).string();
-    meshes << "  - {file: " << quoted(path) << ", xyz_m: [0, 0, 0], rpy_deg: [" << (options.y_up ? 90 : 0) << ", 0, 0], scale: " << options.scale << "}\n";
+    meshes << "  - {file: " << quoted(path) << ", xyz_m: [0, 0, 0], rpy_deg: [" << (options.y_up ? 90 : 0)
+           << ", 0, 0], scale: " << options.scale << "}\n";
     for (const Actor& actor : loadMesh(mesh)) {
-      if (!actors.insert(actor.name).second) throw InputError(mesh + ": a second actor is named " + actor.name + "; rename the object or the file");
+      if (!actors.insert(actor.name).second)
+        throw InputError(mesh + ": a second actor is named " + actor.name + "; rename the object or the file");
       for (const auto& v : actor.vertices) {
         bounds.extend(options.scale * (options.y_up ? Eigen::Vector3d(v.x(), -v.z(), v.y()) : v));
       }
@@ -106,30 +131,38 @@ int makeScene(const Options& options) {
       const Preset& preset = by_name ? *by_name : fallback;
       used.insert(preset.tag);
       if (actor.material_tag != preset.tag) overrides[actor.name] = preset.tag;
-      std::cerr << (by_name ? "note" : "warning") << ": actor " << actor.name << ", material tag '" << actor.material_tag << "' -> " << preset.tag
-                << (by_tag ? "" : by_name ? " (by the actor's name)" : " (nothing tells: edit scene.yaml)") << "\n";
+      std::cerr << (by_name ? "note" : "warning") << ": actor " << actor.name << ", material tag '"
+                << actor.material_tag << "' -> " << preset.tag
+                << (by_tag    ? ""
+                    : by_name ? " (by the actor's name)"
+                              : " (nothing tells: edit scene.yaml)")
+                << "\n";
     }
   }
   std::ofstream scene(scene_file);
   scene << "# Lengths in metres, z up, floor near z = 0. p_map = Rz*Ry*Rx*(scale*p) + xyz_m.\n"
-        << "# As it stands the scene spans " << std::fixed << std::setprecision(2) << bounds.min().x() << ".." << bounds.max().x() << " m, " << bounds.min().y()
-        << ".." << bounds.max().y() << " m, " << bounds.min().z() << ".." << bounds.max().z() << " m.\n"
-        << "meshes:\n" << meshes.str() << "materials: materials.yaml\n";
+        << "# As it stands the scene spans " << std::fixed << std::setprecision(2) << bounds.min().x() << ".."
+        << bounds.max().x() << " m, " << bounds.min().y() << ".." << bounds.max().y() << " m, " << bounds.min().z()
+        << ".." << bounds.max().z() << " m.\n"
+        << "meshes:\n"
+        << meshes.str() << "materials: materials.yaml\n";
   if (triangles > 5000) {
     scene << "# Triangles of a scan are one facet within these limits; wider ones give larger facets.\n"
-          << "facets: {angle_deg: 12, offset_m: 0.03}\n";
+          << "facets: {angle_deg: 35, offset_m: 0.05}\n";
   }
   if (!overrides.empty()) {
     scene << "# What each actor is made of; every tag must stand in materials.yaml.\nactors:\n";
     for (const auto& [actor, tag] : overrides) scene << "  " << quoted(actor) << ": {material: " << tag << "}\n";
   }
   std::ofstream materials(materials_file);
-  materials << "# Constants at 77 GHz from ITU-R P.2040; Carpet and Plastic lie outside the recommendation's range or list.\nmaterials:\n";
+  materials << "# Constants at 77 GHz from ITU-R P.2040; Carpet and Plastic lie outside the recommendation's range or "
+               "list.\nmaterials:\n";
   for (const std::string& tag : used) materials << "  " << tag << ": " << find(tag).yaml << "\n";
   scene.close();
   materials.close();
   if (!scene || !materials) throw std::runtime_error(options.output + ": cannot be written");
-  std::cerr << actors.size() << " actor(s), " << triangles << " triangles: edit " << scene_file.string() << " and " << materials_file.string() << "\n";
+  std::cerr << actors.size() << " actor(s), " << triangles << " triangles: edit " << scene_file.string() << " and "
+            << materials_file.string() << "\n";
   if (bounds.sizes().maxCoeff() > 200 || bounds.sizes().maxCoeff() < 0.5) {
     std::cerr << "warning: the scene is " << bounds.sizes().maxCoeff() << " m across; is --scale right?\n";
   }
@@ -143,7 +176,9 @@ int main(int argc, char** argv) {
   CLI::App app("Begins a scene from your own meshes: writes scene.yaml and materials.yaml to edit.");
   app.add_option("MESH", options.meshes, "OBJ, PLY, STL or glTF files")->required();
   app.add_option("--output", options.output, "folder for scene.yaml and materials.yaml")->required();
-  app.add_option("--scale", options.scale, "metres per unit of the meshes")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--scale", options.scale, "metres per unit of the meshes")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--material", options.material, "of actors that neither tag nor name explains")->capture_default_str();
   app.add_flag("--y-up", options.y_up, "the meshes are y-up (glTF is turned without this)");
   return runProgram(app, argc, argv, [&options] { return makeScene(options); });

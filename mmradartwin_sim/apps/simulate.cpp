@@ -14,10 +14,13 @@ using namespace mmradartwin;
 int main(int argc, char** argv) {
   SimulateOptions options;
   CLI::App app("Simulates the poses of a session and writes a session of its own, with paths/{pose}.csv beside it.");
-  app.add_option("SESSION", options.session, "session directory or its session.yaml; captures are not needed")->required();
+  app.add_option("SESSION", options.session, "session directory or its session.yaml; captures are not needed")
+      ->required();
   app.add_option("--output", options.output, "session directory to write")->required();
   app.add_option("--twin", options.twin_file, "twin.yaml instead of the session's");
-  app.add_option("--frames", options.frames, "frames per pose, all alike")->check(CLI::Range(1, 100000))->capture_default_str();
+  app.add_option("--frames", options.frames, "frames per pose, all alike")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
   app.add_option("--seed", options.seed, "of the phases of scatter points")->capture_default_str();
   app.add_option("--jobs", options.jobs, "threads; 0 = all cores")->check(CLI::Range(0, 1024))->capture_default_str();
   return runProgram(app, argc, argv, [&options] {
@@ -32,8 +35,9 @@ int main(int argc, char** argv) {
     bar.reset();
     for (const std::string& note : result.notes) std::cerr << "note: " << note << "\n";
     for (const PoseProblem& problem : result.problems) std::cerr << "error: " << problem.message << "\n";
-    std::cerr << result.poses << " pose(s) in " << options.output << ", gain " << result.gain_db << " dB, records hold to "
-              << std::max(result.worst_amplitude_error, result.worst_grid_error) << ", " << result.problems.size() << " pose(s) skipped\n";
+    std::cerr << result.poses << " pose(s) in " << options.output << ", gain " << result.gain_db
+              << " dB, records hold to " << std::max(result.worst_amplitude_error, result.worst_grid_error) << ", "
+              << result.problems.size() << " pose(s) skipped\n";
     if (std::max(result.worst_amplitude_error, result.worst_grid_error) > 1e-12) {
       std::cerr << "error: records and grid disagree by more than 1e-12\n";
       return 1;

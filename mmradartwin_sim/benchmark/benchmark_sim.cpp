@@ -55,7 +55,8 @@ void pose8Channels(benchmark::State& state) {
   int i = 0;
   std::size_t records = 0;
   for (auto _ : state) records += twin().simulate(pose(i++)).records.size();
-  state.counters["records"] = benchmark::Counter(static_cast<double>(records) / static_cast<double>(state.iterations()));
+  state.counters["records"] =
+      benchmark::Counter(static_cast<double>(records) / static_cast<double>(state.iterations()));
 }
 BENCHMARK(pose8Channels)->Unit(benchmark::kMillisecond);
 
@@ -67,7 +68,8 @@ void recordsToGrid(benchmark::State& state) {
     accumulate(twin().radar(), s.records, x);
     benchmark::DoNotOptimize(x.data());
   }
-  state.counters["records/s"] = benchmark::Counter(static_cast<double>(s.records.size()) * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+  state.counters["records/s"] = benchmark::Counter(
+      static_cast<double>(s.records.size()) * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
 }
 BENCHMARK(recordsToGrid)->Unit(benchmark::kMillisecond);
 
@@ -89,8 +91,10 @@ void bareEmbreeBounces(benchmark::State& state) {
   RTCScene embree = rtcNewScene(device);
   for (const Actor& a : scene.actors) {
     RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, a.vertices.size()));
-    auto* t = static_cast<unsigned*>(rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, a.triangles.size()));
+    auto* v = static_cast<float*>(
+        rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, a.vertices.size()));
+    auto* t = static_cast<unsigned*>(
+        rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, a.triangles.size()));
     for (std::size_t i = 0; i < a.vertices.size(); ++i) {
       for (int k = 0; k < 3; ++k) v[3 * i + k] = static_cast<float>(a.vertices[i][k]);
     }

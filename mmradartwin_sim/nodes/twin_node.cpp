@@ -1,7 +1,8 @@
+#include "mmradartwin_sim/ros/twin_node.h"
+
 #include <ros/ros.h>
 
 #include "mmradartwin_dsp/input_error.h"
-#include "mmradartwin_sim/ros/twin_node.h"
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "twin");

@@ -36,7 +36,8 @@ Complex toInfinity(double a, double h) {
   Complex sum = 0;
   double from = a;
   while (from < kTurn) {
-    const double to = std::min(kTurn, from + std::min(0.5, std::max(h, from)));  // steps grow away from the pole at l = +-jh
+    const double to =
+        std::min(kTurn, from + std::min(0.5, std::max(h, from)));  // steps grow away from the pole at l = +-jh
     sum += stretch(from, to, h);
     from = to;
   }

@@ -14,7 +14,7 @@ namespace {
 
 using Index3 = std::array<int, 3>;
 
-constexpr double kWeld_m = 1e-5;           // vertices nearer than this are one: STL and glTF repeat them per triangle
+constexpr double kWeld_m = 1e-5;  // vertices nearer than this are one: STL and glTF repeat them per triangle
 constexpr double kSmallestArea_m2 = 1e-12;
 
 struct CellHash {
@@ -64,9 +64,8 @@ double cross2(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::V
 }
 
 std::vector<Eigen::Vector2d> convexHull(std::vector<Eigen::Vector2d> points) {
-  std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
-    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
-  });
+  std::sort(points.begin(), points.end(),
+            [](const auto& a, const auto& b) { return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y(); });
   std::vector<Eigen::Vector2d> hull;
   const auto extend = [&hull](const Eigen::Vector2d& p, std::size_t keep) {
     while (hull.size() >= keep + 2 && cross2(hull[hull.size() - 2], hull.back(), p) <= 1e-14) hull.pop_back();
@@ -155,8 +154,8 @@ void dropCollinear(std::vector<Eigen::Vector2d>& loop) {
 struct ActorMesh {
   const Actor& actor;
   std::vector<int> weld;
-  std::vector<Index3> triangles;          // welded indices
-  std::vector<Eigen::Vector3d> normal;    // zero where the triangle has no area or repeats another
+  std::vector<Index3> triangles;        // welded indices
+  std::vector<Eigen::Vector3d> normal;  // zero where the triangle has no area or repeats another
   std::vector<double> area;
 };
 
@@ -170,8 +169,7 @@ ActorMesh prepare(const Actor& actor) {
     Index3 key = w;
     std::sort(key.begin(), key.end());
     const double area = 0.5 * n.norm();
-    const bool usable =
-        area > kSmallestArea_m2 && key[0] != key[1] && key[1] != key[2] && seen.insert(key).second;
+    const bool usable = area > kSmallestArea_m2 && key[0] != key[1] && key[1] != key[2] && seen.insert(key).second;
     mesh.triangles.push_back(w);
     mesh.area.push_back(usable ? area : 0);
     mesh.normal.push_back(usable ? Eigen::Vector3d(n.normalized()) : Eigen::Vector3d::Zero());

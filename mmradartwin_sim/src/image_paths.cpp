@@ -32,8 +32,8 @@ ImageSearch::ImageSearch(const Scene& scene, bool all_orientations) : scene_(sce
 
 int ImageSearch::exhaustiveOrder() const {
   const double n = static_cast<double>(reflectors_.size());
-  if (n * n * n < 1.5e8) return 3;
-  return n * n < 2.5e7 ? 2 : 1;
+  if (n * n * n < 5e8) return 3;
+  return n * n < 4e6 ? 2 : 1;
 }
 
 bool ImageSearch::faces(int a, bool positive_side, int b) const {
@@ -72,8 +72,8 @@ bool ImageSearch::solve(const Eigen::Vector3d& p, const std::vector<int>& sequen
     if (!f.contains(vertex[i], kInside_m)) return false;
     at = vertex[i];
   }
-  if (limits.in_view && (!limits.in_view((vertex[0] - p).normalized()) ||
-                         !limits.in_view((vertex[order - 1] - p).normalized()))) {
+  if (limits.in_view &&
+      (!limits.in_view((vertex[0] - p).normalized()) || !limits.in_view((vertex[order - 1] - p).normalized()))) {
     return false;
   }
   for (int i = 0; i <= order; ++i) {

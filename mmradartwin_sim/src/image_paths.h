@@ -15,9 +15,9 @@ inline Eigen::Vector3d mirror(const Eigen::Vector3d& p, const Facet& facet) {
 
 /// A closed specular path from a point back to it.
 struct ImagePath {
-  std::vector<int> facets;                 ///< in the order in which they are met
+  std::vector<int> facets;  ///< in the order in which they are met
   std::vector<Eigen::Vector3d> vertices;
-  Eigen::Vector3d image;                   ///< of the point through all facets; the path is as long as it is far
+  Eigen::Vector3d image;  ///< of the point through all facets; the path is as long as it is far
 };
 
 /// Exhaustive image search over a scene's facets; what depends on the scene alone is computed once.
@@ -37,14 +37,16 @@ class ImageSearch {
   /// Paths of order min_order..max_order whose reflection points lie inside their facets and whose legs are all free.
   /// Each facet sequence once; two sequences of the same facets with the same image once; perpendicular pairs at
   /// order 2 not at all (they are the corner's).
-  std::vector<ImagePath> find(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits, int min_order = 1) const;
+  std::vector<ImagePath> find(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
+                              int min_order = 1) const;
 
   /// The path of one facet sequence, where it exists.
   bool solve(const Eigen::Vector3d& p, const std::vector<int>& sequence, const RayCaster& rays, const Limits& limits,
              ImagePath& path) const;
   /// Facet sequences that launched rays meet, up to max_order: seeds where there are too many facets to try all.
-  std::vector<std::vector<int>> seeds(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits, int rays_launched,
-                                      const Eigen::Matrix3d& R_map_radar, double max_elevation_rad) const;
+  std::vector<std::vector<int>> seeds(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
+                                      int rays_launched, const Eigen::Matrix3d& R_map_radar,
+                                      double max_elevation_rad) const;
 
   /// Highest order for which all sequences can be tried at this number of facets.
   int exhaustiveOrder() const;
@@ -54,12 +56,12 @@ class ImageSearch {
   struct Corners {
     Eigen::Matrix<double, 3, 4> point;
   };
-  bool faces(int a, bool positive_side, int b) const;   // b has a part on that side of a
+  bool faces(int a, bool positive_side, int b) const;  // b has a part on that side of a
   bool insideBeam(const Eigen::Vector3d& apex, int through, int target) const;
 
   const Scene& scene_;
-  std::vector<int> reflectors_;         // facet ids
-  std::vector<Corners> corners_;        // per reflector, of the bounding rectangle
+  std::vector<int> reflectors_;   // facet ids
+  std::vector<Corners> corners_;  // per reflector, of the bounding rectangle
 };
 
 /// True for facets that are perpendicular within 0.1 deg: the corner's domain.

@@ -84,7 +84,8 @@ Fresnel fresnel(const Material& material, double cos_theta, double frequency_hz)
 double backscatterAmplitude(const Material& material, double cos_theta, double te_share, double frequency_hz) {
   if (material.model == MaterialModel::kScalar) {
     if (material.diff_back_db <= -90) return 0;
-    return std::pow(10.0, material.diff_back_db / 20) * std::pow(cos_theta, material.norm_exp + 0.5 * material.back_exp);
+    return std::pow(10.0, material.diff_back_db / 20) *
+           std::pow(cos_theta, material.norm_exp + 0.5 * material.back_exp);
   }
   if (material.scattering_coefficient <= 0) return 0;
   const Fresnel r = fresnel(material, cos_theta, frequency_hz);

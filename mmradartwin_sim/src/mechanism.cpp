@@ -69,7 +69,8 @@ int requireActor(const Scene& scene, const std::string& mechanism, const std::st
   std::string known;
   for (const Actor& a : scene.actors) known += (known.empty() ? "" : ", ") + a.name;
   if (known.size() > 400) known = known.substr(0, 400) + ", ...";
-  throw InputError("mechanism " + mechanism + ": key actor: " + scene.file + " has no actor " + actor + "; known: " + known);
+  throw InputError("mechanism " + mechanism + ": key actor: " + scene.file + " has no actor " + actor +
+                   "; known: " + known);
 }
 
 ElementsInMap::ElementsInMap(const PoseContext& context)

@@ -50,7 +50,8 @@ FullPrecision readObjVertices(const std::string& file) {
       at = end;
     }
     if (good) {
-      exact.emplace(std::array<float, 3>{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])}, v);
+      exact.emplace(std::array<float, 3>{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])},
+                    v);
     }
   }
   return exact;
@@ -82,11 +83,13 @@ std::string lowerExtension(const std::string& file) {
 
 class Collector {
  public:
-  Collector(const std::string& file, const aiScene& scene) : file_(file), scene_(scene), extension_(lowerExtension(file)) {
+  Collector(const std::string& file, const aiScene& scene)
+      : file_(file), scene_(scene), extension_(lowerExtension(file)) {
     stem_ = std::filesystem::path(file).stem().string();
     if (extension_ == ".obj") exact_ = readObjVertices(file);
     // glTF is y-up by its specification; the others are taken as they are.
-    if (extension_ == ".gltf" || extension_ == ".glb") up_ = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
+    if (extension_ == ".gltf" || extension_ == ".glb")
+      up_ = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
   }
 
   std::vector<Actor> collect() {
@@ -133,8 +136,10 @@ class Collector {
         actor = &actors_.back();
       } else {
         Actor& candidate = actors_[same_group ? by_name_[name] : found->second];
-        if (candidate.material_tag == tag) actor = &candidate;
-        else name += "." + tag;
+        if (candidate.material_tag == tag)
+          actor = &candidate;
+        else
+          name += "." + tag;
       }
     }
     if (!actor) throw InputError(file_ + ": object " + name + " is there twice; give objects names of their own");
@@ -142,10 +147,11 @@ class Collector {
     const bool identity = T.IsIdentity();
     for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
       const aiVector3D& p = mesh.mVertices[i];
-      Eigen::Vector3d v = identity ? restore(exact_, p)
-                                   : Eigen::Vector3d(double(T.a1) * p.x + double(T.a2) * p.y + double(T.a3) * p.z + T.a4,
-                                                     double(T.b1) * p.x + double(T.b2) * p.y + double(T.b3) * p.z + T.b4,
-                                                     double(T.c1) * p.x + double(T.c2) * p.y + double(T.c3) * p.z + T.c4);
+      Eigen::Vector3d v = identity
+                              ? restore(exact_, p)
+                              : Eigen::Vector3d(double(T.a1) * p.x + double(T.a2) * p.y + double(T.a3) * p.z + T.a4,
+                                                double(T.b1) * p.x + double(T.b2) * p.y + double(T.b3) * p.z + T.b4,
+                                                double(T.c1) * p.x + double(T.c2) * p.y + double(T.c3) * p.z + T.c4);
       v = up_ * v;
       if (!v.allFinite() || v.cwiseAbs().maxCoeff() > kHuge_m) {
         throw InputError(file_ + ": object " + name + ": a vertex is not a finite number within 1e6; repair the mesh");
@@ -156,7 +162,8 @@ class Collector {
       const aiFace& face = mesh.mFaces[i];
       if (face.mNumIndices != 3) continue;
       for (int k = 0; k < 3; ++k) {
-        if (face.mIndices[k] >= mesh.mNumVertices) throw InputError(file_ + ": object " + name + ": a face names a vertex that is not there");
+        if (face.mIndices[k] >= mesh.mNumVertices)
+          throw InputError(file_ + ": object " + name + ": a face names a vertex that is not there");
       }
       actor->triangles.push_back({base + static_cast<int>(face.mIndices[0]), base + static_cast<int>(face.mIndices[1]),
                                   base + static_cast<int>(face.mIndices[2])});
@@ -186,7 +193,8 @@ std::vector<Actor> loadMesh(const std::string& file) {
     throw InputError(file + ": cannot be read as a mesh (" + why + "); OBJ, PLY, STL and glTF are known");
   }
   std::vector<Actor> actors = Collector(file, *scene).collect();
-  actors.erase(std::remove_if(actors.begin(), actors.end(), [](const Actor& a) { return a.triangles.empty(); }), actors.end());
+  actors.erase(std::remove_if(actors.begin(), actors.end(), [](const Actor& a) { return a.triangles.empty(); }),
+               actors.end());
   if (actors.empty()) throw InputError(file + ": holds no triangles; export the surfaces as a triangle mesh");
   return actors;
 }

@@ -31,7 +31,8 @@ void accumulate(const RadarConfig& radar, const std::vector<PathRecord>& records
   for (const PathRecord& record : records) {
     for (int k = 0; k < channels; ++k) {
       const double rate = 2 * M_PI * turns_per_m * record.length_m[k];
-      // Two interleaved recurrences, each begun exactly: rounding grows with the number of steps, 64 of them stay at 1e-14.
+      // Two interleaved recurrences, each begun exactly: rounding grows with the number of steps, 64 of them stay at
+      // 1e-14.
       const std::complex<double> step = std::polar(1.0, 2 * rate / radar.sample_rate_hz);
       std::complex<double> even = record.c[k] * std::polar(1.0, rate * first_s);
       std::complex<double> odd = record.c[k] * std::polar(1.0, rate * (first_s + 1 / radar.sample_rate_hz));
@@ -57,8 +58,7 @@ void setContribution(const RadarConfig& radar, std::complex<double> coefficient,
   record.amplitude = std::abs(coefficient);
   record.c.resize(record.length_m.size());
   for (std::size_t k = 0; k < record.c.size(); ++k) {
-    record.c[k] =
-        coefficient * std::polar(1.0, phaseAtCenter_rad(radar, record.length_m[k] / kSpeedOfLight_m_per_s));
+    record.c[k] = coefficient * std::polar(1.0, phaseAtCenter_rad(radar, record.length_m[k] / kSpeedOfLight_m_per_s));
   }
   record.phase_rad = std::arg(record.c[0]);
   record.range_bin = rangeBin(radar, record.length_m[0]);
@@ -91,8 +91,8 @@ void writePathsCsv(const std::vector<PathRecord>& records, const Scene& scene, c
         << degrees(std::atan2(r.departure.y(), r.departure.x())) << ','
         << degrees(std::asin(std::min(1.0, std::max(-1.0, r.departure.z())))) << ','
         << degrees(std::atan2(r.arrival.y(), r.arrival.x())) << ','
-        << degrees(std::asin(std::min(1.0, std::max(-1.0, r.arrival.z())))) << ',' << 20 * std::log10(r.amplitude) << ','
-        << std::setprecision(6) << r.phase_rad << ',' << r.bounces << ',' << *r.event << ',';
+        << degrees(std::asin(std::min(1.0, std::max(-1.0, r.arrival.z())))) << ',' << 20 * std::log10(r.amplitude)
+        << ',' << std::setprecision(6) << r.phase_rad << ',' << r.bounces << ',' << *r.event << ',';
     for (std::size_t i = 0; i < r.actors.size(); ++i) out << (i ? ";" : "") << scene.actors[r.actors[i]].name;
     out << ',';
     for (std::size_t i = 0; i < r.actors.size(); ++i) out << (i ? ";" : "") << scene.actors[r.actors[i]].material_tag;

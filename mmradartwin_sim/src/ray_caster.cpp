@@ -13,10 +13,10 @@ namespace mmradartwin {
 struct RayCaster::Embree {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();    // single precision inside, so coordinates stay small
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  // single precision inside, so coordinates stay small
   double radius_m = 0;
-  std::vector<std::vector<int>> facet_of_triangle;     // [actor][triangle]
-  std::vector<bool> solid;                             // actors that can have an inside
+  std::vector<std::vector<int>> facet_of_triangle;  // [actor][triangle]
+  std::vector<bool> solid;                          // actors that can have an inside
   std::vector<Eigen::AlignedBox3d> bounds;
 
   ~Embree() {
@@ -140,9 +140,9 @@ std::optional<RayCaster::Hit> RayCaster::firstHit(const Eigen::Vector3d& origin,
 std::optional<int> RayCaster::insideActor(const Eigen::Vector3d& p) const {
   // Directions without symmetry, so that none runs along a wall.
   static const std::array<Eigen::Vector3d, 7> kDirections = {
-      Eigen::Vector3d(0.9137, 0.3711, 0.1653), Eigen::Vector3d(-0.8321, 0.5113, 0.2149),
+      Eigen::Vector3d(0.9137, 0.3711, 0.1653),  Eigen::Vector3d(-0.8321, 0.5113, 0.2149),
       Eigen::Vector3d(0.2917, -0.9211, 0.2579), Eigen::Vector3d(-0.3571, -0.8837, -0.3023),
-      Eigen::Vector3d(0.1931, 0.4127, 0.8902), Eigen::Vector3d(0.5483, -0.3319, -0.7676),
+      Eigen::Vector3d(0.1931, 0.4127, 0.8902),  Eigen::Vector3d(0.5483, -0.3319, -0.7676),
       Eigen::Vector3d(-0.4127, 0.6733, -0.6133)};
   std::vector<int> votes(embree_->bounds.size(), 0);
   for (const Eigen::Vector3d& d : kDirections) {

@@ -64,18 +64,18 @@ Scene loadScene(const std::string& scene_yaml, double frequency_hz) {
     const double scale = entry.has("scale") ? entry.number("scale", 1e-6, 1e6) : 1.0;
     entry.rejectUnknownKeys();
     const Eigen::Vector3d rpy = rpy_deg * M_PI / 180;
-    const Eigen::Matrix3d R = (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
-                               Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
-                               Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
-                                  .toRotationMatrix();
+    const Eigen::Matrix3d R =
+        (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
+            .toRotationMatrix();
     for (Actor& actor : loadMesh(file)) {
       if (actor.name.find_first_of(",;\n\"") != std::string::npos) {
         throw InputError(file + ": object name '" + actor.name + "' holds a comma, semicolon or quote; rename it");
       }
       const auto [other, fresh] = seen.emplace(actor.name, file);
       if (!fresh) {
-        throw InputError(scene_yaml + ": key meshes: two actors are named " + actor.name + " (" + other->second + " and " +
-                         file + "); rename one of the objects");
+        throw InputError(scene_yaml + ": key meshes: two actors are named " + actor.name + " (" + other->second +
+                         " and " + file + "); rename one of the objects");
       }
       for (auto& v : actor.vertices) v = R * (scale * v) + xyz_m;
       scene.actors.push_back(std::move(actor));
@@ -101,8 +101,8 @@ Scene loadScene(const std::string& scene_yaml, double frequency_hz) {
     const auto found = materials.find(actor.material_tag);
     if (found == materials.end()) {
       throw InputError(scene_yaml + ": actor " + actor.name + " has material '" + actor.material_tag + "', which " +
-                       materials_file + " does not have (known: " + joined(materials) + "); add it there, or set actors: {" +
-                       actor.name + ": {material: ...}}");
+                       materials_file + " does not have (known: " + joined(materials) +
+                       "); add it there, or set actors: {" + actor.name + ": {material: ...}}");
     }
     actor.material = found->second;
     checkBand(materials_file, actor.material, frequency_hz);

@@ -57,14 +57,15 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
   session_options.need_captures = false;
   session_options.exclude_duplicates = false;  // the simulated session has the poses of the given one
   const Recording recording = openSession(options.session, session_options);
-  if (fs::exists(options.output) && fs::equivalent(options.output, fs::is_directory(options.session)
-                                                                        ? fs::path(options.session)
-                                                                        : fs::absolute(options.session).parent_path())) {
+  if (fs::exists(options.output) &&
+      fs::equivalent(options.output, fs::is_directory(options.session) ? fs::path(options.session)
+                                                                       : fs::absolute(options.session).parent_path())) {
     throw InputError(options.output + ": --output is the session itself; choose another folder");
   }
   const std::string twin_file = options.twin_file.empty() ? recording.twin_file.value_or("") : options.twin_file;
   std::optional<tbb::global_control> limit;
-  if (options.jobs > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.jobs));
+  if (options.jobs > 0)
+    limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.jobs));
 
   Twin twin(loadTwin(twin_file, recording.scene_file, recording.radar), options.seed);
   SimulateResult result;
@@ -103,12 +104,14 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
     strongest = std::max({strongest, x.real().cwiseAbs().maxCoeff(), x.imag().cwiseAbs().maxCoeff()});
   }
   for (int i = 0; i < count; ++i) {
-    if (!failures[i].empty()) result.problems.push_back({recording.poses[i].name, "pose " + recording.poses[i].name + ": " + failures[i]});
+    if (!failures[i].empty())
+      result.problems.push_back({recording.poses[i].name, "pose " + recording.poses[i].name + ": " + failures[i]});
   }
   const bool any = std::any_of(grids.begin(), grids.end(), [](const ComplexGrid& x) { return x.size() > 0; });
   if (!any) {
     throw InputError(options.session + ": no pose can be simulated" +
-                     (result.problems.empty() ? std::string("; poses.csv has none") : "; the first: " + result.problems.front().message));
+                     (result.problems.empty() ? std::string("; poses.csv has none")
+                                              : "; the first: " + result.problems.front().message));
   }
   result.gain_db = strongest > 0 ? kStrongest_dbfs - 20 * std::log10(strongest) : 0;
 

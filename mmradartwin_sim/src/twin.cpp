@@ -41,7 +41,8 @@ RecordCheck check(const RadarConfig& radar, const std::vector<PathRecord>& recor
       }
     }
     const double expected = channels * r.amplitude * r.amplitude;
-    if (expected > 0) result.worst_amplitude_error = std::max(result.worst_amplitude_error, std::abs(power / expected - 1));
+    if (expected > 0)
+      result.worst_amplitude_error = std::max(result.worst_amplitude_error, std::abs(power / expected - 1));
   }
   double difference = 0, norm = 0;
   for (int k = 0; k < channels; ++k) {
@@ -59,12 +60,12 @@ RecordCheck check(const RadarConfig& radar, const std::vector<PathRecord>& recor
 struct Twin::Impl {
   TwinDescription description;
   std::uint64_t seed;
-  Scene scene;                                    // as described
+  Scene scene;  // as described
   std::unique_ptr<RayCaster> rays;
-  std::unique_ptr<Scene> edited;                  // null where no mechanism edits the scene
+  std::unique_ptr<Scene> edited;  // null where no mechanism edits the scene
   std::unique_ptr<RayCaster> edited_rays;
   std::vector<std::unique_ptr<Mechanism>> mechanisms;  // by rank
-  double strongest = -1;                          // of the session, where it is known
+  double strongest = -1;                               // of the session, where it is known
   mutable std::atomic<double> strongest_so_far{0};
   bool has_tone_gain = false, has_receive = false, needs_strongest = false;
 
@@ -134,7 +135,8 @@ Twin::Twin(TwinDescription description, std::uint64_t seed) : impl_(new Impl) {
     // Whether anything was edited shows in what Embree and the facets would see.
     bool same = m.edited->actors.size() == m.scene.actors.size();
     for (std::size_t i = 0; same && i < m.scene.actors.size(); ++i) {
-      same = m.edited->actors[i].present == m.scene.actors[i].present && m.edited->actors[i].vertices == m.scene.actors[i].vertices &&
+      same = m.edited->actors[i].present == m.scene.actors[i].present &&
+             m.edited->actors[i].vertices == m.scene.actors[i].vertices &&
              m.edited->actors[i].material_tag == m.scene.actors[i].material_tag;
     }
     if (same) {
@@ -190,8 +192,8 @@ std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar) const 
   if (!T_map_radar.matrix().allFinite()) throw InputError("pose is not a number; correct x, y, z and the quaternion");
   const PoseContext c = impl_->context(T_map_radar);
   if (const auto inside = c.rays.insideActor(c.T_map_radar.translation())) {
-    throw InputError("pose at " + formatPoint(c.T_map_radar.translation()) + " lies inside actor " + c.scene.actors[*inside].name +
-                     "; correct the pose or the scene");
+    throw InputError("pose at " + formatPoint(c.T_map_radar.translation()) + " lies inside actor " +
+                     c.scene.actors[*inside].name + "; correct the pose or the scene");
   }
   std::vector<PathRecord> records;
   for (const auto& m : impl_->mechanisms) {
@@ -200,7 +202,8 @@ std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar) const 
   return records;
 }
 
-Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced, std::int64_t stamp_ns) const {
+Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
+                       std::int64_t stamp_ns) const {
   PoseContext c = impl_->context(T_map_radar);
   c.receiver_gain = [this, &c](double length_m) { return impl_->toneGain(c, length_m); };
   Simulation s;

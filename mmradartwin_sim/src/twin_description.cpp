@@ -31,18 +31,28 @@ Parameters readParameters(YamlMap& yaml, const std::vector<ParameterSpec>& specs
   }
   for (const ParameterSpec& s : specs) {
     if (!yaml.has(s.name)) {
-      if (s.required) yaml.fail(s.name, "is missing; mechanism " + mechanism + " needs it; parameters: " + specList(specs));
+      if (s.required)
+        yaml.fail(s.name, "is missing; mechanism " + mechanism + " needs it; parameters: " + specList(specs));
       values.set(s.name, s.default_value);
       continue;
     }
     switch (s.kind) {
-      case ParameterKind::kNumber: values.set(s.name, yaml.number(s.name, s.min, s.max)); break;
-      case ParameterKind::kInteger:
-        values.set(s.name, static_cast<double>(yaml.integer(s.name, static_cast<long long>(s.min), static_cast<long long>(s.max))));
+      case ParameterKind::kNumber:
+        values.set(s.name, yaml.number(s.name, s.min, s.max));
         break;
-      case ParameterKind::kText: values.set(s.name, yaml.text(s.name)); break;
-      case ParameterKind::kNumbers: values.set(s.name, yaml.numbers(s.name, s.min, s.max)); break;
-      case ParameterKind::kTexts: values.set(s.name, yaml.texts(s.name)); break;
+      case ParameterKind::kInteger:
+        values.set(s.name, static_cast<double>(
+                               yaml.integer(s.name, static_cast<long long>(s.min), static_cast<long long>(s.max))));
+        break;
+      case ParameterKind::kText:
+        values.set(s.name, yaml.text(s.name));
+        break;
+      case ParameterKind::kNumbers:
+        values.set(s.name, yaml.numbers(s.name, s.min, s.max));
+        break;
+      case ParameterKind::kTexts:
+        values.set(s.name, yaml.texts(s.name));
+        break;
     }
   }
   return values;
@@ -85,6 +95,13 @@ std::string formatNumber(double v) {
   return text;
 }
 
+bool isEmpty(const Parameters::Value& value) {
+  const auto* text = std::get_if<std::string>(&value);
+  const auto* numbers = std::get_if<std::vector<double>>(&value);
+  const auto* texts = std::get_if<std::vector<std::string>>(&value);
+  return (text && text->empty()) || (numbers && numbers->empty()) || (texts && texts->empty());
+}
+
 void write(std::ostream& out, const Parameters::Value& value) {
   if (const auto* number = std::get_if<double>(&value)) {
     out << formatNumber(*number);
@@ -105,11 +122,14 @@ void write(std::ostream& out, const Parameters::Value& value) {
 
 std::string TwinDescription::toYaml() const {
   std::ostringstream out;
-  out << "scene: " << quoted(scene_file) << "\nmechanisms:\n";
+  out << "scene: " << quoted(scene_file) << "\n";
+  if (!radar_file.empty()) out << "radar: " << quoted(radar_file) << "\n";
+  out << "mechanisms:\n";
   for (const NamedParameters& m : mechanisms) {
     out << "  " << m.mechanism << ": {";
     bool first = true;
     for (const auto& [key, value] : m.values.all()) {
+      if (isEmpty(value)) continue;  // stands for: not given
       out << (first ? "" : ", ") << key << ": ";
       write(out, value);
       first = false;
@@ -126,14 +146,20 @@ TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::
   twin.radar = default_radar;
   twin.scene_file = default_scene.value_or("");
   if (twin_file.empty()) {
-    if (twin.scene_file.empty()) throw InputError("no scene to simulate: the session names none and there is no twin.yaml; add a line scene: to session.yaml");
+    if (twin.scene_file.empty())
+      throw InputError(
+          "no scene to simulate: the session names none and there is no twin.yaml; add a line scene: to session.yaml");
     twin.mechanisms = baseMechanisms();
     return twin;
   }
   YamlMap yaml = YamlMap::load(twin_file);
   if (yaml.has("scene")) twin.scene_file = resolvePath(yaml.text("scene"), twin_file);
-  if (twin.scene_file.empty()) yaml.fail("scene", "is missing, and the session names no scene either; give the path of a scene.yaml");
-  if (yaml.has("radar")) twin.radar = loadRadarConfig(resolvePath(yaml.text("radar"), twin_file));
+  if (twin.scene_file.empty())
+    yaml.fail("scene", "is missing, and the session names no scene either; give the path of a scene.yaml");
+  if (yaml.has("radar")) {
+    twin.radar_file = resolvePath(yaml.text("radar"), twin_file);
+    twin.radar = loadRadarConfig(twin.radar_file);
+  }
   if (!yaml.has("mechanisms")) {
     twin.mechanisms = baseMechanisms();
   } else {

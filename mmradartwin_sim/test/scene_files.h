@@ -57,7 +57,8 @@ class SceneFiles : public ::testing::Test {
           "  Metal: {model: conductor}\n"
           "  RoughMetal: {model: conductor, scattering_coefficient: 0.6}\n"
           "  Concrete: {model: dielectric, relative_permittivity: 5.24, conductivity_s_per_m: 1.38}\n"
-          "  RoughConcrete: {model: dielectric, relative_permittivity: 5.24, conductivity_s_per_m: 1.38, scattering_coefficient: 0.5}\n"
+          "  RoughConcrete: {model: dielectric, relative_permittivity: 5.24, conductivity_s_per_m: 1.38, "
+          "scattering_coefficient: 0.5}\n"
           "  Lossless: {model: dielectric, relative_permittivity: 4}\n");
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
@@ -85,12 +86,15 @@ class SceneFiles : public ::testing::Test {
   }
 
   /// Closed box.
-  void addBox(const std::string& actor, const std::string& material, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+  void addBox(const std::string& actor, const std::string& material, const Eigen::Vector3d& low,
+              const Eigen::Vector3d& high) {
     obj_ << "o " << actor << "\nusemtl " << material << "\n" << std::setprecision(12);
     for (int i = 0; i < 8; ++i) {
-      obj_ << "v " << (i & 1 ? high : low).x() << " " << (i & 2 ? high : low).y() << " " << (i & 4 ? high : low).z() << "\n";
+      obj_ << "v " << (i & 1 ? high : low).x() << " " << (i & 2 ? high : low).y() << " " << (i & 4 ? high : low).z()
+           << "\n";
     }
-    for (const auto& q : std::vector<std::array<int, 4>>{{0, 1, 3, 2}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}}) {
+    for (const auto& q : std::vector<std::array<int, 4>>{
+             {0, 1, 3, 2}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}}) {
       obj_ << "f " << vertices_ + 1 + q[0] << " " << vertices_ + 1 + q[1] << " " << vertices_ + 1 + q[2] << "\n";
       obj_ << "f " << vertices_ + 1 + q[0] << " " << vertices_ + 1 + q[2] << " " << vertices_ + 1 + q[3] << "\n";
     }
@@ -98,13 +102,14 @@ class SceneFiles : public ::testing::Test {
   }
 
   /// Vertical rectangle from a to b in the floor plane, z from low to high.
-  void addWall(const std::string& actor, const std::string& material, const Eigen::Vector2d& a, const Eigen::Vector2d& b,
-               double low = -2, double high = 2, int n = 1) {
+  void addWall(const std::string& actor, const std::string& material, const Eigen::Vector2d& a,
+               const Eigen::Vector2d& b, double low = -2, double high = 2, int n = 1) {
     addRectangle(actor, material, {a.x(), a.y(), low}, {b.x() - a.x(), b.y() - a.y(), 0}, {0, 0, high - low}, n);
   }
 
   /// Writes what was added as NAME.obj and NAME.yaml; returns the scene file.
-  std::string writeScene(const std::string& name = "scene", const std::string& placement = "", const std::string& more = "") {
+  std::string writeScene(const std::string& name = "scene", const std::string& placement = "",
+                         const std::string& more = "") {
     write(name + ".obj", obj_.str());
     write(name + ".yaml", "meshes:\n  - {file: " + name + ".obj" + placement + "}\nmaterials: materials.yaml\n" + more);
     obj_.str("");
@@ -112,7 +117,8 @@ class SceneFiles : public ::testing::Test {
     return path(name + ".yaml");
   }
 
-  Twin makeTwin(const std::string& scene, const std::string& mechanisms = "", const RadarConfig& radar = paperRadar()) const {
+  Twin makeTwin(const std::string& scene, const std::string& mechanisms = "",
+                const RadarConfig& radar = paperRadar()) const {
     if (mechanisms.empty()) return Twin(loadTwin("", scene, radar));
     write("twin.yaml", "mechanisms:\n" + mechanisms);
     return Twin(loadTwin(path("twin.yaml"), scene, radar));

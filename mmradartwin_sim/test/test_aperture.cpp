@@ -10,9 +10,10 @@ using Loops = std::vector<std::vector<Eigen::Vector2d>>;
 
 // Values of C and S to 16 digits, Abramowitz and Stegun 7.3 as SciPy evaluates them.
 TEST(FresnelIntegral, HasItsTabulatedValues) {
-  const double rows[][3] = {{0.1, 0.09999753262708506, 0.0005235895476122108}, {1, 0.779893400376823, 0.4382591473903547},
-                            {2.1999, 0.6362611424452601, 0.45560776241023},    {2.2001, 0.6363108804177189, 0.4558014790272935},
-                            {5, 0.5636311887040122, 0.4991913819171169},       {130, 0.49999995388202995, 0.4975514624165767}};
+  const double rows[][3] = {
+      {0.1, 0.09999753262708506, 0.0005235895476122108}, {1, 0.779893400376823, 0.4382591473903547},
+      {2.1999, 0.6362611424452601, 0.45560776241023},    {2.2001, 0.6363108804177189, 0.4558014790272935},
+      {5, 0.5636311887040122, 0.4991913819171169},       {130, 0.49999995388202995, 0.4975514624165767}};
   for (const auto& row : rows) {
     EXPECT_NEAR(fresnelIntegral(row[0]).real(), row[1], 2e-14);
     EXPECT_NEAR(fresnelIntegral(row[0]).imag(), -row[2], 2e-14);
@@ -27,19 +28,21 @@ TEST(Aperture, IsOneWhereItReachesFarAndAHalfAtAnEdge) {
 }
 
 TEST(Aperture, OfAPolygonAgreesWithTheRectanglesClosedForm) {
-  const double rows[][4] = {{-1, 1, -1, 1}, {-130, 3, -20, 40}, {0.3, 5, -2, 0.001}, {2, 3, 4, 5},
-                            {1e-6, 100, -50, 1e-5}, {0, 2, -1, 1}, {10, 12, -60, 60}};
+  const double rows[][4] = {{-1, 1, -1, 1},         {-130, 3, -20, 40}, {0.3, 5, -2, 0.001}, {2, 3, 4, 5},
+                            {1e-6, 100, -50, 1e-5}, {0, 2, -1, 1},      {10, 12, -60, 60}};
   for (const auto& r : rows) {
     const Loops rectangle = {{{r[0], r[2]}, {r[1], r[2]}, {r[1], r[3]}, {r[0], r[3]}}};
     EXPECT_NEAR(std::abs(aperturePolygon(rectangle) - apertureAxis(r[0], r[1]) * apertureAxis(r[2], r[3])), 0, 1e-9);
   }
 }
 
-// A circle around the reflection point: (1/-2j) integral of exp(-j pi rho^2/2) rho d rho d phi = 1 - exp(-j pi rho^2/2).
+// A circle around the reflection point: (1/-2j) integral of exp(-j pi rho^2/2) rho d rho d phi = 1 - exp(-j pi
+// rho^2/2).
 TEST(Aperture, OfACircleIsTheZonePlatesClosedForm) {
   for (double rho : {0.5, 1.0, 1.41421356, 2.0}) {
     Loops circle(1);
-    for (int i = 0; i < 2000; ++i) circle[0].emplace_back(rho * std::cos(2 * M_PI * i / 2000), rho * std::sin(2 * M_PI * i / 2000));
+    for (int i = 0; i < 2000; ++i)
+      circle[0].emplace_back(rho * std::cos(2 * M_PI * i / 2000), rho * std::sin(2 * M_PI * i / 2000));
     const std::complex<double> expected = 1.0 - std::polar(1.0, -0.5 * M_PI * rho * rho);
     EXPECT_NEAR(std::abs(aperturePolygon(circle) - expected), 0, 2e-5);
   }

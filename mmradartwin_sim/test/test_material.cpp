@@ -1,7 +1,6 @@
-#include "scene_files.h"
-
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/material.h"
+#include "scene_files.h"
 
 namespace mmradartwin {
 namespace {
@@ -17,8 +16,8 @@ Material dielectric(double permittivity, double conductivity) {
 TEST(Fresnel, ReproducesTheHalfSpacesOfP2040) {
   const struct {
     double permittivity, conductivity, gamma;
-  } rows[] = {{5.24, 1.381, .3926}, {3.91, .0477, .3283}, {2.73, .503, .246}, {1.99, .494, .1714},
-              {6.31, 1.211, .431}, {2.58, .643, .2335}, {7.07, .307, .4535}, {3.66, 1.560, .3155}};
+  } rows[] = {{5.24, 1.381, .3926}, {3.91, .0477, .3283}, {2.73, .503, .246},  {1.99, .494, .1714},
+              {6.31, 1.211, .431},  {2.58, .643, .2335},  {7.07, .307, .4535}, {3.66, 1.560, .3155}};
   for (const auto& row : rows) {
     const Fresnel r = fresnel(dielectric(row.permittivity, row.conductivity), 1, 77e9);
     EXPECT_NEAR(std::abs(r.te), row.gamma, 6e-4);
@@ -60,7 +59,8 @@ TEST(ScalarMaterial, IsItsNominalStrengthAtNormalIncidenceAndFallsOffFromThere) 
   EXPECT_EQ(backscatterAmplitude(m, 1, 1, 77e9), 0) << "-99 dB is none";
   m.diff_back_db = -13;
   EXPECT_NEAR(db(backscatterAmplitude(m, 1, 1, 77e9)), -13, 1e-12);
-  EXPECT_NEAR(backscatterAmplitude(m, 0.5, 1, 77e9) / backscatterAmplitude(m, 1, 1, 77e9), 0.5 * std::pow(0.5, 4), 1e-12);
+  EXPECT_NEAR(backscatterAmplitude(m, 0.5, 1, 77e9) / backscatterAmplitude(m, 1, 1, 77e9), 0.5 * std::pow(0.5, 4),
+              1e-12);
 }
 
 class MaterialFile : public SceneFiles {
@@ -77,12 +77,14 @@ TEST_F(MaterialFile, ReadsTheModels) {
 }
 
 TEST_F(MaterialFile, RefusesWhatItDoesNotUnderstand) {
-  EXPECT_NE(errorFor("{model: dielectric, relative_permittivity: 0.5}").find("relative_permittivity"), std::string::npos);
+  EXPECT_NE(errorFor("{model: dielectric, relative_permittivity: 0.5}").find("relative_permittivity"),
+            std::string::npos);
   EXPECT_NE(errorFor("{model: dielectric}").find("relative_permittivity"), std::string::npos);
   EXPECT_NE(errorFor("{model: conductor, permittivity: 3}").find("permittivity"), std::string::npos);
   EXPECT_NE(errorFor("{model: wood}").find("scalar"), std::string::npos);
   EXPECT_NE(errorFor("{model: conductor, scattering_coefficient: 1.5}").find("1.5"), std::string::npos);
-  EXPECT_NE(errorFor("{model: dielectric, relative_permittivity: .nan}").find("relative_permittivity"), std::string::npos);
+  EXPECT_NE(errorFor("{model: dielectric, relative_permittivity: .nan}").find("relative_permittivity"),
+            std::string::npos);
 }
 
 }  // namespace

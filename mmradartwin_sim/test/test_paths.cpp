@@ -1,7 +1,6 @@
-#include "../src/image_paths.h"
-
 #include <algorithm>
 
+#include "../src/image_paths.h"
 #include "scene_files.h"
 
 namespace mmradartwin {
@@ -77,9 +76,11 @@ TEST_F(Paths, OfATurnedPlateAreThoseOfAPolygon) {
   // The same plate as two facets' worth of triangles that are no rectangle in one piece: a cross-shaped outline.
   write("cross.obj",
         "o cross\nusemtl Metal\nv 3 -0.15 -0.05\nv 3 0.15 -0.05\nv 3 0.15 0.05\nv 3 -0.15 0.05\n"
-        "v 3 -0.05 0.05\nv 3 0.05 0.05\nv 3 0.05 0.15\nv 3 -0.05 0.15\nf 1 2 3\nf 1 3 6\nf 1 6 5\nf 1 5 4\nf 5 6 7\nf 5 7 8\n");
+        "v 3 -0.05 0.05\nv 3 0.05 0.05\nv 3 0.05 0.15\nv 3 -0.05 0.15\nf 1 2 3\nf 1 3 6\nf 1 6 5\nf 1 5 4\nf 5 6 7\nf "
+        "5 7 8\n");
   write("cross.yaml", "meshes: [{file: cross.obj}]\nmaterials: materials.yaml\n");
-  const Simulation whole = makeTwin(path("cross.yaml"), "  specular: {}\n", radarAt77GHz()).simulate(radarPose(0, 0, 0));
+  const Simulation whole =
+      makeTwin(path("cross.yaml"), "  specular: {}\n", radarAt77GHz()).simulate(radarPose(0, 0, 0));
   ASSERT_EQ(whole.records.size(), 1u);
   addWall("wide", "Metal", {3, -0.15}, {3, 0.15}, -0.05, 0.05);
   addWall("top", "Metal", {3, -0.05}, {3, 0.05}, 0.05, 0.15);
@@ -107,7 +108,8 @@ TEST_F(Paths, OfAWideWallAreTheImageFormula) {
   concrete.conductivity_s_per_m = 1.38;
   const double tau = 6 / kSpeedOfLight_m_per_s;
   const std::complex<double> expected =
-      std::conj(fresnel(concrete, 1, 77e9).te) * std::polar(1.0, 2 * M_PI * (std::fmod(77e9 * tau, 1.0) - 0.5 * 75e12 * tau * tau));
+      std::conj(fresnel(concrete, 1, 77e9).te) *
+      std::polar(1.0, 2 * M_PI * (std::fmod(77e9 * tau, 1.0) - 0.5 * 75e12 * tau * tau));
   EXPECT_NEAR(std::arg(s.records[0].c[0] / expected), 0, 0.02);
 }
 
@@ -137,10 +139,12 @@ TEST_F(Paths, BesideAFacetComeFromItsNearestPointAtTheImagesLevel) {
   EXPECT_NEAR(s.records[0].length_m[0], 2 * std::hypot(3, 0.11), 1e-9);
   // |C + jS| tail at u = 2 * 0.1/sqrt(lambda R) = 1.8505, by numbers from Abramowitz and Stegun's auxiliary functions.
   const double u = 0.2 / std::sqrt(kLambda77_m * 3);
-  const double f = (1 + 0.926 * u) / (2 + 1.792 * u + 3.104 * u * u), g = 1 / (2 + 4.142 * u + 3.492 * u * u + 6.670 * u * u * u);
+  const double f = (1 + 0.926 * u) / (2 + 1.792 * u + 3.104 * u * u),
+               g = 1 / (2 + 4.142 * u + 3.492 * u * u + 6.670 * u * u * u);
   EXPECT_NEAR(s.records[0].amplitude / imageLevel(1, 3, kLambda77_m), std::hypot(f, g) / std::sqrt(2), 3e-3);
   // Two metres beside, the factor is below 0.01 and the return is dropped.
-  EXPECT_TRUE(makeTwin(path("scene.yaml"), "  specular: {}\n", radarAt77GHz()).simulate(radarPose(0, -2, 0)).records.empty());
+  EXPECT_TRUE(
+      makeTwin(path("scene.yaml"), "  specular: {}\n", radarAt77GHz()).simulate(radarPose(0, -2, 0)).records.empty());
 }
 
 TEST_F(Paths, StayInTheFieldOfViewAndTheRange) {
@@ -159,7 +163,8 @@ TEST_F(Paths, StayInTheFieldOfViewAndTheRange) {
 
 // A wedge of 60 degrees around the radar's axis: both orders exist, with images of their own, s = 2 rho sin(60 deg).
 TEST_F(Paths, OfTwoBouncesHaveTheWedgesGeometry) {
-  const Eigen::Vector2d apex(4, 0), left(4 - 3.7 * std::cos(M_PI / 6), 3.7 * std::sin(M_PI / 6)), right(left.x(), -left.y());
+  const Eigen::Vector2d apex(4, 0), left(4 - 3.7 * std::cos(M_PI / 6), 3.7 * std::sin(M_PI / 6)),
+      right(left.x(), -left.y());
   addWall("left", "Concrete", apex, left, -8, 8);
   addWall("right", "Concrete", apex, right, -8, 8);
   Twin twin = makeTwin(writeScene(), "  specular: {max_bounces: 2}\n  corner: {}\n", radarAt77GHz());
@@ -196,8 +201,10 @@ class Corners : public Paths {
   void addFaces(double towards, double angle_deg = 90, double length = 3, double height = 3) {
     const double h = 0.5 * angle_deg * M_PI / 180;
     const Eigen::Vector2d apex(4, 0);
-    addWall("left", "Concrete", apex, apex + length * Eigen::Vector2d(-towards * std::cos(h), std::sin(h)), -height, height);
-    addWall("right", "Concrete", apex, apex + length * Eigen::Vector2d(-towards * std::cos(h), -std::sin(h)), -height, height);
+    addWall("left", "Concrete", apex, apex + length * Eigen::Vector2d(-towards * std::cos(h), std::sin(h)), -height,
+            height);
+    addWall("right", "Concrete", apex, apex + length * Eigen::Vector2d(-towards * std::cos(h), -std::sin(h)), -height,
+            height);
   }
 };
 
@@ -235,13 +242,17 @@ TEST_F(Corners, HaveOneApertureFromFarEndToFarEnd) {
 
 TEST_F(Corners, AreNotConvexEdges) {
   addFaces(-1);
-  EXPECT_TRUE(makeTwin(writeScene(), "  specular: {}\n  corner: {}\n", radarAt77GHz()).simulate(radarPose(0, 0, 0)).records.empty());
+  EXPECT_TRUE(makeTwin(writeScene(), "  specular: {}\n  corner: {}\n", radarAt77GHz())
+                  .simulate(radarPose(0, 0, 0))
+                  .records.empty());
 }
 
 TEST_F(Corners, AreWithinATenthOfADegree) {
-  for (const auto& [angle, corners] : std::vector<std::pair<double, std::size_t>>{{90.08, 1}, {89.92, 1}, {90.5, 0}, {89.5, 0}}) {
+  for (const auto& [angle, corners] :
+       std::vector<std::pair<double, std::size_t>>{{90.08, 1}, {89.92, 1}, {90.5, 0}, {89.5, 0}}) {
     addFaces(1, angle);
-    const Simulation s = makeTwin(writeScene(), "  specular: {}\n  corner: {}\n", radarAt77GHz()).simulate(radarPose(0, 0, 0));
+    const Simulation s =
+        makeTwin(writeScene(), "  specular: {}\n  corner: {}\n", radarAt77GHz()).simulate(radarPose(0, 0, 0));
     EXPECT_EQ(of(s, "corner").size(), corners) << angle;
     // Sharper than a right angle the ordinary images of both orders exist, wider they do not.
     EXPECT_EQ(of(s, "specular", 2).size(), angle == 89.5 ? 2u : 0u) << angle;
@@ -283,7 +294,8 @@ TEST_F(DiffuseTest, KeepsItsPhasesAtItsPoints) {
   Twin twin = makeTwin(writeScene(), "  diffuse: {}\n");
   const auto phaseAtPoint = [&twin](const PathRecord& r) {
     const double tau = r.length_m[0] / kSpeedOfLight_m_per_s;
-    return std::arg(r.c[0] * std::polar(1.0, -2 * M_PI * (twin.radar().center_frequency_hz() * tau - 0.5 * 75e12 * tau * tau)));
+    return std::arg(r.c[0] *
+                    std::polar(1.0, -2 * M_PI * (twin.radar().center_frequency_hz() * tau - 0.5 * 75e12 * tau * tau)));
   };
   const Simulation a = twin.simulate(radarPose(0, 0, 0)), b = twin.simulate(radarPose(0.5, 0.2, 0.1, 10));
   int common = 0;
@@ -305,7 +317,10 @@ TEST_F(DiffuseTest, HasADirectiveLobe) {
   addWall("patch", "RoughMetal", {3, -0.05}, {3, 0.05}, -0.05, 0.05);
   const std::string scene = writeScene();
   const auto level = [&](const std::string& lobe) {
-    return makeTwin(scene, "  diffuse: {lobe: " + lobe + "}\n", radarAt77GHz()).simulate(radarPose(0, 0, 0)).records.at(0).amplitude;
+    return makeTwin(scene, "  diffuse: {lobe: " + lobe + "}\n", radarAt77GHz())
+        .simulate(radarPose(0, 0, 0))
+        .records.at(0)
+        .amplitude;
   };
   EXPECT_NEAR(db(level("directive") / level("lambertian")), 10 * std::log10(M_PI / 2.4348), 0.02);
 }

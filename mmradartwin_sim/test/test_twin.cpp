@@ -27,7 +27,10 @@ class TwinTest : public SceneFiles {
   static double worst(const ComplexGrid& a, const ComplexGrid& b) { return (a - b).norm() / b.norm(); }
   /// First-order amplitude of a small plate as seen by a twin.
   double plateLevel(const std::string& mechanisms, double yaw_deg = 0) {
-    return makeTwin(path("scene.yaml"), "  specular: {}\n" + mechanisms).simulate(radarPose(0, 0, 0, yaw_deg)).records.at(0).amplitude;
+    return makeTwin(path("scene.yaml"), "  specular: {}\n" + mechanisms)
+        .simulate(radarPose(0, 0, 0, yaw_deg))
+        .records.at(0)
+        .amplitude;
   }
   /// A plate of 10 cm at (range, azimuth) that faces the origin.
   void addPlate(double range, double azimuth_deg) {
@@ -80,7 +83,8 @@ TEST_F(TwinTest, MakesTheSamplesOfTheConvention) {
   // From channel to channel: 2 pi (f_c tau + mu tau t - mu tau^2/2).
   const auto phase = [&](int k) {
     const double d = s.records[0].length_m[k] / kSpeedOfLight_m_per_s;
-    const double turns = radar.carrier_hz * d + radar.slope_hz_per_s * d * radar.sample_time_s(0) - 0.5 * radar.slope_hz_per_s * d * d;
+    const double turns =
+        radar.carrier_hz * d + radar.slope_hz_per_s * d * radar.sample_time_s(0) - 0.5 * radar.slope_hz_per_s * d * d;
     return 2 * M_PI * (turns - std::floor(turns));
   };
   for (int k = 1; k < 8; ++k) {
@@ -116,7 +120,8 @@ TEST_F(TwinTest, DoesNotCareWhereTheRoomStands) {
   writeScene("there", ", xyz_m: [100, -70, 1.5], rpy_deg: [0, 0, 37]");
   const Eigen::Isometry3d move = Eigen::Translation3d(100, -70, 1.5) * Eigen::AngleAxisd(37 * M_PI / 180, V::UnitZ());
   Twin here = makeTwin(path("here.yaml")), there = makeTwin(path("there.yaml"));
-  for (const Eigen::Isometry3d& T : {radarPose(2, 2.5, 1, 30), radarPose(3.1, 1.7, 1.2, -100), radarPose(1, 4, 0.8, 200)}) {
+  for (const Eigen::Isometry3d& T :
+       {radarPose(2, 2.5, 1, 30), radarPose(3.1, 1.7, 1.2, -100), radarPose(1, 4, 0.8, 200)}) {
     const Simulation a = here.simulate(T), b = there.simulate(move * T);
     EXPECT_EQ(a.records.size(), b.records.size());
     EXPECT_LT(worst(b.grid.x, a.grid.x), 1e-6);
@@ -131,7 +136,8 @@ TEST_F(TwinTest, DoesNotCareHowWallsAreTessellated) {
   const std::string mechanisms = "  specular: {}\n  corner: {}\n";
   Twin coarse = makeTwin(path("coarse.yaml"), mechanisms), fine = makeTwin(path("fine.yaml"), mechanisms);
   EXPECT_EQ(coarse.scene().facets.size(), fine.scene().facets.size());
-  for (const Eigen::Isometry3d& T : {radarPose(2, 2.5, 1, 30), radarPose(3.1, 1.7, 1.2, -100), radarPose(1, 4, 0.8, 200)}) {
+  for (const Eigen::Isometry3d& T :
+       {radarPose(2, 2.5, 1, 30), radarPose(3.1, 1.7, 1.2, -100), radarPose(1, 4, 0.8, 200)}) {
     const Simulation a = coarse.simulate(T), b = fine.simulate(T);
     ASSERT_EQ(a.records.size(), b.records.size());
     for (std::size_t i = 0; i < a.records.size(); ++i) {
@@ -165,14 +171,16 @@ TEST_F(TwinTest, RefusesImpossiblePoses) {
 // Mechanisms, each against the closed form of its law on one plate 3 m ahead.
 TEST_F(TwinTest, PatternsFallOffAsCosines) {
   addPlate(3, 40);
-  EXPECT_NEAR(db(plateLevel("  element_pattern: {cos_exponent: 2.1}\n") / plateLevel("")), 2.1 * db(std::cos(40 * M_PI / 180)), 1e-6);
+  EXPECT_NEAR(db(plateLevel("  element_pattern: {cos_exponent: 2.1}\n") / plateLevel("")),
+              2.1 * db(std::cos(40 * M_PI / 180)), 1e-6);
   EXPECT_NEAR(db(plateLevel("  elevation_pattern: {cos_exponent: 3}\n") / plateLevel("")), 0, 1e-6);
 }
 
 TEST_F(TwinTest, OffsetsMoveTheRadarAsTheCausesSay) {
   addPlate(3, 40);
   const auto look = [&](const std::string& m) {
-    const PathRecord r = makeTwin(path("scene.yaml"), "  specular: {}\n" + m).simulate(radarPose(0, 0, 0)).records.at(0);
+    const PathRecord r =
+        makeTwin(path("scene.yaml"), "  specular: {}\n" + m).simulate(radarPose(0, 0, 0)).records.at(0);
     return std::make_pair(r.length_m[0] / 2, std::atan2(r.departure.y(), r.departure.x()) * 180 / M_PI);
   };
   EXPECT_NEAR(look("  radar_yaw_offset: {yaw_deg: 14}\n").second, 26, 1e-6) << "turned left, things move right";
@@ -187,7 +195,8 @@ TEST_F(TwinTest, RangeMechanismsKeepTheAngle) {
   addPlate(3, 40);
   const SignalChain chain(paperRadar());
   for (const char* m : {"  range_scale: {scale: 0.02}\n", "  range_bias: {range_m: 0.06}\n"}) {
-    const ComplexGrid x = makeTwin(path("scene.yaml"), std::string("  specular: {}\n") + m).simulate(radarPose(0, 0, 0)).grid.x;
+    const ComplexGrid x =
+        makeTwin(path("scene.yaml"), std::string("  specular: {}\n") + m).simulate(radarPose(0, 0, 0)).grid.x;
     const ComplexGrid base = makeTwin(path("scene.yaml"), "  specular: {}\n").simulate(radarPose(0, 0, 0)).grid.x;
     // At the window's centre only a phase common to the channels has changed.
     const auto slope = [](const ComplexGrid& g) { return std::arg(g(7, 32) / g(0, 32)); };
@@ -200,11 +209,17 @@ TEST_F(TwinTest, MaterialsGetStrongerPerInteraction) {
   addWall("fin", "Metal", {2, 1}, {3, 1});
   writeScene();
   const auto level = [&](const std::string& m, const std::string& event) {
-    return of(makeTwin(path("scene.yaml"), "  specular: {}\n  corner: {}\n" + m).simulate(radarPose(0, 0, 0)), event).at(0).amplitude;
+    return of(makeTwin(path("scene.yaml"), "  specular: {}\n  corner: {}\n" + m).simulate(radarPose(0, 0, 0)), event)
+        .at(0)
+        .amplitude;
   };
-  EXPECT_NEAR(db(level("  material_reflectivity: {material: Concrete, delta_db: -10}\n", "specular") / level("", "specular")), -10, 1e-9);
-  EXPECT_NEAR(db(level("  material_reflectivity: {actor: wall, delta_db: -10}\n", "corner") / level("", "corner")), -10, 1e-9);
-  EXPECT_NEAR(db(level("  material_reflectivity: {actor: fin, delta_db: 4}\n", "specular") / level("", "specular")), 0, 1e-9);
+  EXPECT_NEAR(
+      db(level("  material_reflectivity: {material: Concrete, delta_db: -10}\n", "specular") / level("", "specular")),
+      -10, 1e-9);
+  EXPECT_NEAR(db(level("  material_reflectivity: {actor: wall, delta_db: -10}\n", "corner") / level("", "corner")), -10,
+              1e-9);
+  EXPECT_NEAR(db(level("  material_reflectivity: {actor: fin, delta_db: 4}\n", "specular") / level("", "specular")), 0,
+              1e-9);
 }
 
 TEST_F(TwinTest, ActorsGoAndMoveWithTheirShadows) {
@@ -214,13 +229,15 @@ TEST_F(TwinTest, ActorsGoAndMoveWithTheirShadows) {
   const auto names = [&](const std::string& m) {
     Twin twin = makeTwin(path("scene.yaml"), "  specular: {max_bounces: 1}\n" + m);
     std::vector<std::string> names;
-    for (const PathRecord& r : twin.simulate(radarPose(0, 0, 0)).records) names.push_back(twin.scene().actors[r.actors[0]].name);
+    for (const PathRecord& r : twin.simulate(radarPose(0, 0, 0)).records)
+      names.push_back(twin.scene().actors[r.actors[0]].name);
     return names;
   };
   EXPECT_EQ(names(""), std::vector<std::string>{"screen"});
   EXPECT_EQ(names("  actor_absent: {actor: screen}\n"), std::vector<std::string>{"wall"});
   EXPECT_EQ(names("  actor_moved: {actor: screen, dy_m: 3}\n"), std::vector<std::string>{"wall"});
-  Twin moved = makeTwin(path("scene.yaml"), "  specular: {max_bounces: 1}\n  actor_moved: {actor: screen, dx_m: 0.5}\n");
+  Twin moved =
+      makeTwin(path("scene.yaml"), "  specular: {max_bounces: 1}\n  actor_moved: {actor: screen, dx_m: 0.5}\n");
   EXPECT_NEAR(moved.simulate(radarPose(0, 0, 0)).records.at(0).length_m[0], 5, 1e-9);
   EXPECT_NEAR(moved.scene().actors[1].vertices[0].x(), 2, 1e-9) << "the described scene stays";
 }
@@ -229,7 +246,8 @@ TEST_F(TwinTest, LeakageStandsOverTheStrongestEchoAfterTheFilter) {
   addPlate(3, 0);
   const double echo = plateLevel("");
   for (const std::string& filter : {std::string(), std::string("  if_highpass: {corner_hz: 500.0e+3}\n")}) {
-    Twin twin = makeTwin(path("scene.yaml"), "  specular: {}\n  tx_rx_leakage: {range_m: 0.6, level_db: 0.3}\n" + filter);
+    Twin twin =
+        makeTwin(path("scene.yaml"), "  specular: {}\n  tx_rx_leakage: {range_m: 0.6, level_db: 0.3}\n" + filter);
     const Simulation a = twin.simulate(radarPose(0, 0, 0)), b = twin.simulate(radarPose(0, 0, 0, 5));
     const auto leak = of(a, "tx_rx_leakage");
     ASSERT_EQ(leak.size(), 1u);
@@ -261,7 +279,8 @@ TEST_F(TwinTest, ChannelErrorsTurnTheReceivedGridOnly) {
   addPlate(3, 20);
   const Simulation base = makeTwin(path("scene.yaml"), "  specular: {}\n").simulate(radarPose(0, 0, 0));
   const Simulation s = makeTwin(path("scene.yaml"),
-                                "  specular: {}\n  channel_phase_error: {phase_deg: [0, 10, 20, 30, 40, 50, 60, 70], gain_db: [0, 1, 0, 0, 0, 0, 0, -2]}\n"
+                                "  specular: {}\n  channel_phase_error: {phase_deg: [0, 10, 20, 30, 40, 50, 60, 70], "
+                                "gain_db: [0, 1, 0, 0, 0, 0, 0, -2]}\n"
                                 "  tx_imbalance: {phase_deg: 15, gain_db: 1}\n")
                            .simulate(radarPose(0, 0, 0));
   EXPECT_FALSE(s.propagation_only);
@@ -279,8 +298,9 @@ TEST_F(TwinTest, WeighsTracedRecordsAgain) {
   Twin base = makeTwin(scene);
   const Eigen::Isometry3d T = radarPose(2, 2.5, 1, 30);
   const auto traced = base.trace(T);
-  Twin extended = makeTwin(scene, "  specular: {}\n  corner: {}\n  diffuse: {}\n  element_pattern: {cos_exponent: 2}\n"
-                                  "  material_reflectivity: {material: RoughConcrete, delta_db: -3}\n");
+  Twin extended = makeTwin(scene,
+                           "  specular: {}\n  corner: {}\n  diffuse: {}\n  element_pattern: {cos_exponent: 2}\n"
+                           "  material_reflectivity: {material: RoughConcrete, delta_db: -3}\n");
   EXPECT_LT(worst(extended.weigh(T, traced).grid.x, extended.simulate(T).grid.x), 1e-12);
 }
 
@@ -301,7 +321,9 @@ TEST_F(TwinTest, ReadsTwinsStrictly) {
   EXPECT_NE(error("mechanism: {specular: {}}\n").find("mechanism"), std::string::npos);
   EXPECT_NE(errorOf([] { loadTwin("", std::nullopt, paperRadar()); }).find("scene"), std::string::npos);
   // What a twin resolves to reads back as the same.
-  write("twin.yaml", "mechanisms: {specular: {}, element_pattern: {cos_exponent: 2.1}, actor_absent: {actor: plate}}\n");
+  write("twin.yaml",
+        "mechanisms: {specular: {}, element_pattern: {cos_exponent: 2.1}, actor_absent: {actor: plate},"
+        " material_reflectivity: {material: Metal, delta_db: -3}}\n");
   const std::string resolved = loadTwin(path("twin.yaml"), path("scene.yaml"), paperRadar()).toYaml();
   write("again.yaml", resolved);
   EXPECT_EQ(loadTwin(path("again.yaml"), std::nullopt, paperRadar()).toYaml(), resolved);
@@ -313,8 +335,9 @@ class SimulateSessionTest : public TwinTest {
     std::filesystem::create_directories(path("session"));
     write("session/radar.yaml", toYaml(paperRadar()));
     write("session/poses.csv", "pose,location,stamp,x,y,z,qx,qy,qz,qw\n" + poses);
-    write("session/session.yaml", "format: mmradartwin_session/1\nradar: radar.yaml\nscene: ../scene.yaml\nposes: poses.csv\n"
-                                  "captures: captures/{pose}.bin\n");
+    write("session/session.yaml",
+          "format: mmradartwin_session/1\nradar: radar.yaml\nscene: ../scene.yaml\nposes: poses.csv\n"
+          "captures: captures/{pose}.bin\n");
   }
   std::string bytes(const std::string& file) const {
     std::ifstream in(path(file), std::ios::binary);
@@ -325,7 +348,9 @@ class SimulateSessionTest : public TwinTest {
 TEST_F(SimulateSessionTest, WritesASessionThatReadsBack) {
   addRoom();
   writeScene();
-  writeSession("a,1,100.0,2,2.5,1,0,0,0,1\nb,1,200.0,2.5,2.5,1,0,0,1,0\nbad,1,300.0,5,4.6,1,0,0,0,1\nnone,1,400.0,nan,2,1,0,0,0,1\n");
+  writeSession(
+      "a,1,100.0,2,2.5,1,0,0,0,1\nb,1,200.0,2.5,2.5,1,0,0,1,0\nbad,1,300.0,5,4.6,1,0,0,0,1\nnone,1,400.0,nan,2,1,0,0,0,"
+      "1\n");
   SimulateOptions options;
   options.session = path("session");
   options.output = path("out");
@@ -360,11 +385,14 @@ TEST_F(SimulateSessionTest, WritesASessionThatReadsBack) {
   const double scale = 32768 * std::pow(10, *recording.gain_db / 20);
   EXPECT_NEAR(first[0], s.grid.x(0, 0).real() * scale, 0.51);
   EXPECT_NEAR(first[1], s.grid.x(0, 0).imag() * scale, 0.51);
-  EXPECT_NEAR(first[2 * (4 * 64 + 4 * 7 + 2)], s.grid.x(4 + 2, 7).real() * scale, 0.51) << "second slot, sample 7, rx 2";
+  EXPECT_NEAR(first[2 * (4 * 64 + 4 * 7 + 2)], s.grid.x(4 + 2, 7).real() * scale, 0.51)
+      << "second slot, sample 7, rx 2";
   std::ifstream csv(path("out/paths/a.csv"));
   std::string header;
   std::getline(csv, header);
-  EXPECT_EQ(header, "length_m,azimuth_dep_deg,elevation_dep_deg,azimuth_arr_deg,elevation_arr_deg,amplitude_db,phase_rad,bounces,event,actors,materials");
+  EXPECT_EQ(header,
+            "length_m,azimuth_dep_deg,elevation_dep_deg,azimuth_arr_deg,elevation_arr_deg,amplitude_db,phase_rad,"
+            "bounces,event,actors,materials");
 
   options.output = path("out2");
   options.jobs = 2;

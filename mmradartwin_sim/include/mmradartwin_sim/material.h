@@ -18,7 +18,7 @@ struct Material {
   double relative_permittivity = std::numeric_limits<double>::quiet_NaN();
   double conductivity_s_per_m = 0;
   double roughness_rms_m = 0;
-  double scattering_coefficient = 0;      ///< S: S^2 of the reflected power scatters
+  double scattering_coefficient = 0;  ///< S: S^2 of the reflected power scatters
   // scalar: the paper's table
   double base_rcs_db = 0, back_exp = 0, mix = 0, diff_back_db = -99, norm_exp = 1;
   // any
@@ -32,27 +32,32 @@ struct Material {
 };
 
 /// Amplitude of diffuse backscatter of a surface at incidence angle cos_theta, without spreading: a patch dA returns
-/// lambda/(4 pi r^2) * backscatterAmplitude * sqrt(dA/pi). te and tm are the shares of the incident field's power in the
-/// two polarisations. Lambertian: S |Gamma| cos(theta). The scalar lobe's own law is in the comment at scalarReflection().
+/// lambda/(4 pi r^2) * backscatterAmplitude * sqrt(dA/pi). te and tm are the shares of the incident field's power in
+/// the two polarisations. Lambertian: S |Gamma| cos(theta). The scalar lobe's own law is in the comment at
+/// scalarReflection().
 double backscatterAmplitude(const Material& material, double cos_theta, double te_share, double frequency_hz);
 
 /// sqrt(1 - S^2): what scattering leaves of a specular amplitude. 1 for scalar materials.
 double specularShare(const Material& material);
 
 /// The paper's scalar lobe materials. The paper gives the scalars without their formula; this is the one chosen here:
-///   lobe(theta)        = cos(theta)^(back_exp/2)                       amplitude of the backscatter lobe, power cos^back_exp
-///   |Gamma|(theta)     = 10^(base_rcs_db/20) ((1 - mix) + mix lobe)    specular: base_rcs_db at normal incidence; the share
+///   lobe(theta)        = cos(theta)^(back_exp/2)                       amplitude of the backscatter lobe, power
+///   cos^back_exp |Gamma|(theta)     = 10^(base_rcs_db/20) ((1 - mix) + mix lobe)    specular: base_rcs_db at normal
+///   incidence; the share
 ///                                                                      mix falls off like the backscatter lobe
-///   backscatter(theta) = 10^(diff_back_db/20) cos(theta)^norm_exp lobe  diffuse; norm_exp = 1 is Lambert's projected area
+///   backscatter(theta) = 10^(diff_back_db/20) cos(theta)^norm_exp lobe  diffuse; norm_exp = 1 is Lambert's projected
+///   area
 /// diff_back_db <= -90 means none. Signs are those of a conductor (TE -, TM +).
 double scalarReflection(const Material& material, double cos_theta);
 
 /// Reads materials.yaml strictly. Throws InputError.
 std::map<std::string, Material> loadMaterials(const std::string& file);
 
-/// Fresnel coefficients of a half space for incidence angle cos_theta, in the exp(-jkL) convention (conjugate once where a
-/// record is made). TE: E perpendicular to the plane of incidence. Source: ITU-R P.2040-3 section 2.2.2.1.
-struct Fresnel { std::complex<double> te, tm; };
+/// Fresnel coefficients of a half space for incidence angle cos_theta, in the exp(-jkL) convention (conjugate once
+/// where a record is made). TE: E perpendicular to the plane of incidence. Source: ITU-R P.2040-3 section 2.2.2.1.
+struct Fresnel {
+  std::complex<double> te, tm;
+};
 Fresnel fresnel(const Material& material, double cos_theta, double frequency_hz);
 
 }  // namespace mmradartwin

@@ -21,13 +21,13 @@ enum class ParameterKind { kNumber, kInteger, kText, kNumbers, kTexts };
 
 /// A parameter that a mechanism has. Ranges are checked before the mechanism sees a value.
 struct ParameterSpec {
-  std::string name;                         ///< with its unit as in causes.md, e.g. yaw_deg
-  std::string unit;                         ///< "deg", "m", "dB", "1", "" for texts
+  std::string name;  ///< with its unit as in causes.md, e.g. yaw_deg
+  std::string unit;  ///< "deg", "m", "dB", "1", "" for texts
   ParameterKind kind = ParameterKind::kNumber;
   double min = 0, max = 0;
   bool required = true;
   std::variant<double, std::string, std::vector<double>, std::vector<std::string>> default_value = 0.0;
-  std::string meaning;                      ///< one line
+  std::string meaning;  ///< one line
 };
 
 /// Checked values by name; every parameter of the mechanism is present unless it is optional without default.
@@ -51,12 +51,13 @@ struct PoseContext {
   const RadarConfig& radar;
   const Scene& scene;
   const RayCaster& rays;
-  Eigen::Isometry3d T_map_radar;            ///< where the twin's radar is, after all pose() calls
-  double frequency_hz;                      ///< of the coefficients: the window's centre
-  /// Base field of view of emission and arrival: |azimuth| < 90 deg, |elevation| <= 20 deg of a direction in radar_link.
+  Eigen::Isometry3d T_map_radar;  ///< where the twin's radar is, after all pose() calls
+  double frequency_hz;            ///< of the coefficients: the window's centre
+  /// Base field of view of emission and arrival: |azimuth| < 90 deg, |elevation| <= 20 deg of a direction in
+  /// radar_link.
   bool inFieldOfView(const Eigen::Vector3d& direction_radar) const;
-  double max_range_m;                       ///< paths with length/2 beyond are left out
-  std::uint64_t seed;                       ///< of what is random by nature (phases of scatter points)
+  double max_range_m;  ///< paths with length/2 beyond are left out
+  std::uint64_t seed;  ///< of what is random by nature (phases of scatter points)
   /// Strongest A_p of the session's poses, for levels that are relative to it.
   std::function<double()> strongest_amplitude;
   /// |gain| of the receiver's filters at a path length: what a level stated after the IF filter has to make up for.
@@ -79,16 +80,16 @@ class Mechanism {
   virtual int rank() const { return 0; }
 
   // Stages, in the order in which a simulation runs them.
-  virtual void editScene(Scene&) const {}                                           ///< once, on loading
+  virtual void editScene(Scene&) const {}  ///< once, on loading
   /// Once, after all editScene(): precomputes what depends on the scene alone. The scene outlives the mechanism.
   virtual void build(const Scene&, const RadarConfig&) {}
   virtual Eigen::Isometry3d pose(const Eigen::Isometry3d& T_map_radar) const { return T_map_radar; }
   virtual void addPaths(const PoseContext&, std::vector<PathRecord>&) const {}
-  virtual void reweight(const PoseContext&, PathRecord&) const {}                   ///< every path of every mechanism
+  virtual void reweight(const PoseContext&, PathRecord&) const {}  ///< every path of every mechanism
   /// Gain of the receiver on the tone of a path of this length: filters act here, exactly, on the received grid.
   virtual std::complex<double> toneGain(const PoseContext&, double /*length_m*/) const { return 1.0; }
   virtual bool hasToneGain() const { return false; }
-  virtual void receive(const PoseContext&, ComplexGrid&) const {}                   ///< on the propagated grid
+  virtual void receive(const PoseContext&, ComplexGrid&) const {}  ///< on the propagated grid
   /// True where receive() does something: then the grid is more than its records.
   virtual bool hasReceiveStage() const { return false; }
   /// True where addPaths() wants strongest_amplitude().

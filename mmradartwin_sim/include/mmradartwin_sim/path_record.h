@@ -12,21 +12,21 @@ namespace mmradartwin {
 
 /// One propagation path (DESIGN sections 3 to 5).
 struct PathRecord {
-  const std::string* event = nullptr;          ///< name of the mechanism that made it (interned, never null in a result)
-  std::vector<int> actors;                     ///< Scene::actors index, one per interaction
-  std::vector<int> facets;                     ///< Scene::facets index or -1, one per interaction
-  std::vector<Eigen::Vector3d> vertices;       ///< map, one per interaction
-  Eigen::Vector3d departure, arrival;          ///< unit vectors in radar_link, both from the radar outwards
+  const std::string* event = nullptr;     ///< name of the mechanism that made it (interned, never null in a result)
+  std::vector<int> actors;                ///< Scene::actors index, one per interaction
+  std::vector<int> facets;                ///< Scene::facets index or -1, one per interaction
+  std::vector<Eigen::Vector3d> vertices;  ///< map, one per interaction
+  Eigen::Vector3d departure, arrival;     ///< unit vectors in radar_link, both from the radar outwards
   int bounces = 0;
-  int range_bin = 0;                           ///< nearest bin of length/2
-  double amplitude = 0;                        ///< A_p, common to the channels
-  double phase_rad = 0;                        ///< of c[0]
-  std::vector<double> length_m;                ///< [M] exact path length per virtual element
-  std::vector<std::complex<double>> c;         ///< [M] at the window's centre; sum|c|^2 = M A_p^2
+  int range_bin = 0;                    ///< nearest bin of length/2
+  double amplitude = 0;                 ///< A_p, common to the channels
+  double phase_rad = 0;                 ///< of c[0]
+  std::vector<double> length_m;         ///< [M] exact path length per virtual element
+  std::vector<std::complex<double>> c;  ///< [M] at the window's centre; sum|c|^2 = M A_p^2
 };
 
-/// Adds records to grid x [M][N]: x_k[n] += c_k exp(j 2 pi mu (length_k/c)(t_n - t_c)). The one place where paths become
-/// samples; rebuilding a grid from records calls the same function.
+/// Adds records to grid x [M][N]: x_k[n] += c_k exp(j 2 pi mu (length_k/c)(t_n - t_c)). The one place where paths
+/// become samples; rebuilding a grid from records calls the same function.
 void accumulate(const RadarConfig& radar, const std::vector<PathRecord>& records, ComplexGrid& x);
 
 /// Fills amplitude-derived fields of a record from its lengths and its coefficient: c_k = coefficient *
@@ -42,8 +42,8 @@ int rangeBin(const RadarConfig& radar, double length_m);
 
 /// What the invariants of DESIGN section 4 came out as for one pose.
 struct RecordCheck {
-  double worst_amplitude_error = 0;     ///< max |sum|c|^2/(M A^2) - 1|
-  double grid_error = 0;                ///< |grid - rebuilt| / |grid|
+  double worst_amplitude_error = 0;  ///< max |sum|c|^2/(M A^2) - 1|
+  double grid_error = 0;             ///< |grid - rebuilt| / |grid|
   bool ok() const { return worst_amplitude_error < 1e-12 && grid_error < 1e-12; }
 };
 

@@ -13,17 +13,17 @@ namespace mmradartwin {
 
 /// A planar polygon of one actor: coplanar, connected triangles merged. Coordinates in map, metres.
 struct Facet {
-  int actor = -1;                            ///< index into Scene::actors
-  int id = -1;                               ///< index into Scene::facets
-  Eigen::Vector3d origin;                    ///< a corner of the bounding rectangle
-  Eigen::Vector3d e1, e2, normal;            ///< orthonormal; normal = e1 x e2 (its side means nothing)
-  double size1_m = 0, size2_m = 0;           ///< bounding rectangle: origin + [0,size1] e1 + [0,size2] e2
+  int actor = -1;                   ///< index into Scene::actors
+  int id = -1;                      ///< index into Scene::facets
+  Eigen::Vector3d origin;           ///< a corner of the bounding rectangle
+  Eigen::Vector3d e1, e2, normal;   ///< orthonormal; normal = e1 x e2 (its side means nothing)
+  double size1_m = 0, size2_m = 0;  ///< bounding rectangle: origin + [0,size1] e1 + [0,size2] e2
   double area_m2 = 0;
-  bool rectangle = false;                    ///< fills its bounding rectangle
+  bool rectangle = false;                           ///< fills its bounding rectangle
   std::vector<std::vector<Eigen::Vector2d>> loops;  ///< boundary loops in (e1, e2), outer ones and holes
-  bool reflects = true;                      ///< false where the normal lies within 45 deg of the vertical: it only occludes
-  bool present = true;                       ///< false where a mechanism took the actor away; ids stay
-  double flatness_m = 0;                     ///< largest distance of a merged vertex from the plane
+  bool reflects = true;   ///< false where the normal lies within 45 deg of the vertical: it only occludes
+  bool present = true;    ///< false where a mechanism took the actor away; ids stay
+  double flatness_m = 0;  ///< largest distance of a merged vertex from the plane
 
   double planeDistance(const Eigen::Vector3d& p) const { return normal.dot(p - origin); }
   bool contains(const Eigen::Vector3d& p_on_plane, double tolerance_m = 0) const;
@@ -36,31 +36,32 @@ struct Actor {
   std::string name;
   std::string material_tag;
   Material material;
-  std::vector<Eigen::Vector3d> vertices;         ///< map, metres
+  std::vector<Eigen::Vector3d> vertices;  ///< map, metres
   std::vector<std::array<int, 3>> triangles;
-  std::vector<int> triangle_facet;               ///< facet id per triangle, -1 where it has no area
-  std::vector<int> facets;                       ///< ids
-  bool present = true;                           ///< false where a mechanism took it away: no paths, no occlusion
+  std::vector<int> triangle_facet;  ///< facet id per triangle, -1 where it has no area
+  std::vector<int> facets;          ///< ids
+  bool present = true;              ///< false where a mechanism took it away: no paths, no occlusion
   Eigen::AlignedBox3d bounds;
 };
 
 /// When neighbouring triangles are one facet. Scans need wider limits than drawings.
 struct FacetTolerance {
-  double angle_deg = 0.5;                        ///< between a triangle's normal and the facet's
-  double offset_m = 0.001;                       ///< of a vertex from the facet's plane
+  double angle_deg = 0.5;   ///< between a triangle's normal and the facet's
+  double offset_m = 0.001;  ///< of a vertex from the facet's plane
 };
 
 struct Scene {
-  std::string file;                              ///< scene.yaml
-  FacetTolerance tolerance;                      ///< scene.yaml's optional `facets: {angle_deg, offset_m}`
+  std::string file;          ///< scene.yaml
+  FacetTolerance tolerance;  ///< scene.yaml's optional `facets: {angle_deg, offset_m}`
   std::vector<Actor> actors;
   std::vector<Facet> facets;
 
   int actorIndex(const std::string& name) const;  ///< -1 where absent
 };
 
-/// Reads scene.yaml strictly, its meshes (assimp) and materials, and builds facets. Throws InputError naming file and key
-/// (unknown material, two actors of one name, no triangles, NaN or huge coordinates, material outside its frequency range).
+/// Reads scene.yaml strictly, its meshes (assimp) and materials, and builds facets. Throws InputError naming file and
+/// key (unknown material, two actors of one name, no triangles, NaN or huge coordinates, material outside its frequency
+/// range).
 Scene loadScene(const std::string& scene_yaml, double frequency_hz);
 /// Facets of all actors, ids in the order of actors and triangles. Throws InputError for an actor without area.
 void rebuildFacets(Scene& scene);
@@ -68,8 +69,8 @@ void rebuildFacets(Scene& scene);
 void moveActor(Scene& scene, int actor, const Eigen::Isometry3d& T_map_map);
 /// Takes an actor out of paths and occlusion; indices stay.
 void removeActor(Scene& scene, int actor);
-/// Reads one mesh file into actors in file coordinates (glTF's y-up turned to z-up), without material look-up or facets:
-/// OBJ object or group name = actor, glTF node name = actor, otherwise the file's stem. Throws InputError.
+/// Reads one mesh file into actors in file coordinates (glTF's y-up turned to z-up), without material look-up or
+/// facets: OBJ object or group name = actor, glTF node name = actor, otherwise the file's stem. Throws InputError.
 std::vector<Actor> loadMesh(const std::string& file);
 
 /// Occlusion queries, thread-safe. Embree behind it; no invalid ray reaches it.
@@ -80,7 +81,12 @@ class RayCaster {
   RayCaster(RayCaster&&) noexcept;
   /// True where the open segment a-b meets nothing, both ends shortened by gap_m.
   bool visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m = 1e-3) const;
-  struct Hit { double distance_m; int actor; int facet; Eigen::Vector3d point; };
+  struct Hit {
+    double distance_m;
+    int actor;
+    int facet;
+    Eigen::Vector3d point;
+  };
   std::optional<Hit> firstHit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double max_m) const;
   /// True where p lies inside a closed actor (odd crossings in most directions); names the actor.
   std::optional<int> insideActor(const Eigen::Vector3d& p) const;

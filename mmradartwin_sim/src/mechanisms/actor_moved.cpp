@@ -33,8 +33,9 @@ class ActorMoved : public Mechanism {
       area += weight;
     }
     centroid /= area;
-    moveActor(scene, actor_, Eigen::Translation3d(centroid + shift_) *
-                                 Eigen::AngleAxisd(yaw_rad_, Eigen::Vector3d::UnitZ()) * Eigen::Translation3d(-centroid));
+    moveActor(scene, actor_,
+              Eigen::Translation3d(centroid + shift_) * Eigen::AngleAxisd(yaw_rad_, Eigen::Vector3d::UnitZ()) *
+                  Eigen::Translation3d(-centroid));
   }
 
  private:

@@ -62,8 +62,8 @@ int requireActor(const Scene& scene, const std::string& mechanism, const std::st
 struct ElementsInMap {
   explicit ElementsInMap(const PoseContext& context);
   std::vector<Eigen::Vector3d> tx, rx;
-  Eigen::Vector3d p;     ///< origin of radar_link
-  Eigen::Vector3d up;    ///< axis of the vertical antennas
+  Eigen::Vector3d p;   ///< origin of radar_link
+  Eigen::Vector3d up;  ///< axis of the vertical antennas
 
   /// Full lengths by way of one point, per virtual element.
   std::vector<double> lengthsVia(const Eigen::Vector3d& point) const;

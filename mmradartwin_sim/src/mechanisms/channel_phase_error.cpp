@@ -30,11 +30,13 @@ class ChannelPhaseError : public Mechanism {
       const std::vector<double>& v = values.numbers(key);
       if (v.empty()) continue;
       if (v.size() != channels) {
-        throw InputError("mechanism channel_phase_error: key " + std::string(key) + ": has " + std::to_string(v.size()) +
-                         " numbers; the radar has " + std::to_string(channels) + " virtual channels");
+        throw InputError("mechanism channel_phase_error: key " + std::string(key) + ": has " +
+                         std::to_string(v.size()) + " numbers; the radar has " + std::to_string(channels) +
+                         " virtual channels");
       }
       for (std::size_t k = 0; k < channels; ++k) {
-        factor_[k] *= key[0] == 'p' ? std::polar(1.0, v[k] * M_PI / 180) : std::complex<double>(std::pow(10.0, v[k] / 20));
+        factor_[k] *=
+            key[0] == 'p' ? std::polar(1.0, v[k] * M_PI / 180) : std::complex<double>(std::pow(10.0, v[k] / 20));
       }
     }
   }

@@ -10,17 +10,17 @@ namespace mmradartwin {
 namespace {
 
 const std::string kName = "corner";
-constexpr double kMeet_m = 0.002;       // faces that come this near to their planes' common line meet in it
+constexpr double kMeet_m = 0.002;  // faces that come this near to their planes' common line meet in it
 constexpr double kInset_m = 0.01;
 constexpr double kSmallestFactor = 0.01;
 
 /// A concave edge of two facets: the line origin + [0, length] along, with one face on each side of the wedge.
 struct Edge {
-  int a, b;                                ///< facet ids
+  int a, b;  ///< facet ids
   Eigen::Vector3d origin, along;
   double length_m;
-  Eigen::Vector3d into_a, into_b;          ///< unit, in the faces, away from the edge; the wedge lies between them
-  double reach_a_m, reach_b_m;             ///< from the edge to the far ends of the faces
+  Eigen::Vector3d into_a, into_b;  ///< unit, in the faces, away from the edge; the wedge lies between them
+  double reach_a_m, reach_b_m;     ///< from the edge to the far ends of the faces
 };
 
 using Interval = std::pair<double, double>;
@@ -107,11 +107,13 @@ class Corner : public Mechanism {
       b.box.extend(b.box.max() + Eigen::Vector3d::Constant(kMeet_m));
       boxes.push_back(b);
     }
-    std::stable_sort(boxes.begin(), boxes.end(), [](const Box& a, const Box& b) { return a.box.min().x() < b.box.min().x(); });
+    std::stable_sort(boxes.begin(), boxes.end(),
+                     [](const Box& a, const Box& b) { return a.box.min().x() < b.box.min().x(); });
     for (std::size_t i = 0; i < boxes.size(); ++i) {
       for (std::size_t j = i + 1; j < boxes.size() && boxes[j].box.min().x() <= boxes[i].box.max().x(); ++j) {
         if (!boxes[i].box.intersects(boxes[j].box)) continue;
-        addEdges(scene.facets[std::min(boxes[i].id, boxes[j].id)], scene.facets[std::max(boxes[i].id, boxes[j].id)], edges_);
+        addEdges(scene.facets[std::min(boxes[i].id, boxes[j].id)], scene.facets[std::max(boxes[i].id, boxes[j].id)],
+                 edges_);
       }
     }
     std::stable_sort(edges_.begin(), edges_.end(),

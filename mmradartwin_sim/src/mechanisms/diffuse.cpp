@@ -98,10 +98,12 @@ class Diffuse : public Mechanism {
       const double cosine = std::min(1.0, std::abs(in.dot(facet.normal)));
       const Material& material = context.scene.actors[facet.actor].material;
       const double te = verticalField(elements.up, in).dot(transverse(in, facet.normal));
-      double amplitude = spreading / r2 * backscatterAmplitude(material, cosine, std::min(1.0, te * te), context.frequency_hz) *
+      double amplitude = spreading / r2 *
+                         backscatterAmplitude(material, cosine, std::min(1.0, te * te), context.frequency_hz) *
                          std::sqrt(point.area_m2 / M_PI);
       if (directive_ && cosine > 0) {
-        // Monostatic: the specular direction lies 2 theta away, (1 + cos 2 theta)/2 = cos^2 theta; Lambert's cos/pi is replaced.
+        // Monostatic: the specular direction lies 2 theta away, (1 + cos 2 theta)/2 = cos^2 theta; Lambert's cos/pi is
+        // replaced.
         amplitude *= std::sqrt(M_PI * std::pow(cosine * cosine, alpha_) / (directiveNorm(alpha_, cosine) * cosine));
       }
       if (!(amplitude > 0)) continue;
@@ -129,8 +131,8 @@ class Diffuse : public Mechanism {
     std::uint64_t hash;
   };
 
-  /// One point in each cell of a grid in the facet's own coordinates, anywhere in its cell; all from hashes of facet and
-  /// cell, so that the points move with the facet and nothing else changes them.
+  /// One point in each cell of a grid in the facet's own coordinates, anywhere in its cell; all from hashes of facet
+  /// and cell, so that the points move with the facet and nothing else changes them.
   void addPoints(const Facet& facet, std::uint64_t facet_hash) {
     const int n1 = std::max(1, static_cast<int>(std::lround(facet.size1_m / spacing_m_)));
     const int n2 = std::max(1, static_cast<int>(std::lround(facet.size2_m / spacing_m_)));
@@ -142,7 +144,8 @@ class Diffuse : public Mechanism {
     const std::size_t first = points_.size();
     for (int i = 0; i < n1; ++i) {
       for (int j = 0; j < n2; ++j) {
-        const std::uint64_t h = scramble(facet_hash ^ scramble((static_cast<std::uint64_t>(i) << 32) | static_cast<std::uint32_t>(j)));
+        const std::uint64_t h =
+            scramble(facet_hash ^ scramble((static_cast<std::uint64_t>(i) << 32) | static_cast<std::uint32_t>(j)));
         const Eigen::Vector3d q = facet.origin + (i + unitInterval(scramble(h + 1))) * d1 * facet.e1 +
                                   (j + unitInterval(scramble(h + 2))) * d2 * facet.e2;
         if (!facet.rectangle && !facet.contains(q)) continue;

@@ -23,9 +23,7 @@ class ElevationPattern : public Mechanism {
   }
 
  private:
-  static double cosine(const Eigen::Vector3d& d) {
-    return std::hypot(d.x(), d.y());
-  }
+  static double cosine(const Eigen::Vector3d& d) { return std::hypot(d.x(), d.y()); }
   double exponent_ = 0;
 };
 

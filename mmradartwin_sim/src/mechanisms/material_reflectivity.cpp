@@ -34,7 +34,9 @@ class MaterialReflectivity : public Mechanism {
       affected_[i] = scene.actors[i].material_tag == material;
       any = any || affected_[i];
     }
-    if (!any) throw InputError("mechanism material_reflectivity: key material: no actor of " + scene.file + " is of " + material);
+    if (!any)
+      throw InputError("mechanism material_reflectivity: key material: no actor of " + scene.file + " is of " +
+                       material);
   }
   void reweight(const PoseContext&, PathRecord& record) const override {
     double factor = 1;

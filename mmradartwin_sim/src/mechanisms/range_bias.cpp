@@ -12,7 +12,9 @@ class RangeBias : public Mechanism {
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("range_m", "m", -5, 5, "added to every one-way range")};
   }
-  void configure(const Parameters& values, const Scene&, const RadarConfig&) override { range_m_ = values.number("range_m"); }
+  void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
+    range_m_ = values.number("range_m");
+  }
   void reweight(const PoseContext& context, PathRecord& record) const override {
     lengthen(context.radar, 2 * range_m_, record);
   }

@@ -12,7 +12,9 @@ class RangeScale : public Mechanism {
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("scale", "1", -0.5, 0.5, "epsilon of range x (1 + epsilon)")};
   }
-  void configure(const Parameters& values, const Scene&, const RadarConfig&) override { scale_ = values.number("scale"); }
+  void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
+    scale_ = values.number("scale");
+  }
   int rank() const override { return 1; }  // after a bias, which the wrong slope scales too
   void reweight(const PoseContext& context, PathRecord& record) const override {
     for (double& length : record.length_m) length *= 1 + scale_;

@@ -9,7 +9,7 @@ namespace mmradartwin {
 namespace {
 
 const std::string kName = "specular";
-constexpr double kInset_m = 0.01;          // where a return beside a facet is taken to come from
+constexpr double kInset_m = 0.01;  // where a return beside a facet is taken to come from
 constexpr double kSmallestFactor = 0.01;
 
 class Specular : public Mechanism {
@@ -22,7 +22,8 @@ class Specular : public Mechanism {
     ParameterSpec budget = numberSpec("ray_budget", "1", 0, 1e7, 20000,
                                       "rays launched per pose to seed the orders that cannot be searched exhaustively");
     budget.kind = ParameterKind::kInteger;
-    return {bounces, numberSpec("power_cutoff_db", "dB", -400, 0, -200, "paths with 20 log10(A_p) below are dropped"), budget};
+    return {bounces, numberSpec("power_cutoff_db", "dB", -400, 0, -200, "paths with 20 log10(A_p) below are dropped"),
+            budget};
   }
 
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
@@ -39,8 +40,9 @@ class Specular : public Mechanism {
   std::vector<std::string> notes() const override {
     if (exhaustive_ >= max_bounces_) return {};
     if (max_bounces_ > 3 && exhaustive_ == 3) return {};
-    return {"specular: " + std::to_string(search_->reflectors().size()) + " facets are too many to try all sequences of more than " +
-            std::to_string(exhaustive_) + "; higher orders come from " + std::to_string(ray_budget_) + " launched rays per pose"};
+    return {"specular: " + std::to_string(search_->reflectors().size()) +
+            " facets are too many to try all sequences of more than " + std::to_string(exhaustive_) +
+            "; higher orders come from " + std::to_string(ray_budget_) + " launched rays per pose"};
   }
 
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
@@ -55,16 +57,19 @@ class Specular : public Mechanism {
     const Eigen::Matrix3d to_radar = context.T_map_radar.linear().transpose();
     limits.in_view = [&](const Eigen::Vector3d& d) { return context.inFieldOfView(to_radar * d); };
     if (exhaustive_ >= 2) {
-      for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2)) addHigher(context, elements, path, records);
+      for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2))
+        addHigher(context, elements, path, records);
     }
     if (exhaustive_ < max_bounces_ && ray_budget_ > 0) {
       limits.max_order = max_bounces_;
       ImagePath path;
-      for (const auto& sequence : search_->seeds(elements.p, context.rays, limits, ray_budget_, context.T_map_radar.linear(),
-                                                 20 * M_PI / 180)) {
+      for (const auto& sequence : search_->seeds(elements.p, context.rays, limits, ray_budget_,
+                                                 context.T_map_radar.linear(), 20 * M_PI / 180)) {
         if (static_cast<int>(sequence.size()) <= std::max(1, exhaustive_)) continue;
-        if (sequence.size() == 2 && perpendicular(context.scene.facets[sequence[0]], context.scene.facets[sequence[1]])) continue;
-        if (search_->solve(elements.p, sequence, context.rays, limits, path)) addHigher(context, elements, path, records);
+        if (sequence.size() == 2 && perpendicular(context.scene.facets[sequence[0]], context.scene.facets[sequence[1]]))
+          continue;
+        if (search_->solve(elements.p, sequence, context.rays, limits, path))
+          addHigher(context, elements, path, records);
       }
     }
   }
@@ -80,7 +85,8 @@ class Specular : public Mechanism {
     const double radius = 0.5 * std::hypot(facet.size1_m, facet.size2_m);
     const double away = (foot - middle).norm();
     if (away > radius) {
-      // Bounds of |factor|: the angle the facet fills as seen from the foot, twice over 2 pi, and its area in Fresnel units.
+      // Bounds of |factor|: the angle the facet fills as seen from the foot, twice over 2 pi, and its area in Fresnel
+      // units.
       if (2 * std::asin(radius / away) < M_PI * kSmallestFactor) return;
       if (2 * facet.area_m2 / (wavelength * R) < kSmallestFactor) return;
       if (2 * (away - radius) / std::sqrt(wavelength * R) > 60) return;
@@ -95,7 +101,8 @@ class Specular : public Mechanism {
     if (!context.inFieldOfView(direction_radar)) return;
     const double gap = std::max(1e-3, 2 * facet.flatness_m / std::max(0.1, std::abs(direction.dot(facet.normal))));
     if (!context.rays.visible(elements.p, vertex, gap)) return;
-    const Eigen::Vector3d straight = -signed_distance / R * facet.normal;  // the image's direction, also beside the facet
+    const Eigen::Vector3d straight =
+        -signed_distance / R * facet.normal;  // the image's direction, also beside the facet
     const std::complex<double> factor = apertureFactor(facet, foot, straight, R, R, wavelength);
     if (std::abs(factor) < kSmallestFactor) return;
 
@@ -104,8 +111,7 @@ class Specular : public Mechanism {
     const ComplexVector back =
         reflectField(e.cast<std::complex<double>>(), straight, facet.normal, material, context.frequency_hz);
     const std::complex<double> gamma = (e.cast<std::complex<double>>().transpose() * back)(0);
-    const std::complex<double> coefficient =
-        wavelength / (4 * M_PI * 2 * R) * specularShare(material) * gamma * factor;
+    const std::complex<double> coefficient = wavelength / (4 * M_PI * 2 * R) * specularShare(material) * gamma * factor;
     if (std::abs(coefficient) < cutoff_) return;
     PathRecord record;
     record.event = &kName;
@@ -139,7 +145,8 @@ class Specular : public Mechanism {
       in = leg.normalized();
       before += leg.norm();
       field = reflectField(field, in, facet.normal, material, context.frequency_hz);
-      weight *= specularShare(material) * apertureFactor(facet, path.vertices[i], in, before, total - before, wavelength);
+      weight *=
+          specularShare(material) * apertureFactor(facet, path.vertices[i], in, before, total - before, wavelength);
       from = path.vertices[i];
       record.actors.push_back(facet.actor);
     }

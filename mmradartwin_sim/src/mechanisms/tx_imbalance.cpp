@@ -17,7 +17,8 @@ class TxImbalance : public Mechanism {
             numberSpec("gain_db", "dB", -60, 60, 0, "of the second transmitter's channels")};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig& radar) override {
-    if (radar.slots() < 2) throw InputError("mechanism tx_imbalance: the radar has one transmitter only; remove the mechanism");
+    if (radar.slots() < 2)
+      throw InputError("mechanism tx_imbalance: the radar has one transmitter only; remove the mechanism");
     receivers_ = radar.receivers();
     factor_ = std::polar(std::pow(10.0, values.number("gain_db") / 20), values.number("phase_deg") * M_PI / 180);
   }

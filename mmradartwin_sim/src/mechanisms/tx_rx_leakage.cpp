@@ -15,7 +15,8 @@ class TxRxLeakage : public Mechanism {
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("range_m", "m", 0, 100, "one-way range at which the coupling appears"),
-            numberSpec("level_db", "dB", -200, 100, "over the session's strongest echo, rms over channels, after the IF filter")};
+            numberSpec("level_db", "dB", -200, 100,
+                       "over the session's strongest echo, rms over channels, after the IF filter")};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig& radar) override {
     range_m_ = values.number("range_m");

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kWarnEvery_s = 5;
-constexpr double kMeasuredFor_s = 1;   // without a grid for so long the twin goes on at its own rate
+constexpr double kMeasuredFor_s = 1;  // without a grid for so long the twin goes on at its own rate
 
 std::string temporaryFolder() {
   std::string pattern = (fs::temp_directory_path() / "mmradartwin_session_XXXXXX").string();
@@ -50,7 +50,8 @@ TwinNode::TwinNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   grid_subscriber_ = nh.subscribe("radar/grid", 100, &TwinNode::onGrid, this);
   pending_timer_ = nh.createWallTimer(ros::WallDuration(0.005), &TwinNode::onPending, this);
   if (rate_hz_ > 0) rate_timer_ = nh.createWallTimer(ros::WallDuration(1 / rate_hz_), &TwinNode::onRate, this);
-  diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  diagnostics_timer_ =
+      nh.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
   if (!scene_file_.empty() && radar_) rebuild();
 }
 
@@ -140,7 +141,9 @@ void TwinNode::onGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid) {
   measured_at_ = ros::WallTime::now();
   if (!twin_) {
     ROS_WARN_THROTTLE(kWarnEvery_s, "grids come, but there is no twin yet: %s",
-                      !problem_.empty() ? problem_.c_str() : (radar_ ? "no scene (parameter scene, or a session message)" : "no radar/config"));
+                      !problem_.empty()
+                          ? problem_.c_str()
+                          : (radar_ ? "no scene (parameter scene, or a session message)" : "no radar/config"));
     return;
   }
   if (pending_) ++skipped_;
@@ -159,7 +162,8 @@ void TwinNode::onPending(const ros::WallTimerEvent&) {
     } catch (const tf2::TransformException& error) {
       if ((ros::WallTime::now() - pending_since_).toSec() < pose_timeout_s_) return;
       ++without_pose_;
-      ROS_WARN_THROTTLE(kWarnEvery_s, "no pose at %.6f, nothing simulated: %s", pending_->header.stamp.toSec(), error.what());
+      ROS_WARN_THROTTLE(kWarnEvery_s, "no pose at %.6f, nothing simulated: %s", pending_->header.stamp.toSec(),
+                        error.what());
       pending_.reset();
       return;
     }
@@ -177,13 +181,16 @@ void TwinNode::onRate(const ros::WallTimerEvent&) {
     const ros::Time stamp = T.header.stamp.isZero() ? ros::Time::now() : T.header.stamp;
     simulate(toIsometry(T.transform), toNanoseconds(stamp));
   } catch (const tf2::TransformException& error) {
-    ROS_WARN_THROTTLE(kWarnEvery_s, "waiting for the pose of %s in %s: %s", radar_frame_.c_str(), map_frame_.c_str(), error.what());
+    ROS_WARN_THROTTLE(kWarnEvery_s, "waiting for the pose of %s in %s: %s", radar_frame_.c_str(), map_frame_.c_str(),
+                      error.what());
   }
 }
 
 void TwinNode::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) {
-  const bool stands = last_ && (last_->T_map_radar.translation() - T_map_radar.translation()).norm() <= reuse_m_ &&
-                      Eigen::Quaterniond(last_->T_map_radar.linear()).angularDistance(Eigen::Quaterniond(T_map_radar.linear())) <= reuse_rad_;
+  const bool stands =
+      last_ && (last_->T_map_radar.translation() - T_map_radar.translation()).norm() <= reuse_m_ &&
+      Eigen::Quaterniond(last_->T_map_radar.linear()).angularDistance(Eigen::Quaterniond(T_map_radar.linear())) <=
+          reuse_rad_;
   if (stands) {
     ++reused_;
     last_->grid.stamp_ns = stamp_ns;
@@ -202,8 +209,8 @@ void TwinNode::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp
     ++simulated_;
     simulate_ms_ = (ros::WallTime::now() - begin).toSec() * 1e3;
     if (!last_->check.ok()) {
-      ROS_ERROR_THROTTLE(kWarnEvery_s, "records and grid disagree: amplitudes by %g, grid by %g", last_->check.worst_amplitude_error,
-                         last_->check.grid_error);
+      ROS_ERROR_THROTTLE(kWarnEvery_s, "records and grid disagree: amplitudes by %g, grid by %g",
+                         last_->check.worst_amplitude_error, last_->check.grid_error);
     }
     mmradartwin_msgs::PathRecords paths = toMsg(*last_, twin_->scene(), radar_hash_);
     paths.header.frame_id = map_frame_;

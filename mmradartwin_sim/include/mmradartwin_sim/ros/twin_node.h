@@ -19,9 +19,10 @@ namespace mmradartwin {
 
 /// radar/config, session, radar/grid, tf -> twin/grid, twin/paths, twin/scene, diagnostics.
 ///
-/// Simulates at the pose of each measured grid (the grid's own, else tf at its stamp) and at `rate_hz` along tf while no
-/// measurement comes. Records are used again while the radar stands within `reuse_m` and `reuse_deg`. Of grids that come
-/// while one is simulated the newest is taken and the others are counted as skipped. Callbacks must come one at a time.
+/// Simulates at the pose of each measured grid (the grid's own, else tf at its stamp) and at `rate_hz` along tf while
+/// no measurement comes. Records are used again while the radar stands within `reuse_m` and `reuse_deg`. Of grids that
+/// come while one is simulated the newest is taken and the others are counted as skipped. Callbacks must come one at a
+/// time.
 ///
 /// The scene is that of the parameter `scene`, else of the latched session message, whose files are unpacked into a
 /// temporary folder.
@@ -47,11 +48,11 @@ class TwinNode {
   std::uint64_t seed_ = 1;
 
   std::optional<RadarConfig> radar_;
-  std::uint64_t radar_hash_ = 0;                        ///< of the twin's radar
-  std::string session_folder_;                          ///< unpacked session, "" where there is none
+  std::uint64_t radar_hash_ = 0;  ///< of the twin's radar
+  std::string session_folder_;    ///< unpacked session, "" where there is none
   std::optional<std::string> session_scene_, session_twin_;
   std::unique_ptr<Twin> twin_;
-  std::string problem_;                                 ///< why there is no twin, or the last pose gave nothing
+  std::string problem_;  ///< why there is no twin, or the last pose gave nothing
   std::optional<Simulation> last_;
 
   mmradartwin_msgs::ReceiveGrid::ConstPtr pending_;
