@@ -19,6 +19,7 @@ namespace {
 
 struct Options {
   std::string input, output, radar, layout;
+  BagOptions bag;
   bool mat = false;
   bool cubes = false;
 };
@@ -53,7 +54,7 @@ void writeMat(const Options& options, const Recording& recording, const Pose& po
 int process(const Options& options) {
   std::optional<CaptureLayout> layout;
   if (!options.layout.empty()) layout = options.layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
-  const Recording recording = openRecording(options.input, options.radar, layout);
+  const Recording recording = openRecording(options.input, options.radar, layout, options.bag);
   const SignalChain chain = [&] {
     try {
       return SignalChain(recording.radar);
@@ -103,7 +104,11 @@ int main(int argc, char** argv) {
   app.add_option("--radar", options.radar, "radar.yaml; needed for a bare capture, else instead of the session's");
   app.add_option("--layout", options.layout, "byte layout of the captures, instead of the radar's")
       ->check(CLI::IsMember({"4lane", "2lane"}));
-  app.add_flag("--mat", options.mat, "also write grid and map of each pose as a MATLAB file (Octave and SciPy read it too)");
+  app.add_option("--map-frame", options.bag.map_frame, "tf frame of the room, for bags")->capture_default_str();
+  app.add_option("--radar-frame", options.bag.radar_frame, "tf frame of the radar, for bags")->capture_default_str();
+  app.add_option("--ns", options.bag.ns, "namespace of the bag's topics; needed only where it holds several");
+  app.add_flag("--mat", options.mat,
+               "also write grid and map of each pose as a MATLAB file (Octave and SciPy read it too)");
   app.add_flag("--cubes", options.cubes, "with --mat: the raw cubes too, [frame][chirp][sample][rx][I,Q]");
   return runProgram(app, argc, argv, [&options] {
     if (options.cubes && !options.mat) throw InputError("--cubes says what --mat writes; give --mat too");

@@ -1,9 +1,8 @@
+#include <nodelet/nodelet.h>
 #include <ros/ros.h>  // nodelet.h needs it before itself
 
-#include <nodelet/nodelet.h>
-#include <pluginlib/class_list_macros.hpp>
-
 #include <memory>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/signal_chain_node.h"

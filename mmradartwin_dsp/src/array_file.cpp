@@ -32,8 +32,8 @@ struct MatFile::Handle {
   std::string file;
   mat_t* mat = nullptr;
 
-  void write(const std::string& name, matio_classes type, matio_types stored, std::vector<std::size_t> shape, void* data,
-             int flags) {
+  void write(const std::string& name, matio_classes type, matio_types stored, std::vector<std::size_t> shape,
+             void* data, int flags) {
     const std::unique_ptr<matvar_t, decltype(&Mat_VarFree)> variable(
         Mat_VarCreate(name.c_str(), type, stored, static_cast<int>(shape.size()), shape.data(), data,
                       flags | MAT_F_DONT_COPY_DATA),
@@ -59,7 +59,8 @@ void MatFile::write(const std::string& name, const std::vector<std::size_t>& sha
   handle_->write(name, MAT_C_DOUBLE, MAT_T_DOUBLE, shape, data.data(), 0);
 }
 
-void MatFile::write(const std::string& name, const std::vector<std::size_t>& shape, const std::complex<double>* values) {
+void MatFile::write(const std::string& name, const std::vector<std::size_t>& shape,
+                    const std::complex<double>* values) {
   auto re = toColumnMajor(shape, values, [](const std::complex<double>& value) { return value.real(); });
   auto im = toColumnMajor(shape, values, [](const std::complex<double>& value) { return value.imag(); });
   mat_complex_split_t split = {re.data(), im.data()};

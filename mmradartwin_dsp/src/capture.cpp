@@ -84,8 +84,8 @@ void decodeFrame(const RadarConfig& radar, const std::uint8_t* bytes, std::vecto
 
 std::vector<std::uint8_t> encodeFrame(const RadarConfig& radar, const std::vector<std::int16_t>& samples) {
   if (samples.size() != cubeSize(radar)) {
-    throw InputError("a frame of " + std::to_string(samples.size()) + " samples does not fit the radar, whose frames have " +
-                     std::to_string(cubeSize(radar)));
+    throw InputError("a frame of " + std::to_string(samples.size()) +
+                     " samples does not fit the radar, whose frames have " + std::to_string(cubeSize(radar)));
   }
   std::vector<std::uint8_t> bytes(radar.bytes_per_frame(), 0);
   const auto chirps = static_cast<std::size_t>(radar.chirps_per_frame());
@@ -93,9 +93,8 @@ std::vector<std::uint8_t> encodeFrame(const RadarConfig& radar, const std::vecto
   for (std::size_t chirp = 0; chirp < chirps; ++chirp) {
     std::uint8_t* out = bytes.data() + chirp * radar.bytes_per_chirp();
     const std::int16_t* in = samples.data() + chirp * stride;
-    walkChirp(radar, [in, out](std::size_t capture, std::size_t cube) {
-      std::memcpy(out + 2 * capture, in + cube, 2);
-    });
+    walkChirp(radar,
+              [in, out](std::size_t capture, std::size_t cube) { std::memcpy(out + 2 * capture, in + cube, 2); });
   }
   return bytes;
 }

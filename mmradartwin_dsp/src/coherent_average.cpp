@@ -42,7 +42,8 @@ void CoherentAverage::sumOverLoops(const AdcCube& cube, Frame& frame) const {
 
 void CoherentAverage::add(const AdcCube& cube) {
   if (cube.chirps != radar_.chirps_per_frame() || cube.samples != radar_.samples_per_chirp ||
-      cube.receivers != radar_.receivers() || cube.data.size() != sum_.size() * static_cast<std::size_t>(radar_.loops_per_frame) ||
+      cube.receivers != radar_.receivers() ||
+      cube.data.size() != sum_.size() * static_cast<std::size_t>(radar_.loops_per_frame) ||
       cube.chirp_valid.size() != static_cast<std::size_t>(cube.chirps)) {
     throw InputError("frame " + std::to_string(cube.sequence) + " has " + std::to_string(cube.chirps) + " chirps x " +
                      std::to_string(cube.samples) + " samples x " + std::to_string(cube.receivers) +

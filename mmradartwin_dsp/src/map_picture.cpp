@@ -31,7 +31,8 @@ struct Layout {
   }
 
   cv::Point2d at(double range_m, double azimuth_rad) const {
-    return {origin.x - range_m * px_per_m * std::sin(azimuth_rad), origin.y - range_m * px_per_m * std::cos(azimuth_rad)};
+    return {origin.x - range_m * px_per_m * std::sin(azimuth_rad),
+            origin.y - range_m * px_per_m * std::cos(azimuth_rad)};
   }
 
   double scale, px_per_m;
@@ -53,9 +54,9 @@ cv::Mat palette(bool diverging) {
   for (int i = 0; i < 256; ++i) {
     const double t = (i - 127.5) / 127.5;
     const cv::Vec3d color = white + (t < 0 ? blue - white : red - white) * std::abs(t);
-    colors.at<cv::Vec3b>(0, i) = cv::Vec3b(cv::saturate_cast<std::uint8_t>(color[0]),
-                                           cv::saturate_cast<std::uint8_t>(color[1]),
-                                           cv::saturate_cast<std::uint8_t>(color[2]));
+    colors.at<cv::Vec3b>(0, i) =
+        cv::Vec3b(cv::saturate_cast<std::uint8_t>(color[0]), cv::saturate_cast<std::uint8_t>(color[1]),
+                  cv::saturate_cast<std::uint8_t>(color[2]));
   }
   return colors;
 }
@@ -133,14 +134,16 @@ void drawGraticule(cv::Mat& picture, const Layout& layout, const FanStyle& style
   // Lines cross dark and light cells alike: drawn half-transparent.
   cv::Mat lines = picture.clone();
   for (double range_m = step_m; range_m < style.max_range_m + 1e-9; range_m += step_m) {
-    cv::ellipse(lines, layout.origin, cv::Size(radius_px(range_m), radius_px(range_m)), 0, 180, 360, kGrid, 1, cv::LINE_AA);
+    cv::ellipse(lines, layout.origin, cv::Size(radius_px(range_m), radius_px(range_m)), 0, 180, 360, kGrid, 1,
+                cv::LINE_AA);
   }
   for (int spoke_deg = -90; spoke_deg <= 90; spoke_deg += 30) {
     cv::line(lines, layout.origin, layout.at(style.max_range_m, spoke_deg * M_PI / 180), kGrid, 1, cv::LINE_AA);
   }
   cv::addWeighted(lines, 0.6, picture, 0.4, 0, picture);
   cv::ellipse(picture, layout.origin, cv::Size(layout.radius, layout.radius), 0, 180, 360, kInk, 1, cv::LINE_AA);
-  cv::line(picture, layout.at(style.max_range_m, -M_PI / 2), layout.at(style.max_range_m, M_PI / 2), kInk, 1, cv::LINE_AA);
+  cv::line(picture, layout.at(style.max_range_m, -M_PI / 2), layout.at(style.max_range_m, M_PI / 2), kInk, 1,
+           cv::LINE_AA);
   for (double range_m = 0; range_m < style.max_range_m + 1e-9; range_m += step_m) {
     const std::string words = std::to_string(static_cast<int>(range_m)) + (range_m > 0 ? "" : " m");
     const double below = layout.origin.y + 17 * layout.scale;

@@ -36,8 +36,8 @@ RadarConfig read(YamlMap yaml) {
   radar.tx_position_m = positions(yaml, "tx_position_m");
   radar.rx_position_m = positions(yaml, "rx_position_m");
   if (yaml.has("layout")) {
-    radar.layout = yaml.choice("layout", {"4lane", "2lane"}) == "2lane" ? CaptureLayout::kTwoLane
-                                                                        : CaptureLayout::kFourLane;
+    radar.layout =
+        yaml.choice("layout", {"4lane", "2lane"}) == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
   }
   if (yaml.has("iq_order")) {
     radar.iq_order = yaml.choice("iq_order", {"iq", "qi"}) == "qi" ? IqOrder::kQi : IqOrder::kIq;
@@ -79,9 +79,8 @@ RadarConfig read(YamlMap yaml) {
     yaml.fail("ramp_end_s", yamlNumber(radar.ramp_end_s) + " ends before the last sample; it must be at least " +
                                 yamlNumber(adc_end_s) + " (adc_start_s + samples_per_chirp/sample_rate_hz)");
   }
-  const double busy_s =
-      radar.chirps_per_frame() * (std::isnan(radar.idle_s + radar.ramp_end_s) ? adc_end_s
-                                                                               : radar.idle_s + radar.ramp_end_s);
+  const double busy_s = radar.chirps_per_frame() *
+                        (std::isnan(radar.idle_s + radar.ramp_end_s) ? adc_end_s : radar.idle_s + radar.ramp_end_s);
   if (busy_s > radar.frame_period_s + 1e-9) {
     yaml.fail("frame_period_s", yamlNumber(radar.frame_period_s) + " is shorter than the frame's " +
                                     std::to_string(radar.chirps_per_frame()) + " chirps; it must be at least " +

@@ -45,8 +45,8 @@ std::string findPackage(const fs::path& folder, const std::string& package, std:
   if (error || depth > 8 || !visited.insert(real).second) return "";
   if (fs::exists(folder / "package.xml", error)) return packageName(folder) == package ? folder.string() : "";
   if (fs::exists(folder / "CATKIN_IGNORE", error)) return "";
-  for (fs::directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end; !error && it != end;
-       it.increment(error)) {
+  for (fs::directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end;
+       !error && it != end; it.increment(error)) {
     std::error_code ignored;
     if (!it->is_directory(ignored) || it->path().filename().string().front() == '.') continue;
     const std::string found = findPackage(it->path(), package, visited, depth + 1);

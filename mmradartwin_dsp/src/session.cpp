@@ -95,7 +95,8 @@ void readPoses(const std::string& file, Recording& recording) {
   std::getline(in, line);
   if (line.compare(0, 3, "\xEF\xBB\xBF") == 0) line.erase(0, 3);  // spreadsheets put a byte order mark
   if (splitCsv(trimmed(line)) != splitCsv(kPoseColumns)) {
-    throw InputError(file + ": line 1: header is '" + trimmed(line).substr(0, 80) + "'; it must be '" + kPoseColumns + "'");
+    throw InputError(file + ": line 1: header is '" + trimmed(line).substr(0, 80) + "'; it must be '" + kPoseColumns +
+                     "'");
   }
   std::set<std::string> names;
   for (int number = 2; std::getline(in, line); ++number) {
@@ -146,9 +147,9 @@ void rejectOverlap(const Recording& recording, const std::string& pattern, const
     const std::int64_t frames = framesBySize(recording.radar, captureFile(pattern, pose.name));
     const std::int64_t end_ns = pose.stamp_ns + recording.radar.frame_offset_ns(frames);
     if (next.stamp_ns < end_ns - kOverlapTolerance_ns) {
-      throw InputError(poses_file + ": poses '" + pose.name + "' and '" + next.name + "' overlap in time: " +
-                       std::to_string(frames) + " frames from " + formatStamp(pose.stamp_ns) + " last until " +
-                       formatStamp(end_ns) + ", the next begins at " + formatStamp(next.stamp_ns) +
+      throw InputError(poses_file + ": poses '" + pose.name + "' and '" + next.name +
+                       "' overlap in time: " + std::to_string(frames) + " frames from " + formatStamp(pose.stamp_ns) +
+                       " last until " + formatStamp(end_ns) + ", the next begins at " + formatStamp(next.stamp_ns) +
                        "; correct the stamps or frame_period_s");
     }
   }
@@ -192,7 +193,8 @@ void excludeDuplicates(Recording& recording) {
 Recording openSession(const std::string& path, const SessionOptions& options) {
   const fs::path file = fs::is_directory(path) ? fs::path(path) / "session.yaml" : fs::path(path);
   if (!fs::exists(file)) {
-    throw InputError(file.string() + ": no such session; give a folder that holds a session.yaml (an unfinished recording has none)");
+    throw InputError(file.string() +
+                     ": no such session; give a folder that holds a session.yaml (an unfinished recording has none)");
   }
   YamlMap yaml = YamlMap::load(file.string());
   yaml.choice("format", {"mmradartwin_session/1"});
@@ -253,7 +255,8 @@ Recording openCapture(const std::string& file, const RadarConfig& radar) {
 
 std::int64_t parseStamp_ns(const std::string& text) {
   const auto bad = [&text](const std::string& why) {
-    return InputError("stamp '" + text.substr(0, 40) + "' " + why + "; write seconds as in 1700000000.25, allowed: 0 to 4294967295");
+    return InputError("stamp '" + text.substr(0, 40) + "' " + why +
+                      "; write seconds as in 1700000000.25, allowed: 0 to 4294967295");
   };
   const std::size_t point = text.find('.');
   const std::string whole = text.substr(0, point);
@@ -297,7 +300,8 @@ SessionWriter::SessionWriter(const std::string& directory, const RadarConfig& ra
     : directory_(directory), radar_(radar), files_(files) {
   std::error_code error;
   fs::create_directories(fs::path(directory) / "captures", error);
-  if (error) throw InputError(directory + ": folder cannot be made (" + error.message() + "); give one that can be written");
+  if (error)
+    throw InputError(directory + ": folder cannot be made (" + error.message() + "); give one that can be written");
   fs::remove(fs::path(directory) / "session.yaml", error);
   writeText(fs::path(directory) / "radar.yaml", files_.radar_yaml);
 }

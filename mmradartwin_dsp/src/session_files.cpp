@@ -22,7 +22,8 @@ const std::string kPackageScheme = "package://";
 
 std::string readFile(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in || fs::is_directory(file)) throw InputError(file.string() + ": cannot be read; put the file there or correct the name");
+  if (!in || fs::is_directory(file))
+    throw InputError(file.string() + ": cannot be read; put the file there or correct the name");
   std::ostringstream bytes;
   bytes << in.rdbuf();
   return bytes.str();
@@ -44,7 +45,9 @@ struct Place {
   /// Name in the session message: relative to the session's folder, files from outside below external/.
   std::string storedName() const {
     if (inside()) return path.string();
-    fs::path name = fs::path("external") / (root == Root::kSession ? "session" : root == Root::kPackage ? "package" : "root");
+    fs::path name = fs::path("external") / (root == Root::kSession   ? "session"
+                                            : root == Root::kPackage ? "package"
+                                                                     : "root");
     if (root == Root::kPackage) name /= package;
     for (const fs::path& part : path) name /= part == ".." ? fs::path("up") : part;
     return name.string();
@@ -127,7 +130,8 @@ struct References {
 References findReferences(const std::string& name, const std::string& bytes) {
   References found;
   std::string extension = fs::path(name).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](char c) { return static_cast<char>(std::tolower(c)); });
   if (extension == ".yaml" || extension == ".yml") {
     found.required = found.yaml = true;
     try {
@@ -153,7 +157,8 @@ References findReferences(const std::string& name, const std::string& bytes) {
 }
 
 void replaceAll(std::string& text, const std::string& from, const std::string& to) {
-  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) text.replace(at, from.size(), to);
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
 }
 
 }  // namespace
@@ -168,7 +173,8 @@ std::string storedCapturePattern(const std::string& session_yaml) {
 }
 
 std::vector<StoredFile> gatherSessionFiles(const std::string& session_file) {
-  const fs::path file = fs::is_directory(session_file) ? fs::path(session_file) / "session.yaml" : fs::path(session_file);
+  const fs::path file =
+      fs::is_directory(session_file) ? fs::path(session_file) / "session.yaml" : fs::path(session_file);
   const fs::path directory = fs::absolute(file).parent_path();
   std::vector<StoredFile> files;
   std::set<std::string> seen;
@@ -185,7 +191,8 @@ std::vector<StoredFile> gatherSessionFiles(const std::string& session_file) {
       const Place target = place.follow(reference);
       if (!fs::is_regular_file(target.resolve(directory))) {
         if (!references.required) continue;
-        throw InputError(from.string() + ": names '" + reference + "', which does not exist; correct the name or put the file there");
+        throw InputError(from.string() + ": names '" + reference +
+                         "', which does not exist; correct the name or put the file there");
       }
       queue.push_back(target);
     }

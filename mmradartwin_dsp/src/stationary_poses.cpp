@@ -67,7 +67,8 @@ std::vector<Stretch> findStationaryPoses(const std::vector<StampedTransform>& fr
   std::vector<Stretch> stretches;
   const StampedTransform* const end = frames.data() + frames.size();
   for (const StampedTransform* begin = frames.data(); begin != end;) {
-    // Grow while the next frame is near the median so far; the median is renewed each time the stretch grows by a tenth.
+    // Grow while the next frame is near the median so far; the median is renewed each time the stretch grows by a
+    // tenth.
     Eigen::Isometry3d center = begin->T_map_radar;
     const StampedTransform* stop = begin + 1;
     std::ptrdiff_t renew_at = 2;

@@ -17,8 +17,8 @@ namespace mmradartwin {
 struct YamlMap::State {
   YAML::Node node;
   std::string file;
-  std::string prefix;               // "meshes[0]." of a nested mapping
-  std::vector<std::string> known;   // keys asked for, in order of asking
+  std::string prefix;              // "meshes[0]." of a nested mapping
+  std::vector<std::string> known;  // keys asked for, in order of asking
 };
 
 namespace {
@@ -93,7 +93,8 @@ std::string didYouMean(const std::string& word, const std::vector<std::string>& 
   return "did you mean '" + *closest + "'? ";
 }
 
-/// Mapping keys must be plain words and stand once; yaml-cpp itself lets the last of two equal keys win or lose silently.
+/// Mapping keys must be plain words and stand once; yaml-cpp itself lets the last of two equal keys win or lose
+/// silently.
 void checkKeys(const YAML::Node& node, const std::string& file, const std::string& prefix) {
   std::set<std::string> seen;
   for (const auto& entry : node) {
@@ -296,7 +297,8 @@ std::vector<std::vector<long long>> YamlMap::integerLists(const std::string& key
     const std::string list_key = indexed(key, lists.size());
     if (!node.IsSequence()) fail(list_key, quote(node) + " is no list; write it in [ ]");
     std::vector<long long> list;
-    for (const YAML::Node& cell : node) list.push_back(readInteger(*this, indexed(list_key, list.size()), cell, min, max));
+    for (const YAML::Node& cell : node)
+      list.push_back(readInteger(*this, indexed(list_key, list.size()), cell, min, max));
     lists.push_back(std::move(list));
   }
   return lists;

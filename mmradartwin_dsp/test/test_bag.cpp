@@ -19,7 +19,8 @@ void copyWithout(const std::string& from, const std::string& to, const std::set<
   rosbag::Bag out(to, rosbag::bagmode::Write);
   rosbag::View view(in);
   for (const rosbag::MessageInstance& message : view) {
-    if (!topics.count(message.getTopic())) out.write(message.getTopic(), message.getTime(), message, message.getConnectionHeader());
+    if (!topics.count(message.getTopic()))
+      out.write(message.getTopic(), message.getTime(), message, message.getConnectionHeader());
   }
 }
 
@@ -92,8 +93,9 @@ TEST(Conversions, MalformedMessagesAreInputErrors) {
 TEST(Bag, SessionComesBackByteForByte) {
   const TestFolder folder;
   // A duplicate, a pose that is NaN, one whose capture is missing and one whose capture is cut: all must survive.
-  writeSession(folder / "lab", "003,B,1700000010,3,2,1.1,0,0,0,1\n004,B,1700000020,nan,2,1.1,0,0,0,1\n"
-                               "005,C,1700000030,5,2,1.1,0,0,0,1\n006,C,1700000040,6,2,1.1,0,0,0,1\n");
+  writeSession(folder / "lab",
+               "003,B,1700000010,3,2,1.1,0,0,0,1\n004,B,1700000020,nan,2,1.1,0,0,0,1\n"
+               "005,C,1700000030,5,2,1.1,0,0,0,1\n006,C,1700000040,6,2,1.1,0,0,0,1\n");
   const RadarConfig radar = paperRadar();
   writeBytes(folder / "lab/captures/003.bin", randomCapture(radar, 7, 3));
   writeBytes(folder / "lab/captures/004.bin", randomCapture(radar, 2, 4));
@@ -112,8 +114,9 @@ TEST(Bag, SessionComesBackByteForByte) {
 
 TEST(Bag, SessionAndItsBagAreTheSameRecording) {
   const TestFolder folder;
-  writeSession(folder / "lab", "003,B,1700000010,3,2,1.1,0,0,0,1\n004,B,1700000020,nan,2,1.1,0,0,0,1\n"
-                               "005,C,1700000030,5,2,1.1,0,0,0,1\n");
+  writeSession(folder / "lab",
+               "003,B,1700000010,3,2,1.1,0,0,0,1\n004,B,1700000020,nan,2,1.1,0,0,0,1\n"
+               "005,C,1700000030,5,2,1.1,0,0,0,1\n");
   sessionToBag(folder / "lab", folder / "lab.bag");
   std::filesystem::rename(folder / "lab", folder / "gone");
   Recording bag = openBag(folder / "lab.bag");
@@ -143,7 +146,8 @@ TEST(Bag, LatchedMessagesAreMarkedSoAndTfBracketsEachPose) {
   std::vector<std::int64_t> tf;
   int latched = 0, cubes = 0;
   for (const rosbag::MessageInstance& message : view) {
-    if (const auto transforms = message.instantiate<tf2_msgs::TFMessage>()) tf.push_back(toNanoseconds(transforms->transforms[0].header.stamp));
+    if (const auto transforms = message.instantiate<tf2_msgs::TFMessage>())
+      tf.push_back(toNanoseconds(transforms->transforms[0].header.stamp));
     const auto header = message.getConnectionHeader();
     if (header->count("latching") && header->at("latching") == "1") ++latched;
     if (const auto cube = message.instantiate<mmradartwin_msgs::AdcCube>()) {
@@ -188,7 +192,8 @@ void writeLiveBag(const std::string& file, const std::string& ns = "") {
     bag.write("/tf", now + ros::Duration(0.002), tf);
     cube.stamp_ns = toNanoseconds(now);
     cube.sequence = static_cast<std::uint32_t>(i);
-    bag.write(ns + "/radar/adc", now + ros::Duration(0.06), toMsg(cube, radarHash(radar)));  // a frame arrives a period late
+    bag.write(ns + "/radar/adc", now + ros::Duration(0.06),
+              toMsg(cube, radarHash(radar)));  // a frame arrives a period late
   }
 }
 
@@ -216,7 +221,9 @@ TEST(Bag, PosesOfALiveRecordingAreWhereTheRadarStood) {
       });
     };
     Recording copy = from_zero;
-    for (Pose& pose : copy.poses) pose.T_map_radar = openSession(folder / "out").poses[static_cast<std::size_t>(&pose - copy.poses.data())].T_map_radar;
+    for (Pose& pose : copy.poses)
+      pose.T_map_radar =
+          openSession(folder / "out").poses[static_cast<std::size_t>(&pose - copy.poses.data())].T_map_radar;
     return copy;
   }());
 }
@@ -229,7 +236,8 @@ TEST(Bag, NamespacesAreFound) {
   options.ns = "/robot1";
   EXPECT_EQ(openBag(folder / "ns.bag", options).poses.size(), 2u);
   options.ns = "/robot2";
-  EXPECT_TRUE(saysInOneLine(inputError([&] { openBag(folder / "ns.bag", options); }), "robot2/radar/adc", "/robot1/radar/adc"));
+  EXPECT_TRUE(
+      saysInOneLine(inputError([&] { openBag(folder / "ns.bag", options); }), "robot2/radar/adc", "/robot1/radar/adc"));
 }
 
 TEST(Bag, ASessionPlayedAtAnotherTimeIsRecognisedByPlace) {
@@ -245,7 +253,8 @@ TEST(Bag, ASessionPlayedAtAnotherTimeIsRecognisedByPlace) {
     rosbag::Bag out(folder / "both.bag", rosbag::bagmode::Write);
     const ros::Duration hour(-3600 * 24);
     rosbag::View session(from, rosbag::TopicQuery("/session")), rest(live);
-    for (const auto& message : session) out.write("/session", ros::Time(1), *message.instantiate<mmradartwin_msgs::Session>());
+    for (const auto& message : session)
+      out.write("/session", ros::Time(1), *message.instantiate<mmradartwin_msgs::Session>());
     for (const auto& message : rest) {
       if (auto cube = message.instantiate<mmradartwin_msgs::AdcCube>()) {
         cube->header.stamp += hour;
@@ -259,7 +268,8 @@ TEST(Bag, ASessionPlayedAtAnotherTimeIsRecognisedByPlace) {
     }
   }
   const Recording recording = openBag(folder / "both.bag");
-  const auto pose = std::find_if(recording.poses.begin(), recording.poses.end(), [](const Pose& p) { return p.name == "003"; });
+  const auto pose =
+      std::find_if(recording.poses.begin(), recording.poses.end(), [](const Pose& p) { return p.name == "003"; });
   ASSERT_NE(pose, recording.poses.end());
   EXPECT_NEAR(static_cast<double>(framesOf(recording, *pose).size()), 60, 1);
   EXPECT_EQ(pose->location, "C");
@@ -283,7 +293,8 @@ TEST(Bag, WhatIsMissingIsNamed) {
   EXPECT_TRUE(saysInOneLine(inputError([&] { openBag(folder / "none.bag"); }), "none.bag"));
   EXPECT_TRUE(saysInOneLine(inputError([&] { openRecording(folder / "none"); }), "none"));
   EXPECT_TRUE(saysInOneLine(inputError([&] { openRecording(folder / "lab/captures/000.bin"); }), "000.bin", "--radar"));
-  EXPECT_TRUE(saysInOneLine(inputError([&] { openRecording(folder / "lab.bag", "radar.yaml"); }), "lab.bag", "--radar"));
+  EXPECT_TRUE(
+      saysInOneLine(inputError([&] { openRecording(folder / "lab.bag", "radar.yaml"); }), "lab.bag", "--radar"));
 }
 
 TEST(Bag, FramesOfAnotherRadarAreRefused) {
@@ -306,7 +317,8 @@ TEST(Bag, FramesOfAnotherRadarAreRefused) {
   }
   const Recording recording = openBag(folder / "other.bag");
   EXPECT_EQ(framesOf(recording, recording.poses[0]).size(), 4u);
-  EXPECT_TRUE(saysInOneLine(inputError([&] { framesOf(recording, recording.poses[1]); }), "pose '001'", "another radar"));
+  EXPECT_TRUE(
+      saysInOneLine(inputError([&] { framesOf(recording, recording.poses[1]); }), "pose '001'", "another radar"));
 }
 
 TEST(Bag, LostFramesOfASessionAreReportedAfterTheRestIsWritten) {
@@ -323,7 +335,8 @@ TEST(Bag, LostFramesOfASessionAreReportedAfterTheRestIsWritten) {
       out.write(message.getTopic(), message.getTime(), message, message.getConnectionHeader());
     }
   }
-  EXPECT_TRUE(saysInOneLine(inputError([&] { bagToSession(folder / "cut.bag", folder / "out"); }), "pose '001'", "cut.bag"));
+  EXPECT_TRUE(
+      saysInOneLine(inputError([&] { bagToSession(folder / "cut.bag", folder / "out"); }), "pose '001'", "cut.bag"));
   EXPECT_EQ(readBytes(folder / "out/captures/000.bin"), readBytes(folder / "lab/captures/000.bin"));
   EXPECT_EQ(std::filesystem::file_size(folder / "out/captures/001.bin"), 3u * 2048);
 }
@@ -344,7 +357,8 @@ TEST(RealCapture, SurvivesABagRoundTripBitForBit) {
   const Recording session = openSession(folder / "lab"), bag = openBag(folder / "lab.bag");
   expectSameFrames(session, bag);
   const SignalChain chain(session.radar);
-  EXPECT_TRUE(chain.map(averagePose(session, session.poses[0])).power_db == chain.map(averagePose(bag, bag.poses[0])).power_db);
+  EXPECT_TRUE(chain.map(averagePose(session, session.poses[0])).power_db ==
+              chain.map(averagePose(bag, bag.poses[0])).power_db);
 }
 
 }  // namespace

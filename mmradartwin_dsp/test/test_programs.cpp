@@ -21,7 +21,8 @@ Outcome run(const std::string& command) {
   std::FILE* pipe = ::popen((command + " 2>&1 >/dev/null").c_str(), "r");
   Outcome result = {-1, ""};
   std::array<char, 4096> buffer;
-  for (std::size_t got; (got = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;) result.errors.append(buffer.data(), got);
+  for (std::size_t got; (got = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
+    result.errors.append(buffer.data(), got);
   result.status = WEXITSTATUS(::pclose(pipe));
   return result;
 }
@@ -34,7 +35,8 @@ TEST(Process, WritesAMapAndAPicturePerPose) {
   const Outcome done = run(kProcess + " " + folder / "lab" + " --output " + folder / "out --mat --cubes");
   EXPECT_EQ(done.status, 0) << done.errors;
   for (const char* pose : {"000", "001", "002"}) {
-    EXPECT_TRUE(contains(readBytes(folder / ("out/maps/" + std::string(pose) + ".csv")), "range_m,azimuth_deg,power_db\n0.000000,-81."));
+    EXPECT_TRUE(contains(readBytes(folder / ("out/maps/" + std::string(pose) + ".csv")),
+                         "range_m,azimuth_deg,power_db\n0.000000,-81."));
     EXPECT_EQ(readBytes(folder / ("out/pictures/" + std::string(pose) + ".png")).substr(1, 3), "PNG");
     EXPECT_EQ(readBytes(folder / ("out/mat/" + std::string(pose) + ".mat")).substr(0, 10), "MATLAB 5.0");
   }
@@ -46,7 +48,10 @@ TEST(Process, SessionBagAndCaptureGiveTheSameMap) {
   EXPECT_EQ(run(kProcess + " " + folder / "lab" + " --output " + folder / "a").status, 0);
   EXPECT_EQ(run(std::string(MMRADARTWIN_SESSION_TO_BAG) + " " + folder / "lab" + " " + folder / "lab.bag").status, 0);
   EXPECT_EQ(run(kProcess + " " + folder / "lab.bag" + " --output " + folder / "b").status, 0);
-  EXPECT_EQ(run(kProcess + " " + folder / "lab/captures/001.bin" + " --radar " + folder / "lab/radar.yaml" + " --output " + folder / "c").status, 0);
+  EXPECT_EQ(run(kProcess + " " + folder / "lab/captures/001.bin" + " --radar " + folder / "lab/radar.yaml" +
+                " --output " + folder / "c")
+                .status,
+            0);
   const std::string map = readBytes(folder / "a/maps/001.csv");
   EXPECT_GT(map.size(), 64u * 64 * 20);
   EXPECT_EQ(readBytes(folder / "b/maps/001.csv"), map);
@@ -75,8 +80,9 @@ TEST(Process, BadUseIsOneErrorLineAndStatusTwo) {
   writeSession(folder / "lab");
   const std::string out = " --output " + folder / "out";
   for (const std::string& command :
-       {kProcess, kProcess + " " + folder / "lab", kProcess + " " + folder / "none" + out, kProcess + " " + folder / "lab --layout 3lane" + out,
-        kProcess + " " + folder / "lab/captures/000.bin" + out, kProcess + " " + folder / "lab --cubes" + out,
+       {kProcess, kProcess + " " + folder / "lab", kProcess + " " + folder / "none" + out,
+        kProcess + " " + folder / "lab --layout 3lane" + out, kProcess + " " + folder / "lab/captures/000.bin" + out,
+        kProcess + " " + folder / "lab --cubes" + out,
         std::string(MMRADARTWIN_SESSION_TO_BAG) + " " + folder / "none" + " " + folder / "x.bag",
         std::string(MMRADARTWIN_SESSION_TO_BAG) + " " + folder / "lab" + " " + folder / "no/x.bag",
         std::string(MMRADARTWIN_BAG_TO_SESSION) + " " + folder / "none.bag" + " " + folder / "x"}) {

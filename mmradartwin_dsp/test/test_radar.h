@@ -52,12 +52,13 @@ inline ComplexGrid pointTarget(const RadarConfig& radar, double range_m, double 
 /// Real recordings; empty where they are not on this machine.
 inline std::filesystem::path dataFolder() {
   if (const char* folder = std::getenv("MMRADARTWIN_DATA")) return folder;
-  return std::filesystem::weakly_canonical(std::filesystem::path(MMRADARTWIN_DSP_SOURCE) / ".." / ".." / "shared" / "data");
+  return std::filesystem::weakly_canonical(std::filesystem::path(MMRADARTWIN_DSP_SOURCE) / ".." / ".." / "shared" /
+                                           "data");
 }
 
-#define SKIP_WITHOUT(file)                                                                                       \
-  if (!std::filesystem::exists(file)) {                                                                          \
-    GTEST_SKIP() << file << " is not here; set MMRADARTWIN_DATA to the folder with the real recordings";         \
+#define SKIP_WITHOUT(file)                                                                               \
+  if (!std::filesystem::exists(file)) {                                                                  \
+    GTEST_SKIP() << file << " is not here; set MMRADARTWIN_DATA to the folder with the real recordings"; \
   }
 
 /// Message of the InputError that `action` throws, "" where it throws none.

@@ -45,9 +45,10 @@ TEST(Session, ReadsWhatIsThere) {
 
 TEST(Session, PosesThatCannotBeUsedAreProblemsOfTheirOwn) {
   const TestFolder folder;
-  writeSession(folder / "lab",
-               "003,B,1700000003.5,nan,2,1.1,0,0,0,1\n004,B,1700000004.5,3,2,1.1,0,0,0,0.9\n005,B,soon,3,2,1.1,0,0,0,1\n"
-               "006,B,1700000006.5,x,2,1.1,0,0,0,1\n");
+  writeSession(
+      folder / "lab",
+      "003,B,1700000003.5,nan,2,1.1,0,0,0,1\n004,B,1700000004.5,3,2,1.1,0,0,0,0.9\n005,B,soon,3,2,1.1,0,0,0,1\n"
+      "006,B,1700000006.5,x,2,1.1,0,0,0,1\n");
   const Recording recording = openSession(folder / "lab");
   EXPECT_EQ(recording.poses.size(), 3u);
   ASSERT_EQ(recording.problems.size(), 4u);
@@ -67,13 +68,15 @@ TEST(Session, MissingAndTruncatedCapturesAreNamedWhenRead) {
   ASSERT_EQ(recording.poses.size(), 3u);
   EXPECT_EQ(framesOf(recording, recording.poses[0]).size(), 4u);
   EXPECT_TRUE(saysInOneLine(inputError([&] { framesOf(recording, recording.poses[1]); }), "pose '001'", "001.bin"));
-  EXPECT_TRUE(saysInOneLine(inputError([&] { framesOf(recording, recording.poses[2]); }), "pose '002'", "3 whole frames"));
+  EXPECT_TRUE(
+      saysInOneLine(inputError([&] { framesOf(recording, recording.poses[2]); }), "pose '002'", "3 whole frames"));
 }
 
 TEST(Session, OverlapInTimeIsAnError) {
   const TestFolder folder;
   writeSession(folder / "lab", "", 21);  // 21 frames last 1.05 s, the next pose comes after 1 s
-  EXPECT_TRUE(saysInOneLine(inputError([&] { openSession(folder / "lab"); }), "poses.csv", "'000'", "'001'", "overlap"));
+  EXPECT_TRUE(
+      saysInOneLine(inputError([&] { openSession(folder / "lab"); }), "poses.csv", "'000'", "'001'", "overlap"));
   writeSession(folder / "lab", "", 20);  // back to back
   EXPECT_EQ(openSession(folder / "lab").poses.size(), 3u);
   SessionOptions without;
@@ -132,7 +135,8 @@ TEST(Session, WriterAndReaderAgree) {
   pose.name = "7";
   pose.location = "desk";
   pose.stamp_ns = 1700000000123456789;
-  pose.T_map_radar = Eigen::Translation3d(1.0 / 3, -2.5, 1.1) * Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized());
+  pose.T_map_radar =
+      Eigen::Translation3d(1.0 / 3, -2.5, 1.1) * Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized());
   AdcCube cube;
   decodeFrame(radar, reinterpret_cast<const std::uint8_t*>(randomCapture(radar, 1, 5).data()), cube.data);
   SessionWriter::Files files;
@@ -169,7 +173,8 @@ TEST(ResolvePath, FindsPackagesWithoutROS) {
   setenv("CMAKE_PREFIX_PATH", (folder / "install").c_str(), 1);
   EXPECT_EQ(resolvePath("package://my_config/radar.yaml", "/a/session.yaml"), folder / "ws/src/repo/config/radar.yaml");
   EXPECT_EQ(resolvePath("package://other/x.yaml", "/a/session.yaml"), folder / "install/share/other/x.yaml");
-  EXPECT_TRUE(saysInOneLine(inputError([] { resolvePath("package://nobody/x", "/a/session.yaml"); }), "/a/session.yaml", "'nobody'"));
+  EXPECT_TRUE(saysInOneLine(inputError([] { resolvePath("package://nobody/x", "/a/session.yaml"); }), "/a/session.yaml",
+                            "'nobody'"));
   setenv("ROS_PACKAGE_PATH", keep_ros.c_str(), 1);
   setenv("CMAKE_PREFIX_PATH", keep_cmake.c_str(), 1);
   EXPECT_EQ(resolvePath("b/../c.yaml", "/a/session.yaml"), "/a/c.yaml");
@@ -187,7 +192,8 @@ TEST(SessionFiles, HoldEverythingThatSceneAndTwinName) {
                                              "model/room.mtl", "model/room.obj", "model/scene.yaml", "poses.csv",
                                              "radar.yaml", "session.yaml", "twin.yaml"}));
   std::filesystem::remove(folder / "lab/materials.yaml");
-  EXPECT_TRUE(saysInOneLine(inputError([&] { gatherSessionFiles(folder / "lab"); }), "scene.yaml", "'../materials.yaml'"));
+  EXPECT_TRUE(
+      saysInOneLine(inputError([&] { gatherSessionFiles(folder / "lab"); }), "scene.yaml", "'../materials.yaml'"));
 }
 
 TEST(SessionFiles, OutsideFilesWorkElsewhereAndLeaveTheOriginalAlone) {
@@ -212,20 +218,26 @@ TEST(SessionFiles, OutsideFilesWorkElsewhereAndLeaveTheOriginalAlone) {
   EXPECT_EQ(readBytes(folder / "there/x/lab/external/session/up/shared/meshes/room.obj"), "v 0 0 0\n");
   const std::string scene = readBytes(*recording.scene_file);
   const std::size_t at = scene.find("materials: ") + 11;
-  EXPECT_EQ(readBytes(resolvePath(scene.substr(at, scene.find('\n', at) - at), *recording.scene_file)), "materials: {}\n");
+  EXPECT_EQ(readBytes(resolvePath(scene.substr(at, scene.find('\n', at) - at), *recording.scene_file)),
+            "materials: {}\n");
 }
 
 TEST(SessionFiles, NamesThatLeaveTheFolderAreRefused) {
   const TestFolder folder;
   for (const char* name : {"../evil", "/evil", "a/../../evil", ""}) {
-    EXPECT_TRUE(saysInOneLine(inputError([&] { restoreSessionFiles({{name, "x"}}, folder / "s"); }), "session message")) << name;
+    EXPECT_TRUE(saysInOneLine(inputError([&] {
+                                restoreSessionFiles({{name, "x"}}, folder / "s");
+                              }),
+                              "session message"))
+        << name;
   }
 }
 
 StampedTransform at(double t_s, double x, double yaw_deg, double jitter = 0) {
   StampedTransform frame;
   frame.stamp_ns = static_cast<std::int64_t>(std::llround(t_s * 1e9));
-  frame.T_map_radar = Eigen::Translation3d(x, jitter, 1.1) * Eigen::AngleAxisd(yaw_deg * M_PI / 180, Eigen::Vector3d::UnitZ());
+  frame.T_map_radar =
+      Eigen::Translation3d(x, jitter, 1.1) * Eigen::AngleAxisd(yaw_deg * M_PI / 180, Eigen::Vector3d::UnitZ());
   return frame;
 }
 
@@ -236,15 +248,16 @@ TEST(StationaryPoses, AreStretchesOfASecond) {
     for (int i = 0; i < seconds * 20; ++i, t += 0.05) frames.push_back(at(t, x, yaw_deg, 0.004 * ((i * 7) % 3 - 1)));
   };
   const auto move = [&](double seconds, double from, double to) {
-    for (int i = 0; i < seconds * 20; ++i, t += 0.05) frames.push_back(at(t, from + (to - from) * i / (seconds * 20), 0));
+    for (int i = 0; i < seconds * 20; ++i, t += 0.05)
+      frames.push_back(at(t, from + (to - from) * i / (seconds * 20), 0));
   };
-  stay(3, 0, 0);       // 001
+  stay(3, 0, 0);  // 001
   move(2, 0.1, 1.9);
-  stay(0.9, 2, 0);     // too short
-  stay(5, 2, 30);      // 002: the same place, turned
+  stay(0.9, 2, 0);  // too short
+  stay(5, 2, 30);   // 002: the same place, turned
   move(2, 2.1, 2.9);
-  stay(1, 3, 0);       // 003: just long enough
-  stay(2, 0.05, 40);   // 004: back at the first location
+  stay(1, 3, 0);      // 003: just long enough
+  stay(2, 0.05, 40);  // 004: back at the first location
   const std::vector<Stretch> stretches = findStationaryPoses(frames, 50000000);
   ASSERT_EQ(stretches.size(), 4u);
   EXPECT_EQ(stretches[0].pose.name, "001");

@@ -49,7 +49,8 @@ inline void writeSession(const std::filesystem::path& folder, const std::string&
              "meshes:\n  - {file: room.obj}\n  - {file: parts/desk.gltf}\nmaterials: ../materials.yaml\n");
   writeBytes(folder / "model/room.obj", "mtllib room.mtl\no wall\nv 0 0 0\n");
   writeBytes(folder / "model/room.mtl", "newmtl Concrete\nmap_Kd missing.png\n");
-  writeBytes(folder / "model/parts/desk.gltf", "{\"asset\": {\"version\": \"2.0\"}, \"buffers\": [{\"uri\": \"desk.bin\"}]}");
+  writeBytes(folder / "model/parts/desk.gltf",
+             "{\"asset\": {\"version\": \"2.0\"}, \"buffers\": [{\"uri\": \"desk.bin\"}]}");
   writeBytes(folder / "model/parts/desk.bin", std::string("\0\1\2\xff", 4));
   writeBytes(folder / "materials.yaml", "materials:\n  Concrete: {model: conductor}\n");
   writeBytes(folder / "twin.yaml", "mechanisms:\n  specular: {max_bounces: 3}\n");

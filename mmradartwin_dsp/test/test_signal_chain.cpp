@@ -62,9 +62,11 @@ TEST(SignalChain, PointTargetPeaksInItsBinAndOnItsSide) {
       const double center_y = radar.virtual_element_m(7).y() / 4;
       const double x = range_m * std::cos(rad(azimuth_deg)), y = range_m * std::sin(rad(azimuth_deg)) - center_y;
       const double sine = y / std::hypot(x, y);
-      const int expected_angle = static_cast<int>(std::lround(32 + 32 * sine * 2 * radar.virtual_pitch_m() / radar.wavelength_m()));
+      const int expected_angle =
+          static_cast<int>(std::lround(32 + 32 * sine * 2 * radar.virtual_pitch_m() / radar.wavelength_m()));
       EXPECT_NEAR(static_cast<double>(peak.angle), expected_angle, 1) << azimuth_deg << " deg, " << range_m << " m";
-      EXPECT_EQ(peak.range, std::lround(std::hypot(x, y) / radar.range_bin_m())) << azimuth_deg << " deg, " << range_m << " m";
+      EXPECT_EQ(peak.range, std::lround(std::hypot(x, y) / radar.range_bin_m()))
+          << azimuth_deg << " deg, " << range_m << " m";
       if (azimuth_deg != 0) {
         EXPECT_GT(axes.azimuth_rad[static_cast<std::size_t>(peak.angle)] * azimuth_deg, 0) << "wrong side";
       }
@@ -153,10 +155,15 @@ TEST(SignalChain, NonUniformArraysAreErrors) {
     change(radar);
     return inputError([&] { SignalChain chain(radar); });
   };
-  EXPECT_TRUE(saysInOneLine(with([](RadarConfig& r) { r.rx_position_m[2].y() += 3e-4; }), "uniform line along y", "element 2"));
+  EXPECT_TRUE(
+      saysInOneLine(with([](RadarConfig& r) { r.rx_position_m[2].y() += 3e-4; }), "uniform line along y", "element 2"));
   EXPECT_TRUE(saysInOneLine(with([](RadarConfig& r) { r.rx_position_m[1].z() += 3e-4; }), "uniform line along y"));
-  EXPECT_TRUE(saysInOneLine(with([](RadarConfig& r) { std::swap(r.tx_position_m[0], r.tx_position_m[1]); }), "uniform"));
-  EXPECT_TRUE(saysInOneLine(with([](RadarConfig& r) { for (auto& p : r.rx_position_m) p.setZero(); }), "uniform"));
+  EXPECT_TRUE(
+      saysInOneLine(with([](RadarConfig& r) { std::swap(r.tx_position_m[0], r.tx_position_m[1]); }), "uniform"));
+  EXPECT_TRUE(saysInOneLine(with([](RadarConfig& r) {
+                              for (auto& p : r.rx_position_m) p.setZero();
+                            }),
+                            "uniform"));
   EXPECT_FALSE(inputError([] { SignalChain(paperRadar()).rangeSpectra(ComplexGrid::Zero(7, 64)); }).empty());
 }
 
@@ -214,7 +221,8 @@ class AverageTest : public ::testing::Test {
             ++weight;
           }
         }
-        x(k, n) = {static_cast<double>(re) / static_cast<double>(weight), static_cast<double>(im) / static_cast<double>(weight)};
+        x(k, n) = {static_cast<double>(re) / static_cast<double>(weight),
+                   static_cast<double>(im) / static_cast<double>(weight)};
       }
     }
     return x;
@@ -229,7 +237,8 @@ TEST_F(AverageTest, SlidingEqualsRecomputationBitForBit) {
   for (unsigned i = 1; i <= 40; ++i) {
     all.push_back(cube(i));
     average.add(all.back());
-    const std::vector<AdcCube> window(all.end() - std::min<std::ptrdiff_t>(5, static_cast<std::ptrdiff_t>(all.size())), all.end());
+    const std::vector<AdcCube> window(all.end() - std::min<std::ptrdiff_t>(5, static_cast<std::ptrdiff_t>(all.size())),
+                                      all.end());
     EXPECT_EQ(average.frames(), static_cast<int>(window.size()));
     if (!average.complete()) continue;
     EXPECT_TRUE(average.grid().x == byDefinition(window)) << i;

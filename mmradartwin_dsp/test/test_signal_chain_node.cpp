@@ -18,7 +18,8 @@ template <typename Message>
 class Inbox {
  public:
   Inbox(ros::NodeHandle& nh, const std::string& topic)
-      : subscriber_(nh.subscribe<Message>(topic, 100, [this](const typename Message::ConstPtr& m) { messages.push_back(m); })) {}
+      : subscriber_(nh.subscribe<Message>(topic, 100,
+                                          [this](const typename Message::ConstPtr& m) { messages.push_back(m); })) {}
   /// Waits until `count` messages are there, some seconds at most.
   bool wait(std::size_t count, double seconds = 5) {
     const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
@@ -51,8 +52,8 @@ class SignalChainNodeTest : public ::testing::Test {
     start_ = ros::Time(1700000000 + 3600 * tests++);
     config_.publish(toMsg(radar_));
     const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10);
-    while (ros::WallTime::now() < end &&
-           !(grids_.connected() && maps_.connected() && twin_maps_.connected() && cubes_.getNumSubscribers() && twin_.getNumSubscribers())) {
+    while (ros::WallTime::now() < end && !(grids_.connected() && maps_.connected() && twin_maps_.connected() &&
+                                           cubes_.getNumSubscribers() && twin_.getNumSubscribers())) {
       ros::spinOnce();
       ros::WallDuration(0.01).sleep();
     }

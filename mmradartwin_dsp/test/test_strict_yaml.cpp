@@ -43,7 +43,8 @@ TEST(StrictYaml, UnknownKeysAreErrorsWithASuggestion) {
 
 TEST(StrictYaml, MissingKeyNamesTheMisspeltOne) {
   YamlMap map = yaml("carier_hz: 1\n");
-  EXPECT_TRUE(saysInOneLine(inputError([&] { map.number("carrier_hz", 0, 1); }), "key carrier_hz", "missing", "carier_hz"));
+  EXPECT_TRUE(
+      saysInOneLine(inputError([&] { map.number("carrier_hz", 0, 1); }), "key carrier_hz", "missing", "carier_hz"));
 }
 
 TEST(StrictYaml, NestedMapsKeepTheirPath) {
@@ -66,7 +67,10 @@ TEST(StrictYaml, BrokenFilesAreErrors) {
 
 TEST(StrictYaml, ChoicesListsAndBooleans) {
   YamlMap map = yaml("l: 4lan\nrows: [[1, 2, 3], [1, 2]]\nb: maybe\nt: [a, b]\n");
-  EXPECT_TRUE(saysInOneLine(inputError([&] { map.choice("l", {"4lane", "2lane"}); }), "'4lan'", "did you mean '4lane'"));
+  EXPECT_TRUE(saysInOneLine(inputError([&] {
+                              map.choice("l", {"4lane", "2lane"});
+                            }),
+                            "'4lan'", "did you mean '4lane'"));
   EXPECT_TRUE(saysInOneLine(inputError([&] { map.rows("rows", 3, -1, 5); }), "rows[1]", "3 numbers"));
   EXPECT_TRUE(saysInOneLine(inputError([&] { map.boolean("b"); }), "key b", "'maybe'"));
   EXPECT_EQ(map.texts("t"), (std::vector<std::string>{"a", "b"}));
@@ -96,7 +100,8 @@ TEST(RadarYaml, TextReadsBack) {
   EXPECT_EQ(parseRadarConfig(written, "b").tx_enable, (std::vector<std::vector<int>>{{0}, {1, 2}}));
   EXPECT_TRUE(parseRadarConfig(written, "b").iq_order == IqOrder::kQi);
   // PyYAML's rule: a float has a point and a signed exponent.
-  EXPECT_TRUE(contains(written, "carrier_hz: 7.7e+10\n") || contains(written, "carrier_hz: 77000000000.0\n")) << written;
+  EXPECT_TRUE(contains(written, "carrier_hz: 7.7e+10\n") || contains(written, "carrier_hz: 77000000000.0\n"))
+      << written;
 }
 
 TEST(RadarYaml, StrictAboutWhatCannotBe) {
@@ -111,7 +116,8 @@ TEST(RadarYaml, StrictAboutWhatCannotBe) {
   EXPECT_TRUE(saysInOneLine(with("slope_hz_per_s: 75.0e+12\n", ""), "slope_hz_per_s", "missing"));
   EXPECT_TRUE(saysInOneLine(with("device", "ramp_end_s: 10.0e-6\ndevice"), "ramp_end_s", "last sample"));
   EXPECT_TRUE(saysInOneLine(with("device", "tx_enable: [[0]]\ndevice"), "tx_enable", "1 slots"));
-  EXPECT_TRUE(saysInOneLine(with("samples_per_chirp: 64", "layout: 2lane\nsamples_per_chirp: 63"), "samples_per_chirp", "even"));
+  EXPECT_TRUE(saysInOneLine(with("samples_per_chirp: 64", "layout: 2lane\nsamples_per_chirp: 63"), "samples_per_chirp",
+                            "even"));
 }
 
 }  // namespace

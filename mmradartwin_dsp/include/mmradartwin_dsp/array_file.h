@@ -8,8 +8,8 @@
 
 namespace mmradartwin {
 
-/// A MATLAB level 5 file (.mat), which MATLAB, Octave and SciPy read. Arrays are given in C order, the last index running
-/// fastest, and keep their index order in the file: x[m][n] becomes x(m+1, n+1).
+/// A MATLAB level 5 file (.mat), which MATLAB, Octave and SciPy read. Arrays are given in C order, the last index
+/// running fastest, and keep their index order in the file: x[m][n] becomes x(m+1, n+1).
 class MatFile {
  public:
   /// Throws std::runtime_error where the file cannot be made, InputError where this build lacks libmatio.

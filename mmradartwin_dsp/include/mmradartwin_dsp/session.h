@@ -38,7 +38,7 @@ struct Recording {
   std::vector<std::string> duplicates;           ///< names of excluded poses (10 cm, 2 cm, 1 deg of an earlier one)
   std::vector<PoseProblem> problems;             ///< poses that cannot be used (NaN, unreadable, ...)
   std::vector<std::string> pose_names;           ///< every pose that the session names, in its order
-  std::string capture_pattern;                   ///< path of a capture with {pose} for the name; empty where there are no files
+  std::string capture_pattern;                   ///< path of a capture, {pose} for the name; "" without files
   /// Visits the frames of a pose in order. Throws InputError where its capture is missing or damaged.
   std::function<void(const Pose&, const std::function<void(const AdcCube&)>&)> forEachFrame;
 };

@@ -60,7 +60,7 @@ class YamlMap {
 
 /// `text` as a double-quoted YAML scalar.
 std::string yamlText(const std::string& text);
-/// Shortest decimal that reads back as exactly `value`, such that YAML 1.1 takes it for a number too (7.7e+10, 1.0e-06).
+/// Shortest decimal that reads back as exactly `value`; YAML 1.1 takes it for a number too (7.7e+10, 1.0e-06).
 std::string yamlNumber(double value);
 
 }  // namespace mmradartwin

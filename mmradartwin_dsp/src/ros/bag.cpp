@@ -53,7 +53,9 @@ struct Folder {
   std::string path;
 };
 
-std::string withoutSlash(const std::string& name) { return name.substr(std::min(name.find_first_not_of('/'), name.size())); }
+std::string withoutSlash(const std::string& name) {
+  return name.substr(std::min(name.find_first_not_of('/'), name.size()));
+}
 
 class BagContents {
  public:
@@ -89,7 +91,8 @@ class BagContents {
       if (!cube || !stamps.count(toNanoseconds(cube->header.stamp))) continue;
       if (cube->radar_hash != radar_hash) {
         throw InputError(file_ + ": pose '" + pose + "': frame " + std::to_string(cube->sequence) +
-                         " was taken with another radar configuration than " + topic("radar/config") + " says; cut the bag with rosbag filter");
+                         " was taken with another radar configuration than " + topic("radar/config") +
+                         " says; cut the bag with rosbag filter");
       }
       AdcCube frame = fromMsg(*cube);
       checkShape(pose, frame);
@@ -124,9 +127,10 @@ class BagContents {
     const std::string ending = "radar/adc";
     if (found.size() < ending.size() || found.compare(found.size() - ending.size(), ending.size(), ending) != 0) {
       std::string others;
-      for (const std::string& name : cube_topics.empty() ? all : cube_topics) others += (others.empty() ? "" : ", ") + name;
-      throw InputError(file_ + ": bag holds no frames on topic " + wanted + " (it has " + (others.empty() ? "nothing" : others) +
-                       "); record radar/adc, radar/config and tf");
+      for (const std::string& name : cube_topics.empty() ? all : cube_topics)
+        others += (others.empty() ? "" : ", ") + name;
+      throw InputError(file_ + ": bag holds no frames on topic " + wanted + " (it has " +
+                       (others.empty() ? "nothing" : others) + "); record radar/adc, radar/config and tf");
     }
     prefix_ = found.substr(0, found.size() - ending.size());
   }
@@ -247,7 +251,8 @@ using CubesByPose = std::map<std::string, std::vector<CubeIndex>>;
 CubesByPose assignByStamp(const std::vector<Pose>& poses, const std::vector<CubeIndex>& cubes, std::int64_t slack_ns) {
   std::vector<const Pose*> by_time;
   for (const Pose& pose : poses) by_time.push_back(&pose);
-  std::stable_sort(by_time.begin(), by_time.end(), [](const Pose* a, const Pose* b) { return a->stamp_ns < b->stamp_ns; });
+  std::stable_sort(by_time.begin(), by_time.end(),
+                   [](const Pose* a, const Pose* b) { return a->stamp_ns < b->stamp_ns; });
   CubesByPose assigned;
   for (const CubeIndex& cube : cubes) {
     const auto next = std::upper_bound(by_time.begin(), by_time.end(), cube.stamp_ns + slack_ns,
@@ -338,14 +343,15 @@ Recording openBag(const std::string& file, const BagOptions& options) {
   }
   fs::create_directories(folder);
   auto assigned = std::make_shared<CubesByPose>();
-  Recording recording = bag->session ? fromSessionMessage(*bag, folder, *assigned)
-                                     : fromStretches(*bag, file, folder, *assigned);
+  Recording recording =
+      bag->session ? fromSessionMessage(*bag, folder, *assigned) : fromStretches(*bag, file, folder, *assigned);
   recording.source = file;
   recording.radar = bag->radar;
   recording.radar_file = bag->label();
   if (recording.poses.empty() && recording.problems.empty()) {
     throw InputError(file + ": bag holds no pose: in tf, " + options.map_frame + " -> " + options.radar_frame +
-                     " nowhere stands still (2 cm, 1 deg) for 1 s while frames come; check the frames' names, or keep the radar still longer");
+                     " nowhere stands still (2 cm, 1 deg) for 1 s while frames come; check the frames' names, or keep "
+                     "the radar still longer");
   }
   if (options.exclude_duplicates) excludeDuplicates(recording);
   recording.forEachFrame = [bag, temporary, assigned, file, from_files = recording.forEachFrame,
@@ -354,25 +360,30 @@ Recording openBag(const std::string& file, const BagOptions& options) {
     const auto cubes = assigned->find(pose.name);
     if (cubes != assigned->end() && !cubes->second.empty()) return bag->forEachFrame(pose.name, cubes->second, visit);
     std::string capture = pattern;
-    if (!capture.empty() && fs::exists(capture.replace(capture.find("{pose}"), 6, pose.name))) return from_files(pose, visit);
-    throw InputError(file + ": pose '" + pose.name + "': bag holds no frames of it; its capture was missing or its time was cut out");
+    if (!capture.empty() && fs::exists(capture.replace(capture.find("{pose}"), 6, pose.name)))
+      return from_files(pose, visit);
+    throw InputError(file + ": pose '" + pose.name +
+                     "': bag holds no frames of it; its capture was missing or its time was cut out");
   };
   return recording;
 }
 
-Recording openRecording(const std::string& path, const std::string& radar_file, const std::optional<CaptureLayout>& layout) {
+Recording openRecording(const std::string& path, const std::string& radar_file,
+                        const std::optional<CaptureLayout>& layout, const BagOptions& bag_options) {
   const std::string extension = fs::path(path).extension().string();
   if (!fs::exists(path)) {
     throw InputError(path + ": no such file or folder; give a session directory, a .bag or a .bin capture");
   }
   if (extension == ".bag") {
     if (!radar_file.empty() || layout) {
-      throw InputError(path + ": a bag brings its own radar and holds cubes, not captures; leave --radar and --layout out");
+      throw InputError(path +
+                       ": a bag brings its own radar and holds cubes, not captures; leave --radar and --layout out");
     }
-    return openBag(path);
+    return openBag(path, bag_options);
   }
   if (extension == ".bin") {
-    if (radar_file.empty()) throw InputError(path + ": a bare capture needs a radar description; give --radar radar.yaml");
+    if (radar_file.empty())
+      throw InputError(path + ": a bare capture needs a radar description; give --radar radar.yaml");
     RadarConfig radar = loadRadarConfig(radar_file);
     if (layout) radar.layout = *layout;
     return openCapture(path, radar);

@@ -28,8 +28,8 @@ std::vector<Eigen::Vector3d> fromPoints(const std::vector<geometry_msgs::Point>&
 
 void requireSize(const char* message, const char* field, std::size_t found, std::uint64_t expected) {
   if (found == expected) return;
-  throw InputError(std::string(message) + ": field " + field + " has " + std::to_string(found) + " entries; its shape says " +
-                   std::to_string(expected));
+  throw InputError(std::string(message) + ": field " + field + " has " + std::to_string(found) +
+                   " entries; its shape says " + std::to_string(expected));
 }
 
 /// Sizes multiply without overflow below this, and no radar comes near.
@@ -93,7 +93,9 @@ mmradartwin_msgs::RadarConfig toMsg(const RadarConfig& radar) {
   msg.layout = radar.layout == CaptureLayout::kTwoLane ? "2lane" : "4lane";
   msg.iq_order = radar.iq_order == IqOrder::kQi ? "qi" : "iq";
   // One NaN, bit for bit, or equal configurations would hash differently.
-  const auto canonical = [](double value) { return std::isnan(value) ? std::numeric_limits<double>::quiet_NaN() : value; };
+  const auto canonical = [](double value) {
+    return std::isnan(value) ? std::numeric_limits<double>::quiet_NaN() : value;
+  };
   msg.idle_s = canonical(radar.idle_s);
   msg.ramp_end_s = canonical(radar.ramp_end_s);
   msg.rx_gain_db = canonical(radar.rx_gain_db);
@@ -176,8 +178,7 @@ mmradartwin_msgs::AdcCube toMsg(const AdcCube& cube, std::uint64_t radar_hash) {
 
 AdcCube fromMsg(const mmradartwin_msgs::AdcCube& msg) {
   requirePlausible("AdcCube", msg.chirps, msg.samples_per_chirp, msg.receivers);
-  requireSize("AdcCube", "samples", msg.samples.size(),
-              2ull * msg.chirps * msg.samples_per_chirp * msg.receivers);
+  requireSize("AdcCube", "samples", msg.samples.size(), 2ull * msg.chirps * msg.samples_per_chirp * msg.receivers);
   requireSize("AdcCube", "chirp_valid", msg.chirp_valid.size(), msg.chirps);
   AdcCube cube;
   cube.stamp_ns = toNanoseconds(msg.header.stamp);

@@ -166,7 +166,8 @@ void restoreSession(const mmradartwin_msgs::Session& message, const std::string&
     return std::any_of(files.begin(), files.end(), [&](const StoredFile& file) { return file.name == name; });
   };
   if (!has_file("session.yaml")) throw InputError(bag + ": its session message holds no session.yaml; record it anew");
-  const auto session_yaml = std::find_if(files.begin(), files.end(), [](const StoredFile& f) { return f.name == "session.yaml"; });
+  const auto session_yaml =
+      std::find_if(files.begin(), files.end(), [](const StoredFile& f) { return f.name == "session.yaml"; });
   const std::string pattern = storedCapturePattern(session_yaml->bytes);
   BagOptions options;
   options.exclude_duplicates = false;
@@ -176,7 +177,8 @@ void restoreSession(const mmradartwin_msgs::Session& message, const std::string&
   for (std::size_t i = 0; i < total; ++i) {
     const std::string& name = recording.pose_names[i];
     const std::string expected = i < message.capture_sha256.size() ? message.capture_sha256[i] : "";
-    const auto pose = std::find_if(recording.poses.begin(), recording.poses.end(), [&](const Pose& p) { return p.name == name; });
+    const auto pose =
+        std::find_if(recording.poses.begin(), recording.poses.end(), [&](const Pose& p) { return p.name == name; });
     if (!expected.empty() && !has_file(captureOf(pattern, name))) {
       std::string found;
       try {
@@ -194,7 +196,8 @@ void restoreSession(const mmradartwin_msgs::Session& message, const std::string&
   if (different.empty()) return;
   throw InputError(bag + ": pose '" + different.front() + "'" +
                    (different.size() > 1 ? " and " + std::to_string(different.size() - 1) + " more" : "") +
-                   ": the bag's frames are not the whole capture (lost on the way, or cut out); the rest of the session was written to " +
+                   ": the bag's frames are not the whole capture (lost on the way, or cut out); the rest of the "
+                   "session was written to " +
                    directory);
 }
 
@@ -231,7 +234,8 @@ void bagToSession(const std::string& bag, const std::string& directory, const Po
   }
   std::error_code error;
   fs::create_directories(directory, error);
-  if (error) throw InputError(directory + ": folder cannot be made (" + error.message() + "); give one that can be written");
+  if (error)
+    throw InputError(directory + ": folder cannot be made (" + error.message() + "); give one that can be written");
   message ? restoreSession(*message, bag, directory, progress) : writeFoundSession(bag, directory, progress);
 }
 
@@ -255,7 +259,8 @@ void sessionToBag(const std::string& session, const std::string& bag_file, const
   try {
     bag.open(unfinished, rosbag::bagmode::Write);
   } catch (const rosbag::BagException& error) {
-    throw InputError(bag_file + ": bag cannot be written (" + error.what() + "); give a file in a folder that can be written");
+    throw InputError(bag_file + ": bag cannot be written (" + error.what() +
+                     "); give a file in a folder that can be written");
   }
   std::int64_t start_ns = std::numeric_limits<std::int64_t>::max();
   for (const Pose& pose : recording.poses) start_ns = std::min(start_ns, pose.stamp_ns);
@@ -271,7 +276,8 @@ void sessionToBag(const std::string& session, const std::string& bag_file, const
     const bool exists = fs::is_regular_file(capture);
     const std::string bytes = exists ? readBytes(capture) : "";
     message.capture_sha256.push_back(exists ? sha256(bytes) : "");
-    const auto pose = std::find_if(recording.poses.begin(), recording.poses.end(), [&](const Pose& p) { return p.name == name; });
+    const auto pose =
+        std::find_if(recording.poses.begin(), recording.poses.end(), [&](const Pose& p) { return p.name == name; });
     const bool in_cubes = exists && pose != recording.poses.end() && writer.add(*pose);
     if (exists && !in_cubes) {
       message.files.emplace_back();

@@ -70,8 +70,10 @@ void SignalChainNode::onCube(const mmradartwin_msgs::AdcCube::ConstPtr& cube) {
     return;
   }
   if (cube->radar_hash != radar_hash_) {
-    ROS_WARN_THROTTLE(kWarnEvery_s, "frame %u refused: it was taken with another radar configuration (%016lx) than radar/config's (%016lx)",
-                      cube->sequence, static_cast<unsigned long>(cube->radar_hash), static_cast<unsigned long>(radar_hash_));
+    ROS_WARN_THROTTLE(
+        kWarnEvery_s,
+        "frame %u refused: it was taken with another radar configuration (%016lx) than radar/config's (%016lx)",
+        cube->sequence, static_cast<unsigned long>(cube->radar_hash), static_cast<unsigned long>(radar_hash_));
     return;
   }
   if (!newest_.isZero() && cube->header.stamp == newest_) {
@@ -111,7 +113,8 @@ void SignalChainNode::drain() {
   }
 }
 
-void SignalChainNode::process(const mmradartwin_msgs::AdcCube& msg, const std::optional<Eigen::Isometry3d>& T_map_radar) {
+void SignalChainNode::process(const mmradartwin_msgs::AdcCube& msg,
+                              const std::optional<Eigen::Isometry3d>& T_map_radar) {
   try {
     const AdcCube cube = fromMsg(msg);
     if (T_map_radar && window_pose_ && !standsStill(*T_map_radar, *window_pose_, moved_m_, moved_rad_)) {
@@ -123,7 +126,8 @@ void SignalChainNode::process(const mmradartwin_msgs::AdcCube& msg, const std::o
     if (++since_published_ < publish_every_) return;
     since_published_ = 0;
     if (!average_->complete()) {
-      ROS_WARN_THROTTLE(kWarnEvery_s, "no map: a TDM slot has no valid chirp in the last %d frame(s)", average_->frames());
+      ROS_WARN_THROTTLE(kWarnEvery_s, "no map: a TDM slot has no valid chirp in the last %d frame(s)",
+                        average_->frames());
       return;
     }
     publish(T_map_radar);
@@ -156,10 +160,12 @@ void SignalChainNode::onTwinGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& 
   if (twin_map_publisher_.getNumSubscribers() == 0) return;
   if (msg->radar_hash != radar_hash_) {
     // A twin may model another radar than the one that measures; both are drawn on the measured one's axes.
-    ROS_WARN_THROTTLE(60, "twin/grid was made for another radar configuration than radar/config's; its map has the measured axes");
+    ROS_WARN_THROTTLE(
+        60, "twin/grid was made for another radar configuration than radar/config's; its map has the measured axes");
   }
   try {
-    const auto map = boost::make_shared<mmradartwin_msgs::RangeAngleMap>(toMsg(chain_->map(fromMsg(*msg)), msg->radar_hash));
+    const auto map =
+        boost::make_shared<mmradartwin_msgs::RangeAngleMap>(toMsg(chain_->map(fromMsg(*msg)), msg->radar_hash));
     map->header.frame_id = radar_frame_;
     twin_map_publisher_.publish(map);
   } catch (const InputError& error) {

@@ -11,34 +11,36 @@ namespace mmradartwin {
 struct BagOptions {
   std::string map_frame = "map";
   std::string radar_frame = "radar_link";
-  std::string ns;                       ///< namespace of the topics, "" or "/robot1"; "" also finds the only one there is
-  std::string unpack_to;                ///< where the session message's files are written; "" = a fresh temporary folder,
-                                        ///< which goes with the last copy of the Recording
+  std::string ns;  ///< namespace of the topics, "" or "/robot1"; "" also finds the only one there is
+  /// Where the session message's files are written; "" = a fresh temporary folder, which goes with the last copy of the
+  /// Recording.
+  std::string unpack_to;
   bool exclude_duplicates = true;
 };
 
 /// Opens a bag as a Recording. With a `session` message its poses.csv defines the poses; otherwise a pose is a stretch
-/// of at least 1 s in which T_map_radar stays within 2 cm and 1 deg of its median, poses within 10 cm horizontally share
-/// a location. Throws InputError for a bag without radar configuration, cubes or tf.
+/// of at least 1 s in which T_map_radar stays within 2 cm and 1 deg of its median, poses within 10 cm horizontally
+/// share a location. Throws InputError for a bag without radar configuration, cubes or tf.
 ///
-/// Frames belong to the session's pose that began last, by stamp, as long as tf (where it is known) agrees with it. Where
-/// no frame falls on any pose, as in a live recording of a session that was played at another time, the stretches found
-/// in tf take the names of the session's poses at those places.
+/// Frames belong to the session's pose that began last, by stamp, as long as tf (where it is known) agrees with it.
+/// Where no frame falls on any pose, as in a live recording of a session that was played at another time, the stretches
+/// found in tf take the names of the session's poses at those places.
 Recording openBag(const std::string& file, const BagOptions& options = {});
 
 /// Opens whatever PATH is: session directory or session.yaml, *.bag, or (with `radar_file`) a bare *.bin capture.
-/// `radar_file` and `layout` replace what a session says; a bag takes neither.
+/// `radar_file` and `layout` replace what a session says; a bag takes neither, and takes `bag_options` instead.
 Recording openRecording(const std::string& path, const std::string& radar_file = "",
-                        const std::optional<CaptureLayout>& layout = std::nullopt);
+                        const std::optional<CaptureLayout>& layout = std::nullopt, const BagOptions& bag_options = {});
 
 /// Called after each pose with how many are done, and of how many.
 using PoseProgress = std::function<void(int done, int total)>;
 
-/// Writes a session as a bag: the latched `session` message (session_files.h says which files it holds and how those from
-/// outside of the directory fare), latched `radar/config`, one `radar/adc` message per frame, and T_map_radar in /tf a quarter of
-/// a period before the first frame and after every frame of a pose, so that a replay need not wait for the pose's end. All poses are written, duplicates too; captures
-/// that cubes cannot carry (truncated ones, those of unusable poses) travel as files in the session message. Messages are
-/// recorded at their stamps. The bag appears under its name when it is complete.
+/// Writes a session as a bag: the latched `session` message (session_files.h says which files it holds and how those
+/// from outside of the directory fare), latched `radar/config`, one `radar/adc` message per frame, and T_map_radar in
+/// /tf a quarter of a period before the first frame and after every frame of a pose, so that a replay need not wait for
+/// the pose's end. All poses are written, duplicates too; captures that cubes cannot carry (truncated ones, those of
+/// unusable poses) travel as files in the session message. Messages are recorded at their stamps. The bag appears under
+/// its name when it is complete.
 void sessionToBag(const std::string& session, const std::string& bag, const PoseProgress& progress = {});
 
 /// Inverse of sessionToBag, byte for byte; from any other bag, a session with the poses found in it. Throws InputError

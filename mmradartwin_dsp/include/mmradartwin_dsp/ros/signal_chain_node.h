@@ -15,8 +15,8 @@
 
 namespace mmradartwin {
 
-/// radar/config, radar/adc, twin/grid -> radar/grid, radar/range_angle, twin/range_angle. The same class runs as a node and
-/// as a nodelet; callbacks must come one at a time.
+/// radar/config, radar/adc, twin/grid -> radar/grid, radar/range_angle, twin/range_angle. The same class runs as a node
+/// and as a nodelet; callbacks must come one at a time.
 ///
 /// A frame waits until tf knows T_map_radar at its stamp, `pose_timeout_s` at most; without a pose it goes on with
 /// pose_valid = false. The average begins anew when the radar has moved by more than `moved_m` or `moved_deg` since the

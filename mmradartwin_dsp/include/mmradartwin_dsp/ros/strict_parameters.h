@@ -7,8 +7,8 @@
 
 namespace mmradartwin {
 
-/// A node's private parameters read strictly: wrong types, values out of range and unknown names are InputErrors that name
-/// the parameter, its value and what is allowed. Absent ones take the default.
+/// A node's private parameters read strictly: wrong types, values out of range and unknown names are InputErrors that
+/// name the parameter, its value and what is allowed. Absent ones take the default.
 class StrictParameters {
  public:
   explicit StrictParameters(const ros::NodeHandle& private_nh) : nh_(private_nh) {}
