@@ -9,7 +9,7 @@ import unittest
 import numpy as np
 
 from mmradartwin_tests import office
-from mmradartwin_tests.effects import EFFECTS, make_effect
+from mmradartwin_tests.effects import EFFECTS, UNCATALOGUED, make_effect
 from mmradartwin_tests.effects.objects import cylinder_path
 from mmradartwin_tests.geometry import Actor, Cylinder, Room, sheet
 from mmradartwin_tests.session import Measurement, Settings
@@ -72,7 +72,7 @@ class Table(WithBaseline):
 
     def test_no_effect_changes_the_plan_or_the_description(self):
         plain = Measurement(Settings(output="", seed=4, poses=2, frames=2))
-        for name in EFFECTS:
+        for name in {**EFFECTS, **UNCATALOGUED}:
             measurement = Measurement(Settings(output="", seed=4, poses=2, frames=2, effects=[make_effect(name)]))
             self.assertEqual([s.stamp_ns for s in measurement.stations], [s.stamp_ns for s in plain.stations], msg=name)
             for a, b in zip(measurement.stations, plain.stations):
@@ -418,6 +418,48 @@ class Frames(WithBaseline):
         start = first // 1456 * 1456
         self.assertEqual(slipped[start:-1456], payload[start + 1456:])
         self.assertEqual(made.payload(measurement, 0, measurement.stations[0], payload, None), payload)
+
+
+class OutsideTheCatalogue(WithBaseline):
+    def test_there_are_enough_and_none_has_a_catalogue_name(self):
+        self.assertGreaterEqual(len(UNCATALOGUED), 8)
+        self.assertFalse(set(UNCATALOGUED) & set(EFFECTS))
+
+    def gains(self, name, **parameters):
+        """(station, path, gain in dB) over all paths of the baseline."""
+        measurement, pairs = self.echoes_of(make_effect(name, parameters))
+        for station, (ours, base) in zip(measurement.stations, pairs):
+            for path, a, b in zip(base.paths, ours.coefficients, base.coefficients):
+                yield station, path, 20 * math.log10(abs(a / b))
+
+    def test_laws_follow_their_variable(self):
+        for _, path, gain in self.gains("range_ripple", ripple_db=3.0, period_m=2.0):
+            self.assertAlmostEqual(gain, 3.0 * math.sin(math.pi * path.lengths_m[0] / 2.0), places=6)
+        for station, _, gain in self.gains("height_gain", db_per_m=10.0):
+            self.assertAlmostEqual(gain, 10.0 * (station.true.position[2] - 1.1), places=6)
+        for _, path, gain in self.gains("compass_gain", swing_db=2.0, toward_deg=0.0):
+            self.assertAlmostEqual(gain, 2.0 * math.cos(math.atan2(path.arrival[1], path.arrival[0])), places=6)
+        for station, path, gain in self.gains("bracket_shadow", loss_db=5.0, from_deg=0.0, to_deg=90.0):
+            left = sum(station.true.to_radar(d)[1] > 0 for d in (path.departure, path.arrival))
+            self.assertAlmostEqual(gain, -5.0 * left, places=6)
+        for _, path, gain in self.gains("compression", strength=1.0, reference=abs(1e-5)):
+            self.assertAlmostEqual(gain, -20 * math.log10(1 + abs(path.coefficient) / 1e-5), places=6)
+
+    def test_trailing_copies(self):
+        measurement, pairs = self.echoes_of(make_effect("trailing_echo", {"level_db": -10.0, "delay_m": 0.5}))
+        for ours, base in pairs:
+            n = len(base.paths)
+            self.assertEqual(len(ours.coefficients), 2 * n)
+            np.testing.assert_allclose(ours.lengths_m[n:], base.lengths_m + 1.0)
+            np.testing.assert_allclose(np.abs(ours.coefficients[n:] / base.coefficients), 10**-0.5)
+
+    def test_grids_and_frames_change(self):
+        for name in UNCATALOGUED:
+            made = make_effect(name)
+            measurement, received = measure(made, poses=2)
+            plain, clean = measure(poses=2)
+            changed = [not np.array_equal(measurement.measure(i, received[i]), plain.measure(i, clean[i])) for i in range(2)]
+            self.assertTrue(any(changed), msg=name)
 
 
 class Pairs(unittest.TestCase):

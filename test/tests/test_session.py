@@ -10,7 +10,8 @@ import unittest
 
 import numpy as np
 
-from mmradartwin_tests.session import Measurement, Settings
+from mmradartwin_tests.radar import Radar
+from mmradartwin_tests.session import NOISE_RMS, Measurement, Settings
 
 SCRIPT = os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "scripts", "make_session.py")
 
@@ -128,6 +129,15 @@ class Campaign(unittest.TestCase):
         yaw = np.degrees([math.atan2(t[1, 0], t[0, 0]) for t in turns])
         self.assertAlmostEqual(offset.std(), 0.003, delta=0.0005)
         self.assertAlmostEqual(yaw.std(), 0.3, delta=0.07)
+
+
+class Noise(unittest.TestCase):
+    def test_wall_at_three_metres_stands_fifty_decibels_over_noise(self):
+        # One chirp, one channel, one Hann-windowed range bin: gain N / 1.5.
+        radar = Radar()
+        amplitude = radar.wavelength_m / (4 * math.pi * 6.0) * 0.3926
+        level = 20 * math.log10(amplitude / NOISE_RMS) + 10 * math.log10(radar.samples / 1.5)
+        self.assertAlmostEqual(level, 50.0, delta=0.5)
 
 
 class CommandLine(unittest.TestCase):

@@ -1,12 +1,19 @@
 """The interface of hidden effects and their table."""
 import numpy as np
 
-EFFECTS = {}
+EFFECTS = {}        # of the catalogue, by the binding name
+UNCATALOGUED = {}   # everything else
 
 
 def effect(cls):
     """Class decorator: enters an effect into the table under its name."""
     EFFECTS[cls.name] = cls
+    return cls
+
+
+def uncatalogued(cls):
+    """Class decorator of effects that the catalogue does not name."""
+    UNCATALOGUED[cls.name] = cls
     return cls
 
 
@@ -86,9 +93,10 @@ class Effect:
 
 def make_effect(name, parameters=None, strength=None):
     """An effect by its name. ValueError with the known names for an unknown one."""
-    if name not in EFFECTS:
-        raise ValueError(f"unknown effect '{name}'; known: {', '.join(sorted(EFFECTS))}")
-    made = EFFECTS[name](**(parameters or {}))
+    table = {**EFFECTS, **UNCATALOGUED}
+    if name not in table:
+        raise ValueError(f"unknown effect '{name}'; known: {', '.join(sorted(table))}")
+    made = table[name](**(parameters or {}))
     if strength is not None:
         made.scale(strength)
     return made
