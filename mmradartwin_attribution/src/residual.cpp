@@ -58,6 +58,7 @@ class Router {
     for (std::size_t i = 0; i < pose_.regions.size(); ++i) {
       const ResponseRegion& region = pose_.regions[i];
       if (!at(config_.tight, region, m)) continue;
+      if (region.simulated_strong) return;  // the region is matched, its support not weak
       bool any = false, tight = false;
       for (const Response& s : pose_.simulated.responses) {
         if (s.level_db < config_.weak_db || !countsFor(static_cast<int>(i), s)) continue;

@@ -69,6 +69,11 @@ TEST_F(ResidualTest, AWeakResponseInTheTightWindowIsC2) {
   EXPECT_TRUE(materialChangeAdmissible(r.residual_class));
 }
 
+TEST_F(ResidualTest, AStrongResponseInTheRegionsTightWindowIsAMatch) {
+  // 0.34 m apart, beyond the tight window around either response, but both in the region's.
+  EXPECT_TRUE(compare({{4.83, 30, -5}}, {{5.17, 30, -5}}, {region("tv", 5, 30)}).residuals.empty());
+}
+
 TEST_F(ResidualTest, AResponseInTheWideWindowAloneIsC4OnBothSides) {
   const auto pose = compare({{5, 30, -5}}, {{5.45, 30, -5}}, {region("tv", 5, 30)});
   ASSERT_EQ(pose.residuals.size(), 2u);

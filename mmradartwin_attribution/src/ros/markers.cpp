@@ -238,24 +238,31 @@ void MarkerBuilder::addBoxes(const PoseAttribution& pose, Array& out) {
 
 void MarkerBuilder::addLabels(const PoseAttribution& pose, Array& out) {
   std::map<std::string, int> shown;
+  // A dark copy just behind each text keeps it legible on bright cells.
   const auto add = [&](const std::string& ns, const std::string& frame, const geometry_msgs::Point& at,
                        const std::string& words, const std_msgs::ColorRGBA& color) {
-    Marker m = marker(ns, shown[ns]++, Marker::TEXT_VIEW_FACING, frame);
-    m.pose.position = at;
-    m.scale.z = 0.34;
-    m.color = color;
-    m.text = words;
-    out.markers.push_back(std::move(m));
+    for (bool shadow : {true, false}) {
+      Marker m = marker(ns, shown[ns]++, Marker::TEXT_VIEW_FACING, frame);
+      m.pose.position = at;
+      m.scale.z = 0.5;
+      m.color = color;
+      m.text = words;
+      if (shadow) {
+        m.pose.position = point(at.x - 0.04, at.y - 0.04, at.z - 0.05);
+        m.color = rgba(0, 0, 0);
+      }
+      out.markers.push_back(std::move(m));
+    }
   };
   for (const Residual& r : pose.residuals) {
     add(className(r.residual_class), r.measured_stronger ? frames_.measured : frames_.simulated,
-        polar(r.range_m + field_.halfRange_m(field_.config().tight) + 0.2, r.azimuth_rad, 0.1), label(r),
+        polar(r.range_m + field_.halfRange_m(field_.config().tight) + 0.35, r.azimuth_rad, 0.2), label(r),
         classColor(r.residual_class));
   }
   for (const ResponseRegion& r : pose.regions) {
     if (r.field != Field::kCentral || !r.measured_strong || !r.simulated_strong) continue;
     for (const std::string& frame : {frames_.measured, frames_.simulated}) {
-      add("matched actors", frame, polar(std::max(0.2, r.range_m - 0.35), r.azimuth_rad, 0.1), spoken(r.actor), kWhite);
+      add("matched actors", frame, polar(std::max(0.2, r.range_m - 0.45), r.azimuth_rad, 0.2), spoken(r.actor), kWhite);
     }
   }
   for (const auto& [ns, count] : labels_shown_) {
@@ -315,8 +322,8 @@ void MarkerBuilder::addRadar(const Eigen::Isometry3d& T_map_radar, const std::st
   Marker text = marker("radar", 1, Marker::TEXT_VIEW_FACING, frames_.map);
   const Eigen::Vector3d p = T_map_radar.translation();
   text.pose.position = point(p.x(), p.y(), p.z() + 0.4);
-  text.scale.z = 0.34;
-  text.text = caption.empty() ? "radar" : caption;
+  text.scale.z = 0.5;
+  text.text = caption.empty() ? "radar" : "pose " + caption;
   out.markers.push_back(std::move(text));
 }
 
