@@ -38,8 +38,9 @@ def main():
                 os.remove(os.path.join(at("_true"), name))
             r = compare(at("_true"), at("_sim/paths"))
             m = r["median"]
-            print(f"{r['poses']:5d} {tier:>8} {len(r['pairs']):8d} {len(r['missing']):7d} {len(r['extra']):5d} {r['isolated']:8d} | "
-                  f"{m['level_db']:15.4f} {1e3 * m['range_m']:9.3f} {m['azimuth_deg']:12.4f} | {r['worst']['level_db']:13.4f}")
+            print(f"{r['poses']:5d} {tier:>8} {len(r['pairs']):8d} {len(r['missing']):7d} {len(r['extra']):5d} "
+                  f"{r['isolated']:8d} | {m['level_db']:15.4f} {1e3 * m['range_m']:9.3f} {m['azimuth_deg']:12.4f} | "
+                  f"{r['worst']['level_db']:13.4f}")
             if not (m["level_db"] <= 0.3 and m["range_m"] <= 0.005 and m["azimuth_deg"] <= 0.3):
                 status = 1
     return status

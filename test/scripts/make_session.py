@@ -31,11 +31,14 @@ def parse():
     parser.add_argument("--headings", type=int, default=7, help="per location")
     parser.add_argument("--poses", type=int, help="thin the campaign to this many poses, without duplicates")
     parser.add_argument("--frames", type=int, default=100, help="per pose")
-    parser.add_argument("--pause", type=float, default=8.0, help="mean pause between poses, s (between places four times)")
+    parser.add_argument("--pause", type=float, default=8.0,
+                        help="mean pause between poses, s (between places four times)")
     parser.add_argument("--duplicates", type=int, help="repeated poses at the end (default 2 in a full campaign)")
-    parser.add_argument("--tier", choices=sorted(campaign.POSE_ERROR), default="default", help="size of errors in the description")
+    parser.add_argument("--tier", choices=sorted(campaign.POSE_ERROR), default="default",
+                        help="size of errors in the description")
     parser.add_argument("--speckle-seed", type=int, help="of the rough surfaces' phases alone (default: the seed)")
-    parser.add_argument("--at-reported", action="store_true", help="measure at the reported poses: the ceiling of any twin")
+    parser.add_argument("--at-reported", action="store_true",
+                        help="measure at the reported poses: the ceiling of any twin")
     parser.add_argument("--effect", action="append", default=[], help="hidden effect by its name; may be repeated")
     parser.add_argument("--strength", type=float, help="of the first effect, 1 = its typical size")
     parser.add_argument("--param", action="append", default=[], metavar="KEY=VALUE",
@@ -68,7 +71,8 @@ def main():
         for option in ("truth", "paths_csv"):
             path = getattr(arguments, option)
             if path and os.path.realpath(path).startswith(os.path.realpath(arguments.output) + os.sep):
-                raise ValueError(f"--{option.replace('_', '-')} {path}: lies inside the session; choose a place outside")
+                flag = "--" + option.replace("_", "-")
+                raise ValueError(f"{flag} {path}: lies inside the session; choose a place outside")
         settings = session.Settings(
             output=arguments.output, seed=arguments.seed, locations=arguments.locations, headings=arguments.headings,
             frames=arguments.frames, poses=arguments.poses, tier=arguments.tier, speckle_seed=arguments.speckle_seed,

@@ -34,15 +34,18 @@ class Simulated(unittest.TestCase):
     @classmethod
     def generate(cls, tier):
         at = lambda name: os.path.join(cls.directory.name, tier + name)
-        measurement = Measurement(Settings(output=at("_session"), seed=cls.seed, poses=12 if tier == "exact" else 24, frames=1, tier=tier, paths_csv=at("_true")))
+        measurement = Measurement(Settings(output=at("_session"), seed=cls.seed, poses=12 if tier == "exact" else 24,
+                                           frames=1, tier=tier, paths_csv=at("_true")))
         measurement.run()
-        run = subprocess.run([PROGRAM, at("_session"), "--output", at("_sim")], capture_output=True, text=True, check=False)
+        run = subprocess.run([PROGRAM, at("_session"), "--output", at("_sim")], capture_output=True, text=True,
+                             check=False)
         if run.returncode != 0:
             raise RuntimeError(f"simulate ended with {run.returncode}: {run.stderr}")
         return measurement
 
     def folders(self, tier):
-        return os.path.join(self.directory.name, tier + "_true"), os.path.join(self.directory.name, tier + "_sim", "paths")
+        base = os.path.join(self.directory.name, tier)
+        return base + "_true", os.path.join(base + "_sim", "paths")
 
     def test_isolated_strong_paths_of_a_measured_session(self):
         result = compare(*self.folders("default"))
@@ -91,7 +94,8 @@ class Simulated(unittest.TestCase):
                     if row["event"] == "diffuse":
                         theirs[row["actors"]] = theirs.get(row["actors"], 0.0) + 10**(float(row["amplitude_db"]) / 10)
             total = sum(ours.values())
-            ratios += [10 * math.log10(theirs.get(name, 1e-30) / power) for name, power in ours.items() if power > 0.1 * total]
+            ratios += [10 * math.log10(theirs.get(name, 1e-30) / power)
+                       for name, power in ours.items() if power > 0.1 * total]
         self.assertGreater(len(ratios), 12)
         self.assertLess(abs(float(np.median(ratios))), 0.1, msg=f"seed {self.seed}")
         self.assertLess(float(np.quantile(np.abs(ratios), 0.9)), 0.7, msg=f"seed {self.seed}")
@@ -102,7 +106,8 @@ class Simulated(unittest.TestCase):
         twin = os.path.join(session, "smooth.yaml")
         with open(twin, "w", encoding="ascii") as out:
             out.write("scene: scene.yaml\nradar: radar.yaml\nmechanisms:\n  specular: {max_bounces: 3}\n  corner: {}\n")
-        run = subprocess.run([PROGRAM, session, "--twin", twin, "--output", other], capture_output=True, text=True, check=False)
+        run = subprocess.run([PROGRAM, session, "--twin", twin, "--output", other], capture_output=True, text=True,
+                             check=False)
         self.assertEqual(run.returncode, 0, msg=run.stderr)
         with open(os.path.join(other, "session.yaml"), encoding="ascii") as file:
             gain_db = float(re.search(r"gain_db: *(\S+)", file.read()).group(1))
@@ -110,7 +115,8 @@ class Simulated(unittest.TestCase):
         errors = []
         for station in measurement.stations:
             x = measurement.radar.grid(*path_arrays(measurement.tracer.specular(station.true), 8))
-            raw = np.fromfile(os.path.join(other, "captures", station.name + ".bin"), "<i2").reshape(2, 64, 2, 4).astype(float)
+            raw = np.fromfile(os.path.join(other, "captures", station.name + ".bin"), "<i2").astype(float)
+            raw = raw.reshape(2, 64, 2, 4)
             y = (raw[:, :, 0, :] + 1j * raw[:, :, 1, :]).transpose(0, 2, 1).reshape(8, 64) / 32768 / 10**(gain_db / 20)
             errors.append(float(np.linalg.norm(y - x) / np.linalg.norm(x)))
         # One pose may hang on a grazing ray; quantisation and the mesh's 0.1 um leave a per cent.

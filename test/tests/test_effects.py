@@ -20,7 +20,8 @@ POSES = 5
 
 def measure(*effects, **options):
     """(measurement, received grids) of a small campaign."""
-    measurement = Measurement(Settings(output="", jobs=1, effects=list(effects), **{"seed": 21, "poses": POSES, "frames": 20, **options}))
+    measurement = Measurement(Settings(output="", jobs=1, effects=list(effects),
+                                       **{"seed": 21, "poses": POSES, "frames": 20, **options}))
     received, measurement.rows = measurement.receive()
     return measurement, received
 
@@ -55,12 +56,15 @@ class WithBaseline(unittest.TestCase):
 
 class Table(WithBaseline):
     def test_names_are_those_of_the_catalogue(self):
-        catalogue = set("""tx_rx_leakage range_bias range_scale carrier_scale if_highpass if_lowpass excess_attenuation gain_drift
-            iq_imbalance dc_offset second_harmonic adc_saturation noise_floor radar_yaw_offset radar_position_offset scene_registration
-            radar_pitch_offset pose_time_lag channel_phase_error tx_imbalance iq_conjugation channel_conjugation channel_permutation
-            element_pattern elevation_pattern material_reflectivity surface_roughness diffuse_scattering edge_diffraction
-            floor_ceiling_multipath corner_reflection wall_ghost transmission actor_absent actor_unmodelled actor_moved moving_target
-            interference phase_drift packet_loss packet_misalignment""".split())
+        catalogue = set("""
+            tx_rx_leakage range_bias range_scale carrier_scale if_highpass if_lowpass excess_attenuation
+            gain_drift iq_imbalance dc_offset second_harmonic adc_saturation noise_floor radar_yaw_offset
+            radar_position_offset scene_registration radar_pitch_offset pose_time_lag channel_phase_error
+            tx_imbalance iq_conjugation channel_conjugation channel_permutation element_pattern
+            elevation_pattern material_reflectivity surface_roughness diffuse_scattering edge_diffraction
+            floor_ceiling_multipath corner_reflection wall_ghost transmission actor_absent actor_unmodelled
+            actor_moved moving_target interference phase_drift packet_loss packet_misalignment
+            """.split())
         self.assertLessEqual(set(EFFECTS), catalogue)
         self.assertGreaterEqual(len(EFFECTS), 25)
 
@@ -117,7 +121,8 @@ class Receiver(WithBaseline):
         # Codes 175/350 kHz: -28 dB at 0.1 m, -6.4 at 0.5, -2.2 at 1, -0.3 at 3 m.
         made = make_effect("if_highpass", {"corner_hz": 175e3 / math.sqrt((math.sqrt(41) - 5) / 8)})
         for r, expected in ((0.1, -28.0), (0.5, -6.4), (1.0, -2.2), (3.0, -0.3)):
-            self.assertAlmostEqual(20 * math.log10(abs(complex(made.if_response(self.base, self.base.beat_hz(2 * r))))), expected, delta=0.35)
+            self.assertAlmostEqual(20 * math.log10(abs(complex(made.if_response(self.base,
+                self.base.beat_hz(2 * r))))), expected, delta=0.35)
 
     def test_lowpass_corner(self):
         made = make_effect("if_lowpass", {"corner_hz": 4e6})
@@ -143,7 +148,8 @@ class Receiver(WithBaseline):
         made, measurement, received = self.pair("dc_offset", level_db=0.0)
         added = np.fft.fft(received[2] - self.clean[2], axis=1)
         self.assertLess(np.abs(added[:, 1:]).max(), 1e-9 * np.abs(added[:, 0]).max())
-        self.assertAlmostEqual(math.sqrt(np.mean(np.abs(received[0] - self.clean[0])**2)) / measurement.strongest, 1.0, places=9)
+        self.assertAlmostEqual(math.sqrt(np.mean(np.abs(received[0] - self.clean[0])**2)) / measurement.strongest,
+                               1.0, places=9)
 
     def test_harmonic_at_twice_the_range(self):
         made, measurement, received = self.pair("second_harmonic", level_db=-20.0)
@@ -210,7 +216,8 @@ class Array(WithBaseline):
     def test_second_transmitter(self):
         made, measurement, received = self.pair("tx_imbalance", phase_deg=30.0, gain_db=-2.0)
         np.testing.assert_allclose(received[0][:4], self.clean[0][:4])
-        np.testing.assert_allclose(received[0][4:] / self.clean[0][4:], 10**(-0.1) * np.exp(1j * math.pi / 6), rtol=1e-9)
+        np.testing.assert_allclose(received[0][4:] / self.clean[0][4:], 10**(-0.1) * np.exp(1j * math.pi / 6),
+                                   rtol=1e-9)
 
     def test_discrete_conventions(self):
         self.assertTrue(np.array_equal(self.pair("iq_conjugation")[2][0], np.conj(self.clean[0])))
@@ -233,17 +240,20 @@ class Array(WithBaseline):
 
 class Surfaces(WithBaseline):
     def test_reflectivity_per_interaction(self):
-        measurement, pairs = self.echoes_of(make_effect("material_reflectivity", {"material": "Concrete", "delta_db": -6.0}))
+        measurement, pairs = self.echoes_of(make_effect("material_reflectivity",
+                                                        {"material": "Concrete", "delta_db": -6.0}))
         for ours, base in pairs:
             for path, a, b in zip(ours.paths, ours.coefficients, base.coefficients):
                 count = sum(measurement.room.actors[i].tag == "Concrete" for i in path.actors)
                 self.assertAlmostEqual(20 * math.log10(abs(a / b)), -6.0 * count, places=9)
             concrete = np.array([measurement.room.actors[i].tag == "Concrete" for i in ours.scatter.actor])
-            np.testing.assert_allclose(np.abs(ours.scatter_coefficients / base.scatter_coefficients), np.where(concrete, 10**-0.3, 1.0))
+            np.testing.assert_allclose(np.abs(ours.scatter_coefficients / base.scatter_coefficients),
+                                       np.where(concrete, 10**-0.3, 1.0))
 
     def test_roughness_at_normal_incidence(self):
         # sigma 0.3 mm at 77.93 GHz: 20 log10 exp(-2 (k sigma)^2)
-        measurement, pairs = self.echoes_of(make_effect("surface_roughness", {"material": "Concrete", "roughness_rms_m": 3e-4}))
+        measurement, pairs = self.echoes_of(make_effect("surface_roughness",
+                                                        {"material": "Concrete", "roughness_rms_m": 3e-4}))
         k = 2 * math.pi / measurement.radar.wavelength_m
         seen = 0
         for ours, base in pairs:
@@ -255,7 +265,8 @@ class Surfaces(WithBaseline):
         self.assertGreater(seen, 3)
 
     def test_scattering_takes_from_the_specular(self):
-        measurement, pairs = self.echoes_of(make_effect("diffuse_scattering", {"material": "Wood", "scattering_coefficient": 0.6}))
+        measurement, pairs = self.echoes_of(make_effect("diffuse_scattering",
+                                                        {"material": "Wood", "scattering_coefficient": 0.6}))
         more = sum(len(o.scatter.phase) - len(b.scatter.phase) for o, b in pairs)
         self.assertGreater(more, 100)
         for ours, base in pairs:
@@ -287,14 +298,16 @@ class Objects(WithBaseline):
         # A short cylinder far away: 2 pi a L^2 / lambda.
         part = Cylinder(np.array([40.0, 0, 0]), 0.05, 0.1)
         radar = self.base.radar
-        room = Room([Actor("behind", "Metal", [sheet((90, -1, -1), (0, 2, 0), (0, 0, 2))]), Actor("object", "Metal", [part])],
+        room = Room([Actor("behind", "Metal", [sheet((90, -1, -1), (0, 2, 0), (0, 0, 2))]),
+                     Actor("object", "Metal", [part])],
                     office.MATERIALS)
         bare = types.SimpleNamespace(radar=radar, room=room, tracer=Tracer(room, radar))
         at = types.SimpleNamespace(true=Pose([0, 0, 0], np.eye(3)))
         path = cylinder_path(bare, at, 1, part, office.MATERIALS["Metal"], "specular")
         r, wavelength = 40.0 - 0.05, radar.wavelength_m
         sigma = abs(path.coefficient)**2 * (4 * math.pi)**3 * r**4 / wavelength**2
-        self.assertAlmostEqual(10 * math.log10(sigma), 10 * math.log10(2 * math.pi * 0.05 * 0.1**2 / wavelength), delta=0.15)
+        self.assertAlmostEqual(10 * math.log10(sigma), 10 * math.log10(2 * math.pi * 0.05 * 0.1**2 / wavelength),
+                               delta=0.15)
 
     def test_absent_and_moved(self):
         measurement, pairs = self.echoes_of(make_effect("actor_absent", {"actor": "whiteboard"}))
@@ -303,7 +316,8 @@ class Objects(WithBaseline):
         made = make_effect("actor_moved", {"actor": "pillar", "dx_m": 0.1, "dy_m": -0.05, "dyaw_deg": 3.0})
         measurement, _ = self.echoes_of(made)
         find = lambda actors: next(a for a in actors if a.name == "pillar")
-        np.testing.assert_allclose(find(measurement.room.actors).centroid() - find(measurement.described_actors).centroid(), [0.1, -0.05, 0], atol=1e-9)
+        np.testing.assert_allclose(find(measurement.room.actors).centroid()
+                                   - find(measurement.described_actors).centroid(), [0.1, -0.05, 0], atol=1e-9)
 
 
 class Propagation(WithBaseline):
@@ -369,7 +383,8 @@ class Frames(WithBaseline):
         made = make_effect(name, parameters)
         measurement, received = measure(made, frames=100, poses=POSES)
         x = np.broadcast_to(received[index], (100, *received[index].shape))
-        return made, measurement, received, np.asarray(made.frames(measurement, index, measurement.stations[index], x, np.random.default_rng(5)))
+        return made, measurement, received, np.asarray(made.frames(measurement, index, measurement.stations[index], x,
+                                                                   np.random.default_rng(5)))
 
     def test_mover_makes_frames_disagree_at_its_range(self):
         made = make_effect("moving_target", {"rcs_dbsm": 5.0})
@@ -458,7 +473,8 @@ class OutsideTheCatalogue(WithBaseline):
             made = make_effect(name)
             measurement, received = measure(made, poses=2)
             plain, clean = measure(poses=2)
-            changed = [not np.array_equal(measurement.measure(i, received[i]), plain.measure(i, clean[i])) for i in range(2)]
+            changed = [not np.array_equal(measurement.measure(i, received[i]), plain.measure(i, clean[i]))
+                       for i in range(2)]
             self.assertTrue(any(changed), msg=name)
 
 
@@ -470,7 +486,8 @@ class Pairs(unittest.TestCase):
 
     def test_session_with_effect_is_written(self):
         with tempfile.TemporaryDirectory() as directory:
-            settings = Settings(output=os.path.join(directory, "s"), seed=2, poses=2, frames=2, effects=[make_effect("noise_floor")],
+            settings = Settings(output=os.path.join(directory, "s"), seed=2, poses=2, frames=2,
+                                effects=[make_effect("noise_floor")],
                                 truth=os.path.join(directory, "t.json"))
             Measurement(settings).run()
             with open(os.path.join(directory, "s", "twin.yaml"), encoding="ascii") as file:

@@ -23,7 +23,8 @@ class Office(unittest.TestCase):
         actors = office.build_actors()
         self.assertEqual({a.tag for a in actors}, TAGS)
         self.assertEqual(len({a.name for a in actors}), len(actors))
-        self.assertTrue(any(not np.allclose(np.abs(p.rotation), np.eye(3)) for a in actors for p in a.parts if isinstance(p, Box)))
+        self.assertTrue(any(not np.allclose(np.abs(p.rotation), np.eye(3)) for a in actors for p in a.parts
+                            if isinstance(p, Box)))
 
     def test_things_stand_a_centimetre_apart(self):
         parts = [(a.name, p) for a in office.build_actors() for p in a.parts if not a.shell]
@@ -43,7 +44,8 @@ class Office(unittest.TestCase):
             for name in ("office.obj", "scene.yaml", "materials.yaml"):
                 with open(os.path.join(directory, name), encoding="ascii") as ours, \
                         open(os.path.join(SHIPPED, name), encoding="ascii") as shipped:
-                    self.assertEqual(ours.read(), shipped.read(), msg=f"{name}: run make_office.py --output config/office")
+                    self.assertEqual(ours.read(), shipped.read(),
+                                     msg=f"{name}: run make_office.py --output config/office")
 
     def test_obj_holds_every_actor_with_its_tag(self):
         with tempfile.TemporaryDirectory() as directory:

@@ -29,7 +29,8 @@ class BeatSignal(unittest.TestCase):
         radar = Radar()
         theta, distance = math.radians(25.0), 30.0
         point = distance * np.array([math.cos(theta), math.sin(theta), 0])
-        lengths = (np.linalg.norm(point - radar.tx, axis=1)[:, None] + np.linalg.norm(point - radar.rx, axis=1)).reshape(1, -1)
+        lengths = (np.linalg.norm(point - radar.tx, axis=1)[:, None]
+                   + np.linalg.norm(point - radar.rx, axis=1)).reshape(1, -1)
         c = radar.contributions(lengths, np.ones(1))[0]
         k = np.arange(8)
         pitch = radar.rx[1, 1]
@@ -40,7 +41,8 @@ class BeatSignal(unittest.TestCase):
         radar = Radar()
         theta, bin_index = math.radians(40.0), 20
         point = bin_index * radar.range_bin_m * np.array([math.cos(theta), math.sin(theta), 0])
-        lengths = (np.linalg.norm(point - radar.tx, axis=1)[:, None] + np.linalg.norm(point - radar.rx, axis=1)).reshape(1, -1)
+        lengths = (np.linalg.norm(point - radar.tx, axis=1)[:, None]
+                   + np.linalg.norm(point - radar.rx, axis=1)).reshape(1, -1)
         x = radar.grid(lengths, np.ones(1))
         window = 0.5 * (1 - np.cos(2 * np.pi * np.arange(64) / 64))
         spectra = np.fft.fft(x * window, axis=1)

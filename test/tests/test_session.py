@@ -40,7 +40,8 @@ class Files(unittest.TestCase):
 
     def test_directory_is_complete(self):
         names = sorted(os.listdir(os.path.join(self.directory.name, "session")))
-        self.assertEqual(names, ["captures", "materials.yaml", "office.obj", "poses.csv", "radar.yaml", "scene.yaml", "session.yaml"])
+        self.assertEqual(names, ["captures", "materials.yaml", "office.obj", "poses.csv", "radar.yaml", "scene.yaml",
+                                 "session.yaml"])
         for row in poses_of(self.directory.name):
             size = os.path.getsize(os.path.join(self.directory.name, "session", "captures", row["pose"] + ".bin"))
             self.assertEqual(size, 4 * 2048)
@@ -64,14 +65,16 @@ class Files(unittest.TestCase):
         self.assertGreater(np.abs(x).max(), 40 * noise)
 
     def test_noise_level_and_frames(self):
-        cube = np.fromfile(os.path.join(self.directory.name, "session", "captures", "002.bin"), "<i2").reshape(4, 2, 64, 2, 4)
+        cube = np.fromfile(os.path.join(self.directory.name, "session", "captures", "002.bin"), "<i2").reshape(4, 2,
+            64, 2, 4)
         values = cube[:, :, :, 0, :] + 1j * cube[:, :, :, 1, :]
         spread = values - values.mean(axis=0)
         rms = math.sqrt((np.abs(spread)**2).sum() / (3 * 512)) / (self.measurement.gain * 32768)
         self.assertAlmostEqual(rms / self.measurement.noise_rms, 1.0, delta=0.05)
 
     def test_headroom(self):
-        peak = max(np.abs(np.fromfile(os.path.join(self.directory.name, "session", "captures", row["pose"] + ".bin"), "<i2").astype(int)).max()
+        peak = max(np.abs(np.fromfile(os.path.join(self.directory.name, "session", "captures", row["pose"] + ".bin"),
+                                      "<i2").astype(int)).max()
                    for row in poses_of(self.directory.name))
         self.assertLess(20 * math.log10(peak / 32768), -8.5)
         self.assertGreater(20 * math.log10(peak / 32768), -12.0)
@@ -110,7 +113,8 @@ class Campaign(unittest.TestCase):
             turn = a.reported.rotation.T @ b.reported.rotation
             heading = abs(math.degrees(math.atan2(turn[1, 0], turn[0, 0])))
             return np.hypot(d[0], d[1]) < 0.1 and abs(d[2]) < 0.02 and heading < 1.0
-        pairs = [(a.name, b.name) for i, a in enumerate(self.stations) for b in self.stations[i + 1:] if is_duplicate(a, b)]
+        pairs = [(a.name, b.name) for i, a in enumerate(self.stations) for b in self.stations[i + 1:]
+                 if is_duplicate(a, b)]
         self.assertEqual(sorted(b for _, b in pairs), ["155", "156"])
 
     def test_times_do_not_overlap(self):
@@ -147,7 +151,8 @@ class CommandLine(unittest.TestCase):
     def test_errors_are_one_line(self):
         with tempfile.TemporaryDirectory() as directory:
             target = os.path.join(directory, "s")
-            for arguments in (["--effect", "no_such"], ["--param", "a=1"], ["--poses", "0"], ["--truth", target + "/t.json"],
+            for arguments in (["--effect", "no_such"], ["--param", "a=1"], ["--poses", "0"],
+                              ["--truth", target + "/t.json"],
                               ["--effect", "range_bias", "--param", "nonsense=1"]):
                 result = self.run_script("--output", target, "--seed", "1", *arguments)
                 self.assertEqual(result.returncode, 2, msg=arguments)
@@ -160,7 +165,8 @@ class CommandLine(unittest.TestCase):
             contents = []
             for run in ("a", "b"):
                 target = os.path.join(directory, run)
-                result = self.run_script("--output", target, "--seed", "4", "--poses", "2", "--frames", "2", "--jobs", "2" if run == "a" else "1")
+                result = self.run_script("--output", target, "--seed", "4", "--poses", "2", "--frames", "2", "--jobs",
+                                         "2" if run == "a" else "1")
                 self.assertEqual(result.returncode, 0, msg=result.stderr)
                 with open(os.path.join(target, "captures", "002.bin"), "rb") as file:
                     contents.append(file.read())

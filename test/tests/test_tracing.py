@@ -39,7 +39,8 @@ class Plates(unittest.TestCase):
             path, = Tracer(plate(3.0, 400.0, 400.0, MATERIALS, tag), radar).specular(Pose([0, 0, 0], LEVEL))
             te, _ = fresnel(MATERIALS[tag], 1.0, radar.center_hz)
             # The field must not depend on conjugation yet: exp(-jkL), textbook sign.
-            self.assertAlmostEqual(abs(path.coefficient / (te * smooth * radar.wavelength_m / (4 * math.pi * 6)) - 1), 0, delta=0.02)
+            self.assertAlmostEqual(abs(path.coefficient / (te * smooth * radar.wavelength_m / (4 * math.pi * 6)) - 1),
+                                   0, delta=0.02)
             self.assertAlmostEqual(path.length_m, 6.0, places=12)
             y = radar.tx[:, None, 1] - radar.rx[None, :, 1]
             np.testing.assert_allclose(path.lengths_m, np.hypot(6.0, y).ravel(), atol=1e-12)
@@ -52,7 +53,8 @@ class Plates(unittest.TestCase):
         wide = aperture_axis(-1.06, -0.06, 2.0, 2.0, radar.wavelength_m)
         high = aperture_axis(-0.5, 0.5, 2.0, 2.0, radar.wavelength_m)
         self.assertAlmostEqual(abs(wide), abs(1 / (math.sqrt(2) * math.pi * u(0.06))), delta=0.05)   # knife edge's tail
-        self.assertAlmostEqual(abs(path.coefficient), radar.wavelength_m / (16 * math.pi) * abs(wide * high), delta=1e-12)
+        self.assertAlmostEqual(abs(path.coefficient), radar.wavelength_m / (16 * math.pi) * abs(wide * high),
+                               delta=1e-12)
         self.assertAlmostEqual(path.length_m, 2 * math.hypot(2.0, 0.07), places=9)
         self.assertAlmostEqual(math.atan2(path.departure[1], path.departure[0]), math.atan2(-0.07, 2.0), places=9)
 
@@ -117,7 +119,8 @@ class BareRoom(unittest.TestCase):
 
 class Corners(unittest.TestCase):
     def room(self, tag="Concrete"):
-        faces = [Actor("a", tag, [sheet((0, 0, -3), (9, 0, 0), (0, 0, 6))]), Actor("b", tag, [sheet((0, 0, -3), (0, 9, 0), (0, 0, 6))])]
+        faces = [Actor("a", tag, [sheet((0, 0, -3), (9, 0, 0), (0, 0, 6))]),
+                 Actor("b", tag, [sheet((0, 0, -3), (0, 9, 0), (0, 0, 6))])]
         return Room(faces, MATERIALS)
 
     def test_squared_reflection_at_the_apex(self):

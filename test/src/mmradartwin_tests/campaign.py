@@ -64,7 +64,8 @@ def plan(room, rng, locations, headings, poses, frames, frame_period_s, tier, pa
 
     def add(location, true, reported):
         nonlocal clock
-        stations.append(Station(f"{len(stations) + 1:0{width}d}", location, round(clock * 1000) * 1000000, true, reported))
+        stations.append(Station(f"{len(stations) + 1:0{width}d}", location, round(clock * 1000) * 1000000, true,
+                                reported))
         clock += frames * frame_period_s + pause_s * rng.uniform(0.7, 1.3)
 
     for place, (spot, count_here) in enumerate(zip(spots, per_place)):
@@ -91,7 +92,8 @@ def plan(room, rng, locations, headings, poses, frames, frame_period_s, tier, pa
 
 def _spots(room, rng, count):
     """Positions clear of everything, well apart from each other."""
-    low, high = room.origin.min(axis=0), (room.origin + room.s1[:, None] * room.e1 + room.s2[:, None] * room.e2).max(axis=0)
+    low, high = room.origin.min(axis=0), (room.origin + room.s1[:, None] * room.e1 + room.s2[:, None]
+                                          * room.e2).max(axis=0)
     spots, tries = [], 0
     while len(spots) < count:
         tries += 1

@@ -1,4 +1,7 @@
-"""Closed forms of reflection and diffraction, in the convention exp(-jkL) of the textbooks (conjugated where samples are made)."""
+"""Closed forms of reflection and of finite apertures, in the textbooks' convention exp(-jkL).
+
+They are conjugated once, where samples are made.
+"""
 import numpy as np
 from scipy.special import fresnel as fresnel_integrals
 

@@ -129,7 +129,8 @@ def write_obj(actors, path):
 
 def materials_yaml(materials=None):
     """Text of materials.yaml, physical constants at 77 GHz."""
-    lines = ["# ITU-R P.2040 evaluated at 77 GHz; Carpet and Plastic lie outside the recommendation's range or list.", "materials:"]
+    lines = ["# ITU-R P.2040 evaluated at 77 GHz; Carpet and Plastic lie outside the recommendation's range or list.",
+             "materials:"]
     for tag, m in (materials or MATERIALS).items():
         color = "[" + ", ".join(f"{c:.2f}" for c in m.color) + "]"
         if m.conductor:

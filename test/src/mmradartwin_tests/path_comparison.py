@@ -39,7 +39,8 @@ def match(ours, theirs, reach_m=0.1, reach_deg=3.0):
             used_a.add(i)
             used_b.add(j)
             pairs.append((ours[i], theirs[j]))
-    return (pairs, [a for i, a in enumerate(ours) if i not in used_a], [b for j, b in enumerate(theirs) if j not in used_b])
+    return (pairs, [a for i, a in enumerate(ours) if i not in used_a],
+            [b for j, b in enumerate(theirs) if j not in used_b])
 
 
 def isolated(row, rows):
@@ -55,7 +56,8 @@ def compare(true_directory, other_directory, floor_db=-140.0):
     """Differences over all poses of two directories of path lists.
 
     Returns a dictionary: poses, pairs (all matched), isolated (count), and for the isolated strong ones the medians of
-    |level_db|, |range_m|, |azimuth_deg| and, as bias, of the signed differences; for all pairs the worst; missing and extra: (pose, row) above floor_db.
+    |level_db|, |range_m|, |azimuth_deg| and, as bias, of the signed differences; for all pairs the worst; missing and
+    extra: (pose, row) above floor_db.
     """
     names = sorted(n for n in os.listdir(true_directory) if n.endswith(".csv"))
     everything, strong, missing, extra = [], [], [], []

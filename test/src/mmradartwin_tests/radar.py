@@ -88,7 +88,8 @@ class Radar:
         """Text of radar.yaml."""
         vector = lambda p: "[" + ", ".join(f"{v:g}" if v == 0 else repr(float(v)) for v in p) + "]"
         rows = lambda a: "[" + ", ".join(vector(p) for p in a) + "]"
-        number = lambda v, unit, suffix: f"{v / unit:.12g}".rstrip() + suffix if "." in f"{v / unit:.12g}" else f"{v / unit:.1f}{suffix}"
+        plain = lambda v: f"{v:.12g}" if "." in f"{v:.12g}" else f"{v:.1f}"
+        number = lambda v, unit, suffix: plain(v / unit) + suffix
         return "\n".join([
             "device: awr2243",
             f"carrier_hz: {number(self.carrier_hz, 1e9, 'e+9')}",

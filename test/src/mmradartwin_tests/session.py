@@ -1,7 +1,7 @@
 """Measures a room: from paths to the int16 captures of a session directory (mmradartwin_session/1).
 
-The chain of one session: plan the campaign; trace every pose in the true room; let hidden effects act on paths; sum them
-to grids; let effects act on the received grids; choose one gain; write frames with thermal noise, quantised.
+The chain of one session: plan the campaign; trace every pose in the true room; let hidden effects act on paths; sum
+them to grids; let effects act on the received grids; choose one gain; write frames with thermal noise, quantised.
 """
 import dataclasses
 import json
@@ -79,7 +79,8 @@ class Measurement:
         if duplicates is None:
             duplicates = 2 if settings.poses is None else 0
         self.stations = campaign.plan(room, self.rng(1), settings.locations, settings.headings, settings.poses,
-                                      settings.frames, self.radar.frame_period_s, settings.tier, settings.pause_s, duplicates)
+                                      settings.frames, self.radar.frame_period_s, settings.tier, settings.pause_s,
+                                      duplicates)
         if settings.at_reported:
             for station in self.stations:
                 station.true = station.reported
@@ -176,7 +177,8 @@ class Measurement:
                 angles += [math.degrees(math.atan2(d[1], d[0])), math.degrees(math.asin(max(-1.0, min(1.0, d[2]))))]
             names = [self.room.actors[a] for a in p.actors]
             rows.append([f"{echoes.lengths_m[i, 0]:.6f}", *(f"{a:.5f}" for a in angles),
-                         f"{20 * math.log10(max(abs(first[i]), 1e-30)):.5f}", f"{np.angle(first[i]):.6f}", str(len(p.actors)),
+                         f"{20 * math.log10(max(abs(first[i]), 1e-30)):.5f}", f"{np.angle(first[i]):.6f}",
+                         str(len(p.actors)),
                          p.event, ";".join(a.name for a in names), ";".join(a.tag for a in names)])
         return rows
 
@@ -255,7 +257,8 @@ class Measurement:
             "seed": self.settings.seed, "speckle_seed": self.speckle_seed, "tier": self.settings.tier,
             "effects": [{"cause": e.name, "parameters": e.truth(self)} for e in self.settings.effects],
             "gain_db": 20 * math.log10(self.gain), "noise_rms": self.noise_rms, "strongest_amplitude": self.strongest,
-            "poses": {s.name: {"position_m": list(s.true.position), "quaternion_xyzw": list(campaign.quaternion(s.true.rotation))}
+            "poses": {s.name: {"position_m": list(s.true.position),
+                               "quaternion_xyzw": list(campaign.quaternion(s.true.rotation))}
                       for s in self.stations},
         }
 
@@ -281,7 +284,8 @@ def write_description(directory, measurement):
         out.write("pose,location,stamp,x,y,z,qx,qy,qz,qw\n")
         for s in measurement.stations:
             stamp = f"{s.stamp_ns // 10**9}.{s.stamp_ns % 10**9:09d}"
-            numbers = [*(f"{v:.6f}" for v in s.reported.position), *(f"{v:.9f}" for v in campaign.quaternion(s.reported.rotation))]
+            numbers = [*(f"{v:.6f}" for v in s.reported.position),
+                       *(f"{v:.9f}" for v in campaign.quaternion(s.reported.rotation))]
             out.write(",".join([s.name, s.location, stamp, *numbers]) + "\n")
     with open(os.path.join(directory, "session.yaml"), "w", encoding="ascii") as out:
         mechanisms = measurement.described_mechanisms()

@@ -40,7 +40,7 @@ class Path:
 
 @dataclasses.dataclass
 class Scatter:
-    """Scatter points seen from one pose: lengths [P, M], amplitude and phase [P], facet and actor [P], points [P, 3]."""
+    """Scatter points seen from one pose: lengths [P, M]; amplitude, phase, facet, actor [P]; points [P, 3]."""
     points: np.ndarray
     lengths_m: np.ndarray
     amplitude: np.ndarray
@@ -51,7 +51,7 @@ class Scatter:
 
 @dataclasses.dataclass
 class Corner:
-    """Two facets a, b that meet at a right angle: edge from start along a unit vector, and the faces' directions from it."""
+    """Two facets a, b that meet at a right angle: edge from start along a unit vector, directions from it."""
     a: int
     b: int
     start: np.ndarray
@@ -127,7 +127,8 @@ class Tracer:
         ids = np.flatnonzero(room.reflects)
         corner_points = np.array([room.corners(f) for f in range(len(room.s1))])
         # heights[f, g]: how far facet g reaches to the front of facet f
-        heights = np.einsum("gcx,fx->fgc", corner_points, room.normal) - np.sum(room.normal * room.origin, axis=1)[:, None, None]
+        level = np.sum(room.normal * room.origin, axis=1)
+        heights = np.einsum("gcx,fx->fgc", corner_points, room.normal) - level[:, None, None]
         reach = np.where(room.closed[:, None], heights.max(axis=2), np.abs(heights).max(axis=2)) > 1e-6
         faces = reach & reach.T
         self._faces = np.zeros_like(faces)
@@ -247,7 +248,8 @@ class Tracer:
             if (p - start) @ into_a <= 1e-6 or (p - start) @ into_b <= 1e-6:
                 continue
             across = np.cross(along, perpendicular)
-            far = sorted(max((room.corners(f) - start) @ into) * (into @ across) for f, into in ((a, into_a), (b, into_b)))
+            far = sorted(max((room.corners(f) - start) @ into) * (into @ across)
+                         for f, into in ((a, into_a), (b, into_b)))
             factor = (aperture_axis(far[0], far[1], distance, distance, wavelength) *
                       aperture_axis(-t, extent - t, distance, distance, wavelength))
             inside = 0 <= t <= extent
@@ -314,8 +316,10 @@ class Tracer:
             points[alive, i] = target
         if not len(alive):
             return []
-        chain = np.concatenate([np.broadcast_to(p, (len(alive), 1, 3)), points[alive], np.broadcast_to(p, (len(alive), 1, 3))], axis=1)
-        free = room.visible(chain[:, :-1].reshape(-1, 3), chain[:, 1:].reshape(-1, 3)).reshape(len(alive), order + 1).all(axis=1)
+        chain = np.concatenate([np.broadcast_to(p, (len(alive), 1, 3)), points[alive],
+                                np.broadcast_to(p, (len(alive), 1, 3))], axis=1)
+        free = room.visible(chain[:, :-1].reshape(-1, 3), chain[:, 1:].reshape(-1, 3))
+        free = free.reshape(len(alive), order + 1).all(axis=1)
         paths, seen = [], set()
         for row, vertices in zip(alive[free], chain[free]):
             facets = [int(f) for f in sequences[row]]
@@ -357,7 +361,8 @@ class Tracer:
         direction = ray / np.maximum(r, 1e-9)[:, None]
         cosine = -np.sum(direction * room.normal[self._scatter_facet], axis=1)
         keep = pose.sees(direction) if len(r) else np.zeros(0, bool)
-        keep &= (r <= self.radar.max_range_m) & ((cosine > 1e-6) | (~room.closed[self._scatter_facet] & (np.abs(cosine) > 1e-6)))
+        lit = (cosine > 1e-6) | (~room.closed[self._scatter_facet] & (np.abs(cosine) > 1e-6))
+        keep &= (r <= self.radar.max_range_m) & lit
         keep[keep] = room.visible(p, self._scatter_points[keep])
         facet, direction, r = self._scatter_facet[keep], direction[keep], r[keep]
         cosine = np.abs(cosine[keep])
@@ -375,7 +380,8 @@ class Tracer:
             te, tm = fresnel(room.material[a], cosine[m], self.radar.center_hz)
             gamma[m] = np.sqrt(np.abs(te)**2 * te_share[m] + np.abs(tm)**2 * (1 - te_share[m]))
             scattering[m] = room.material[a].scattering
-        amplitude = wavelength / (4 * np.pi * r**2) * scattering * gamma * cosine * np.sqrt(self._scatter_area[keep] / np.pi)
+        patch = np.sqrt(self._scatter_area[keep] / np.pi)
+        amplitude = wavelength / (4 * np.pi * r**2) * scattering * gamma * cosine * patch
         points = self._scatter_points[keep]
         return Scatter(points, self.point_lengths(pose, points), amplitude, self._scatter_phase[keep], facet, actor)
 

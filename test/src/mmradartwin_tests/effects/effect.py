@@ -31,7 +31,8 @@ class Effect:
     def __init__(self, **parameters):
         unknown = set(parameters) - set(self.defaults)
         if unknown:
-            raise ValueError(f"effect {self.name} has no parameter {', '.join(sorted(unknown))}; it has {', '.join(self.defaults)}")
+            raise ValueError(f"effect {self.name} has no parameter {', '.join(sorted(unknown))}; "
+                             f"it has {', '.join(self.defaults)}")
         self.p = {**self.defaults, **parameters}
 
     def scale(self, strength):

@@ -18,13 +18,14 @@ def free_spot(measurement, margin_m, stream):
     for _ in range(4000):
         p = np.array([rng.uniform(0.8, 7.2), rng.uniform(0.8, 5.2), 1.0])
         distance = [np.hypot(*(s.true.position - p)[:2]) for s in measurement.stations]
-        if min(distance) < margin_m + 0.3 or measurement.described_room.inside(p) or measurement.described_room.clearance(p) < margin_m:
+        room = measurement.described_room
+        if min(distance) < margin_m + 0.3 or room.inside(p) or room.clearance(p) < margin_m:
             continue
         seen = 0
         for s in measurement.stations:
             ray = p - s.true.position
             level = np.array([ray[0], ray[1], 0.0]) / np.hypot(ray[0], ray[1])
-            seen += bool(s.true.sees(level)[0]) and bool(measurement.described_room.visible(s.true.position, p)[0])
+            seen += bool(s.true.sees(level)[0]) and bool(room.visible(s.true.position, p)[0])
         if seen > best_count:
             best, best_count = p, seen
         if best_count > 0.35 * len(measurement.stations):
@@ -35,8 +36,10 @@ def free_spot(measurement, margin_m, stream):
 
 
 def cylinder_path(measurement, station, actor_index, cylinder, material, event):
-    """First-order echo of an upright cylinder, or None: image level times sqrt(r / (r + R)) for the curvature across and
-    the Fresnel aperture of its height."""
+    """First-order echo of an upright cylinder, or None.
+
+    Image level times sqrt(r / (r + R)) for the curvature across and the Fresnel aperture of its height.
+    """
     p, wavelength = station.true.position, measurement.radar.wavelength_m
     ray = cylinder.center[:2] - p[:2]
     axis = np.hypot(*ray)
@@ -45,13 +48,16 @@ def cylinder_path(measurement, station, actor_index, cylinder, material, event):
     height = min(max(p[2], bottom + 0.01), top - 0.01)
     point = np.array([*(p[:2] + ray / axis * distance), height])
     direction = (point - p) / np.linalg.norm(point - p)
-    if distance <= 0 or not station.true.sees(direction)[0] or not measurement.room.visible(p, point - 1e-3 * direction)[0]:
+    if distance <= 0 or not station.true.sees(direction)[0]:
+        return None
+    if not measurement.room.visible(p, point - 1e-3 * direction)[0]:
         return None
     factor = aperture_axis(bottom - p[2], top - p[2], distance, distance, wavelength)
     if abs(factor) < 0.01:
         return None
     te, _ = fresnel(material, 1.0, measurement.radar.center_hz)
-    level = te * factor * wavelength / (8 * math.pi * distance) * math.sqrt(cylinder.radius / (cylinder.radius + distance))
+    curvature = math.sqrt(cylinder.radius / (cylinder.radius + distance))
+    level = te * factor * curvature * wavelength / (8 * math.pi * distance)
     lengths = measurement.tracer.point_lengths(station.true, point[None])[0]
     return Path(event, (-1,), (actor_index,), point[None], direction, direction, float(2 * np.linalg.norm(point - p)),
                 complex(level), lengths, (1.0,))
@@ -59,7 +65,7 @@ def cylinder_path(measurement, station, actor_index, cylinder, material, event):
 
 @effect
 class ActorUnmodelled(Effect):
-    """An object in the room that the scene lacks: an upright metal cylinder (size_m its diameter) or a turned box (its side)."""
+    """An object in the room that the scene lacks: an upright cylinder (size_m: diameter) or a turned box (side)."""
     name, rank = "actor_unmodelled", 0
     main = "size_m"
     defaults = {"x_m": None, "y_m": None, "size_m": 0.3, "shape": "cylinder", "material": "Metal", "height_m": 1.7}
@@ -73,7 +79,8 @@ class ActorUnmodelled(Effect):
     def room(self, measurement, actors, materials):
         center = (self.p["x_m"], self.p["y_m"], 0.01 + self.p["height_m"] / 2)
         if self.p["shape"] == "box":
-            part = box(center, (self.p["size_m"], self.p["size_m"], self.p["height_m"]), 360 * measurement.rng(131).random())
+            part = box(center, (self.p["size_m"], self.p["size_m"], self.p["height_m"]),
+                       360 * measurement.rng(131).random())
         else:
             part = Cylinder(np.array(center), self.p["size_m"] / 2, self.p["height_m"])
         return actors + [Actor("object", self.p["material"], [part])], materials
@@ -112,13 +119,15 @@ class ActorMoved(Effect):
 
     def prepare(self, measurement):
         rng = measurement.rng(133)
-        self.p["actor"] = self.p["actor"] or str(rng.choice(["cabinet_north", "cabinet_east", "wardrobe", "bookshelf", "pillar"]))
+        self.p["actor"] = self.p["actor"] or str(rng.choice(["cabinet_north", "cabinet_east", "wardrobe", "bookshelf",
+                                                             "pillar"]))
         actor = measurement.described_actors[measurement.described_room.actor_index(self.p["actor"])]
         if self.p["dx_m"] is None or self.p["dy_m"] is None:
             # Into the room, so that it does not run into its wall.
             inward = np.array([4.0, 3.0]) - actor.centroid()[:2]
             angle = math.atan2(inward[1], inward[0]) + rng.uniform(-0.3, 0.3)
-            self.p["dx_m"], self.p["dy_m"] = self.p["distance_m"] * math.cos(angle), self.p["distance_m"] * math.sin(angle)
+            self.p["dx_m"] = self.p["distance_m"] * math.cos(angle)
+            self.p["dy_m"] = self.p["distance_m"] * math.sin(angle)
 
     def room(self, measurement, actors, materials):
         shift = np.array([self.p["dx_m"], self.p["dy_m"], 0.0])

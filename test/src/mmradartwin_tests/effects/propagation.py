@@ -11,7 +11,7 @@ from mmradartwin_tests.tracing import Corner, Path
 
 
 def vertical_edges(room):
-    """Edges that diffract: (start, height, n, direction in face 0, its normal, direction in face n, its normal, facets)."""
+    """Edges that diffract: (start, height, n, into face 0, its normal, into face n, its normal, facets)."""
     found, shared = [], set()
     ids = [f for f in np.flatnonzero(room.reflects)]
     edges = {}
@@ -32,7 +32,8 @@ def vertical_edges(room):
                     continue
                 start, end = np.array(edge[0]), np.array(edge[1])
                 into = [horizontal(room.center(f) - start) for f in (a, b)]
-                found.append((start, end[2] - start[2], 1.5, into[0], room.normal[a], into[1], room.normal[b], (int(a), int(b))))
+                found.append((start, end[2] - start[2], 1.5, into[0], room.normal[a], into[1], room.normal[b],
+                              (int(a), int(b))))
     for a in ids:
         if room.closed[a]:
             continue
@@ -40,7 +41,8 @@ def vertical_edges(room):
             if (a, edge) not in shared:
                 start, end = np.array(edge[0]), np.array(edge[1])
                 into = horizontal(room.center(a) - start)
-                found.append((start, end[2] - start[2], 2.0, into, room.normal[a], into, -room.normal[a], (int(a), int(a))))
+                found.append((start, end[2] - start[2], 2.0, into, room.normal[a], into, -room.normal[a],
+                              (int(a), int(a))))
     return found
 
 
@@ -52,7 +54,7 @@ def horizontal(v):
 
 @effect
 class EdgeDiffraction(Effect):
-    """Returns of the vertical edges of furniture by UTD, wherever no first-order return of their faces holds them already."""
+    """Returns of the upright edges of furniture by UTD, wherever no first-order return of their faces holds them."""
     name, main, rank = "edge_diffraction", "level", 0
     defaults = {"level": 1.0}
 
@@ -157,7 +159,8 @@ class CornerReflection(Effect):
                 foot = near - gap.min() * room.normal[b]
                 foot = foot[np.argsort(foot[:, 2])]
                 extent = float(foot[1][2] - foot[0][2])
-                found.append(Corner(int(a), int(b), foot[0], np.array([0.0, 0.0, 1.0]), extent, room.normal[b], room.normal[a]))
+                found.append(Corner(int(a), int(b), foot[0], np.array([0.0, 0.0, 1.0]), extent, room.normal[b],
+                                    room.normal[a]))
         return found
 
     def echoes(self, measurement, station, echoes):
@@ -230,10 +233,12 @@ class WallGhost(Effect):
                 wall_te, _ = fresnel(room.material[room.actor[wall]], abs(out[i] @ normal), radar.center_hz)
                 area = tracer.scatter_area(facet[i]) * self.STRIDE
                 level = (radar.wavelength_m / (4 * math.pi * r1[i] * r2[i]) * material.scattering * abs(te) *
-                         math.sqrt(abs(cosine_in[i] * cosine_out[i]) * area / math.pi) * abs(wall_te) * tracer.smooth(wall))
+                         math.sqrt(abs(cosine_in[i] * cosine_out[i]) * area / math.pi) * abs(wall_te)
+                         * tracer.smooth(wall))
                 # The point's own phase, the same both ways.
                 value = complex(level * 10**(self.p["gain_db"] / 20) * np.exp(-1j * direct.phase[pick[i]]))
-                paths += self.pair(station, tracer, wall, int(room.actor[wall]), int(direct.actor[pick[i]]), p, q[i], points[i],
+                paths += self.pair(station, tracer, wall, int(room.actor[wall]), int(direct.actor[pick[i]]), p, q[i],
+                                   points[i],
                                    out[i], to_point[i] / r2[i], value)
         echoes.add(paths)
 
@@ -247,8 +252,10 @@ class WallGhost(Effect):
         first = (distance(mirror(tx))[:, None] + distance(rx)).ravel()
         second = (distance(tx)[:, None] + distance(mirror(rx))).ravel()
         length = float(np.linalg.norm(q - p) + np.linalg.norm(point - q) + np.linalg.norm(point - p))
-        return [Path(self.name, (wall, -1), (wall_actor, actor), np.array([q, point]), out, back, length, value, first, (0.0, 0.0)),
-                Path(self.name, (-1, wall), (actor, wall_actor), np.array([point, q]), back, out, length, value, second, (0.0, 0.0))]
+        return [Path(self.name, (wall, -1), (wall_actor, actor), np.array([q, point]), out, back, length, value,
+                     first, (0.0, 0.0)),
+                Path(self.name, (-1, wall), (actor, wall_actor), np.array([point, q]), back, out, length, value,
+                     second, (0.0, 0.0))]
 
     def truth(self, measurement):
         return {"walls": self.names()}

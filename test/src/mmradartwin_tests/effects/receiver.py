@@ -156,7 +156,7 @@ class DcOffset(Effect):
 
 @effect
 class SecondHarmonic(Effect):
-    """Square law ahead of the ADC's filter: echoes at sums of beat frequencies; those beyond the sampling rate are filtered.
+    """Square law ahead of the ADC's filter: echoes at sums of beat frequencies, none beyond the sampling rate.
 
     level_db: against the host, at the session's strongest host.
     """

@@ -20,8 +20,10 @@ class EchoLaw(Effect):
 
     def echoes(self, measurement, station, echoes):
         if len(echoes.paths):
-            legs = [station.true.to_radar(np.array([getattr(p, side) for p in echoes.paths])) for side in ("departure", "arrival")]
-            echoes.coefficients = echoes.coefficients * self.factor(measurement, station, *legs, echoes.lengths_m[:, 0], np.abs(echoes.coefficients))
+            legs = [station.true.to_radar(np.array([getattr(p, side) for p in echoes.paths]))
+                    for side in ("departure", "arrival")]
+            factor = self.factor(measurement, station, *legs, echoes.lengths_m[:, 0], np.abs(echoes.coefficients))
+            echoes.coefficients = echoes.coefficients * factor
         ray = echoes.scatter.points - station.true.position
         ray = station.true.to_radar(ray / np.linalg.norm(ray, axis=1)[:, None])
         echoes.scatter_coefficients = echoes.scatter_coefficients * self.factor(
@@ -46,7 +48,8 @@ class RadomeRipple(EchoLaw):
         total = 0
         for d in (departure, arrival):
             turn = 2 * np.pi * np.sin(azimuth(d)) / self.p["period_sine"]
-            total = total + self.p["ripple_db"] / 8.686 * np.cos(turn) + 1j * math.radians(self.p["ripple_deg"]) * np.sin(turn)
+            total = total + self.p["ripple_db"] / 8.686 * np.cos(turn)
+            total = total + 1j * math.radians(self.p["ripple_deg"]) * np.sin(turn)
         return np.exp(total)
 
 
@@ -102,7 +105,8 @@ class CompassGain(EchoLaw):
 
     def factor(self, measurement, station, departure, arrival, length_m, size):
         world = arrival @ station.true.rotation.T
-        return 10**(self.p["swing_db"] * np.cos(np.arctan2(world[:, 1], world[:, 0]) - math.radians(self.p["toward_deg"])) / 20)
+        away = np.arctan2(world[:, 1], world[:, 0]) - math.radians(self.p["toward_deg"])
+        return 10**(self.p["swing_db"] * np.cos(away) / 20)
 
 
 @uncatalogued
@@ -141,8 +145,10 @@ class TrailingEcho(Effect):
         self.turn = np.exp(2j * np.pi * measurement.rng(160).random())
 
     def echoes(self, measurement, station, echoes):
-        copies = [Path(p.event, p.facets, p.actors, p.vertices, p.departure, p.arrival, p.length_m + 2 * self.p["delay_m"],
-                       complex(np.conj(c * self.turn * 10**(self.p["level_db"] / 20))), lengths + 2 * self.p["delay_m"], p.cosines)
+        copies = [Path(p.event, p.facets, p.actors, p.vertices, p.departure, p.arrival,
+                       p.length_m + 2 * self.p["delay_m"],
+                       complex(np.conj(c * self.turn * 10**(self.p["level_db"] / 20))),
+                       lengths + 2 * self.p["delay_m"], p.cosines)
                   for p, c, lengths in zip(echoes.paths, echoes.coefficients, echoes.lengths_m)]
         echoes.add(copies)
 
@@ -176,7 +182,8 @@ class FrequencySpur(Effect):
         radar = measurement.radar
         t = np.arange(radar.samples) / radar.sample_rate_hz
         phase = np.exp(2j * np.pi * rng.random((len(frames), 1, 1)))
-        return np.asarray(frames) + measurement.strongest * 10**(self.p["level_db"] / 20) * phase * np.exp(2j * np.pi * self.p["beat_hz"] * t)
+        level = measurement.strongest * 10**(self.p["level_db"] / 20)
+        return np.asarray(frames) + level * phase * np.exp(2j * np.pi * self.p["beat_hz"] * t)
 
     def truth(self, measurement):
         return {**self.p, "variable": "frame and beat frequency"}
