@@ -76,6 +76,22 @@ TEST_F(MaterialFile, ReadsTheModels) {
   EXPECT_EQ(loadMaterials(path("materials.yaml")).at("RoughMetal").scattering_coefficient, 0.6);
 }
 
+TEST_F(MaterialFile, ShipsThePapersSevenTagsTwice) {
+  const std::string folder = MMRADARTWIN_CONFIG "/materials/";
+  const auto physical = loadMaterials(folder + "physical_77ghz.yaml"),
+             scalar = loadMaterials(folder + "paper_scalar.yaml");
+  for (const char* tag : {"Metal", "Concrete", "Wood", "TableTop", "Carpet", "Glass", "Plastic"}) {
+    EXPECT_EQ(physical.count(tag), 1u) << tag;
+    ASSERT_EQ(scalar.count(tag), 1u) << tag;
+    EXPECT_EQ(scalar.at(tag).model, MaterialModel::kScalar);
+    EXPECT_EQ(scalar.at(tag).color, physical.at(tag).color) << tag;
+  }
+  EXPECT_NEAR(std::abs(fresnel(physical.at("Concrete"), 1, 77e9).te), .3926, 5e-4);
+  EXPECT_NEAR(std::abs(fresnel(physical.at("Glass"), 1, 77e9).te), .431, 5e-4);
+  EXPECT_NEAR(db(scalarReflection(scalar.at("Concrete"), 1)), -8, 1e-12);
+  EXPECT_TRUE(physical.at("Carpet").extrapolated);
+}
+
 TEST_F(MaterialFile, RefusesWhatItDoesNotUnderstand) {
   EXPECT_NE(errorFor("{model: dielectric, relative_permittivity: 0.5}").find("relative_permittivity"),
             std::string::npos);

@@ -265,6 +265,21 @@ TEST_F(TwinTest, LeakageStandsOverTheStrongestEchoAfterTheFilter) {
   }
 }
 
+TEST_F(TwinTest, LeakageTakesAVectorOverTheChannels) {
+  addPlate(3, 0);
+  Twin twin =
+      makeTwin(path("scene.yaml"),
+               "  specular: {}\n  tx_rx_leakage: {range_m: 0.1, level_db: -6, phase_deg: [0, 20, 40, 60, 80, 100, 120, "
+               "140], gain_db: [0, 3, 0, 0, 0, 0, 0, 0]}\n");
+  const auto leak = of(twin.simulate(radarPose(0, 0, 0)), "tx_rx_leakage");
+  ASSERT_EQ(leak.size(), 1u);
+  EXPECT_NEAR(std::arg(leak[0].c[3] / leak[0].c[0]) * 180 / M_PI, 60, 1e-9);
+  EXPECT_NEAR(db(std::abs(leak[0].c[1] / leak[0].c[0])), 3, 1e-9);
+  double power = 0;
+  for (const auto& c : leak[0].c) power += std::norm(c);
+  EXPECT_NEAR(db(std::sqrt(power / 8) / plateLevel("")), -6, 1e-9);
+}
+
 TEST_F(TwinTest, HighPassHasItsCorner) {
   addPlate(3, 0);
   // A tone at 500 kHz per metre of range: corner at the plate's beat frequency loses 3.01 dB.

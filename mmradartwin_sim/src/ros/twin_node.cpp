@@ -179,6 +179,10 @@ void TwinNode::onRate(const ros::WallTimerEvent&) {
     const geometry_msgs::TransformStamped T = tf_buffer_.lookupTransform(map_frame_, radar_frame_, ros::Time(0));
     // A static transform carries no stamp of its own.
     const ros::Time stamp = T.header.stamp.isZero() ? ros::Time::now() : T.header.stamp;
+    // A pose that nobody renews is shown again once a second, for those who come late.
+    const ros::WallTime now = ros::WallTime::now();
+    if (last_ && last_->grid.stamp_ns == toNanoseconds(stamp) && (now - published_at_).toSec() < 1) return;
+    published_at_ = now;
     simulate(toIsometry(T.transform), toNanoseconds(stamp));
   } catch (const tf2::TransformException& error) {
     ROS_WARN_THROTTLE(kWarnEvery_s, "waiting for the pose of %s in %s: %s", radar_frame_.c_str(), map_frame_.c_str(),

@@ -56,7 +56,7 @@ class TwinNode {
   std::optional<Simulation> last_;
 
   mmradartwin_msgs::ReceiveGrid::ConstPtr pending_;
-  ros::WallTime pending_since_, measured_at_;
+  ros::WallTime pending_since_, measured_at_, published_at_;
   std::uint64_t simulated_ = 0, reused_ = 0, skipped_ = 0, without_pose_ = 0;
   double simulate_ms_ = 0;
 
