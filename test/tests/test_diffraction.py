@@ -31,7 +31,8 @@ class HalfPlane(unittest.TestCase):
         return total
 
     def test_exact_values(self):
-        for phi, size in ((30, 1.399526), (90, 2.114831), (180, 1.059370), (239, .488427), (241, .441478), (270, .117994), (330, .016837)):
+        for phi, size in ((30, 1.399526), (90, 2.114831), (180, 1.059370), (239, .488427), (241, .441478),
+                          (270, .117994), (330, .016837)):
             self.assertAlmostEqual(abs(self.field(phi)), size, delta=2e-6, msg=str(phi))
 
     def test_continuity_at_both_shadow_boundaries(self):
