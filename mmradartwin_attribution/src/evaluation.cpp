@@ -16,7 +16,7 @@ RangeAngleMap averagedMap(const Recording& recording, const SignalChain& chain, 
   CoherentAverage average(recording.radar, 0);
   recording.forEachFrame(pose, [&](const AdcCube& cube) { average.add(cube); });
   if (!average.complete()) {
-    throw InputError("pose " + pose.name + ": its capture holds no valid chirp for some TDM slot; record it again");
+    throw InputError("pose '" + pose.name + "': its capture holds no valid chirp for some TDM slot; record it again");
   }
   ReceiveGrid grid = average.grid();
   grid.pose_valid = true;
@@ -43,7 +43,7 @@ SimulatedBranch simulatedBySession(const Recording& session) {
       const std::lock_guard<std::mutex> lock(*reading);
       return SimulatedPose{averagedMap(session, *chain, candidate), {}};
     }
-    throw InputError("pose " + pose.name + ": the simulated session " + session.source +
+    throw InputError("pose '" + pose.name + "': the simulated session " + session.source +
                      " has no usable pose of that name");
   };
 }
@@ -79,7 +79,8 @@ Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated
       out.records = std::move(other.records);
       out.used = true;
     } catch (const InputError& error) {
-      out.problem = error.what();
+      const std::string prefix = "pose '" + out.pose.name + "': ", message = error.what();
+      out.problem = message.rfind(prefix, 0) == 0 ? message : prefix + message;
     }
     if (options.on_pose && out.used) options.on_pose(out);
     if (!options.keep_records) out.records = {};

@@ -25,6 +25,13 @@ std::string generate(const std::string& name, const std::string& options) {
   return directory;
 }
 
+void remove(const std::string& directory) {
+  if (directory.empty()) return;
+  fs::remove_all(directory);
+  fs::remove(directory + ".json");
+  fs::remove(directory + ".log");
+}
+
 class InterventionTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -37,12 +44,8 @@ class InterventionTest : public ::testing::Test {
   static void TearDownTestSuite() {
     lab_.reset();
     base_.reset();
-    for (const std::string& directory : {measured_, other_speckle_}) {
-      if (directory.empty()) continue;
-      fs::remove_all(directory);
-      fs::remove(directory + ".json");
-      fs::remove(directory + ".log");
-    }
+    remove(measured_);
+    remove(other_speckle_);
   }
   void SetUp() override {
     if (!lab_) GTEST_SKIP() << "the session generator " << MMRADARTWIN_TEST_DIR << "/scripts/make_session.py did not run";
@@ -94,25 +97,35 @@ TEST_F(InterventionTest, WithNothingHiddenTheTwinReachesTheCeiling) {
 TEST_F(InterventionTest, ATurnedRadarShiftsResponses) {
   const Twin turned(lab_->describe("  radar_yaw_offset: {yaw_deg: 14}\n"));
   const auto count = routed("radar turned by 14 deg", lab_->against(simulatedByTwin(turned)), 4);
+  // The rest: speckle maxima of rough walls away from any region (C5), and peaks that normalise where the array has a null (C3).
   EXPECT_EQ(std::max_element(count.begin(), count.end()) - count.begin(), 3);
-  EXPECT_GE(share(count, 4), 0.6);
+  EXPECT_GE(share(count, 4), 0.7);
 }
 
+// Where the actor held the strongest echo, the normalisation lifts all others: what then stands out is C3 and C4 by rule.
 TEST_F(InterventionTest, ASuppressedActorLosesSupport) {
+  for (const std::string actor : {"wall_north", "cabinet_north", "wardrobe"}) {
+    routed("paths of " + actor + " suppressed", lab_->against(without(actor)), 1);
+  }
   const auto count = routed("paths of wall_east suppressed", lab_->against(without("wall_east")), 1);
   EXPECT_GE(share(count, 1), 0.6);
 }
 
 TEST_F(InterventionTest, AWeakerMaterialIsWeakSupport) {
-  const auto count = routed("Wood 10 dB weaker", lab_->against(lab_->edited([](std::vector<PathRecord>& records) {
-    for (PathRecord& r : records) {
-      for (int actor : r.actors) {
-        if (lab_->twin.scene().actors[actor].material_tag != "Wood") continue;
-        r.amplitude *= std::sqrt(0.1);
-        for (auto& c : r.c) c *= std::sqrt(0.1);
+  const auto weaker = [](const std::string& tag) {
+    return lab_->against(lab_->edited([tag](std::vector<PathRecord>& records) {
+      for (PathRecord& r : records) {
+        for (int actor : r.actors) {
+          if (lab_->twin.scene().actors[actor].material_tag != tag) continue;
+          r.amplitude *= std::sqrt(0.1);
+          for (auto& c : r.c) c *= std::sqrt(0.1);
+        }
       }
-    }
-  })), 2);
+    }));
+  };
+  for (const std::string tag : {"Concrete", "Metal"}) routed(tag + " 10 dB weaker", weaker(tag), 2);
+  const auto count = routed("Wood 10 dB weaker", weaker("Wood"), 2);
+  EXPECT_EQ(std::max_element(count.begin(), count.end()) - count.begin(), 1);
   EXPECT_GE(share(count, 2), 0.5);
 }
 
@@ -141,21 +154,12 @@ TEST_F(InterventionTest, ACouplingPeakIsAnUnsupportedAnchor) {
 }
 
 TEST_F(InterventionTest, AnUnmodelledObjectIsAMissingMechanism) {
-  // The scene loses an object that the measurement has; regions come from the scene, so that it has none.
-  std::array<int, 5> sum{};
-  for (const std::string& actor : {"pillar", "cabinet_east", "tv"}) {
-    const Twin lacking(lab_->describe("  actor_absent: {actor: " + actor + "}\n"));
-    Scene scene = lab_->twin.scene();
-    for (Eigen::Vector3d& v : scene.actors[scene.actorIndex(actor)].vertices) v.z() -= 100;
-    rebuildFacets(scene);
-    const RayCaster rays(scene);
-    const auto count =
-        routed(actor + " not in the scene",
-               evaluate(lab_->recording, simulatedByTwin(lacking), scene, rays, lab_->options), 5);
-    for (int i = 0; i < 5; ++i) sum[i] += count[i];
-  }
-  std::printf("[  counts  ] together C5 %.0f %%\n", 100 * share(sum, 5));
-  EXPECT_GT(sum[4], 0);
+  const std::string session = generate("unmodelled", "--effect actor_unmodelled");
+  if (session.empty()) GTEST_SKIP() << "the session generator has no effect actor_unmodelled";
+  const Laboratory changed(session);
+  const auto count = routed("object that the scene lacks", changed.against(simulatedByTwin(changed.twin)), 5);
+  EXPECT_GE(share(count, 5), 0.6);
+  remove(session);
 }
 
 TEST_F(InterventionTest, RecordsOfASuppressedActorNameIt) {

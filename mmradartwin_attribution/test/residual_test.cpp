@@ -70,8 +70,10 @@ TEST_F(ResidualTest, AWeakResponseInTheTightWindowIsC2) {
 }
 
 TEST_F(ResidualTest, AStrongResponseInTheRegionsTightWindowIsAMatch) {
-  // 0.34 m apart, beyond the tight window around either response, but both in the region's.
-  EXPECT_TRUE(compare({{4.83, 30, -5}}, {{5.17, 30, -5}}, {region("tv", 5, 30)}).residuals.empty());
+  // 0.34 m apart, beyond the tight window around either response, but both in the region's: no weak support, no material.
+  const auto pose = compare({{4.83, 30, -5}}, {{5.17, 30, -5}}, {region("tv", 5, 30)});
+  EXPECT_TRUE(pose.regions[0].simulated_strong);
+  for (const Residual& r : pose.residuals) EXPECT_FALSE(r.measured_stronger);
 }
 
 TEST_F(ResidualTest, AResponseInTheWideWindowAloneIsC4OnBothSides) {

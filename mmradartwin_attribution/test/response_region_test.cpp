@@ -122,7 +122,9 @@ TEST_F(RoomTest, AnObjectHidesWhatIsBehindAndFacesTheRadar) {
   EXPECT_EQ(cabinet->actor, "cabinet");
   EXPECT_EQ(find(regions, RegionKind::kFacing, 4, 0), nullptr) << "the wall's foot is hidden";
   for (const ResponseRegion& r : regions) {
-    if (r.kind == RegionKind::kCorner) EXPECT_EQ(r.actor.find("cabinet"), std::string::npos) << "convex edges are none";
+    if (r.kind == RegionKind::kCorner) {
+      EXPECT_EQ(r.actor.find("cabinet"), std::string::npos) << "convex edges are none";
+    }
   }
   EXPECT_NE(find(regions, RegionKind::kCorner, std::sqrt(20.0), 26.565), nullptr);
 }
@@ -132,7 +134,9 @@ TEST_F(RoomTest, AnObjectAgainstTheMiddleOfAWallMakesTwoCorners) {
   const auto regions = regionsAt(1, 2, 0);
   // Beside its front (4.5 m ahead) the cabinet's sides are hidden from here; from the side one is seen.
   for (const ResponseRegion& r : regions) {
-    if (r.kind == RegionKind::kCorner) EXPECT_EQ(r.actor.find("cabinet"), std::string::npos);
+    if (r.kind == RegionKind::kCorner) {
+      EXPECT_EQ(r.actor.find("cabinet"), std::string::npos);
+    }
   }
   const auto beside = regionsAt(4, 3.4, 0);
   const ResponseRegion* corner =
@@ -155,7 +159,7 @@ TEST_F(RoomTest, ASmallObjectTurnedAwayHasItsNearestVisiblePoint) {
     if (r.actor != "post") continue;
     ++found;
     EXPECT_TRUE(r.kind == RegionKind::kExtent || r.kind == RegionKind::kEdge);
-    EXPECT_NEAR(r.range_m, 3.0, 0.1);
+    EXPECT_NEAR(r.range_m, 3.0, 0.2);
     EXPECT_NEAR(r.azimuth_rad / kDegree, 0, 2);
   }
   EXPECT_EQ(found, 1);
@@ -186,7 +190,7 @@ TEST_F(RoomTest, NoTwoRegionsOfOneActorShareACell) {
 TEST(FresnelAperture, LimitsOfTheClosedForm) {
   EXPECT_NEAR(fresnelAperture(-100, 100), 1, 0.01) << "an unbounded plane";
   EXPECT_NEAR(fresnelAperture(0, 100), 0.5, 0.005) << "a half plane, on its edge: -6 dB";
-  EXPECT_NEAR(fresnelAperture(-0.05, 0.05), 0.1 / std::sqrt(2.0), 1e-3) << "small: its width in u over sqrt 2";
+  EXPECT_NEAR(fresnelAperture(-0.05, 0.05), 0.1 / std::sqrt(2.0), 2e-3) << "small: its width in u over sqrt 2";
   EXPECT_LT(fresnelAperture(5, 10), 0.1);
 }
 
