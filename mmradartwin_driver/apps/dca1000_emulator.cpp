@@ -47,17 +47,23 @@ int main(int argc, char** argv) {
   app.add_option("--config-port", options.config_port, "command port of both sides")->capture_default_str();
   app.add_option("--data-port", options.data_port, "the host's data port")->capture_default_str();
   app.add_option("--source-port", options.source_port, "port that the card sends from")->capture_default_str();
-  app.add_option("--payload-bytes", options.payload_bytes, "sample bytes in a full packet")->capture_default_str()
+  app.add_option("--payload-bytes", options.payload_bytes, "sample bytes in a full packet")
+      ->capture_default_str()
       ->check(CLI::Range(1, 1462));
-  app.add_option("--start-delay-s", options.start_delay_s, "from the first RECORD_START to the first frame")->capture_default_str()
+  app.add_option("--start-delay-s", options.start_delay_s, "from the first RECORD_START to the first frame")
+      ->capture_default_str()
       ->check(CLI::Range(0.0, 60.0));
-  app.add_option("--flush-s", options.flush_s, "from the last sample to the short last packet")->capture_default_str()
+  app.add_option("--flush-s", options.flush_s, "from the last sample to the short last packet")
+      ->capture_default_str()
       ->check(CLI::Range(0.0, 60.0));
-  app.add_option("--deaf-s", options.deaf_s, "silence after CONFIG_FPGA")->capture_default_str()->check(CLI::Range(0.0, 60.0));
+  app.add_option("--deaf-s", options.deaf_s, "silence after CONFIG_FPGA")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 60.0));
   app.add_option("--loss", options.loss, "probability that a data packet is lost")->check(CLI::Range(0.0, 1.0));
   app.add_option("--duplicate", options.duplicate, "probability that it comes twice")->check(CLI::Range(0.0, 1.0));
   app.add_option("--reorder", options.reorder, "probability that it is overtaken")->check(CLI::Range(0.0, 1.0));
-  app.add_option("--reorder-depth", options.reorder_depth, "packets that overtake it at most")->capture_default_str()
+  app.add_option("--reorder-depth", options.reorder_depth, "packets that overtake it at most")
+      ->capture_default_str()
       ->check(CLI::PositiveNumber);
   app.add_option("--truncate", options.truncate, "probability that its end is missing")->check(CLI::Range(0.0, 1.0));
   app.add_option("--seed", options.seed, "of these chances")->capture_default_str();

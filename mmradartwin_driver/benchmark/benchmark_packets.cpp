@@ -130,7 +130,8 @@ void receivePackets(benchmark::State& state) {
     burst.send(kBurst);
     state.ResumeTiming();
     int got;
-    while ((got = receiver.receive(0, [](const DataPacket& packet) { benchmark::DoNotOptimize(packet); })) > 0) packets += got;
+    while ((got = receiver.receive(0, [](const DataPacket& packet) { benchmark::DoNotOptimize(packet); })) > 0)
+      packets += got;
   }
   if (packets != state.iterations() * kBurst) state.SkipWithError("packets were dropped");
   state.SetItemsProcessed(packets);

@@ -8,8 +8,8 @@
 
 namespace mmradartwin {
 
-/// A program started by this one, whose standard output is read line by line. Ended with SIGTERM, and after 2 s SIGKILL,
-/// when the object goes.
+/// A program started by this one, whose standard output is read line by line. Ended with SIGTERM, and after 2 s
+/// SIGKILL, when the object goes.
 class ChildProcess {
  public:
   /// Throws std::runtime_error where it cannot be started.

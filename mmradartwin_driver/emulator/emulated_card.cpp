@@ -87,8 +87,8 @@ void EmulatedCard::serve(int timeout_ms) {
   std::vector<std::uint8_t> request(600);
   sockaddr_in from{};
   socklen_t from_size = sizeof from;
-  const auto size = recvfrom(command_fd_, request.data(), request.size(), 0, reinterpret_cast<sockaddr*>(&from),
-                             &from_size);
+  const auto size =
+      recvfrom(command_fd_, request.data(), request.size(), 0, reinterpret_cast<sockaddr*>(&from), &from_size);
   if (size < 0 || clock_ns(CLOCK_MONOTONIC) < deaf_until_ns_) return;
   request.resize(static_cast<std::size_t>(size));
   execute(request, from);
@@ -129,7 +129,8 @@ void EmulatedCard::execute(const std::vector<std::uint8_t>& request, const socka
                    : 1;
       if (result == 0) {
         const bool two_lanes = session_.radar.layout == CaptureLayout::kTwoLane;
-        if (two_lanes != (request[7] == 2)) log_("warning: configured for other lanes than the session was recorded with");
+        if (two_lanes != (request[7] == 2))
+          log_("warning: configured for other lanes than the session was recorded with");
         deaf_until_ns_ = clock_ns(CLOCK_MONOTONIC) + std::llround(options_.deaf_s * 1e9);
       }
       break;

@@ -17,12 +17,12 @@
 
 namespace mmradartwin {
 
-/// A DCA1000EVM with a radar on its LVDS side, as seen from the Ethernet port. Written from the protocol document, apart
-/// from the driver: what the one gets wrong the other does not repeat.
+/// A DCA1000EVM with a radar on its LVDS side, as seen from the Ethernet port. Written from the protocol document,
+/// apart from the driver: what the one gets wrong the other does not repeat.
 ///
 /// Time: the radar triggers its first frame start_delay_s after the first RECORD_START and then one every frame period,
-/// armed or not. Chirp c of a frame is sampled c * (idle + ramp_end) + idle + adc_start + N / f_s after its start, and its
-/// bytes are with the card then. The card sends whenever a payload is full, packets at least delay + 11.2 us apart,
+/// armed or not. Chirp c of a frame is sampled c * (idle + ramp_end) + idle + adc_start + N / f_s after its start, and
+/// its bytes are with the card then. The card sends whenever a payload is full, packets at least delay + 11.2 us apart,
 /// and what is left 2 s after the last chirp, with the record-completed status.
 class EmulatedCard {
  public:
@@ -32,10 +32,10 @@ class EmulatedCard {
     int payload_bytes = 1456;
     double start_delay_s = 1.0;
     double flush_s = 2.0;
-    double deaf_s = 0.3;                  ///< after CONFIG_FPGA
+    double deaf_s = 0.3;  ///< after CONFIG_FPGA
     std::uint64_t seed = 1;
     double loss = 0, duplicate = 0, reorder = 0, truncate = 0;  ///< probability per data packet
-    int reorder_depth = 2;                ///< so many packets overtake a reordered one, at most
+    int reorder_depth = 2;                                      ///< so many packets overtake a reordered one, at most
     std::map<std::int64_t, std::uint16_t> status_at_frame;      ///< unsolicited status bits
   };
   /// Lines about what happens, "armed first_frame_ns=... frames=..." among them. From both threads.
@@ -74,17 +74,17 @@ class EmulatedCard {
   std::int64_t deaf_until_ns_ = 0;
   std::int64_t chirp_ns_, sampled_ns_;
 
-  std::mutex mutex_;                    // the four below
-  std::uint64_t recording_ = 0;         ///< counts RECORD_STARTs
+  std::mutex mutex_;             // the four below
+  std::uint64_t recording_ = 0;  ///< counts RECORD_STARTs
   bool recording_on_ = false;
-  std::int64_t radar_start_ns_ = 0;     ///< monotonic; 0 before the first RECORD_START
-  std::int64_t interval_ns_;            ///< between packets
+  std::int64_t radar_start_ns_ = 0;  ///< monotonic; 0 before the first RECORD_START
+  std::int64_t interval_ns_;         ///< between packets
 
   // Of the radar's thread.
-  std::uint64_t sending_ = 0;           ///< recording that the counts belong to
+  std::uint64_t sending_ = 0;  ///< recording that the counts belong to
   std::uint32_t sequence_ = 0;
   std::uint64_t bytes_sent_ = 0;
-  std::vector<std::uint8_t> held_;      ///< bytes waiting for a full payload
+  std::vector<std::uint8_t> held_;  ///< bytes waiting for a full payload
   std::int64_t last_sent_ns_ = 0;
   struct Delayed {
     std::vector<std::uint8_t> datagram;

@@ -17,7 +17,8 @@ std::int64_t countFrames(const RadarConfig& radar, const std::string& file) {
   const std::uintmax_t frame = radar.bytes_per_frame();
   if (size == 0 || size % frame != 0) {
     throw InputError(file + ": " + std::to_string(size) + " bytes are no whole number of frames of " +
-                     std::to_string(frame) + " bytes: give the radar.yaml that it was recorded with, or record it again");
+                     std::to_string(frame) +
+                     " bytes: give the radar.yaml that it was recorded with, or record it again");
   }
   return static_cast<std::int64_t>(size / frame);
 }

@@ -1,5 +1,5 @@
-// Plays a session as if it were measured now: starts the DCA1000 emulator on its captures and publishes its poses in tf on
-// the emulator's schedule.
+// Plays a session as if it were measured now: starts the DCA1000 emulator on its captures and publishes its poses in tf
+// on the emulator's schedule.
 #include <ros/ros.h>
 #include <std_msgs/Float32.h>
 #include <tf2_ros/buffer.h>
@@ -71,7 +71,8 @@ class SessionPlayer {
     const tf2_ros::TransformListener listener(buffer);
     constexpr double kWait_s = 20;
     try {
-      const auto T = buffer.lookupTransform(radar_frame_, camera_frame_, ros::Time(0), ros::Duration(kWait_s)).transform;
+      const auto T =
+          buffer.lookupTransform(radar_frame_, camera_frame_, ros::Time(0), ros::Duration(kWait_s)).transform;
       geometry_msgs::Pose pose;
       pose.position.x = T.translation.x;
       pose.position.y = T.translation.y;
@@ -85,16 +86,25 @@ class SessionPlayer {
   }
 
   void startEmulator() {
-    std::vector<std::string> arguments = {
-        session_path_,     "--first",         std::to_string(selection_.first),
-        "--every",         std::to_string(selection_.every),
-        "--count",         std::to_string(selection_.count),
-        "--card-ip",       card_ip_,
-        "--host-ip",       host_ip_,
-        "--config-port",   std::to_string(config_port_),
-        "--data-port",     std::to_string(data_port_),
-        "--start-delay-s", std::to_string(start_delay_s_),
-        "--once",          "--end-with-parent"};
+    std::vector<std::string> arguments = {session_path_,
+                                          "--first",
+                                          std::to_string(selection_.first),
+                                          "--every",
+                                          std::to_string(selection_.every),
+                                          "--count",
+                                          std::to_string(selection_.count),
+                                          "--card-ip",
+                                          card_ip_,
+                                          "--host-ip",
+                                          host_ip_,
+                                          "--config-port",
+                                          std::to_string(config_port_),
+                                          "--data-port",
+                                          std::to_string(data_port_),
+                                          "--start-delay-s",
+                                          std::to_string(start_delay_s_),
+                                          "--once",
+                                          "--end-with-parent"};
     std::istringstream more(emulator_options_);
     for (std::string word; more >> word;) arguments.push_back(word);
     emulator_ = std::make_unique<ChildProcess>(programBeside("dca1000_emulator"), arguments);
@@ -111,7 +121,8 @@ class SessionPlayer {
       }
       if (!emulatorRuns()) return std::nullopt;
       if ((ros::WallTime::now() - since).toSec() > 5) {
-        ROS_WARN_STREAM_THROTTLE(10, "the emulated card at " << card_ip_ << " waits to be armed: start driver_node with card_ip "
+        ROS_WARN_STREAM_THROTTLE(10, "the emulated card at " << card_ip_
+                                                             << " waits to be armed: start driver_node with card_ip "
                                                              << card_ip_ << " and host_ip " << host_ip_);
       }
     }

@@ -28,8 +28,8 @@ Dca1000Control::Dca1000Control(const std::string& host_ip, const std::string& ca
 
 void Dca1000Control::send(Dca1000Command command, const std::vector<std::uint8_t>& body) {
   const std::vector<std::uint8_t> bytes = encodeCommand(command, body);
-  const auto sent = sendto(socket_.fd(), bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&card_),
-                           sizeof card_);
+  const auto sent =
+      sendto(socket_.fd(), bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&card_), sizeof card_);
   if (sent == static_cast<ssize_t>(bytes.size())) return;
   // A port that nobody listens on reports so with the next datagram: that is silence, not a failure of this host.
   if (errno == ECONNREFUSED) return;
@@ -61,9 +61,9 @@ Dca1000Reply Dca1000Control::command(Dca1000Command command, const std::vector<s
       // Anything else is the late answer to an earlier attempt.
     }
   }
-  throw RigError("no answer from the DCA1000 at " + card_ip_ + " to " +
-                 commandName(static_cast<std::uint16_t>(command)) +
-                 ": check its power, the cable, that SW2.5 is on SW_CONFIG, and that no firewall blocks UDP 4096 and 4098");
+  throw RigError(
+      "no answer from the DCA1000 at " + card_ip_ + " to " + commandName(static_cast<std::uint16_t>(command)) +
+      ": check its power, the cable, that SW2.5 is on SW_CONFIG, and that no firewall blocks UDP from the card");
 }
 
 void Dca1000Control::done(Dca1000Command code, const std::vector<std::uint8_t>& body) {

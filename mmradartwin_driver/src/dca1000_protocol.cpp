@@ -29,15 +29,24 @@ std::string hex(unsigned value) {
 
 std::string commandName(std::uint16_t code) {
   switch (static_cast<Dca1000Command>(code)) {
-    case Dca1000Command::kResetFpga: return "RESET_FPGA";
-    case Dca1000Command::kResetRadar: return "RESET_AR_DEV";
-    case Dca1000Command::kConfigFpga: return "CONFIG_FPGA_GEN";
-    case Dca1000Command::kRecordStart: return "RECORD_START";
-    case Dca1000Command::kRecordStop: return "RECORD_STOP";
-    case Dca1000Command::kSystemConnect: return "SYSTEM_CONNECT";
-    case Dca1000Command::kSystemStatus: return "SYSTEM_ERROR";
-    case Dca1000Command::kConfigPacketData: return "CONFIG_PACKET_DATA";
-    case Dca1000Command::kReadFpgaVersion: return "READ_FPGA_VERSION";
+    case Dca1000Command::kResetFpga:
+      return "RESET_FPGA";
+    case Dca1000Command::kResetRadar:
+      return "RESET_AR_DEV";
+    case Dca1000Command::kConfigFpga:
+      return "CONFIG_FPGA_GEN";
+    case Dca1000Command::kRecordStart:
+      return "RECORD_START";
+    case Dca1000Command::kRecordStop:
+      return "RECORD_STOP";
+    case Dca1000Command::kSystemConnect:
+      return "SYSTEM_CONNECT";
+    case Dca1000Command::kSystemStatus:
+      return "SYSTEM_ERROR";
+    case Dca1000Command::kConfigPacketData:
+      return "CONFIG_PACKET_DATA";
+    case Dca1000Command::kReadFpgaVersion:
+      return "READ_FPGA_VERSION";
   }
   return hex(code);
 }
@@ -59,8 +68,9 @@ std::vector<std::uint8_t> fpgaConfigBody(int lanes, int timer_s) {
   if (timer_s < 0 || timer_s > 255) {
     throw InputError("DCA1000: timer of " + std::to_string(timer_s) + " s: must be 0 to 255");
   }
-  return {kRawLogging, static_cast<std::uint8_t>(lanes == 4 ? 1 : 2), kCapture, kEthernet, k16Bit,
-          static_cast<std::uint8_t>(timer_s)};
+  return {kRawLogging, static_cast<std::uint8_t>(lanes == 4 ? 1 : 2),
+          kCapture,    kEthernet,
+          k16Bit,      static_cast<std::uint8_t>(timer_s)};
 }
 
 std::vector<std::uint8_t> packetConfigBody(std::uint16_t packet_bytes, std::uint16_t delay_ticks) {

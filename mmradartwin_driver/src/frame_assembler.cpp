@@ -120,7 +120,8 @@ void FrameAssembler::remember(const DataPacket& packet) {
   std::memcpy(entry.head.data(), packet.payload, std::min(packet.size, entry.head.size()));
 }
 
-/// Near the held packets, in count and sequence alike, and not going back after a pause: that would be the next restart.
+/// Near the held packets, in count and sequence alike, and not going back after a pause: that would be the next
+/// restart.
 bool FrameAssembler::continuesSuspects(const DataPacket& packet) const {
   constexpr std::uint64_t kNear = 64 * 1472;
   const Suspect& last = suspects_.back();
@@ -307,8 +308,8 @@ void FrameAssembler::handOut(std::uint64_t frame) {
     const auto loseUntil = [&](std::size_t end) {
       if (position >= end) return;
       // Half a word is no sample: the hole is widened to whole words.
-      const std::size_t from = position & ~std::size_t{1}, to = std::min<std::size_t>((end + 1) & ~std::size_t{1},
-                                                                                      frame_bytes_);
+      const std::size_t from = position & ~std::size_t{1},
+                        to = std::min<std::size_t>((end + 1) & ~std::size_t{1}, frame_bytes_);
       std::memset(done.bytes.data() + from, 0, to - from);
       for (std::size_t chirp = position / chirp_bytes; chirp <= (end - 1) / chirp_bytes; ++chirp) {
         cube.chirp_valid[chirp] = 0;

@@ -27,11 +27,16 @@ int linkHeaderBytes(int link_type, const std::uint8_t* p, std::size_t size) {
       if (networkOrder16(p + at) == kVlan) at += 4;
       return size >= at + 2 && networkOrder16(p + at) == kIpv4 ? static_cast<int>(at + 2) : -1;
     }
-    case DLT_LINUX_SLL: return size >= 16 && networkOrder16(p + 14) == kIpv4 ? 16 : -1;
-    case DLT_LINUX_SLL2: return size >= 20 && networkOrder16(p) == kIpv4 ? 20 : -1;
-    case DLT_NULL: return 4;
-    case DLT_RAW: return 0;
-    default: return -1;
+    case DLT_LINUX_SLL:
+      return size >= 16 && networkOrder16(p + 14) == kIpv4 ? 16 : -1;
+    case DLT_LINUX_SLL2:
+      return size >= 20 && networkOrder16(p) == kIpv4 ? 20 : -1;
+    case DLT_NULL:
+      return 4;
+    case DLT_RAW:
+      return 0;
+    default:
+      return -1;
   }
 }
 

@@ -12,6 +12,7 @@ using std::chrono::seconds;
 
 constexpr milliseconds kRetryAfter{2000};
 constexpr seconds kRepeatProblemAfter{10};
+constexpr seconds kGrace{3};
 constexpr milliseconds kAskWhileSilent{2000};
 /// The card sends the rest of a recording about 2 s after its last sample; what is silent for longer has ended.
 constexpr milliseconds kStreamEnded{3500};
@@ -75,8 +76,8 @@ void Rig::run() {
 void Rig::open() {
   setPhase(RigState::Phase::kConnecting);
   if (!receiver_) {
-    receiver_ = std::make_unique<PacketReceiver>(options_.host_ip, options_.data_port, options_.card_ip,
-                                                 options_.receiver);
+    receiver_ =
+        std::make_unique<PacketReceiver>(options_.host_ip, options_.data_port, options_.card_ip, options_.receiver);
     const std::size_t granted = receiver_->buffer_bytes();
     if (granted < options_.receiver.buffer_bytes) {
       events_(Level::kWarning, "the kernel grants " + std::to_string(granted >> 10) + " kB of " +
@@ -206,7 +207,9 @@ void Rig::report(const std::string& problem) {
   }
   if (repeated && Clock::now() - last_report_ < kRepeatProblemAfter) return;
   last_report_ = Clock::now();
-  events_(Level::kError, problem);
+  // Driver and card are often started together.
+  const bool starting = Clock::now() - started_ < kGrace;
+  events_(starting ? Level::kWarning : Level::kError, problem + (starting ? " (trying again)" : ""));
 }
 
 void Rig::setPhase(RigState::Phase phase) {

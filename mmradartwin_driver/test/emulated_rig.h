@@ -47,7 +47,8 @@ inline std::vector<std::uint8_t> readBytes(const std::string& file) {
 
 /// The paper's radar: 2048 bytes per frame; frames as often as asked.
 inline std::string paperRadarYaml(double frame_period_s) {
-  return "device: awr2243\ncarrier_hz: 77.0e+9\nslope_hz_per_s: 75.0e+12\nsamples_per_chirp: 64\nsample_rate_hz: 5.0e+6\n"
+  return "device: awr2243\ncarrier_hz: 77.0e+9\nslope_hz_per_s: 75.0e+12\nsamples_per_chirp: 64\nsample_rate_hz: "
+         "5.0e+6\n"
          "adc_start_s: 6.0e-6\nloops_per_frame: 1\nframe_period_s: " +
          std::to_string(frame_period_s) +
          "\ntx_position_m: [[0, 0, 0], [0, 0.0077867, 0]]\n"

@@ -18,7 +18,9 @@ struct ArrivingPacket {
   std::vector<std::uint8_t> payload;
   std::int64_t stamp_ns;
 
-  DataPacket view() const { return {sequence, offset % (std::uint64_t{1} << 48), payload.data(), payload.size(), stamp_ns}; }
+  DataPacket view() const {
+    return {sequence, offset % (std::uint64_t{1} << 48), payload.data(), payload.size(), stamp_ns};
+  }
 };
 
 /// Byte `offset` of recording `epoch`: anything that differs from place to place and from recording to recording.
@@ -74,8 +76,8 @@ inline std::vector<ArrivingPacket> cutIntoPackets(std::mt19937_64& random, std::
 
 struct Impairment {
   double loss = 0, duplicate = 0, reorder = 0, truncate = 0;
-  int depth = 1;            ///< places a packet may fall behind
-  std::size_t spared = 0;   ///< so many packets at the head stay as they are
+  int depth = 1;           ///< places a packet may fall behind
+  std::size_t spared = 0;  ///< so many packets at the head stay as they are
 };
 
 inline std::vector<ArrivingPacket> impair(std::mt19937_64& random, const std::vector<ArrivingPacket>& sent,
@@ -104,8 +106,8 @@ inline std::vector<ArrivingPacket> impair(std::mt19937_64& random, const std::ve
   return arriving;
 }
 
-/// What an assembler must have of one recording, byte by byte, told from the arrivals by the rule alone: a byte of frame f
-/// counts if, by the time it is placed, no byte beyond the end of f + window has come.
+/// What an assembler must have of one recording, byte by byte, told from the arrivals by the rule alone: a byte of
+/// frame f counts if, by the time it is placed, no byte beyond the end of f + window has come.
 class ArrivalOracle {
  public:
   ArrivalOracle(std::uint64_t frame_bytes, std::uint64_t window_bytes) : frame_(frame_bytes), window_(window_bytes) {}

@@ -17,7 +17,7 @@ inline std::string realData(const std::string& name) {
 
 }  // namespace mmradartwin
 
-#define SKIP_WITHOUT(file)                                                                  \
-  if (!std::filesystem::exists(file)) {                                                     \
+#define SKIP_WITHOUT(file)                                                                   \
+  if (!std::filesystem::exists(file)) {                                                      \
     GTEST_SKIP() << file << " is missing: set MMRADARTWIN_DATA to the folder that holds it"; \
   }

@@ -61,7 +61,8 @@ Dca1000Control::Options quick() {
 TEST(Dca1000Control, StatusBetweenCommandAndReplyIsKept) {
   const std::string host = loopbackIp(1), ip = loopbackIp(2);
   ScriptedCard card(ip, 2, [](int, std::uint8_t code) -> std::vector<std::vector<std::uint8_t>> {
-    if (code == 0x09) return {reply(0x0a, kNoLvdsData), {1, 2, 3}, reply(0x0e, 0x0402), reply(0x0a, kDdrFull), reply(0x09, 0)};
+    if (code == 0x09)
+      return {reply(0x0a, kNoLvdsData), {1, 2, 3}, reply(0x0e, 0x0402), reply(0x0a, kDdrFull), reply(0x09, 0)};
     return {reply(code, 0)};
   });
   Dca1000Control control(host, ip, kDca1000ConfigPort, quick());
@@ -85,7 +86,8 @@ TEST(Dca1000Control, AsksAgainWhenAReplyIsLost) {
 TEST(Dca1000Control, SaysWhenTheCardRefusesOrIsSilent) {
   const std::string host = loopbackIp(1), ip = loopbackIp(2);
   {
-    ScriptedCard card(ip, 1, [](int, std::uint8_t code) -> std::vector<std::vector<std::uint8_t>> { return {reply(code, 1)}; });
+    ScriptedCard card(
+        ip, 1, [](int, std::uint8_t code) -> std::vector<std::vector<std::uint8_t>> { return {reply(code, 1)}; });
     Dca1000Control control(host, ip, kDca1000ConfigPort, quick());
     try {
       control.configurePackets(25);
@@ -117,8 +119,7 @@ TEST(Sockets, ErrorsSayWhatToDo) {
   EXPECT_NE(std::string::npos,
             message([] { PacketReceiver("203.0.113.7", 4098, "203.0.113.8"); }).find("no address 203.0.113.7"));
   const UdpSocket taken(loopbackIp(1), 4098, "test");
-  EXPECT_NE(std::string::npos,
-            message([] { PacketReceiver(loopbackIp(1), 4098, loopbackIp(2)); }).find("is in use"));
+  EXPECT_NE(std::string::npos, message([] { PacketReceiver(loopbackIp(1), 4098, loopbackIp(2)); }).find("is in use"));
   EXPECT_THROW(parseIpv4("192.168.33"), InputError);
   EXPECT_THROW(parseIpv4("card"), InputError);
 }

@@ -59,7 +59,8 @@ TEST(EmulatorLoopback, RealCaptureInBothLayoutsBitForBit) {
   SKIP_WITHOUT(two);
   // 128 loops of 2 TX, 128 samples, 4 receivers; 92 us per chirp (data/README).
   const std::string yaml =
-      "device: xwr1843\ncarrier_hz: 77.4201e+9\nslope_hz_per_s: 60.0e+12\nsamples_per_chirp: 128\nsample_rate_hz: 2.5e+6\n"
+      "device: xwr1843\ncarrier_hz: 77.4201e+9\nslope_hz_per_s: 60.0e+12\nsamples_per_chirp: 128\nsample_rate_hz: "
+      "2.5e+6\n"
       "adc_start_s: 7.0e-6\nloops_per_frame: 128\nframe_period_s: 0.05\nidle_s: 30.0e-6\nramp_end_s: 62.0e-6\n"
       "tx_position_m: [[0, 0, 0], [0, 0.0077446, 0]]\n"
       "rx_position_m: [[0, 0, 0], [0, 0.0019361, 0], [0, 0.0038723, 0], [0, 0.0058084, 0]]\nlayout: ";
@@ -115,8 +116,8 @@ TEST(EmulatorLoopback, WhatIsImpairedOnTheWayIsFlaggedAndNothingElse) {
   TemporaryFolder folder;
   writeSession(folder, 0.005, {200});
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
-  const Recorded recorded = record(radar, {folder.file(""), "--loss", "0.05", "--duplicate", "0.05", "--reorder", "0.05",
-                                           "--truncate", "0.03", "--seed", "4"});
+  const Recorded recorded = record(radar, {folder.file(""), "--loss", "0.05", "--duplicate", "0.05", "--reorder",
+                                           "0.05", "--truncate", "0.03", "--seed", "4"});
   const auto sent = readBytes(folder.file("captures/a.bin"));
   EXPECT_EQ(1u, recorded.frames.epochs);
   EXPECT_GT(recorded.frames.incomplete_frames, 10u);

@@ -34,10 +34,14 @@ struct Collected {
 
 struct Bench {
   explicit Bench(const RadarConfig& radar, const FrameAssembler::Options& options = {})
-      : radar_(radar), assembler(radar, [this](AdcCube&& cube) {
-          collected.epochs.push_back(assembler.counters().epochs);
-          collected.cubes.push_back(std::move(cube));
-        }, options) {}
+      : radar_(radar),
+        assembler(
+            radar,
+            [this](AdcCube&& cube) {
+              collected.epochs.push_back(assembler.counters().epochs);
+              collected.cubes.push_back(std::move(cube));
+            },
+            options) {}
   /// `count` packets of 1456 bytes from number `first` on, `interval_ns` apart.
   void feed(std::uint64_t epoch, std::uint64_t first, std::uint64_t count, std::int64_t interval_ns = kMillisecond) {
     for (std::uint64_t i = first; i < first + count; ++i) feedOne(epoch, i, interval_ns);
@@ -120,8 +124,8 @@ TEST(FrameAssembler, WholeFramesLostAreAGapInTheSequence) {
   const auto& cubes = bench.collected.cubes;
   EXPECT_EQ(0u, cubes[0].sequence);
   EXPECT_EQ(1u, cubes[1].sequence);
-  EXPECT_EQ(2u, cubes[2].sequence);     // 272 bytes of it had come
-  EXPECT_EQ(213u, cubes[3].sequence);   // 300 * 1456 / 2048 = 213.28
+  EXPECT_EQ(2u, cubes[2].sequence);    // 272 bytes of it had come
+  EXPECT_EQ(213u, cubes[3].sequence);  // 300 * 1456 / 2048 = 213.28
   EXPECT_EQ(210u, bench.assembler.counters().missing_frames);
   EXPECT_EQ((300u - 3u) * 1456u, bench.assembler.counters().lost_bytes);
 }
@@ -241,7 +245,8 @@ TEST(FrameAssembler, StampIsTheFramesStart) {
   for (std::uint64_t i = 0; i < 100; ++i) {
     const std::uint64_t last = (i + 1) * 1456 - 1;
     bench.now_ns = 0;
-    bench.feedOne(0, i, start_ns + static_cast<std::int64_t>(last / 2048 * 50'000'000 + (last % 2048 / 1024 + 1) * chirp_ns));
+    bench.feedOne(0, i,
+                  start_ns + static_cast<std::int64_t>(last / 2048 * 50'000'000 + (last % 2048 / 1024 + 1) * chirp_ns));
   }
   ASSERT_EQ(71u, bench.collected.cubes.size());
   for (const AdcCube& cube : bench.collected.cubes) {
@@ -303,8 +308,8 @@ TEST_P(OneRecording, EveryByteIsInItsPlaceOrFlaggedLost) {
     options.window_bytes = std::uniform_int_distribution<std::size_t>(0, 8000)(random);
     Bench bench(radar, options);
 
-    const std::vector<std::uint64_t> begins = {0, 0, 0, 1456 * 100, (std::uint64_t{1} << 32) - 5000,
-                                               (std::uint64_t{1} << 48) - 20000};
+    const std::vector<std::uint64_t> begins = {
+        0, 0, 0, 1456 * 100, (std::uint64_t{1} << 32) - 5000, (std::uint64_t{1} << 48) - 20000};
     const std::uint64_t begin = begins[random() % begins.size()];
     const std::size_t bytes = std::uniform_int_distribution<std::size_t>(1, 60000)(random);
     const auto sent = cutIntoPackets(random, 7, begin, bytes, random() % 2);
@@ -318,7 +323,8 @@ TEST_P(OneRecording, EveryByteIsInItsPlaceOrFlaggedLost) {
     how.spared = begin > options.plausible_gap_bytes ? 4 : 0;  // what confirms a count that begins far off
     if (sent.size() < how.spared) continue;
 
-    ArrivalOracle oracle(frame_bytes, std::max<std::uint64_t>(options.window_frames * frame_bytes, options.window_bytes));
+    ArrivalOracle oracle(frame_bytes,
+                         std::max<std::uint64_t>(options.window_frames * frame_bytes, options.window_bytes));
     for (ArrivingPacket& packet : impair(random, sent, how)) {
       packet.stamp_ns = bench.now_ns += 20'000;
       bench.assembler.add(packet.view());

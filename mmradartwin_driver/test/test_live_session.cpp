@@ -37,9 +37,10 @@ std::vector<Row> rowsOf(const mmradartwin_msgs::Session& session) {
       const std::size_t point = row[2].find('.');
       std::string fraction = point == std::string::npos ? "" : row[2].substr(point + 1);
       fraction.resize(9, '0');
-      rows.push_back({row[0], ros::Time(static_cast<std::uint32_t>(std::stoul(row[2])),
-                                        static_cast<std::uint32_t>(std::stoul(fraction))),
-                      std::stod(row[3])});
+      rows.push_back(
+          {row[0],
+           ros::Time(static_cast<std::uint32_t>(std::stoul(row[2])), static_cast<std::uint32_t>(std::stoul(fraction))),
+           std::stod(row[3])});
     }
   }
   return rows;

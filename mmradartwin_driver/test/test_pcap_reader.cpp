@@ -15,8 +15,9 @@ namespace mmradartwin {
 namespace {
 
 /// What the sender's configuration must have been: one frame of 16384 bytes; packets of 1456 bytes came 0.97 or 1.94 ms
-/// apart in just the order in which chirps of 1024 bytes, one every 0.972 ms, fill them. With four receivers on two lanes
-/// a chirp of 1024 bytes has 64 complex samples; 16 chirps are 8 loops of 2 TX (or 16 of 1, which changes nothing here).
+/// apart in just the order in which chirps of 1024 bytes, one every 0.972 ms, fill them. With four receivers on two
+/// lanes a chirp of 1024 bytes has 64 complex samples; 16 chirps are 8 loops of 2 TX (or 16 of 1, which changes nothing
+/// here).
 RadarConfig radarOfTheCapture() {
   RadarConfig radar;
   radar.device = "iwr1843";
@@ -70,9 +71,7 @@ TEST(RealPcap, OneFrameWithoutLoss) {
   EXPECT_EQ(16384u, assembler.counters().bytes);
 
   // Two lanes, SWRA581B figure 11: per chirp RX after RX, groups of I[n] I[n+1] Q[n] Q[n+1].
-  const auto word = [&](std::size_t i) {
-    return static_cast<std::int16_t>(payload[2 * i] | payload[2 * i + 1] << 8);
-  };
+  const auto word = [&](std::size_t i) { return static_cast<std::int16_t>(payload[2 * i] | payload[2 * i + 1] << 8); };
   for (std::size_t chirp = 0; chirp < 16; ++chirp) {
     for (std::size_t n = 0; n < 64; ++n) {
       for (std::size_t rx = 0; rx < 4; ++rx) {

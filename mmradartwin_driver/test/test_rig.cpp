@@ -13,7 +13,8 @@ namespace {
 
 struct RunningRig {
   explicit RunningRig(const RadarConfig& radar)
-      : rig(radar, options(), [this](AdcCube&& cube) { take(std::move(cube)); },
+      : rig(
+            radar, options(), [this](AdcCube&& cube) { take(std::move(cube)); },
             [this](Rig::Level, const std::string& text) {
               const std::lock_guard<std::mutex> lock(mutex);
               events.push_back(text);
@@ -109,7 +110,8 @@ TEST(Rig, WaitsForACardAndComesBackToOneThatWasGone) {
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   RunningRig running(radar);
   std::this_thread::sleep_for(std::chrono::milliseconds(1200));
-  EXPECT_NE(std::string::npos, running.rig.state().problem.find("no answer from the DCA1000")) << running.rig.state().problem;
+  EXPECT_NE(std::string::npos, running.rig.state().problem.find("no answer from the DCA1000"))
+      << running.rig.state().problem;
   {
     EmulatorProgram emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
     ASSERT_TRUE(running.waitForCubes(50));
@@ -136,7 +138,8 @@ TEST(Rig, NamesAHostAddressThatIsMissing) {
   options.host_ip = "203.0.113.7";
   TemporaryFolder folder;
   writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
-  const Rig rig(loadRadarConfig(folder.file("radar.yaml")), options, [](AdcCube&&) {}, [](Rig::Level, const std::string&) {});
+  const Rig rig(
+      loadRadarConfig(folder.file("radar.yaml")), options, [](AdcCube&&) {}, [](Rig::Level, const std::string&) {});
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   EXPECT_NE(std::string::npos, rig.state().problem.find("no address 203.0.113.7")) << rig.state().problem;
 }

@@ -27,8 +27,8 @@ class Dca1000Control {
   Dca1000Control(const std::string& host_ip, const std::string& card_ip, std::uint16_t port, const Options& options);
 
   // Each throws RigError where the card does not answer after all attempts or answers that it failed.
-  void connect();           ///< SYSTEM_CONNECT: is it there?
-  bool answers();           ///< connect() once, without an exception
+  void connect();  ///< SYSTEM_CONNECT: is it there?
+  bool answers();  ///< connect() once, without an exception
   void resetFpga();
   void resetRadar();
   FpgaVersion readVersion();

@@ -80,10 +80,10 @@ std::string describeStatus(std::uint16_t bits);
 constexpr std::size_t kDataHeaderBytes = 10;
 struct DataPacket {
   std::uint32_t sequence = 0;
-  std::uint64_t byte_count = 0;             ///< 48 bit: offset of payload[0] in the recording
-  const std::uint8_t* payload = nullptr;    ///< not owned
-  std::size_t size = 0;                     ///< bytes of payload, whatever the datagram brought
-  std::int64_t stamp_ns = 0;                ///< receive time
+  std::uint64_t byte_count = 0;           ///< 48 bit: offset of payload[0] in the recording
+  const std::uint8_t* payload = nullptr;  ///< not owned
+  std::size_t size = 0;                   ///< bytes of payload, whatever the datagram brought
+  std::int64_t stamp_ns = 0;              ///< receive time
 };
 /// Views the datagram's bytes; nothing where it is too short to hold a header and a sample byte.
 std::optional<DataPacket> decodeDataPacket(const std::uint8_t* bytes, std::size_t size, std::int64_t stamp_ns);

@@ -13,41 +13,41 @@
 
 namespace mmradartwin {
 
-/// Puts the payload of data packets together to frames, each byte at its absolute offset in the recording: byte b belongs
-/// to frame b / bytes_per_frame. A byte that never arrives is zero in the cube, counted in lost_bytes, and its chirp is
-/// not valid; the other half of a 16-bit word that was torn goes with it. Packets may have any length, span any number
-/// of frames and come late, twice, cut short or not at all.
+/// Puts the payload of data packets together to frames, each byte at its absolute offset in the recording: byte b
+/// belongs to frame b / bytes_per_frame. A byte that never arrives is zero in the cube, counted in lost_bytes, and its
+/// chirp is not valid; the other half of a 16-bit word that was torn goes with it. Packets may have any length, span
+/// any number of frames and come late, twice, cut short or not at all.
 ///
 /// Frames are handed out in order: a complete one at once, one with holes as soon as data arrive that lie further than
 /// the reorder window behind its end, or at flush(). Frames of which not a single byte came are left out (a gap in the
 /// sequence). Bytes for frames already handed out are counted as late and dropped.
 ///
-/// A packet that goes back in the count more than `reorder_ns` after the newest one is no reordered one. If it is the first
-/// of a recording (sequence 1, byte 0), or `confirm_packets` of them are near each other, then the count has been restarted:
-/// that ends all open frames, and a new epoch begins with frame 0. A packet implausibly far ahead is held back until as
-/// many are near each other. A restart whose first packets are lost and that lands ahead of the old count cannot be told
-/// from loss; arming through restart() leaves no such doubt.
+/// A packet that goes back in the count more than `reorder_ns` after the newest one is no reordered one. If it is the
+/// first of a recording (sequence 1, byte 0), or `confirm_packets` of them are near each other, then the count has been
+/// restarted: that ends all open frames, and a new epoch begins with frame 0. A packet implausibly far ahead is held
+/// back until as many are near each other. A restart whose first packets are lost and that lands ahead of the old count
+/// cannot be told from loss; arming through restart() leaves no such doubt.
 class FrameAssembler {
  public:
   struct Options {
-    int window_frames = 2;                                   ///< at least; in the data, not in time
-    std::size_t window_bytes = 4 * 1472;                     ///< at least
-    std::uint64_t plausible_gap_bytes = 64u << 20;           ///< ahead of the newest byte
-    std::int64_t reorder_ns = 20'000'000;                    ///< what comes later than this was not reordered
+    int window_frames = 2;                          ///< at least; in the data, not in time
+    std::size_t window_bytes = 4 * 1472;            ///< at least
+    std::uint64_t plausible_gap_bytes = 64u << 20;  ///< ahead of the newest byte
+    std::int64_t reorder_ns = 20'000'000;           ///< what comes later than this was not reordered
     int confirm_packets = 4;
   };
   struct Counters {
     std::uint64_t packets = 0;
-    std::uint64_t bytes = 0;             ///< that found their place
-    std::uint64_t lost_bytes = 0;        ///< in frames that are over, those never received included
+    std::uint64_t bytes = 0;       ///< that found their place
+    std::uint64_t lost_bytes = 0;  ///< in frames that are over, those never received included
     std::uint64_t duplicate_packets = 0;
-    std::uint64_t late_packets = 0;      ///< wholly or in part for frames already handed out
-    std::uint64_t reordered_packets = 0; ///< behind the newest byte, but in time
-    std::uint64_t rejected_packets = 0;  ///< fitted no count, and nothing continued them
-    std::uint64_t frames = 0;            ///< handed out
-    std::uint64_t incomplete_frames = 0; ///< of these
-    std::uint64_t missing_frames = 0;    ///< of which nothing came before later data
-    std::uint64_t epochs = 1;            ///< restarts + 1
+    std::uint64_t late_packets = 0;       ///< wholly or in part for frames already handed out
+    std::uint64_t reordered_packets = 0;  ///< behind the newest byte, but in time
+    std::uint64_t rejected_packets = 0;   ///< fitted no count, and nothing continued them
+    std::uint64_t frames = 0;             ///< handed out
+    std::uint64_t incomplete_frames = 0;  ///< of these
+    std::uint64_t missing_frames = 0;     ///< of which nothing came before later data
+    std::uint64_t epochs = 1;             ///< restarts + 1
   };
   using Output = std::function<void(AdcCube&&)>;
 
@@ -71,7 +71,7 @@ class FrameAssembler {
   struct Slot {
     bool begun = false;
     std::vector<std::uint8_t> bytes;
-    std::vector<Interval> received;                 ///< sorted, disjoint, not touching
+    std::vector<Interval> received;  ///< sorted, disjoint, not touching
     std::size_t received_bytes = 0;
     std::optional<std::int64_t> observed_start_ns;  ///< by the packet with the frame's first byte
     std::int64_t rough_start_ns = 0;                ///< by the first packet that brought anything
@@ -117,9 +117,9 @@ class FrameAssembler {
   Counters counters_;
 
   std::vector<Slot> slots_;
-  std::uint64_t base_frame_ = 0;   ///< first one not handed out
-  std::uint64_t next_byte_ = 0;    ///< end of the data seen in this epoch
-  bool begun_ = false;             ///< a packet of this epoch has been placed
+  std::uint64_t base_frame_ = 0;  ///< first one not handed out
+  std::uint64_t next_byte_ = 0;   ///< end of the data seen in this epoch
+  bool begun_ = false;            ///< a packet of this epoch has been placed
   std::uint32_t newest_sequence_ = 0;
   std::int64_t newest_stamp_ns_ = 0;
   std::size_t longest_payload_ = 0;

@@ -18,8 +18,8 @@ namespace mmradartwin {
 /// (That packets leave so is seen in a capture of a real card: 16 chirps of 1024 bytes, packets 1 or 2 chirps apart.)
 ///
 /// Arrival is never early, only late. So of the observed start and the one predicted from the frame before, the earlier
-/// one is taken; the prediction runs slow by `drift` so that it follows a radar whose crystal is slower than this clock.
-/// An observation more than half a frame period late is believed: the radar has paused.
+/// one is taken; the prediction runs slow by `drift` so that it follows a radar whose crystal is slower than this
+/// clock. An observation more than half a frame period late is believed: the radar has paused.
 class FrameClock {
  public:
   explicit FrameClock(const RadarConfig& radar, double drift = 1e-4);

@@ -14,14 +14,14 @@ struct PcapPorts {
   std::uint16_t data = kDca1000DataPort;
 };
 struct PcapVisitor {
-  std::function<void(const DataPacket&)> data;                             ///< to the host's data port
-  std::function<void(const Dca1000Reply&, std::int64_t stamp_ns)> reply;   ///< to the host's command port, status too
+  std::function<void(const DataPacket&)> data;                            ///< to the host's data port
+  std::function<void(const Dca1000Reply&, std::int64_t stamp_ns)> reply;  ///< to the host's command port, status too
 };
 struct PcapCounters {
   std::uint64_t frames = 0;  ///< in the file
   std::uint64_t data = 0;
   std::uint64_t replies = 0;
-  std::uint64_t other = 0;   ///< not UDP over IPv4 to one of the two ports, fragments, malformed
+  std::uint64_t other = 0;  ///< not UDP over IPv4 to one of the two ports, fragments, malformed
 };
 /// Reads the whole file in its order. Throws InputError: no such file, no capture, cut short (after visiting what is
 /// whole).

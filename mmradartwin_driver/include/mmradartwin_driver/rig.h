@@ -32,12 +32,12 @@ struct RigOptions {
 struct RigState {
   enum class Phase { kConnecting, kArmed, kStreaming };
   Phase phase = Phase::kConnecting;
-  std::string problem;                      ///< one line that says the next thing to do; empty while all is well
+  std::string problem;  ///< one line that says the next thing to do; empty while all is well
   std::optional<FpgaVersion> version;
-  std::optional<std::uint16_t> last_status; ///< of the card, since it was armed
+  std::optional<std::uint16_t> last_status;  ///< of the card, since it was armed
   std::uint64_t armings = 0;
-  double silent_s = 0;                      ///< since the last packet, or since arming
-  std::size_t buffer_bytes = 0;             ///< of the data socket, as granted
+  double silent_s = 0;           ///< since the last packet, or since arming
+  std::size_t buffer_bytes = 0;  ///< of the data socket, as granted
   FrameAssembler::Counters frames;
   PacketReceiver::Counters packets;
 };
@@ -80,6 +80,7 @@ class Rig {
   std::unique_ptr<Dca1000Control> control_;
   PacketReceiver::Counters earlier_;  ///< of receivers that were closed
   bool configured_ = false;
+  const Clock::time_point started_ = Clock::now();
   Clock::time_point last_data_{};
   Clock::time_point last_report_{};
 

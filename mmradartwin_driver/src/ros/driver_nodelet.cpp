@@ -1,9 +1,9 @@
 #include <ros/ros.h>
 // nodelet.h needs ros.h before it.
 #include <nodelet/nodelet.h>
-#include <pluginlib/class_list_macros.hpp>
 
 #include <memory>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "mmradartwin_driver/ros/radar_driver.h"
 #include "mmradartwin_dsp/input_error.h"

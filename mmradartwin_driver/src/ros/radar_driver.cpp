@@ -1,8 +1,7 @@
 #include "mmradartwin_driver/ros/radar_driver.h"
 
-#include <boost/make_shared.hpp>
-
 #include <algorithm>
+#include <boost/make_shared.hpp>
 #include <cstdio>
 
 #include "mmradartwin_driver/ros/private_parameters.h"
@@ -16,9 +15,15 @@ using diagnostic_msgs::DiagnosticStatus;
 
 void logEvent(Rig::Level level, const std::string& text) {
   switch (level) {
-    case Rig::Level::kInfo: ROS_INFO_STREAM(text); break;
-    case Rig::Level::kWarning: ROS_WARN_STREAM(text); break;
-    case Rig::Level::kError: ROS_ERROR_STREAM(text); break;
+    case Rig::Level::kInfo:
+      ROS_INFO_STREAM(text);
+      break;
+    case Rig::Level::kWarning:
+      ROS_WARN_STREAM(text);
+      break;
+    case Rig::Level::kError:
+      ROS_ERROR_STREAM(text);
+      break;
   }
 }
 
@@ -56,7 +61,8 @@ RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& priva
 
   updater_.setHardwareID("DCA1000 " + options_.card_ip);
   updater_.add("radar stream", this, &RadarDriver::diagnose);
-  rig_ = std::make_unique<Rig>(radar_, options_, [this](AdcCube&& cube) { publish(std::move(cube)); }, logEvent);
+  rig_ = std::make_unique<Rig>(
+      radar_, options_, [this](AdcCube&& cube) { publish(std::move(cube)); }, logEvent);
   // A timer, not the arrival of data: silence is what has to be reported.
   timer_ = handle.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.update(); });
 }
@@ -96,7 +102,8 @@ void RadarDriver::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
     status.summary(DiagnosticStatus::WARN, "this host dropped " + std::to_string(dropped) +
                                                " packets: raise net.core.rmem_max or free the processor");
   } else if (lost > 0) {
-    status.summary(DiagnosticStatus::WARN, std::to_string(lost) + " bytes lost: raise packet_delay_us, check the cable");
+    status.summary(DiagnosticStatus::WARN,
+                   std::to_string(lost) + " bytes lost: raise packet_delay_us, check the cable");
   } else {
     status.summary(DiagnosticStatus::OK, "streaming");
   }
@@ -115,9 +122,9 @@ void RadarDriver::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
   status.add("recordings armed", state.armings);
   status.add("silent for [s]", state.silent_s);
   status.add("last card status", state.last_status ? describeStatus(*state.last_status) : "none since armed");
-  status.add("FPGA version", state.version ? std::to_string(state.version->major) + "." +
-                                                 std::to_string(state.version->minor)
-                                           : "unknown");
+  status.add("FPGA version", state.version
+                                 ? std::to_string(state.version->major) + "." + std::to_string(state.version->minor)
+                                 : "unknown");
 }
 
 }  // namespace mmradartwin
