@@ -116,6 +116,7 @@ class AttributionNode {
 
   void onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, MapMsg::ConstPtr>& own,
              std::map<std::int64_t, MapMsg::ConstPtr>& other, bool measured) {
+    ++received_;
     const std::int64_t stamp = toNanoseconds(msg->header.stamp);
     const auto match = other.find(stamp);
     if (match == other.end()) {
@@ -219,11 +220,12 @@ class AttributionNode {
   }
 
   void watch(const ros::WallTimerEvent&) {
-    if (pairs_ == pairs_before_ && (!measured_.empty() || !simulated_.empty())) {
+    if (pairs_ == pairs_before_ && received_ != received_before_) {
       ROS_WARN("no pair of maps in 5 s: %zu measured and %zu simulated wait for a counterpart of the same stamp",
                measured_.size(), simulated_.size());
     }
     pairs_before_ = pairs_;
+    received_before_ = received_;
   }
 
   ros::NodeHandle nh_, private_nh_;
@@ -237,7 +239,7 @@ class AttributionNode {
   ros::WallTimer watchdog_;
   ros::WallTime last_markers_;
   std::uint32_t had_subscribers_ = 0;
-  std::size_t pairs_ = 0, pairs_before_ = 0;
+  std::size_t pairs_ = 0, pairs_before_ = 0, received_ = 0, received_before_ = 0;
 
   std::map<std::int64_t, MapMsg::ConstPtr> measured_, simulated_;   // waiting, by stamp
   mmradartwin_msgs::PathRecords::ConstPtr paths_, records_of_;
