@@ -28,7 +28,7 @@ mmradartwin_msgs::PathRecords toMsg(const Simulation& simulation, const Scene& s
   msg.header.stamp = toRosTime(simulation.stamp_ns);
   msg.radar_hash = radar_hash;
   msg.T_map_radar = toMsg(simulation.T_map_radar);
-  msg.propagation_only = !simulation.propagation_only;  // the message says that receiver effects are not in the records
+  msg.propagation_only = simulation.propagation_only;
   msg.records.resize(simulation.records.size());
   for (std::size_t i = 0; i < simulation.records.size(); ++i) {
     const PathRecord& r = simulation.records[i];
