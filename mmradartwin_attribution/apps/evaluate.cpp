@@ -1,4 +1,5 @@
-// Compares a recording with its twin (or with a simulated session): the paper's table, per-pose results, pictures, a report.
+// Compares a recording with its twin (or with a simulated session): the paper's table, per-pose results, pictures, a
+// report.
 
 #include <CLI/CLI.hpp>
 #include <boost/timer/progress_display.hpp>

@@ -21,7 +21,7 @@ namespace {
 
 using namespace mmradartwin;
 
-constexpr std::size_t kMaxWaiting = 64;   // maps that wait for their counterpart
+constexpr std::size_t kMaxWaiting = 64;  // maps that wait for their counterpart
 
 /// Names of a session's poses by the stamp at which each begins.
 std::map<std::int64_t, std::string> posesByStamp(const mmradartwin_msgs::Session& session) {
@@ -61,7 +61,8 @@ class AttributionNode {
     private_nh_.param("markers_hz", markers_hz_, 2.0);
     private_nh_.param("max_paths", max_paths_, 200);
     if (!(markers_hz_ > 0 && markers_hz_ <= 100)) {
-      throw InputError("parameter markers_hz is " + std::to_string(markers_hz_) + "; give a rate above 0 and up to 100");
+      throw InputError("parameter markers_hz is " + std::to_string(markers_hz_) +
+                       "; give a rate above 0 and up to 100");
     }
     if (max_paths_ < 0 || max_paths_ > 2000) {
       throw InputError("parameter max_paths is " + std::to_string(max_paths_) + "; give 0 to 2000");
@@ -241,7 +242,7 @@ class AttributionNode {
   std::uint32_t had_subscribers_ = 0;
   std::size_t pairs_ = 0, pairs_before_ = 0, received_ = 0, received_before_ = 0;
 
-  std::map<std::int64_t, MapMsg::ConstPtr> measured_, simulated_;   // waiting, by stamp
+  std::map<std::int64_t, MapMsg::ConstPtr> measured_, simulated_;  // waiting, by stamp
   mmradartwin_msgs::PathRecords::ConstPtr paths_, records_of_;
   std::vector<PathRecord> records_;
   std::map<std::int64_t, std::string> pose_names_;

@@ -106,7 +106,8 @@ AttributionConfig parseAttributionConfig(const std::string& yaml_text, const std
 
 std::string toYaml(const AttributionConfig& c) {
   std::ostringstream s;
-  s << "# Field of view: cells beyond min_range_m and within +-max_azimuth_deg are evaluated and set the normalisation;\n"
+  s << "# Field of view: cells beyond min_range_m and within +-max_azimuth_deg are evaluated and set the "
+       "normalisation;\n"
        "# those up to outer_azimuth_deg are reported apart.\n"
     << "min_range_m: " << number(c.min_range_m) << "\n"
     << "max_azimuth_deg: " << number(c.max_azimuth_rad / kDegree) << "\n"

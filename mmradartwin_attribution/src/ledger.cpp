@@ -9,9 +9,7 @@
 namespace mmradartwin {
 namespace {
 
-double share(double part, double whole) {
-  return whole > 0 ? part / whole : std::numeric_limits<double>::quiet_NaN();
-}
+double share(double part, double whole) { return whole > 0 ? part / whole : std::numeric_limits<double>::quiet_NaN(); }
 
 std::string fixed(double value, int digits) {
   if (std::isnan(value)) return "-";
@@ -54,7 +52,8 @@ LedgerSummary Ledger::summary() const {
   s.poses = poses_;
   s.active = active_;
   s.recalled = recalled_;
-  s.recall = share(std::accumulate(recalled_.begin(), recalled_.end(), 0), std::accumulate(active_.begin(), active_.end(), 0));
+  s.recall =
+      share(std::accumulate(recalled_.begin(), recalled_.end(), 0), std::accumulate(active_.begin(), active_.end(), 0));
   for (int i = 0; i < 3; ++i) {
     s.recall_band[i] = share(recalled_[i], active_[i]);
     s.top[i] = share(top_hits_[i], top_count_[i]);

@@ -50,7 +50,8 @@ class LabelSpace {
   std::vector<cv::Rect2d> taken_;
 };
 
-std::vector<FanBox> boxes(const EvaluationField& field, const PoseAttribution& pose, bool measured, double max_range_m) {
+std::vector<FanBox> boxes(const EvaluationField& field, const PoseAttribution& pose, bool measured,
+                          double max_range_m) {
   std::vector<FanBox> result;
   LabelSpace labels(max_range_m);
   const MatchWindow& tight = field.config().tight;
@@ -61,7 +62,8 @@ std::vector<FanBox> boxes(const EvaluationField& field, const PoseAttribution& p
   };
   for (const Residual& r : pose.residuals) {
     if (r.measured_stronger != measured) continue;
-    add(r.range_m, r.azimuth_rad, kMagenta, className(r.residual_class) + (r.actor.empty() ? "" : " " + spoken(r.actor)));
+    add(r.range_m, r.azimuth_rad, kMagenta,
+        className(r.residual_class) + (r.actor.empty() ? "" : " " + spoken(r.actor)));
   }
   for (const ResponseRegion& r : pose.regions) {
     if (r.field == Field::kCentral && r.measured_strong && r.simulated_strong) {
@@ -69,7 +71,8 @@ std::vector<FanBox> boxes(const EvaluationField& field, const PoseAttribution& p
     }
   }
   // A label stands beyond its box: nearer ones are drawn over farther boxes.
-  std::stable_sort(result.begin(), result.end(), [](const FanBox& a, const FanBox& b) { return a.range_m > b.range_m; });
+  std::stable_sort(result.begin(), result.end(),
+                   [](const FanBox& a, const FanBox& b) { return a.range_m > b.range_m; });
   return result;
 }
 
@@ -148,9 +151,8 @@ cv::Mat drawPose(const EvaluationField& field, const PoseResult& result) {
     matched += r.simulated_strong;
   }
   put(picture,
-      std::to_string(matched) + " of " + std::to_string(active) +
-          " measured expected regions matched (white); " + std::to_string(pose.residuals.size()) +
-          " residuals (magenta)",
+      std::to_string(matched) + " of " + std::to_string(active) + " measured expected regions matched (white); " +
+          std::to_string(pose.residuals.size()) + " residuals (magenta)",
       14, y, 0.45, kInk);
   for (int i = 0; i < shown; ++i) {
     y += kLine;
@@ -177,7 +179,8 @@ cv::Mat drawCoverage(const Scene& scene, const std::vector<Pose>& poses, double 
   for (const Actor& actor : scene.actors) {
     const auto& c = actor.material.color;
     const cv::Scalar color(255 * c[2], 255 * c[1], 255 * c[0]);
-    const bool listed = std::any_of(legend.begin(), legend.end(), [&](const auto& l) { return l.first == actor.material_tag; });
+    const bool listed =
+        std::any_of(legend.begin(), legend.end(), [&](const auto& l) { return l.first == actor.material_tag; });
     if (!listed) legend.emplace_back(actor.material_tag, color);
     for (const auto& t : actor.triangles) {
       Triangle triangle{{actor.vertices[t[0]], actor.vertices[t[1]], actor.vertices[t[2]]}, 0, false, color};
@@ -199,7 +202,8 @@ cv::Mat drawCoverage(const Scene& scene, const std::vector<Pose>& poses, double 
                   CV_8UC3, kWhite);
   constexpr int kShift = 4;  // 1/16 pixel
   const auto at = [&](const Eigen::Vector2d& p) {
-    return cv::Point2d(kMargin + (p.x() - bounds.min().x()) * px_per_m, kMargin + (bounds.max().y() - p.y()) * px_per_m);
+    return cv::Point2d(kMargin + (p.x() - bounds.min().x()) * px_per_m,
+                       kMargin + (bounds.max().y() - p.y()) * px_per_m);
   };
   const auto fine = [&](const Eigen::Vector2d& p) {
     const cv::Point2d q = at(p);
@@ -243,8 +247,10 @@ cv::Mat drawCoverage(const Scene& scene, const std::vector<Pose>& poses, double 
     cv::circle(picture, p, 6, kWhite, 1, cv::LINE_AA);
     put(picture, pose.location, cvRound(p.x) + 9, cvRound(p.y) - 8, 0.42, kInk);
   }
-  put(picture, format("coverage: %.0f poses at %.0f locations", static_cast<double>(poses.size()),
-                      static_cast<double>(locations.size())), kMargin, 26, 0.6, kInk);
+  put(picture,
+      format("coverage: %.0f poses at %.0f locations", static_cast<double>(poses.size()),
+             static_cast<double>(locations.size())),
+      kMargin, 26, 0.6, kInk);
   const int x = picture.cols - kLegend + 6;
   int y = kMargin + 8;
   for (const auto& [name, color] : legend) {

@@ -45,11 +45,20 @@ std::string html(const std::string& text) {
   std::string out;
   for (char c : text) {
     switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
     }
   }
   return out;
@@ -63,7 +72,8 @@ nlohmann::json json(const LedgerSummary& s) {
   j["recall"] = json(s.recall);
   for (int i = 0; i < 3; ++i) {
     const char* bands[] = {"near", "mid", "far"};
-    j["recall_by_band"][bands[i]] = {{"recall", json(s.recall_band[i])}, {"active", s.active[i]}, {"recalled", s.recalled[i]}};
+    j["recall_by_band"][bands[i]] = {
+        {"recall", json(s.recall_band[i])}, {"active", s.active[i]}, {"recalled", s.recalled[i]}};
     j["top"].push_back(json(s.top[i]));
   }
   j["q3_median_db"] = json(s.q3_median_db);
@@ -87,10 +97,12 @@ std::string pictureLink(const ReportWriter& writer, const std::string& pose) {
 void ReportWriter::writePoses(const Evaluation& evaluation, const AttributionConfig& config) const {
   OutputFile file(directory_ + "/poses.csv");
   std::ofstream& out = file.stream();
-  out << "pose,location,stamp,x_m,y_m,z_m,heading_deg,frames,regions,active,recalled,active_near,recalled_near,active_mid,"
+  out << "pose,location,stamp,x_m,y_m,z_m,heading_deg,frames,regions,active,recalled,active_near,recalled_near,active_"
+         "mid,"
          "recalled_mid,active_far,recalled_far";
   for (int k : config.top_k) out << ",top" << k << "_hits,top" << k << "_count";
-  out << ",q1_energy,q2_energy,q1_cells,q2_cells,q3_median_db,q3_cells,q4_mae_db,q4_cells,c1,c2,c3,c4,c5,measured_peak_dbfs,"
+  out << ",q1_energy,q2_energy,q1_cells,q2_cells,q3_median_db,q3_cells,q4_mae_db,q4_cells,c1,c2,c3,c4,c5,measured_peak_"
+         "dbfs,"
          "outer_active,outer_recalled,outer_peak_db,agreement,agreement_channel_conjugated,agreement_iq_conjugated,"
          "conjugated_better\n";
   for (const PoseResult& p : evaluation.poses) {
@@ -99,19 +111,19 @@ void ReportWriter::writePoses(const Evaluation& evaluation, const AttributionCon
     const Eigen::Vector3d t = p.pose.T_map_radar.translation(), x = p.pose.T_map_radar.linear().col(0);
     out << field(p.pose.name) << ',' << field(p.pose.location) << ',' << formatStamp(p.pose.stamp_ns) << ','
         << number(t.x(), 4) << ',' << number(t.y(), 4) << ',' << number(t.z(), 4) << ','
-        << number(std::atan2(x.y(), x.x()) / kDegree, 2) << ',' << p.frames << ',' << p.attribution.regions.size() << ','
-        << m.active[0] + m.active[1] + m.active[2] << ',' << m.recalled[0] + m.recalled[1] + m.recalled[2];
+        << number(std::atan2(x.y(), x.x()) / kDegree, 2) << ',' << p.frames << ',' << p.attribution.regions.size()
+        << ',' << m.active[0] + m.active[1] + m.active[2] << ',' << m.recalled[0] + m.recalled[1] + m.recalled[2];
     for (int i = 0; i < 3; ++i) out << ',' << m.active[i] << ',' << m.recalled[i];
     for (int i = 0; i < 3; ++i) out << ',' << m.top_hits[i] << ',' << m.top_count[i];
-    out << ',' << number(m.q1_energy, 5) << ',' << number(m.q2_energy, 5) << ',' << m.q1_cells << ',' << m.q2_cells << ','
-        << number(quantile(m.q3_db, 0.5)) << ',' << m.q3_db.size() << ','
+    out << ',' << number(m.q1_energy, 5) << ',' << number(m.q2_energy, 5) << ',' << m.q1_cells << ',' << m.q2_cells
+        << ',' << number(quantile(m.q3_db, 0.5)) << ',' << m.q3_db.size() << ','
         << (m.q4_cells ? number(m.q4_sum_db / m.q4_cells) : "") << ',' << m.q4_cells;
     for (int count : m.class_count) out << ',' << count;
     const ConventionCheck& c = p.attribution.convention;
     out << ',' << number(p.attribution.measured.peak_db) << ',' << o.active[0] + o.active[1] + o.active[2] << ','
         << o.recalled[0] + o.recalled[1] + o.recalled[2] << ',' << number(o.measured_peak_db) << ','
-        << number(c.as_recorded, 4) << ',' << number(c.channel_conjugated, 4) << ',' << number(c.iq_conjugated, 4) << ','
-        << (c.conjugatedBetter() ? 1 : 0) << '\n';
+        << number(c.as_recorded, 4) << ',' << number(c.channel_conjugated, 4) << ',' << number(c.iq_conjugated, 4)
+        << ',' << (c.conjugatedBetter() ? 1 : 0) << '\n';
   }
   file.close();
 }
@@ -154,9 +166,8 @@ void ReportWriter::writeRegions(const Evaluation& evaluation) const {
       out << field(p.pose.name) << ',' << number(r.range_m) << ',' << number(r.azimuth_rad / kDegree, 2) << ','
           << regionKindName(r.kind) << ',' << field(r.actor) << ',' << field(r.material) << ','
           << (r.field == Field::kCentral ? "central" : "outer") << ',' << (r.measured_strong ? 1 : 0) << ','
-          << (r.simulated_strong ? 1 : 0) << ','
-          << (r.kind == RegionKind::kExtent ? "" : number(r.support_db, 1)) << ',' << number(r.point.x()) << ','
-          << number(r.point.y()) << ',' << number(r.point.z()) << '\n';
+          << (r.simulated_strong ? 1 : 0) << ',' << (r.kind == RegionKind::kExtent ? "" : number(r.support_db, 1))
+          << ',' << number(r.point.x()) << ',' << number(r.point.y()) << ',' << number(r.point.z()) << '\n';
     }
   }
   file.close();
@@ -198,10 +209,13 @@ void ReportWriter::writeHtml(const Evaluation& evaluation, const AttributionConf
          "thead tr{border-top:2px solid #222;border-bottom:1px solid #222}tbody{border-bottom:2px solid #222}\n"
          "td.n{text-align:right;font-variant-numeric:tabular-nums}img{max-width:100%;height:auto}\n"
          "figure{margin:1.5em 0;padding:.6em;border:1px solid #ddd}figcaption{font-size:.92em;color:#444}\n"
-         "nav{columns:12 5em;font-size:.9em}code,pre{background:#f4f4f4;font-size:.88em}pre{padding:.8em;overflow:auto}\n"
-         ".warn{background:#fff3d6;padding:.6em 1em}</style></head><body>\n<h1>Measured and simulated radar, compared</h1>\n";
+         "nav{columns:12 "
+         "5em;font-size:.9em}code,pre{background:#f4f4f4;font-size:.88em}pre{padding:.8em;overflow:auto}\n"
+         ".warn{background:#fff3d6;padding:.6em 1em}</style></head><body>\n<h1>Measured and simulated radar, "
+         "compared</h1>\n";
   out << "<p>" << evaluation.central.poses << " poses of <code>" << html(run.recording)
-      << "</code>, simulated side: <code>" << html(run.simulated) << "</code>. Version " << html(run.version) << ".</p>\n";
+      << "</code>, simulated side: <code>" << html(run.simulated) << "</code>. Version " << html(run.version)
+      << ".</p>\n";
   out << "<h2>Evaluation summary, central field of view &plusmn;" << number(config.max_azimuth_rad / kDegree, 0)
       << "&deg;</h2>\n<table><thead><tr><th>Target</th><th>Metric</th><th>Result</th></tr></thead><tbody>\n";
   for (const auto& row : tableRows(evaluation.central, config.top_k)) {
@@ -210,16 +224,19 @@ void ReportWriter::writeHtml(const Evaluation& evaluation, const AttributionConf
   out << "</tbody></table>\n<p>Recall: overall; near (" << number(config.min_range_m, 2) << "&ndash;"
       << number(config.near_limit_m, 1) << " m) / mid (&ndash;" << number(config.far_limit_m, 1)
       << " m) / far. The background figure is a sanity check and claims nothing.</p>\n"
-      << "<h2>Residual classes and what they permit</h2>\n<table><thead><tr><th>Class</th><th>Residuals</th><th>Share</th>"
+      << "<h2>Residual classes and what they "
+         "permit</h2>\n<table><thead><tr><th>Class</th><th>Residuals</th><th>Share</th>"
          "<th>Action or limitation tag</th></tr></thead><tbody>\n";
   for (int i = 0; i < 5; ++i) {
     const auto c = static_cast<ResidualClass>(i + 1);
     const double share = evaluation.central.class_share[i];
-    out << "<tr><td>" << className(c) << " " << classLabel(c) << "</td><td class=\"n\">" << evaluation.central.class_count[i]
-        << "</td><td class=\"n\">" << (std::isnan(share) ? "&ndash;" : number(100 * share, 0) + " %") << "</td><td>"
-        << html(classAction(c)) << "</td></tr>\n";
+    out << "<tr><td>" << className(c) << " " << classLabel(c) << "</td><td class=\"n\">"
+        << evaluation.central.class_count[i] << "</td><td class=\"n\">"
+        << (std::isnan(share) ? "&ndash;" : number(100 * share, 0) + " %") << "</td><td>" << html(classAction(c))
+        << "</td></tr>\n";
   }
-  out << "</tbody></table>\n<p>Material changes are admissible for C2 alone. The routing follows windows and thresholds; it "
+  out << "</tbody></table>\n<p>Material changes are admissible for C2 alone. The routing follows windows and "
+         "thresholds; it "
          "does not name causes.</p>\n";
   std::istringstream text(reportText(evaluation, config));
   out << "<pre>" << html(text.str()) << "</pre>\n";
@@ -229,7 +246,8 @@ void ReportWriter::writeHtml(const Evaluation& evaluation, const AttributionConf
     out << "</ul></div>\n";
   }
   out << "<h2>Coverage</h2>\n<p><img src=\"coverage.png\" alt=\"The scene from above with the radar's places\"></p>\n";
-  out << "<h2>Poses</h2>\n<p>White boxes: expected regions where both branches respond. Magenta boxes: residuals, on the "
+  out << "<h2>Poses</h2>\n<p>White boxes: expected regions where both branches respond. Magenta boxes: residuals, on "
+         "the "
          "branch that is stronger.</p>\n<nav>";
   for (const PoseResult& p : evaluation.poses) {
     if (p.used) out << "<a href=\"#pose-" << html(p.pose.name) << "\">" << html(p.pose.name) << "</a><br>";
@@ -242,9 +260,9 @@ void ReportWriter::writeHtml(const Evaluation& evaluation, const AttributionConf
         << html(pictureLink(*this, p.pose.name)) << "\" alt=\"measured, simulated and residual map of pose "
         << html(p.pose.name) << "\"><figcaption>Pose " << html(p.pose.name) << ": "
         << m.recalled[0] + m.recalled[1] + m.recalled[2] << " of " << m.active[0] + m.active[1] + m.active[2]
-        << " measured regions recalled, Q1 " << number(m.q1_energy) << ", Q2 " << number(m.q2_energy) << ", C1&ndash;C5 "
-        << m.class_count[0] << "/" << m.class_count[1] << "/" << m.class_count[2] << "/" << m.class_count[3] << "/"
-        << m.class_count[4] << "</figcaption></figure>\n";
+        << " measured regions recalled, Q1 " << number(m.q1_energy) << ", Q2 " << number(m.q2_energy)
+        << ", C1&ndash;C5 " << m.class_count[0] << "/" << m.class_count[1] << "/" << m.class_count[2] << "/"
+        << m.class_count[3] << "/" << m.class_count[4] << "</figcaption></figure>\n";
   }
   out << "<h2>How to repeat this</h2>\n<pre>";
   for (const std::string& word : run.command) out << html(word) << ' ';
@@ -262,7 +280,8 @@ void ReportWriter::writeHtml(const Evaluation& evaluation, const AttributionConf
   file.close();
 }
 
-void ReportWriter::write(const Evaluation& evaluation, const AttributionConfig& config, const RunDescription& run) const {
+void ReportWriter::write(const Evaluation& evaluation, const AttributionConfig& config,
+                         const RunDescription& run) const {
   writePoses(evaluation, config);
   writeResiduals(evaluation);
   writeRegions(evaluation);

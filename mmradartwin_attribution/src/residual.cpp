@@ -31,9 +31,9 @@ class Router {
   }
 
   double distance(const ResponseRegion& region, const Response& response) const {
-    return std::hypot((response.range_m - region.range_m) / field_.halfRange_m(config_.wide),
-                      (response.azimuth_rad - region.azimuth_rad) /
-                          field_.halfAzimuth_rad(config_.wide, region.azimuth_rad));
+    return std::hypot(
+        (response.range_m - region.range_m) / field_.halfRange_m(config_.wide),
+        (response.azimuth_rad - region.azimuth_rad) / field_.halfAzimuth_rad(config_.wide, region.azimuth_rad));
   }
 
   // A response inside another region's tight window does not count for this one (unless it is in its own as well).
@@ -65,8 +65,9 @@ class Router {
         any = true;
         tight = tight || at(config_.tight, region, s);
       }
-      const ResidualClass c = !any ? ResidualClass::kMissingSupport
-                                   : tight ? ResidualClass::kWeakSupport : ResidualClass::kShiftedResponse;
+      const ResidualClass c = !any    ? ResidualClass::kMissingSupport
+                              : tight ? ResidualClass::kWeakSupport
+                                      : ResidualClass::kShiftedResponse;
       if (c < best || (c == best && distance(region, m) < distance(pose_.regions[best_region], m))) {
         best = c;
         best_region = static_cast<int>(i);

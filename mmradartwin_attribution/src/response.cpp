@@ -101,14 +101,14 @@ NormalisedMap EvaluationField::normalise(const RangeAngleMap& map) const {
   const int ranges = static_cast<int>(axes_.range_m.size()), angles = static_cast<int>(axes_.azimuth_rad.size());
   if (map.power_db.rows() != ranges || map.power_db.cols() != angles) {
     throw InputError("range-angle map has " + std::to_string(map.power_db.rows()) + " x " +
-                     std::to_string(map.power_db.cols()) + " cells, the radar's have " + std::to_string(ranges) + " x " +
-                     std::to_string(angles) + ": both branches need the same radar");
+                     std::to_string(map.power_db.cols()) + " cells, the radar's have " + std::to_string(ranges) +
+                     " x " + std::to_string(angles) + ": both branches need the same radar");
   }
   for (int i = 0; i < ranges; ++i) {
     if (std::abs(map.axes.range_m.at(i) - axes_.range_m[i]) > 1e-6) {
       throw InputError("range-angle map: range bin " + std::to_string(i) + " lies at " +
-                       std::to_string(map.axes.range_m.at(i)) + " m, the radar's at " + std::to_string(axes_.range_m[i]) +
-                       " m: both branches need the same radar");
+                       std::to_string(map.axes.range_m.at(i)) + " m, the radar's at " +
+                       std::to_string(axes_.range_m[i]) + " m: both branches need the same radar");
     }
   }
   for (int i = 0; i < angles; ++i) {
@@ -131,9 +131,8 @@ NormalisedMap EvaluationField::normalise(const RangeAngleMap& map) const {
   }
   result.peak_db = peak;
   const RealGrid relative = (map.power_db.array() - peak).matrix();
-  result.level_db = relative.unaryExpr([this](double v) {
-    return std::isnan(v) ? config_.floor_db : std::clamp(v, config_.floor_db, 0.0);
-  });
+  result.level_db = relative.unaryExpr(
+      [this](double v) { return std::isnan(v) ? config_.floor_db : std::clamp(v, config_.floor_db, 0.0); });
   result.responses = findResponses(relative);
   return result;
 }

@@ -34,7 +34,9 @@ std::vector<Eigen::Vector3d> boundary(const Facet& facet) {
 }
 
 // Position along the line and least and greatest distance from it of the points that come within gap of it.
-struct Along { double begin = 1e9, end = -1e9, nearest = 1e9, farthest = 0; };
+struct Along {
+  double begin = 1e9, end = -1e9, nearest = 1e9, farthest = 0;
+};
 
 Along along(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& origin, const Eigen::Vector3d& axis,
             double gap) {
@@ -106,8 +108,8 @@ void RegionModel::findCorners() {
       const Eigen::Vector3d in_a = axis.cross(a.normal);
       const double slope = b.normal.dot(in_a);
       const Eigen::Vector3d origin = a.origin - (b.planeDistance(a.origin) / slope) * in_a;
-      // A facet may cross the line (a cabinet stands before the middle of a wall): then its rim is far from the line, and
-      // the part of it beyond the other's plane counts by its whole extent along the line.
+      // A facet may cross the line (a cabinet stands before the middle of a wall): then its rim is far from the line,
+      // and the part of it beyond the other's plane counts by its whole extent along the line.
       const auto span = [&](const std::vector<Eigen::Vector3d>& rim, const Facet& other) {
         const auto [positive, negative] = reach(other, rim);
         const bool crosses = positive > gap && negative > gap;
@@ -143,14 +145,14 @@ void RegionModel::placeProbes() {
     bool any = false;
     for (int i = 0; i < n1; ++i) {
       for (int j = 0; j < n2; ++j) {
-        const Eigen::Vector3d p =
-            f.origin + (i + 0.5) / n1 * f.size1_m * f.e1 + (j + 0.5) / n2 * f.size2_m * f.e2;
+        const Eigen::Vector3d p = f.origin + (i + 0.5) / n1 * f.size1_m * f.e1 + (j + 0.5) / n2 * f.size2_m * f.e2;
         if (!f.rectangle && !f.contains(p)) continue;
         probes.push_back({p, f.id, f.size1_m * f.size2_m / (n1 * n2)});
         any = true;
       }
     }
-    if (!any) probes.push_back({f.nearest(f.origin + 0.5 * (f.size1_m * f.e1 + f.size2_m * f.e2), 1e-3), f.id, f.area_m2});
+    if (!any)
+      probes.push_back({f.nearest(f.origin + 0.5 * (f.size1_m * f.e1 + f.size2_m * f.e2), 1e-3), f.id, f.area_m2});
   }
 }
 
@@ -181,8 +183,8 @@ void RegionModel::addFacets(const Eigen::Isometry3d& T, std::vector<ResponseRegi
     const Eigen::Vector3d foot = radar - distance * f.normal;
     const double scale = 2 / std::sqrt(wavelength_m_ * R);
     const double x1 = f.e1.dot(foot - f.origin), x2 = f.e2.dot(foot - f.origin);
-    const double aperture = fresnelAperture(-x1 * scale, (f.size1_m - x1) * scale) *
-                            fresnelAperture(-x2 * scale, (f.size2_m - x2) * scale);
+    const double aperture =
+        fresnelAperture(-x1 * scale, (f.size1_m - x1) * scale) * fresnelAperture(-x2 * scale, (f.size2_m - x2) * scale);
     ResponseRegion region;
     region.support_db = level_db(wavelength_m_ / (8 * M_PI * R) * aperture);
     const bool inside = f.contains(foot, 1e-6);
@@ -203,7 +205,8 @@ void RegionModel::addCorners(const Eigen::Isometry3d& T, std::vector<ResponseReg
     const double length = segment.norm();
     const double t = segment.dot(radar - c.begin) / length;
     const Eigen::Vector3d foot = c.begin + t / length * segment;
-    const Eigen::Vector3d point = c.begin + std::clamp(t, std::min(0.01, length / 2), std::max(length - 0.01, length / 2)) / length * segment;
+    const Eigen::Vector3d point =
+        c.begin + std::clamp(t, std::min(0.01, length / 2), std::max(length - 0.01, length / 2)) / length * segment;
     const double R = (foot - radar).norm();
     if (R < 1e-3) continue;
     const double scale = 2 / std::sqrt(wavelength_m_ * R);
@@ -211,8 +214,8 @@ void RegionModel::addCorners(const Eigen::Isometry3d& T, std::vector<ResponseReg
     const Eigen::Vector3d ray = (foot - radar) / R;
     const double across_a = c.width_first_m * std::abs(ray.dot(a.normal));
     const double across_b = c.width_second_m * std::abs(ray.dot(b.normal));
-    const double aperture = fresnelAperture(-across_a * scale, across_b * scale) *
-                            fresnelAperture(-t * scale, (length - t) * scale);
+    const double aperture =
+        fresnelAperture(-across_a * scale, across_b * scale) * fresnelAperture(-t * scale, (length - t) * scale);
     ResponseRegion region;
     region.support_db = level_db(wavelength_m_ / (8 * M_PI * R) * aperture);
     region.kind = RegionKind::kCorner;
@@ -257,8 +260,8 @@ void RegionModel::addExtentsOf(int actor, const Eigen::Isometry3d& T, double flo
     return std::none_of(out.begin(), out.end(), [&](const ResponseRegion& r) {
       return std::find(r.actors.begin(), r.actors.end(), actor) != r.actors.end() &&
              std::abs(r.range_m - v.range_m) < field_.halfRange_m(wide) + field_.halfRange_m(tight) &&
-             std::abs(r.azimuth_rad - v.azimuth_rad) < field_.halfAzimuth_rad(wide, r.azimuth_rad) +
-                                                           field_.halfAzimuth_rad(tight, v.azimuth_rad);
+             std::abs(r.azimuth_rad - v.azimuth_rad) <
+                 field_.halfAzimuth_rad(wide, r.azimuth_rad) + field_.halfAzimuth_rad(tight, v.azimuth_rad);
     });
   };
   while (true) {
@@ -314,9 +317,9 @@ std::vector<ResponseRegion> RegionModel::regions(const Eigen::Isometry3d& T_map_
     if (r.field == Field::kCentral) strongest = std::max(strongest, r.support_db);
   }
   const double floor = strongest + field_.config().regions.support_floor_db;
-  found.erase(std::remove_if(found.begin(), found.end(),
-                             [floor](const ResponseRegion& r) { return r.support_db < floor; }),
-              found.end());
+  found.erase(
+      std::remove_if(found.begin(), found.end(), [floor](const ResponseRegion& r) { return r.support_db < floor; }),
+      found.end());
   found = merged(std::move(found));
   const double extent_floor = field_.config().regions.extent_floor_db;
   addExtents(T_map_radar, strongest + extent_floor, found);

@@ -13,9 +13,8 @@ constexpr double kDegree = M_PI / 180.0;
 bool StandingLedger::counts(const Stretch& stretch) const { return stretch.end_ns - stretch.begin_ns >= 1000000000; }
 
 bool StandingLedger::duplicate(const Stretch& stretch) const {
-  return std::any_of(finished_.begin(), finished_.end(), [&](const Stretch& earlier) {
-    return sameView(earlier.T, stretch.T);
-  });
+  return std::any_of(finished_.begin(), finished_.end(),
+                     [&](const Stretch& earlier) { return sameView(earlier.T, stretch.T); });
 }
 
 void StandingLedger::add(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_radar, const std::string& name,
@@ -61,7 +60,8 @@ LedgerSummary StandingLedger::summary() const {
 
 std::vector<std::string> StandingLedger::duplicates() const {
   std::vector<std::string> names = duplicates_;
-  if (!current_.empty() && counts(current_.front()) && duplicate(current_.front())) names.push_back(current_.front().name);
+  if (!current_.empty() && counts(current_.front()) && duplicate(current_.front()))
+    names.push_back(current_.front().name);
   return names;
 }
 

@@ -28,7 +28,8 @@ class Laboratory {
 
   /// The base twin with one more mechanism, as a line of twin.yaml.
   TwinDescription describe(const std::string& mechanism = "") const {
-    const std::string file = std::filesystem::temp_directory_path() / ("attribution_twin_" + std::to_string(getpid()) + ".yaml");
+    const std::string file =
+        std::filesystem::temp_directory_path() / ("attribution_twin_" + std::to_string(getpid()) + ".yaml");
     std::ofstream(file) << "mechanisms:\n  specular: {max_bounces: 3}\n  corner: {}\n  diffuse: {}\n" << mechanism;
     TwinDescription description = loadTwin(file, recording.scene_file, recording.radar);
     std::filesystem::remove(file);

@@ -1,13 +1,14 @@
-// Interventions on the simulated side against a session of the measured-session generator (test/, Python, no code shared):
-// how residuals route that appear with an intervention and not without it. Counts are printed; thresholds hold where the
-// rules can reach them.
+// Interventions on the simulated side against a session of the measured-session generator (test/, Python, no code
+// shared): how residuals route that appear with an intervention and not without it. Counts are printed; thresholds hold
+// where the rules can reach them.
+
+#include "intervention.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <algorithm>
 
-#include "intervention.h"
 #include "mmradartwin_attribution/report.h"
 
 namespace mmradartwin {
@@ -48,7 +49,8 @@ class InterventionTest : public ::testing::Test {
     remove(other_speckle_);
   }
   void SetUp() override {
-    if (!lab_) GTEST_SKIP() << "the session generator " << MMRADARTWIN_TEST_DIR << "/scripts/make_session.py did not run";
+    if (!lab_)
+      GTEST_SKIP() << "the session generator " << MMRADARTWIN_TEST_DIR << "/scripts/make_session.py did not run";
   }
 
   // Prints and returns the classes of what appears.
@@ -83,9 +85,9 @@ TEST_F(InterventionTest, WithNothingHiddenTheTwinReachesTheCeiling) {
   const Recording other = openSession(other_speckle_);
   const Evaluation ceiling = lab_->against(simulatedBySession(other));
   const LedgerSummary &twin = base_->central, &best = ceiling.central;
-  std::printf("[  counts  ] recall %.3f (%.3f/%.3f/%.3f), ceiling %.3f (%.3f/%.3f/%.3f), Q3 median %.2f dB\n", twin.recall,
-              twin.recall_band[0], twin.recall_band[1], twin.recall_band[2], best.recall, best.recall_band[0],
-              best.recall_band[1], best.recall_band[2], twin.q3_median_db);
+  std::printf("[  counts  ] recall %.3f (%.3f/%.3f/%.3f), ceiling %.3f (%.3f/%.3f/%.3f), Q3 median %.2f dB\n",
+              twin.recall, twin.recall_band[0], twin.recall_band[1], twin.recall_band[2], best.recall,
+              best.recall_band[0], best.recall_band[1], best.recall_band[2], twin.q3_median_db);
   EXPECT_EQ(twin.poses, 154);
   EXPECT_EQ(base_->duplicates.size(), 2u);
   EXPECT_LE(std::abs(twin.q3_median_db), 0.5);
@@ -97,12 +99,14 @@ TEST_F(InterventionTest, WithNothingHiddenTheTwinReachesTheCeiling) {
 TEST_F(InterventionTest, ATurnedRadarShiftsResponses) {
   const Twin turned(lab_->describe("  radar_yaw_offset: {yaw_deg: 14}\n"));
   const auto count = routed("radar turned by 14 deg", lab_->against(simulatedByTwin(turned)), 4);
-  // The rest: speckle maxima of rough walls away from any region (C5), and peaks that normalise where the array has a null (C3).
+  // The rest: speckle maxima of rough walls away from any region (C5), and peaks that normalise where the array has a
+  // null (C3).
   EXPECT_EQ(std::max_element(count.begin(), count.end()) - count.begin(), 3);
   EXPECT_GE(share(count, 4), 0.7);
 }
 
-// Where the actor held the strongest echo, the normalisation lifts all others: what then stands out is C3 and C4 by rule.
+// Where the actor held the strongest echo, the normalisation lifts all others: what then stands out is C3 and C4 by
+// rule.
 TEST_F(InterventionTest, ASuppressedActorLosesSupport) {
   for (const std::string actor : {"wall_north", "cabinet_north", "wardrobe"}) {
     routed("paths of " + actor + " suppressed", lab_->against(without(actor)), 1);

@@ -66,10 +66,11 @@ TEST(Ledger, PrintsThePapersTable) {
   Ledger ledger;
   ledger.add(first());
   const std::string table = formatTable(ledger.summary(), AttributionConfig(), "title");
-  for (const char* part : {"Target        Metric          Result", "Placement     Recall          0.667; 0.500/1.000/-",
-                           "Peaks         Top-1/3/5       1.000/0.667/0.400", "Matched amp.  Q3 median/IQR   2.00/1.00 dB",
-                           "Under-pred.   Q1 energy       0.200", "Over-pred.    Q2 energy       0.100",
-                           "Background    Q4 MAE          3.00 dB", "Routing       C1/C2/C3/C4/C5  25/50/0/25/0%"}) {
+  for (const char* part :
+       {"Target        Metric          Result", "Placement     Recall          0.667; 0.500/1.000/-",
+        "Peaks         Top-1/3/5       1.000/0.667/0.400", "Matched amp.  Q3 median/IQR   2.00/1.00 dB",
+        "Under-pred.   Q1 energy       0.200", "Over-pred.    Q2 energy       0.100",
+        "Background    Q4 MAE          3.00 dB", "Routing       C1/C2/C3/C4/C5  25/50/0/25/0%"}) {
     EXPECT_NE(table.find(part), std::string::npos) << part << "\nin\n" << table;
   }
 }
@@ -112,7 +113,7 @@ TEST_F(StandingLedgerTest, TheLongestAverageIsWhatCounts) {
   late.q1_energy = 0.1;
   ledger_.add(0, pose(0, 0), "a", 1, early);
   ledger_.add(2000000000, pose(0, 0), "a", 100, late);
-  ledger_.add(2050000000, pose(0, 0), "a", 1, early);   // the average began anew
+  ledger_.add(2050000000, pose(0, 0), "a", 1, early);  // the average began anew
   EXPECT_DOUBLE_EQ(ledger_.summary().q1_energy, 0.1);
 }
 

@@ -15,7 +15,7 @@ class ResidualTest : public ::testing::Test {
   RadarConfig radar_ = synthetic::paperRadar();
   SignalChain chain_{radar_};
   EvaluationField field_{AttributionConfig(), radar_, chain_.axes()};
-  const Target anchor_{3.0, 0, 0};   // in both branches, at a region: what the others are relative to
+  const Target anchor_{3.0, 0, 0};  // in both branches, at a region: what the others are relative to
 
   static ResponseRegion region(const std::string& actor, double range_m, double azimuth_deg) {
     ResponseRegion r;
@@ -26,7 +26,8 @@ class ResidualTest : public ::testing::Test {
     return r;
   }
 
-  PoseAttribution compare(std::vector<Target> measured, std::vector<Target> simulated, std::vector<ResponseRegion> regions) {
+  PoseAttribution compare(std::vector<Target> measured, std::vector<Target> simulated,
+                          std::vector<ResponseRegion> regions) {
     measured.push_back(anchor_);
     simulated.push_back(anchor_);
     regions.push_back(region("anchor", anchor_.range_m, anchor_.azimuth_deg));
@@ -60,7 +61,8 @@ TEST_F(ResidualTest, NothingInTheWideWindowIsC1) {
 }
 
 TEST_F(ResidualTest, AResponseBelowTheWeakThresholdIsC1AsWell) {
-  EXPECT_EQ(only(compare({{5, 30, -5}}, {{5, 30, -28}}, {region("tv", 5, 30)})).residual_class, ResidualClass::kMissingSupport);
+  EXPECT_EQ(only(compare({{5, 30, -5}}, {{5, 30, -28}}, {region("tv", 5, 30)})).residual_class,
+            ResidualClass::kMissingSupport);
 }
 
 TEST_F(ResidualTest, AWeakResponseInTheTightWindowIsC2) {
@@ -70,7 +72,8 @@ TEST_F(ResidualTest, AWeakResponseInTheTightWindowIsC2) {
 }
 
 TEST_F(ResidualTest, AStrongResponseInTheRegionsTightWindowIsAMatch) {
-  // 0.34 m apart, beyond the tight window around either response, but both in the region's: no weak support, no material.
+  // 0.34 m apart, beyond the tight window around either response, but both in the region's: no weak support, no
+  // material.
   const auto pose = compare({{4.83, 30, -5}}, {{5.17, 30, -5}}, {region("tv", 5, 30)});
   EXPECT_TRUE(pose.regions[0].simulated_strong);
   for (const Residual& r : pose.residuals) EXPECT_FALSE(r.measured_stronger);
@@ -100,7 +103,8 @@ TEST_F(ResidualTest, MeasuredAtNoRegionIsC5) {
 
 TEST_F(ResidualTest, AnotherRegionsResponseDoesNotCount) {
   // The response at 5.5 m is the shelf's: the tv behind which nothing is simulated stays without support.
-  const auto pose = compare({{5, 30, -5}, {5.5, 30, -5}}, {{5.5, 30, -5}}, {region("tv", 5, 30), region("shelf", 5.5, 30)});
+  const auto pose =
+      compare({{5, 30, -5}, {5.5, 30, -5}}, {{5.5, 30, -5}}, {region("tv", 5, 30), region("shelf", 5.5, 30)});
   EXPECT_EQ(only(pose).residual_class, ResidualClass::kMissingSupport);
   EXPECT_EQ(only(pose).actor, "tv");
 }
@@ -182,8 +186,7 @@ TEST_F(ResidualTest, ConjugationIsNoticed) {
   const ConventionCheck right = checkConvention(field_, synthetic::map(radar_, targets), simulated);
   EXPECT_FALSE(right.conjugatedBetter());
   EXPECT_NEAR(right.as_recorded, 1, 1e-9);
-  const ConventionCheck iq =
-      checkConvention(field_, chain_.map(synthetic::grid(radar_, targets, true)), simulated);
+  const ConventionCheck iq = checkConvention(field_, chain_.map(synthetic::grid(radar_, targets, true)), simulated);
   EXPECT_TRUE(iq.conjugatedBetter());
   EXPECT_GT(iq.iq_conjugated, 0.98);
   std::vector<Target> mirrored = targets;
@@ -211,20 +214,21 @@ class MetricTest : public ResidualTest {
 
 TEST_F(MetricTest, EnergiesAndDifferencesOfHandMadeMaps) {
   RangeAngleMap m = flat(-80), s = flat(-45);
-  m.power_db(20, 32) = 0;     // both strong, in a region: Q3 = 0
+  m.power_db(20, 32) = 0;  // both strong, in a region: Q3 = 0
   s.power_db(20, 32) = 0;
-  m.power_db(21, 32) = -3;    // both strong, in the region: -7
+  m.power_db(21, 32) = -3;  // both strong, in the region: -7
   s.power_db(21, 32) = -10;
-  m.power_db(40, 20) = -10;   // Q1: measured strong, simulated weak
-  m.power_db(50, 40) = -40;   // Q2: simulated strong, measured weak
+  m.power_db(40, 20) = -10;  // Q1: measured strong, simulated weak
+  m.power_db(50, 40) = -40;  // Q2: simulated strong, measured weak
   s.power_db(50, 40) = -5;
-  m.power_db(60, 30) = -12;   // both strong, at no region
+  m.power_db(60, 30) = -12;  // both strong, at no region
   s.power_db(60, 30) = -12;
   ResponseRegion expected = region("wall", chain_.axes().range_m[20], 0);
   const PoseAttribution pose = compareMaps(field_, m, s, {expected}, {});
   const int rest = evaluatedCells() - 5;
   const double m_all = 1 + std::pow(10, -0.3) + 0.1 + 1e-4 + std::pow(10, -1.2) + rest * 1e-5;
-  const double s_all = 1 + 0.1 + std::pow(10, -4.5) + std::pow(10, -0.5) + std::pow(10, -1.2) + rest * std::pow(10, -4.5);
+  const double s_all =
+      1 + 0.1 + std::pow(10, -4.5) + std::pow(10, -0.5) + std::pow(10, -1.2) + rest * std::pow(10, -4.5);
   EXPECT_NEAR(pose.central.q1_energy, 0.1 / m_all, 1e-12);
   EXPECT_NEAR(pose.central.q2_energy, std::pow(10, -0.5) / s_all, 1e-12);
   EXPECT_EQ(pose.central.q1_cells, 1);
@@ -254,10 +258,9 @@ TEST_F(MetricTest, TopKCountsAgreementWithinItsWindow) {
 TEST_F(MetricTest, RecallByBand) {
   const std::vector<Target> measured = {{1.0, 0, -3}, {3.0, 20, 0}, {3.5, -25, -6}, {6.0, 10, -6}};
   const std::vector<Target> simulated = {{1.0, 0, -3}, {3.0, 20, 0}, {6.0, 10, -20}};
-  const PoseAttribution pose = compareMaps(field_, synthetic::map(radar_, measured), synthetic::map(radar_, simulated),
-                                           {region("a", 1, 0), region("b", 3, 20), region("c", 3.5, -25),
-                                            region("d", 6, 10), region("e", 8, 0)},
-                                           {});
+  const PoseAttribution pose = compareMaps(
+      field_, synthetic::map(radar_, measured), synthetic::map(radar_, simulated),
+      {region("a", 1, 0), region("b", 3, 20), region("c", 3.5, -25), region("d", 6, 10), region("e", 8, 0)}, {});
   EXPECT_EQ(pose.central.active, (std::array<int, 3>{1, 2, 1}));
   EXPECT_EQ(pose.central.recalled, (std::array<int, 3>{1, 1, 0}));
 }

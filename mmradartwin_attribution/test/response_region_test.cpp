@@ -66,7 +66,8 @@ class RoomTest : public ::testing::Test {
   static const ResponseRegion* find(const std::vector<ResponseRegion>& regions, RegionKind kind, double range_m,
                                     double azimuth_deg) {
     for (const ResponseRegion& r : regions) {
-      if (r.kind == kind && std::abs(r.range_m - range_m) < 0.02 && std::abs(r.azimuth_rad / kDegree - azimuth_deg) < 0.3) {
+      if (r.kind == kind && std::abs(r.range_m - range_m) < 0.02 &&
+          std::abs(r.azimuth_rad / kDegree - azimuth_deg) < 0.3) {
         return &r;
       }
     }
@@ -74,8 +75,8 @@ class RoomTest : public ::testing::Test {
   }
 
   static int count(const std::vector<ResponseRegion>& regions, RegionKind kind) {
-    return static_cast<int>(std::count_if(regions.begin(), regions.end(),
-                                          [kind](const ResponseRegion& r) { return r.kind == kind; }));
+    return static_cast<int>(
+        std::count_if(regions.begin(), regions.end(), [kind](const ResponseRegion& r) { return r.kind == kind; }));
   }
 
   RadarConfig radar_ = synthetic::paperRadar();
@@ -139,8 +140,7 @@ TEST_F(RoomTest, AnObjectAgainstTheMiddleOfAWallMakesTwoCorners) {
     }
   }
   const auto beside = regionsAt(4, 3.4, 0);
-  const ResponseRegion* corner =
-      find(beside, RegionKind::kCorner, std::hypot(2, 1), std::atan2(-1, 2) / kDegree);
+  const ResponseRegion* corner = find(beside, RegionKind::kCorner, std::hypot(2, 1), std::atan2(-1, 2) / kDegree);
   ASSERT_NE(corner, nullptr);
   EXPECT_NE(corner->actor.find("cabinet"), std::string::npos);
   EXPECT_NE(corner->actor.find("east"), std::string::npos);

@@ -33,8 +33,8 @@ struct Target {
   double range_m, azimuth_deg, level_db;
 };
 
-/// Far-field samples of point targets in closed form: a tone of r/(c/2B) cycles per window and exp(-j 2 pi d k sin(theta)/lambda)
-/// over the elements; `conjugate` as a receiver with I and Q swapped delivers them.
+/// Far-field samples of point targets in closed form: a tone of r/(c/2B) cycles per window and exp(-j 2 pi d k
+/// sin(theta)/lambda) over the elements; `conjugate` as a receiver with I and Q swapped delivers them.
 inline ReceiveGrid grid(const RadarConfig& radar, const std::vector<Target>& targets, bool conjugate = false) {
   ReceiveGrid g;
   g.full_scale = 1;

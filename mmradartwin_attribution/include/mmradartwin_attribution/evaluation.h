@@ -19,9 +19,10 @@ namespace mmradartwin {
 /// The simulated side of one pose.
 struct SimulatedPose {
   RangeAngleMap map;
-  std::vector<PathRecord> records;     ///< empty where the simulated side is a recording
+  std::vector<PathRecord> records;  ///< empty where the simulated side is a recording
 };
-/// Gives the simulated side of a pose; called for several poses at once. Throws InputError for a pose that cannot be used.
+/// Gives the simulated side of a pose; called for several poses at once. Throws InputError for a pose that cannot be
+/// used.
 using SimulatedBranch = std::function<SimulatedPose(const Pose&)>;
 
 /// Simulates with a twin. Keeps a reference to it.
@@ -33,30 +34,30 @@ SimulatedBranch simulatedBySession(const Recording& session);
 RangeAngleMap averagedMap(const Recording& recording, const SignalChain& chain, const Pose& pose);
 
 struct PoseResult {
-  std::size_t index = 0;               ///< in the recording's poses
+  std::size_t index = 0;  ///< in the recording's poses
   Pose pose;
   bool used = false;
-  std::string problem;                 ///< where not used: one line for the user
-  int frames = 0;                      ///< in the measured average
+  std::string problem;  ///< where not used: one line for the user
+  int frames = 0;       ///< in the measured average
   PoseAttribution attribution;
-  std::vector<PathRecord> records;     ///< behind the simulated map; residuals index them (see keep_records)
+  std::vector<PathRecord> records;             ///< behind the simulated map; residuals index them (see keep_records)
   std::map<int, PathRecord> residual_records;  ///< those of them that make up a residual, by index
 };
 
 struct EvaluationOptions {
   AttributionConfig config;
-  int jobs = 0;                                                     ///< 0: as many as there are cores
-  bool keep_records = false;                                        ///< else PoseResult::records is emptied after on_pose
-  std::function<void(const PoseResult&)> on_pose;                   ///< from worker threads, as each pose is done
+  int jobs = 0;                                    ///< 0: as many as there are cores
+  bool keep_records = false;                       ///< else PoseResult::records is emptied after on_pose
+  std::function<void(const PoseResult&)> on_pose;  ///< from worker threads, as each pose is done
   std::function<void(std::size_t done, std::size_t all)> on_progress;  ///< one call at a time
 };
 
 struct Evaluation {
-  std::vector<PoseResult> poses;       ///< in the recording's order
+  std::vector<PoseResult> poses;  ///< in the recording's order
   LedgerSummary central, outer;
   std::vector<std::string> duplicates;
-  std::vector<PoseProblem> problems;   ///< of the recording and of single poses
-  int conjugated_better = 0;           ///< poses whose conjugated measurement agrees better
+  std::vector<PoseProblem> problems;  ///< of the recording and of single poses
+  int conjugated_better = 0;          ///< poses whose conjugated measurement agrees better
 };
 
 /// Compares every pose of a recording with its simulated side. The scene gives the expected regions.

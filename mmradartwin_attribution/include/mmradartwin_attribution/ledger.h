@@ -12,15 +12,15 @@ namespace mmradartwin {
 struct LedgerSummary {
   int poses = 0;
   double recall = 0;
-  std::array<double, 3> recall_band{};      ///< near, mid, far
+  std::array<double, 3> recall_band{};  ///< near, mid, far
   std::array<int, 3> active{}, recalled{};
-  std::array<double, 3> top{};              ///< by config.top_k
+  std::array<double, 3> top{};  ///< by config.top_k
   double q3_median_db = 0, q3_iqr_db = 0;
   int q3_cells = 0;
-  double q1_energy = 0, q2_energy = 0;      ///< means over poses
+  double q1_energy = 0, q2_energy = 0;  ///< means over poses
   double q4_mae_db = 0;
   std::array<int, 5> class_count{};
-  std::array<double, 5> class_share{};      ///< of all residuals
+  std::array<double, 5> class_share{};  ///< of all residuals
 };
 
 /// Adds up poses. Regions, cells and responses are pooled; Q1 and Q2 energy are means over poses.

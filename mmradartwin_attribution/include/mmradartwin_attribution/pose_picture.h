@@ -11,9 +11,9 @@ namespace mmradartwin {
 /// Colour of a class, blue, green, red 0..255: five hues of Okabe and Ito that stay apart under colour blindness.
 cv::Scalar classColor_bgr(ResidualClass c);
 
-/// Measured, simulated and residual fan of one pose side by side. White boxes: expected regions where both branches respond
-/// strongly; magenta boxes: residuals, drawn on the branch that is stronger. Boxes name actors; below stands a list of the
-/// residuals with class and levels.
+/// Measured, simulated and residual fan of one pose side by side. White boxes: expected regions where both branches
+/// respond strongly; magenta boxes: residuals, drawn on the branch that is stronger. Boxes name actors; below stands a
+/// list of the residuals with class and levels.
 cv::Mat drawPose(const EvaluationField& field, const PoseResult& result);
 
 /// Acquisition coverage: the scene from above, coloured by material, with the radar's places and headings. Horizontal

@@ -13,21 +13,21 @@ enum class Field { kExcluded, kCentral, kOuter };
 
 /// A response of a map: a local maximum that is no point response of a stronger one.
 struct Response {
-  int range_bin = 0, angle_bin = 0;   ///< cell of the maximum
-  double range_m = 0, azimuth_rad = 0;///< interpolated within that cell
-  double level_db = 0;                ///< relative to the map's peak, clipped
+  int range_bin = 0, angle_bin = 0;     ///< cell of the maximum
+  double range_m = 0, azimuth_rad = 0;  ///< interpolated within that cell
+  double level_db = 0;                  ///< relative to the map's peak, clipped
   Field field = Field::kExcluded;
 };
 
 /// A map relative to its peak among the evaluated cells.
 struct NormalisedMap {
-  RealGrid level_db;                  ///< [N][64] clipped to [floor, 0] dB
-  double peak_db = 0;                 ///< what 0 dB stands for, in the unit of the map
-  std::vector<Response> responses;    ///< strongest first, down to the floor; central and outer field
+  RealGrid level_db;                ///< [N][64] clipped to [floor, 0] dB
+  double peak_db = 0;               ///< what 0 dB stands for, in the unit of the map
+  std::vector<Response> responses;  ///< strongest first, down to the floor; central and outer field
 };
 
-/// What the evaluation looks at in maps of one radar: which cells count, how a point appears there, which neighbourhoods
-/// belong together. All methods are const and may be called from several threads.
+/// What the evaluation looks at in maps of one radar: which cells count, how a point appears there, which
+/// neighbourhoods belong together. All methods are const and may be called from several threads.
 class EvaluationField {
  public:
   /// Throws InputError where no cell is left to evaluate.
@@ -44,17 +44,17 @@ class EvaluationField {
                 double azimuth_rad) const;
   double halfRange_m(const MatchWindow& window) const;
   double halfAzimuth_rad(const MatchWindow& window, double center_azimuth_rad) const;
-  /// How much of a record's amplitude the chain puts into the map at a place, 0 to 1: its range offset through the window,
-  /// its contributions c_k steered to the azimuth. Follows a path with different departure and arrival, which has no single
-  /// direction. 0 for a record without contributions.
+  /// How much of a record's amplitude the chain puts into the map at a place, 0 to 1: its range offset through the
+  /// window, its contributions c_k steered to the azimuth. Follows a path with different departure and arrival, which
+  /// has no single direction. 0 for a record without contributions.
   double recordShare(const PathRecord& record, double range_m, double azimuth_rad) const;
 
   /// Power of a point response (1 at its peak) `range_bins` and `angle_bins` (of 64) away from it: the periodic Hann
   /// window's transform in range and the untapered array's (Dirichlet kernel of M elements) in angle.
   double pointResponse(double range_bins, double angle_bins) const;
 
-  /// Normalises, clips and finds responses. Throws InputError where the map's shape or axes are not this field's, or the
-  /// map holds no finite power among the evaluated cells.
+  /// Normalises, clips and finds responses. Throws InputError where the map's shape or axes are not this field's, or
+  /// the map holds no finite power among the evaluated cells.
   NormalisedMap normalise(const RangeAngleMap& map) const;
 
  private:
@@ -65,8 +65,8 @@ class EvaluationField {
   int channels_ = 0;
   double range_bin_m_ = 0;
   double sine_bin_ = 0;
-  std::vector<char> range_field_;      // [N] beyond the near range
-  std::vector<Field> angle_field_;     // [64]
+  std::vector<char> range_field_;   // [N] beyond the near range
+  std::vector<Field> angle_field_;  // [64]
 };
 
 }  // namespace mmradartwin

@@ -22,17 +22,18 @@ const std::string& regionKindName(RegionKind kind);
 /// Where scene and pose alone say that a strong response should be.
 struct ResponseRegion {
   double range_m = 0;
-  double azimuth_rad = 0;            ///< as a line array along y sees it: asin of the direction's y
+  double azimuth_rad = 0;  ///< as a line array along y sees it: asin of the direction's y
   RegionKind kind = RegionKind::kExtent;
-  std::vector<int> actors;           ///< Scene::actors; two for a corner between actors
-  std::string actor, material;       ///< names and tags, joined with ";"
-  Eigen::Vector3d point;             ///< map
-  /// Level by geometry alone, 20 log10 of: lambda/(8 pi R) times the aperture factor of a perfect reflector, for an extent
-  /// lambda/(4 pi) sqrt(S^2 sum(cos^2 dA/(pi r^4))) over the visible surface in the tight window, S = regions.extent_scattering.
+  std::vector<int> actors;      ///< Scene::actors; two for a corner between actors
+  std::string actor, material;  ///< names and tags, joined with ";"
+  Eigen::Vector3d point;        ///< map
+  /// Level by geometry alone, 20 log10 of: lambda/(8 pi R) times the aperture factor of a perfect reflector, for an
+  /// extent lambda/(4 pi) sqrt(S^2 sum(cos^2 dA/(pi r^4))) over the visible surface in the tight window, S =
+  /// regions.extent_scattering.
   double support_db = 0;
   Field field = Field::kCentral;
-  bool measured_strong = false;      ///< filled by the comparison: a measured response >= strong in the tight window
-  bool simulated_strong = false;     ///< and a simulated one
+  bool measured_strong = false;   ///< filled by the comparison: a measured response >= strong in the tight window
+  bool simulated_strong = false;  ///< and a simulated one
 };
 
 /// Expected regions of one scene. What depends on the scene alone is found once; regions() is const and thread-safe.
@@ -40,19 +41,24 @@ class RegionModel {
  public:
   /// Keeps references: scene and rays must outlive it.
   RegionModel(const Scene& scene, const RayCaster& rays, const EvaluationField& field, const RadarConfig& radar);
-  /// Regions of a pose in order of range. No two of one actor lie in each other's tight window, so that none share a cell.
+  /// Regions of a pose in order of range. No two of one actor lie in each other's tight window, so that none share a
+  /// cell.
   std::vector<ResponseRegion> regions(const Eigen::Isometry3d& T_map_radar) const;
   /// Concave right-angled corners of the scene: pairs of facets with the segment they share.
   struct Corner {
-    int first, second;                        ///< facets
-    Eigen::Vector3d begin, end;               ///< of the common segment, map
-    double toward_second, toward_first;       ///< sign of the plane distance on which the other facet lies
-    double width_first_m, width_second_m;     ///< from the line to the far end
+    int first, second;                     ///< facets
+    Eigen::Vector3d begin, end;            ///< of the common segment, map
+    double toward_second, toward_first;    ///< sign of the plane distance on which the other facet lies
+    double width_first_m, width_second_m;  ///< from the line to the far end
   };
   const std::vector<Corner>& corners() const { return corners_; }
 
  private:
-  struct Probe { Eigen::Vector3d point; int facet; double area_m2; };
+  struct Probe {
+    Eigen::Vector3d point;
+    int facet;
+    double area_m2;
+  };
   void findCorners();
   void placeProbes();
   bool seen(const Eigen::Vector3d& radar_map, const Eigen::Vector3d& point, const Eigen::Vector3d& inward) const;
@@ -69,11 +75,11 @@ class RegionModel {
   double wavelength_m_;
   double max_range_m_;
   std::vector<Corner> corners_;
-  std::vector<std::vector<Probe>> probes_;    // per actor
+  std::vector<std::vector<Probe>> probes_;  // per actor
 };
 
-/// Fresnel aperture factor of one axis, |E(u2) - E(u1)|/|1 - j| with E = C - jS: 1 for an unbounded plane. u = 2x/sqrt(lambda R)
-/// with x from the foot of the perpendicular to the facet's two ends.
+/// Fresnel aperture factor of one axis, |E(u2) - E(u1)|/|1 - j| with E = C - jS: 1 for an unbounded plane. u =
+/// 2x/sqrt(lambda R) with x from the foot of the perpendicular to the facet's two ends.
 double fresnelAperture(double u1, double u2);
 
 }  // namespace mmradartwin

@@ -9,8 +9,8 @@
 
 namespace mmradartwin {
 
-/// A ledger over a live stream: a pose is a stretch of at least 1 s in which the radar stands (within 2 cm and 1 deg of where
-/// the stretch began); of each stretch the last of its longest averages counts once. A later stretch within 10 cm
+/// A ledger over a live stream: a pose is a stretch of at least 1 s in which the radar stands (within 2 cm and 1 deg of
+/// where the stretch began); of each stretch the last of its longest averages counts once. A later stretch within 10 cm
 /// horizontally, 2 cm in height and 1 deg in heading of an earlier one is a duplicate: left out and listed.
 class StandingLedger {
  public:
@@ -34,7 +34,7 @@ class StandingLedger {
 
   std::vector<Stretch> finished_;
   std::vector<std::string> duplicates_;
-  std::vector<Stretch> current_;   // none or one
+  std::vector<Stretch> current_;  // none or one
 };
 
 }  // namespace mmradartwin

@@ -226,7 +226,8 @@ void MarkerBuilder::addBoxes(const PoseAttribution& pose, Array& out) {
     matched.scale.x = mismatch.scale.x = 0.05;
     mismatch.color = kMagenta;
     for (const ResponseRegion& r : pose.regions) {
-      if (r.field == Field::kCentral && r.measured_strong && r.simulated_strong) outline(matched, r.range_m, r.azimuth_rad);
+      if (r.field == Field::kCentral && r.measured_strong && r.simulated_strong)
+        outline(matched, r.range_m, r.azimuth_rad);
     }
     for (const Residual& r : pose.residuals) {
       if (r.measured_stronger == (branch == 0)) outline(mismatch, r.range_m, r.azimuth_rad);
@@ -327,7 +328,8 @@ void MarkerBuilder::addRadar(const Eigen::Isometry3d& T_map_radar, const std::st
   out.markers.push_back(std::move(text));
 }
 
-visualization_msgs::MarkerArray MarkerBuilder::build(const PoseAttribution& pose, const std::vector<PathRecord>& records,
+visualization_msgs::MarkerArray MarkerBuilder::build(const PoseAttribution& pose,
+                                                     const std::vector<PathRecord>& records,
                                                      const Eigen::Isometry3d& T_map_radar, const std::string& caption) {
   Array out;
   if (first_) {

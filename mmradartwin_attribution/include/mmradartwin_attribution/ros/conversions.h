@@ -20,8 +20,8 @@ mmradartwin_msgs::Ledger toMsg(const LedgerSummary& summary, const std::vector<s
 
 /// Records with the indices of `scene`'s actors (-1 for a name it lacks); facets are not in the message.
 std::vector<PathRecord> pathsFromMsg(const mmradartwin_msgs::PathRecords& msg, const Scene& scene);
-/// Actors with their triangles, tags and colours, facets rebuilt. Throws InputError for broken geometry (a triangle count
-/// that is no whole number, coordinates that are not finite).
+/// Actors with their triangles, tags and colours, facets rebuilt. Throws InputError for broken geometry (a triangle
+/// count that is no whole number, coordinates that are not finite).
 Scene sceneFromMsg(const mmradartwin_msgs::Scene& msg);
 
 }  // namespace mmradartwin

@@ -17,8 +17,8 @@ struct MarkerFrames {
   std::string residual = "radar_link_view_residual";
 };
 
-/// What rviz shows of one pose. Fans keep their topology and all markers their ids from message to message; what a pose no
-/// longer has is deleted by id. The first message clears what an earlier process left.
+/// What rviz shows of one pose. Fans keep their topology and all markers their ids from message to message; what a pose
+/// no longer has is deleted by id. The first message clears what an earlier process left.
 class MarkerBuilder {
  public:
   MarkerBuilder(const EvaluationField& field, const MarkerFrames& frames, int max_paths = 200);
@@ -41,9 +41,9 @@ class MarkerBuilder {
   MarkerFrames frames_;
   int max_paths_;
   double max_range_m_;
-  std::vector<geometry_msgs::Point> fan_points_;   // six per cell
-  std::vector<std::pair<int, int>> fan_cells_;     // range and angle bin of each
-  std::map<std::string, int> labels_shown_;        // by namespace
+  std::vector<geometry_msgs::Point> fan_points_;  // six per cell
+  std::vector<std::pair<int, int>> fan_cells_;    // range and angle bin of each
+  std::map<std::string, int> labels_shown_;       // by namespace
   std::vector<std::string> events_shown_;
   bool first_ = true;
 };
