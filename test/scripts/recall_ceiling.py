@@ -59,7 +59,8 @@ def main():
         pairs.append([sum(p[i] for p in pairs) for i in (0, 1)])
         share[branch] = [a / max(b, 1) for a, b in pairs]
         worst = max(q3[branch], key=abs)
-        print(f"{branch:28}" + "".join(f"{s:8.3f} ({b:5d})" for s, (_, b) in zip(share[branch], pairs)) + f"{worst:17.2f} dB")
+        cells = "".join(f"{s:8.3f} ({b:5d})" for s, (_, b) in zip(share[branch], pairs))
+        print(f"{branch:28}{cells}{worst:17.2f} dB")
         if branch == "twin" and abs(worst) > 0.5:
             status = 1
     for branch in BRANCHES[1:]:
