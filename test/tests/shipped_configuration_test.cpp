@@ -1,0 +1,60 @@
+// Every YAML file below config/ is read by the code that reads it for a user; a file of unknown kind fails the test.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_attribution/attribution_config.h"
+#include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_sim/material.h"
+#include "mmradartwin_sim/scene.h"
+#include "mmradartwin_sim/twin.h"
+
+namespace mmradartwin {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kConfig = MMRADARTWIN_CONFIG_FOLDER;
+
+std::vector<std::string> shippedFiles() {
+  std::vector<std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(kConfig)) {
+    if (entry.path().extension() == ".yaml") files.push_back(fs::relative(entry.path(), kConfig).string());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+class ShippedConfiguration : public testing::TestWithParam<std::string> {};
+
+TEST_P(ShippedConfiguration, Loads) {
+  const fs::path file = kConfig / GetParam();
+  const std::string name = file.filename().string(), folder = file.parent_path().filename().string();
+  if (name == "radar.yaml") {
+    const RadarConfig radar = loadRadarConfig(file.string());
+    EXPECT_GT(SignalChain(radar).axes().range_m.back(), 1.0);
+  } else if (name == "attribution.yaml") {
+    EXPECT_NO_THROW(loadAttributionConfig(file.string()));
+  } else if (name == "scene.yaml") {
+    const RadarConfig radar = loadRadarConfig((kConfig / "radar.yaml").string());
+    const Twin twin(loadTwin("", file.string(), radar));
+    EXPECT_GT(twin.scene().facets.size(), 10u);
+  } else if (name == "materials.yaml" || folder == "materials") {
+    EXPECT_GE(loadMaterials(file.string()).size(), 7u);
+  } else {
+    FAIL() << "no reader is known for " << file << "; add one here";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ShippedConfiguration, testing::ValuesIn(shippedFiles()), [](const auto& info) {
+  std::string name = info.param;
+  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c); }, '_');
+  return name;
+});
+
+}  // namespace
+}  // namespace mmradartwin

@@ -1,0 +1,145 @@
+#!/usr/bin/env python3
+"""Starts live, replay, inspect and record as a user would (demo has a test of its own) and looks at what runs and flows."""
+import glob
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+import unittest
+
+import rosbag
+import rosgraph
+
+from installed_programs import find_program
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+class Launched:
+    """One roslaunch on a master of its own, ended with SIGINT as by Ctrl-C."""
+
+    def __init__(self, *arguments, port=None):
+        self.port = port or free_port()
+        self.environment = dict(os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{self.port}", ROS_IP="127.0.0.1")
+        self.log = tempfile.NamedTemporaryFile("w+", prefix="mmradartwin_launch_", suffix=".log")
+        self.process = subprocess.Popen(["roslaunch", "-p", str(self.port), "mmradartwin_launch", *arguments],
+                                        env=self.environment, stdout=self.log, stderr=subprocess.STDOUT,
+                                        stdin=subprocess.DEVNULL, start_new_session=True)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+            try:
+                self.process.wait(30)
+            except subprocess.TimeoutExpired:
+                os.killpg(self.process.pid, signal.SIGKILL)
+        self.log.close()
+
+    def text(self):
+        with open(self.log.name) as file:
+            return file.read()
+
+    def state(self):
+        """(publishers by topic, nodes)."""
+        try:
+            publishers, subscribers, _ = rosgraph.Master("/test", self.environment["ROS_MASTER_URI"]).getSystemState()
+        except (OSError, rosgraph.MasterException):
+            return {}, set()
+        nodes = {node for _, names in publishers + subscribers for node in names}
+        return {topic: names for topic, names in publishers}, nodes
+
+    def wait_for_nodes(self, wanted, seconds=30):
+        deadline = time.time() + seconds
+        while time.time() < deadline:
+            _, nodes = self.state()
+            if wanted <= nodes:
+                return nodes
+            time.sleep(0.3)
+        raise AssertionError(f"nodes {wanted - self.state()[1]} are missing after {seconds} s:\n{self.text()[-2000:]}")
+
+    def record(self, topics, seconds, file):
+        """Records topics for a while; returns message counts by topic."""
+        subprocess.run(["rosbag", "record", "--quiet", "--duration", str(seconds), "-O", file, *topics],
+                       env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True,
+                       timeout=seconds + 20)
+        with rosbag.Bag(file) as bag:
+            return {topic: info.message_count for topic, info in bag.get_type_and_topic_info().topics.items()}
+
+
+class LaunchFiles(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp(prefix="mmradartwin_launch_")
+        session = os.path.join(cls.folder, "session")
+        cls.bag = os.path.join(cls.folder, "session.bag")
+        cls.results = os.path.join(cls.folder, "report")
+        for command in ([find_program("mmradartwin_tests", "make_session.py"), "--output", session, "--locations", "2",
+                         "--headings", "1", "--frames", "100", "--pause", "1", "--seed", "21"],
+                        [find_program("mmradartwin_dsp", "session_to_bag"), session, cls.bag],
+                        [find_program("mmradartwin_attribution", "evaluate"), session, "--output", cls.results]):
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=120)
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder, ignore_errors=True)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def test_live_starts_and_stays_without_a_card(self):
+        with Launched("live.launch", "rviz:=", "card_ip:=127.77.1.2", "host_ip:=127.77.1.1") as launched:
+            nodes = launched.wait_for_nodes({"/driver", "/signal_chain", "/twin", "/attribution"})
+            time.sleep(6)
+            self.assertNotIn("has died", launched.text())
+            self.assertIn("/driver", nodes)
+            self.assertIn("no answer from the DCA1000 at 127.77.1.2", launched.text())
+
+    def test_replay_runs_the_chain_on_the_bags_clock_without_the_driver(self):
+        with Launched("replay.launch", "bag:=" + self.bag, "rviz:=") as launched:
+            nodes = launched.wait_for_nodes({"/player", "/signal_chain", "/twin", "/attribution"})
+            self.assertNotIn("/driver", nodes)
+            sim_time = rosgraph.Master("/test", launched.environment["ROS_MASTER_URI"]).getParam("/use_sim_time")
+            self.assertTrue(sim_time)
+            counts = launched.record(["/attribution/residuals", "/twin/paths", "/radar/range_angle"], 6, self.path("replayed.bag"))
+            self.assertGreater(counts.get("/radar/range_angle", 0), 40)
+            self.assertGreater(counts.get("/attribution/residuals", 0), 40)
+            # Nothing is stamped with the wall clock: stamps lie within the bag's.
+            with rosbag.Bag(self.bag) as bag:
+                first, last = bag.get_start_time(), bag.get_end_time()
+            with rosbag.Bag(self.path("replayed.bag")) as bag:
+                for _, message, _ in bag.read_messages("/radar/range_angle"):
+                    self.assertTrue(first - 1 <= message.header.stamp.to_sec() <= last + 1)
+
+    def test_inspect_shows_stored_results(self):
+        with Launched("inspect.launch", "results:=" + self.results, "rviz:=") as launched:
+            nodes = launched.wait_for_nodes({"/player"})
+            self.assertFalse({"/driver", "/signal_chain", "/twin"} & nodes)
+            counts = launched.record(["/attribution/markers", "/attribution/residuals"], 5, self.path("inspected.bag"))
+            self.assertGreater(counts.get("/attribution/markers", 0), 0)
+
+    def test_record_writes_a_bag_that_stands_alone(self):
+        with Launched("replay.launch", "bag:=" + self.bag, "rviz:=") as replay:
+            replay.wait_for_nodes({"/player"})
+            with Launched("record.launch", "output:=" + self.path("recorded"), port=replay.port) as recorder:
+                recorder.wait_for_nodes({"/recorder"})
+                time.sleep(5)
+        bags = glob.glob(self.path("recorded*.bag"))
+        self.assertEqual(len(bags), 1, os.listdir(self.folder))
+        with rosbag.Bag(bags[0]) as bag:
+            topics = bag.get_type_and_topic_info().topics
+        for topic in ("/radar/config", "/radar/adc", "/session", "/tf"):
+            self.assertIn(topic, topics)
+
+
+if __name__ == "__main__":
+    unittest.main()
