@@ -1,6 +1,7 @@
 #include "mmradartwin_driver/dca1000_control.h"
 
 #include <sys/socket.h>
+#include <time.h>
 
 #include <cerrno>
 #include <cstring>
@@ -13,6 +14,12 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+std::int64_t now_ns() {
+  timespec now;
+  clock_gettime(CLOCK_REALTIME, &now);
+  return now.tv_sec * 1'000'000'000LL + now.tv_nsec;
+}
+
 }  // namespace
 
 Dca1000Control::Dca1000Control(const std::string& host_ip, const std::string& card_ip, std::uint16_t port)
@@ -24,10 +31,13 @@ Dca1000Control::Dca1000Control(const std::string& host_ip, const std::string& ca
   card_.sin_family = AF_INET;
   card_.sin_port = htons(port);
   card_.sin_addr = parseIpv4(card_ip);
+  local_ = card_;
+  local_.sin_addr = parseIpv4(host_ip);
 }
 
 void Dca1000Control::send(Dca1000Command command, const std::vector<std::uint8_t>& body) {
   const std::vector<std::uint8_t> bytes = encodeCommand(command, body);
+  if (tap_) tap_({local_, card_, bytes.data(), bytes.size(), now_ns()});
   const auto sent =
       sendto(socket_.fd(), bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&card_), sizeof card_);
   if (sent == static_cast<ssize_t>(bytes.size())) return;
@@ -47,6 +57,7 @@ std::optional<Dca1000Reply> Dca1000Control::receive(Clock::time_point deadline) 
     const auto size =
         recvfrom(socket_.fd(), bytes, sizeof bytes, MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &from_size);
     if (size < 0 || from.sin_addr.s_addr != card_.sin_addr.s_addr) continue;  // the port is 1024, not the one asked
+    if (tap_) tap_({from, local_, bytes, static_cast<std::size_t>(size), now_ns()});
     if (const auto reply = decodeReply(bytes, static_cast<std::size_t>(size))) return reply;
   }
 }

@@ -69,6 +69,9 @@ PacketReceiver::PacketReceiver(const std::string& host_ip, std::uint16_t port, c
 PacketReceiver::PacketReceiver(const std::string& host_ip, std::uint16_t port, const std::string& card_ip,
                                const Options& options)
     : socket_(host_ip, port, "samples"), card_(parseIpv4(card_ip)), batch_(std::make_unique<Batch>(options.batch)) {
+  local_.sin_family = AF_INET;
+  local_.sin_port = htons(port);
+  local_.sin_addr = parseIpv4(host_ip);
   granted_bytes_ = forceReceiveBuffer(socket_.fd(), options.buffer_bytes);
   const int on = 1;
   if (setsockopt(socket_.fd(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on) != 0 ||
@@ -113,6 +116,10 @@ int PacketReceiver::receive(int timeout_ms, const std::function<void(const DataP
       ++counters_.foreign;
       continue;
     }
+    if (tap_) {
+      tap_({batch_->sources[i], local_, static_cast<const std::uint8_t*>(batch_->vectors[i].iov_base),
+            batch_->messages[i].msg_len, stamp_ns});
+    }
     const auto packet = decodeDataPacket(static_cast<const std::uint8_t*>(batch_->vectors[i].iov_base),
                                          batch_->messages[i].msg_len, stamp_ns);
     if (!packet || (header.msg_flags & MSG_TRUNC)) {
@@ -129,7 +136,10 @@ int PacketReceiver::receive(int timeout_ms, const std::function<void(const DataP
 
 void PacketReceiver::drain() {
   const Counters before = counters_;
+  DatagramTap tap;
+  tap.swap(tap_);
   while (socket_.waitReadable(0)) receive(0, [](const DataPacket&) {});
+  tap.swap(tap_);
   counters_ = before;
 }
 

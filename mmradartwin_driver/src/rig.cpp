@@ -1,5 +1,6 @@
 #include "mmradartwin_driver/rig.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "mmradartwin_driver/rig_error.h"
@@ -23,16 +24,23 @@ PacketReceiver::Counters sum(const PacketReceiver::Counters& a, const PacketRece
           a.malformed + b.malformed};
 }
 
+std::size_t waitingFrames(const RadarConfig& radar, const RigOptions& options) {
+  return std::clamp<std::size_t>(options.hand_over_bytes / radar.bytes_per_frame(), 16, 4096);
+}
+
 }  // namespace
 
 Rig::Rig(const RadarConfig& radar, const RigOptions& options, CubeSink cubes, EventSink events)
     : radar_(radar),
       options_(options),
       events_(std::move(events)),
-      assembler_(radar, std::move(cubes), options.assembler) {
+      deliveries_(waitingFrames(radar, options), std::move(cubes)),
+      assembler_(
+          radar, [this](AdcCube&& cube) { deliveries_.give(std::move(cube)); }, options.assembler) {
   packetDelayTicks(options_.packet_delay_us);
   parseIpv4(options_.host_ip);
   parseIpv4(options_.card_ip);
+  if (!options_.record_pcap.empty()) recording_ = std::make_unique<PcapWriter>(options_.record_pcap);
   silent_since_ = Clock::now();
   thread_ = std::thread([this] { run(); });
 }
@@ -78,6 +86,7 @@ void Rig::open() {
   if (!receiver_) {
     receiver_ =
         std::make_unique<PacketReceiver>(options_.host_ip, options_.data_port, options_.card_ip, options_.receiver);
+    if (recording_) receiver_->setTap([this](const Datagram& datagram) { recording_->add(datagram); });
     const std::size_t granted = receiver_->buffer_bytes();
     if (granted < options_.receiver.buffer_bytes) {
       events_(Level::kWarning, "the kernel grants " + std::to_string(granted >> 10) + " kB of " +
@@ -88,6 +97,7 @@ void Rig::open() {
   }
   if (options_.configure_card && !control_) {
     control_ = std::make_unique<Dca1000Control>(options_.host_ip, options_.card_ip, options_.config_port);
+    if (recording_) control_->setTap([this](const Datagram& datagram) { recording_->add(datagram); });
   }
 }
 
@@ -148,6 +158,7 @@ void Rig::stream() {
       ended = false;
     }
     publishState();
+    watchRecording();
     const auto silent = Clock::now() - last_data_;
     if (any_data && !ended && silent > kStreamEnded) {
       ended = true;
@@ -224,7 +235,22 @@ void Rig::publishState() {
     state_.packets = sum(earlier_, receiver_->counters());
     state_.buffer_bytes = receiver_->buffer_bytes();
   }
+  state_.frames_not_taken = deliveries_.dropped();
+  if (recording_) {
+    state_.packets_recorded = recording_->written();
+    state_.packets_not_recorded = recording_->left_out();
+  }
   silent_since_ = last_data_;
+}
+
+/// Frames go on where the recording of packets cannot.
+void Rig::watchRecording() {
+  if (!recording_ || recording_failed_ || recording_->left_out() == 0) return;
+  recording_failed_ = true;
+  const std::string problem = recording_->problem();
+  events_(Level::kError, problem.empty() ? "the disk is too slow for the packet recording " + recording_->file() +
+                                               ": packets are missing from it; record to a faster one"
+                                         : problem);
 }
 
 /// Closes the sockets, so that the next try finds addresses and ports as they are then.

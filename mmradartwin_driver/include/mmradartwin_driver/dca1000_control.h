@@ -5,8 +5,10 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "mmradartwin_driver/datagram.h"
 #include "mmradartwin_driver/dca1000_protocol.h"
 #include "mmradartwin_driver/udp_socket.h"
 
@@ -38,6 +40,9 @@ class Dca1000Control {
   void startRecord();
   void stopRecord();
 
+  /// From now on `tap` sees every command and every datagram that the card answers with.
+  void setTap(DatagramTap tap) { tap_ = std::move(tap); }
+
   /// Next status datagram, waiting up to the given time for one.
   std::optional<std::uint16_t> takeStatus(std::chrono::milliseconds wait);
 
@@ -50,7 +55,8 @@ class Dca1000Control {
 
   Options options_;
   std::string card_ip_;
-  sockaddr_in card_{};
+  sockaddr_in card_{}, local_{};
+  DatagramTap tap_;
   UdpSocket socket_;
   std::deque<std::uint16_t> statuses_;
 };

@@ -4,8 +4,10 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "mmradartwin_driver/datagram.h"
 #include "mmradartwin_driver/dca1000_protocol.h"
 #include "mmradartwin_driver/udp_socket.h"
 
@@ -37,6 +39,9 @@ class PacketReceiver {
   /// Throws away what waits in the socket: datagrams of an earlier recording.
   void drain();
 
+  /// From now on `tap` sees every datagram of the card, unusable ones too, but not those that drain() throws away.
+  void setTap(DatagramTap tap) { tap_ = std::move(tap); }
+
   const Counters& counters() const { return counters_; }
   /// What the kernel granted, bytes as asked for (it books twice that). Less than asked: raise net.core.rmem_max.
   std::size_t buffer_bytes() const { return granted_bytes_; }
@@ -45,6 +50,8 @@ class PacketReceiver {
   struct Batch;
   UdpSocket socket_;
   in_addr card_;
+  sockaddr_in local_{};
+  DatagramTap tap_;
   std::unique_ptr<Batch> batch_;
   Counters counters_;
   std::size_t granted_bytes_ = 0;

@@ -4,7 +4,9 @@
 #include <boost/make_shared.hpp>
 #include <cstdio>
 
+#include "mmradartwin_driver/capture_link.h"
 #include "mmradartwin_driver/ros/private_parameters.h"
+#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/session.h"
 
@@ -44,11 +46,20 @@ RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& priva
   options_.config_port = parameters.integer("config_port", options_.config_port, 1, 65535);
   options_.data_port = parameters.integer("data_port", options_.data_port, 1, 65535);
   options_.packet_delay_us = parameters.number("packet_delay_us", options_.packet_delay_us, 0, 524.28);
+  options_.record_pcap = parameters.text("record_pcap", "");
   options_.configure_card = parameters.boolean("configure_card", options_.configure_card);
   frame_id_ = parameters.text("frame_id", "radar_link");
   parameters.rejectUnknown();
 
   radar_ = loadRadarConfig(resolvePath(radar_file, "./"));
+  // Another program's packet delay is not known here.
+  if (options_.configure_card) {
+    try {
+      checkCaptureLink(radar_, options_.packet_delay_us);
+    } catch (const InputError& error) {
+      throw InputError(radar_file + ": " + error.what());
+    }
+  }
   mmradartwin_msgs::RadarConfig config = toMsg(radar_);
   radar_hash_ = radarHash(config);
   config.header.stamp = ros::Time::now();
@@ -101,12 +112,19 @@ void RadarDriver::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
   } else if (dropped > 0) {
     status.summary(DiagnosticStatus::WARN, "this host dropped " + std::to_string(dropped) +
                                                " packets: raise net.core.rmem_max or free the processor");
+  } else if (state.frames_not_taken > diagnosed_not_taken_) {
+    status.summary(DiagnosticStatus::WARN, std::to_string(state.frames_not_taken - diagnosed_not_taken_) +
+                                               " frames dropped, published too slowly: free the processor");
+  } else if (state.packets_not_recorded > 0) {
+    status.summary(DiagnosticStatus::WARN, "packets are missing from the recording " + options_.record_pcap +
+                                               ": check the free space, record to a faster disk");
   } else if (lost > 0) {
     status.summary(DiagnosticStatus::WARN,
                    std::to_string(lost) + " bytes lost: raise packet_delay_us, check the cable");
   } else {
     status.summary(DiagnosticStatus::OK, "streaming");
   }
+  diagnosed_not_taken_ = state.frames_not_taken;
   status.add("frame rate [Hz]", rate_hz);
   status.add("frame rate expected [Hz]", 1 / radar_.frame_period_s);
   status.add("frames", state.frames.frames);
@@ -119,6 +137,11 @@ void RadarDriver::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
   status.add("packets dropped by this host", state.packets.kernel_drops);
   status.add("packets from other addresses", state.packets.foreign);
   status.add("socket buffer [kB]", state.buffer_bytes >> 10);
+  status.add("frames published too slowly", state.frames_not_taken);
+  if (!options_.record_pcap.empty()) {
+    status.add("packets recorded", state.packets_recorded);
+    status.add("packets missing from the recording", state.packets_not_recorded);
+  }
   status.add("recordings armed", state.armings);
   status.add("silent for [s]", state.silent_s);
   status.add("last card status", state.last_status ? describeStatus(*state.last_status) : "none since armed");

@@ -12,7 +12,7 @@ namespace mmradartwin {
 
 /// The rig as a node: publishes `radar/config` (latched), `radar/adc` (one message per frame) and diagnostics.
 /// Private parameters: radar (path of radar.yaml, required), host_ip, card_ip, config_port, data_port, packet_delay_us,
-/// configure_card, frame_id.
+/// configure_card, record_pcap (a pcap file to record all packets to), frame_id.
 class RadarDriver {
  public:
   /// Throws InputError for unusable parameters; everything about the rig is reported and tried again.
@@ -32,6 +32,7 @@ class RadarDriver {
   ros::WallTimer timer_;
   FrameAssembler::Counters diagnosed_frames_;
   PacketReceiver::Counters diagnosed_packets_;
+  std::uint64_t diagnosed_not_taken_ = 0;
   ros::WallTime diagnosed_at_;
   std::unique_ptr<Rig> rig_;  ///< last: its thread uses the rest
 };

@@ -1,0 +1,35 @@
+// pcap_to_capture: recorded packets of a DCA1000 -> a capture file, through the driver's own assembler.
+#include <CLI/CLI.hpp>
+#include <iostream>
+
+#include "mmradartwin_driver/pcap_capture.h"
+#include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/session.h"
+
+int main(int argc, char** argv) {
+  using namespace mmradartwin;
+  std::string input, radar, output;
+  std::uint16_t data_port = 4098, config_port = 4096;
+  CLI::App app("Makes a capture from recorded packets (tcpdump, Wireshark, or the driver's record_pcap).");
+  app.add_option("PCAP", input, "pcap or pcapng file")->required();
+  app.add_option("--radar", radar, "radar.yaml of the radar that was recorded")->required();
+  app.add_option("--output", output, "capture to write")->required();
+  app.add_option("--data-port", data_port, "UDP port of the samples")->capture_default_str();
+  app.add_option("--config-port", config_port, "UDP port of the card's answers")->capture_default_str();
+  return runProgram(app, argc, argv, [&] {
+    const PcapCapture capture = pcapToCapture(input, loadRadarConfig(radar), output, data_port, config_port);
+    for (std::size_t i = 1; i < capture.recordings.size(); ++i) {
+      std::cerr << "note: frame " << capture.recordings[i] << " begins another recording: the card was armed anew\n";
+    }
+    for (const CaptureFlaw& flaw : capture.flaws) {
+      std::cerr << "error: frame " << flaw.frame << ": " << flaw.lost_bytes << " bytes lost (zeros in the capture), "
+                << flaw.chirps.size() << " chirp(s) from " << flaw.chirps.front() << " on not whole\n";
+    }
+    for (const std::uint64_t bytes : capture.cut_off) {
+      std::cerr << "error: a last frame was cut off after " << bytes << " bytes and left out\n";
+    }
+    std::cerr << output << ": " << capture.frames << " frame(s), the first at " << formatStamp(capture.first_stamp_ns)
+              << " s, " << capture.flaws.size() << " with losses\n";
+    return capture.flaws.empty() && capture.cut_off.empty() ? 0 : 2;
+  });
+}

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_driver/frame_assembler.h"
+#include "mmradartwin_dsp/radar_config.h"
+
+namespace mmradartwin {
+
+/// Something about a frame of a capture that was made from packets.
+struct CaptureFlaw {
+  std::uint64_t frame = 0;       ///< its index in the capture
+  std::uint64_t lost_bytes = 0;  ///< these are zeros in the capture
+  std::vector<int> chirps;       ///< that are not whole
+};
+
+struct PcapCapture {
+  std::uint64_t frames = 0;               ///< written
+  std::int64_t first_stamp_ns = 0;        ///< start of the first one
+  std::vector<CaptureFlaw> flaws;         ///< in order
+  std::vector<std::uint64_t> recordings;  ///< index of each recording's first frame: the card was armed anew there
+  std::vector<std::uint64_t> cut_off;     ///< bytes of last frames that ended within, one for each; left out
+  FrameAssembler::Counters counters;
+};
+
+/// Puts the samples in a pcap together, through the same assembler as those that arrive live, and writes them as a
+/// capture: frames back to back, at their place even where packets are missing (zeros). The card's answer to
+/// RECORD_START, where the file has it, begins a recording. Throws InputError: unreadable file, no packet of samples,
+/// output that cannot be written.
+PcapCapture pcapToCapture(const std::string& pcap, const RadarConfig& radar, const std::string& output,
+                          std::uint16_t data_port = 4098, std::uint16_t config_port = 4096);
+
+}  // namespace mmradartwin

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "mmradartwin_driver/datagram.h"
+
+namespace mmradartwin {
+
+/// Records datagrams as a pcap of Ethernet frames with nanosecond stamps, for Wireshark and readPcap(). The headers are
+/// made as the card makes them: no UDP checksum, TTL 255, do not fragment; the host's MAC address is 02:00:00:00:00:01.
+///
+/// A thread of its own writes; whoever adds never waits for the disk. Where the disk is too slow for `queue_bytes`,
+/// datagrams are left out and counted; where it is full, the recording ends with the last whole packet.
+class PcapWriter {
+ public:
+  /// "{stamp}" in the name becomes the time, as 20250131T235959. Throws InputError: exists already, cannot be written.
+  explicit PcapWriter(const std::string& file, std::size_t queue_bytes = 256u << 20);
+  ~PcapWriter();  ///< writes what waits
+
+  void add(const Datagram& datagram);
+  /// Waits until everything added has been written.
+  void flush();
+
+  const std::string& file() const { return file_; }
+  std::uint64_t written() const { return written_; }
+  std::uint64_t left_out() const { return left_out_; }
+  /// One line; empty while all is well.
+  std::string problem() const;
+
+ private:
+  struct Output;
+  void run();
+  void write(const std::vector<std::uint8_t>& records);
+
+  std::string file_;
+  std::size_t queue_bytes_;
+  std::unique_ptr<Output> output_;
+  std::atomic<std::uint64_t> written_{0}, left_out_{0};
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::uint8_t> waiting_;  ///< stamp, size, frame; one after the other
+  std::string problem_;
+  bool writing_ = false, stop_ = false;
+  std::thread thread_;
+};
+
+}  // namespace mmradartwin

@@ -1,0 +1,120 @@
+#include "mmradartwin_driver/pcap_capture.h"
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <optional>
+
+#include "mmradartwin_driver/pcap_reader.h"
+#include "mmradartwin_dsp/capture.h"
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin {
+namespace {
+
+class CaptureOutput {
+ public:
+  CaptureOutput(const RadarConfig& radar, const std::string& file)
+      : radar_(radar), file_(file), out_(file, std::ios::binary | std::ios::trunc) {
+    if (!out_) {
+      throw InputError(file + ": cannot be written (" + std::strerror(errno) + "); give a file in another folder");
+    }
+  }
+  /// The frame before is written now that it is known not to be the last one.
+  void take(AdcCube&& cube) {
+    settle(false);
+    if (new_recording_) {
+      result.recordings.push_back(result.frames);
+      expected_ = 0;
+      new_recording_ = false;
+    }
+    for (; expected_ < cube.sequence; ++expected_) writeMissing();
+    ++expected_;
+    held_ = std::move(cube);
+  }
+  /// What came so far belongs to a recording that has ended.
+  void endRecording() {
+    settle(true);
+    new_recording_ = true;
+  }
+  void finish() {
+    settle(true);
+    out_.close();
+    if (!out_) throw std::runtime_error(file_ + ": cannot be written to its end; check the free space");
+  }
+
+  PcapCapture result;
+
+ private:
+  void settle(bool last) {
+    if (!held_) return;
+    const AdcCube cube = std::move(*held_);
+    held_.reset();
+    // A recording ends within a frame wherever it was stopped: that frame has no more to come.
+    if (last && !cube.chirp_valid.back()) {
+      result.cut_off.push_back(radar_.bytes_per_frame() - cube.lost_bytes);
+      return;
+    }
+    if (result.frames == 0) result.first_stamp_ns = cube.stamp_ns;
+    if (cube.lost_bytes > 0) {
+      CaptureFlaw flaw{result.frames, cube.lost_bytes, {}};
+      for (std::size_t chirp = 0; chirp < cube.chirp_valid.size(); ++chirp) {
+        if (!cube.chirp_valid[chirp]) flaw.chirps.push_back(static_cast<int>(chirp));
+      }
+      result.flaws.push_back(flaw);
+    }
+    write(encodeFrame(radar_, cube.data));
+  }
+  void writeMissing() {
+    CaptureFlaw flaw{result.frames, radar_.bytes_per_frame(), {}};
+    for (int chirp = 0; chirp < radar_.chirps_per_frame(); ++chirp) flaw.chirps.push_back(chirp);
+    result.flaws.push_back(flaw);
+    write(std::vector<std::uint8_t>(radar_.bytes_per_frame(), 0));
+  }
+  void write(const std::vector<std::uint8_t>& bytes) {
+    out_.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    ++result.frames;
+  }
+
+  const RadarConfig& radar_;
+  std::string file_;
+  std::ofstream out_;
+  std::optional<AdcCube> held_;
+  std::uint64_t expected_ = 0;
+  bool new_recording_ = true;
+};
+
+}  // namespace
+
+PcapCapture pcapToCapture(const std::string& pcap, const RadarConfig& radar, const std::string& output,
+                          std::uint16_t data_port, std::uint16_t config_port) {
+  CaptureOutput out(radar, output);
+  std::uint64_t epochs = 1;
+  FrameAssembler* counted = nullptr;
+  FrameAssembler assembler(radar, [&](AdcCube&& cube) {
+    // The count began anew without a command in the file.
+    if (counted->counters().epochs != epochs) {
+      epochs = counted->counters().epochs;
+      out.endRecording();
+    }
+    out.take(std::move(cube));
+  });
+  counted = &assembler;
+  PcapVisitor visitor;
+  visitor.data = [&](const DataPacket& packet) { assembler.add(packet); };
+  visitor.reply = [&](const Dca1000Reply& reply, std::int64_t) {
+    if (reply.code != static_cast<std::uint16_t>(Dca1000Command::kRecordStart)) return;
+    assembler.restart();
+  };
+  const PcapCounters counters = readPcap(pcap, visitor, {config_port, data_port});
+  assembler.flush();
+  out.finish();
+  out.result.counters = assembler.counters();
+  if (counters.data == 0) {
+    throw InputError(pcap + ": holds no packet of samples to UDP port " + std::to_string(data_port) + " among its " +
+                     std::to_string(counters.frames) + "; give the card's data port with --data-port");
+  }
+  return std::move(out.result);
+}
+
+}  // namespace mmradartwin

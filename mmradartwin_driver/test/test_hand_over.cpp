@@ -1,0 +1,59 @@
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <future>
+#include <vector>
+
+#include "mmradartwin_driver/hand_over.h"
+
+namespace mmradartwin {
+namespace {
+
+TEST(HandOver, DeliversEverythingInOrder) {
+  std::vector<int> taken;
+  {
+    HandOver<int> hand_over(1000, [&taken](int&& value) { taken.push_back(value); });
+    for (int i = 0; i < 1000; ++i) EXPECT_TRUE(hand_over.give(int{i}));
+    EXPECT_EQ(0u, hand_over.dropped());
+  }  // what waits is delivered before the object goes
+  ASSERT_EQ(1000u, taken.size());
+  for (int i = 0; i < 1000; ++i) EXPECT_EQ(i, taken[static_cast<std::size_t>(i)]);
+}
+
+TEST(HandOver, NeverMakesTheGiverWait) {
+  std::promise<void> stalled, go_on;
+  std::vector<int> taken;
+  {
+    HandOver<int> hand_over(8, [&](int&& value) {
+      if (taken.empty()) {
+        stalled.set_value();
+        go_on.get_future().wait();
+      }
+      taken.push_back(value);
+    });
+    hand_over.give(0);
+    stalled.get_future().wait();
+    const auto before = std::chrono::steady_clock::now();
+    int dropped = 0;
+    for (int i = 1; i <= 20; ++i) dropped += hand_over.give(int{i}) ? 0 : 1;
+    EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::milliseconds(100));
+    EXPECT_EQ(12, dropped);
+    EXPECT_EQ(12u, hand_over.dropped());
+    go_on.set_value();
+  }
+  EXPECT_EQ((std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8}), taken);
+}
+
+TEST(HandOver, WakesTheTakerEveryTime) {
+  std::atomic<int> sum{0};
+  HandOver<int> hand_over(4, [&sum](int&& value) { sum += value; });
+  for (int i = 0; i < 200; ++i) {
+    ASSERT_TRUE(hand_over.give(1));
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+    while (sum != i + 1 && std::chrono::steady_clock::now() < until) std::this_thread::yield();
+    ASSERT_EQ(i + 1, sum);
+  }
+}
+
+}  // namespace
+}  // namespace mmradartwin
