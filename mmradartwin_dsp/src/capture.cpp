@@ -4,14 +4,19 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <regex>
 
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
 namespace {
+
+namespace fs = std::filesystem;
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "captures are little endian; this reads them as they lie");
 
@@ -99,24 +104,55 @@ std::vector<std::uint8_t> encodeFrame(const RadarConfig& radar, const std::vecto
   return bytes;
 }
 
+std::vector<std::string> captureParts(const std::string& file) {
+  static const std::regex kFirst("(.*_raw_)0(\\.bin)", std::regex::icase);
+  const fs::path path(file);
+  const std::string name = path.filename().string();
+  std::smatch match;
+  if (!std::regex_match(name, match, kFirst)) return {file};
+  const std::string head = match[1], tail = match[2];
+  const auto part = [&](std::size_t number) { return path.parent_path() / (head + std::to_string(number) + tail); };
+  std::vector<std::string> parts = {file};
+  while (fs::exists(part(parts.size()))) parts.push_back(part(parts.size()).string());
+  // A part that lies beyond a missing one would be taken for another capture's.
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(path.has_parent_path() ? path.parent_path() : ".", error)) {
+    const std::string other = entry.path().filename().string();
+    if (other.size() <= head.size() + tail.size() || other.compare(0, head.size(), head) != 0) continue;
+    const std::string number = other.substr(head.size(), other.size() - head.size() - tail.size());
+    if (number.size() > 6 || other != head + number + tail) continue;
+    if (number.find_first_not_of("0123456789") != std::string::npos) continue;
+    if (std::stoul(number) > parts.size()) {
+      throw InputError(file + ": " + head + std::to_string(parts.size()) + tail + " is missing, and " + other +
+                       " is there; put all parts of the capture into one folder");
+    }
+  }
+  return parts;
+}
+
 CaptureReader::CaptureReader(const RadarConfig& radar, const std::string& file) : radar_(radar), file_(file) {
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) {
-    throw InputError(file + ": capture cannot be opened (" + std::strerror(errno) +
-                     "); put the recorded file there or take its pose out of poses.csv");
+  std::size_t size = 0;
+  for (const std::string& part : captureParts(file)) {
+    const int descriptor = ::open(part.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0) {
+      throw InputError(part + ": capture cannot be opened (" + std::strerror(errno) +
+                       "); put the recorded file there or take its pose out of poses.csv");
+    }
+    const std::shared_ptr<const int> owner(new int(descriptor), [](const int* d) {
+      ::close(*d);
+      delete d;
+    });
+    struct stat status = {};
+    if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
+      throw InputError(part + ": is no capture file; give a .bin with the recorded bytes");
+    }
+    parts_.push_back({owner, size, size + static_cast<std::size_t>(status.st_size)});
+    size = parts_.back().end;
   }
-  descriptor_.reset(new int(descriptor), [](const int* d) {
-    ::close(*d);
-    delete d;
-  });
-  struct stat status = {};
-  if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
-    throw InputError(file + ": is no capture file; give a .bin with the recorded bytes");
-  }
-  const auto size = static_cast<std::size_t>(status.st_size);
   const std::size_t whole = size / radar_.bytes_per_frame();
   if (size == 0 || size % radar_.bytes_per_frame() != 0) {
-    throw InputError(file + ": capture is truncated or not from this radar: " + std::to_string(size) + " bytes are " +
+    throw InputError(file + ": capture is truncated or not from this radar: " + std::to_string(size) + " bytes " +
+                     (parts_.size() > 1 ? "in " + std::to_string(parts_.size()) + " parts " : "") + "are " +
                      std::to_string(whole) + " whole frames of " + std::to_string(radar_.bytes_per_frame()) +
                      " bytes and " + std::to_string(size % radar_.bytes_per_frame()) +
                      " bytes over; cut it to whole frames, record it anew, or correct radar.yaml");
@@ -133,8 +169,11 @@ std::vector<std::uint8_t> CaptureReader::bytes(int i) const {
   std::vector<std::uint8_t> bytes(radar_.bytes_per_frame());
   std::size_t done = 0;
   while (done < bytes.size()) {
-    const auto offset = static_cast<off_t>(static_cast<std::size_t>(i) * bytes.size() + done);
-    const ssize_t got = ::pread(*descriptor_, bytes.data() + done, bytes.size() - done, offset);
+    const std::size_t offset = static_cast<std::size_t>(i) * bytes.size() + done;
+    const auto part = std::find_if(parts_.begin(), parts_.end(), [&](const Part& p) { return offset < p.end; });
+    const ssize_t got =
+        ::pread(*part->descriptor, bytes.data() + done, std::min(bytes.size() - done, part->end - offset),
+                static_cast<off_t>(offset - part->begin));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) {
       throw InputError(file_ + ": frame " + std::to_string(i) + " cannot be read (" +

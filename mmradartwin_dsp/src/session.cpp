@@ -131,9 +131,18 @@ std::string captureFile(const std::string& pattern, const std::string& pose) {
 
 /// Whole frames a capture seems to hold; 0 where it is missing (reading it says so).
 std::int64_t framesBySize(const RadarConfig& radar, const std::string& file) {
-  std::error_code error;
-  const auto size = fs::file_size(file, error);
-  return error ? 0 : static_cast<std::int64_t>(size / radar.bytes_per_frame());
+  std::uintmax_t size = 0;
+  try {
+    for (const std::string& part : captureParts(file)) {
+      std::error_code error;
+      const std::uintmax_t bytes = fs::file_size(part, error);
+      if (error) return 0;
+      size += bytes;
+    }
+  } catch (const InputError&) {
+    return 0;
+  }
+  return static_cast<std::int64_t>(size / radar.bytes_per_frame());
 }
 
 void rejectOverlap(const Recording& recording, const std::string& pattern, const std::string& poses_file) {

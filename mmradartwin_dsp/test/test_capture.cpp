@@ -143,5 +143,35 @@ TEST(RealCapture, BothLayoutsOfOneRecordingGiveTheSameCube) {
   EXPECT_EQ(four_lane.frame(0, 0).data.size(), 256u * 128 * 4 * 2);
 }
 
+/// Parts cut within a frame and within a sample, as TI's tools cut them.
+TEST(Capture, PartsAreReadAsOne) {
+  const TestFolder folder;
+  const RadarConfig radar = paperRadar();
+  std::mt19937 random(5);
+  std::string bytes(5 * radar.bytes_per_frame(), '\0');
+  for (char& byte : bytes) byte = static_cast<char>(random());
+  std::ofstream(folder / "whole.bin", std::ios::binary) << bytes;
+  std::ofstream(folder / "a_Raw_0.bin", std::ios::binary) << bytes.substr(0, 3001);
+  std::ofstream(folder / "a_Raw_1.bin", std::ios::binary) << bytes.substr(3001, 1000);
+  std::ofstream(folder / "a_Raw_2.bin", std::ios::binary) << bytes.substr(4001);
+  std::ofstream(folder / "a_Raw_0_LogFile.csv") << "not a part";
+  std::ofstream(folder / "b_Raw_7.bin") << "another capture's";
+  EXPECT_EQ(captureParts(folder / "a_Raw_0.bin").size(), 3u);
+  EXPECT_EQ(captureParts(folder / "whole.bin").size(), 1u);
+  const CaptureReader parts(radar, folder / "a_Raw_0.bin"), whole(radar, folder / "whole.bin");
+  ASSERT_EQ(parts.frames(), 5);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(parts.bytes(i), whole.bytes(i)) << i;
+}
+
+TEST(Capture, MissingPartIsNamed) {
+  const TestFolder folder;
+  const RadarConfig radar = paperRadar();
+  for (const char* name : {"a_RAW_0.bin", "a_RAW_2.bin"}) {
+    std::ofstream(folder / name, std::ios::binary) << std::string(2048, 'x');
+  }
+  EXPECT_TRUE(
+      saysInOneLine(inputError([&] { CaptureReader(radar, folder / "a_RAW_0.bin"); }), "a_RAW_1.bin is missing"));
+}
+
 }  // namespace
 }  // namespace mmradartwin

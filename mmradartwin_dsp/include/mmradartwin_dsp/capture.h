@@ -15,7 +15,12 @@ void decodeFrame(const RadarConfig& radar, const std::uint8_t* bytes, std::vecto
 /// The inverse of decodeFrame. Throws InputError where the number of samples is not the radar's.
 std::vector<std::uint8_t> encodeFrame(const RadarConfig& radar, const std::vector<std::int16_t>& samples);
 
-/// A capture file: frames back to back, their number from the file's size. Reading is safe from several threads.
+/// The files that a capture consists of. TI's tools begin another file when one is full: X_Raw_0.bin is followed by
+/// X_Raw_1.bin, X_Raw_2.bin and so on (also _RAW_), which hold the rest of one stream of bytes. Throws InputError where
+/// one in between is missing.
+std::vector<std::string> captureParts(const std::string& file);
+
+/// A capture file, or all that captureParts() names, one after the other: frames back to back, their number from the file's size. Reading is safe from several threads.
 class CaptureReader {
  public:
   /// Throws InputError: missing file, or a size that is no whole number of frames (says how many whole ones there are).
@@ -29,7 +34,11 @@ class CaptureReader {
  private:
   RadarConfig radar_;
   std::string file_;
-  std::shared_ptr<const int> descriptor_;
+  struct Part {
+    std::shared_ptr<const int> descriptor;
+    std::size_t begin, end;  ///< of its bytes in the capture
+  };
+  std::vector<Part> parts_;
   int frames_ = 0;
 };
 

@@ -274,7 +274,14 @@ void sessionToBag(const std::string& session, const std::string& bag_file, const
     const std::string& name = recording.pose_names[static_cast<std::size_t>(i)];
     const std::string capture = captureOf(recording.capture_pattern, name);
     const bool exists = fs::is_regular_file(capture);
-    const std::string bytes = exists ? readBytes(capture) : "";
+    std::string bytes;  // a capture in several parts comes back as one file
+    if (exists) {
+      try {
+        for (const std::string& part : captureParts(capture)) bytes += readBytes(part);
+      } catch (const InputError&) {  // a part is missing: the pose is none that frames can be read of
+        bytes = readBytes(capture);
+      }
+    }
     message.capture_sha256.push_back(exists ? sha256(bytes) : "");
     const auto pose =
         std::find_if(recording.poses.begin(), recording.poses.end(), [&](const Pose& p) { return p.name == name; });
