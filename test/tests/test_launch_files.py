@@ -13,7 +13,7 @@ import unittest
 import rosbag
 import rosgraph
 
-from installed_programs import find_program
+from mmradartwin_tests.installed_programs import find_program
 
 
 def free_port():
