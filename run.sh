@@ -95,11 +95,15 @@ run_bench() {
   source_workspace
   data_folder
   local bench
-  for bench in "$ws"/devel/lib/mmradartwin_*/*_benchmark; do
+  for bench in "$ws"/devel/lib/mmradartwin_*/*benchmark*; do
     [ -x "$bench" ] || continue
     say "$(basename "$bench")"
     "$bench" --benchmark_out="$out/$(basename "$bench").json" --benchmark_out_format=json
   done
+  say "simulator against generator, path by path"
+  rosrun mmradartwin_tests compare_with_simulator.py --seed 1 | tee "$out/paths.txt"
+  say "recall of the twin beside its ceiling"
+  rosrun mmradartwin_tests recall_ceiling.py --seed 100 --sessions 6 | tee "$out/recall.txt"
 }
 
 lint() {
