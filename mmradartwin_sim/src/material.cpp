@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/strict_yaml.h"
 
 namespace mmradartwin {
@@ -79,6 +80,26 @@ Fresnel fresnel(const Material& material, double cos_theta, double frequency_hz)
   const std::complex<double> eta = material.permittivity(frequency_hz);
   const std::complex<double> root = std::sqrt(eta - (1 - cos_theta * cos_theta));
   return {(cos_theta - root) / (cos_theta + root), (eta * cos_theta - root) / (eta * cos_theta + root)};
+}
+
+Slab slab(const Material& material, double cos_theta, double frequency_hz) {
+  const Fresnel r = fresnel(material, cos_theta, frequency_hz);
+  if (material.model != MaterialModel::kDielectric || !std::isfinite(material.thickness_m)) return {r, {0.0, 0.0}};
+  const std::complex<double> root = std::sqrt(material.permittivity(frequency_hz) - (1 - cos_theta * cos_theta));
+  const double wavelength = kSpeedOfLight_m_per_s / frequency_hz;
+  const std::complex<double> once =
+      std::exp(std::complex<double>(0, -2 * M_PI * material.thickness_m / wavelength) * root);
+  const auto both = [&once](std::complex<double> face) {
+    const std::complex<double> bottom = 1.0 - face * face * once * once;
+    return std::make_pair(face * (1.0 - once * once) / bottom, (1.0 - face * face) * once / bottom);
+  };
+  const auto te = both(r.te), tm = both(r.tm);
+  return {{te.first, tm.first}, {te.second, tm.second}};
+}
+
+double roughnessLoss(double roughness_rms_m, double cos_theta, double frequency_hz) {
+  const double x = 2 * M_PI * frequency_hz / kSpeedOfLight_m_per_s * roughness_rms_m * cos_theta;
+  return std::exp(-2 * x * x);
 }
 
 double backscatterAmplitude(const Material& material, double cos_theta, double te_share, double frequency_hz) {

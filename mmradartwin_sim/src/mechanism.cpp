@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "mechanisms/builtin.h"
+#include "mechanisms/propagation_builtin.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -42,6 +43,7 @@ MechanismRegistry& MechanismRegistry::instance() {
     r.add("channel_phase_error", makeChannelPhaseError);
     r.add("tx_imbalance", makeTxImbalance);
     r.add("if_highpass", makeIfHighpass);
+    addPropagationMechanisms(r);
     return r;
   }();
   return registry;

@@ -13,6 +13,8 @@ namespace mmradartwin {
 struct RayCaster::Embree {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
+  RTCScene veil = nullptr;                           // actors that rays pass, null where there are none
+  std::vector<std::vector<Facet>> veil_of;           // [actor], empty for the others
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  // single precision inside, so coordinates stay small
   double radius_m = 0;
   std::vector<std::vector<int>> facet_of_triangle;  // [actor][triangle]
@@ -21,6 +23,7 @@ struct RayCaster::Embree {
 
   ~Embree() {
     if (scene) rtcReleaseScene(scene);
+    if (veil) rtcReleaseScene(veil);
     if (device) rtcReleaseDevice(device);
   }
 };
@@ -48,6 +51,26 @@ void fill(RTCRay& ray, const Eigen::Vector3d& origin, const Eigen::Vector3d& dir
   ray.flags = 0;
 }
 
+void attach(RTCDevice device, RTCScene scene, const Actor& actor, const Eigen::Vector3d& center, unsigned id) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                               3 * sizeof(float), actor.vertices.size()));
+  auto* triangles = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                                   3 * sizeof(unsigned), actor.triangles.size()));
+  if (!vertices || !triangles) throw std::runtime_error("Embree has no memory for actor " + actor.name);
+  for (std::size_t i = 0; i < actor.vertices.size(); ++i) {
+    const Eigen::Vector3f v = (actor.vertices[i] - center).cast<float>();
+    std::memcpy(vertices + 3 * i, v.data(), 3 * sizeof(float));
+  }
+  for (std::size_t i = 0; i < actor.triangles.size(); ++i) {
+    for (int k = 0; k < 3; ++k) triangles[3 * i + k] = static_cast<unsigned>(actor.triangles[i][k]);
+  }
+  rtcSetGeometryMask(geometry, static_cast<unsigned>(-1));
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(scene, geometry, id);
+  rtcReleaseGeometry(geometry);
+}
+
 }  // namespace
 
 RayCaster::RayCaster(const Scene& scene) : embree_(new Embree) {
@@ -64,6 +87,7 @@ RayCaster::RayCaster(const Scene& scene) : embree_(new Embree) {
     e.center = all.center();
     e.radius_m = 0.5 * all.diagonal().norm();
   }
+  e.veil_of.resize(scene.actors.size());
   const double volume = all.isEmpty() ? 0 : (all.sizes().array() + 0.01).prod();
   for (std::size_t a = 0; a < scene.actors.size(); ++a) {
     const Actor& actor = scene.actors[a];
@@ -72,24 +96,18 @@ RayCaster::RayCaster(const Scene& scene) : embree_(new Embree) {
     // A shell that encloses most of the scene is the room itself: the radar is meant to be inside it.
     e.solid.push_back(actor.present && !actor.bounds.isEmpty() && actor.bounds.sizes().prod() < 0.5 * volume);
     if (!actor.present || actor.triangles.empty()) continue;
-    RTCGeometry geometry = rtcNewGeometry(e.device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                                 3 * sizeof(float), actor.vertices.size()));
-    auto* triangles = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), actor.triangles.size()));
-    if (!vertices || !triangles) throw std::runtime_error("Embree has no memory for actor " + actor.name);
-    for (std::size_t i = 0; i < actor.vertices.size(); ++i) {
-      const Eigen::Vector3f v = (actor.vertices[i] - e.center).cast<float>();
-      std::memcpy(vertices + 3 * i, v.data(), 3 * sizeof(float));
+    RTCScene target = e.scene;
+    if (!actor.occludes) {
+      if (!e.veil) e.veil = rtcNewScene(e.device);
+      target = e.veil;
+      for (int id : actor.facets) e.veil_of[a].push_back(scene.facets[id]);
     }
-    for (std::size_t i = 0; i < actor.triangles.size(); ++i) {
-      for (int k = 0; k < 3; ++k) triangles[3 * i + k] = static_cast<unsigned>(actor.triangles[i][k]);
-    }
-    rtcSetGeometryMask(geometry, static_cast<unsigned>(-1));
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(e.scene, geometry, static_cast<unsigned>(a));
-    rtcReleaseGeometry(geometry);
+    attach(e.device, target, actor, e.center, static_cast<unsigned>(a));
   }
+  for (std::size_t i = 0; i < scene.screens.size(); ++i) {
+    attach(e.device, e.scene, scene.screens[i], e.center, static_cast<unsigned>(scene.actors.size() + i));
+  }
+  if (e.veil) rtcCommitScene(e.veil);
   rtcCommitScene(e.scene);
 }
 
@@ -109,7 +127,38 @@ bool RayCaster::visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, doub
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcOccluded1(embree_->scene, &context, &ray);
-  return ray.tfar >= 0;
+  if (ray.tfar < 0) return false;
+  return !embree_->veil || passesVeils(a, b, gap_m);
+}
+
+bool RayCaster::passesVeils(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const {
+  const Eigen::Vector3d unit = (b - a).normalized();
+  const auto ends_on = [&](const std::vector<Facet>& facets) {
+    for (const Facet& f : facets) {
+      for (const Eigen::Vector3d& p : {a, b}) {
+        if (std::abs(f.planeDistance(p)) < gap_m + f.flatness_m && f.contains(p, gap_m)) return true;
+      }
+    }
+    return false;
+  };
+  const double length = (b - a).norm() - gap_m;
+  double from = gap_m;
+  while (from < length) {
+    const Eigen::Vector3d origin = a + from * unit - embree_->center;
+    if (!castable(origin, unit, length - from)) return true;
+    RTCRayHit query;
+    fill(query.ray, origin, unit, length - from);
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    query.hit.primID = RTC_INVALID_GEOMETRY_ID;
+    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(embree_->veil, &context, &query);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return true;
+    if (ends_on(embree_->veil_of[query.hit.geomID])) return false;
+    from += query.ray.tfar + 1e-4;
+  }
+  return true;
 }
 
 std::optional<RayCaster::Hit> RayCaster::firstHit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
@@ -132,7 +181,9 @@ std::optional<RayCaster::Hit> RayCaster::firstHit(const Eigen::Vector3d& origin,
   Hit hit;
   hit.distance_m = query.ray.tfar;
   hit.actor = static_cast<int>(query.hit.geomID);
-  hit.facet = embree_->facet_of_triangle[hit.actor][query.hit.primID];
+  // A screen's hit has the index behind the last actor and no facet.
+  const auto& facets = embree_->facet_of_triangle;
+  hit.facet = hit.actor < static_cast<int>(facets.size()) ? facets[hit.actor][query.hit.primID] : -1;
   hit.point = origin + hit.distance_m * unit;
   return hit;
 }
@@ -151,7 +202,7 @@ std::optional<int> RayCaster::insideActor(const Eigen::Vector3d& p) const {
     for (int i = 0; i < 4096; ++i) {
       const auto hit = firstHit(from, d, std::numeric_limits<double>::infinity());
       if (!hit) break;
-      ++crossings[hit->actor];
+      if (hit->actor < static_cast<int>(crossings.size())) ++crossings[hit->actor];
       from = hit->point + 1e-4 * d.normalized();
     }
     for (std::size_t a = 0; a < votes.size(); ++a) votes[a] += crossings[a] % 2;

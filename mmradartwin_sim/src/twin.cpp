@@ -133,11 +133,13 @@ Twin::Twin(TwinDescription description, std::uint64_t seed) : impl_(new Impl) {
     m.edited = std::make_unique<Scene>(m.scene);
     for (const auto& mechanism : m.mechanisms) mechanism->editScene(*m.edited);
     // Whether anything was edited shows in what Embree and the facets would see.
-    bool same = m.edited->actors.size() == m.scene.actors.size();
+    bool same = m.edited->actors.size() == m.scene.actors.size() && m.edited->screens.empty();
     for (std::size_t i = 0; same && i < m.scene.actors.size(); ++i) {
       same = m.edited->actors[i].present == m.scene.actors[i].present &&
              m.edited->actors[i].vertices == m.scene.actors[i].vertices &&
-             m.edited->actors[i].material_tag == m.scene.actors[i].material_tag;
+             m.edited->actors[i].material_tag == m.scene.actors[i].material_tag &&
+             m.edited->actors[i].occludes == m.scene.actors[i].occludes &&
+             m.edited->actors[i].material.scattering_coefficient == m.scene.actors[i].material.scattering_coefficient;
     }
     if (same) {
       m.edited.reset();

@@ -60,4 +60,14 @@ struct Fresnel {
 };
 Fresnel fresnel(const Material& material, double cos_theta, double frequency_hz);
 
+/// Coefficients of a slab of thickness_m in air, field against field at its two faces, in the exp(-jkL) convention.
+/// Source: ITU-R P.2040-3 section 2.2.2.2 (single layer). Without a thickness: those of the half space, nothing gets
+/// through. Only mechanisms that say so ask for it; specular reflection is that of the half space.
+struct Slab {
+  Fresnel reflection, transmission;
+};
+Slab slab(const Material& material, double cos_theta, double frequency_hz);
+/// exp(-2 (k sigma cos theta)^2): what roughness leaves of a reflection's coherent amplitude (Rayleigh, Ament).
+double roughnessLoss(double roughness_rms_m, double cos_theta, double frequency_hz);
+
 }  // namespace mmradartwin

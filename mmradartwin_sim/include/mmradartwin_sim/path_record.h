@@ -16,6 +16,9 @@ struct PathRecord {
   std::vector<int> actors;                ///< Scene::actors index, one per interaction
   std::vector<int> facets;                ///< Scene::facets index or -1, one per interaction
   std::vector<Eigen::Vector3d> vertices;  ///< map, one per interaction
+  /// |cos| of the angle of incidence that each interaction's coefficient was taken at, -1 where it is no reflection;
+  /// empty where none is: what a mechanism of weight needs of the geometry.
+  std::vector<double> reflection_cosine;
   Eigen::Vector3d departure, arrival;     ///< unit vectors in radar_link, both from the radar outwards
   int bounces = 0;
   int range_bin = 0;                    ///< nearest bin of length/2
@@ -35,6 +38,8 @@ void setContribution(const RadarConfig& radar, std::complex<double> coefficient,
 
 /// Makes a record's path longer by extra_m at all elements (a constant delay); amplitude and direction stay.
 void lengthen(const RadarConfig& radar, double extra_m, PathRecord& record);
+/// The same by an amount of its own per virtual element.
+void lengthenChannels(const RadarConfig& radar, const std::vector<double>& extra_m, PathRecord& record);
 /// Multiplies amplitude and contribution.
 void scaleRecord(std::complex<double> factor, PathRecord& record);
 /// Nearest range bin of length/2, held within the grid.

@@ -41,6 +41,7 @@ struct Actor {
   std::vector<int> triangle_facet;  ///< facet id per triangle, -1 where it has no area
   std::vector<int> facets;          ///< ids
   bool present = true;              ///< false where a mechanism took it away: no paths, no occlusion
+  bool occludes = true;  ///< false where rays pass through it; its own faces stay hidden behind each other
   Eigen::AlignedBox3d bounds;
 };
 
@@ -55,6 +56,7 @@ struct Scene {
   FacetTolerance tolerance;  ///< scene.yaml's optional `facets: {angle_deg, offset_m}`
   std::vector<Actor> actors;
   std::vector<Facet> facets;
+  std::vector<Actor> screens;  ///< what mechanisms put into the room: they occlude, nothing else
 
   int actorIndex(const std::string& name) const;  ///< -1 where absent
 };
@@ -92,6 +94,7 @@ class RayCaster {
   std::optional<int> insideActor(const Eigen::Vector3d& p) const;
 
  private:
+  bool passesVeils(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const;
   struct Embree;
   std::unique_ptr<Embree> embree_;
 };

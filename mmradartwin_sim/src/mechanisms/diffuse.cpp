@@ -1,7 +1,7 @@
 #include <cmath>
-#include <cstring>
 
 #include "../polarisation.h"
+#include "../scatter_points.h"
 #include "builtin.h"
 #include "mmradartwin_dsp/input_error.h"
 
@@ -9,22 +9,6 @@ namespace mmradartwin {
 namespace {
 
 const std::string kName = "diffuse";
-
-/// SplitMix64: one step turns any number into an unrelated one.
-std::uint64_t scramble(std::uint64_t x) {
-  x += 0x9E3779B97F4A7C15ULL;
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ULL;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EBULL;
-  return x ^ (x >> 31);
-}
-
-double unitInterval(std::uint64_t h) { return static_cast<double>(h >> 11) * 0x1.0p-53; }
-
-std::uint64_t hashText(const std::string& text) {
-  std::uint64_t h = 1469598103934665603ULL;
-  for (unsigned char c : text) h = (h ^ c) * 1099511628211ULL;
-  return h;
-}
 
 /// Integral of ((1 + cos psi)/2)^alpha over the hemisphere, psi from the specular direction.
 /// Source: Degli-Esposti et al. 2007, eq. 12 (F_alpha).
@@ -70,15 +54,8 @@ class Diffuse : public Mechanism {
   }
 
   void build(const Scene& scene, const RadarConfig& radar) override {
-    points_.clear();
-    for (const Actor& actor : scene.actors) {
-      if (!actor.present || backscatterAmplitude(actor.material, 1, 1, radar.center_frequency_hz()) <= 0) continue;
-      const std::uint64_t actor_hash = hashText(actor.name);
-      for (std::size_t i = 0; i < actor.facets.size(); ++i) {
-        const Facet& facet = scene.facets[actor.facets[i]];
-        if (facet.reflects && facet.present) addPoints(facet, scramble(actor_hash + i));
-      }
-    }
+    points_ =
+        makeScatterPoints(scene, spacing_m_, radar.center_frequency_hz(), kName, [](const Facet&) { return true; });
   }
 
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
@@ -86,7 +63,7 @@ class Diffuse : public Mechanism {
     const double spreading = context.radar.wavelength_m() / (4 * M_PI);
     const Eigen::Matrix3d to_radar = context.T_map_radar.linear().transpose();
     const double max2 = context.max_range_m * context.max_range_m;
-    for (const Point& point : points_) {
+    for (const ScatterPoint& point : points_) {
       const Eigen::Vector3d way = point.position - elements.p;
       const double r2 = way.squaredNorm();
       if (r2 > max2 || r2 < 1e-6) continue;
@@ -117,55 +94,16 @@ class Diffuse : public Mechanism {
       record.departure = record.arrival = direction_radar;
       record.bounces = 1;
       record.length_m = elements.lengthsVia(point.position);
-      const double phase = 2 * M_PI * unitInterval(scramble(point.hash ^ scramble(context.seed)));
-      setContribution(context.radar, std::polar(amplitude, phase), record);
+      setContribution(context.radar, std::polar(amplitude, point.phase_rad(context.seed)), record);
       records.push_back(std::move(record));
     }
   }
 
  private:
-  struct Point {
-    Eigen::Vector3d position;
-    int facet;
-    double area_m2;
-    std::uint64_t hash;
-  };
-
-  /// One point in each cell of a grid in the facet's own coordinates, anywhere in its cell; all from hashes of facet
-  /// and cell, so that the points move with the facet and nothing else changes them.
-  void addPoints(const Facet& facet, std::uint64_t facet_hash) {
-    const int n1 = std::max(1, static_cast<int>(std::lround(facet.size1_m / spacing_m_)));
-    const int n2 = std::max(1, static_cast<int>(std::lround(facet.size2_m / spacing_m_)));
-    if (static_cast<double>(n1) * n2 > 4e6) {
-      throw InputError("mechanism diffuse: key spacing_m: " + std::to_string(spacing_m_) +
-                       " m gives millions of scatter points on one facet; choose a wider spacing");
-    }
-    const double d1 = facet.size1_m / n1, d2 = facet.size2_m / n2;
-    const std::size_t first = points_.size();
-    for (int i = 0; i < n1; ++i) {
-      for (int j = 0; j < n2; ++j) {
-        const std::uint64_t h =
-            scramble(facet_hash ^ scramble((static_cast<std::uint64_t>(i) << 32) | static_cast<std::uint32_t>(j)));
-        const Eigen::Vector3d q = facet.origin + (i + unitInterval(scramble(h + 1))) * d1 * facet.e1 +
-                                  (j + unitInterval(scramble(h + 2))) * d2 * facet.e2;
-        if (!facet.rectangle && !facet.contains(q)) continue;
-        points_.push_back({q, facet.id, d1 * d2, h});
-      }
-    }
-    if (points_.size() == first) {
-      // Too slim for any cell's point: one stands for the whole.
-      const Eigen::Vector3d middle = facet.origin + 0.5 * (facet.size1_m * facet.e1 + facet.size2_m * facet.e2);
-      points_.push_back({facet.nearest(middle, 1e-3), facet.id, facet.area_m2, facet_hash});
-      return;
-    }
-    const double scale = facet.area_m2 / (d1 * d2 * static_cast<double>(points_.size() - first));
-    for (std::size_t i = first; i < points_.size(); ++i) points_[i].area_m2 *= scale;
-  }
-
   double spacing_m_ = 0.1;
   bool directive_ = false;
   int alpha_ = 4;
-  std::vector<Point> points_;
+  std::vector<ScatterPoint> points_;
 };
 
 }  // namespace

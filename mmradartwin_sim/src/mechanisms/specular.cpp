@@ -2,6 +2,7 @@
 
 #include "../aperture.h"
 #include "../image_paths.h"
+#include "../image_record.h"
 #include "../polarisation.h"
 #include "builtin.h"
 
@@ -58,7 +59,7 @@ class Specular : public Mechanism {
     limits.in_view = [&](const Eigen::Vector3d& d) { return context.inFieldOfView(to_radar * d); };
     if (exhaustive_ >= 2) {
       for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2))
-        addHigher(context, elements, path, records);
+        addImageRecord(context, elements, path, kName, 1, cutoff_, records);
     }
     if (exhaustive_ < max_bounces_ && ray_budget_ > 0) {
       limits.max_order = max_bounces_;
@@ -69,7 +70,7 @@ class Specular : public Mechanism {
         if (sequence.size() == 2 && perpendicular(context.scene.facets[sequence[0]], context.scene.facets[sequence[1]]))
           continue;
         if (search_->solve(elements.p, sequence, context.rays, limits, path))
-          addHigher(context, elements, path, records);
+          addImageRecord(context, elements, path, kName, 1, cutoff_, records);
       }
     }
   }
@@ -120,50 +121,10 @@ class Specular : public Mechanism {
     record.vertices = {vertex};
     record.departure = record.arrival = direction_radar;
     record.bounces = 1;
+    record.reflection_cosine = {1.0};  // the level is that of the perpendicular, also beside the facet
     record.length_m = inside ? elements.lengthsByImage([&](const Eigen::Vector3d& t) { return mirror(t, facet); })
                              : elements.lengthsVia(vertex);
     setContribution(context.radar, std::conj(coefficient), record);
-    records.push_back(std::move(record));
-  }
-
-  void addHigher(const PoseContext& context, const ElementsInMap& elements, const ImagePath& path,
-                 std::vector<PathRecord>& records) const {
-    const double wavelength = context.radar.wavelength_m();
-    const int order = static_cast<int>(path.facets.size());
-    const double total = (path.image - elements.p).norm();
-    Eigen::Vector3d in = (path.vertices.front() - elements.p).normalized();
-    const Eigen::Vector3d arrival = (path.vertices.back() - elements.p).normalized();
-    ComplexVector field = verticalField(elements.up, in).cast<std::complex<double>>();
-    std::complex<double> weight = wavelength / (4 * M_PI * total);
-    double before = 0;
-    Eigen::Vector3d from = elements.p;
-    PathRecord record;
-    for (int i = 0; i < order; ++i) {
-      const Facet& facet = context.scene.facets[path.facets[i]];
-      const Material& material = context.scene.actors[facet.actor].material;
-      const Eigen::Vector3d leg = path.vertices[i] - from;
-      in = leg.normalized();
-      before += leg.norm();
-      field = reflectField(field, in, facet.normal, material, context.frequency_hz);
-      weight *=
-          specularShare(material) * apertureFactor(facet, path.vertices[i], in, before, total - before, wavelength);
-      from = path.vertices[i];
-      record.actors.push_back(facet.actor);
-    }
-    weight *= (verticalField(elements.up, arrival).cast<std::complex<double>>().transpose() * field)(0);
-    if (std::abs(weight) < cutoff_) return;
-    record.event = &kName;
-    record.facets = path.facets;
-    record.vertices = path.vertices;
-    const Eigen::Matrix3d to_radar = context.T_map_radar.linear().transpose();
-    record.departure = to_radar * (path.vertices.front() - elements.p).normalized();
-    record.arrival = to_radar * arrival;
-    record.bounces = order;
-    record.length_m = elements.lengthsByImage([&](Eigen::Vector3d t) {
-      for (int id : path.facets) t = mirror(t, context.scene.facets[id]);
-      return t;
-    });
-    setContribution(context.radar, std::conj(weight), record);
     records.push_back(std::move(record));
   }
 

@@ -1,0 +1,276 @@
+// Each class of ray that the simulator casts beside a bare Embree loop over the same rays on the same mesh, one thread;
+// a full pose with 50,000 scatter points, weighing it again, and the limit of 300,000 or 1,000,000 bounce rays.
+// MMRADARTWIN_SCENE names another scene.yaml than the shipped office.
+
+#include <benchmark/benchmark.h>
+#include <embree3/rtcore.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include "mmradartwin_sim/twin.h"
+
+using namespace mmradartwin;
+
+namespace {
+
+RadarConfig paperRadar() {
+  RadarConfig radar;
+  radar.device = "awr2243";
+  radar.carrier_hz = 77e9;
+  radar.slope_hz_per_s = 75e12;
+  radar.samples_per_chirp = 64;
+  radar.sample_rate_hz = 5e6;
+  radar.adc_start_s = 6e-6;
+  radar.loops_per_frame = 1;
+  radar.frame_period_s = 0.05;
+  const double d = kSpeedOfLight_m_per_s / 77e9 / 2;
+  radar.tx_position_m = {{0, 0, 0}, {0, 4 * d, 0}};
+  radar.rx_position_m = {{0, 0, 0}, {0, d, 0}, {0, 2 * d, 0}, {0, 3 * d, 0}};
+  return radar;
+}
+
+std::string sceneFile() {
+  const char* given = std::getenv("MMRADARTWIN_SCENE");
+  return given ? given : MMRADARTWIN_OFFICE;
+}
+
+/// Embree alone on a scene's triangles, about the same centre as the simulator's.
+class BareEmbree {
+ public:
+  explicit BareEmbree(const Scene& scene) : device_(rtcNewDevice("threads=1")), scene_(rtcNewScene(device_)) {
+    rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
+    Eigen::AlignedBox3d all;
+    for (const Actor& a : scene.actors) {
+      for (const auto& v : a.vertices) all.extend(v);
+    }
+    center_ = all.center();
+    for (const Actor& a : scene.actors) {
+      RTCGeometry g = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+      auto* v = static_cast<float*>(
+          rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, a.vertices.size()));
+      auto* t = static_cast<unsigned*>(
+          rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, a.triangles.size()));
+      for (std::size_t i = 0; i < a.vertices.size(); ++i) {
+        for (int k = 0; k < 3; ++k) v[3 * i + k] = static_cast<float>(a.vertices[i][k] - center_[k]);
+      }
+      for (std::size_t i = 0; i < a.triangles.size(); ++i) {
+        for (int k = 0; k < 3; ++k) t[3 * i + k] = static_cast<unsigned>(a.triangles[i][k]);
+      }
+      rtcCommitGeometry(g);
+      rtcAttachGeometry(scene_, g);
+      rtcReleaseGeometry(g);
+    }
+    rtcCommitScene(scene_);
+  }
+  ~BareEmbree() {
+    rtcReleaseScene(scene_);
+    rtcReleaseDevice(device_);
+  }
+  const Eigen::Vector3d& center() const { return center_; }
+  /// Ray as Embree wants it, prepared before the loop.
+  RTCRay ray(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double length) const {
+    RTCRay r{};
+    r.org_x = static_cast<float>(from.x() - center_.x());
+    r.org_y = static_cast<float>(from.y() - center_.y());
+    r.org_z = static_cast<float>(from.z() - center_.z());
+    r.dir_x = static_cast<float>(direction.x());
+    r.dir_y = static_cast<float>(direction.y());
+    r.dir_z = static_cast<float>(direction.z());
+    r.tfar = static_cast<float>(length);
+    r.mask = static_cast<unsigned>(-1);
+    return r;
+  }
+  bool intersect(RTCRayHit& q) const {
+    q.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(scene_, &context, &q);
+    return q.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+  }
+  bool occluded(RTCRay& r) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded1(scene_, &context, &r);
+    return r.tfar < 0;
+  }
+
+ private:
+  RTCDevice device_;
+  RTCScene scene_;
+  Eigen::Vector3d center_;
+};
+
+struct Setting {
+  Scene scene = loadScene(sceneFile(), 77.93e9);
+  RayCaster rays{scene};
+  BareEmbree bare{scene};
+  std::vector<Eigen::Vector3d> direction;  // a fan of 120 by 30 deg, scan order
+  std::vector<Eigen::Vector3d> target;     // what it meets, shuffled: ends of occlusion rays
+  Eigen::Vector3d radar{3.0, 2.6, 1.0};
+  Setting() {
+    if (std::getenv("MMRADARTWIN_SCENE")) {
+      Eigen::AlignedBox3d all;
+      for (const Actor& a : scene.actors) all.extend(a.bounds);
+      radar = all.center();
+    }
+    for (int j = 0; j < 200; ++j) {
+      for (int i = 0; i < 500; ++i) {
+        const double az = (i / 499.0 - 0.5) * 120 * M_PI / 180, el = (j / 199.0 - 0.5) * 30 * M_PI / 180;
+        direction.emplace_back(std::cos(el) * std::cos(az), std::cos(el) * std::sin(az), std::sin(el));
+      }
+    }
+    for (const auto& d : direction) {
+      if (const auto hit = rays.firstHit(radar, d, 1000)) target.push_back(hit->point);
+    }
+    std::shuffle(target.begin(), target.end(), std::mt19937(1));
+  }
+};
+
+const Setting& setting() {
+  static const Setting s;
+  return s;
+}
+
+void report(benchmark::State& state, std::size_t rays) {
+  state.counters["rays/s"] = benchmark::Counter(static_cast<double>(rays) * static_cast<double>(state.iterations()),
+                                                benchmark::Counter::kIsRate);
+}
+
+void firstHitBare(benchmark::State& state) {
+  const Setting& s = setting();
+  std::vector<RTCRay> prepared;
+  for (const auto& d : s.direction) prepared.push_back(s.bare.ray(s.radar, d, 1000));
+  for (auto _ : state) {
+    for (const RTCRay& r : prepared) {
+      RTCRayHit q;
+      q.ray = r;
+      benchmark::DoNotOptimize(s.bare.intersect(q));
+    }
+  }
+  report(state, prepared.size());
+}
+BENCHMARK(firstHitBare)->Unit(benchmark::kMillisecond);
+
+void firstHitOurs(benchmark::State& state) {
+  const Setting& s = setting();
+  for (auto _ : state) {
+    for (const auto& d : s.direction) benchmark::DoNotOptimize(s.rays.firstHit(s.radar, d, 1000));
+  }
+  report(state, s.direction.size());
+}
+BENCHMARK(firstHitOurs)->Unit(benchmark::kMillisecond);
+
+void occlusionBare(benchmark::State& state) {
+  const Setting& s = setting();
+  std::vector<RTCRay> prepared;
+  for (const auto& t : s.target) {
+    const Eigen::Vector3d way = t - s.radar, d = way.normalized();
+    prepared.push_back(s.bare.ray(s.radar + 1e-3 * d, d, way.norm() - 2e-3));
+  }
+  for (auto _ : state) {
+    for (const RTCRay& r : prepared) {
+      RTCRay q = r;
+      benchmark::DoNotOptimize(s.bare.occluded(q));
+    }
+  }
+  report(state, prepared.size());
+}
+BENCHMARK(occlusionBare)->Unit(benchmark::kMillisecond);
+
+void occlusionOurs(benchmark::State& state) {
+  const Setting& s = setting();
+  for (auto _ : state) {
+    for (const auto& t : s.target) benchmark::DoNotOptimize(s.rays.visible(s.radar, t, 1e-3));
+  }
+  report(state, s.target.size());
+}
+BENCHMARK(occlusionOurs)->Unit(benchmark::kMillisecond);
+
+/// Cosine-distributed bounces, six to a ray: the limit that a full pose is held against.
+void bareBounceRays(benchmark::State& state) {
+  const Setting& s = setting();
+  const std::int64_t wanted = state.range(0);
+  for (auto _ : state) {
+    std::mt19937 random(1);
+    std::uniform_real_distribution<float> unit(-1, 1);
+    std::int64_t rays = 0;
+    while (rays < wanted) {
+      RTCRayHit q{};
+      Eigen::Vector3f d(unit(random), unit(random), 0.3f * unit(random));
+      q.ray = s.bare.ray(s.radar, d.cast<double>().normalized(), 1000);
+      for (int bounce = 0; bounce < 6 && rays < wanted; ++bounce) {
+        ++rays;
+        if (!s.bare.intersect(q)) break;
+        d = Eigen::Vector3f(q.ray.dir_x, q.ray.dir_y, q.ray.dir_z);
+        Eigen::Vector3f n = Eigen::Vector3f(q.hit.Ng_x, q.hit.Ng_y, q.hit.Ng_z).normalized();
+        if (n.dot(d) > 0) n = -n;
+        q.ray.org_x += q.ray.tfar * d.x() + 1e-4f * n.x();
+        q.ray.org_y += q.ray.tfar * d.y() + 1e-4f * n.y();
+        q.ray.org_z += q.ray.tfar * d.z() + 1e-4f * n.z();
+        d = (n + 0.99f * Eigen::Vector3f(unit(random), unit(random), unit(random)).normalized()).normalized();
+        q.ray.dir_x = d.x();
+        q.ray.dir_y = d.y();
+        q.ray.dir_z = d.z();
+        q.ray.tnear = 0;
+        q.ray.tfar = 1000;
+      }
+    }
+  }
+  report(state, static_cast<std::size_t>(wanted));
+}
+BENCHMARK(bareBounceRays)->Arg(300000)->Arg(1000000)->Unit(benchmark::kMillisecond);
+
+/// specular to order 3, corners, edges and about 50,000 scatter points in the room.
+const Twin& fullTwin() {
+  static const Twin twin = [] {
+    const Setting& s = setting();
+    double rough_m2 = 0;
+    for (const Facet& f : s.scene.facets) {
+      if (f.reflects && backscatterAmplitude(s.scene.actors[f.actor].material, 1, 1, 77.93e9) > 0)
+        rough_m2 += f.area_m2;
+    }
+    const double spacing = std::max(0.005, std::sqrt(rough_m2 / 50000));
+    const std::string file = (std::filesystem::temp_directory_path() / "mmradartwin_benchmark_twin.yaml").string();
+    std::ofstream(file) << "mechanisms:\n  specular: {}\n  corner: {}\n  edge_diffraction: {level: 1}\n"
+                        << "  diffuse: {spacing_m: " << spacing << "}\n";
+    Twin made(loadTwin(file, sceneFile(), paperRadar()));
+    std::filesystem::remove(file);
+    return made;
+  }();
+  return twin;
+}
+
+Eigen::Isometry3d pose(int i) {
+  return Eigen::Translation3d(setting().radar) * Eigen::AngleAxisd(0.9 * i, Eigen::Vector3d::UnitZ());
+}
+
+void fullPose(benchmark::State& state) {
+  const Twin& twin = fullTwin();
+  int i = 0;
+  std::size_t records = 0;
+  for (auto _ : state) records += twin.simulate(pose(i++)).records.size();
+  state.counters["records"] = static_cast<double>(records) / static_cast<double>(state.iterations());
+}
+BENCHMARK(fullPose)->Unit(benchmark::kMillisecond);
+
+void fullPoseTrace(benchmark::State& state) {
+  const Twin& twin = fullTwin();
+  int i = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(twin.trace(pose(i++)).size());
+}
+BENCHMARK(fullPoseTrace)->Unit(benchmark::kMillisecond);
+
+void fullPoseWeighAgain(benchmark::State& state) {
+  const Twin& twin = fullTwin();
+  const auto traced = twin.trace(pose(0));
+  for (auto _ : state) benchmark::DoNotOptimize(twin.weigh(pose(0), traced).grid.x.data());
+}
+BENCHMARK(fullPoseWeighAgain)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+
+BENCHMARK_MAIN();

@@ -1,0 +1,137 @@
+#include <algorithm>
+#include <cmath>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "propagation_builtin.h"
+
+namespace mmradartwin {
+namespace {
+
+const std::string kName = "empirical_law";
+
+/// A law that was read off the data and has no name: gain, delay or angle of paths, tabulated over one variable.
+/// Between the table's points it is linear, beyond its ends constant.
+class EmpiricalLaw : public Mechanism {
+ public:
+  const std::string& name() const override { return kName; }
+  std::vector<ParameterSpec> parameters() const override {
+    ParameterSpec at = optionalNumbersSpec("at", "of the variable", -1e6, 1e6, "where the law is given, ascending");
+    at.required = true;
+    return {
+        textSpec("variable", true, "",
+                 "range_m (half the path), azimuth_deg (mean of departure and arrival), incidence_deg (of the first "
+                 "specular reflection; other paths stay as they are), height_m (of the radar in map) or heading_deg "
+                 "(of the radar in map, -180 to 180)"),
+        at,
+        optionalNumbersSpec("gain_db", "dB", -200, 200, "of the echo, per point"),
+        optionalNumbersSpec("delay_m", "m", -10, 10, "added to the one-way range, per point"),
+        optionalNumbersSpec("angle_deg", "deg", -90, 90, "added to azimuths of departure and arrival, per point"),
+        textSpec("actor", false, "", "only paths that meet this actor"),
+        textSpec("material", false, "", "only paths that meet this material"),
+        textSpec("event", false, "", "only paths of this mechanism")};
+  }
+  void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
+    variable_ = values.text("variable");
+    const std::vector<std::string> known = {"range_m", "azimuth_deg", "incidence_deg", "height_m", "heading_deg"};
+    if (std::find(known.begin(), known.end(), variable_) == known.end()) {
+      throw InputError("mechanism empirical_law: key variable: '" + variable_ +
+                       "' is unknown; allowed: range_m, azimuth_deg, incidence_deg, height_m, heading_deg");
+    }
+    at_ = values.numbers("at");
+    if (at_.empty() || std::adjacent_find(at_.begin(), at_.end(), std::greater_equal<double>()) != at_.end()) {
+      throw InputError("mechanism empirical_law: key at: needs one ascending number or more");
+    }
+    gain_db_ = column(values, "gain_db");
+    delay_m_ = column(values, "delay_m");
+    angle_deg_ = column(values, "angle_deg");
+    if (gain_db_.empty() && delay_m_.empty() && angle_deg_.empty()) {
+      throw InputError(
+          "mechanism empirical_law: gives no law; add gain_db, delay_m or angle_deg, one number per point");
+    }
+    event_ = values.text("event");
+    affected_.clear();
+    if (!values.text("material").empty()) affected_ = requireMaterial(scene, kName, values.text("material"));
+    if (!values.text("actor").empty()) {
+      if (!affected_.empty()) throw InputError("mechanism empirical_law: give at most one of material and actor");
+      affected_.assign(scene.actors.size(), false);
+      affected_[requireActor(scene, kName, values.text("actor"))] = true;
+    }
+  }
+  int rank() const override { return -1; }  // on geometry's lengths and angles
+  void reweight(const PoseContext& context, PathRecord& record) const override {
+    if (!event_.empty() && *record.event != event_) return;
+    if (!affected_.empty() &&
+        std::none_of(record.actors.begin(), record.actors.end(), [this](int a) { return affected_[a]; })) {
+      return;
+    }
+    double x = 0;
+    if (!variable(context, record, x)) return;
+    if (!gain_db_.empty()) scaleRecord(std::pow(10.0, look(gain_db_, x) / 20), record);
+    if (!angle_deg_.empty()) turn(context.radar, look(angle_deg_, x) * M_PI / 180, record);
+    if (!delay_m_.empty()) lengthen(context.radar, 2 * look(delay_m_, x), record);
+  }
+
+ private:
+  std::vector<double> column(const Parameters& values, const char* key) const {
+    const std::vector<double>& v = values.numbers(key);
+    if (!v.empty() && v.size() != at_.size()) {
+      throw InputError("mechanism empirical_law: key " + std::string(key) + ": has " + std::to_string(v.size()) +
+                       " numbers; at has " + std::to_string(at_.size()));
+    }
+    return v;
+  }
+
+  double look(const std::vector<double>& law, double x) const {
+    if (x <= at_.front()) return law.front();
+    if (x >= at_.back()) return law.back();
+    const std::size_t i = static_cast<std::size_t>(std::upper_bound(at_.begin(), at_.end(), x) - at_.begin());
+    const double share = (x - at_[i - 1]) / (at_[i] - at_[i - 1]);
+    return law[i - 1] + share * (law[i] - law[i - 1]);
+  }
+
+  bool variable(const PoseContext& context, const PathRecord& record, double& x) const {
+    constexpr double kDegrees = 180 / M_PI;
+    if (variable_ == "range_m") {
+      x = 0.5 * record.length_m[0];
+    } else if (variable_ == "azimuth_deg") {
+      x = 0.5 * kDegrees *
+          (std::atan2(record.departure.y(), record.departure.x()) + std::atan2(record.arrival.y(), record.arrival.x()));
+    } else if (variable_ == "incidence_deg") {
+      const auto first = std::find_if(record.reflection_cosine.begin(), record.reflection_cosine.end(),
+                                      [](double c) { return c >= 0; });
+      if (first == record.reflection_cosine.end()) return false;
+      x = kDegrees * std::acos(std::min(1.0, *first));
+    } else if (variable_ == "height_m") {
+      x = context.T_map_radar.translation().z();
+    } else {
+      const Eigen::Vector3d boresight = context.T_map_radar.linear().col(0);
+      x = kDegrees * std::atan2(boresight.y(), boresight.x());
+    }
+    return true;
+  }
+
+  /// Turns both directions about the radar's z; the ways of the elements change as those of a plane wave do.
+  static void turn(const RadarConfig& radar, double angle_rad, PathRecord& record) {
+    const Eigen::AngleAxisd R(angle_rad, Eigen::Vector3d::UnitZ());
+    const Eigen::Vector3d departure = R * record.departure, arrival = R * record.arrival;
+    std::vector<double> extra_m;
+    for (const auto& t : radar.tx_position_m) {
+      for (const auto& r : radar.rx_position_m) {
+        extra_m.push_back(-(departure - record.departure).dot(t) - (arrival - record.arrival).dot(r));
+      }
+    }
+    lengthenChannels(radar, extra_m, record);
+    record.departure = departure;
+    record.arrival = arrival;
+  }
+
+  std::string variable_, event_;
+  std::vector<double> at_, gain_db_, delay_m_, angle_deg_;
+  std::vector<bool> affected_;
+};
+
+}  // namespace
+
+std::unique_ptr<Mechanism> makeEmpiricalLaw() { return std::make_unique<EmpiricalLaw>(); }
+
+}  // namespace mmradartwin
