@@ -206,7 +206,10 @@ void EmulatedUsbBus::unplug() {
   State& state = *state_;
   state.gone = true;
   if (state.node.empty()) return;
-  umockdev_testbed_uevent(state.testbed, ("/sys" + state.device).c_str(), "remove");
+  // Only this process and those that run under the same library hear of it.
+  if (umockdev_in_mock_environment()) {
+    umockdev_testbed_uevent(state.testbed, ("/sys" + state.device).c_str(), "remove");
+  }
   umockdev_testbed_remove_device(state.testbed, ("/sys" + state.device).c_str());
   umockdev_testbed_detach_ioctl(state.testbed, state.node.c_str(), nullptr);
   state.node.clear();

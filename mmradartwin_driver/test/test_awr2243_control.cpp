@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <ostream>
+#include <random>
 #include <string>
 
 #include "emulated_radar_bus.h"
@@ -331,6 +332,50 @@ TEST(Awr2243Control, UnpluggedAnywhereIsAnErrorAndReplugGoesOn) {
     control.bringUp(deploymentRegisters());
     control.start();
     EXPECT_TRUE(bench.radar.frames_run);
+  }
+}
+
+/// Whatever comes over the wires: noise, and noise that begins like a message.
+class NoisyPort : public RadarPort {
+ public:
+  explicit NoisyPort(unsigned seed) : random_(seed) {}
+  void setBootMode(BootMode) override {}
+  void setReset(bool) override {}
+  void writeWords(const std::vector<std::uint8_t>& bytes) override {
+    // Its own command comes back as an answer now and then, which is whole and still wrong.
+    if (random_() % 2) echo_ = bytes;
+  }
+  std::vector<std::uint8_t> readWords(std::size_t words) override {
+    std::vector<std::uint8_t> bytes(2 * words);
+    for (auto& byte : bytes) byte = static_cast<std::uint8_t>(random_());
+    if (bytes.size() == 16 && random_() % 4) {
+      std::copy(std::begin(kSyncFromRadar), std::end(kSyncFromRadar), bytes.begin());
+      if (echo_.size() >= 16) {
+        std::copy(echo_.begin() + 4, echo_.begin() + 16, bytes.begin() + 4);
+        if (random_() % 2) bytes[8] = static_cast<std::uint8_t>(random_());
+      }
+    }
+    return bytes;
+  }
+  bool hostInterrupt() override { return random_() % 2 != 0; }
+
+ private:
+  std::mt19937 random_;
+  std::vector<std::uint8_t> echo_;
+};
+
+TEST(Awr2243Control, NoiseIsAnErrorAndNothingWorse) {
+  Awr2243Control::Options options;
+  for (auto* time : {&options.answer_timeout, &options.power_up_timeout, &options.boot_error_wait,
+                     &options.calibration_timeout, &options.interrupt_fall_timeout, &options.reset_pulse}) {
+    *time = milliseconds(1);
+  }
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    NoisyPort port(seed);
+    Awr2243Control control(port, nullptr, options);
+    EXPECT_THROW(control.bringUp(deploymentRegisters()), RigError);
+    EXPECT_THROW(control.start(), RigError);
+    EXPECT_THROW(control.version(), RigError);
   }
 }
 

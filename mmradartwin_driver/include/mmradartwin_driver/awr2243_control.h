@@ -63,6 +63,8 @@ class Awr2243Control {
   MmwaveLinkMessage command(const std::string& step, MmwaveLinkMessage message,
                             std::optional<std::chrono::milliseconds> timeout = std::nullopt);
   const Counters& counters() const { return counters_; }
+  /// Reported by the radar since its front end is up, for which it must be brought up again; empty while all is well.
+  const std::string& fault() const { return fault_; }
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_driver/awr2243_control.h"
+#include "mmradartwin_driver/usb_device.h"
+
+namespace mmradartwin {
+
+/// The AWR2243 as the rig needs it: opened, configured and started on demand, and all of that again after a cable was
+/// pulled or the radar reported a fault. One thread at a time. What fails throws RigError, after which the same call
+/// can be made again.
+class Awr2243Link {
+ public:
+  using OpenUsb = std::function<std::unique_ptr<UsbTransport>()>;
+
+  /// Reads the firmware image, where `image_file` is not empty. Throws InputError where that cannot be read.
+  Awr2243Link(const Awr2243Registers& registers, const std::string& image_file, Awr2243Control::EventSink events);
+  Awr2243Link(const Awr2243Registers& registers, const std::string& image_file, Awr2243Control::EventSink events,
+              const Awr2243Control::Options& options, OpenUsb open_usb);
+  ~Awr2243Link();  ///< stops the frames
+
+  /// Opens the USB port and brings the radar up, unless that has been done. Its LVDS clock runs afterwards, which the
+  /// capture card's FPGA must see before it is configured.
+  void prepare();
+  /// Frames run from their first chirp when this returns; those that ran were stopped. The card must be recording.
+  void start();
+  void stop();
+  /// Delivers events. Throws RigError where the radar reported a fault or is gone.
+  void poll();
+
+  bool running() const { return running_; }
+  const std::string& version() const { return version_; }  ///< empty before prepare()
+  std::optional<int> temperature_deg_c() const;
+
+ private:
+  /// Runs `action`; where it fails everything is closed, so that the next prepare() starts from the cable.
+  template <class Action>
+  void guarded(Action action);
+  void drop();
+
+  Awr2243Registers registers_;
+  std::string image_file_;
+  std::vector<std::uint8_t> image_;
+  Awr2243Control::EventSink events_;
+  Awr2243Control::Options options_;
+  OpenUsb open_usb_;
+  std::unique_ptr<UsbTransport> usb_;
+  std::unique_ptr<RadarPort> port_;
+  std::unique_ptr<Awr2243Control> control_;
+  bool running_ = false;
+  std::string version_;
+};
+
+}  // namespace mmradartwin
