@@ -1,0 +1,44 @@
+// validate: says what is missing or odd in a bag before anyone depends on it.
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <optional>
+
+#include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/ros/bag_validation.h"
+
+int main(int argc, char** argv) {
+  using namespace mmradartwin;
+  std::string bag;
+  BagOptions options;
+  BagLimits limits;
+  double stamp_tolerance_ms = limits.stamp_tolerance_s * 1e3;
+  CLI::App app("Says what is missing or odd in a recorded bag. Exit status 0: nothing, 2: something.");
+  app.add_option("BAG", bag, "bag to look at")->required();
+  app.add_option("--ns", options.ns, "look at the radar of this namespace only");
+  app.add_option("--map-frame", options.map_frame, "tf frame of the room")->capture_default_str();
+  app.add_option("--radar-frame", options.radar_frame, "tf frame of the radar")->capture_default_str();
+  app.add_option("--stamp-tolerance-ms", stamp_tolerance_ms, "frames' stamps may be off the frame period by so much")
+      ->capture_default_str();
+  app.add_option("--tf-gap-s", limits.tf_gap_s, "longest time between transforms around a frame")
+      ->capture_default_str();
+  return runProgram(app, argc, argv, [&] {
+    limits.stamp_tolerance_s = stamp_tolerance_ms * 1e-3;
+    std::vector<BagFinding> findings;
+    {
+      std::optional<ProgressBar> progress;
+      findings = validateBag(bag, options, limits, [&progress](int done, int total) {
+        if (!progress) progress.emplace(total);
+        progress->show(done);
+      });
+    }
+    for (const BagFinding& finding : findings) {
+      std::cout << bag << ": ";
+      if (!finding.first.empty() || finding.count > 1) std::cout << finding.count << " ";
+      std::cout << finding.what;
+      if (!finding.first.empty()) std::cout << "; first: " << finding.first;
+      std::cout << "\n";
+    }
+    if (findings.empty()) std::cout << bag << ": nothing is missing or odd\n";
+    return findings.empty() ? 0 : 2;
+  });
+}

@@ -1,0 +1,400 @@
+#include "mmradartwin_dsp/device_settings.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/strict_yaml.h"
+#include "raw_settings.h"
+
+namespace mmradartwin {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::string shortest(double value) { return yamlNumber(value); }
+
+std::string lowerCase(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+/// One step of a path into a JSON file, with errors that name the whole path.
+class JsonPlace {
+ public:
+  JsonPlace(const json& value, const std::string& where) : value_(value), where_(where) {}
+
+  bool has(const std::string& key) const { return value_.is_object() && value_.contains(key); }
+  JsonPlace operator[](const std::string& key) const {
+    if (!has(key)) throw InputError(where_ + ": has no " + key + "; give settings as mmWave Studio writes them");
+    return {value_.at(key), where_ + "/" + key};
+  }
+  std::vector<JsonPlace> items() const {
+    if (!value_.is_array()) throw InputError(where_ + ": must be a list");
+    std::vector<JsonPlace> all;
+    for (std::size_t i = 0; i < value_.size(); ++i) all.emplace_back(value_[i], where_ + "/" + std::to_string(i));
+    return all;
+  }
+  /// Numbers stand as such, or as text in hexadecimal.
+  double number() const {
+    if (value_.is_number()) return value_.get<double>();
+    if (value_.is_string()) {
+      const std::string text = value_.get<std::string>();
+      char* end = nullptr;
+      const double value = text.compare(0, 2, "0x") == 0 ? static_cast<double>(std::strtoul(text.c_str(), &end, 16))
+                                                         : std::strtod(text.c_str(), &end);
+      if (!text.empty() && *end == 0) return value;
+    }
+    throw InputError(where_ + ": " + value_.dump() + " is no number");
+  }
+  int integer() const {
+    const double value = number();
+    if (value != std::floor(value) || std::abs(value) > 4294967295.0) {
+      throw InputError(where_ + ": " + value_.dump() + " must be a whole number");
+    }
+    return static_cast<int>(static_cast<long long>(value));
+  }
+  std::string text() const {
+    if (!value_.is_string()) throw InputError(where_ + ": must be text");
+    return value_.get<std::string>();
+  }
+  const std::string& where() const { return where_; }
+
+ private:
+  const json& value_;
+  std::string where_;
+};
+
+void readMmwave(const JsonPlace& root, RawSettings& settings) {
+  const auto devices = root["mmWaveDevices"].items();
+  if (devices.size() != 1) {
+    throw InputError(root.where() + ": configures " + std::to_string(devices.size()) +
+                     " devices; a radar.yaml holds one");
+  }
+  const JsonPlace rf = devices[0]["rfConfig"];
+  if (rf.has("waveformType") && rf["waveformType"].text() != "legacyFrameChirp") {
+    throw InputError(rf["waveformType"].where() + ": is " + rf["waveformType"].text() +
+                     "; known is legacyFrameChirp (one frame of equal chirps)");
+  }
+  const auto set = [&settings](const std::string& name, const JsonPlace& place) {
+    settings.set(name, place.integer(), place.where());
+  };
+  for (const JsonPlace& item : rf["rlProfiles"].items()) {
+    const JsonPlace p = item["rlProfileCfg_t"];
+    RawSettings::Profile profile{};
+    profile.start_ghz = p["startFreqConst_GHz"].number();
+    profile.idle_us = p["idleTimeConst_usec"].number();
+    profile.adc_start_us = p["adcStartTimeConst_usec"].number();
+    profile.ramp_end_us = p["rampEndTime_usec"].number();
+    profile.slope_mhz_per_us = p["freqSlopeConst_MHz_usec"].number();
+    profile.samples = p["numAdcSamples"].integer();
+    profile.ksps = p["digOutSampleRate"].number();
+    profile.hpf1 = p["hpfCornerFreq1"].integer();
+    profile.hpf2 = p["hpfCornerFreq2"].integer();
+    profile.rx_gain = p["rxGain_dB"].integer();
+    const int backoff = p.has("txOutPowerBackoffCode") ? p["txOutPowerBackoffCode"].integer() : 0;
+    for (std::size_t tx = 0; tx < 3; ++tx) profile.backoff_db[tx] = backoff >> (8 * tx) & 0xff;
+    if (p.has("txPhaseShifter") && p["txPhaseShifter"].integer() != 0) {
+      throw InputError(p["txPhaseShifter"].where() +
+                       ": the transmitters' phases are shifted; only unshifted ones are known here");
+    }
+    const int id = p["profileId"].integer();
+    if (!settings.profiles.emplace(id, profile).second) {
+      throw InputError(p.where() + ": profile " + std::to_string(id) + " is given twice");
+    }
+    settings.profile_from = p.where();
+  }
+  for (const JsonPlace& item : rf["rlChirps"].items()) {
+    const JsonPlace c = item["rlChirpCfg_t"];
+    for (const char* variation :
+         {"startFreqVar_MHz", "freqSlopeVar_KHz_usec", "idleTimeVar_usec", "adcStartTimeVar_usec"}) {
+      if (c.has(variation) && c[variation].number() != 0) {
+        throw InputError(c[variation].where() +
+                         ": this chirp differs from its profile; only chirps that are all alike "
+                         "are known here");
+      }
+    }
+    for (int chirp = c["chirpStartIdx"].integer(); chirp <= c["chirpEndIdx"].integer() && chirp < 512; ++chirp) {
+      settings.chirps[chirp] = {c["profileId"].integer(), static_cast<unsigned>(c["txEnable"].integer())};
+    }
+  }
+  const JsonPlace frame = rf["rlFrameCfg_t"];
+  set("chirp_start", frame["chirpStartIdx"]);
+  set("chirp_end", frame["chirpEndIdx"]);
+  set("loops", frame["numLoops"]);
+  settings.set("period_ms", frame["framePeriodicity_msec"].number(), frame.where());
+  set("rx_mask", rf["rlChanCfg_t"]["rxChannelEn"]);
+  const JsonPlace format = rf["rlAdcOutCfg_t"]["fmt"];
+  set("adc_bits", format["b2AdcBits"]);
+  set("adc_format", format["b2AdcOutFmt"]);
+  const JsonPlace raw = devices[0]["rawDataCaptureConfig"];
+  set("iq_swap", raw["rlDevDataFmtCfg_t"]["iqSwapSel"]);
+  set("interleave", raw["rlDevDataFmtCfg_t"]["chInterleave"]);
+  set("interface", raw["rlDevDataPathCfg_t"]["intfSel"]);
+  set("packet", raw["rlDevDataPathCfg_t"]["transferFmtPkt0"]);
+  if (raw.has("rlDevLaneEnable_t")) {
+    const JsonPlace lanes = raw["rlDevLaneEnable_t"]["laneEn"];
+    int count = 0;
+    for (int mask = lanes.integer(); mask; mask >>= 1) count += mask & 1;
+    settings.set("lanes", count, lanes.where());
+  }
+  if (raw.has("rlDevLvdsLaneCfg_t")) set("lane_format", raw["rlDevLvdsLaneCfg_t"]["laneFormat"]);
+}
+
+void readCard(const JsonPlace& card, RawSettings& settings) {
+  if (card.has("dataLoggingMode") && card["dataLoggingMode"].text() != "raw") {
+    throw InputError(card["dataLoggingMode"].where() + ": is '" + card["dataLoggingMode"].text() +
+                     "'; only raw captures hold samples as radar.yaml tells them");
+  }
+  const JsonPlace lanes = card["lvdsMode"];
+  if (lanes.integer() != 1 && lanes.integer() != 2) {
+    throw InputError(lanes.where() + ": must be 1 (four lanes) or 2 (two lanes)");
+  }
+  settings.set("lanes", lanes.integer() == 1 ? 4 : 2, lanes.where());
+  if (card.has("dataFormatMode")) {
+    const JsonPlace format = card["dataFormatMode"];  // 1: 12 bit, 2: 14 bit, 3: 16 bit
+    settings.set("adc_bits", format.integer() - 1, format.where());
+  }
+  if (card.has("packetDelay_us")) {
+    settings.set("packet_delay_us", card["packetDelay_us"].number(), card["packetDelay_us"].where());
+  }
+}
+
+void readJson(const std::string& file, const std::vector<std::string>& files, RawSettings& settings) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw InputError(file + ": cannot be read; give a JSON file that exists");
+  json root;
+  try {
+    root = json::parse(in);
+  } catch (const json::exception& error) {
+    throw InputError(file + ": is no JSON: " + error.what());
+  }
+  const JsonPlace place(root, file);
+  bool known = false;
+  if (place.has("mmWaveDevices")) {
+    readMmwave(place, settings);
+    known = true;
+  }
+  if (place.has("DCA1000Config")) {
+    readCard(place["DCA1000Config"], settings);
+    known = true;
+  }
+  if (place.has("mmWaveDevice")) settings.setDevice(place["mmWaveDevice"].text(), file);
+  if (place.has("configUsed")) {
+    known = true;
+    // Written on Windows: of the path only the name can be looked for.
+    std::string name = place["configUsed"].text();
+    name = name.substr(name.find_last_of("/\\") + 1);
+    const bool given = std::any_of(files.begin(), files.end(),
+                                   [&](const std::string& other) { return fs::path(other).filename() == name; });
+    const std::string beside = (fs::path(file).parent_path() / name).string();
+    if (!given && !fs::exists(beside)) {
+      throw InputError(file + ": names " + name + ", which is not beside it; put it there or give it too");
+    }
+    if (!given) readJson(beside, {file, beside}, settings);
+  }
+  if (!known) {
+    throw InputError(file +
+                     ": is none of the known JSON files (mmWave Studio's *.mmwave.json with mmWaveDevices, its "
+                     "setup.json with configUsed, cf.json with DCA1000Config)");
+  }
+}
+
+double required(const RawSettings& settings, const std::string& name, const std::string& from) {
+  const auto value = settings.values.find(name);
+  if (value == settings.values.end())
+    throw InputError("the settings do not say " + from + "; give the file that does too");
+  return value->second.value;
+}
+
+void demand(const RawSettings& settings, const std::string& name, const std::vector<int>& allowed,
+            const std::string& why) {
+  const auto value = settings.values.find(name);
+  if (value == settings.values.end()) return;
+  if (std::find(allowed.begin(), allowed.end(), static_cast<int>(value->second.value)) != allowed.end()) return;
+  throw InputError(value->second.where + ": " + shortest(value->second.value) + ": " + why);
+}
+
+void placeAntennas(ImportedSettings& imported, const std::string& digits, const std::vector<int>& receivers,
+                   const std::vector<int>& transmitters) {
+  const bool two = digits.compare(0, 2, "16") == 0;  // xWR16xx have two transmitters, the others three
+  const double half_m = std::round(kSpeedOfLight_m_per_s / imported.radar.carrier_hz / 2 * 1e7) * 1e-7;
+  for (const int rx : receivers) imported.radar.rx_position_m.emplace_back(0, rx * half_m, 0);
+  for (const int tx : transmitters) {
+    const bool raised = !two && tx == 1;
+    const double halves = tx == 0 ? 0 : raised ? 2 : 4;
+    imported.radar.tx_position_m.emplace_back(0, halves * half_m, raised ? half_m : 0);
+  }
+  imported.assumed.push_back("antenna positions: those of TI's BOOST boards for this device, elements " +
+                             shortest(half_m) +
+                             " m (half a wavelength at the chirp's start) apart along y; check "
+                             "them, and the sign of y, against the board as it is mounted");
+}
+
+}  // namespace
+
+void RawSettings::set(const std::string& name, double value, const std::string& where) {
+  const auto [known, fresh] = values.emplace(name, Given{value, where});
+  if (fresh || known->second.value == value) return;
+  throw InputError(where + ": " + name + " is " + shortest(value) + ", but " + known->second.where + " says " +
+                   shortest(known->second.value) + "; give files of one configuration");
+}
+
+void RawSettings::setDevice(const std::string& name, const std::string& where) {
+  std::string plain;
+  for (const char c : lowerCase(name)) {
+    if (std::isalnum(static_cast<unsigned char>(c))) plain += c;
+  }
+  if (!device.empty() && device != plain) {
+    throw InputError(where + ": the device is " + plain + ", but " + device_from + " says " + device +
+                     "; give files of one configuration");
+  }
+  device = plain;
+  device_from = where;
+}
+
+ImportedSettings importSettings(const std::vector<std::string>& files, const std::string& device) {
+  if (files.empty()) throw InputError("no settings file; give a .lua script or JSON files");
+  RawSettings raw;
+  if (!device.empty()) raw.setDevice(device, "--device");
+  for (const std::string& file : files) {
+    const std::string extension = lowerCase(fs::path(file).extension().string());
+    if (extension == ".lua") {
+      readLuaSettings(file, raw);
+    } else if (extension == ".json") {
+      readJson(file, files, raw);
+    } else {
+      throw InputError(file +
+                       ": settings are read from .lua and .json; where mmWave Studio saved XML, save the same "
+                       "as JSON (Import/Export tab), or give the script");
+    }
+  }
+  if (raw.device.empty()) {
+    throw InputError(files.front() + ": does not say which device it is for; give setup.json too, or --device awr2243");
+  }
+  const std::size_t digit = raw.device.find_first_of("0123456789");
+  const std::string digits = digit == std::string::npos ? "" : raw.device.substr(digit, 4);
+  const std::vector<std::string> four = {"1243", "1443", "2243"}, two = {"1642", "1843", "6443", "6843"};
+  const auto among = [&](const std::vector<std::string>& list) {
+    return std::find(list.begin(), list.end(), digits) != list.end();
+  };
+  if (!among(four) && !among(two)) {
+    throw InputError(raw.device_from + ": device '" + raw.device +
+                     "' is not known; known are xWR1243, 1443, 2243, 1642, 1843, 6443 and 6843");
+  }
+
+  ImportedSettings imported;
+  RadarConfig& radar = imported.radar;
+  radar.device = raw.device.compare(0, 3, "xwr") == 0 && digits == "2243" ? "awr2243" : raw.device;
+  const int first = static_cast<int>(required(raw, "chirp_start", "which chirps a frame has (FrameConfig)"));
+  const int last = static_cast<int>(required(raw, "chirp_end", "which chirps a frame has (FrameConfig)"));
+  if (first < 0 || last < first || last > 511) {
+    throw InputError(raw.values["chirp_end"].where + ": chirps " + std::to_string(first) + " to " +
+                     std::to_string(last) + " of a frame: must be within 0 to 511, in order");
+  }
+  std::vector<int> transmitters;
+  std::optional<int> profile_id;
+  for (int chirp = first; chirp <= last; ++chirp) {
+    const auto found = raw.chirps.find(chirp);
+    if (found == raw.chirps.end()) {
+      throw InputError(raw.values["chirp_end"].where + ": the frame uses chirp " + std::to_string(chirp) +
+                       ", which is not configured");
+    }
+    if (profile_id && *profile_id != found->second.profile) {
+      throw InputError(raw.profile_from + ": the frame's chirps have several profiles; a radar.yaml holds one");
+    }
+    profile_id = found->second.profile;
+    const unsigned mask = found->second.tx_mask;
+    if (mask != 1 && mask != 2 && mask != 4) {
+      throw InputError("chirp " + std::to_string(chirp) + " is sent by transmitters of mask " + std::to_string(mask) +
+                       ": where several send at once (or none), its position in the virtual array is not known here");
+    }
+    transmitters.push_back(mask == 4 ? 2 : static_cast<int>(mask) - 1);
+    radar.tx_enable.push_back({transmitters.back()});
+  }
+  const auto used = raw.profiles.find(*profile_id);
+  if (used == raw.profiles.end()) {
+    throw InputError("the frame's chirps have profile " + std::to_string(*profile_id) + ", which is not configured");
+  }
+  const RawSettings::Profile& profile = used->second;
+  radar.carrier_hz = std::round(profile.start_ghz * 1e9);
+  radar.slope_hz_per_s = std::round(profile.slope_mhz_per_us * 1e9) * 1e3;
+  radar.samples_per_chirp = profile.samples;
+  radar.sample_rate_hz = profile.ksps * 1e3;
+  radar.adc_start_s = profile.adc_start_us / 1e6;
+  radar.idle_s = profile.idle_us / 1e6;
+  radar.ramp_end_s = profile.ramp_end_us / 1e6;
+  radar.loops_per_frame = static_cast<int>(required(raw, "loops", "how many loops a frame has (FrameConfig)"));
+  radar.frame_period_s = required(raw, "period_ms", "the frame period (FrameConfig)") / 1e3;
+  radar.rx_gain_db = profile.rx_gain & 0x3f;
+  if (profile.rx_gain & 0xc0) {
+    imported.assumed.push_back("rx_gain_db: bits 5:0 of the gain field " + std::to_string(profile.rx_gain) +
+                               "; the RF gain target in its bits 7:6 is not kept");
+  }
+  const double backoff_db = profile.backoff_db[static_cast<std::size_t>(transmitters.front())];
+  const bool same = std::all_of(transmitters.begin(), transmitters.end(),
+                                [&](int tx) { return profile.backoff_db[static_cast<std::size_t>(tx)] == backoff_db; });
+  if (same) {
+    radar.tx_backoff_db = backoff_db;
+  } else {
+    imported.assumed.push_back("tx_backoff_db left out: the transmitters' backoffs differ");
+  }
+  const double corner1[] = {175e3, 235e3, 350e3, 700e3}, corner2[] = {350e3, 700e3, 1.4e6, 2.8e6};
+  if (profile.hpf1 < 0 || profile.hpf1 > 3 || profile.hpf2 < 0 || profile.hpf2 > 3) {
+    throw InputError(raw.profile_from + ": high-pass codes " + std::to_string(profile.hpf1) + " and " +
+                     std::to_string(profile.hpf2) + ": must be 0 to 3");
+  }
+  radar.if_highpass_hz = {corner1[profile.hpf1], corner2[profile.hpf2]};
+
+  demand(raw, "adc_bits", {2}, "samples must have 16 bits (code 2; in cf.json dataFormatMode 3)");
+  demand(raw, "adc_format", {1, 2}, "samples must be complex (code 1 or 2)");
+  demand(raw, "interface", {1}, "samples must leave over LVDS (code 1)");
+  demand(raw, "packet", {1}, "packets must hold ADC samples only (code 1)");
+  demand(raw, "lane_format", {0}, "lanes must be in their order (format map 0)");
+  demand(raw, "iq_swap", {0, 1}, "must be 0 (I first) or 1 (Q first)");
+  const int lanes =
+      static_cast<int>(required(raw, "lanes", "how many LVDS lanes there are (LVDSLaneConfig, laneEn or cf.json)"));
+  const bool four_lanes = lanes == 4 && among(four);
+  if (!four_lanes && !(lanes == 2 && among(two))) {
+    throw InputError(raw.values["lanes"].where + ": " + std::to_string(lanes) + " LVDS lanes of an " + raw.device +
+                     ": known are four of xWR1243, 1443 and 2243, and two of the others");
+  }
+  demand(raw, "interleave", {four_lanes ? 0 : 1},
+         std::string("samples of this device must be ") + (four_lanes ? "interleaved (0)" : "non-interleaved (1)"));
+  radar.layout = four_lanes ? CaptureLayout::kFourLane : CaptureLayout::kTwoLane;
+  if (raw.values.count("iq_swap")) {
+    radar.iq_order = raw.values["iq_swap"].value != 0 ? IqOrder::kQi : IqOrder::kIq;
+  } else {
+    imported.assumed.push_back("iq_order: I first, as devices send it unless told otherwise");
+  }
+  for (const char* name : {"adc_bits", "adc_format", "packet"}) {
+    if (!raw.values.count(name)) {
+      imported.assumed.push_back("16-bit complex ADC samples: the files do not say all of it");
+      break;
+    }
+  }
+  const int rx_mask = static_cast<int>(required(raw, "rx_mask", "which receivers are on (ChanNAdcConfig)"));
+  for (int rx = 0; rx < 4; ++rx) {
+    if (rx_mask >> rx & 1) radar.rx_enable.push_back(rx);
+  }
+  placeAntennas(imported, digits, radar.rx_enable, transmitters);
+  if (raw.values.count("packet_delay_us")) {
+    imported.assumed.push_back("the card's packet delay is no part of radar.yaml: give the driver packet_delay_us:=" +
+                               shortest(raw.values["packet_delay_us"].value));
+  }
+  parseRadarConfig(toYaml(radar), files.front());  // its ranges hold for imported values too
+  return imported;
+}
+
+std::string toYaml(const ImportedSettings& settings) {
+  std::string text = "# From TI's settings. What they do not say:\n";
+  for (const std::string& line : settings.assumed) text += "# - " + line + "\n";
+  return text + toYaml(settings.radar);
+}
+
+}  // namespace mmradartwin

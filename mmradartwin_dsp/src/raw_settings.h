@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+
+namespace mmradartwin {
+
+/// A number that a settings file gave, and where.
+struct Given {
+  double value = 0;
+  std::string where;
+};
+
+/// What TI's files say, in TI's units, before it is a radar. Two files that say different things are an InputError.
+struct RawSettings {
+  struct Profile {
+    double start_ghz, idle_us, adc_start_us, ramp_end_us, slope_mhz_per_us, ksps;
+    int samples, hpf1, hpf2, rx_gain;
+    std::array<double, 3> backoff_db;
+  };
+  struct Chirp {
+    int profile;
+    unsigned tx_mask;
+  };
+  std::map<int, Profile> profiles;
+  std::map<int, Chirp> chirps;
+  /// chirp_start, chirp_end, loops, period_ms, rx_mask, adc_bits (2: 16), adc_format (1, 2: complex), iq_swap,
+  /// interface (1: LVDS), packet (1: ADC samples only), lanes, lane_format, interleave (0: interleaved),
+  /// packet_delay_us.
+  std::map<std::string, Given> values;
+  std::string device, device_from;
+  std::string profile_from;
+
+  /// Throws InputError where another file said otherwise.
+  void set(const std::string& name, double value, const std::string& where);
+  void setDevice(const std::string& name, const std::string& where);
+};
+
+/// Adds what the ar1.* calls of a mmWave Studio script say.
+void readLuaSettings(const std::string& file, RawSettings& settings);
+
+}  // namespace mmradartwin
