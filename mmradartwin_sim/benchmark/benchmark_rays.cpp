@@ -12,6 +12,7 @@
 #include <random>
 
 #include "mmradartwin_sim/twin.h"
+#include "mmradartwin_sim/weight_basis.h"
 
 using namespace mmradartwin;
 
@@ -270,6 +271,19 @@ void fullPoseWeighAgain(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(twin.weigh(pose(0), traced).grid.x.data());
 }
 BENCHMARK(fullPoseWeighAgain)->Unit(benchmark::kMillisecond);
+
+void fullPoseWeighByGroups(benchmark::State& state) {
+  const Twin& twin = fullTwin();
+  const WeightBasis basis(twin.radar(), twin.trace(pose(0)));
+  const std::vector<std::complex<double>> weights(basis.groups().size(), 0.7);
+  ComplexGrid x;
+  for (auto _ : state) {
+    basis.sum(weights, x);
+    benchmark::DoNotOptimize(x.data());
+  }
+  state.counters["groups"] = static_cast<double>(basis.groups().size());
+}
+BENCHMARK(fullPoseWeighByGroups)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

@@ -30,21 +30,24 @@ struct RayCaster::Embree {
 
 namespace {
 
-/// False where Embree would abort (Debian builds it with assertions on rays) or nothing can be met.
+/// Origins further out than this lose all digits in single precision.
+constexpr double kFarthest_m = 1e9;
+
+/// False where Embree would abort (Debian builds it with assertions on rays) or nothing can be met. NaN fails every
+/// comparison.
 bool castable(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double length) {
-  return origin.allFinite() && direction.allFinite() && direction.squaredNorm() > 0.5 && std::isfinite(length) &&
-         length > 0 && origin.cwiseAbs().maxCoeff() < 1e9;
+  const auto within = [](const Eigen::Vector3d& v, double limit) {
+    return std::abs(v.x()) < limit && std::abs(v.y()) < limit && std::abs(v.z()) < limit;
+  };
+  return within(origin, kFarthest_m) && within(direction, 1.001) && length > 0 && length < 2 * kFarthest_m;
 }
 
+/// Whole vectors are stored, as Embree loads them: single numbers would have to wait for each other.
 void fill(RTCRay& ray, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double length) {
-  ray.org_x = static_cast<float>(origin.x());
-  ray.org_y = static_cast<float>(origin.y());
-  ray.org_z = static_cast<float>(origin.z());
-  ray.tnear = 0;
-  ray.dir_x = static_cast<float>(direction.x());
-  ray.dir_y = static_cast<float>(direction.y());
-  ray.dir_z = static_cast<float>(direction.z());
-  ray.time = 0;
+  Eigen::Map<Eigen::Vector4f, Eigen::Aligned16>(&ray.org_x) = Eigen::Vector4f(
+      static_cast<float>(origin.x()), static_cast<float>(origin.y()), static_cast<float>(origin.z()), 0.0F);
+  Eigen::Map<Eigen::Vector4f, Eigen::Aligned16>(&ray.dir_x) = Eigen::Vector4f(
+      static_cast<float>(direction.x()), static_cast<float>(direction.y()), static_cast<float>(direction.z()), 0.0F);
   ray.tfar = static_cast<float>(length);
   ray.mask = static_cast<unsigned>(-1);  // Debian's Embree has ray masks on
   ray.id = 0;
@@ -117,9 +120,8 @@ RayCaster::RayCaster(RayCaster&&) noexcept = default;
 bool RayCaster::visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const {
   const Eigen::Vector3d d = b - a;
   const double length = d.norm();
-  if (!std::isfinite(length)) return false;
   if (length <= 2 * gap_m) return true;
-  const Eigen::Vector3d unit = d / length;
+  const Eigen::Vector3d unit = (1 / length) * d;
   const Eigen::Vector3d origin = a + gap_m * unit - embree_->center;
   if (!castable(origin, unit, length - 2 * gap_m)) return false;
   RTCRay ray;
@@ -165,9 +167,9 @@ std::optional<RayCaster::Hit> RayCaster::firstHit(const Eigen::Vector3d& origin,
                                                   double max_m) const {
   const double norm = direction.norm();
   if (!(norm > 0)) return std::nullopt;
-  const Eigen::Vector3d unit = direction / norm, from = origin - embree_->center;
+  const Eigen::Vector3d unit = (1 / norm) * direction, from = origin - embree_->center;
   // Beyond the scene there is nothing, and Embree wants finite rays.
-  const double length = std::min(max_m, from.norm() + embree_->radius_m + 1);
+  const double length = std::min(max_m, from.lpNorm<1>() + embree_->radius_m + 1);
   if (!castable(from, unit, length)) return std::nullopt;
   RTCRayHit query;
   fill(query.ray, from, unit, length);
