@@ -68,7 +68,10 @@ PacketReceiver::PacketReceiver(const std::string& host_ip, std::uint16_t port, c
 
 PacketReceiver::PacketReceiver(const std::string& host_ip, std::uint16_t port, const std::string& card_ip,
                                const Options& options)
-    : socket_(host_ip, port, "samples"), card_(parseIpv4(card_ip)), batch_(std::make_unique<Batch>(options.batch)) {
+    : socket_(host_ip, port, "samples"),
+      card_(parseIpv4(card_ip)),
+      batch_(std::make_unique<Batch>(options.batch)),
+      gather_us_(options.gather_us) {
   local_.sin_family = AF_INET;
   local_.sin_port = htons(port);
   local_.sin_addr = parseIpv4(host_ip);
@@ -85,15 +88,29 @@ PacketReceiver::~PacketReceiver() = default;
 int PacketReceiver::receive(int timeout_ms, const std::function<void(const DataPacket&)>& visit) {
   const int size = static_cast<int>(batch_->messages.size());
   batch_->prepare(size);
-  int got = recvmmsg(socket_.fd(), batch_->messages.data(), size, MSG_DONTWAIT, nullptr);
-  if (got < 0 && (errno == EAGAIN || errno == EINTR)) {
-    if (!socket_.waitReadable(timeout_ms)) return 0;
-    got = recvmmsg(socket_.fd(), batch_->messages.data(), size, MSG_DONTWAIT, nullptr);
+  if (timeout_ms > 0 && timeout_ms != timeout_ms_) {
+    const timeval wait{timeout_ms / 1000, timeout_ms % 1000 * 1000};
+    setsockopt(socket_.fd(), SOL_SOCKET, SO_RCVTIMEO, &wait, sizeof wait);
+    timeout_ms_ = timeout_ms;
   }
+  if (dense_ && timeout_ms > 0) {
+    const timespec gather{0, gather_us_ * 1000L};
+    clock_nanosleep(CLOCK_MONOTONIC, 0, &gather, nullptr);
+  }
+  // Waits for the first datagram only, in one call into the kernel.
+  const int got =
+      recvmmsg(socket_.fd(), batch_->messages.data(), size, timeout_ms > 0 ? MSG_WAITFORONE : MSG_DONTWAIT, nullptr);
   if (got < 0) {
+    dense_ = false;
     if (errno == EAGAIN || errno == EINTR) return 0;
     throw RigError(std::string("the data socket fails: ") + std::strerror(errno));
   }
+  constexpr std::int64_t kDense_ns = 2'000'000;
+  timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  const std::int64_t batch_ns = now.tv_sec * 1'000'000'000LL + now.tv_nsec;
+  dense_ = gather_us_ > 0 && got < size && batch_ns - last_batch_ns_ < kDense_ns;  // a full batch: more may wait
+  last_batch_ns_ = batch_ns;
   int visited = 0;
   for (int i = 0; i < got; ++i) {
     msghdr& header = batch_->messages[i].msg_hdr;

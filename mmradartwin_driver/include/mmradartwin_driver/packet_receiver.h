@@ -19,6 +19,9 @@ class PacketReceiver {
   struct Options {
     std::size_t buffer_bytes = 32u << 20;  ///< of the socket; 0.4 s at the card's fastest
     int batch = 64;                        ///< datagrams read in one call at most
+    /// While packets follow each other closely, let them gather in the socket so long before they are read: a wake-up
+    /// costs more than a packet. Stamps are the kernel's and do not change by it.
+    int gather_us = 300;
   };
   struct Counters {
     std::uint64_t packets = 0;       ///< of the card
@@ -56,6 +59,10 @@ class PacketReceiver {
   Counters counters_;
   std::size_t granted_bytes_ = 0;
   std::uint32_t overflow_ = 0;
+  int gather_us_;
+  int timeout_ms_ = -1;  ///< that the socket has now
+  bool dense_ = false;   ///< the last batch came soon after the one before
+  std::int64_t last_batch_ns_ = 0;
 };
 
 }  // namespace mmradartwin
