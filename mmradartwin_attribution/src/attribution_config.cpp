@@ -49,6 +49,7 @@ AttributionConfig read(YamlMap yaml) {
     YamlMap r = yaml.map("regions");
     readNumber(r, "max_elevation_deg", 0.0, 90.0, kDegree, c.regions.max_elevation_rad);
     readNumber(r, "support_floor_db", -200.0, 0.0, 1.0, c.regions.support_floor_db);
+    if (r.has("image_order")) c.regions.image_order = static_cast<int>(r.integer("image_order", 1, 3));
     readNumber(r, "corner_tolerance_deg", 0.0, 45.0, kDegree, c.regions.corner_tolerance_rad);
     readNumber(r, "corner_gap_m", 0.0, 1.0, 1.0, c.regions.corner_gap_m);
     readNumber(r, "extent_floor_db", -200.0, 0.0, 1.0, c.regions.extent_floor_db);
@@ -96,7 +97,7 @@ AttributionConfig::AttributionConfig()
       far_limit_m(4),
       top_k{1, 3, 5},
       record_span_db(20),
-      regions{20 * kDegree, -30, 2 * kDegree, 0.005, -25, 0.5, 0.1} {}
+      regions{20 * kDegree, -30, 3, 2 * kDegree, 0.005, -25, 0.5, 0.1} {}
 
 AttributionConfig loadAttributionConfig(const std::string& file) { return read(YamlMap::load(file)); }
 
@@ -133,6 +134,7 @@ std::string toYaml(const AttributionConfig& c) {
     << "regions:\n"
     << "  max_elevation_deg: " << number(c.regions.max_elevation_rad / kDegree) << "\n"
     << "  support_floor_db: " << number(c.regions.support_floor_db) << "\n"
+    << "  image_order: " << c.regions.image_order << "\n"
     << "  corner_tolerance_deg: " << number(c.regions.corner_tolerance_rad / kDegree) << "\n"
     << "  corner_gap_m: " << number(c.regions.corner_gap_m) << "\n"
     << "  extent_floor_db: " << number(c.regions.extent_floor_db) << "\n"

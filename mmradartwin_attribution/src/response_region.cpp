@@ -6,6 +6,8 @@
 #include <map>
 #include <set>
 
+#include "mirror_image.h"
+
 namespace mmradartwin {
 namespace {
 
@@ -63,6 +65,8 @@ std::pair<double, double> reach(const Facet& plane, const std::vector<Eigen::Vec
   return {positive, negative};
 }
 
+constexpr double kLobeFloor_db = -6;  // lobes of an image's beam: half of the strongest, sidelobes stay below
+
 double level_db(double amplitude) { return 20 * std::log10(std::max(amplitude, 1e-12)); }
 
 }  // namespace
@@ -70,7 +74,7 @@ double level_db(double amplitude) { return 20 * std::log10(std::max(amplitude, 1
 double fresnelAperture(double u1, double u2) { return std::abs(fresnelE(u2) - fresnelE(u1)) / std::sqrt(2.0); }
 
 const std::string& regionKindName(RegionKind kind) {
-  static const std::string names[] = {"facing", "corner", "edge", "extent"};
+  static const std::string names[] = {"facing", "corner", "edge", "extent", "image"};
   return names[static_cast<int>(kind)];
 }
 
@@ -79,11 +83,15 @@ RegionModel::RegionModel(const Scene& scene, const RayCaster& rays, const Evalua
     : scene_(scene),
       rays_(rays),
       field_(field),
+      radar_(radar),
       wavelength_m_(radar.wavelength_m()),
-      max_range_m_(radar.max_range_m()) {
+      max_range_m_(radar.max_range_m()),
+      mirrors_(std::make_unique<MirrorSearch>(scene, rays, radar.wavelength_m())) {
   findCorners();
   placeProbes();
 }
+
+RegionModel::~RegionModel() = default;
 
 void RegionModel::findCorners() {
   const double gap = field_.config().regions.corner_gap_m;
@@ -228,6 +236,66 @@ void RegionModel::addCorners(const Eigen::Isometry3d& T, std::vector<ResponseReg
   }
 }
 
+// Paths over the same facets back and forth are equally long and so add up with a known phase. Where departure and
+// arrival differ, the array steers neither way: the region is where its beam has the lobes of both together.
+void RegionModel::addImages(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const {
+  const RegionConfig& config = field_.config().regions;
+  if (config.image_order < 2) return;
+  const std::vector<MirrorImage> images =
+      mirrors_->find(T, config.image_order, 2 * max_range_m_, config.max_elevation_rad);
+  const Eigen::Isometry3d T_radar_map = T.inverse();
+  const int channels = radar_.channels();
+  const auto addChannels = [&](const MirrorImage& image, Eigen::VectorXcd& sum) {
+    const Eigen::Vector3d departure = (T_radar_map * image.vertices.front()).normalized();
+    const Eigen::Vector3d arrival = (T_radar_map * image.vertices.back()).normalized();
+    for (int k = 0; k < channels; ++k) {
+      const double closer_m = departure.dot(radar_.tx_position_m[k / radar_.receivers()]) +
+                              arrival.dot(radar_.rx_position_m[k % radar_.receivers()]);
+      sum[k] += std::polar(1.0, -2 * M_PI * closer_m / wavelength_m_);
+    }
+  };
+  constexpr int kSteps = 256;  // of the sine, each way
+  std::vector<char> used(images.size(), 0);
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (used[i]) continue;
+    Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(channels);
+    addChannels(images[i], sum);
+    std::vector<int> reversed(images[i].facets.rbegin(), images[i].facets.rend());
+    for (std::size_t j = i + 1; j < images.size(); ++j) {
+      if (used[j] || images[j].facets != reversed) continue;
+      addChannels(images[j], sum);
+      used[j] = 1;
+    }
+    std::vector<double> beam(2 * kSteps + 1);
+    for (int u = -kSteps; u <= kSteps; ++u) {
+      std::complex<double> total = 0;
+      for (int k = 0; k < channels; ++k) {
+        total += sum[k] * std::polar(1.0, 2 * M_PI * k * radar_.virtual_pitch_m() * u / kSteps / wavelength_m_);
+      }
+      beam[u + kSteps] = std::abs(total) / channels;
+    }
+    const double most = *std::max_element(beam.begin(), beam.end());
+    for (int u = 1; u < 2 * kSteps; ++u) {
+      if (beam[u] < beam[u - 1] || beam[u] <= beam[u + 1] || level_db(beam[u] / most) < kLobeFloor_db) continue;
+      ResponseRegion region;
+      region.range_m = images[i].length_m / 2;
+      region.azimuth_rad = std::asin(static_cast<double>(u - kSteps) / kSteps);
+      region.field = field_.fieldAt(region.range_m, region.azimuth_rad);
+      if (region.field == Field::kExcluded) continue;
+      region.kind = RegionKind::kImage;
+      region.point = images[i].vertices[images[i].vertices.size() / 2];
+      region.support_db = level_db(wavelength_m_ / (4 * M_PI * images[i].length_m) * images[i].aperture * beam[u]);
+      for (int facet : images[i].facets) {
+        const int actor = scene_.facets[facet].actor;
+        if (std::find(region.actors.begin(), region.actors.end(), actor) == region.actors.end()) {
+          region.actors.push_back(actor);
+        }
+      }
+      out.push_back(region);
+    }
+  }
+}
+
 void RegionModel::addExtents(const Eigen::Isometry3d& T, double floor_db, std::vector<ResponseRegion>& out) const {
   for (std::size_t actor = 0; actor < probes_.size(); ++actor) addExtentsOf(static_cast<int>(actor), T, floor_db, out);
 }
@@ -255,13 +323,17 @@ void RegionModel::addExtentsOf(int actor, const Eigen::Isometry3d& T, double flo
                        place_of.field});
   }
   const MatchWindow &tight = field_.config().tight, &wide = field_.config().wide;
-  // The tight window of an extent stays clear of the wide windows of the actor's other regions.
+  // The tight window of an extent stays clear of the wide windows of the actor's other regions on its surface, and of
+  // the tight ones of its images.
+  const auto around = [&](const ResponseRegion& r) -> const MatchWindow& {
+    return r.kind == RegionKind::kImage ? tight : wide;
+  };
   const auto apart = [&](const Visible& v) {
     return std::none_of(out.begin(), out.end(), [&](const ResponseRegion& r) {
       return std::find(r.actors.begin(), r.actors.end(), actor) != r.actors.end() &&
-             std::abs(r.range_m - v.range_m) < field_.halfRange_m(wide) + field_.halfRange_m(tight) &&
+             std::abs(r.range_m - v.range_m) < field_.halfRange_m(around(r)) + field_.halfRange_m(tight) &&
              std::abs(r.azimuth_rad - v.azimuth_rad) <
-                 field_.halfAzimuth_rad(wide, r.azimuth_rad) + field_.halfAzimuth_rad(tight, v.azimuth_rad);
+                 field_.halfAzimuth_rad(around(r), r.azimuth_rad) + field_.halfAzimuth_rad(tight, v.azimuth_rad);
     });
   };
   while (true) {
@@ -316,6 +388,7 @@ std::vector<ResponseRegion> RegionModel::regions(const Eigen::Isometry3d& T_map_
   for (const ResponseRegion& r : found) {
     if (r.field == Field::kCentral) strongest = std::max(strongest, r.support_db);
   }
+  addImages(T_map_radar, found);
   const double floor = strongest + field_.config().regions.support_floor_db;
   found.erase(
       std::remove_if(found.begin(), found.end(), [floor](const ResponseRegion& r) { return r.support_db < floor; }),

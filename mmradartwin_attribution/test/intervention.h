@@ -1,11 +1,15 @@
 #pragma once
 
+#include <unistd.h>
+
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,6 +28,9 @@ class Laboratory {
     std::vector<Eigen::Isometry3d> poses;
     for (const Pose& pose : recording.poses) poses.push_back(pose.T_map_radar);
     twin.prepare(poses);
+    for (const Pose& pose : recording.poses) {
+      simulations.emplace(pose.name, twin.simulate(pose.T_map_radar, pose.stamp_ns));
+    }
   }
 
   /// The base twin with one more mechanism, as a line of twin.yaml.
@@ -41,24 +48,38 @@ class Laboratory {
     return evaluate(recording, simulated, of.scene(), of.rays(), options);
   }
 
-  /// Simulates, changes the records, rebuilds the grid from them.
-  SimulatedBranch edited(const std::function<void(std::vector<PathRecord>&)>& edit) const {
+  /// The twin's echoes with every path that `weight` does not give 1 scaled in amplitude. Occlusion stays as it is.
+  SimulatedBranch weighed(const std::function<double(const PathRecord&)>& weight) const {
     auto chain = std::make_shared<SignalChain>(twin.radar());
-    return [this, chain, edit](const Pose& pose) {
-      Simulation simulation = twin.simulate(pose.T_map_radar, pose.stamp_ns);
-      edit(simulation.records);
-      simulation.grid.x.setZero();
-      accumulate(twin.radar(), simulation.records, simulation.grid.x);
+    return [this, chain, weight](const Pose& pose) {
+      Simulation simulation = simulations.at(pose.name);
+      std::vector<PathRecord> difference;
+      for (PathRecord& record : simulation.records) {
+        const double factor = weight(record);
+        if (factor == 1) continue;
+        difference.push_back(record);
+        for (auto& c : difference.back().c) c *= factor - 1;
+        record.amplitude *= factor;
+        for (auto& c : record.c) c *= factor;
+      }
+      accumulate(twin.radar(), difference, simulation.grid.x);
       return SimulatedPose{chain->map(simulation.grid), simulation.records};
     };
   }
 
   /// Residuals of `with` that have no counterpart in `without`: same pose and side, within the tight window.
-  std::vector<Residual> appearing(const Evaluation& with, const Evaluation& without) const {
+  /// With `where` only those of poses in which the simulated map's peak, and so its normalisation, stayed within 0.1
+  /// dB.
+  enum class Where { kEveryPose, kPeakKept };
+  std::vector<Residual> appearing(const Evaluation& with, const Evaluation& without,
+                                  Where where = Where::kEveryPose) const {
     const SignalChain chain(recording.radar);
     const EvaluationField field(options.config, recording.radar, chain.axes());
     std::vector<Residual> result;
     for (std::size_t i = 0; i < with.poses.size(); ++i) {
+      const double lift_db =
+          with.poses[i].attribution.simulated.peak_db - without.poses[i].attribution.simulated.peak_db;
+      if (where == Where::kPeakKept && std::abs(lift_db) > 0.1) continue;
       for (const Residual& r : with.poses[i].attribution.residuals) {
         bool before = false;
         for (const Residual& b : without.poses[i].attribution.residuals) {
@@ -80,6 +101,7 @@ class Laboratory {
   EvaluationOptions options;
   Recording recording;
   Twin twin;
+  std::map<std::string, Simulation> simulations;  ///< of the twin as it is, by pose
 };
 
 inline double share(const std::array<int, 5>& count, int residual_class) {

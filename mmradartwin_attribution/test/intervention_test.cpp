@@ -1,6 +1,7 @@
 // Interventions on the simulated side against a session of the measured-session generator (test/, Python, no code
-// shared): how residuals route that appear with an intervention and not without it. Counts are printed; thresholds hold
-// where the rules can reach them.
+// shared): how residuals route that appear with an intervention and not without it. Counts are printed. The figures in
+// the comments were measured on campaigns that nothing was adjusted on (seeds 201 to 203, 462 poses); a single campaign
+// scatters by some percent around them. MMRADARTWIN_INTERVENTION_SEED chooses another than the default.
 
 #include "intervention.h"
 
@@ -8,6 +9,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <numeric>
+#include <set>
 
 #include "mmradartwin_attribution/report.h"
 
@@ -19,9 +22,11 @@ namespace fs = std::filesystem;
 std::string generate(const std::string& name, const std::string& options) {
   const std::string script = MMRADARTWIN_TEST_DIR "/scripts/make_session.py";
   if (!fs::exists(script)) return "";
+  const char* seed = std::getenv("MMRADARTWIN_INTERVENTION_SEED");
   const std::string directory = fs::temp_directory_path() / ("attribution_" + std::to_string(getpid()) + "_" + name);
   const std::string command = "/usr/bin/python3 " + script + " --output " + directory + " --truth " + directory +
-                              ".json --seed 1 --frames 20 " + options + " >/dev/null 2>" + directory + ".log";
+                              ".json --seed " + (seed ? seed : "1") + " --frames 20 " + options + " >/dev/null 2>" +
+                              directory + ".log";
   if (std::system(command.c_str()) != 0) return "";
   return directory;
 }
@@ -53,23 +58,50 @@ class InterventionTest : public ::testing::Test {
       GTEST_SKIP() << "the session generator " << MMRADARTWIN_TEST_DIR << "/scripts/make_session.py did not run";
   }
 
-  // Prints and returns the classes of what appears.
-  static std::array<int, 5> routed(const std::string& name, const Evaluation& with, int expected) {
-    const auto count = Laboratory::classes(lab_->appearing(with, *base_));
-    std::printf("[  counts  ] %-28s C%d %3.0f %%  (%s)\n", name.c_str(), expected, 100 * share(count, expected),
+  using Count = std::array<int, 5>;
+  static void print(const std::string& name, const Count& count, int expected) {
+    std::printf("[  counts  ] %-34s C%d %3.0f %%  (%s)\n", name.c_str(), expected, 100 * share(count, expected),
                 text(count).c_str());
+  }
+  // Prints and returns the classes of what appears.
+  static Count routed(const std::string& name, const Evaluation& with, int expected) {
+    const Count count = Laboratory::classes(lab_->appearing(with, *base_));
+    print(name, count, expected);
     return count;
   }
+  static void add(Count& to, const Count& more) {
+    for (std::size_t i = 0; i < to.size(); ++i) to[i] += more[i];
+  }
+  static int total(const Count& count) { return std::accumulate(count.begin(), count.end(), 0); }
+  static int largest(const Count& count) {
+    return static_cast<int>(std::max_element(count.begin(), count.end()) - count.begin()) + 1;
+  }
 
-  static SimulatedBranch without(const std::string& actor) {
-    const int index = lab_->twin.scene().actorIndex(actor);
-    return lab_->edited([index](std::vector<PathRecord>& records) {
-      records.erase(std::remove_if(records.begin(), records.end(),
-                                   [index](const PathRecord& r) {
-                                     return std::find(r.actors.begin(), r.actors.end(), index) != r.actors.end();
-                                   }),
-                    records.end());
-    });
+  // Scales, one after the other, the paths over each group of actors; pools the groups that at least 15 residuals
+  // appear with.
+  struct Pooled {
+    Count every{}, peak_kept{};
+    int groups = 0;
+  };
+  static Pooled scaled(const std::map<std::string, std::set<int>>& groups, double factor, int expected) {
+    Pooled pooled;
+    for (const auto& group : groups) {
+      const std::set<int>& actors = group.second;
+      const auto touches = [&actors](const PathRecord& record) {
+        return std::any_of(record.actors.begin(), record.actors.end(), [&](int a) { return actors.count(a) > 0; });
+      };
+      const Evaluation with =
+          lab_->against(lab_->weighed([&](const PathRecord& record) { return touches(record) ? factor : 1.0; }));
+      const Count count = Laboratory::classes(lab_->appearing(with, *base_));
+      if (total(count) < 15) continue;
+      print(group.first, count, expected);
+      add(pooled.every, count);
+      add(pooled.peak_kept, Laboratory::classes(lab_->appearing(with, *base_, Laboratory::Where::kPeakKept)));
+      ++pooled.groups;
+    }
+    print("pooled", pooled.every, expected);
+    print("pooled, poses that keep the peak", pooled.peak_kept, expected);
+    return pooled;
   }
 
   static std::string measured_, other_speckle_;
@@ -96,43 +128,47 @@ TEST_F(InterventionTest, WithNothingHiddenTheTwinReachesTheCeiling) {
   EXPECT_EQ(base_->conjugated_better, 0);
 }
 
+// 81 % at +14 and 82 % at -14 deg (1183 of 1468, 1188 of 1454). The rest: speckle maxima of rough walls that lie at no
+// region (C5), and peaks that normalise or fall where no region is (C3).
 TEST_F(InterventionTest, ATurnedRadarShiftsResponses) {
-  const Twin turned(lab_->describe("  radar_yaw_offset: {yaw_deg: 14}\n"));
-  const auto count = routed("radar turned by 14 deg", lab_->against(simulatedByTwin(turned)), 4);
-  // The rest: speckle maxima of rough walls away from any region (C5), and peaks that normalise where the array has a
-  // null (C3).
-  EXPECT_EQ(std::max_element(count.begin(), count.end()) - count.begin(), 3);
-  EXPECT_GE(share(count, 4), 0.7);
-}
-
-// Where the actor held the strongest echo, the normalisation lifts all others: what then stands out is C3 and C4 by
-// rule.
-TEST_F(InterventionTest, ASuppressedActorLosesSupport) {
-  for (const std::string actor : {"wall_north", "cabinet_north", "wardrobe"}) {
-    routed("paths of " + actor + " suppressed", lab_->against(without(actor)), 1);
+  Count both{};
+  for (int yaw_deg : {14, -14}) {
+    const Twin turned(lab_->describe("  radar_yaw_offset: {yaw_deg: " + std::to_string(yaw_deg) + "}\n"));
+    add(both, routed("radar turned by " + std::to_string(yaw_deg) + " deg", lab_->against(simulatedByTwin(turned)), 4));
   }
-  const auto count = routed("paths of wall_east suppressed", lab_->against(without("wall_east")), 1);
-  EXPECT_GE(share(count, 1), 0.6);
+  print("both ways", both, 4);
+  EXPECT_GE(share(both, 4), 0.8);
 }
 
+// 44 % over all poses (758 of 1727), 66 % in poses where the suppressed actor did not hold the strongest echo (493 of
+// 742, actors with fewer residuals included). Where it did, the next echo normalises the map: all others rise, and what
+// they lift above -15 dB where the measurement is weak is C3 and C4 by rule (637 of 1131), not a matter of the actor.
+TEST_F(InterventionTest, ASuppressedActorLosesSupport) {
+  std::map<std::string, std::set<int>> actors;
+  for (std::size_t a = 0; a < lab_->twin.scene().actors.size(); ++a) {
+    actors[lab_->twin.scene().actors[a].name + " suppressed"] = {static_cast<int>(a)};
+  }
+  const Pooled pooled = scaled(actors, 0, 1);
+  EXPECT_GE(pooled.groups, 8);
+  EXPECT_GE(share(pooled.peak_kept, 1), 0.6);
+  EXPECT_EQ(largest(pooled.every), 1);
+  EXPECT_GE(share(pooled.every, 1), 0.4);
+}
+
+// 50 % over all poses (347 of 693), 75 % in poses that keep the peak (275 of 368); the reason is the same.
 TEST_F(InterventionTest, AWeakerMaterialIsWeakSupport) {
-  const auto weaker = [](const std::string& tag) {
-    return lab_->against(lab_->edited([tag](std::vector<PathRecord>& records) {
-      for (PathRecord& r : records) {
-        for (int actor : r.actors) {
-          if (lab_->twin.scene().actors[actor].material_tag != tag) continue;
-          r.amplitude *= std::sqrt(0.1);
-          for (auto& c : r.c) c *= std::sqrt(0.1);
-        }
-      }
-    }));
-  };
-  for (const std::string tag : {"Concrete", "Metal"}) routed(tag + " 10 dB weaker", weaker(tag), 2);
-  const auto count = routed("Wood 10 dB weaker", weaker("Wood"), 2);
-  EXPECT_EQ(std::max_element(count.begin(), count.end()) - count.begin(), 1);
-  EXPECT_GE(share(count, 2), 0.5);
+  std::map<std::string, std::set<int>> materials;
+  for (std::size_t a = 0; a < lab_->twin.scene().actors.size(); ++a) {
+    materials[lab_->twin.scene().actors[a].material_tag + " 10 dB weaker"].insert(static_cast<int>(a));
+  }
+  const Pooled pooled = scaled(materials, std::sqrt(0.1), 2);
+  EXPECT_GE(pooled.groups, 4);
+  EXPECT_GE(share(pooled.peak_kept, 2), 0.6);
+  EXPECT_EQ(largest(pooled.every), 2);
+  EXPECT_GE(share(pooled.every, 2), 0.42);
 }
 
+// 90 % (395 of 440).
 TEST_F(InterventionTest, ACouplingPeakIsAnUnsupportedAnchor) {
   const auto chain = std::make_shared<SignalChain>(lab_->twin.radar());
   const RadarConfig& radar = lab_->twin.radar();
@@ -157,6 +193,8 @@ TEST_F(InterventionTest, ACouplingPeakIsAnUnsupportedAnchor) {
   EXPECT_GE(share(count, 3), 0.6);
 }
 
+// 64 % (141 of 221; single campaigns 52 to 76 %). The rest is what the object hides: echoes of the twin that the
+// measurement lacks, C3 and C4 by rule.
 TEST_F(InterventionTest, AnUnmodelledObjectIsAMissingMechanism) {
   const std::string session = generate("unmodelled", "--effect actor_unmodelled");
   if (session.empty()) GTEST_SKIP() << "the session generator has no effect actor_unmodelled";

@@ -115,6 +115,37 @@ TEST_F(RoomTest, TheHeadingTurnsRegions) {
   EXPECT_EQ(outer->field, Field::kOuter);
 }
 
+TEST_F(RoomTest, AWallFacesTheRadarInAMirror) {
+  // East, west, east: 3 m to the one wall, 6 m to the other and both ways back, 18 m in all.
+  const auto regions = regionsAt(3, 2, 0);
+  const ResponseRegion* image = find(regions, RegionKind::kImage, 9, 0);
+  ASSERT_NE(image, nullptr);
+  EXPECT_EQ(image->actor, "east;west");
+  EXPECT_NEAR(image->support_db, 20 * std::log10(radar_.wavelength_m() / (8 * M_PI * 9)), 1.5) << "three large mirrors";
+  AttributionConfig config;
+  config.regions.image_order = 1;
+  const EvaluationField field(config, radar_, SignalChain(radar_).axes());
+  EXPECT_EQ(count(RegionModel(scene_, *rays_, field, radar_).regions(pose(3, 2, 0)), RegionKind::kImage), 0);
+}
+
+// Two plates meet at 60 deg, 4 m ahead of a radar that looks along their bisector. A path over both leaves at +30 and
+// comes back at -30 deg, or the other way round: an equilateral triangle with sides of 4 tan(30) = 2.31 m. Over TX 0
+// and 4 d the two add up to 2 cos(pi k/2) at element k, which steers to sin = +-1/2 alike.
+TEST_F(RoomTest, PathsThatDepartAndArriveApartLieWhereTheArrayHasTheirLobes) {
+  addQuad("left", {5, 2, 0}, {-1.6 * std::sqrt(3.0), 1.6, 0}, {0, 0, 2.5});
+  addQuad("right", {5, 2, 0}, {-1.6 * std::sqrt(3.0), -1.6, 0}, {0, 0, 2.5});
+  const auto regions = regionsAt(1, 2, 0);
+  const double pitch = radar_.virtual_pitch_m() / radar_.wavelength_m() * 2;  // 1 at the ramp's start
+  int lobes = 0;
+  for (const ResponseRegion& r : regions) {
+    if (r.kind != RegionKind::kImage || std::abs(r.range_m - 2 * std::sqrt(3.0)) > 0.01) continue;
+    ++lobes;
+    EXPECT_NEAR(std::abs(std::sin(r.azimuth_rad)), 0.5, 0.5 * std::abs(pitch - 1) + 0.01);
+    EXPECT_TRUE(r.actor == "left;right" || r.actor == "right;left") << r.actor;
+  }
+  EXPECT_EQ(lobes, 2);
+}
+
 TEST_F(RoomTest, AnObjectHidesWhatIsBehindAndFacesTheRadar) {
   addBox("cabinet", {4.5, 1.5, 0.01}, {5.0, 2.5, 2.0});
   const auto regions = regionsAt(2, 2, 0);

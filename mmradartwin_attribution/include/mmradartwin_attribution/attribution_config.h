@@ -13,8 +13,9 @@ struct MatchWindow {
 
 /// What makes an expected response region (geometry and pose alone, see response_region.h).
 struct RegionConfig {
-  double max_elevation_rad;     ///< of a supporting point, either side
-  double support_floor_db;      ///< a reflecting facet counts down to this much below the pose's strongest support
+  double max_elevation_rad;  ///< of a supporting point, either side
+  double support_floor_db;   ///< a facet, corner or image counts down to this much below the pose's strongest support
+  int image_order;           ///< paths of up to so many mirrors count: 3, or 1 for none
   double corner_tolerance_rad;  ///< two facets form a corner where they are perpendicular within this
   double corner_gap_m;          ///< and come this close to their common line
   double extent_floor_db;       ///< a visible rough surface down to this much below it

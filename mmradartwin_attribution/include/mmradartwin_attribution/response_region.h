@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,8 @@ enum class RegionKind {
   kFacing,  ///< a facet that faces the radar: foot of the perpendicular inside it
   kCorner,  ///< concave right angle of two facets
   kEdge,    ///< the rim of a facet, nearest to a foot that lies beside it
-  kExtent   ///< visible surface away from those, where a rough one would scatter most
+  kExtent,  ///< visible surface away from those, where a rough one would scatter most
+  kImage    ///< a facet, or a corner, that faces the radar by way of other facets: a path of two or three mirrors
 };
 const std::string& regionKindName(RegionKind kind);
 
@@ -27,7 +29,8 @@ struct ResponseRegion {
   std::vector<int> actors;      ///< Scene::actors; two for a corner between actors
   std::string actor, material;  ///< names and tags, joined with ";"
   Eigen::Vector3d point;        ///< map
-  /// Level by geometry alone, 20 log10 of: lambda/(8 pi R) times the aperture factor of a perfect reflector, for an
+  /// Level by geometry alone, 20 log10 of: lambda/(8 pi R) times the aperture factor of a perfect reflector (an image:
+  /// of all its mirrors, and times how far the array adds the paths up there), for an
   /// extent lambda/(4 pi) sqrt(S^2 sum(cos^2 dA/(pi r^4))) over the visible surface in the tight window, S =
   /// regions.extent_scattering.
   double support_db = 0;
@@ -36,11 +39,14 @@ struct ResponseRegion {
   bool simulated_strong = false;  ///< and a simulated one
 };
 
+class MirrorSearch;
+
 /// Expected regions of one scene. What depends on the scene alone is found once; regions() is const and thread-safe.
 class RegionModel {
  public:
   /// Keeps references: scene and rays must outlive it.
   RegionModel(const Scene& scene, const RayCaster& rays, const EvaluationField& field, const RadarConfig& radar);
+  ~RegionModel();
   /// Regions of a pose in order of range. No two of one actor lie in each other's tight window, so that none share a
   /// cell.
   std::vector<ResponseRegion> regions(const Eigen::Isometry3d& T_map_radar) const;
@@ -65,6 +71,7 @@ class RegionModel {
   bool place(const Eigen::Isometry3d& T_map_radar, const Eigen::Vector3d& point, ResponseRegion& region) const;
   void addFacets(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const;
   void addCorners(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const;
+  void addImages(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const;
   void addExtents(const Eigen::Isometry3d& T, double floor_db, std::vector<ResponseRegion>& out) const;
   void addExtentsOf(int actor, const Eigen::Isometry3d& T, double floor_db, std::vector<ResponseRegion>& out) const;
   std::vector<ResponseRegion> merged(std::vector<ResponseRegion> found) const;
@@ -72,8 +79,10 @@ class RegionModel {
   const Scene& scene_;
   const RayCaster& rays_;
   EvaluationField field_;
+  RadarConfig radar_;
   double wavelength_m_;
   double max_range_m_;
+  std::unique_ptr<MirrorSearch> mirrors_;
   std::vector<Corner> corners_;
   std::vector<std::vector<Probe>> probes_;  // per actor
 };
