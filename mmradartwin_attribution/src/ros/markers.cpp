@@ -349,33 +349,38 @@ visualization_msgs::MarkerArray MarkerBuilder::build(const PoseAttribution& pose
   return out;
 }
 
-visualization_msgs::MarkerArray sceneMarkers(const Scene& scene, const std::string& map_frame, double alpha) {
+visualization_msgs::MarkerArray sceneMarkers(const Scene& scene, const std::string& map_frame) {
+  constexpr double kUprightAlpha = 0.75, kLevelAlpha = 0.3;
   std::map<std::string, Marker> by_material;
-  for (const Actor& actor : scene.actors) {
-    Marker& m = by_material[actor.material_tag];
-    if (m.points.empty()) {
+  const auto list = [&](const Actor& actor, bool level) -> Marker& {
+    Marker& m = by_material[actor.material_tag + (level ? " level" : "")];
+    if (m.ns.empty()) {
       m.header.frame_id = map_frame;
       m.frame_locked = true;
-      m.ns = actor.material_tag;
+      m.ns = actor.material_tag + (level ? " level" : "");
       m.type = Marker::TRIANGLE_LIST;
       m.action = Marker::ADD;
       m.pose.orientation.w = 1;
       m.scale.x = m.scale.y = m.scale.z = 1;
       const auto& c = actor.material.color;
-      m.color = rgba(c[0], c[1], c[2], alpha);
+      // Half way to white.
+      m.color = level ? rgba(0.5 + 0.5 * c[0], 0.5 + 0.5 * c[1], 0.5 + 0.5 * c[2], kLevelAlpha)
+                      : rgba(c[0], c[1], c[2], kUprightAlpha);
     }
+    return m;
+  };
+  for (const Actor& actor : scene.actors) {
     for (const auto& t : actor.triangles) {
       // A horizontal surface above head height (a ceiling) would hide everything from above.
       const Eigen::Vector3d &a = actor.vertices[t[0]], &b = actor.vertices[t[1]], &c = actor.vertices[t[2]];
       const bool level = std::abs((b - a).cross(c - a).normalized().z()) > 0.7;
       if (level && std::min({a.z(), b.z(), c.z()}) > 2.0) continue;
+      Marker& m = list(actor, level);
       for (int corner : t) m.points.push_back(point(actor.vertices[corner]));
     }
   }
   visualization_msgs::MarkerArray out;
-  for (auto& [material, m] : by_material) {
-    if (!m.points.empty()) out.markers.push_back(std::move(m));
-  }
+  for (auto& [name, m] : by_material) out.markers.push_back(std::move(m));
   return out;
 }
 

@@ -48,7 +48,8 @@ class MarkerBuilder {
   bool first_ = true;
 };
 
-/// The scene, one TRIANGLE_LIST per material, half transparent; published once. The namespace is the material.
-visualization_msgs::MarkerArray sceneMarkers(const Scene& scene, const std::string& map_frame, double alpha = 0.35);
+/// The scene: one TRIANGLE_LIST per material of its upright surfaces, nearly opaque, and one of its level ones, lighter
+/// and more transparent, so that fans above the floor stand out. The namespace is the material, with " level" for those.
+visualization_msgs::MarkerArray sceneMarkers(const Scene& scene, const std::string& map_frame);
 
 }  // namespace mmradartwin
