@@ -71,7 +71,9 @@ class AttributionNode {
     residuals_ = nh_.advertise<mmradartwin_msgs::Residuals>("attribution/residuals", 10);
     ledger_ = nh_.advertise<mmradartwin_msgs::Ledger>("attribution/ledger", 1, true);
     markers_ = nh_.advertise<visualization_msgs::MarkerArray>("attribution/markers", 2);
-    scene_markers_ = nh_.advertise<visualization_msgs::MarkerArray>("attribution/scene_markers", 1, true);
+    scene_markers_ = nh_.advertise<visualization_msgs::MarkerArray>(
+        "attribution/scene_markers", 1, [this](const ros::SingleSubscriberPublisher&) { onSceneViewer(); },
+        ros::SubscriberStatusCallback(), ros::VoidConstPtr(), true);
     subscribers_.push_back(nh_.subscribe("radar/config", 1, &AttributionNode::onRadar, this));
     subscribers_.push_back(nh_.subscribe("session", 1, &AttributionNode::onSession, this));
     subscribers_.push_back(nh_.subscribe("twin/paths", 10, &AttributionNode::onPaths, this));
@@ -139,7 +141,20 @@ class AttributionNode {
     rays_.reset();
     scene_ = std::make_unique<Scene>(std::move(scene));
     rays_ = std::make_unique<RayCaster>(*scene_);
+    scene_due_ = true;
+    publishScene();
+  }
+
+  // The latched scene reaches a viewer at once, and is lost to it where tf does not yet reach: rviz drops markers that
+  // it cannot place. So each viewer gets it once more when tf has been there for a pair of maps.
+  void onSceneViewer() { scene_viewer_since_ = ros::WallTime::now(); }
+
+  void publishScene() {
+    const ros::WallTime now = ros::WallTime::now();
+    if (!scene_ || !scene_due_ || (now - scene_published_).toSec() < 2) return;
     scene_markers_.publish(sceneMarkers(*scene_, frames_.map));
+    scene_published_ = now;
+    scene_due_ = false;
   }
 
   // Everything that depends on radar and scene.
@@ -213,6 +228,11 @@ class AttributionNode {
       had_subscribers_ = markers_.getNumSubscribers();
     }
     ++pairs_;
+    if (!scene_viewer_since_.isZero() && (now - scene_viewer_since_).toSec() > 1) {
+      scene_viewer_since_ = ros::WallTime();
+      scene_due_ = true;
+    }
+    publishScene();
   }
 
   std::string nameAt(std::int64_t stamp_ns) const {
@@ -221,6 +241,7 @@ class AttributionNode {
   }
 
   void watch(const ros::WallTimerEvent&) {
+    publishScene();
     if (pairs_ == pairs_before_ && received_ != received_before_) {
       ROS_WARN("no pair of maps in 5 s: %zu measured and %zu simulated wait for a counterpart of the same stamp",
                measured_.size(), simulated_.size());
@@ -238,7 +259,8 @@ class AttributionNode {
   ros::Publisher residuals_, ledger_, markers_, scene_markers_;
   std::vector<ros::Subscriber> subscribers_;
   ros::WallTimer watchdog_;
-  ros::WallTime last_markers_;
+  ros::WallTime last_markers_, scene_published_, scene_viewer_since_;  // zero: never, nobody new
+  bool scene_due_ = false;
   std::uint32_t had_subscribers_ = 0;
   std::size_t pairs_ = 0, pairs_before_ = 0, received_ = 0, received_before_ = 0;
 
