@@ -69,9 +69,11 @@ class Launched:
 
     def record(self, topics, seconds, file):
         """Records topics for a while; returns message counts by topic."""
-        subprocess.run(["rosbag", "record", "--quiet", "--duration", str(seconds), "-O", file, *topics],
-                       env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True,
-                       timeout=seconds + 20)
+        recorder = subprocess.Popen(["rosbag", "record", "--quiet", "-O", file, *topics, "__name:=counting"],
+                                    env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(seconds)
+        subprocess.run(["rosnode", "kill", "/counting"], env=self.environment, stdout=subprocess.DEVNULL, timeout=20)
+        recorder.wait(20)
         with rosbag.Bag(file) as bag:
             return {topic: info.message_count for topic, info in bag.get_type_and_topic_info().topics.items()}
 
@@ -97,7 +99,7 @@ class LaunchFiles(unittest.TestCase):
         return os.path.join(self.folder, name)
 
     def test_live_starts_and_stays_without_a_card(self):
-        with Launched("live.launch", "rviz:=", "card_ip:=127.77.1.2", "host_ip:=127.77.1.1") as launched:
+        with Launched("live.launch", "rviz:=false", "card_ip:=127.77.1.2", "host_ip:=127.77.1.1") as launched:
             nodes = launched.wait_for_nodes({"/driver", "/signal_chain", "/twin", "/attribution"})
             time.sleep(6)
             self.assertNotIn("has died", launched.text())
@@ -105,7 +107,7 @@ class LaunchFiles(unittest.TestCase):
             self.assertIn("no answer from the DCA1000 at 127.77.1.2", launched.text())
 
     def test_replay_runs_the_chain_on_the_bags_clock_without_the_driver(self):
-        with Launched("replay.launch", "bag:=" + self.bag, "rviz:=") as launched:
+        with Launched("replay.launch", "bag:=" + self.bag, "rviz:=false") as launched:
             nodes = launched.wait_for_nodes({"/player", "/signal_chain", "/twin", "/attribution"})
             self.assertNotIn("/driver", nodes)
             sim_time = rosgraph.Master("/test", launched.environment["ROS_MASTER_URI"]).getParam("/use_sim_time")
@@ -121,14 +123,14 @@ class LaunchFiles(unittest.TestCase):
                     self.assertTrue(first - 1 <= message.header.stamp.to_sec() <= last + 1)
 
     def test_inspect_shows_stored_results(self):
-        with Launched("inspect.launch", "results:=" + self.results, "rviz:=") as launched:
+        with Launched("inspect.launch", "results:=" + self.results, "rviz:=false") as launched:
             nodes = launched.wait_for_nodes({"/player"})
             self.assertFalse({"/driver", "/signal_chain", "/twin"} & nodes)
             counts = launched.record(["/attribution/markers", "/attribution/residuals"], 5, self.path("inspected.bag"))
             self.assertGreater(counts.get("/attribution/markers", 0), 0)
 
     def test_record_writes_a_bag_that_stands_alone(self):
-        with Launched("replay.launch", "bag:=" + self.bag, "rviz:=") as replay:
+        with Launched("replay.launch", "bag:=" + self.bag, "rviz:=false") as replay:
             replay.wait_for_nodes({"/player"})
             with Launched("record.launch", "output:=" + self.path("recorded"), port=replay.port) as recorder:
                 recorder.wait_for_nodes({"/recorder"})
