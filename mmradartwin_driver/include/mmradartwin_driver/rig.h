@@ -26,7 +26,7 @@ struct RigOptions {
   std::uint16_t data_port = kDca1000DataPort;
   double packet_delay_us = 25;
   bool configure_card = true;  ///< false: another program configures and arms it, only the data port is opened
-  std::string record_pcap;                   ///< records everything between card and host there; "" = nowhere
+  std::string record_pcap;     ///< records everything between card and host there; "" = nowhere
   std::size_t hand_over_bytes = 128u << 20;  ///< of frames that may wait for a slow taker; at least 16 frames do
   PacketReceiver::Options receiver;
   FrameAssembler::Options assembler;
@@ -44,22 +44,23 @@ struct RigState {
   std::size_t buffer_bytes = 0;  ///< of the data socket, as granted
   FrameAssembler::Counters frames;
   PacketReceiver::Counters packets;
-  std::uint64_t frames_not_taken = 0;   ///< dropped because whoever takes the frames was too slow
-  std::uint64_t packets_recorded = 0;   ///< in the pcap
+  std::uint64_t frames_not_taken = 0;  ///< dropped because whoever takes the frames was too slow
+  std::uint64_t packets_recorded = 0;  ///< in the pcap
   std::uint64_t packets_not_recorded = 0;
 };
 
 /// The capture card, from its configuration to cubes. One thread of its own: opens the sockets, configures and arms the
 /// card, receives, and does all of that again when the card or the network was gone, when the recording is completed,
-/// or when the card says that it threw samples away (after which its count no longer tells the place of a byte). A second
-/// thread delivers the cubes: whoever takes them may stall without a packet being lost.
+/// or when the card says that it threw samples away (after which its count no longer tells the place of a byte). A
+/// second thread delivers the cubes: whoever takes them may stall without a packet being lost.
 class Rig {
  public:
   enum class Level { kInfo, kWarning, kError };
   using CubeSink = std::function<void(AdcCube&&)>;
   using EventSink = std::function<void(Level, const std::string&)>;
 
-  /// Cubes are delivered from one thread, events reported from another, both the rig's own. Throws InputError for options out of range.
+  /// Cubes are delivered from one thread, events reported from another, both the rig's own. Throws InputError for
+  /// options out of range.
   Rig(const RadarConfig& radar, const RigOptions& options, CubeSink cubes, EventSink events);
   ~Rig();  ///< ends the thread and the recording
   RigState state() const;

@@ -20,7 +20,8 @@ std::vector<std::uint8_t> encodeFrame(const RadarConfig& radar, const std::vecto
 /// one in between is missing.
 std::vector<std::string> captureParts(const std::string& file);
 
-/// A capture file, or all that captureParts() names, one after the other: frames back to back, their number from the file's size. Reading is safe from several threads.
+/// A capture file, or all that captureParts() names, one after the other: frames back to back, their number from the
+/// file's size. Reading is safe from several threads.
 class CaptureReader {
  public:
   /// Throws InputError: missing file, or a size that is no whole number of frames (says how many whole ones there are).
