@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_sim/plugin.h"
 #include "mmradartwin_sim/simulate_session.h"
 
 using namespace mmradartwin;
@@ -18,12 +19,15 @@ int main(int argc, char** argv) {
       ->required();
   app.add_option("--output", options.output, "session directory to write")->required();
   app.add_option("--twin", options.twin_file, "twin.yaml instead of the session's");
-  app.add_option("--frames", options.frames, "frames per pose, all alike")
+  std::string plugins;
+  app.add_option("--plugins", plugins, "libraries with mechanisms of your own, parted by ':' (or MMRADARTWIN_PLUGINS)");
+  app.add_option("--frames", options.frames, "frames per pose, alike but for mechanisms of frames")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   app.add_option("--seed", options.seed, "of the phases of scatter points")->capture_default_str();
   app.add_option("--jobs", options.jobs, "threads; 0 = all cores")->check(CLI::Range(0, 1024))->capture_default_str();
-  return runProgram(app, argc, argv, [&options] {
+  return runProgram(app, argc, argv, [&options, &plugins] {
+    loadMechanismPlugins(plugins, "--plugins");
     std::unique_ptr<ProgressBar> bar;
     std::mutex mutex;
     int shown = 0;

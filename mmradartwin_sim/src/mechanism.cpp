@@ -4,6 +4,7 @@
 
 #include "mechanisms/builtin.h"
 #include "mechanisms/propagation_builtin.h"
+#include "mechanisms/receiver_builtin.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -43,6 +44,25 @@ MechanismRegistry& MechanismRegistry::instance() {
     r.add("channel_phase_error", makeChannelPhaseError);
     r.add("tx_imbalance", makeTxImbalance);
     r.add("if_highpass", makeIfHighpass);
+    r.add("if_lowpass", makeIfLowpass);
+    r.add("iq_conjugation", makeIqConjugation);
+    r.add("channel_conjugation", makeChannelConjugation);
+    r.add("channel_permutation", makeChannelPermutation);
+    r.add("mutual_coupling", makeMutualCoupling);
+    r.add("iq_imbalance", makeIqImbalance);
+    r.add("dc_offset", makeDcOffset);
+    r.add("second_harmonic", makeSecondHarmonic);
+    r.add("chirp_nonlinearity", makeChirpNonlinearity);
+    r.add("gain_drift", makeGainDrift);
+    r.add("moving_target", makeMovingTarget);
+    r.add("phase_noise", makePhaseNoise);
+    r.add("phase_drift", makePhaseDrift);
+    r.add("interference", makeInterference);
+    r.add("noise_floor", makeNoiseFloor);
+    r.add("adc_saturation", makeAdcSaturation);
+    r.add("quantisation", makeQuantisation);
+    r.add("packet_loss", makePacketLoss);
+    r.add("packet_misalignment", makePacketMisalignment);
     addPropagationMechanisms(r);
     return r;
   }();

@@ -50,6 +50,49 @@ AdcCube makeCube(const RadarConfig& radar, const ComplexGrid& x, double scale) {
   return cube;
 }
 
+/// Levels of all I and Q values of a session, told from any thread in any order.
+class SampleLevels {
+ public:
+  /// exceededBy() is for those who asked for it.
+  explicit SampleLevels(bool count) : counts_(count ? kBins : 0) {
+    for (auto& c : counts_) c.store(0);
+  }
+  void add(const ComplexGrid& x) {
+    double largest = 0;
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      for (const double v : {std::abs(x.data()[i].real()), std::abs(x.data()[i].imag())}) {
+        largest = std::max(largest, v);
+        if (!counts_.empty()) counts_[static_cast<std::size_t>(bin(v))].fetch_add(1, std::memory_order_relaxed);
+      }
+    }
+    double known = strongest_.load();
+    while (largest > known && !strongest_.compare_exchange_weak(known, largest)) {
+    }
+  }
+  double strongest() const { return strongest_.load(); }
+  /// The level that this share of all values exceeds, to 0.0005 dB.
+  double exceededBy(double fraction) const {
+    std::uint64_t total = 0, above = 0;
+    for (const auto& c : counts_) total += c.load();
+    int b = kBins - 1;
+    for (; b > 0; --b) {
+      above += counts_[static_cast<std::size_t>(b)].load();
+      if (static_cast<double>(above) >= fraction * static_cast<double>(total)) break;
+    }
+    return std::pow(10.0, (kLowest_db + b * kStep_db) / 20);
+  }
+
+ private:
+  static constexpr double kLowest_db = -400, kStep_db = 0.0005;
+  static constexpr int kBins = 1000000;
+  static int bin(double v) {
+    if (!(v > 0)) return 0;
+    return static_cast<int>(std::min(kBins - 1.0, std::max(0.0, (20 * std::log10(v) - kLowest_db) / kStep_db)));
+  }
+  std::vector<std::atomic<std::uint64_t>> counts_;
+  std::atomic<double> strongest_{0};
+};
+
 }  // namespace
 
 SimulateResult simulateSession(const SimulateOptions& options, const std::function<void(int, int)>& progress) {
@@ -73,12 +116,14 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
   result.problems = recording.problems;
   std::vector<Eigen::Isometry3d> poses;
   for (const Pose& p : recording.poses) poses.push_back(p.T_map_radar);
+  twin.setSession(recording.poses);
   twin.prepare(poses);
 
   const fs::path paths = fs::path(options.output) / "paths";
   fs::create_directories(paths);
   const int count = static_cast<int>(recording.poses.size());
-  std::vector<ComplexGrid> grids(recording.poses.size());
+  std::vector<Simulation> simulated(recording.poses.size());
+  SampleLevels levels(twin.clippedFraction() > 0);
   std::vector<std::string> failures(recording.poses.size());
   std::atomic<int> done{0};
   std::mutex mutex;
@@ -87,7 +132,13 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
     try {
       Simulation s = twin.simulate(pose.T_map_radar, pose.stamp_ns);
       writePathsCsv(s.records, twin.scene(), (paths / (pose.name + ".csv")).string());
-      grids[i] = std::move(s.grid.x);
+      if (twin.hasFrameStage()) {
+        twin.visitChirps(s, options.frames, [&levels](const ChirpContext&, const ComplexGrid& x) { levels.add(x); });
+      } else {
+        levels.add(s.grid.x);
+      }
+      s.records = {};  // of all poses together they are too many; frames that need them trace again
+      simulated[i] = std::move(s);
       const std::lock_guard<std::mutex> lock(mutex);
       result.worst_amplitude_error = std::max(result.worst_amplitude_error, s.check.worst_amplitude_error);
       result.worst_grid_error = std::max(result.worst_grid_error, s.check.grid_error);
@@ -98,22 +149,23 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
     if (progress) progress(now, count);
   });
 
-  double strongest = 0;
-  for (const ComplexGrid& x : grids) {
-    if (x.size() == 0) continue;
-    strongest = std::max({strongest, x.real().cwiseAbs().maxCoeff(), x.imag().cwiseAbs().maxCoeff()});
-  }
   for (int i = 0; i < count; ++i) {
     if (!failures[i].empty())
       result.problems.push_back({recording.poses[i].name, "pose " + recording.poses[i].name + ": " + failures[i]});
   }
-  const bool any = std::any_of(grids.begin(), grids.end(), [](const ComplexGrid& x) { return x.size() > 0; });
+  const bool any =
+      std::any_of(simulated.begin(), simulated.end(), [](const Simulation& s) { return s.grid.x.size() > 0; });
   if (!any) {
     throw InputError(options.session + ": no pose can be simulated" +
                      (result.problems.empty() ? std::string("; poses.csv has none")
                                               : "; the first: " + result.problems.front().message));
   }
-  result.gain_db = strongest > 0 ? kStrongest_dbfs - 20 * std::log10(strongest) : 0;
+  const double strongest = levels.strongest(), clipped = twin.clippedFraction();
+  if (clipped > 0 && strongest > 0) {
+    result.gain_db = -20 * std::log10(levels.exceededBy(clipped));
+  } else {
+    result.gain_db = strongest > 0 ? kStrongest_dbfs - 20 * std::log10(strongest) : 0;
+  }
 
   SessionWriter::Files files;
   files.radar_yaml = toYaml(twin.radar());
@@ -122,15 +174,38 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
   files.gain_db = result.gain_db;
   SessionWriter writer(options.output, twin.radar(), files);
   const double scale = 32768 * std::pow(10.0, result.gain_db / 20);
-  for (int i = 0; i < count; ++i) {
-    if (grids[i].size() == 0) continue;
-    std::vector<AdcCube> cubes(static_cast<std::size_t>(options.frames), makeCube(twin.radar(), grids[i], scale));
-    for (int f = 0; f < options.frames; ++f) {
-      cubes[f].sequence = static_cast<std::uint32_t>(f);
-      cubes[f].stamp_ns = recording.poses[i].stamp_ns + std::llround(f * twin.radar().frame_period_s * 1e9);
+  // Frames of some poses at once, written in order; bounded by what they take.
+  const double bytes_per_pose = static_cast<double>(twin.radar().bytes_per_frame()) * options.frames;
+  const int at_once = static_cast<int>(std::min(16.0, std::max(1.0, 64e6 / bytes_per_pose)));
+  for (int first = 0; first < count; first += at_once) {
+    const int last = std::min(count, first + at_once);
+    std::vector<std::vector<AdcCube>> cubes(static_cast<std::size_t>(last - first));
+    tbb::parallel_for(first, last, [&](int i) {
+      Simulation& s = simulated[i];
+      if (s.grid.x.size() == 0) return;
+      const Pose& pose = recording.poses[i];
+      std::vector<AdcCube>& frames = cubes[static_cast<std::size_t>(i - first)];
+      if (twin.hasFrameStage()) {
+        if (twin.framesNeedRecords()) s = twin.simulate(pose.T_map_radar, pose.stamp_ns);
+        try {
+          frames = twin.simulateFrames(s, {options.frames, result.gain_db, pose.name});
+        } catch (const InputError& e) {
+          throw InputError("pose " + pose.name + ": " + e.what());
+        }
+      } else {
+        frames.assign(static_cast<std::size_t>(options.frames), makeCube(twin.radar(), s.grid.x, scale));
+        for (int f = 0; f < options.frames; ++f) {
+          frames[f].sequence = static_cast<std::uint32_t>(f);
+          frames[f].stamp_ns = pose.stamp_ns + twin.radar().frame_offset_ns(f);
+        }
+      }
+      s = {};
+    });
+    for (int i = first; i < last; ++i) {
+      if (cubes[static_cast<std::size_t>(i - first)].empty()) continue;
+      writer.add(recording.poses[i], cubes[static_cast<std::size_t>(i - first)]);
+      ++result.poses;
     }
-    writer.add(recording.poses[i], cubes);
-    ++result.poses;
   }
   writer.finish();
   std::ofstream resolved(fs::path(options.output) / "twin.resolved.yaml");

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "twin_impl.h"
 
 namespace mmradartwin {
 namespace {
@@ -57,64 +58,6 @@ RecordCheck check(const RadarConfig& radar, const std::vector<PathRecord>& recor
 
 }  // namespace
 
-struct Twin::Impl {
-  TwinDescription description;
-  std::uint64_t seed;
-  Scene scene;  // as described
-  std::unique_ptr<RayCaster> rays;
-  std::unique_ptr<Scene> edited;  // null where no mechanism edits the scene
-  std::unique_ptr<RayCaster> edited_rays;
-  std::vector<std::unique_ptr<Mechanism>> mechanisms;  // by rank
-  double strongest = -1;                               // of the session, where it is known
-  mutable std::atomic<double> strongest_so_far{0};
-  bool has_tone_gain = false, has_receive = false, needs_strongest = false;
-
-  const Scene& model() const { return edited ? *edited : scene; }
-  const RayCaster& modelRays() const { return edited_rays ? *edited_rays : *rays; }
-
-  Eigen::Isometry3d modelPose(const Eigen::Isometry3d& T_map_radar) const {
-    Eigen::Isometry3d T = T_map_radar;
-    for (const auto& m : mechanisms) T = m->pose(T);
-    return T;
-  }
-
-  PoseContext context(const Eigen::Isometry3d& T_map_radar) const {
-    const RadarConfig& radar = description.radar;
-    PoseContext c{radar,
-                  model(),
-                  modelRays(),
-                  modelPose(T_map_radar),
-                  radar.center_frequency_hz(),
-                  radar.max_range_m(),
-                  seed,
-                  [this] { return strongest >= 0 ? strongest : strongest_so_far.load(); },
-                  {}};
-    return c;
-  }
-
-  double toneGain(const PoseContext& c, double length_m) const {
-    double gain = 1;
-    for (const auto& m : mechanisms) {
-      if (m->hasToneGain()) gain *= std::abs(m->toneGain(c, length_m));
-    }
-    return gain;
-  }
-
-  void reweight(const PoseContext& c, std::vector<PathRecord>& records, std::size_t from) const {
-    for (std::size_t i = from; i < records.size(); ++i) {
-      for (const auto& m : mechanisms) m->reweight(c, records[i]);
-    }
-  }
-
-  double strongestOf(const PoseContext& c, const std::vector<PathRecord>& records) const {
-    double best = 0;
-    for (const PathRecord& r : records) {
-      best = std::max(best, has_tone_gain ? r.amplitude * toneGain(c, r.length_m[0]) : r.amplitude);
-    }
-    return best;
-  }
-};
-
 Twin::Twin(TwinDescription description, std::uint64_t seed) : impl_(new Impl) {
   Impl& m = *impl_;
   m.description = std::move(description);
@@ -150,6 +93,12 @@ Twin::Twin(TwinDescription description, std::uint64_t seed) : impl_(new Impl) {
       mechanism->build(m.model(), radar);
       m.has_tone_gain = m.has_tone_gain || mechanism->hasToneGain();
       m.has_receive = m.has_receive || mechanism->hasReceiveStage();
+      m.has_distort = m.has_distort || mechanism->hasDistortStage();
+      m.has_chirp_paths = m.has_chirp_paths || mechanism->hasChirpPaths();
+      m.has_modulation = m.has_modulation || mechanism->hasModulation();
+      m.has_chirp_stage = m.has_chirp_stage || mechanism->hasChirpStage();
+      m.has_digitise = m.has_digitise || mechanism->hasDigitiseStage();
+      m.has_transport = m.has_transport || mechanism->hasTransportStage();
       m.needs_strongest = m.needs_strongest || mechanism->needsStrongestAmplitude();
     }
   } catch (const InputError& e) {
@@ -165,6 +114,19 @@ const RadarConfig& Twin::radar() const { return impl_->description.radar; }
 const Scene& Twin::scene() const { return impl_->scene; }
 const RayCaster& Twin::rays() const { return *impl_->rays; }
 void Twin::setStrongestAmplitude(double amplitude) { impl_->strongest = amplitude; }
+
+void Twin::setSession(const std::vector<Pose>& poses) {
+  impl_->session_ns.clear();
+  for (const Pose& p : poses) impl_->session_ns.push_back(p.stamp_ns);
+  std::sort(impl_->session_ns.begin(), impl_->session_ns.end());
+  for (const auto& m : impl_->mechanisms) {
+    const std::string only = m->onlyPose();
+    if (only.empty() || std::any_of(poses.begin(), poses.end(), [&only](const Pose& p) { return p.name == only; })) {
+      continue;
+    }
+    throw InputError(description().file + ": mechanism " + m->name() + ": key pose: the session has no pose " + only);
+  }
+}
 
 std::vector<std::string> Twin::notes() const {
   std::vector<std::string> notes;
@@ -206,7 +168,7 @@ std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar) const 
 
 Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                        std::int64_t stamp_ns) const {
-  PoseContext c = impl_->context(T_map_radar);
+  PoseContext c = impl_->context(T_map_radar, stamp_ns);
   c.receiver_gain = [this, &c](double length_m) { return impl_->toneGain(c, length_m); };
   Simulation s;
   s.stamp_ns = stamp_ns;
@@ -232,24 +194,12 @@ Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRec
   accumulate(radar, s.records, s.grid.x);
   if (s.records.empty()) s.grid.x = ComplexGrid::Zero(radar.channels(), radar.samples_per_chirp);
   s.check = check(radar, s.records, s.grid.x);
-  s.propagation_only = !impl_->has_tone_gain && !impl_->has_receive;
-  if (impl_->has_tone_gain) {
-    std::vector<PathRecord> filtered = s.records;
-    for (PathRecord& r : filtered) {
-      for (std::size_t k = 0; k < r.c.size(); ++k) {
-        for (const auto& m : impl_->mechanisms) {
-          if (m->hasToneGain()) r.c[k] *= m->toneGain(c, r.length_m[k]);
-        }
-      }
-    }
+  s.propagation_only = !impl_->has_tone_gain && !impl_->has_receive && !impl_->has_distort;
+  if (impl_->has_tone_gain || impl_->has_distort) {
     s.grid.x.setZero();
-    accumulate(radar, filtered, s.grid.x);
+    impl_->propagate(c, impl_->filtered(c, s.records), s.grid.x);
   }
-  if (impl_->has_receive) {
-    for (const auto& m : impl_->mechanisms) {
-      if (m->hasReceiveStage()) m->receive(c, s.grid.x);
-    }
-  }
+  impl_->receive(c, s.grid.x);
   return s;
 }
 

@@ -5,6 +5,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/strict_yaml.h"
+#include "mmradartwin_sim/plugin.h"
 #include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
@@ -141,6 +142,7 @@ std::string TwinDescription::toYaml() const {
 
 TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::string>& default_scene,
                          const RadarConfig& default_radar) {
+  loadMechanismPluginsOfEnvironment();
   TwinDescription twin;
   twin.file = twin_file;
   twin.radar = default_radar;

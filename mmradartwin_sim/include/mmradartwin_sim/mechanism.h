@@ -62,6 +62,28 @@ struct PoseContext {
   std::function<double()> strongest_amplitude;
   /// |gain| of the receiver's filters at a path length: what a level stated after the IF filter has to make up for.
   std::function<double(double length_m)> receiver_gain;
+  /// When the pose was taken: after the session's first pose, and its place among the session's poses in time order.
+  /// Zero, and 0 of 1, where no session is known (Twin::setSession).
+  double session_s = 0;
+  int pose_index = 0, pose_count = 1;
+};
+
+/// One chirp of one frame of a pose, for what differs from chirp to chirp (DESIGN section 3: chirps come as
+/// loop * slots + slot).
+struct ChirpContext {
+  const PoseContext& pose;
+  std::int64_t stamp_ns = 0;  ///< start of the pose's first frame
+  int frame = 0, chirp = 0, slot = 0;
+  double time_s = 0;             ///< centre of the chirp's ADC window after stamp_ns
+  std::uint64_t draw = 0;        ///< key of this chirp's random numbers: seed, stamp, frame and chirp make it
+  std::uint64_t frame_draw = 0;  ///< the same for all chirps of a frame
+};
+
+/// The bytes of one pose on their way from the ADC: frames back to back in the radar's capture layout.
+struct PayloadContext {
+  const RadarConfig& radar;
+  std::string pose;  ///< its name, "" where it has none
+  std::uint64_t draw = 0;
 };
 
 /// One unit of the physical model (DESIGN section 4). Implementations override the stages they act in; all stages are
@@ -92,8 +114,33 @@ class Mechanism {
   virtual void receive(const PoseContext&, ComplexGrid&) const {}  ///< on the propagated grid
   /// True where receive() does something: then the grid is more than its records.
   virtual bool hasReceiveStage() const { return false; }
-  /// True where addPaths() wants strongest_amplitude().
+  /// True where addPaths() or receive() wants strongest_amplitude().
   virtual bool needsStrongestAmplitude() const { return false; }
+  /// Between propagation and receive(), with the paths (as the receiver's filters leave them) that make up the grid.
+  virtual void distort(const PoseContext&, const std::vector<PathRecord>&, ComplexGrid&) const {}
+  virtual bool hasDistortStage() const { return false; }
+
+  // Stages of frames, run for every chirp by Twin::simulateFrames() alone: the grid of a pose is what stays the same.
+  /// Echoes that are there for this chirp only; reweight(), filters and receive() act on them as on any path.
+  virtual void addChirpPaths(const ChirpContext&, std::vector<PathRecord>&) const {}
+  virtual bool hasChirpPaths() const { return false; }
+  /// x [R][N] of one chirp before receive(). delayed [R][N] is the same with every path weighted by its delay in s.
+  virtual void modulateChirp(const ChirpContext&, const ComplexGrid& /*delayed*/, ComplexGrid& /*x*/) const {}
+  virtual bool hasModulation() const { return false; }
+  /// x [R][N] of one chirp after receive(), in units of path amplitude.
+  virtual void changeChirp(const ChirpContext&, ComplexGrid&) const {}
+  virtual bool hasChirpStage() const { return false; }
+  /// x [R][N] of one chirp in units of full scale, before it is rounded to 16 bit and held within full scale.
+  virtual void digitise(const ChirpContext&, ComplexGrid&) const {}
+  virtual bool hasDigitiseStage() const { return false; }
+  /// Share of I and Q values that lie beyond full scale; a session's gain is chosen for it where it is not 0.
+  virtual double clippedFraction() const { return 0; }
+  /// All frames of a pose as bytes. They may be shortened by up to surplusBytes(): so many more are made.
+  virtual void transport(const PayloadContext&, std::vector<std::uint8_t>&) const {}
+  virtual bool hasTransportStage() const { return false; }
+  virtual std::size_t surplusBytes() const { return 0; }
+  /// Name of the one pose that the mechanism concerns, "" for all. A session without it is refused.
+  virtual std::string onlyPose() const { return {}; }
 };
 
 /// Mechanisms are found by name. A user's package registers one from its own plug-in library.

@@ -2,13 +2,16 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "mmradartwin_dsp/adc_cube.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
+#include "mmradartwin_dsp/session.h"
 #include "mmradartwin_sim/mechanism.h"
 #include "mmradartwin_sim/path_record.h"
 #include "mmradartwin_sim/scene.h"
@@ -44,6 +47,13 @@ struct Simulation {
   RecordCheck check;
 };
 
+/// How a pose becomes frames of samples.
+struct FrameOptions {
+  int frames = 1;
+  double gain_db = 0;     ///< sample / 32768 = 10^(gain_db/20) x
+  std::string pose_name;  ///< of mechanisms that concern one pose
+};
+
 /// A twin ready to simulate. simulate() is const and may run for several poses at once; its result depends on pose and
 /// description alone, not on threads.
 class Twin {
@@ -73,7 +83,25 @@ class Twin {
   /// Throws InputError for a pose that is NaN or inside an actor (names it).
   Simulation simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
 
+  /// Names and stamps of the session's poses, for what concerns one of them or changes with time. Without it every pose
+  /// is the first. Throws InputError where a mechanism names a pose that is not among them.
+  void setSession(const std::vector<Pose>& poses);
+  /// True where a mechanism acts on frames, chirps or samples; else all frames are the grid's samples.
+  bool hasFrameStage() const;
+  /// True where simulateFrames() and visitChirps() look at the records; else the grid is all they need.
+  bool framesNeedRecords() const;
+  /// Share of I and Q values that the session's gain is to drive beyond full scale; 0 where no mechanism says so.
+  double clippedFraction() const;
+  /// The frames of a simulated pose, chirp by chirp, sample/32768 = 10^(gain_db/20) x, rounded and held within full
+  /// scale. Depends on pose, stamp and seed alone.
+  std::vector<AdcCube> simulateFrames(const Simulation& pose, const FrameOptions& options) const;
+  /// The same before the converter, in path amplitudes: shows every chirp [R][N]. For levels of a whole session.
+  void visitChirps(const Simulation& pose, int frames,
+                   const std::function<void(const ChirpContext&, const ComplexGrid&)>& visit) const;
+
  private:
+  void forEachChirp(const Simulation& pose, int frames,
+                    const std::function<void(const ChirpContext&, ComplexGrid&)>& visit) const;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

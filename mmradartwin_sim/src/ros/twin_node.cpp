@@ -12,6 +12,7 @@
 #include "mmradartwin_dsp/ros/strict_parameters.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/session_files.h"
+#include "mmradartwin_sim/plugin.h"
 #include "mmradartwin_sim/ros/conversions.h"
 
 namespace mmradartwin {
@@ -62,6 +63,7 @@ TwinNode::~TwinNode() {
 
 void TwinNode::readParameters(const ros::NodeHandle& private_nh) {
   StrictParameters parameters(private_nh);
+  loadMechanismPlugins(parameters.text("plugins", ""), "parameter plugins");
   scene_file_ = parameters.text("scene", "");
   twin_file_ = parameters.text("twin", "");
   radar_file_ = parameters.text("radar", "");

@@ -1,0 +1,9 @@
+#pragma once
+
+#include <class_loader/register_macro.hpp>
+
+#include "mmradartwin_sim/mechanism.h"
+
+/// Makes a mechanism of a plug-in library known; once per class, at global scope of a .cpp. The class needs a default
+/// constructor; twin.yaml calls it by what its name() returns.
+#define MMRADARTWIN_REGISTER_MECHANISM(Class) CLASS_LOADER_REGISTER_CLASS(Class, mmradartwin::Mechanism)

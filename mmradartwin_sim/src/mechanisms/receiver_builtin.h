@@ -1,0 +1,46 @@
+#pragma once
+
+#include <memory>
+
+#include "builtin.h"
+
+namespace mmradartwin {
+
+// Makers of the mechanisms of receiver, array and frames, each defined in the file that bears its name.
+std::unique_ptr<Mechanism> makeIfLowpass();
+std::unique_ptr<Mechanism> makeIqConjugation();
+std::unique_ptr<Mechanism> makeChannelConjugation();
+std::unique_ptr<Mechanism> makeChannelPermutation();
+std::unique_ptr<Mechanism> makeMutualCoupling();
+std::unique_ptr<Mechanism> makeIqImbalance();
+std::unique_ptr<Mechanism> makeDcOffset();
+std::unique_ptr<Mechanism> makeSecondHarmonic();
+std::unique_ptr<Mechanism> makeChirpNonlinearity();
+std::unique_ptr<Mechanism> makeGainDrift();
+std::unique_ptr<Mechanism> makeMovingTarget();
+std::unique_ptr<Mechanism> makePhaseNoise();
+std::unique_ptr<Mechanism> makePhaseDrift();
+std::unique_ptr<Mechanism> makeInterference();
+std::unique_ptr<Mechanism> makeNoiseFloor();
+std::unique_ptr<Mechanism> makeAdcSaturation();
+std::unique_ptr<Mechanism> makeQuantisation();
+std::unique_ptr<Mechanism> makePacketLoss();
+std::unique_ptr<Mechanism> makePacketMisalignment();
+
+/// A list; an empty one stands for: not given.
+inline ParameterSpec optionalListSpec(const char* name, const char* unit, double min, double max, const char* meaning) {
+  ParameterSpec s = numberSpec(name, unit, min, max, meaning);
+  s.kind = ParameterKind::kNumbers;
+  s.required = false;
+  s.default_value = std::vector<double>();
+  return s;
+}
+
+inline ParameterSpec integerSpec(const char* name, const char* unit, double min, double max, double default_value,
+                                 const char* meaning) {
+  ParameterSpec s = numberSpec(name, unit, min, max, default_value, meaning);
+  s.kind = ParameterKind::kInteger;
+  return s;
+}
+
+}  // namespace mmradartwin

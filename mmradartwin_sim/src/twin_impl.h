@@ -1,0 +1,109 @@
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "mmradartwin_sim/twin.h"
+
+namespace mmradartwin {
+
+struct Twin::Impl {
+  TwinDescription description;
+  std::uint64_t seed;
+  Scene scene;  // as described
+  std::unique_ptr<RayCaster> rays;
+  std::unique_ptr<Scene> edited;  // null where no mechanism edits the scene
+  std::unique_ptr<RayCaster> edited_rays;
+  std::vector<std::unique_ptr<Mechanism>> mechanisms;  // by rank
+  double strongest = -1;                               // of the session, where it is known
+  mutable std::atomic<double> strongest_so_far{0};
+  bool has_tone_gain = false, has_receive = false, has_distort = false, needs_strongest = false;
+  bool has_chirp_paths = false, has_modulation = false, has_chirp_stage = false, has_digitise = false,
+       has_transport = false;
+  std::vector<std::int64_t> session_ns;  // stamps of the session's poses in order of time
+
+  const Scene& model() const { return edited ? *edited : scene; }
+  const RayCaster& modelRays() const { return edited_rays ? *edited_rays : *rays; }
+
+  Eigen::Isometry3d modelPose(const Eigen::Isometry3d& T_map_radar) const {
+    Eigen::Isometry3d T = T_map_radar;
+    for (const auto& m : mechanisms) T = m->pose(T);
+    return T;
+  }
+
+  PoseContext context(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const {
+    const RadarConfig& radar = description.radar;
+    PoseContext c{radar,
+                  model(),
+                  modelRays(),
+                  modelPose(T_map_radar),
+                  radar.center_frequency_hz(),
+                  radar.max_range_m(),
+                  seed,
+                  [this] { return strongest >= 0 ? strongest : strongest_so_far.load(); },
+                  {}};
+    if (!session_ns.empty()) {
+      c.session_s = static_cast<double>(stamp_ns - session_ns.front()) * 1e-9;
+      c.pose_count = static_cast<int>(session_ns.size());
+      c.pose_index =
+          static_cast<int>(std::lower_bound(session_ns.begin(), session_ns.end(), stamp_ns) - session_ns.begin());
+    }
+    return c;
+  }
+
+  double toneGain(const PoseContext& c, double length_m) const {
+    double gain = 1;
+    for (const auto& m : mechanisms) {
+      if (m->hasToneGain()) gain *= std::abs(m->toneGain(c, length_m));
+    }
+    return gain;
+  }
+
+  void reweight(const PoseContext& c, std::vector<PathRecord>& records, std::size_t from) const {
+    for (std::size_t i = from; i < records.size(); ++i) {
+      for (const auto& m : mechanisms) m->reweight(c, records[i]);
+    }
+  }
+
+  /// Paths as the receiver's filters leave them; the same records where there are no filters.
+  std::vector<PathRecord> filtered(const PoseContext& c, std::vector<PathRecord> records) const {
+    if (!has_tone_gain) return records;
+    for (PathRecord& r : records) {
+      for (std::size_t k = 0; k < r.c.size(); ++k) {
+        for (const auto& m : mechanisms) {
+          if (m->hasToneGain()) r.c[k] *= m->toneGain(c, r.length_m[k]);
+        }
+      }
+    }
+    return records;
+  }
+
+  /// Grid of filtered paths before receive().
+  void propagate(const PoseContext& c, const std::vector<PathRecord>& filtered_paths, ComplexGrid& x) const {
+    accumulate(c.radar, filtered_paths, x);
+    if (!has_distort) return;
+    for (const auto& m : mechanisms) {
+      if (m->hasDistortStage()) m->distort(c, filtered_paths, x);
+    }
+  }
+
+  void receive(const PoseContext& c, ComplexGrid& x) const {
+    if (!has_receive) return;
+    for (const auto& m : mechanisms) {
+      if (m->hasReceiveStage()) m->receive(c, x);
+    }
+  }
+
+  double strongestOf(const PoseContext& c, const std::vector<PathRecord>& records) const {
+    double best = 0;
+    for (const PathRecord& r : records) {
+      best = std::max(best, has_tone_gain ? r.amplitude * toneGain(c, r.length_m[0]) : r.amplitude);
+    }
+    return best;
+  }
+};
+
+}  // namespace mmradartwin

@@ -1,0 +1,2 @@
+// A library that brings no mechanism.
+extern "C" int mmradartwinEmptyPlugin() { return 0; }
