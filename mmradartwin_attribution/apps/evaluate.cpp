@@ -49,6 +49,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
     std::vector<Eigen::Isometry3d> poses;
     for (const Pose& pose : recording.poses) poses.push_back(pose.T_map_radar);
     twin.prepare(poses);
+    twin.setSession(recording.poses);
     simulated = simulatedByTwin(twin);
   } else {
     other = open(arguments.simulated, arguments);
