@@ -59,6 +59,7 @@ while kill -0 "$launch" 2>/dev/null; do
 done
 wait "$launch" || true
 launch=
+say "the session was played to its end (roslaunch calls that the death of session_player; all is well)"
 
 bag=$out/demo.bag
 [ -f "$bag" ] || { printf 'error: %s was not recorded; the messages above say why\n' "$bag" >&2; exit 1; }

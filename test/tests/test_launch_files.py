@@ -10,6 +10,7 @@ import tempfile
 import time
 import unittest
 
+import numpy
 import rosbag
 import rosgraph
 
@@ -112,7 +113,8 @@ class LaunchFiles(unittest.TestCase):
             self.assertNotIn("/driver", nodes)
             sim_time = rosgraph.Master("/test", launched.environment["ROS_MASTER_URI"]).getParam("/use_sim_time")
             self.assertTrue(sim_time)
-            counts = launched.record(["/attribution/residuals", "/twin/paths", "/radar/range_angle"], 6, self.path("replayed.bag"))
+            counts = launched.record(["/attribution/residuals", "/twin/paths", "/twin/grid", "/radar/config", "/radar/range_angle"],
+                                     6, self.path("replayed.bag"))
             self.assertGreater(counts.get("/radar/range_angle", 0), 40)
             self.assertGreater(counts.get("/attribution/residuals", 0), 40)
             # Nothing is stamped with the wall clock: stamps lie within the bag's.
@@ -121,6 +123,32 @@ class LaunchFiles(unittest.TestCase):
             with rosbag.Bag(self.path("replayed.bag")) as bag:
                 for _, message, _ in bag.read_messages("/radar/range_angle"):
                     self.assertTrue(first - 1 <= message.header.stamp.to_sec() <= last + 1)
+
+        with rosbag.Bag(self.path("replayed.bag")) as bag:
+            radar = next(message for _, message, _ in bag.read_messages("/radar/config"))
+            paths = [message for _, message, _ in bag.read_messages("/twin/paths")]
+            grids = [message for _, message, _ in bag.read_messages("/twin/grid")]
+        self.check_records(radar, paths, grids)
+
+    def check_records(self, radar, paths, grids):
+        """The published grid is the sum of the published records, and sum|c|^2 = M A^2 (DESIGN section 4), within 1e-6."""
+        samples, rate = radar.samples_per_chirp, radar.sample_rate_hz
+        from_center_s = numpy.arange(samples) / rate - samples / (2 * rate)
+        compared = 0
+        for message in paths:
+            grid = next((g for g in grids if g.T_map_radar == message.T_map_radar), None)
+            if grid is None:
+                continue
+            amplitude = numpy.array([r.amplitude for r in message.records])
+            c = numpy.array([numpy.array(r.c_re) + 1j * numpy.array(r.c_im) for r in message.records])
+            length_m = numpy.array([r.length_m for r in message.records])
+            numpy.testing.assert_allclose((numpy.abs(c) ** 2).sum(1), grid.channels * amplitude ** 2, rtol=1e-6)
+            turns = radar.slope_hz_per_s * length_m[:, :, None] / 299792458.0 * from_center_s
+            rebuilt = (c[:, :, None] * numpy.exp(2j * numpy.pi * turns)).sum(0)
+            published = numpy.array(grid.data).view(complex).reshape(grid.channels, grid.samples)
+            self.assertLess(numpy.linalg.norm(published - rebuilt), 1e-6 * numpy.linalg.norm(rebuilt))
+            compared += 1
+        self.assertGreater(compared, 0)
 
     def test_inspect_shows_stored_results(self):
         with Launched("inspect.launch", "results:=" + self.results, "rviz:=false") as launched:
