@@ -14,9 +14,9 @@
 #include "../emulator/played_session.h"
 #include "../emulator/pose_schedule.h"
 #include "mmradartwin_driver/ros/live_session_message.h"
-#include "mmradartwin_driver/ros/private_parameters.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/strict_parameters.h"
 
 namespace mmradartwin {
 namespace {
@@ -24,7 +24,7 @@ namespace {
 class SessionPlayer {
  public:
   SessionPlayer() {
-    PrivateParameters parameters(ros::NodeHandle("~"));
+    StrictParameters parameters(ros::NodeHandle("~"));
     session_path_ = parameters.requiredText("session", "a session directory");
     card_ip_ = parameters.text("card_ip", "127.0.0.2");
     host_ip_ = parameters.text("host_ip", "127.0.0.1");

@@ -5,9 +5,9 @@
 #include <cstdio>
 
 #include "mmradartwin_driver/capture_link.h"
-#include "mmradartwin_driver/ros/private_parameters.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/strict_parameters.h"
 #include "mmradartwin_dsp/session.h"
 
 namespace mmradartwin {
@@ -39,7 +39,7 @@ std::string seconds(double value_s) {
 
 RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : updater_(nh, private_nh, ros::this_node::getName()), diagnosed_at_(ros::WallTime::now()) {
-  PrivateParameters parameters(private_nh);
+  StrictParameters parameters(private_nh);
   const std::string radar_file = parameters.requiredText("radar", "the path of the device's radar.yaml");
   options_.host_ip = parameters.text("host_ip", options_.host_ip);
   options_.card_ip = parameters.text("card_ip", options_.card_ip);

@@ -15,8 +15,8 @@ struct StoredFile {
 /// the YAML keys file, materials, mesh, poses, radar, scene and twin; `mtllib` and textures of OBJ files; buffers and
 /// images of glTF. Captures are not among them. session.yaml comes first.
 ///
-/// Files outside of the directory (package://, absolute, ../) get the names external/package/PKG/..., external/root/...
-/// and external/session/up/.... Throws InputError for a YAML reference that leads nowhere.
+/// Files outside of the directory get names below external/: package/PKG/... for package://, root/... for absolute
+/// paths, session/up/... for ../. Throws InputError for a YAML reference that leads nowhere.
 std::vector<StoredFile> gatherSessionFiles(const std::string& session_file);
 
 /// Where a session's captures stand relative to its directory, with {pose} for the name: as its session.yaml says, or

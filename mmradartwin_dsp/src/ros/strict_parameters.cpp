@@ -84,6 +84,12 @@ std::string StrictParameters::text(const std::string& name, const std::string& d
   return text;
 }
 
+std::string StrictParameters::requiredText(const std::string& name, const std::string& what) {
+  const std::string value = text(name, "");
+  if (value.empty()) fail(name, "is missing: set it to " + what);
+  return value;
+}
+
 void StrictParameters::rejectUnknown() const {
   std::vector<std::string> names;
   nh_.getParamNames(names);

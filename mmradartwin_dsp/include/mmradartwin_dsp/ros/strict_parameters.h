@@ -18,6 +18,8 @@ class StrictParameters {
   bool boolean(const std::string& name, bool default_value);
   /// Not empty unless the default is.
   std::string text(const std::string& name, const std::string& default_value);
+  /// A text that must be given; `what` says in the error what to set it to.
+  std::string requiredText(const std::string& name, const std::string& what);
   /// Throws for the first parameter below the node's name that was never asked for.
   void rejectUnknown() const;
 
