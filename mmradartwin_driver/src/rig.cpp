@@ -234,7 +234,9 @@ bool Rig::handleStatus(std::uint16_t status) {
     return true;
   }
   if (status & kRecordCompleted) {
-    events_(Level::kInfo, "the card has completed its recording: the radar's frames have ended");
+    // Frames that this rig started run until it stops them.
+    events_(watch_ ? Level::kWarning : Level::kInfo,
+            "the card has completed its recording: the radar's frames have ended");
     // The last packets may be behind the status.
     while (receiveBatch(20) && !stop_) {
     }

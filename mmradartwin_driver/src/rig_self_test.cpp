@@ -19,6 +19,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kPatternSamples = 1024;
 constexpr std::size_t kLanes = 4;
 constexpr std::uint16_t kTargetLevel = 120;  ///< -12 dBFS
+constexpr double kAboveNoise_db = 20;
 constexpr double kAzimuthTolerance_rad = 8 * kPi / 180;
 
 /// Sample n of a ramp.
@@ -212,7 +213,13 @@ CheckResult judgeTestSource(const RadarConfig& radar, const std::vector<std::uin
     return result;
   }
   const RangeAngleMap map = chain.map(average.grid());
-  const double strongest_db = map.power_db.array().isFinite().select(map.power_db.array(), -400).maxCoeff();
+  std::vector<double> levels_db;
+  for (Eigen::Index i = 0; i < map.power_db.size(); ++i) {
+    if (std::isfinite(map.power_db.data()[i])) levels_db.push_back(map.power_db.data()[i]);
+  }
+  const auto middle = levels_db.begin() + static_cast<std::ptrdiff_t>(levels_db.size() / 2);
+  std::nth_element(levels_db.begin(), middle, levels_db.end());
+  const double median_db = *middle, strongest_db = *std::max_element(levels_db.begin(), levels_db.end());
   // Swapped I and Q conjugate the samples: ranges are mirrored, and angles too. Reversed lanes mirror the angles alone.
   struct Place {
     bool far, other_side;
@@ -234,7 +241,8 @@ CheckResult judgeTestSource(const RadarConfig& radar, const std::vector<std::uin
   const Place& best = *std::max_element(places.begin(), places.end(),
                                         [](const Place& a, const Place& b) { return a.level_db < b.level_db; });
   result.level = CheckResult::Level::kProblem;
-  if (best.level_db < strongest_db - 6) {
+  // Two equal targets stand as high as anything, and far above the rest; the strongest of noise does not.
+  if (best.level_db < strongest_db - 6 || best.level_db < median_db + kAboveNoise_db) {
     result.found = text("the chip's two targets are not in the samples (%.0f dB where they should be, strongest %.0f dB)",
                         places.front().level_db, strongest_db);
     result.next = "check slope, sample rate and rx_position_m in radar.yaml, and the lane pattern above";
