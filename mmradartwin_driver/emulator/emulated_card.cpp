@@ -2,6 +2,8 @@
 
 #include <arpa/inet.h>
 #include <poll.h>
+#include <pthread.h>
+#include <sched.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <time.h>
@@ -166,6 +168,9 @@ bool EmulatedCard::sleepUntil(std::int64_t monotonic_ns) {
 
 void EmulatedCard::lvdsThread() {
   prctl(PR_SET_TIMERSLACK, 1UL);  // sleep to the microsecond
+  // The card is hardware: it does not wait for this host's other work. Without the right to that it does.
+  const sched_param priority{1};
+  pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
   const std::int64_t flush_ns = std::llround(options_.flush_s * 1e9);
   std::int64_t last_sample_ns = 0;
   LvdsFrame frame;
@@ -184,7 +189,8 @@ void EmulatedCard::lvdsThread() {
     if (!radar_.over() || (sending_ != 0 && !idle)) continue;
     log_("completed packets=" + std::to_string(sent_.packets) + " bytes=" + std::to_string(bytes_sent_) +
          " lost=" + std::to_string(sent_.lost) + " duplicated=" + std::to_string(sent_.duplicated) +
-         " reordered=" + std::to_string(sent_.reordered) + " truncated=" + std::to_string(sent_.truncated));
+         " reordered=" + std::to_string(sent_.reordered) + " truncated=" + std::to_string(sent_.truncated) +
+         " own_late_us=" + std::to_string(own_late_ns_ / 1000));
     completed_ = true;
     return;
   }
@@ -238,10 +244,12 @@ void EmulatedCard::sendFull(std::int64_t available_ns) {
     }
     // By the schedule, not by when the last one really went out: this host's delays must not add up.
     last_sent_ns_ = std::max(available_ns, last_sent_ns_ + interval_ns);
-    if (!sleepUntil(last_sent_ns_ + noise_ns())) {
+    const std::int64_t leaves_ns = last_sent_ns_ + noise_ns();
+    if (!sleepUntil(leaves_ns)) {
       sending_ = 0;
       return;
     }
+    own_late_ns_ = std::max(own_late_ns_, clock_ns(CLOCK_MONOTONIC) - leaves_ns);
     sendData(payload);
   }
 }

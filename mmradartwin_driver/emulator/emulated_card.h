@@ -86,6 +86,7 @@ class EmulatedCard {
   std::uint64_t bytes_sent_ = 0;
   std::vector<std::uint8_t> held_;  ///< bytes waiting for a full payload
   std::int64_t last_sent_ns_ = 0;
+  std::int64_t own_late_ns_ = 0;  ///< the most that this host, not the noise asked for, made a packet late
   struct Delayed {
     std::vector<std::uint8_t> datagram;
     int overtakers;

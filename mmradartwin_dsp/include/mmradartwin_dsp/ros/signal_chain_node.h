@@ -4,11 +4,15 @@
 #include <mmradartwin_msgs/RadarConfig.h>
 #include <mmradartwin_msgs/ReceiveGrid.h>
 #include <ros/ros.h>
+#include <tf2_msgs/TFMessage.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
 
 #include <deque>
+#include <map>
 #include <optional>
+#include <set>
+#include <string>
 
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/range_angle.h"
