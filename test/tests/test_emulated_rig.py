@@ -53,7 +53,7 @@ class Rig(Launched):
     def text(self):
         return re.sub(r"\x1b\[[0-9;]*m", "", super().text())
 
-    def wait_for_text(self, text, count=1, seconds=120):
+    def wait_for_text(self, text, count=1, seconds=240):
         deadline = time.time() + seconds
         while time.time() < deadline:
             if self.text().count(text) >= count:
@@ -70,6 +70,10 @@ class Rig(Launched):
 
     def network_is_there(self):
         return os.path.exists("/sys/class/net/" + self.interface)
+
+    def played(self):
+        """(poses, frames) of the session that the emulator plays: without repeated poses."""
+        return tuple(map(int, re.search(r"ready poses=(\d+) frames=(\d+)", self.text()).groups()))
 
     def runs(self):
         """[(ns of the first frame's start, session frame)] of the radar's runs, from the emulator's own account."""
@@ -93,7 +97,7 @@ class EmulatedRig(unittest.TestCase):
         cls.session = os.path.join(cls.folder, "session")
         subprocess.run([find_program("mmradartwin_tests", "make_session.py"), "--output", cls.session, "--locations",
                         str(POSES), "--headings", "1", "--frames", str(FRAMES), "--seed", "31"],
-                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=300)
+                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=600)
 
     @classmethod
     def tearDownClass(cls):
@@ -108,7 +112,7 @@ class EmulatedRig(unittest.TestCase):
         core = subprocess.Popen(["roscore", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                                 env=dict(os.environ, ROS_MASTER_URI=uri, ROS_IP="127.0.0.1"))
         self.addCleanup(lambda: core.poll() is None and core.kill())
-        self.assertTrue(wait_until(lambda: rosgraph.is_master_online(uri), 60), "roscore does not start")
+        self.assertTrue(wait_until(lambda: rosgraph.is_master_online(uri), 240), "roscore does not start")
         return core
 
     def recorder(self, rig, bag, *topics):
@@ -132,7 +136,7 @@ class EmulatedRig(unittest.TestCase):
             recorder = self.recorder(rig, "faults.bag", "/radar/adc", "/radar/config", "/diagnostics", "/tf", "/tf_static",
                                      "/twin/grid", "/attribution/residuals")
             self.addCleanup(lambda: recorder.poll() is None and recorder.kill())
-            rig.wait_for_nodes({"/faults"}, 60)
+            rig.wait_for_nodes({"/faults"}, 240)
             time.sleep(6)
 
             rig.do("usb out")
@@ -171,16 +175,16 @@ class EmulatedRig(unittest.TestCase):
             rig.wait_for_text("registered anew", 4)
             later = self.recorder(rig, "later.bag", "/radar/adc", "/radar/config")
             self.addCleanup(lambda: later.poll() is None and later.kill())
-            rig.wait_for_nodes({"/later"}, 60)
+            rig.wait_for_nodes({"/later"}, 240)
             time.sleep(5)
             self.stop(later)
             self.stop(recorder)
-            text, runs = rig.text(), rig.runs()
+            text, runs, played = rig.text(), rig.runs(), rig.played()
         self.assertNotIn("error: radar:", text)  # no violation of its protocol, as the emulated chip sees it
-        self.assertTrue(wait_until(lambda: not rig.network_is_there(), 20), "the emulated network was left behind")
+        self.assertTrue(wait_until(lambda: not rig.network_is_there(), 60), "the emulated network was left behind")
         self.assertGreaterEqual(len(runs), 5)
         self.check_diagnostics()
-        self.check_frames(runs)
+        self.check_frames(runs, *played)
         with rosbag.Bag(self.path("later.bag")) as bag:
             counts = {topic: info.message_count for topic, info in bag.get_type_and_topic_info().topics.items()}
         self.assertGreater(counts.get("/radar/adc", 0), 10, "nobody who came after the master's restart found the frames")
@@ -206,17 +210,17 @@ class EmulatedRig(unittest.TestCase):
                             f"{task} never said \"{part}\" at level {level}: {sorted(said)}")
         self.assertTrue(any(t == "radar device" and v > 0 and "event: " in m for t, v, m in said), sorted(said))
 
-    def check_frames(self, runs):
+    def check_frames(self, runs, played_poses, total):
         """Every whole frame is one of the session's, counted from a start of the radar and stamped with its time."""
         with open(os.path.join(self.session, "poses.csv")) as file:
-            rows = [line.strip().split(",") for line in file][1:]
+            rows = [line.strip().split(",") for line in file][1:played_poses + 1]
         names = [row[0] for row in rows]
         content = {}
         for pose, name in enumerate(names):
             raw = numpy.fromfile(os.path.join(self.session, "captures", name + ".bin"), "<i2")
             for i, frame in enumerate(raw.reshape(-1, 2, 64, 2, 4).transpose(0, 1, 2, 4, 3)):
                 content[frame.tobytes()] = pose * FRAMES + i
-        total = len(content)
+        self.assertEqual(len(content), total)
         whole, poses = 0, []
         with rosbag.Bag(self.path("faults.bag")) as bag:
             for _, message, _ in bag.read_messages("/radar/adc"):
@@ -250,11 +254,11 @@ class EmulatedRig(unittest.TestCase):
 
     def test_nothing_is_left_where_it_is_killed(self):
         with Rig(self.folder, self.session, None) as rig:
-            self.assertTrue(wait_until(rig.network_is_there, 120), rig.text()[-2000:])
+            self.assertTrue(wait_until(rig.network_is_there, 240), rig.text()[-2000:])
             # As a machine that runs out of memory would.
             for pid in processes("emulated_rig", self.session):
                 os.kill(pid, signal.SIGKILL)
-            self.assertTrue(wait_until(lambda: not rig.network_is_there(), 30), "the emulated network was left behind")
+            self.assertTrue(wait_until(lambda: not rig.network_is_there(), 60), "the emulated network was left behind")
 
 
 if __name__ == "__main__":
