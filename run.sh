@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# mmradartwin's commands: ./run.sh demo | test | setup | build | bench | lint | exec CMD...
+# mmradartwin's commands: ./run.sh demo | test | setup | build | bench | fuzz | tsan | lint | exec CMD...
 set -euo pipefail
 
 root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
