@@ -170,6 +170,25 @@ TEST_F(SceneTest, SurvivesDamagedFiles) {
   EXPECT_GT(loaded, 0);
 }
 
+// Walls are open surfaces and furniture runs into walls: neither is an error, and neither may upset the tracing.
+TEST_F(SceneTest, TracesOpenAndSelfIntersectingSurfaces) {
+  addPolygons("bowtie", "Metal", {V(4, -1, -1), V(4, 1, 1), V(4, 1, -1), V(4, -1, 1)}, {{0, 1, 2, 3}});
+  addPolygons("crossed", "RoughMetal",
+              {V(3, -1, -1), V(3, 1, -1), V(3, 1, 1), V(3, -1, 1), V(2, 0, -1), V(4, 0, -1), V(4, 0, 1), V(2, 0, 1)},
+              {{0, 1, 2, 3}, {4, 5, 6, 7}});
+  addPolygons("open_box", "Concrete", {V(5, 1, 0), V(6, 1, 0), V(6, 2, 0), V(5, 2, 0), V(5, 1, 1), V(6, 1, 1)},
+              {{0, 1, 5, 4}, {0, 1, 2, 3}});
+  addPolygons("folded_back", "Concrete", {V(5, -2, 0), V(6, -2, 0), V(6, -2, 1), V(5, -2, 1)},
+              {{0, 1, 2, 3}, {3, 2, 1, 0}});
+  Twin twin = makeTwin(writeScene(), "  specular: {}\n  corner: {}\n  diffuse: {}\n  edge_diffraction: {level: 1}\n");
+  for (double y : {-1.5, 0.0, 0.3}) {
+    const Simulation s = twin.simulate(radarPose(0, y, 0.2));
+    EXPECT_FALSE(s.records.empty());
+    EXPECT_TRUE(s.check.ok());
+    for (const PathRecord& r : s.records) EXPECT_TRUE(std::isfinite(r.amplitude) && std::isfinite(r.length_m[0]));
+  }
+}
+
 TEST_F(SceneTest, ChecksTheMaterialsBand) {
   write("materials.yaml",
         "materials: {Carpet: {model: dielectric, relative_permittivity: 2, valid_hz: [1.0e+9, 40.0e+9]}}\n");
