@@ -212,6 +212,33 @@ std::vector<PathRecord> Twin::receivedPaths(const Eigen::Isometry3d& T_map_radar
 
 bool Twin::hasReceiveStage() const { return impl_->has_receive || impl_->has_distort; }
 
+std::optional<Eigen::MatrixXcd> Twin::channelMatrix(const Eigen::Isometry3d& T_map_radar,
+                                                    std::int64_t stamp_ns) const {
+  if (impl_->has_distort) return std::nullopt;
+  const PoseContext c = impl_->context(T_map_radar, stamp_ns);
+  const int channels = c.radar.channels(), samples = c.radar.samples_per_chirp;
+  const auto answer = [&](int channel, double cycles) {
+    ComplexGrid x = ComplexGrid::Zero(channels, samples);
+    for (int n = 0; channel >= 0 && n < samples; ++n) x(channel, n) = std::polar(1.0, 2 * M_PI * cycles * n / samples);
+    impl_->receive(c, x);
+    return x;
+  };
+  if (!answer(-1, 0).isZero(0)) return std::nullopt;
+  Eigen::MatrixXcd matrix(channels, channels);
+  constexpr double kCycles[] = {3.3, 17.9};  // a tone that comes back changed, or that another one changes, shows here
+  for (int k = 0; k < channels; ++k) {
+    for (double cycles : kCycles) {
+      const ComplexGrid x = answer(k, cycles);
+      if (cycles == kCycles[0]) matrix.col(k) = x.col(0);
+      for (int n = 0; n < samples; ++n) {
+        const std::complex<double> tone = std::polar(1.0, 2 * M_PI * cycles * n / samples);
+        if ((x.col(n) - matrix.col(k) * tone).norm() > 1e-9 * (1 + matrix.col(k).norm())) return std::nullopt;
+      }
+    }
+  }
+  return matrix;
+}
+
 Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                        std::int64_t stamp_ns) const {
   PoseContext c = impl_->context(T_map_radar, stamp_ns);

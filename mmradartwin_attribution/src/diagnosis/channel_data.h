@@ -14,11 +14,11 @@ namespace mmradartwin {
 /// What the diagnosis knows of one pose: windowed range spectra of its coherent average, as complex channels.
 struct PoseChannels {
   Pose pose;
-  int location = 0;          ///< index of its place, for what is held out
+  int location = 0;  ///< index of its place, for what is held out
   int frames = 0;
-  ReceiveGrid grid;          ///< the average itself
-  Eigen::MatrixXcd y;        ///< [M][N] range spectra over the window's sum and full scale: a tone's own amplitude
-  double noise_power = 0;    ///< thermal power in a cell of y, from the scatter of the frames; 0 for a single frame
+  ReceiveGrid grid;        ///< the average itself
+  Eigen::MatrixXcd y;      ///< [M][N] range spectra over the window's sum and full scale: a tone's own amplitude
+  double noise_power = 0;  ///< thermal power in a cell of y, from the scatter of the frames; 0 for a single frame
 };
 
 struct ChannelData {

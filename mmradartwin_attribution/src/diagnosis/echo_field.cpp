@@ -88,6 +88,13 @@ EchoGroup& EchoCollector::group(const std::vector<int>& actors) {
 void EchoCollector::outer(const std::complex<double>* c, double cosine,
                           std::vector<std::complex<float>>& packed) const {
   packed.resize(size_);
+  if (cosine == 0) {  // no direction to be wrong about
+    std::size_t i = 0;
+    for (int k = 0; k < channels_; ++k) {
+      for (int l = 0; l <= k; ++l) packed[i++] = std::complex<float>(c[k] * std::conj(c[l]));
+    }
+    return;
+  }
   const double spread = 0.5 * cosine * cosine * angle_error_rad_ * angle_error_rad_;
   std::size_t i = 0;
   for (int k = 0; k < channels_; ++k) {
@@ -103,7 +110,7 @@ void EchoCollector::add(const PathRecord& record, bool weak) {
   EchoGroup& g = group(record.actors);
   const double cosine = pathCosine(record), place = 0.5 * meanLength_m(record) / bin_m_;
   std::vector<std::complex<float>> packed;
-  outer(record.c.data(), cosine, packed);
+  outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error drowns in the others
   const int reach = weak ? kLobe : kSkirt, middle = static_cast<int>(std::lround(place));
   for (int r = std::max(0, middle - reach); r <= std::min(samples_ - 1, middle + reach); ++r) {
     const double w = hannResponse(r - place), slope = -hannSlope(r - place) / bin_m_;

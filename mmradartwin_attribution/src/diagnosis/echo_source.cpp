@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/range_angle.h"
@@ -12,12 +13,15 @@
 namespace mmradartwin {
 namespace {
 
-// Paths below this share of the pose's strongest echo's power are summed by place before a receiver sees them, and reach
-// no further than their main lobe.
+// Paths below this share of the pose's strongest echo's power are summed by place before a receiver sees them, and
+// reach no further than their main lobe.
 constexpr double kWeakPower = 1e-3;
 // A path whose amplitude changes by less than this share within the pose's accuracy does not graze anything.
 constexpr double kSteady = 0.02;
-constexpr double kAngleCell = 1.0 / 16;  // of sin(azimuth), when weak paths are summed
+constexpr double kReceiverSine = 1.0 / 16;  // of sin(azimuth), where weak paths go through the receiver together
+// Scatter points of a surface, thousands a pose, are summed over cells that are small beside what the radar resolves.
+constexpr std::size_t kCloud = 300;
+constexpr double kCloudBins = 0.25, kCloudSine = 1.0 / 32;
 
 std::string keyOf(const std::vector<NamedParameters>& geometry) {
   std::string key;
@@ -25,22 +29,20 @@ std::string keyOf(const std::vector<NamedParameters>& geometry) {
   return key;
 }
 
-/// Weak paths of one cell of range, direction and actors become one with their power.
-std::vector<PathRecord> merged(const RadarConfig& radar, std::vector<PathRecord> records) {
-  double strongest = 0;
-  for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude * r.amplitude);
-  std::map<std::pair<std::vector<int>, std::pair<int, int>>, std::pair<std::size_t, double>> cells;
+/// Paths of one cell of range, direction and actors become one with their power; those for which `keep` holds stay.
+template <typename Keep>
+std::vector<PathRecord> merged(std::vector<PathRecord> records, double range_cell_m, double sine_cell, Keep keep) {
+  std::map<std::tuple<std::vector<int>, int, int>, std::pair<std::size_t, double>> cells;
   std::vector<PathRecord> result;
   for (PathRecord& r : records) {
-    const double power = r.amplitude * r.amplitude;
-    if (power > kWeakPower * strongest) {
+    if (keep(r)) {
       result.push_back(std::move(r));
       continue;
     }
-    const int direction = static_cast<int>(std::floor(0.5 * (r.departure.y() + r.arrival.y()) / kAngleCell));
-    const auto key = std::make_pair(r.actors, std::make_pair(rangeBin(radar, r.length_m[0]), direction));
-    const auto [at, fresh] = cells.try_emplace(key, result.size(), 0.0);
-    at->second.second += power;
+    const int direction = static_cast<int>(std::floor(0.5 * (r.departure.y() + r.arrival.y()) / sine_cell));
+    const int range = static_cast<int>(std::floor(0.5 * r.length_m[0] / range_cell_m));
+    const auto [at, fresh] = cells.try_emplace({r.actors, range, direction}, result.size(), 0.0);
+    at->second.second += r.amplitude * r.amplitude;
     if (fresh) result.push_back(std::move(r));
   }
   for (const auto& [key, cell] : cells) {
@@ -112,6 +114,10 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
                                    });
                                  }),
                   records.end());
+    if (records.size() > kCloud) {
+      records = merged(std::move(records), kCloudBins * base_.radar().range_bin_m(), kCloudSine,
+                       [](const PathRecord& r) { return r.bounces != 1; });
+    }
     entry.paths[i] = std::move(records);
     entry.known[i] = 1;
   });
@@ -132,9 +138,8 @@ void EchoSource::findGraze(const std::vector<NamedParameters>& mechanisms) {
     EchoCollector collector(base_.radar(), accuracy_.path_angle_rad);
     const auto compare = [&](const std::vector<PathRecord>& from, const std::vector<PathRecord>& to) {
       for (const PathRecord& r : from) {
-        const auto same = std::find_if(to.begin(), to.end(), [&](const PathRecord& o) {
-          return o.event == r.event && o.facets == r.facets;
-        });
+        const auto same = std::find_if(to.begin(), to.end(),
+                                       [&](const PathRecord& o) { return o.event == r.event && o.facets == r.facets; });
         const double other = same == to.end() ? 0 : same->amplitude;
         if (r.amplitude <= other || r.amplitude == 0) continue;
         const double lost = (r.amplitude - other) / r.amplitude;
@@ -168,6 +173,7 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
   for (const NamedParameters& m : mechanisms) parts.push_back(&traced(geometry, m, poses));
   const RadarConfig& radar = base_.radar();
   const SignalChain chain(radar);
+  const int channels = radar.channels();
   const double window = 0.5 * radar.samples_per_chirp;  // Hann's sum
 
   std::vector<PoseEchoes> result(poses.size());
@@ -177,23 +183,33 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
     std::vector<PathRecord> all;
     for (const Traced* part : parts) all.insert(all.end(), (*part)[i].begin(), (*part)[i].end());
     EchoCollector collector(radar, accuracy_.path_angle_rad);
-    const auto spectra = [&](const ComplexGrid& x) -> Eigen::MatrixXcd { return chain.rangeSpectra(x) / window; };
-    std::vector<PathRecord> seen = twin.receivedPaths(pose.T_map_radar, all, pose.stamp_ns);
-    if (!twin.hasReceiveStage()) {
+    std::optional<Eigen::MatrixXcd> matrix;
+    if (twin.hasReceiveStage()) matrix = twin.channelMatrix(pose.T_map_radar, pose.stamp_ns);
+    if (!twin.hasReceiveStage() || matrix) {
+      std::vector<PathRecord> seen = twin.receivedPaths(pose.T_map_radar, std::move(all), pose.stamp_ns);
       double strongest = 0;
       for (const PathRecord& r : seen) strongest = std::max(strongest, r.amplitude * r.amplitude);
-      for (const PathRecord& r : seen) collector.add(r, r.amplitude * r.amplitude < kWeakPower * strongest);
+      for (PathRecord& r : seen) {
+        if (matrix)
+          Eigen::Map<Eigen::VectorXcd>(r.c.data(), channels) =
+              *matrix * Eigen::Map<Eigen::VectorXcd>(r.c.data(), channels).eval();
+        collector.add(r, r.amplitude * r.amplitude < kWeakPower * strongest);
+      }
     } else {
-      // The receiver mixes ranges or channels: each path is sent through it alone, less what comes without any path.
+      // The receiver mixes ranges: each path is sent through it alone, less what comes without any path.
+      const auto spectra = [&](const ComplexGrid& x) -> Eigen::MatrixXcd { return chain.rangeSpectra(x) / window; };
       const Eigen::MatrixXcd nothing = spectra(twin.weigh(pose.T_map_radar, {}, pose.stamp_ns).grid.x);
-      for (PathRecord& r : merged(radar, std::move(all))) {
+      double strongest = 0;
+      for (const PathRecord& r : all) strongest = std::max(strongest, r.amplitude * r.amplitude);
+      const auto strong = [&](const PathRecord& r) { return r.amplitude * r.amplitude > kWeakPower * strongest; };
+      for (PathRecord& r : merged(std::move(all), radar.range_bin_m(), kReceiverSine, strong)) {
         const Simulation alone = twin.weigh(pose.T_map_radar, {r}, pose.stamp_ns);
         if (!alone.records.empty()) collector.add(alone.records.front(), spectra(alone.grid.x) - nothing);
       }
       if (nothing.squaredNorm() > 0) {
         PathRecord fixed;
         fixed.departure = fixed.arrival = Eigen::Vector3d::UnitX();
-        fixed.length_m.assign(static_cast<std::size_t>(radar.channels()), 0.0);
+        fixed.length_m.assign(static_cast<std::size_t>(channels), 0.0);
         collector.add(fixed, nothing);
       }
     }

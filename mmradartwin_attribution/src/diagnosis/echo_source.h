@@ -17,8 +17,8 @@ struct PoseAccuracy {
   double path_range_m = 0.005;
 };
 
-/// The expected channels of a session for any list of mechanisms. Paths are traced once per mechanism and geometry; what
-/// only weighs or receives traces nothing (DESIGN section 4).
+/// The expected channels of a session for any list of mechanisms. Paths are traced once per mechanism and geometry;
+/// what only weighs or receives traces nothing (DESIGN section 4).
 class EchoSource {
  public:
   /// Keeps references to base and data.
@@ -51,7 +51,7 @@ class EchoSource {
     std::vector<char> known;  // by pose
   };
   std::map<std::string, Entry> cache_;
-  std::vector<BinCovariance> graze_;    // by pose
+  std::vector<BinCovariance> graze_;  // by pose
   std::vector<std::string> settled_;
   std::map<std::string, bool> alters_;  // geometry, by mechanism text
 };

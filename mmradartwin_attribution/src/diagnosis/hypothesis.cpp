@@ -123,8 +123,8 @@ std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedPara
   const MechanismRegistry& registry = MechanismRegistry::instance();
   const std::size_t channels = static_cast<std::size_t>(twin.radar().channels());
   for (const std::string& name : registry.names()) {
-    const bool there = std::any_of(present.begin(), present.end(),
-                                   [&](const NamedParameters& m) { return m.mechanism == name; });
+    const bool there =
+        std::any_of(present.begin(), present.end(), [&](const NamedParameters& m) { return m.mechanism == name; });
     if (there) continue;  // twin.yaml knows each mechanism once
     const std::vector<ParameterSpec> specs = registry.create(name)->parameters();
     if (!hasTried(specs) && !isPresence(specs)) continue;

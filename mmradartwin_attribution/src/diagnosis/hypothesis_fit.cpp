@@ -49,7 +49,8 @@ HypothesisFitter::Effective HypothesisFitter::effective(const Scores& s, int glo
   const Eigen::MatrixXd nuisance = s.information.topLeftCorner(globals, globals);
   const Eigen::MatrixXd projection = nuisance.ldlt().solve(s.information.topRightCorner(globals, n));  // [g][n]
   e.by_location = s.by_location.rightCols(n) - s.by_location.leftCols(globals) * projection;
-  e.information = s.information.bottomRightCorner(n, n) - s.information.topRightCorner(globals, n).transpose() * projection;
+  e.information =
+      s.information.bottomRightCorner(n, n) - s.information.topRightCorner(globals, n).transpose() * projection;
   e.information.diagonal().array() += 1e-9 * e.information.diagonal().array().abs() + 1e-12;
   e.total = s.total.tail(n) - projection.transpose() * s.total.head(globals);
   const double locations = static_cast<double>(e.by_location.rows());
@@ -85,8 +86,7 @@ std::vector<std::pair<int, double>> HypothesisFitter::suspects(const ModelState&
   return result;
 }
 
-Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypothesis,
-                                  const std::vector<int>& poses) {
+Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses) {
   Screened result{hypothesis, 0, std::vector<double>(hypothesis.coordinates.size(), 1.0)};
   const SessionCovariance base = model_.covariance(null.echoes, null.nuisance, poses);
   std::vector<SessionCovariance> directions;
@@ -108,7 +108,8 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
   bool possible = true;
   for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
     const Coordinate& c = hypothesis.coordinates[j];
-    const bool one_sided = c.logarithmic() || c.min == c.neutral || c.max == c.neutral || hypothesis.coordinates[j].min > -1e-12;
+    const bool one_sided =
+        c.logarithmic() || c.min == c.neutral || c.max == c.neutral || hypothesis.coordinates[j].min > -1e-12;
     if (one_sided && step[static_cast<Eigen::Index>(j)] <= 0) possible = false;
     result.start[j] = std::clamp(step[static_cast<Eigen::Index>(j)], one_sided ? 0.02 : -8.0, 8.0);
   }
@@ -174,7 +175,8 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
         double& v = next[static_cast<std::size_t>(j)];
         v += share * std::clamp(step[globals + j], -3.0, 3.0);
         if (c.logarithmic()) v = std::max(v, 0.3 * f.scaled[static_cast<std::size_t>(j)]);
-        const double low = std::min(c.scaled(c.min), c.scaled(c.max)), high = std::max(c.scaled(c.min), c.scaled(c.max));
+        const double low = std::min(c.scaled(c.min), c.scaled(c.max)),
+                     high = std::max(c.scaled(c.min), c.scaled(c.max));
         v = std::clamp(v, low, high);
       }
       ModelState s = evaluate(next, model_.stepped(f.state.nuisance, step.head(globals), scores, step, share));
@@ -202,9 +204,9 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
     const Eigen::MatrixXd robust = covariance * middle * covariance;
     for (Eigen::Index j = 0; j < n; ++j) {
       const double variance = std::max(robust(j, j), covariance(j, j));
-      f.standard_error.push_back(std::sqrt(variance) *
-                                 std::abs(hypothesis.coordinates[static_cast<std::size_t>(j)].slope(
-                                     f.scaled[static_cast<std::size_t>(j)])));
+      f.standard_error.push_back(
+          std::sqrt(variance) *
+          std::abs(hypothesis.coordinates[static_cast<std::size_t>(j)].slope(f.scaled[static_cast<std::size_t>(j)])));
     }
     // Without a fold: one step away from the fit by that fold's scores.
     for (int k = 0; k < folds_; ++k) {

@@ -23,20 +23,20 @@ struct ModelState {
 /// One hypothesis, all else refitted.
 struct HypothesisFit {
   Hypothesis hypothesis;
-  std::vector<double> scaled;         ///< of its coordinates
+  std::vector<double> scaled;  ///< of its coordinates
   ModelState state;
-  double gain = 0;                    ///< nats over the state without it
-  double inflation = 1;               ///< of the scores' variance over places against what the likelihood expects
-  double false_alarm_rate = 1;        ///< family-wise: of the best of all hypotheses that were tried
-  double held_out_gain = 0;           ///< nats on places that the fit did not see, each fold by one step from the fit
-  std::vector<double> standard_error; ///< of the values (not scaled), by location
+  double gain = 0;                     ///< nats over the state without it
+  double inflation = 1;                ///< of the scores' variance over places against what the likelihood expects
+  double false_alarm_rate = 1;         ///< family-wise: of the best of all hypotheses that were tried
+  double held_out_gain = 0;            ///< nats on places that the fit did not see, each fold by one step from the fit
+  std::vector<double> standard_error;  ///< of the values (not scaled), by location
   std::vector<std::vector<double>> fold_scaled;  ///< coordinates without each fold of locations
-  double ranking() const;             ///< gain less a price per coordinate
+  double ranking() const;                        ///< gain less a price per coordinate
 };
 
 struct Screened {
   Hypothesis hypothesis;
-  double promised = 0;   ///< nats by the score test, inflation taken off
+  double promised = 0;  ///< nats by the score test, inflation taken off
   std::vector<double> start;
 };
 

@@ -12,12 +12,12 @@ namespace mmradartwin {
 
 /// What no cause is: fitted in every hypothesis alike. Powers as natural logarithms.
 struct Nuisance {
-  double log_gain = 0;         ///< of measured power over the twin's
-  double log_floor = 0;        ///< clutter's power in a cell at 3 m
-  double floor_slope = -3;     ///< exponent of the clutter's power over range
-  double log_relative = -8;    ///< what differs from channel to channel of an echo, of its power
-  double log_graze = 0;        ///< factor of PoseEchoes::graze
-  double log_range = 0;        ///< factor of the variance of a path's own range
+  double log_gain = 0;                ///< of measured power over the twin's
+  double log_floor = 0;               ///< clutter's power in a cell at 3 m
+  double floor_slope = -3;            ///< exponent of the clutter's power over range
+  double log_relative = -8;           ///< what differs from channel to channel of an echo, of its power
+  double log_graze = 0;               ///< factor of PoseEchoes::graze
+  double log_range = 0;               ///< factor of the variance of a path's own range
   std::vector<double> actor_gain;     ///< [actors] natural logarithm of power, per interaction
   std::vector<double> actor_range_m;  ///< [actors] added one-way range, shared by the interactions of a path
   std::vector<double> yaw_rad;        ///< [poses] error of the heading
@@ -37,12 +37,12 @@ using SessionCovariance = std::vector<PoseCovariance>;
 
 /// Derivatives of the log-likelihood at one place: by location, so that their scatter shows what the model omits.
 struct Scores {
-  double log_likelihood = 0;             ///< with the priors of the latents
-  Eigen::MatrixXd by_location;           ///< [locations][directions] scores; the heading of each pose eliminated
-  Eigen::MatrixXd information;           ///< [directions][directions], priors included; the same
-  Eigen::VectorXd total;                 ///< [directions] scores, priors included
-  std::vector<double> yaw_step;          ///< [poses] best change of the heading, all else as it is
-  Eigen::MatrixXd yaw_coupling;          ///< [poses][directions] of that change by a change of the directions
+  double log_likelihood = 0;     ///< with the priors of the latents
+  Eigen::MatrixXd by_location;   ///< [locations][directions] scores; the heading of each pose eliminated
+  Eigen::MatrixXd information;   ///< [directions][directions], priors included; the same
+  Eigen::VectorXd total;         ///< [directions] scores, priors included
+  std::vector<double> yaw_step;  ///< [poses] best change of the heading, all else as it is
+  Eigen::MatrixXd yaw_coupling;  ///< [poses][directions] of that change by a change of the directions
 };
 
 constexpr int kMaxChannels = 16;

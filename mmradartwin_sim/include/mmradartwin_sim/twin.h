@@ -91,6 +91,9 @@ class Twin {
                                         std::int64_t stamp_ns = 0) const;
   /// True where the receiver does more to the grid than filter it path by path.
   bool hasReceiveStage() const;
+  /// Where all that the receiver does beyond filters is one complex matrix over the channels, the same at all samples:
+  /// that matrix [M][M]; else nothing.
+  std::optional<Eigen::MatrixXcd> channelMatrix(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
   /// Throws InputError for a pose that is NaN or inside an actor (names it).
   Simulation simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
 
