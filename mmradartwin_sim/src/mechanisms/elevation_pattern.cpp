@@ -12,7 +12,7 @@ class ElevationPattern : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("cos_exponent", "1", 0, 100, "n of the one-way power cos^n")};
+    return {tried(numberSpec("cos_exponent", "1", 0, 100, "n of the one-way power cos^n"), 0, 8)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     exponent_ = values.number("cos_exponent");
