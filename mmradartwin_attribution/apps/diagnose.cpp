@@ -32,7 +32,6 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   const std::string twin_file = arguments.twin.empty() ? recording.twin_file.value_or("") : arguments.twin;
   std::optional<std::string> scene = recording.scene_file;
   if (!arguments.scene.empty()) scene = arguments.scene;
-  Twin twin(loadTwin(twin_file, scene, recording.radar));
 
   const DiagnosisReport report(arguments.output);
   DiagnosisOptions options;
@@ -48,7 +47,14 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
     width = length;
     std::cerr << text << std::flush;
   };
-  const Diagnosis diagnosis = diagnose(recording, twin, options);
+  Diagnosis diagnosis;
+  if (!scene && twin_file.empty()) {
+    std::cerr << "the recording names no scene: only its frames are judged\n";
+    diagnosis = diagnoseReceiver(recording, options);
+  } else {
+    Twin twin(loadTwin(twin_file, scene, recording.radar));
+    diagnosis = diagnose(recording, twin, options);
+  }
   std::cerr << '\r' << std::string(width, ' ') << '\r';
   report.write(diagnosis, command);
   for (const PoseProblem& problem : diagnosis.problems) std::cerr << "error: " << problem.message << '\n';

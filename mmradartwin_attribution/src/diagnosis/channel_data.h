@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "mmradartwin_attribution/frame_evidence.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
 #include "mmradartwin_dsp/session.h"
@@ -28,15 +29,13 @@ struct ChannelData {
   std::vector<PoseProblem> problems;   ///< poses left out, with the reason
 };
 
-/// Receives every frame of a pose as it is read; for a judge of raw samples.
-using FrameVisitor = std::function<void(const Pose&, const AdcCube&)>;
-
-/// Reads all captures once. Throws InputError where no pose is left.
-ChannelData readChannels(const Recording& recording, const FrameVisitor& visit,
+/// Reads all captures once, frames through the examiner, whose repaired averages are taken. Throws InputError where no
+/// pose is left.
+ChannelData readChannels(const Recording& recording, FrameExaminer& examiner,
                          const std::function<void(std::size_t done, std::size_t all)>& on_progress);
 
-/// Fills y of a pose from its grid (again, after the grid was changed).
 class SignalChain;
+/// Fills y of a pose from its grid (again, after the grid was changed).
 void transformGrid(const SignalChain& chain, PoseChannels& pose);
 
 }  // namespace mmradartwin

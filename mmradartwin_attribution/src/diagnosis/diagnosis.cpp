@@ -27,15 +27,16 @@ namespace {
 
 constexpr int kFolds = 5;
 constexpr double kFalseAlarm = 0.01;  ///< family-wise, per round
-constexpr std::size_t kMostFindings = 4;
+constexpr int kMostFindings = 4;
 constexpr std::size_t kScreenPoses = 44;  ///< a part of the session ranks hypotheses well enough
 constexpr std::size_t kFewestPoses = 12;
-constexpr std::size_t kSecondLook = 12;  ///< hypotheses that are looked at on all poses
-constexpr std::size_t kSuspects = 6;     ///< actors whose geometry is tried
-constexpr std::size_t kMostFits = 7;     ///< of one round
-constexpr double kWorthAFit = 6;         ///< nats promised
-constexpr double kAlike = 5;             ///< nats within which two names are not told apart
-constexpr double kObjectPlaces = 500;    ///< places of an 8 by 6 m room that a session resolves, as a family
+constexpr std::size_t kSecondLook = 9;     ///< hypotheses that are looked at on all poses
+constexpr std::size_t kSuspects = 6;       ///< actors whose geometry is tried
+constexpr std::size_t kMostFits = 7;       ///< of one round
+constexpr double kWorthAFit = 6;           ///< nats promised
+constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding
+constexpr double kAlike = 5;               ///< nats within which two names are not told apart
+constexpr double kObjectPlaces = 500;      ///< places of an 8 by 6 m room that a session resolves, as a family
 
 std::string number(double value, int digits = 3) {
   std::ostringstream out;
@@ -46,6 +47,28 @@ std::string number(double value, int digits = 3) {
 bool catalogued(const std::string& name) {
   const auto& all = causeDescriptions();
   return std::any_of(all.begin(), all.end(), [&](const CauseDescription& c) { return c.name == name; });
+}
+
+Finding findingOf(const FrameFinding& frames) {
+  Finding f;
+  f.cause = frames.cause;
+  f.parameters = frames.parameters;
+  f.candidates = {{f.cause, 1.0}};
+  f.evidence.log_likelihood_gain = frames.log_likelihood_gain;
+  f.evidence.false_alarm_rate = frames.false_alarm_rate;
+  f.where = frames.where;
+  if (f.where.empty()) f.where.emplace_back();
+  for (FindingPlace& place : f.where) {
+    if (place.poses.empty()) place.poses = frames.poses;
+  }
+  f.description = frames.description;
+  if (f.cause == "unknown") return f;
+  NamedParameters m = defaultMechanism(f.cause);
+  for (const FindingParameter& p : f.parameters) {
+    if (m.values.has(p.name)) m.values.set(p.name, p.value);
+  }
+  f.mechanism = m;
+  return f;
 }
 
 class Session {
@@ -75,6 +98,7 @@ class Session {
   const Recording& recording_;
   Twin& twin_;
   const DiagnosisOptions& options_;
+  FrameExaminer examiner_;
   ChannelData data_;
   PoseAccuracy accuracy_;
   std::unique_ptr<EchoSource> source_;
@@ -87,8 +111,8 @@ class Session {
 };
 
 Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options)
-    : recording_(recording), twin_(twin), options_(options) {
-  data_ = readChannels(recording, nullptr, [&](std::size_t done, std::size_t all) {
+    : recording_(recording), twin_(twin), options_(options), examiner_(recording.radar) {
+  data_ = readChannels(recording, examiner_, [&](std::size_t done, std::size_t all) {
     report("reading captures", static_cast<double>(done) / static_cast<double>(all));
   });
   twin_.setSession(recording.poses);
@@ -228,8 +252,7 @@ void Session::judgeNoise() {
     std::vector<double> levels_db;
     for (const PoseChannels& p : data_.poses) {
       if (!(p.noise_power > 0)) continue;
-      const double chirps = static_cast<double>(p.frames) * data_.radar.loops_per_frame;
-      levels_db.push_back(10 * std::log10(p.noise_power * chirps * 2.0 / 3 * data_.radar.samples_per_chirp));
+      levels_db.push_back(10 * std::log10(p.noise_power * p.shots * 2.0 / 3 * data_.radar.samples_per_chirp));
     }
     if (levels_db.size() < 2) return;
     const double stated = m.values.number("level_dbfs") + m.values.number("delta_db");
@@ -262,15 +285,17 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   for (std::size_t i = 0; i < std::min(kSuspects, suspects.size()); ++i) {
     suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(suspects[i].first)].name);
   }
-  // The more numbers a hypothesis has, the more evaluations, and the fewer poses rank it.
-  const auto some = [&](const Hypothesis& h) {
+  const auto spread = [&](std::size_t wanted) {
     const std::size_t count = data_.poses.size();
-    const std::size_t wanted = std::min(count, std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
+    wanted = std::min(count, wanted);
     std::vector<int> poses;
     for (std::size_t i = 0; i < wanted; ++i) poses.push_back(static_cast<int>(i * count / wanted));
     return poses;
   };
-
+  // The more numbers a hypothesis has, the more evaluations, and the fewer poses rank it.
+  const auto some = [&](const Hypothesis& h) {
+    return spread(std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
+  };
   const auto better = [](const Screened& a, const Screened& b) { return a.promised > b.promised; };
   std::vector<Screened> screened;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -288,12 +313,12 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   }
   std::stable_sort(screened.begin(), screened.end(), better);
   if (screened.size() > kSecondLook) screened.resize(kSecondLook);
-  std::vector<int> everyone(data_.poses.size());
-  std::iota(everyone.begin(), everyone.end(), 0);
   for (Screened& s : screened) {
     report("looking again at " + s.hypothesis.label(), 0);
-    s = fitter_->screen(state_, s.hypothesis, everyone);
-    s.promised -= 1.5 * static_cast<double>(s.hypothesis.coordinates.size());
+    const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
+    const std::vector<int> poses = spread(numbers > 3 ? kScreenPoses : data_.poses.size());
+    s = fitter_->screen(state_, s.hypothesis, poses);
+    s.promised -= numbers + 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
     source_->settle(mechanisms_);
   }
   if (const auto place = projectBack(twin_, *model_, state_)) {
@@ -482,7 +507,8 @@ bool Session::judgeChannels(int round) {
       finding.gain = gainOf(f);
       // Where the likelihood gains and the maps do not, it is the likelihood's own shortcomings that were fitted: what
       // a pose's error does at edges looks like a little of many things.
-      if (!((*finding.gain->explained_power.difference_ci95)[0] > 0)) continue;
+      const GainMetric& explained = finding.gain->explained_power;
+      if (!((*explained.difference_ci95)[0] > 0) || explained.after - explained.before < kLeastExplained) continue;
       addMetrics(f, *finding.gain);
     }
     report("found " + f.hypothesis.label() + ", " + number(f.gain, 4) + " nats", 1);
@@ -499,6 +525,13 @@ bool Session::judgeChannels(int round) {
 }
 
 Diagnosis Session::run() {
+  for (const FrameFinding& f : examiner_.findings()) {
+    Finding finding = findingOf(f);
+    const bool there = std::any_of(extended_.begin(), extended_.end(),
+                                   [&](const NamedParameters& m) { return m.mechanism == finding.cause; });
+    if (!there) extended_.push_back(*finding.mechanism);
+    result_.findings.findings.push_back(std::move(finding));
+  }
   judgeDelivery();
   source_->settle(mechanisms_);
   judgeTone();
@@ -527,8 +560,8 @@ Diagnosis Session::run() {
                     " with its poses exchanged; check that scene, poses and captures belong together";
     findings.findings.push_back(std::move(f));
   } else {
-    for (std::size_t round = 0; findings.findings.size() < kMostFindings; ++round) {
-      if (!judgeChannels(static_cast<int>(round))) break;
+    for (int round = 0; round < kMostFindings; ++round) {
+      if (!judgeChannels(round)) break;
     }
   }
   result_.extended = twin_.description();
@@ -538,6 +571,27 @@ Diagnosis Session::run() {
 }
 
 }  // namespace
+
+Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& options) {
+  FrameExaminer examiner(recording.radar);
+  const ChannelData data = readChannels(recording, examiner, [&](std::size_t done, std::size_t all) {
+    if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
+    if (options.on_progress) {
+      options.on_progress({"reading captures", static_cast<double>(done) / static_cast<double>(all)});
+    }
+  });
+  Diagnosis result;
+  for (const FrameFinding& f : examiner.findings()) {
+    result.findings.findings.push_back(findingOf(f));
+    result.extended.mechanisms.push_back(*result.findings.findings.back().mechanism);
+  }
+  result.findings.poses = static_cast<int>(data.poses.size());
+  result.findings.locations = static_cast<int>(data.locations.size());
+  result.findings.held_out = "nothing: without a scene only frames are judged";
+  result.extended.radar = recording.radar;
+  result.problems = data.problems;
+  return result;
+}
 
 Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOptions& options) {
   std::unique_ptr<tbb::global_control> limit;

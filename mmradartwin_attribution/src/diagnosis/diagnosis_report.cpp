@@ -94,7 +94,11 @@ DiagnosisReport::DiagnosisReport(const std::string& directory) : directory_(dire
 std::string diagnosisText(const Diagnosis& d) {
   std::ostringstream out;
   out << "Verdict: " << d.findings.verdict() << ", " << d.findings.poses << " poses at " << d.findings.locations
-      << " locations; the twin as given explains " << shown(d.explained_power) << " of the measured power\n";
+      << " locations";
+  if (!d.extended.scene_file.empty()) {
+    out << "; the twin as given explains " << shown(d.explained_power) << " of the measured power";
+  }
+  out << "\n";
   int i = 0;
   for (const Finding& f : d.findings.findings) {
     out << ++i << ". " << f.cause << " (" << className(causeDescription(f.cause).residual_class) << ")";
@@ -124,9 +128,11 @@ std::string diagnosisText(const Diagnosis& d) {
 
 void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::string>& command) const {
   Findings findings = diagnosis.findings;
-  findings.extended_twin = "twin.extended.yaml";
+  if (!diagnosis.extended.scene_file.empty()) {
+    findings.extended_twin = "twin.extended.yaml";
+    save(directory_ + "/twin.extended.yaml", diagnosis.extended.toYaml());
+  }
   writeFindings(findings, directory_ + "/findings.json");
-  save(directory_ + "/twin.extended.yaml", diagnosis.extended.toYaml());
   std::ostringstream tried;
   tried << "round,hypothesis,promised_nats,gain_nats\n";
   for (const TriedHypothesis& t : diagnosis.tried) {

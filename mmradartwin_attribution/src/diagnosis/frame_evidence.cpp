@@ -26,7 +26,8 @@ std::array<double, 2> shareInterval(double hits, double of) {
   const auto quantile = [](double a, double b, double p) {
     return boost::math::quantile(boost::math::beta_distribution<double>(a, b), p);
   };
-  return {hits > 0 ? quantile(hits, of - hits + 1, 0.025) : 0.0, hits < of ? quantile(hits + 1, of - hits, 0.975) : 1.0};
+  return {hits > 0 ? quantile(hits, of - hits + 1, 0.025) : 0.0,
+          hits < of ? quantile(hits + 1, of - hits, 0.975) : 1.0};
 }
 
 FindingParameter number(const char* name, const char* unit, double value, const std::array<double, 2>& ci95) {
@@ -335,10 +336,10 @@ std::vector<FrameFinding> FrameExaminer::findings() const {
   const State& s = *state_;
   std::vector<FrameFinding> all = {s.saturation(), s.packetLoss(), s.misalignment(), s.interference(), s.drift()};
   for (FrameFinding& walker : locateMotion(s.radar, s.motion).walkers) all.push_back(std::move(walker));
-  all.erase(std::remove_if(all.begin(), all.end(), [](const auto& f) { return f.log_likelihood_gain <= 0; }), all.end());
-  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) {
-    return a.log_likelihood_gain > b.log_likelihood_gain;
-  });
+  all.erase(std::remove_if(all.begin(), all.end(), [](const auto& f) { return f.log_likelihood_gain <= 0; }),
+            all.end());
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.log_likelihood_gain > b.log_likelihood_gain; });
   return all;
 }
 

@@ -258,8 +258,8 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
   // for each of I and Q.
   const double scale = std::max(noise_variance, 0.5);
   const std::vector<Complex> gains = commonGains(s, average, noise_variance);
-  // Windows of 1, 2, 4, ... samples up to half a chirp; chance beats a threshold once in 1e12 windows, a session has some
-  // 1e7.
+  // Windows of 1, 2, 4, ... samples up to half a chirp; chance beats a threshold once in 1e12 windows, a session has
+  // some 1e7.
   std::vector<int> lengths;
   std::vector<double> thresholds;
   for (int w = 1; 2 * w <= s.samples; w *= 2) {
@@ -323,8 +323,8 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
         c += e * e.adjoint();
       }
       const double noise = scale * level * best_length;
-      const double first = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd>(c, Eigen::EigenvaluesOnly).eigenvalues()
-                               [s.receivers - 1];
+      const double first =
+          Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd>(c, Eigen::EigenvaluesOnly).eigenvalues()[s.receivers - 1];
       if (first - noise < 0.7 * (c.trace().real() - s.receivers * noise)) continue;
       // Not one receiver alone: that is a fault of its converter, no wave.
       if (s.receivers > 1 && c.diagonal().real().maxCoeff() > 0.9 * c.trace().real()) continue;

@@ -67,7 +67,8 @@ struct Bursts {
   double log_likelihood_gain = 0;
   std::vector<std::uint8_t> hit;  ///< [shot][slot] chirps taken out of use
 };
-/// Finds energy that is confined to a part of one chirp, the same wave at all receivers, and takes the chirp out of use.
+/// Finds energy that is confined to a part of one chirp, the same wave at all receivers, and takes the chirp out of
+/// use.
 Bursts dropBursts(const std::vector<std::complex<float>>& average, double noise_variance, FrameStack& stack);
 
 /// Values that stand at a code beyond which there is none, where that code comes far more often than its neighbours.

@@ -47,9 +47,9 @@ double peakOffset(double left, double middle, double right) {
 /// Range spectra of the residuals, shot by shot, of those shots that are nearly whole.
 struct ShotExaminer::Spectra {
   int channels = 0, bins = 0;
-  std::vector<int> shot;          ///< numbers of the shots
-  std::vector<Complex> residual;  ///< [shot][bin][channel]; whitened once the noise is known
-  std::vector<Complex> average;   ///< [bin][channel], alike
+  std::vector<int> shot;                   ///< numbers of the shots
+  std::vector<Complex> residual;           ///< [shot][bin][channel]; whitened once the noise is known
+  std::vector<Complex> average;            ///< [bin][channel], alike
   std::vector<std::complex<double>> gain;  ///< [shot] common to all cells, taken out of the residuals
   int per_frame = 1;
   const Complex* at(std::size_t i, int bin) const {
@@ -271,8 +271,8 @@ void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& s, ShotResid
   double spread = 0;
   for (double f : frame) spread += (f - mean_frame) * (f - mean_frame);
   if (!(spread > 0)) return;
-  // The slope of each second bin's phase (a Hann window ties neighbours together), weighed by its own scatter: a cell in
-  // which something moves counts for little.
+  // The slope of each second bin's phase (a Hann window ties neighbours together), weighed by its own scatter: a cell
+  // in which something moves counts for little.
   double weights = 0, weighted = 0, squares = 0, moments = 0;
   for (int b = 0; b < s.bins; b += 2) {
     const Eigen::Map<const Eigen::VectorXcf> still(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
@@ -387,7 +387,8 @@ void ShotExaminer::readDopplerEchoes(const Spectra& s, ShotResiduals& result) co
         if (peak < 0.5f * static_cast<float>(s.channels) * power(b, d)) continue;
         const double step = radar_.wavelength_m() / (2 * radar_.virtual_pitch_m()) / (kAngleBins / 2);
         const double offset = peakOffset(beam[(a + kAngleBins - 1) % kAngleBins], peak, beam[(a + 1) % kAngleBins]);
-        const double turn_offset = peakOffset(power(b, (d + loops - 1) % loops), power(b, d), power(b, (d + 1) % loops));
+        const double turn_offset =
+            peakOffset(power(b, (d + loops - 1) % loops), power(b, d), power(b, (d + 1) % loops));
         Peak p{};
         p.echo.frame = frame;
         p.echo.range_m = (b + peakOffset(power(b - 1, d), power(b, d), power(b + 1, d))) * radar_.range_bin_m();

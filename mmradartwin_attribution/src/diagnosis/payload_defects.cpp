@@ -61,8 +61,8 @@ std::size_t firstPacket(const Payload& p, std::size_t begin, std::size_t phase) 
 }  // namespace
 
 std::vector<int> payloadOrder(const RadarConfig& radar) {
-  const std::size_t cube = static_cast<std::size_t>(radar.chirps_per_frame()) * radar.samples_per_chirp *
-                           radar.receivers() * 2;
+  const std::size_t cube =
+      static_cast<std::size_t>(radar.chirps_per_frame()) * radar.samples_per_chirp * radar.receivers() * 2;
   // Sends every place's number through the encoder, seven bits at a time, with a bit that tells it from filling.
   std::vector<int> order(radar.bytes_per_frame() / 2, 0);
   std::vector<std::int16_t> digits(cube);
@@ -271,9 +271,11 @@ std::optional<Slip> findSlip(const Payload& p) {
 }
 
 void closeSlip(const Slip& slip, Payload& p) {
-  const std::size_t gap = std::min(static_cast<std::size_t>(slip.packets) * kPacketValues, p.value.size() - slip.position);
+  const std::size_t gap =
+      std::min(static_cast<std::size_t>(slip.packets) * kPacketValues, p.value.size() - slip.position);
   const auto open = [&](auto& list) {
-    std::copy_backward(list.begin() + static_cast<long>(slip.position), list.end() - static_cast<long>(gap), list.end());
+    std::copy_backward(list.begin() + static_cast<long>(slip.position), list.end() - static_cast<long>(gap),
+                       list.end());
     std::fill_n(list.begin() + static_cast<long>(slip.position), gap, 0);
   };
   open(p.value);

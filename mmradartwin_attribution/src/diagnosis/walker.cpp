@@ -163,9 +163,8 @@ class Search {
     FrameFinding f;
     f.cause = "unknown";
     f.log_likelihood_gain = evidence;
-    f.false_alarm_rate =
-        std::min(1.0, std::exp(std::log(static_cast<double>(columns_) * rows_) +
-                               logChance(kTrust * evidence, poses_.size())));
+    f.false_alarm_rate = std::min(
+        1.0, std::exp(std::log(static_cast<double>(columns_) * rows_) + logChance(kTrust * evidence, poses_.size())));
     FindingPlace place;
     const double range_m = bin * radar_.range_bin_m();
     place.range_m = {range_m - radar_.range_bin_m(), range_m + radar_.range_bin_m()};
@@ -232,8 +231,8 @@ class Search {
       Eigen::Vector2d center = Eigen::Vector2d::Zero(), squares = center;
       double weights = 0, speed = 0, speed_squares = 0;
       FindingPlace place;
-      place.range_m = place.azimuth_deg = {std::numeric_limits<double>::infinity(),
-                                           -std::numeric_limits<double>::infinity()};
+      place.range_m =
+          place.azimuth_deg = {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
       std::set<std::string> names;
       for (const Sighting& s : walker) {
         // Good to a range bin along the view and some 2 degrees, the array's errors, across it; a sum of equals.
@@ -272,8 +271,8 @@ class Search {
       f.where = {place};
       std::ostringstream text;
       text << "something moves at (" << center.x() << ", " << center.y() << ") m in the map, at "
-           << walker.front().echo.range_m << " m and " << degrees(walker.front().echo.azimuth_rad)
-           << " deg of pose " << poses_[walker.front().pose].pose.name << ", "
+           << walker.front().echo.range_m << " m and " << degrees(walker.front().echo.azimuth_rad) << " deg of pose "
+           << poses_[walker.front().pose].pose.name << ", "
            << (walker.front().echo.radial_m_per_s > 0 ? "away from" : "towards") << " the radar at " << speed << " m/s";
       f.description = text.str();
       motion.walkers.push_back(std::move(f));
@@ -321,7 +320,8 @@ class Search {
       // A few seconds see part of a walk of some decimetres; angles are good to some 2 degrees, the array's errors.
       const double part_m = 0.2 / std::sqrt(std::max(1.0, t.at.size() / 20.0));
       const double range_m = std::hypot(part_m, 0.05), cross_m = std::hypot(part_m, 0.035 * r);
-      t.information = along * along.transpose() / (range_m * range_m) + across * across.transpose() / (cross_m * cross_m);
+      t.information =
+          along * along.transpose() / (range_m * range_m) + across * across.transpose() / (cross_m * cross_m);
       total += t.information;
       sum += t.information * t.mean;
     }
