@@ -13,13 +13,9 @@ class ElevationPattern : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-<<<<<<< HEAD
-    return {tried(numberSpec("cos_exponent", "1", 0, 100, "n of the one-way power cos^n"), 0, 8)};
-=======
-    return {numberSpec("cos_exponent", "1", 0, 100, 0, "n of the one-way power cos^n"),
+    return {tried(numberSpec("cos_exponent", "1", 0, 100, 0, "n of the one-way power cos^n"), 0, 8),
             optionalListSpec("angles_deg", "deg", -90, 90, "elevations of a measured curve, rising, positive upwards"),
             optionalListSpec("gain_db", "dB", -200, 60, "one-way power at angles_deg")};
->>>>>>> w_sim
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     exponent_ = values.number("cos_exponent");
