@@ -162,11 +162,16 @@ void Session::checkPlaces() const {
 
 double Session::strongestMeasured() const {
   double strongest = 0;
-  for (std::size_t i = 0; i < state_.echoes.size(); ++i) {
-    for (const PathRecord& r : twin_.trace(data_.poses[i].pose.T_map_radar))
-      strongest = std::max(strongest, r.amplitude);
+  for (const PoseChannels& p : data_.poses) {
+    const Eigen::VectorXd power = p.y.colwise().squaredNorm().transpose() / static_cast<double>(p.y.rows());
+    for (Eigen::Index r = model_->firstBin() + 2; r + 2 < power.size(); ++r) {
+      // A tone's power summed over Hann's lobe is 1.5 times its own, wherever it lies between the bins.
+      if (power[r] >= power[r - 1] && power[r] >= power[r + 1]) {
+        strongest = std::max(strongest, power.segment(r - 2, 5).sum() / 1.5);
+      }
+    }
   }
-  return strongest * std::exp(0.5 * state_.nuisance.log_gain);
+  return std::sqrt(strongest);
 }
 
 void Session::judgeDelivery() {
@@ -208,7 +213,6 @@ void Session::judgeTone() {
   if (tone.false_alarm_rate > 1e-6 || tone.gain < 30) return;
   const ChannelData recorded = data_;
   subtractTone(tone, data_);
-  state_ = fitter_->state(mechanisms_, nullptr);
   const double rms = std::sqrt(tone.channels.squaredNorm() / static_cast<double>(tone.channels.size()));
   const double level_db = 20 * std::log10(rms / strongestMeasured());
   const double error_db = 8.686 / std::sqrt(2 * std::max(1.0, tone.gain));

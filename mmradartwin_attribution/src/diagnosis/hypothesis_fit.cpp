@@ -68,7 +68,7 @@ ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanism
   s.mechanisms = mechanisms;
   s.echoes = source_.echoes(mechanisms);
   s.nuisance = start != nullptr ? *start : model_.start(s.echoes);
-  model_.fit(s.echoes, s.nuisance, start != nullptr ? 4 : 12);
+  model_.fit(s.echoes, s.nuisance, start != nullptr ? 4 : 16);
   s.log_likelihood = model_.logLikelihood(s.echoes, s.nuisance, &s.by_pose);
   s.basis = model_.basis(s.echoes, s.nuisance);
   return s;
@@ -88,14 +88,16 @@ std::vector<std::pair<int, double>> HypothesisFitter::suspects(const ModelState&
 
 Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses) {
   Screened result{hypothesis, 0, std::vector<double>(hypothesis.coordinates.size(), 1.0)};
-  const SessionCovariance base = model_.covariance(null.echoes, null.nuisance, poses);
+  std::vector<PoseEchoes> looked_at;
+  for (int i : poses) looked_at.push_back(null.echoes[static_cast<std::size_t>(i)]);
+  const SessionCovariance base = model_.covariance(looked_at, null.nuisance, poses);
   std::vector<SessionCovariance> directions;
   const std::size_t count = std::max<std::size_t>(1, hypothesis.coordinates.size());
   for (std::size_t j = 0; j < count; ++j) {
     std::vector<double> at(hypothesis.coordinates.size(), 0.0);
     if (!at.empty()) at[j] = 1;
     const auto echoes = source_.echoes(with(null.mechanisms, hypothesis.at(at)), poses);
-    directions.push_back(difference(model_.covariance(echoes, null.nuisance), base, 1));
+    directions.push_back(difference(model_.covariance(echoes, null.nuisance, poses), base, 1));
   }
   const Effective e = effective(model_.scores(null.basis, directions, poses), null.nuisance.globals());
   const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
@@ -131,24 +133,44 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
     s.log_likelihood = model_.logLikelihood(s.echoes, nuisance, &s.by_pose);
     return s;
   };
-  f.scaled = start;
-  f.state = evaluate(start, null.nuisance);
+  // A cause may have been fitted as the latents of all poses or actors: it starts without them, too.
+  Nuisance without = null.nuisance;
+  std::fill(without.yaw_rad.begin(), without.yaw_rad.end(), 0.0);
+  Nuisance bare = without;
+  std::fill(bare.actor_gain.begin(), bare.actor_gain.end(), 0.0);
+  std::fill(bare.actor_range_m.begin(), bare.actor_range_m.end(), 0.0);
+  const auto consider = [&](const std::vector<double>& scaled) {
+    ModelState s = evaluate(scaled, null.nuisance);
+    for (const Nuisance* other : {&without, &bare}) {
+      std::vector<double> by_pose;
+      const double value = model_.logLikelihood(s.echoes, *other, &by_pose);
+      if (value <= s.log_likelihood) continue;
+      s.log_likelihood = value;
+      s.nuisance = *other;
+      s.by_pose = std::move(by_pose);
+    }
+    if (f.scaled.size() == scaled.size() && !f.state.echoes.empty() && s.log_likelihood <= f.state.log_likelihood)
+      return;
+    f.state = std::move(s);
+    f.scaled = scaled;
+  };
+  consider(start);
+  if (n == 1 && hypothesis.coordinates[0].min < hypothesis.coordinates[0].neutral &&
+      !hypothesis.coordinates[0].logarithmic()) {
+    for (double scaled : {-3.0, -1.0, 1.0, 3.0}) consider({scaled});  // what latents hide starts from far off
+  }
   if (n > 0) {
     for (double factor : {0.4, 2.0}) {
       std::vector<double> other = start;
       for (double& v : other) v *= factor;
-      ModelState s = evaluate(other, null.nuisance);
-      if (s.log_likelihood > f.state.log_likelihood) {
-        f.state = std::move(s);
-        f.scaled = other;
-      }
+      consider(other);
     }
   }
   std::vector<int> everyone(null.echoes.size());
   std::iota(everyone.begin(), everyone.end(), 0);
   const auto derivatives = [&](const ModelState& s, const std::vector<double>& scaled) {
     std::vector<SessionCovariance> directions;
-    const SessionCovariance here = model_.covariance(s.echoes, s.nuisance);
+    const SessionCovariance here = model_.covariance(s.echoes, s.nuisance, everyone);
     for (Eigen::Index j = 0; j < n; ++j) {
       std::vector<double> moved = scaled;
       const double step = hypothesis.coordinates[static_cast<std::size_t>(j)].logarithmic()
@@ -156,7 +178,8 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
                               : kSmallStep;
       moved[static_cast<std::size_t>(j)] += step;
       directions.push_back(difference(
-          model_.covariance(source_.echoes(with(null.mechanisms, hypothesis.at(moved))), s.nuisance), here, step));
+          model_.covariance(source_.echoes(with(null.mechanisms, hypothesis.at(moved))), s.nuisance, everyone), here,
+          step));
     }
     return model_.scores(model_.basis(s.echoes, s.nuisance), directions, everyone);
   };

@@ -33,6 +33,21 @@ void mirror(Matrix& m) {
   }
 }
 
+/// Turns a lower triangle by phases: a heading's error moves a group's mean direction, and phases alone keep the matrix
+/// definite. `power` and `cosine` are the group's fields of the bin.
+void turnBy(double yaw_rad, const std::vector<double>& element_phase, const std::complex<float>* power,
+            const std::complex<float>* cosine, Matrix& m) {
+  if (yaw_rad == 0 || power == nullptr || cosine == nullptr || !(power[0].real() > 0)) return;
+  const double turn = yaw_rad * cosine[0].real() / power[0].real();
+  Vector phase(m.rows());
+  for (Eigen::Index k = 0; k < m.rows(); ++k) {
+    phase[k] = std::polar(1.0, element_phase[static_cast<std::size_t>(k)] * turn);
+  }
+  for (Eigen::Index k = 0; k < m.rows(); ++k) {
+    for (Eigen::Index l = 0; l < k; ++l) m(k, l) *= phase[k] * std::conj(phase[l]);
+  }
+}
+
 double groupGain(const EchoGroup& group, const Nuisance& nuisance) {
   double sum = 0;
   for (int a : group.actors) {
@@ -109,16 +124,7 @@ SessionModel::Matrix SessionModel::sigma(const PoseEchoes& echoes, const Nuisanc
       if (const auto* p = g.shift.at(bin, size_)) unpack(p, u * shift, own);
     }
     if (bend != nullptr) unpack(bend, u * (shift * shift + range_variance), own);
-    const auto* cosine = g.cosine.at(bin, size_);
-    if (n.yaw_rad[pose] != 0 && cosine != nullptr && power != nullptr && power[0].real() > 0) {
-      // The group's mean direction turns; phases alone keep the matrix definite.
-      const double turn = n.yaw_rad[pose] * cosine[0].real() / power[0].real();
-      Vector phase(channels_);
-      for (int k = 0; k < channels_; ++k) phase[k] = std::polar(1.0, element_phase_[k] * turn);
-      for (int k = 0; k < channels_; ++k) {
-        for (int l = 0; l < k; ++l) own(k, l) *= phase[k] * std::conj(phase[l]);
-      }
-    }
+    turnBy(n.yaw_rad[pose], element_phase_, power, g.cosine.at(bin, size_), own);
     s.triangularView<Eigen::Lower>() += own;
   }
   if (const auto* p = echoes.graze.at(bin, size_)) unpack(p, gain * std::exp(n.log_graze), s);
@@ -162,26 +168,28 @@ double SessionModel::logLikelihood(const std::vector<PoseEchoes>& echoes, const 
   return sum + prior(nuisance);
 }
 
-SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& all, const Nuisance& n,
+SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes, const Nuisance& n,
                                            const std::vector<int>& poses) const {
-  std::vector<PoseEchoes> some;
-  for (int i : poses) some.push_back(all[static_cast<std::size_t>(i)]);
-  return covariance(some, n);
-}
-
-SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes, const Nuisance& n) const {
-  SessionCovariance result(echoes.size());
-  const float gain = static_cast<float>(std::exp(n.log_gain));
-  tbb::parallel_for(std::size_t{0}, echoes.size(), [&](std::size_t i) {
+  SessionCovariance result(poses.size());
+  const double gain = std::exp(n.log_gain);
+  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
     result[i].assign(static_cast<std::size_t>(samples_) * size_, {});
+    Matrix own(channels_, channels_);
     for (const EchoGroup& g : echoes[i].groups) {
-      const float u = gain * static_cast<float>(groupGain(g, n)), shift = static_cast<float>(groupShift_m(g, n));
-      const std::pair<const BinCovariance*, float> terms[] = {
-          {&g.power, u}, {&g.shift, u * shift}, {&g.bend, u * shift * shift}};
-      for (const auto& [field, factor] : terms) {
-        if (factor == 0) continue;
-        std::complex<float>* to = result[i].data() + static_cast<std::size_t>(field->first) * size_;
-        for (std::size_t j = 0; j < field->packed.size(); ++j) to[j] += factor * field->packed[j];
+      const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
+      for (int bin = g.power.first; bin < g.power.first + g.power.bins; ++bin) {
+        const auto* power = g.power.at(bin, size_);
+        own.setZero();
+        unpack(power, u, own);
+        if (shift != 0) {
+          if (const auto* p = g.shift.at(bin, size_)) unpack(p, u * shift, own);
+          if (const auto* p = g.bend.at(bin, size_)) unpack(p, u * shift * shift, own);
+        }
+        turnBy(n.yaw_rad[poses[i]], element_phase_, power, g.cosine.at(bin, size_), own);
+        std::complex<float>* to = result[i].data() + static_cast<std::size_t>(bin) * size_;
+        for (int k = 0; k < channels_; ++k) {
+          for (int l = 0; l <= k; ++l) *to++ += std::complex<float>(own(k, l));
+        }
       }
     }
   });
@@ -199,6 +207,7 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
   const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
   // Only directions that do something in a bin enter its products.
   std::vector<int> active;
+  Matrix own(channels_, channels_);
   std::vector<char> is_active(static_cast<std::size_t>(globals + 1));
   std::vector<Matrix> raw(static_cast<std::size_t>(globals + 1), Matrix::Zero(channels_, channels_));
   const auto touch = [&](int j) -> Matrix& {
@@ -225,26 +234,38 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     for (const EchoGroup& g : echoes.groups) {
       const auto *power = g.power.at(bin, size_), *shift = g.shift.at(bin, size_), *bend = g.bend.at(bin, size_);
       if (power == nullptr && bend == nullptr) continue;
+      const auto* cosine = g.cosine.at(bin, size_);
       const double f = gain * groupGain(g, n), moved = groupShift_m(g, n);
+      const auto add = [&](int direction) {
+        turnBy(n.yaw_rad[pose], element_phase_, power, cosine, own);
+        touch(direction).triangularView<Eigen::Lower>() += own;
+      };
       for (int a : g.actors) {
         if (a < 0 || a >= actors_) continue;
-        Matrix& level = touch(kActors + a);
-        if (power != nullptr) unpack(power, f, level);
-        if (shift != nullptr && moved != 0) unpack(shift, f * moved, level);
-        Matrix& place = touch(kActors + actors_ + a);
-        if (shift != nullptr) unpack(shift, f, place);
-        if (bend != nullptr && moved != 0) unpack(bend, 2 * f * moved, place);
+        own.setZero();
+        if (power != nullptr) unpack(power, f, own);
+        if (shift != nullptr && moved != 0) unpack(shift, f * moved, own);
+        add(kActors + a);
+        own.setZero();
+        if (shift != nullptr) unpack(shift, f, own);
+        if (bend != nullptr && moved != 0) unpack(bend, 2 * f * moved, own);
+        add(kActors + actors_ + a);
       }
-      if (bend != nullptr) unpack(bend, f * range_variance, touch(kRange));
-      if (const auto* p = g.cosine.at(bin, size_)) {
-        Matrix& turn = touch(heading);
+      if (bend != nullptr) {
+        own.setZero();
+        unpack(bend, f * range_variance, own);
+        add(kRange);
+      }
+      if (cosine != nullptr) {
+        own.setZero();
         std::size_t i = 0;
         for (int k = 0; k < channels_; ++k) {
           for (int l = 0; l <= k; ++l, ++i) {
-            turn(k, l) +=
-                f * std::complex<double>(0, element_phase_[k] - element_phase_[l]) * std::complex<double>(p[i]);
+            own(k, l) =
+                f * std::complex<double>(0, element_phase_[k] - element_phase_[l]) * std::complex<double>(cosine[i]);
           }
         }
+        add(heading);
       }
     }
     if (const auto* p = echoes.graze.at(bin, size_)) unpack(p, gain * std::exp(n.log_graze), touch(kGraze));
@@ -425,7 +446,7 @@ Nuisance SessionModel::stepped(const Nuisance& from, const Eigen::VectorXd& g, c
   for (std::size_t i = 0; i < n.yaw_rad.size(); ++i) {
     const double step =
         scores.yaw_step[i] - scores.yaw_coupling.row(static_cast<Eigen::Index>(i)).dot(whole_step.transpose());
-    n.yaw_rad[i] = std::clamp(n.yaw_rad[i] + held(step, 0.005), -0.02, 0.02);
+    n.yaw_rad[i] = std::clamp(n.yaw_rad[i] + held(step, 0.02), -0.06, 0.06);
   }
   return n;
 }
@@ -440,14 +461,19 @@ double SessionModel::fit(const std::vector<PoseEchoes>& echoes, Nuisance& nuisan
     const Eigen::VectorXd step = s.information.ldlt().solve(s.total);
     const double promised = 0.5 * s.total.dot(step);
     bool better = false;
-    for (double share : {1.0, 0.5, 0.2, 0.05}) {
-      const Nuisance next = stepped(nuisance, step, s, step, share);
+    const Eigen::VectorXd none = Eigen::VectorXd::Zero(step.size());
+    // Together; else, where the headings are far off, one after the other.
+    for (int attempt = 0; attempt < 6 && !better; ++attempt) {
+      constexpr double kShares[] = {1.0, 0.5, 0.2, 0.05};
+      Nuisance next = attempt < 4    ? stepped(nuisance, step, s, step, kShares[attempt])
+                      : attempt == 4 ? stepped(nuisance, none, s, none, 1)
+                                     : stepped(nuisance, step, s, step, 0.5);
+      if (attempt == 5) next.yaw_rad = nuisance.yaw_rad;
       const double value = logLikelihood(echoes, next);
       if (value <= best) continue;
-      nuisance = next;
+      nuisance = std::move(next);
       best = value;
       better = true;
-      break;
     }
     if (!better || promised < kEnough) break;
   }
@@ -486,6 +512,8 @@ Nuisance SessionModel::start(const std::vector<PoseEchoes>& echoes) const {
   };
   n.log_gain = quantile(ratio, 0.5);
   n.log_floor = quantile(low, 0.25);
+  // Wide errors first: far outliers of a narrow t pull on nothing, and headings would not find their place.
+  n.log_relative = -3;
   return n;
 }
 

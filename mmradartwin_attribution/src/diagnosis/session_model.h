@@ -82,9 +82,8 @@ class SessionModel {
   /// Log-likelihood with priors; by_pose without.
   double logLikelihood(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
                        std::vector<double>* by_pose = nullptr) const;
-  /// Expected covariance of the echoes alone, with their gain and latents.
-  SessionCovariance covariance(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance) const;
-  SessionCovariance covariance(const std::vector<PoseEchoes>& all, const Nuisance& nuisance,
+  /// Expected covariance of the echoes alone, with their gain and latents; echoes[i] are those of poses[i].
+  SessionCovariance covariance(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
                                const std::vector<int>& poses) const;
   Basis basis(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance) const;
   /// Scores by the globals of Nuisance (in the order of its members) and by more directions: changes of covariance(),
