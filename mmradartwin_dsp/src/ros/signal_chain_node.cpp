@@ -144,7 +144,8 @@ void SignalChainNode::drain() {
       T_map_radar = toIsometry(tf_buffer_.lookupTransform(map_frame_, radar_frame_, stamp).transform);
       if (inGap(stamp)) {
         T_map_radar.reset();
-        ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f goes on without a pose: tf has none near it, and the radar moved",
+        ROS_WARN_THROTTLE(kWarnEvery_s,
+                          "frame at %.6f goes on without a pose: tf has none near it, and the radar moved",
                           stamp.toSec());
       }
     } catch (const tf2::TransformException& error) {

@@ -23,10 +23,10 @@ namespace mmradartwin {
 /// and as a nodelet; callbacks must come one at a time.
 ///
 /// A frame waits until tf knows T_map_radar at its stamp, `pose_timeout_s` at most; without a pose it goes on with
-/// pose_valid = false, as one does that lies between two poses more than `pose_gap_s` apart where the radar has moved in
-/// between: nobody knows how. The average begins anew when the radar has moved by more than `moved_m` or `moved_deg` since the
-/// window's first pose, when radar/config changes, and when stamps go back (a bag that loops). Frames of another radar
-/// configuration than the latched one are refused.
+/// pose_valid = false, as one does that lies between two poses more than `pose_gap_s` apart where the radar has moved
+/// in between: nobody knows how. The average begins anew when the radar has moved by more than `moved_m` or `moved_deg`
+/// since the window's first pose, when radar/config changes, and when stamps go back (a bag that loops). Frames of
+/// another radar configuration than the latched one are refused.
 class SignalChainNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
