@@ -11,10 +11,11 @@ say() { printf '== %s\n' "$*" >&2; }
 if [ "$session" = generate ] || [ -z "$session" ]; then
   session=${XDG_CACHE_HOME:-$HOME/.cache}/mmradartwin/emulated_session
   if [ ! -f "$session/complete" ]; then
-    say "first start: generating a session for the emulated rig in $session (about a minute; session:=FOLDER plays another)"
+    say "first start: generating a session for the emulated rig in $session, about a minute"
+    say "(session:=FOLDER plays another)"
     rm -rf "$session"
     mkdir -p "$(dirname "$session")"
-    rosrun mmradartwin_tests make_session.py --output "$session" --seed 7 --locations 6 --headings 2 --frames 200 >&2
+    rosrun mmradartwin_tests make_session.py --output "$session" --seed 7 --locations 4 --headings 2 --frames 100 >&2
     touch "$session/complete"
   else
     say "playing the session that an earlier start generated: $session (remove it to have another)"

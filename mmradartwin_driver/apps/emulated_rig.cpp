@@ -1,5 +1,7 @@
 // A whole rig without hardware: an emulated AWR2243 on an emulated USB bus and an emulated DCA1000 on a network of its
 // own. Programs see the radar when they are started by with_emulated_usb.
+#include "../emulator/emulated_rig.h"
+
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -14,7 +16,6 @@
 #include <fstream>
 #include <mutex>
 
-#include "../emulator/emulated_rig.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace {
@@ -89,7 +90,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--interface", options.interface, "this host's end of the cable")->capture_default_str();
   app.add_option("--card-ip", options.card.card_ip, "address of the card")->capture_default_str();
-  app.add_option("--host-ip", options.card.host_ip, "address of this host on the card's network")->capture_default_str();
+  app.add_option("--host-ip", options.card.host_ip, "address of this host on the card's network")
+      ->capture_default_str();
   app.add_flag("--loopback", options.loopback, "no network of its own: both addresses are this host's");
   app.add_flag("--once", options.lanes.once, "end with the session instead of beginning it anew");
   app.add_flag("--no-firmware", no_firmware, "the radar's flash is empty");

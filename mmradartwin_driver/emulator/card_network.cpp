@@ -57,7 +57,8 @@ CardNetwork::CardNetwork(const Options& options) : options_(options) {
   if (!taken.empty()) {
     throw std::runtime_error("this host has the address " + options_.host_ip +
                              " already, as for a real card: take it away (ip addr del), or give --host-ip and "
-                             "--card-ip of another network; it is on " + taken);
+                             "--card-ip of another network; it is on " +
+                             taken);
   }
   const std::string host = std::to_string(getpid());
   onThread([&] {

@@ -78,7 +78,7 @@ class EmulatedCard {
   std::mutex mutex_;             // the three below
   std::uint64_t recording_ = 0;  ///< counts RECORD_STARTs
   bool recording_on_ = false;
-  std::int64_t interval_ns_;     ///< between packets
+  std::int64_t interval_ns_;  ///< between packets
 
   // Of the thread that takes what the lanes bring.
   std::uint64_t sending_ = 0;  ///< recording that the counts belong to

@@ -21,7 +21,8 @@ void put(std::vector<std::uint8_t>& bytes, std::size_t word, int value) {
 }
 
 /// Lane k of four carries receiver k: eight words per sample, the first of each of the four, then the second.
-void putSample(const LvdsActivity& activity, std::vector<std::uint8_t>& bytes, std::size_t sample, int rx, int i, int q) {
+void putSample(const LvdsActivity& activity, std::vector<std::uint8_t>& bytes, std::size_t sample, int rx, int i,
+               int q) {
   const std::size_t lane = static_cast<std::size_t>(activity.lanes_reversed ? 3 - rx : rx);
   put(bytes, sample * 8 + lane, activity.q_first ? q : i);
   put(bytes, sample * 8 + 4 + lane, activity.q_first ? i : q);
@@ -60,8 +61,8 @@ std::vector<std::uint8_t> synthesiseLvds(const LvdsActivity& activity, double el
         const double at_s = elapsed_s + chirp * static_cast<double>(activity.chirp_ns) * 1e-9;
         for (const LvdsActivity::Target& target : activity.targets) {
           const double tau_s = delay_s(activity, target, rx, at_s);
-          const double turns = activity.start_frequency_hz * tau_s +
-                               activity.slope_hz_per_s * tau_s * (ramp_s - tau_s / 2);
+          const double turns =
+              activity.start_frequency_hz * tau_s + activity.slope_hz_per_s * tau_s * (ramp_s - tau_s / 2);
           sum += std::polar(32767 * std::pow(10.0, target.level_dbfs / 20), 2 * kPi * std::fmod(turns, 1.0));
         }
         const auto clipped = [](double value) {
@@ -92,7 +93,8 @@ void EmulatedLvds::set(const LvdsActivity& activity) {
     const std::size_t bytes = 16u * static_cast<std::size_t>(activity.chirps * activity.samples);
     if (bytes != session_.radar.bytes_per_frame()) {
       log_("error: the radar is configured for frames of " + std::to_string(bytes) + " bytes, and the session has " +
-           std::to_string(session_.radar.bytes_per_frame()) + ": nothing is sent; give the driver a radar.yaml with "
+           std::to_string(session_.radar.bytes_per_frame()) +
+           ": nothing is sent; give the driver a radar.yaml with "
            "the session's samples, loops and transmitters");
       activity_.kind = Kind::kSilent;
     } else {
@@ -124,8 +126,8 @@ bool EmulatedLvds::next(LvdsFrame& frame) {
   using SteadyTime = std::chrono::time_point<std::chrono::steady_clock, std::chrono::nanoseconds>;
   std::unique_lock<std::mutex> lock(mutex_);
   const std::uint64_t run = run_;
-  const bool done = activity_.kind == Kind::kTestPattern && activity_.pattern_packets > 0 &&
-                    run_frame_ >= activity_.pattern_packets;
+  const bool done =
+      activity_.kind == Kind::kTestPattern && activity_.pattern_packets > 0 && run_frame_ >= activity_.pattern_packets;
   if (activity_.kind == Kind::kSilent || over_ || done) {
     changed_.wait_for(lock, std::chrono::milliseconds(20));
     return false;

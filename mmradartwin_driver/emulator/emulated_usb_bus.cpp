@@ -195,8 +195,9 @@ void EmulatedUsbBus::plug() {
       "P: " + state.device + "\nN: " + state.node.substr(5) +
       "\nE: SUBSYSTEM=usb\nE: DRIVER=usb\nE: BUSNUM=001\nE: DEVNUM=" + state.node.substr(17) +
       "\nE: DEVNAME=" + state.node +
-      "\nE: DEVTYPE=usb_device\nA: idVendor=0451\\n\nA: idProduct=fd03\\n\nA: bConfigurationValue=1\\n\nA: busnum=1\\n\nA: devnum=" + number +
-      "\\n\nA: speed=480\\n\nH: descriptors=" + descriptors() + "\n";
+      "\nE: DEVTYPE=usb_device\nA: idVendor=0451\\n\nA: idProduct=fd03\\n\nA: bConfigurationValue=1\\n\nA: "
+      "busnum=1\\n\nA: devnum=" +
+      number + "\\n\nA: speed=480\\n\nH: descriptors=" + descriptors() + "\n";
   GError* error = nullptr;
   if (!umockdev_testbed_add_from_string(state.testbed, description.c_str(), &error)) {
     const std::string why = error ? error->message : "";

@@ -31,9 +31,10 @@ void PoseWatch::observe(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_ra
     } else if ((moved_m > options_.jump_m && moved_m > options_.speed_limit_m_per_s * apart_s) ||
                (turned_rad > options_.jump_rad && turned_rad > options_.turn_limit_rad_per_s * apart_s)) {
       ++jumps_;
-      told_ = text("the pose jumped by %.2f m and %.0f deg within %.2f s: was the radar put elsewhere, or did its "
-                   "localisation correct itself?",
-                   moved_m, turned_rad * 57.29578, apart_s);
+      told_ = text(
+          "the pose jumped by %.2f m and %.0f deg within %.2f s: was the radar put elsewhere, or did its "
+          "localisation correct itself?",
+          moved_m, turned_rad * 57.29578, apart_s);
       told_ns_ = stamp_ns;
     }
   }
@@ -46,7 +47,8 @@ PoseWatch::Report PoseWatch::report(std::int64_t now_ns) const {
   report.gaps = gaps_;
   report.jumps = jumps_;
   if (!stamp_ns_) {
-    report.text = "no pose of the radar yet: start the node that publishes the camera's pose, and the mount's transform";
+    report.text =
+        "no pose of the radar yet: start the node that publishes the camera's pose, and the mount's transform";
     return report;
   }
   if (*stamp_ns_ == 0) {
@@ -56,7 +58,8 @@ PoseWatch::Report PoseWatch::report(std::int64_t now_ns) const {
   }
   report.age_s = static_cast<double>(now_ns - *stamp_ns_) * 1e-9;
   if (*report.age_s > options_.age_limit_s) {
-    report.text = text("the latest pose is %.1f s old: see to the node that publishes the camera's pose", *report.age_s);
+    report.text =
+        text("the latest pose is %.1f s old: see to the node that publishes the camera's pose", *report.age_s);
   } else if (!told_.empty() && static_cast<double>(now_ns - told_ns_) * 1e-9 < options_.remember_s) {
     report.level = Level::kWarning;
     report.text = told_;

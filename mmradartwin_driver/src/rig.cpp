@@ -44,13 +44,13 @@ Rig::Rig(const RadarConfig& radar, const RigOptions& options, CubeSink cubes, Ev
   parseIpv4(options_.card_ip);
   if (!options_.record_pcap.empty()) recording_ = std::make_unique<PcapWriter>(options_.record_pcap);
   if (options_.radar) {
-    watch_ = std::make_unique<RadarWatch>(
-        *options_.radar, options_.radar_firmware, [this](RadarWatch::Level level, const std::string& text) {
-          events_(level == RadarWatch::Level::kInfo      ? Level::kInfo
-                  : level == RadarWatch::Level::kWarning ? Level::kWarning
-                                                         : Level::kError,
-                  text);
-        });
+    watch_ = std::make_unique<RadarWatch>(*options_.radar, options_.radar_firmware,
+                                          [this](RadarWatch::Level level, const std::string& text) {
+                                            events_(level == RadarWatch::Level::kInfo      ? Level::kInfo
+                                                    : level == RadarWatch::Level::kWarning ? Level::kWarning
+                                                                                           : Level::kError,
+                                                    text);
+                                          });
   }
   silent_since_ = Clock::now();
   thread_ = std::thread([this] { run(); });
@@ -175,8 +175,9 @@ bool Rig::receiveBatch(int timeout_ms) {
 void Rig::checkFirstSamples(Clock::duration silent) {
   if (silent < kFirstSamples + std::chrono::duration<double>(2 * radar_.frame_period_s)) return;
   watch_->forget();
-  throw RigError("the radar runs, and no samples come from the card: seat the LVDS ribbon between the boards; radar and "
-                 "card are set up anew");
+  throw RigError(
+      "the radar runs, and no samples come from the card: seat the LVDS ribbon between the boards; radar and "
+      "card are set up anew");
 }
 
 void Rig::stream() {

@@ -258,7 +258,8 @@ class Examination {
                std::to_string(control.temperature_deg_c().value_or(0)) + " deg C at calibration" + warnings);
       step = "lane pattern";
       awr2243::TestPattern pattern = selfTestPattern();
-      tell(judgeTestPattern(quantised, recordBytes(16 * selfTestPacketBytes(), [&] { control.setTestPattern(pattern); })));
+      tell(judgeTestPattern(quantised,
+                            recordBytes(16 * selfTestPacketBytes(), [&] { control.setTestPattern(pattern); })));
       pattern.enable = 0;
       control.setTestPattern(pattern);
       step = "test source";
@@ -284,8 +285,9 @@ class Examination {
     std::vector<std::uint8_t> bytes(wanted);
     std::vector<bool> have(wanted);
     std::size_t missing = wanted;
-    const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
-                                          options_.first_packet_s + 2 * kSelfTestFrames * options_.radar->frame_period_s));
+    const auto until =
+        Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+                           options_.first_packet_s + 2 * kSelfTestFrames * options_.radar->frame_period_s));
     while (missing > 0 && Clock::now() < until) {
       receiver_->receive(20, [&](const DataPacket& packet) {
         for (std::size_t i = 0; i < packet.size && packet.byte_count + i < wanted; ++i) {

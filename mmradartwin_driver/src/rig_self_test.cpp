@@ -96,8 +96,10 @@ awr2243::TestPattern selfTestPattern() {
   pattern.samples = kPatternSamples;
   for (std::size_t rx = 0; rx < kLanes; ++rx) {
     const auto number = static_cast<std::uint16_t>(rx);
-    pattern.rx[rx].i = {static_cast<std::uint16_t>(0x0100 + 0x1000 * number), static_cast<std::uint16_t>(1 + 2 * number)};
-    pattern.rx[rx].q = {static_cast<std::uint16_t>(0x8200 + 0x1000 * number), static_cast<std::uint16_t>(2 + 2 * number)};
+    pattern.rx[rx].i = {static_cast<std::uint16_t>(0x0100 + 0x1000 * number),
+                        static_cast<std::uint16_t>(1 + 2 * number)};
+    pattern.rx[rx].q = {static_cast<std::uint16_t>(0x8200 + 0x1000 * number),
+                        static_cast<std::uint16_t>(2 + 2 * number)};
   }
   return pattern;
 }
@@ -171,7 +173,8 @@ awr2243::TestSource selfTestSource(const RadarConfig& radar) {
   for (std::size_t i = 0; i < targets.size(); ++i) {
     const double across_m = targets[i].range_m * std::sin(targets[i].azimuth_rad);
     const double ahead_m = targets[i].range_m * std::cos(targets[i].azimuth_rad);
-    if (ahead_m > 300) throw InputError("the self-test's targets would be further out than the chip can be told: 300 m");
+    if (ahead_m > 300)
+      throw InputError("the self-test's targets would be further out than the chip can be told: 300 m");
     source.targets[i].position_cm[0] = static_cast<std::int16_t>(std::lround(across_m * 100));
     source.targets[i].position_cm[1] = static_cast<std::int16_t>(std::lround(ahead_m * 100));
     source.targets[i].level = kTargetLevel;
@@ -243,8 +246,9 @@ CheckResult judgeTestSource(const RadarConfig& radar, const std::vector<std::uin
   result.level = CheckResult::Level::kProblem;
   // Two equal targets stand as high as anything, and far above the rest; the strongest of noise does not.
   if (best.level_db < strongest_db - 6 || best.level_db < median_db + kAboveNoise_db) {
-    result.found = text("the chip's two targets are not in the samples (%.0f dB where they should be, strongest %.0f dB)",
-                        places.front().level_db, strongest_db);
+    result.found =
+        text("the chip's two targets are not in the samples (%.0f dB where they should be, strongest %.0f dB)",
+             places.front().level_db, strongest_db);
     result.next = "check slope, sample rate and rx_position_m in radar.yaml, and the lane pattern above";
   } else if (!best.far && !best.other_side) {
     result.level = CheckResult::Level::kFine;

@@ -1,5 +1,5 @@
-// Stamps of frames from a card whose packets leave late, through kernel, receiver, assembler and clock, against when the
-// frames truly began.
+// Stamps of frames from a card whose packets leave late, through kernel, receiver, assembler and clock, against when
+// the frames truly began.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -85,8 +85,8 @@ Jitter measure(unsigned seed) {
 }
 
 TEST(FrameStamps, JitterBelow100usWhileArrivalsAreMillisecondsLate) {
-  // Where the machine is so busy that it delays the emulated card by more than the noise asked for, the noise is another
-  // than the one of this test: then once more.
+  // Where the machine is so busy that it delays the emulated card by more than the noise asked for, the noise is
+  // another than the one of this test: then once more.
   constexpr double kOwnLateLimit_us = 10e3;
   for (unsigned seed = 1; seed <= 3; ++seed) {
     const Jitter jitter = measure(seed);
@@ -98,7 +98,8 @@ TEST(FrameStamps, JitterBelow100usWhileArrivalsAreMillisecondsLate) {
     RecordProperty("rms_us", std::to_string(jitter.stamps_us));
     return;
   }
-  GTEST_SKIP() << "this machine is too busy to play a card: it delayed packets by more than 10 ms in each of three tries";
+  GTEST_SKIP()
+      << "this machine is too busy to play a card: it delayed packets by more than 10 ms in each of three tries";
 }
 
 }  // namespace

@@ -133,9 +133,9 @@ std::string examine(const std::vector<std::string>& wiring, int expected_status)
   TemporaryFolder folder;
   writeSession(folder, 0.05, {20});
   writeText(folder.file("device.yaml"), paperRadarYaml(0.05) + kDevice);
-  std::vector<std::string> arguments = {folder.file(""),  "--loopback", "--host-ip", loopbackIp(1),
-                                        "--card-ip",      loopbackIp(2), "--run-folder", folder.file("rig"),
-                                        "--deaf-s",       "0.1",         "--end-with-parent"};
+  std::vector<std::string> arguments = {folder.file(""), "--loopback",  "--host-ip",        loopbackIp(1),
+                                        "--card-ip",     loopbackIp(2), "--run-folder",     folder.file("rig"),
+                                        "--deaf-s",      "0.1",         "--end-with-parent"};
   arguments.insert(arguments.end(), wiring.begin(), wiring.end());
   ChildProcess rig(MMRADARTWIN_EMULATED_RIG, arguments);
   const auto ready = rig.readLine(20000);

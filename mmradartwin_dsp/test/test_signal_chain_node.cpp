@@ -163,19 +163,6 @@ TEST_F(SignalChainNodeTest, WaitsForThePoseAtTheStampAndGoesOnWithoutOne) {
   EXPECT_EQ(grids_.messages[1]->T_map_radar.orientation.w, 1);
 }
 
-TEST_F(SignalChainNodeTest, NoPoseAcrossAGapInWhichTheRadarMoved) {
-  sendPose(stamp(-1), 5);
-  sendPose(stamp(30), 8);  // 1.55 s later, elsewhere
-  sendPose(stamp(60), 8);  // 1.5 s later, and it stood still
-  send(0);
-  ASSERT_TRUE(grids_.wait(1));
-  EXPECT_FALSE(grids_.messages[0]->pose_valid);
-  send(45);
-  ASSERT_TRUE(grids_.wait(2));
-  EXPECT_TRUE(grids_.messages[1]->pose_valid);
-  EXPECT_NEAR(grids_.messages[1]->T_map_radar.position.x, 8, 1e-9);
-}
-
 TEST_F(SignalChainNodeTest, SurvivesBadMessagesAndForeignRadars) {
   sendPose(stamp(-0.5), 0);
   sendPose(stamp(10), 0);

@@ -25,8 +25,8 @@ class RadarWatch {
   };
   struct State {
     bool configured = false, running = false;
-    std::string problem;  ///< one line with the next thing to do; empty while all is well
-    std::string version;  ///< of the firmware; empty before the radar was up
+    std::string problem;                   ///< one line with the next thing to do; empty while all is well
+    std::string version;                   ///< of the firmware; empty before the radar was up
     std::optional<int> temperature_deg_c;  ///< at the last calibration
     std::uint64_t bring_ups = 0, starts = 0, events = 0, warnings = 0, errors = 0;
     std::deque<Event> latest;  ///< the last ten, newest first

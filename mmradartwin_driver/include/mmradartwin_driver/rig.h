@@ -43,7 +43,7 @@ struct RigState {
   Phase phase = Phase::kConnecting;
   std::string problem;  ///< one line that says the next thing to do; empty while all is well
   std::optional<FpgaVersion> version;
-  std::optional<RadarWatch::State> radar;  ///< where the rig configures it
+  std::optional<RadarWatch::State> radar;    ///< where the rig configures it
   std::optional<std::uint16_t> last_status;  ///< of the card, since it was armed
   std::uint64_t armings = 0;
   double silent_s = 0;           ///< since the last packet, or since arming

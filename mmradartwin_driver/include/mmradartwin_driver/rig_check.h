@@ -33,7 +33,7 @@ struct RigCheckOptions {
   /// Configure the radar (an AWR2243, `radar` with the keys for that) and let the chip make samples up, see
   /// rig_self_test.h. Afterwards it must be configured again.
   bool self_test = false;
-  std::string radar_firmware;            ///< image for a radar whose flash is empty, with self_test
+  std::string radar_firmware;  ///< image for a radar whose flash is empty, with self_test
   std::string sysfs = "/sys", devfs = "/dev", procfs = "/proc", etc = "/etc";
 };
 

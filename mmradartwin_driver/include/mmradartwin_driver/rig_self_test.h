@@ -32,8 +32,8 @@ std::vector<SelfTestTarget> selfTestTargets(const RadarConfig& radar);
 /// The same for the chip, whose x is radar_link's y, with the receivers where radar.yaml has them. Throws InputError
 /// where they are further out than the chip can be told.
 awr2243::TestSource selfTestSource(const RadarConfig& radar);
-/// `bytes`: whole frames of selfTestRadar(). Looks for both targets where they were put, and at the places where swapped
-/// I and Q or reversed lanes would put them. Throws InputError where the receivers are no uniform line.
+/// `bytes`: whole frames of selfTestRadar(). Looks for both targets where they were put, and at the places where
+/// swapped I and Q or reversed lanes would put them. Throws InputError where the receivers are no uniform line.
 CheckResult judgeTestSource(const RadarConfig& radar, const std::vector<std::uint8_t>& bytes);
 
 }  // namespace mmradartwin

@@ -58,7 +58,8 @@ RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& priva
     updater_.add("radar pose", this, &RadarDriver::diagnosePose);
     tf_buffer_ = std::make_unique<tf2_ros::Buffer>();
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(*tf_buffer_, handle);
-    pose_timer_ = handle.createWallTimer(ros::WallDuration(0.02), [this](const ros::WallTimerEvent&) { observePose(); });
+    pose_timer_ =
+        handle.createWallTimer(ros::WallDuration(0.02), [this](const ros::WallTimerEvent&) { observePose(); });
   }
   rig_ = std::make_unique<Rig>(
       radar_, options_, [this](AdcCube&& cube) { publish(std::move(cube)); }, logEvent);
@@ -209,7 +210,8 @@ void RadarDriver::diagnoseDevice(diagnostic_updater::DiagnosticStatusWrapper& st
     const bool error = recent->level == RadarWatch::Level::kError;
     status.summary(error ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN, "event: " + recent->text);
   } else if (!state.running) {
-    status.summary(DiagnosticStatus::WARN, state.configured ? "configured, its frames do not run" : "not configured yet");
+    status.summary(DiagnosticStatus::WARN,
+                   state.configured ? "configured, its frames do not run" : "not configured yet");
   } else {
     status.summary(DiagnosticStatus::OK, "frames run");
   }
@@ -223,9 +225,9 @@ void RadarDriver::diagnoseDevice(diagnostic_updater::DiagnosticStatusWrapper& st
   status.add("events that warn", state.warnings);
   status.add("events that report an error", state.errors);
   for (std::size_t i = 0; i < state.latest.size(); ++i) {
-    status.add("event " + std::to_string(i + 1) + " before now",
-               seconds(std::chrono::duration<double>(now - state.latest[i].at).count()) + " ago: " +
-                   state.latest[i].text);
+    status.add(
+        "event " + std::to_string(i + 1) + " before now",
+        seconds(std::chrono::duration<double>(now - state.latest[i].at).count()) + " ago: " + state.latest[i].text);
   }
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
@@ -15,13 +14,6 @@ namespace {
 constexpr double kWarnEvery_s = 5;
 /// Frames that may wait for tf; a second at the fastest frame rates.
 constexpr std::size_t kLongestQueue = 1000;
-/// tf's own memory.
-constexpr double kRemembered_s = 10;
-
-Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& T) {
-  return Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
-         Eigen::Quaterniond(T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z).normalized();
-}
 
 }  // namespace
 
@@ -34,7 +26,6 @@ SignalChainNode::SignalChainNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   config_subscriber_ = nh.subscribe("radar/config", 2, &SignalChainNode::onConfig, this);
   cube_subscriber_ = nh.subscribe("radar/adc", 200, &SignalChainNode::onCube, this);
   twin_subscriber_ = nh.subscribe("twin/grid", 50, &SignalChainNode::onTwinGrid, this);
-  transform_subscriber_ = nh.subscribe("tf", 1000, &SignalChainNode::onTransforms, this);
   timer_ = nh.createWallTimer(ros::WallDuration(0.01), [this](const ros::WallTimerEvent&) { drain(); });
 }
 
@@ -45,7 +36,6 @@ void SignalChainNode::readParameters(const ros::NodeHandle& private_nh) {
   moved_m_ = parameters.number("moved_m", moved_m_, 1e-4, 1e3);
   moved_rad_ = parameters.number("moved_deg", 1.0, 1e-2, 180) * M_PI / 180;
   pose_timeout_s_ = parameters.number("pose_timeout_s", pose_timeout_s_, 0, 60);
-  pose_gap_s_ = parameters.number("pose_gap_s", pose_gap_s_, 0.01, 3600);
   map_frame_ = parameters.text("map_frame", map_frame_);
   radar_frame_ = parameters.text("radar_frame", radar_frame_);
   parameters.rejectUnknown();
@@ -96,43 +86,10 @@ void SignalChainNode::onCube(const mmradartwin_msgs::AdcCube::ConstPtr& cube) {
     // What tf holds lies in the future now and would keep older transforms out. With simulated time its listener has
     // seen the jump itself, and has begun to fill again.
     if (!ros::Time::isSimTime()) tf_buffer_.clear();
-    transform_stamps_.clear();
   }
   newest_ = cube->header.stamp;
   queue_.push_back({cube, ros::Time::now()});
   drain();
-}
-
-void SignalChainNode::onTransforms(const tf2_msgs::TFMessage::ConstPtr& message) {
-  for (const geometry_msgs::TransformStamped& transform : message->transforms) {
-    std::set<ros::Time>& stamps = transform_stamps_[transform.child_frame_id];
-    stamps.insert(transform.header.stamp);
-    const ros::Time newest = *stamps.rbegin();
-    while ((newest - *stamps.begin()).toSec() > kRemembered_s) stamps.erase(stamps.begin());
-  }
-}
-
-bool SignalChainNode::inGap(const ros::Time& stamp) const {
-  // tf draws a straight line between two transforms, however far apart they are.
-  std::string frame = radar_frame_, parent;
-  while (frame != map_frame_ && tf_buffer_._getParent(frame, stamp, parent)) {
-    const auto known = transform_stamps_.find(frame);
-    frame = parent;
-    if (known == transform_stamps_.end()) continue;  // static
-    const auto after = known->second.lower_bound(stamp);
-    if (after == known->second.end() || after == known->second.begin()) continue;
-    const auto before = std::prev(after);
-    if ((*after - *before).toSec() <= pose_gap_s_) continue;
-    const auto pose = [this](const ros::Time& at) {
-      return toIsometry(tf_buffer_.lookupTransform(map_frame_, radar_frame_, at).transform);
-    };
-    try {
-      if (!standsStill(pose(*before), pose(*after), moved_m_, moved_rad_)) return true;
-    } catch (const tf2::TransformException&) {
-      return true;  // nobody knows whether it moved
-    }
-  }
-  return false;
 }
 
 void SignalChainNode::drain() {
@@ -141,12 +98,9 @@ void SignalChainNode::drain() {
     const ros::Time stamp = front.cube->header.stamp;
     std::optional<Eigen::Isometry3d> T_map_radar;
     try {
-      T_map_radar = toIsometry(tf_buffer_.lookupTransform(map_frame_, radar_frame_, stamp).transform);
-      if (inGap(stamp)) {
-        T_map_radar.reset();
-        ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f goes on without a pose: tf has none near it, and the radar moved",
-                          stamp.toSec());
-      }
+      const geometry_msgs::Transform T = tf_buffer_.lookupTransform(map_frame_, radar_frame_, stamp).transform;
+      T_map_radar = Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
+                    Eigen::Quaterniond(T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z).normalized();
     } catch (const tf2::TransformException& error) {
       const double waited_s = (ros::Time::now() - front.since).toSec();
       // Time that went back while the frame waited counts as waited out.

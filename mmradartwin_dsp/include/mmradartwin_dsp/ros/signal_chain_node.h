@@ -4,15 +4,11 @@
 #include <mmradartwin_msgs/RadarConfig.h>
 #include <mmradartwin_msgs/ReceiveGrid.h>
 #include <ros/ros.h>
-#include <tf2_msgs/TFMessage.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
 
 #include <deque>
-#include <map>
 #include <optional>
-#include <set>
-#include <string>
 
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/range_angle.h"
@@ -23,8 +19,7 @@ namespace mmradartwin {
 /// and as a nodelet; callbacks must come one at a time.
 ///
 /// A frame waits until tf knows T_map_radar at its stamp, `pose_timeout_s` at most; without a pose it goes on with
-/// pose_valid = false, as one does that lies between two poses more than `pose_gap_s` apart where the radar has moved in
-/// between: nobody knows how. The average begins anew when the radar has moved by more than `moved_m` or `moved_deg` since the
+/// pose_valid = false. The average begins anew when the radar has moved by more than `moved_m` or `moved_deg` since the
 /// window's first pose, when radar/config changes, and when stamps go back (a bag that loops). Frames of another radar
 /// configuration than the latched one are refused.
 class SignalChainNode {
@@ -42,9 +37,6 @@ class SignalChainNode {
   void onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& config);
   void onCube(const mmradartwin_msgs::AdcCube::ConstPtr& cube);
   void onTwinGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid);
-  void onTransforms(const tf2_msgs::TFMessage::ConstPtr& message);
-  /// True where transforms on the way from map to radar enclose the stamp too far apart, and the radar moved meanwhile.
-  bool inGap(const ros::Time& stamp) const;
   /// Takes all frames from the queue whose pose is known or will not come.
   void drain();
   void process(const mmradartwin_msgs::AdcCube& cube, const std::optional<Eigen::Isometry3d>& T_map_radar);
@@ -56,7 +48,6 @@ class SignalChainNode {
   double moved_m_ = 0.02;
   double moved_rad_ = 0;
   double pose_timeout_s_ = 0.5;
-  double pose_gap_s_ = 0.5;
   std::string map_frame_ = "map";
   std::string radar_frame_ = "radar_link";
 
@@ -64,7 +55,6 @@ class SignalChainNode {
   std::optional<tf2_ros::TransformListener> tf_listener_;
   ros::Publisher grid_publisher_, map_publisher_, twin_map_publisher_;
   ros::Subscriber config_subscriber_, cube_subscriber_, twin_subscriber_;
-  ros::Subscriber transform_subscriber_;
   ros::WallTimer timer_;
 
   std::uint64_t radar_hash_ = 0;
@@ -72,7 +62,6 @@ class SignalChainNode {
   std::optional<CoherentAverage> average_;
   std::optional<Eigen::Isometry3d> window_pose_;  ///< first known pose of the window
   std::deque<Waiting> queue_;
-  std::map<std::string, std::set<ros::Time>> transform_stamps_;  ///< by child frame, as far back as tf remembers
   ros::Time newest_;
   int since_published_ = 0;
 };
