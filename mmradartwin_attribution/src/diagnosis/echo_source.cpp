@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <tuple>
 
 #include "mmradartwin_dsp/input_error.h"
@@ -19,9 +20,9 @@ constexpr double kWeakPower = 1e-3;
 // A path whose amplitude changes by less than this share within the pose's accuracy does not graze anything.
 constexpr double kSteady = 0.02;
 constexpr double kReceiverSine = 1.0 / 16;  // of sin(azimuth), where weak paths go through the receiver together
-// Scatter points of a surface, thousands a pose, are summed over cells that are small beside what the radar resolves.
+// From so many paths of one mechanism on they are a cloud of scatter points.
 constexpr std::size_t kCloud = 300;
-constexpr double kCloudBins = 0.25, kCloudSine = 1.0 / 32;
+constexpr double kCloud_m = 0.12, kCloudHeight_m = 0.3;
 
 std::string keyOf(const std::vector<NamedParameters>& geometry) {
   std::string key;
@@ -29,27 +30,49 @@ std::string keyOf(const std::vector<NamedParameters>& geometry) {
   return key;
 }
 
-/// Paths of one cell of range, direction and actors become one with their power; those for which `keep` holds stay.
-template <typename Keep>
-std::vector<PathRecord> merged(std::vector<PathRecord> records, double range_cell_m, double sine_cell, Keep keep) {
-  std::map<std::tuple<std::vector<int>, int, int>, std::pair<std::size_t, double>> cells;
+/// Paths of one cell become one with their power; those for which cell() gives nothing stay.
+template <typename Key, typename Cell>
+std::vector<PathRecord> merged(std::vector<PathRecord> records, Cell cell) {
+  std::map<Key, std::pair<std::size_t, double>> cells;
   std::vector<PathRecord> result;
   for (PathRecord& r : records) {
-    if (keep(r)) {
-      result.push_back(std::move(r));
-      continue;
+    const std::optional<Key> key = cell(r);
+    if (key) {
+      const auto [at, fresh] = cells.try_emplace(*key, result.size(), 0.0);
+      at->second.second += r.amplitude * r.amplitude;
+      if (!fresh) continue;
     }
-    const int direction = static_cast<int>(std::floor(0.5 * (r.departure.y() + r.arrival.y()) / sine_cell));
-    const int range = static_cast<int>(std::floor(0.5 * r.length_m[0] / range_cell_m));
-    const auto [at, fresh] = cells.try_emplace({r.actors, range, direction}, result.size(), 0.0);
-    at->second.second += r.amplitude * r.amplitude;
-    if (fresh) result.push_back(std::move(r));
+    result.push_back(std::move(r));
   }
-  for (const auto& [key, cell] : cells) {
-    PathRecord& r = result[cell.first];
-    if (r.amplitude > 0) scaleRecord(std::sqrt(cell.second) / r.amplitude, r);
+  for (const auto& [key, sum] : cells) {
+    PathRecord& r = result[sum.first];
+    if (r.amplitude > 0) scaleRecord(std::sqrt(sum.second) / r.amplitude, r);
   }
   return result;
+}
+
+/// Scatter points of a surface, thousands a pose, in cells of the room that are small beside what the radar resolves;
+/// cells of the room, so that a turned or moved radar sees the same ones.
+std::vector<PathRecord> mergedCloud(std::vector<PathRecord> records) {
+  using Key = std::tuple<int, int, int, int>;
+  return merged<Key>(std::move(records), [](const PathRecord& r) -> std::optional<Key> {
+    if (r.bounces != 1 || r.facets.empty()) return std::nullopt;
+    const Eigen::Vector3d p = r.vertices.front().cwiseQuotient(Eigen::Vector3d(kCloud_m, kCloud_m, kCloudHeight_m));
+    return Key{r.facets.front(), static_cast<int>(std::floor(p.x())), static_cast<int>(std::floor(p.y())),
+               static_cast<int>(std::floor(p.z()))};
+  });
+}
+
+/// Weak paths by range, direction and actors, for a receiver that they have to go through one by one.
+std::vector<PathRecord> mergedWeak(const RadarConfig& radar, std::vector<PathRecord> records) {
+  double strongest = 0;
+  for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude * r.amplitude);
+  using Key = std::tuple<std::vector<int>, int, int>;
+  return merged<Key>(std::move(records), [&](const PathRecord& r) -> std::optional<Key> {
+    if (r.amplitude * r.amplitude > kWeakPower * strongest) return std::nullopt;
+    const int direction = static_cast<int>(std::floor(0.5 * (r.departure.y() + r.arrival.y()) / kReceiverSine));
+    return Key{r.actors, rangeBin(radar, r.length_m[0]), direction};
+  });
 }
 
 }  // namespace
@@ -114,10 +137,7 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
                                    });
                                  }),
                   records.end());
-    if (records.size() > kCloud) {
-      records = merged(std::move(records), kCloudBins * base_.radar().range_bin_m(), kCloudSine,
-                       [](const PathRecord& r) { return r.bounces != 1; });
-    }
+    if (records.size() > kCloud) records = mergedCloud(std::move(records));
     entry.paths[i] = std::move(records);
     entry.known[i] = 1;
   });
@@ -199,10 +219,7 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
       // The receiver mixes ranges: each path is sent through it alone, less what comes without any path.
       const auto spectra = [&](const ComplexGrid& x) -> Eigen::MatrixXcd { return chain.rangeSpectra(x) / window; };
       const Eigen::MatrixXcd nothing = spectra(twin.weigh(pose.T_map_radar, {}, pose.stamp_ns).grid.x);
-      double strongest = 0;
-      for (const PathRecord& r : all) strongest = std::max(strongest, r.amplitude * r.amplitude);
-      const auto strong = [&](const PathRecord& r) { return r.amplitude * r.amplitude > kWeakPower * strongest; };
-      for (PathRecord& r : merged(std::move(all), radar.range_bin_m(), kReceiverSine, strong)) {
+      for (PathRecord& r : mergedWeak(radar, std::move(all))) {
         const Simulation alone = twin.weigh(pose.T_map_radar, {r}, pose.stamp_ns);
         if (!alone.records.empty()) collector.add(alone.records.front(), spectra(alone.grid.x) - nothing);
       }

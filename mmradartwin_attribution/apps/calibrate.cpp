@@ -1,0 +1,152 @@
+// Finds the radar's mount, range bias and channel errors from poses in front of a corner reflector or a wall.
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+
+#include "mmradartwin_attribution/mount_calibration.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/map_picture.h"
+#include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/ros/bag.h"
+#include "mmradartwin_sim/twin.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace mmradartwin;
+
+struct Arguments {
+  std::string recording, output, twin, scene, radar, wall, lasers;
+  std::string channels = "twin";
+  std::vector<double> reflector_m, mount;
+  MountCalibrationOptions options;
+};
+
+void write(const fs::path& file, const std::string& text) {
+  std::ofstream out(file);
+  out << text;
+  out.close();
+  if (!out) throw InputError(file.string() + ": cannot be written; is there space, and may you write there?");
+}
+
+/// The mechanisms that a calibration answers, in place of what the twin had of them.
+void calibrate(TwinDescription& twin, const MountCalibration& c, bool channels) {
+  const auto replace = [&twin](const std::string& mechanism, const Parameters* values) {
+    auto& all = twin.mechanisms;
+    all.erase(std::remove_if(all.begin(), all.end(), [&](const auto& m) { return m.mechanism == mechanism; }), all.end());
+    if (values) all.push_back({mechanism, *values});
+  };
+  Parameters yaw, position, range, channel;
+  yaw.set("yaw_deg", c.yaw_deg.value);
+  position.set("forward_m", c.forward_m.value);
+  position.set("left_m", c.left_m.value);
+  range.set("range_m", c.range_m.value);
+  std::vector<double> phase, gain;
+  for (const CalibratedValue& v : c.phase_deg) phase.push_back(v.value);
+  for (const CalibratedValue& v : c.gain_db) gain.push_back(v.value);
+  channel.set("phase_deg", phase);
+  channel.set("gain_db", gain);
+  if (c.yaw_deg.observable) replace("radar_yaw_offset", &yaw);
+  if (c.forward_m.observable || c.left_m.observable) replace("radar_position_offset", &position);
+  if (c.range_m.observable) replace("range_bias", &range);
+  if (channels) replace("channel_phase_error", &channel);
+}
+
+void print(const CalibratedValue& v, const std::string& label) {
+  if (v.observable) {
+    std::printf("%-22s %10.4f %-3s  95 %%: %.4f to %.4f\n", label.c_str(), v.value, v.unit.c_str(), v.ci95[0], v.ci95[1]);
+  } else {
+    std::printf("%-22s %s\n", label.c_str(), v.note.c_str());
+  }
+}
+
+int run(const Arguments& arguments) {
+  if (arguments.reflector_m.empty() == arguments.wall.empty()) {
+    throw InputError("give what the radar was held in front of: either --reflector X Y Z (map, m) or --wall ACTOR");
+  }
+  const Recording recording = openRecording(arguments.recording, arguments.radar);
+  std::optional<std::string> scene_file = recording.scene_file;
+  if (!arguments.scene.empty()) scene_file = arguments.scene;
+  const std::string twin_file = !arguments.twin.empty() ? arguments.twin : recording.twin_file.value_or("");
+  TwinDescription twin = loadTwin(twin_file, scene_file, recording.radar);
+  if (!twin.scene_file.empty()) twin.scene_file = fs::absolute(twin.scene_file).lexically_normal().string();
+
+  CalibrationTarget target;
+  if (!arguments.wall.empty()) {
+    target = wallTarget(loadScene(twin.scene_file, recording.radar.center_frequency_hz()), arguments.wall);
+  } else {
+    target.name = "the corner reflector";
+    target.reflector_map_m = Eigen::Vector3d(arguments.reflector_m[0], arguments.reflector_m[1], arguments.reflector_m[2]);
+  }
+  const std::vector<LaserDistance> lasers =
+      arguments.lasers.empty() ? std::vector<LaserDistance>() : readLaserDistances(arguments.lasers);
+  MountCalibration calibration;
+  {
+    ProgressBar progress(static_cast<int>(recording.poses.size()));
+    calibration = calibrateMount(recording, target, lasers, arguments.options, [&](int done) { progress.show(done); });
+  }
+
+  fs::create_directories(arguments.output);
+  const fs::path folder(arguments.output);
+  calibrate(twin, calibration, arguments.channels == "twin");
+  write(folder / "twin.yaml", twin.toYaml());
+  write(folder / "calibration.yaml", toYaml(calibration));
+  writePicture(drawCalibration(calibration), (folder / "calibration.png").string());
+
+  for (const PoseProblem& problem : calibration.problems) std::cerr << "error: " << problem.message << '\n';
+  for (const std::string& note : calibration.notes) std::cerr << "note: " << note << '\n';
+  print(calibration.yaw_deg, "yaw");
+  print(calibration.forward_m, "forward");
+  print(calibration.left_m, "left");
+  print(calibration.range_m, "range bias");
+  for (std::size_t k = 1; k < calibration.phase_deg.size(); ++k) {
+    print(calibration.phase_deg[k], "phase of channel " + std::to_string(k));
+    print(calibration.gain_db[k], "gain of channel " + std::to_string(k));
+  }
+  if (!arguments.mount.empty()) {
+    const auto& m = arguments.mount;
+    const Eigen::Isometry3d T = Eigen::Translation3d(m[0], m[1], m[2]) *
+                                Eigen::AngleAxisd(m[3], Eigen::Vector3d::UnitZ()) *
+                                Eigen::AngleAxisd(m[4], Eigen::Vector3d::UnitY()) *
+                                Eigen::AngleAxisd(m[5], Eigen::Vector3d::UnitX());
+    const Eigen::Isometry3d better = correctedMount(calibration, T);
+    const Eigen::Matrix3d R = better.linear();
+    std::printf("mount:=\"%.4f %.4f %.4f %.5f %.5f %.5f\"  (use it without radar_yaw_offset and radar_position_offset)\n",
+                better.translation().x(), better.translation().y(), better.translation().z(),
+                std::atan2(R(1, 0), R(0, 0)), std::atan2(-R(2, 0), std::hypot(R(2, 1), R(2, 2))),
+                std::atan2(R(2, 1), R(2, 2)));
+  }
+  std::cout << "Twin: " << (folder / "twin.yaml").string() << ", picture: " << (folder / "calibration.png").string() << '\n';
+  return calibration.problems.empty() ? 0 : 2;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app("Finds the radar's mount, range bias and channel errors from poses in front of a known target.");
+  app.name("calibrate");
+  app.add_option("recording", arguments.recording, "session directory, session.yaml or bag")->required();
+  app.add_option("--output", arguments.output, "folder for twin.yaml, calibration.yaml and calibration.png")->required();
+  app.add_option("--reflector", arguments.reflector_m, "corner reflector's apex in map: X Y Z [m]")->expected(3);
+  app.add_option("--wall", arguments.wall, "actor of the scene that the radar was held in front of");
+  app.add_option("--laser", arguments.lasers, "CSV pose,distance_m: radar to target as a laser meter gave it");
+  app.add_option("--channels", arguments.channels, "twin: channel errors go into twin.yaml; none: they are only reported")
+      ->check(CLI::IsMember({"twin", "none"}))
+      ->capture_default_str();
+  app.add_option("--twin", arguments.twin, "twin.yaml to complete (default: the session's, or the base mechanisms)");
+  app.add_option("--scene", arguments.scene, "scene.yaml where the recording names none");
+  app.add_option("--radar", arguments.radar, "radar.yaml for a recording without one");
+  app.add_option("--mount", arguments.mount,
+                 "camera_link -> radar_link that the poses were made with, x y z yaw pitch roll [m, rad]: prints the "
+                 "corrected one for live.launch")
+      ->expected(6);
+  app.add_option("--search", arguments.options.search_m, "the echo is looked for within this of its place [m]")
+      ->check(CLI::Range(0.05, 2.0))
+      ->capture_default_str();
+  return runProgram(app, argc, argv, [&arguments] { return run(arguments); });
+}

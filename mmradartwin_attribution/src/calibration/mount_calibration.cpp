@@ -1,0 +1,442 @@
+#include "mmradartwin_attribution/mount_calibration.h"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include <Eigen/Eigenvalues>
+#include <unsupported/Eigen/NonLinearOptimization>
+#include <unsupported/Eigen/NumericalDiff>
+
+#include "mmradartwin_dsp/average_pose.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "target_echo.h"
+
+namespace mmradartwin {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kDeg = M_PI / 180;
+enum Index { kYaw, kForward, kLeft, kRange, kFirstPhase };
+// Beyond these deviations a value says nothing about a mount.
+constexpr double kMostYaw_rad = 1 * kDeg, kMostOffset_m = 0.02, kMostPhase_rad = 15 * kDeg;
+// Smaller scatter than this comes of having few poses.
+constexpr double kLeastRange_m = 3e-4, kLeastHeading_rad = 0.02 * kDeg, kLeastChannel = 2e-3;
+
+/// Standard deviations of one pose's own errors.
+struct Scatter {
+  double range_m = 0.005;  ///< of the radar's range beside the laser's
+  double pose_m = 0.005;   ///< of the pose's distance
+  double heading_rad = 0.3 * kDeg;
+  double channel = 0.05;   ///< of a channel's real or imaginary part, rms 1
+};
+
+struct Observation {
+  TargetEcho echo;
+  std::optional<double> laser_m;
+};
+
+Eigen::Isometry3d placed(const Eigen::Isometry3d& T, double yaw, double forward, double left) {
+  return T * Eigen::Translation3d(forward, left, 0) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ());
+}
+
+/// Residuals of all poses over their scatter, for Eigen's Levenberg-Marquardt. Parameters: yaw [rad], forward, left,
+/// range [m], phases of channels 1.. [rad], logarithms of their gains.
+struct Residuals {
+  using Scalar = double;
+  using InputType = VectorXd;
+  using ValueType = VectorXd;
+  using JacobianType = MatrixXd;
+  enum { InputsAtCompileTime = Eigen::Dynamic, ValuesAtCompileTime = Eigen::Dynamic };
+
+  const RadarConfig& radar;
+  const CalibrationTarget& target;
+  const std::vector<Observation>& observations;
+  Scatter scatter;
+  std::vector<int> free;  ///< parameters that are fitted; the others are 0
+  bool level_slope = false;  ///< a linear phase over the channels cannot be told from yaw: held at 0
+
+  int channels() const { return radar.channels(); }
+  int parameters() const { return kFirstPhase + 2 * (channels() - 1); }
+  int rows() const { return 2 + 2 * channels(); }  // per pose
+  int inputs() const { return static_cast<int>(free.size()); }
+  int values() const { return rows() * static_cast<int>(observations.size()) + 1; }
+
+  VectorXd full(const VectorXd& x) const {
+    VectorXd all = VectorXd::Zero(parameters());
+    for (std::size_t i = 0; i < free.size(); ++i) all(free[i]) = x(static_cast<Eigen::Index>(i));
+    return all;
+  }
+
+  /// [2M] measured minus expected channels, the common complex level fitted, times sqrt(M).
+  VectorXd channelError(const Observation& o, const VectorXd& p, double turn) const {
+    const auto paths = targetPaths(radar, target, placed(o.echo.T_map_radar, p(kYaw) + turn, p(kForward), p(kLeft)));
+    const int M = channels();
+    VectorXd error = VectorXd::Zero(2 * M);
+    if (!paths) return error;
+    Eigen::VectorXcd expected = steering(radar, *paths);
+    for (int k = 1; k < M; ++k) {
+      expected(k) *= std::polar(std::exp(p(kFirstPhase + M - 1 + k - 1)), p(kFirstPhase + k - 1));
+    }
+    const std::complex<double> level = expected.dot(o.echo.channels) / expected.squaredNorm();
+    const Eigen::VectorXcd e = std::sqrt(static_cast<double>(M)) * (o.echo.channels - level * expected);
+    error.head(M) = e.real();
+    error.tail(M) = e.imag();
+    return error;
+  }
+  VectorXd perTurn(const Observation& o, const VectorXd& p) const {
+    constexpr double h = 1e-4;
+    return (channelError(o, p, h) - channelError(o, p, -h)) / (2 * h);
+  }
+  double distance(const Observation& o, const VectorXd& p) const {
+    const auto paths = targetPaths(radar, target, placed(o.echo.T_map_radar, p(kYaw), p(kForward), p(kLeft)));
+    return paths ? paths->range_m : o.echo.range_m;
+  }
+
+  int operator()(const VectorXd& x, VectorXd& r) const {
+    const VectorXd p = full(x);
+    r = VectorXd::Zero(values());
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      const Observation& o = observations[i];
+      const Eigen::Index at = static_cast<Eigen::Index>(i) * rows();
+      const double d = distance(o, p);
+      if (o.laser_m) {
+        r(at) = (o.echo.range_m - *o.laser_m - p(kRange)) / scatter.range_m;
+        r(at + 1) = (*o.laser_m - d) / scatter.pose_m;
+      } else {
+        r(at) = (o.echo.range_m - p(kRange) - d) / std::hypot(scatter.range_m, scatter.pose_m);
+      }
+      // White noise of the channels, and a heading error of this pose alone, which turns them together.
+      VectorXd e = channelError(o, p, 0);
+      const VectorXd a = perTurn(o, p);
+      const double norm = a.norm();
+      if (norm > 1e-9) {
+        const VectorXd unit = a / norm;
+        const double shrink = scatter.channel / std::hypot(scatter.channel, scatter.heading_rad * norm);
+        e -= (1 - shrink) * unit.dot(e) * unit;
+      }
+      r.segment(at + 2, 2 * channels()) = e / scatter.channel;
+    }
+    if (level_slope) {
+      double slope = 0;
+      for (int k = 1; k < channels(); ++k) slope += (k - 0.5 * (channels() - 1)) * p(kFirstPhase + k - 1);
+      r(values() - 1) = slope / 1e-3;
+    }
+    return 0;
+  }
+};
+
+struct Fit {
+  VectorXd p;         ///< all parameters
+  MatrixXd inverse;   ///< covariance of the free ones
+  VectorXd deviation; ///< of all; infinite where not observable, 0 where held
+};
+
+Fit solve(const Residuals& residuals, const VectorXd& start) {
+  Eigen::NumericalDiff<Residuals, Eigen::Central> differentiated(residuals);
+  VectorXd x(residuals.inputs());
+  for (int i = 0; i < residuals.inputs(); ++i) x(i) = start(residuals.free[static_cast<std::size_t>(i)]);
+  Eigen::LevenbergMarquardt<Eigen::NumericalDiff<Residuals, Eigen::Central>> solver(differentiated);
+  solver.parameters.maxfev = 400;
+  solver.minimize(x);
+  MatrixXd J(residuals.values(), residuals.inputs());
+  differentiated.df(x, J);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum(J.transpose() * J);
+  // A direction that is not seen at all gets a large variance instead of a division by zero.
+  const VectorXd variance = spectrum.eigenvalues().cwiseMax(1e-4).cwiseInverse();
+  Fit fit;
+  fit.p = residuals.full(x);
+  fit.inverse = spectrum.eigenvectors() * variance.asDiagonal() * spectrum.eigenvectors().transpose();
+  fit.deviation = VectorXd::Zero(residuals.parameters());
+  for (int i = 0; i < residuals.inputs(); ++i) {
+    fit.deviation(residuals.free[static_cast<std::size_t>(i)]) = std::sqrt(fit.inverse(i, i));
+  }
+  return fit;
+}
+
+/// The poses' own errors from what the fit leaves.
+Scatter scatterOf(const Residuals& residuals, const VectorXd& p, bool lasers) {
+  const double poses = static_cast<double>(residuals.observations.size());
+  double range2 = 0, pose2 = 0, heading2 = 0, channel2 = 0;
+  int with_laser = 0;
+  for (const Observation& o : residuals.observations) {
+    const double d = residuals.distance(o, p);
+    if (o.laser_m) {
+      range2 += std::pow(o.echo.range_m - *o.laser_m - p(kRange), 2);
+      pose2 += std::pow(*o.laser_m - d, 2);
+      ++with_laser;
+    } else {
+      pose2 += std::pow(o.echo.range_m - p(kRange) - d, 2);
+    }
+    VectorXd e = residuals.channelError(o, p, 0);
+    const VectorXd a = residuals.perTurn(o, p);
+    const double turn = a.squaredNorm() > 0 ? a.dot(e) / a.squaredNorm() : 0;
+    heading2 += turn * turn;
+    channel2 += (e - turn * a).squaredNorm();
+  }
+  const int geometry = lasers ? 2 : 3;  // forward and left, and the range bias where no laser gives it
+  const double phases = 2 * residuals.channels() - 2;
+  Scatter scatter;
+  scatter.pose_m = std::max(kLeastRange_m, std::sqrt(pose2 / std::max(1.0, poses - geometry)));
+  scatter.range_m = with_laser > 1 ? std::max(kLeastRange_m, std::sqrt(range2 / (with_laser - 1))) : kLeastRange_m;
+  scatter.heading_rad = std::max(kLeastHeading_rad, std::sqrt(heading2 / std::max(1.0, poses - 1)));
+  // Of 2M numbers a pose's level takes two and its heading one.
+  scatter.channel =
+      std::max(kLeastChannel, std::sqrt(channel2 / std::max(1.0, poses * (phases - 1) - phases)));
+  return scatter;
+}
+
+double coarseYaw(const Residuals& residuals, const MountCalibrationOptions& options) {
+  double best = 0, score = -1;
+  for (double yaw = -options.search_rad; yaw <= options.search_rad + 1e-9; yaw += 0.5 * kDeg) {
+    double sum = 0;
+    for (const Observation& o : residuals.observations) {
+      const auto paths = targetPaths(residuals.radar, residuals.target, placed(o.echo.T_map_radar, yaw, 0, 0));
+      if (paths) sum += std::norm(steering(residuals.radar, *paths).dot(o.echo.channels));
+    }
+    if (sum > score) score = sum, best = yaw;
+  }
+  return best;
+}
+
+/// A mount's offset explains what all differences have in common; what one pose has alone is a contradiction.
+void checkLasers(const Residuals& residuals, const MountCalibrationOptions& options) {
+  std::vector<const Observation*> with;
+  for (const Observation& o : residuals.observations) {
+    if (o.laser_m) with.push_back(&o);
+  }
+  if (with.empty()) return;
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // forward, left: least absolute differences, by reweighting
+  const auto difference = [&](const Observation& o) {
+    VectorXd p = VectorXd::Zero(residuals.parameters());
+    p(kForward) = offset.x(), p(kLeft) = offset.y();
+    return *o.laser_m - residuals.distance(o, p);
+  };
+  if (with.size() >= 4) {
+    for (int i = 0; i < 40; ++i) {
+      Eigen::Matrix2d H = 1e-3 * Eigen::Matrix2d::Identity();
+      Eigen::Vector2d g = Eigen::Vector2d::Zero();
+      for (const Observation* o : with) {
+        const auto paths = targetPaths(residuals.radar, residuals.target,
+                                       placed(o->echo.T_map_radar, 0, offset.x(), offset.y()));
+        if (!paths) continue;
+        const Eigen::Vector2d J = -paths->direction.head<2>();
+        const double r = difference(*o), weight = 1 / std::max(std::abs(r), 1e-3);
+        H += weight * J * J.transpose();
+        g += weight * r * J;
+      }
+      offset.head<2>() += H.ldlt().solve(g);
+    }
+  }
+  const double limit_m = with.size() >= 4 ? options.max_laser_error_m : 0.1 + options.max_laser_error_m;
+  const Observation* worst = *std::max_element(with.begin(), with.end(), [&](const auto* a, const auto* b) {
+    return std::abs(difference(*a)) < std::abs(difference(*b));
+  });
+  if (std::abs(difference(*worst)) <= limit_m) return;
+  std::ostringstream text;
+  text.precision(3);
+  text << std::fixed << "pose '" << worst->echo.pose << "': the laser says " << *worst->laser_m << " m to "
+       << residuals.target.name << ", the pose " << *worst->laser_m - difference(*worst)
+       << " m; measure again, or correct the pose or the target's place";
+  throw InputError(text.str());
+}
+
+void fillErrors(const Residuals& residuals, const VectorXd& p, int after, const Observation& o, CalibratedPose& pose) {
+  const auto paths = targetPaths(residuals.radar, residuals.target,
+                                 placed(o.echo.T_map_radar, p(kYaw), p(kForward), p(kLeft)));
+  if (!paths) return;
+  pose.azimuth_deg = std::atan2(paths->direction.y(), paths->direction.x()) / kDeg;
+  pose.range_error_m[after] = o.echo.range_m - p(kRange) - paths->range_m;
+  // The heading that would explain the channels, best by the array's answer alone.
+  double best = 0, score = -1;
+  for (double turn = -15; turn <= 15; turn += 0.02) {
+    const double error = residuals.channelError(o, p, turn * kDeg).squaredNorm();
+    if (score < 0 || error < score) score = error, best = turn;
+  }
+  pose.azimuth_error_deg[after] = -best;  // a radar turned to the left sees the target further to the right
+  Eigen::VectorXcd against = o.echo.channels.cwiseProduct(steering(residuals.radar, *paths).conjugate());
+  const int M = residuals.channels();
+  for (int k = 1; k < M; ++k) against(k) *= std::polar(1.0, -p(kFirstPhase + k - 1));
+  const std::complex<double> mean = against.sum();
+  pose.channel_error_deg[after].clear();
+  for (int k = 0; k < M; ++k) pose.channel_error_deg[after].push_back(std::arg(against(k) * std::conj(mean)) / kDeg);
+}
+
+}  // namespace
+
+CalibrationTarget wallTarget(const Scene& scene, const std::string& actor) {
+  const int index = scene.actorIndex(actor);
+  if (index < 0) {
+    std::string known;
+    for (const Actor& a : scene.actors) known += (known.empty() ? "" : ", ") + a.name;
+    throw InputError(scene.file + ": has no actor '" + actor + "'; it has " + known);
+  }
+  CalibrationTarget target;
+  target.name = actor;
+  for (int id : scene.actors[static_cast<std::size_t>(index)].facets) {
+    if (scene.facets[static_cast<std::size_t>(id)].reflects) target.wall.push_back(scene.facets[static_cast<std::size_t>(id)]);
+  }
+  if (target.wall.empty()) throw InputError(scene.file + ": actor '" + actor + "' has no upright surface to calibrate on");
+  return target;
+}
+
+std::vector<LaserDistance> readLaserDistances(const std::string& file) {
+  std::ifstream in(file);
+  if (!in) throw InputError(file + ": cannot be read; give a CSV file pose,distance_m");
+  std::vector<LaserDistance> distances;
+  std::set<std::string> seen;
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
+    const std::string where = file + ": line " + std::to_string(number) + ": ";
+    if (number == 1) {
+      if (line != "pose,distance_m") throw InputError(where + "'" + line + "' must be pose,distance_m");
+      continue;
+    }
+    if (line.empty()) continue;
+    const std::size_t comma = line.find(',');
+    std::size_t end = 0;
+    double value = 0;
+    try {
+      value = std::stod(line.substr(comma == std::string::npos ? line.size() : comma + 1), &end);
+    } catch (const std::exception&) {
+      end = 0;
+    }
+    if (comma == std::string::npos || end == 0 || comma + 1 + end != line.size() || !(value > 0 && value < 1000)) {
+      throw InputError(where + "'" + line + "' is no pose and distance in metres (0 to 1000)");
+    }
+    const std::string pose = line.substr(0, comma);
+    if (!seen.insert(pose).second) throw InputError(where + "pose '" + pose + "' stands twice");
+    distances.push_back({pose, value});
+  }
+  return distances;
+}
+
+MountCalibration calibrateMount(const Recording& recording, const CalibrationTarget& target,
+                                const std::vector<LaserDistance>& lasers, const MountCalibrationOptions& options,
+                                const std::function<void(int)>& progress) {
+  MountCalibration result;
+  std::map<std::string, double> laser_of;
+  for (const LaserDistance& laser : lasers) {
+    if (std::find(recording.pose_names.begin(), recording.pose_names.end(), laser.pose) == recording.pose_names.end()) {
+      throw InputError("the laser's distances name pose '" + laser.pose + "', which " + recording.source + " has not");
+    }
+    laser_of[laser.pose] = laser.distance_m;
+  }
+  result.problems = recording.problems;
+  std::vector<Observation> observations;
+  int done = 0;
+  for (const Pose& pose : recording.poses) {
+    CalibratedPose entry;
+    entry.name = pose.name;
+    try {
+      Observation o{findEcho(recording.radar, target, pose, averagePose(recording, pose), options), {}};
+      if (const auto it = laser_of.find(pose.name); it != laser_of.end()) o.laser_m = it->second;
+      entry.used = true;
+      entry.range_m = o.echo.range_m;
+      entry.level_db = o.echo.level_db;
+      observations.push_back(o);
+    } catch (const InputError& error) {
+      entry.why_not = error.what();
+      result.problems.push_back({pose.name, error.what()});
+    }
+    result.poses.push_back(entry);
+    if (progress) progress(++done);
+  }
+  if (observations.size() < 3) {
+    throw InputError(recording.source + ": " + std::to_string(observations.size()) + " of " +
+                     std::to_string(recording.poses.size()) + " poses show " + target.name +
+                     "; a calibration needs three or more, at several angles" +
+                     (result.problems.empty() ? "" : ". First problem: " + result.problems.front().message));
+  }
+  const int M = recording.radar.channels();
+  Residuals residuals{recording.radar, target, observations, {}, {}, false};
+  for (int i = 0; i < residuals.parameters(); ++i) residuals.free.push_back(i);
+  checkLasers(residuals, options);
+  result.lasers = std::any_of(observations.begin(), observations.end(), [](const auto& o) { return o.laser_m.has_value(); });
+
+  VectorXd start = VectorXd::Zero(residuals.parameters());
+  start(kYaw) = coarseYaw(residuals, options);
+  const VectorXd before = VectorXd::Zero(residuals.parameters());
+  Fit fit = solve(residuals, start);
+  const auto hold = [&](int parameter, const std::string& why) {
+    residuals.free.erase(std::remove(residuals.free.begin(), residuals.free.end(), parameter), residuals.free.end());
+    result.notes.push_back(why);
+    start = fit.p;
+    start(parameter) = 0;
+    fit = solve(residuals, start);
+  };
+  const auto refine = [&] {
+    for (int i = 0; i < 4; ++i) {
+      residuals.scatter = scatterOf(residuals, fit.p, result.lasers);
+      fit = solve(residuals, fit.p);
+    }
+  };
+  refine();
+  bool forward = true, left = true, range = true;
+  if (fit.deviation(kForward) > kMostOffset_m || fit.deviation(kRange) > kMostOffset_m) {
+    forward = false;
+    hold(kForward, "forward_m cannot be told from range_bias with these poses and is held at 0: take poses that hold the "
+                   "target up to 40 deg off boresight on both sides, or laser distances");
+    refine();
+  }
+  if (fit.deviation(kLeft) > kMostOffset_m) {
+    left = false;
+    hold(kLeft, "left_m is not fixed by these poses and is held at 0: take poses that hold the target off boresight");
+    refine();
+  }
+  range = fit.deviation(kRange) <= kMostOffset_m;
+  if (fit.deviation(kYaw) > kMostYaw_rad || fit.deviation.segment(kFirstPhase, M - 1).maxCoeff() > kMostPhase_rad) {
+    result.notes.push_back("a phase that grows evenly over the channels cannot be told from yaw with these poses and "
+                           "counts as yaw: take poses that hold the target off boresight on both sides");
+    residuals.level_slope = true;
+    fit = solve(residuals, fit.p);
+    refine();
+  }
+  result.notes.push_back("height, pitch and roll of the mount are not observable with an array along one line");
+
+  const double freedom = std::max(1.0, static_cast<double>(observations.size()) - 3);
+  const double t = boost::math::quantile(boost::math::students_t(freedom), 0.975);
+  const auto value = [&](const char* name, const char* unit, int parameter, double factor, bool observable) {
+    CalibratedValue v;
+    v.name = name, v.unit = unit, v.observable = observable;
+    v.value = factor * fit.p(parameter);
+    const double half = t * factor * fit.deviation(parameter);
+    v.ci95 = {v.value - half, v.value + half};
+    if (!observable) v.note = "not observable with these poses, held at 0";
+    return v;
+  };
+  result.yaw_deg = value("yaw_deg", "deg", kYaw, 1 / kDeg, fit.deviation(kYaw) <= kMostYaw_rad);
+  result.forward_m = value("forward_m", "m", kForward, 1, forward);
+  result.left_m = value("left_m", "m", kLeft, 1, left);
+  result.range_m = value("range_m", "m", kRange, 1, range);
+  CalibratedValue zero;
+  zero.name = "phase_deg", zero.unit = "deg", zero.note = "the reference";
+  result.phase_deg.push_back(zero);
+  zero.name = "gain_db", zero.unit = "dB";
+  result.gain_db.push_back(zero);
+  for (int k = 1; k < M; ++k) {
+    result.phase_deg.push_back(value("phase_deg", "deg", kFirstPhase + k - 1, 1 / kDeg, true));
+    result.gain_db.push_back(value("gain_db", "dB", kFirstPhase + M - 1 + k - 1, 20 / std::log(10.0), true));
+  }
+  std::size_t next = 0;
+  for (CalibratedPose& pose : result.poses) {
+    if (!pose.used) continue;
+    fillErrors(residuals, before, 0, observations[next], pose);
+    fillErrors(residuals, fit.p, 1, observations[next], pose);
+    ++next;
+  }
+  return result;
+}
+
+Eigen::Isometry3d correctedMount(const MountCalibration& c, const Eigen::Isometry3d& T_camera_radar) {
+  return placed(T_camera_radar, c.yaw_deg.value * kDeg, c.forward_m.value, c.left_m.value);
+}
+
+}  // namespace mmradartwin

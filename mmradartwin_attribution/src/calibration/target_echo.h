@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <complex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_attribution/mount_calibration.h"
+#include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_dsp/receive_grid.h"
+
+namespace mmradartwin {
+
+/// Geometry of the target from one pose.
+struct TargetPaths {
+  double range_m = 0;            ///< from the radar's origin
+  Eigen::Vector3d direction;     ///< unit, radar_link
+  std::vector<double> length_m;  ///< [M] TX to target to RX
+};
+/// Nothing where no facet of the wall is faced.
+std::optional<TargetPaths> targetPaths(const RadarConfig& radar, const CalibrationTarget& target,
+                                       const Eigen::Isometry3d& T_map_radar);
+
+/// exp(j phase) of the channels at the window's centre, against a path of twice range_m.
+Eigen::VectorXcd steering(const RadarConfig& radar, const TargetPaths& paths);
+
+/// The target's echo in one measured grid.
+struct TargetEcho {
+  std::string pose;
+  Eigen::Isometry3d T_map_radar;
+  double range_m = 0, level_db = 0;
+  Eigen::VectorXcd channels;  ///< [M], unit norm
+};
+/// The strongest tone within search_m of where the pose puts the target. Throws InputError that says why there is none.
+TargetEcho findEcho(const RadarConfig& radar, const CalibrationTarget& target, const Pose& pose,
+                    const ReceiveGrid& grid, const MountCalibrationOptions& options);
+
+}  // namespace mmradartwin
