@@ -36,10 +36,8 @@ constexpr double kFarthest_m = 1e9;
 /// False where Embree would abort (Debian builds it with assertions on rays) or nothing can be met. NaN fails every
 /// comparison.
 bool castable(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double length) {
-  const auto within = [](const Eigen::Vector3d& v, double limit) {
-    return std::abs(v.x()) < limit && std::abs(v.y()) < limit && std::abs(v.z()) < limit;
-  };
-  return within(origin, kFarthest_m) && within(direction, 1.001) && length > 0 && length < 2 * kFarthest_m;
+  return origin.squaredNorm() < kFarthest_m * kFarthest_m && direction.squaredNorm() < 1.001 && length > 0 &&
+         length < 2 * kFarthest_m;
 }
 
 /// Whole vectors are stored, as Embree loads them: single numbers would have to wait for each other.
@@ -211,9 +209,11 @@ bool RayCaster::passesVeils(const Eigen::Vector3d& a, const Eigen::Vector3d& b, 
 
 std::optional<RayCaster::Hit> RayCaster::firstHit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                                   double max_m) const {
-  const double norm = direction.norm();
-  if (!(norm > 0)) return std::nullopt;
-  const Eigen::Vector3d unit = (1 / norm) * direction, from = origin - embree_->center;
+  const double square = direction.squaredNorm();
+  if (!(square > 0)) return std::nullopt;
+  const Eigen::Vector3d from = origin - embree_->center;
+  Eigen::Vector3d unit = direction;
+  if (std::abs(square - 1) > 1e-14) unit /= std::sqrt(square);
   // Beyond the scene there is nothing, and Embree wants finite rays.
   const double length = std::min(max_m, from.lpNorm<1>() + embree_->radius_m + 1);
   if (!castable(from, unit, length)) return std::nullopt;

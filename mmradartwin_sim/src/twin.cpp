@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/traced_session.h"
 #include "twin_impl.h"
 
 namespace mmradartwin {
@@ -241,6 +242,16 @@ std::optional<Eigen::MatrixXcd> Twin::channelMatrix(const Eigen::Isometry3d& T_m
 
 Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                        std::int64_t stamp_ns) const {
+  return weigh(T_map_radar, std::move(traced), stamp_ns, nullptr);
+}
+
+Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, const CondensedTrace& traced,
+                       std::int64_t stamp_ns) const {
+  return weigh(T_map_radar, traced.records(), stamp_ns, &traced);
+}
+
+Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced, std::int64_t stamp_ns,
+                       const CondensedTrace* condensed) const {
   PoseContext c = impl_->context(T_map_radar, stamp_ns);
   c.receiver_gain = [this, &c](double length_m) { return impl_->toneGain(c, length_m); };
   Simulation s;
@@ -262,6 +273,11 @@ Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRec
   if (impl_->has_tone_gain || impl_->has_distort) {
     s.grid.x.setZero();
     impl_->propagate(c, impl_->filtered(c, s.records), s.grid.x);
+  }
+  if (condensed) {
+    std::vector<PathRecord> nodes = condensed->nodes();
+    impl_->reweight(c, nodes, 0);
+    condensed->addNodes(radar, impl_->filtered(c, std::move(nodes)), s.grid.x);
   }
   impl_->receive(c, s.grid.x);
   return s;
