@@ -223,28 +223,6 @@ double differenceVariance(const FrameStack& s) {
   return means.empty() ? 1.0 / 6 : std::max<double>(medianOf(means), 1.0 / 6);
 }
 
-double commonTurn(const FrameStack& s) {
-  if (s.frames < 3) return 0;
-  std::vector<std::complex<double>> turns;
-  std::complex<double> all = 0;
-  const std::size_t per_frame = static_cast<std::size_t>(s.loops) * s.values();
-  for (int f = 1; f < s.frames; ++f) {
-    const std::size_t now = static_cast<std::size_t>(f) * per_frame, before = now - per_frame;
-    std::complex<double> sum = 0;
-    for (std::size_t i = 0; i < per_frame; ++i) {
-      sum += std::complex<double>(s.x[now + i] * std::conj(s.x[before + i]));  // values not in use are zero
-    }
-    if (sum == 0.0) continue;
-    turns.push_back(sum);
-    all += sum / std::abs(sum);
-  }
-  if (turns.empty() || all == 0.0) return 0;
-  const std::complex<double> center = all / std::abs(all);
-  std::vector<float> angles;
-  for (const auto& t : turns) angles.push_back(static_cast<float>(std::arg(t * std::conj(center))));
-  return std::arg(center) + medianOf(angles);
-}
-
 void turnFrames(double rad_per_frame, FrameStack& s) {
   const std::size_t per_frame = static_cast<std::size_t>(s.loops) * s.values();
   for (int f = 1; f < s.frames; ++f) {
@@ -258,8 +236,8 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
   // for each of I and Q.
   const double scale = std::max(noise_variance, 0.5);
   const std::vector<Complex> gains = commonGains(s, average, noise_variance);
-  // Windows of 1, 2, 4, ... samples up to half a chirp; chance beats a threshold once in 1e12 windows, a session has some
-  // 1e7.
+  // Windows of 1, 2, 4, ... samples up to half a chirp; chance beats a threshold once in 1e12 windows, a session has
+  // some 1e7.
   std::vector<int> lengths;
   std::vector<double> thresholds;
   for (int w = 1; 2 * w <= s.samples; w *= 2) {
@@ -323,8 +301,8 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
         c += e * e.adjoint();
       }
       const double noise = scale * level * best_length;
-      const double first = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd>(c, Eigen::EigenvaluesOnly).eigenvalues()
-                               [s.receivers - 1];
+      const double first =
+          Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd>(c, Eigen::EigenvaluesOnly).eigenvalues()[s.receivers - 1];
       if (first - noise < 0.7 * (c.trace().real() - s.receivers * noise)) continue;
       // Not one receiver alone: that is a fault of its converter, no wave.
       if (s.receivers > 1 && c.diagonal().real().maxCoeff() > 0.9 * c.trace().real()) continue;

@@ -56,9 +56,7 @@ std::vector<std::complex<float>> commonGains(const FrameStack& stack, const std:
 /// rounding leaves.
 double differenceVariance(const FrameStack& stack);
 
-/// Turn from one frame to the next that all frames share: the angle that successive frames make, robust against a
-/// minority of frames. 0 with fewer than 3 frames.
-double commonTurn(const FrameStack& stack);
+/// Turns every frame by so much more than the one before.
 void turnFrames(double rad_per_frame, FrameStack& stack);
 
 struct Bursts {
@@ -67,7 +65,8 @@ struct Bursts {
   double log_likelihood_gain = 0;
   std::vector<std::uint8_t> hit;  ///< [shot][slot] chirps taken out of use
 };
-/// Finds energy that is confined to a part of one chirp, the same wave at all receivers, and takes the chirp out of use.
+/// Finds energy that is confined to a part of one chirp, the same wave at all receivers, and takes the chirp out of
+/// use.
 Bursts dropBursts(const std::vector<std::complex<float>>& average, double noise_variance, FrameStack& stack);
 
 /// Values that stand at a code beyond which there is none, where that code comes far more often than its neighbours.

@@ -13,8 +13,8 @@ namespace mmradartwin {
 struct MovingEcho {
   int frame = 0;
   double range_m = 0, azimuth_rad = 0;
-  double snr = 0;                ///< power over noise after range and angle transforms
-  double radial_m_per_s = 0;     ///< away from the radar; NaN where a frame has too few loops to tell
+  double snr = 0;             ///< power over noise after range and angle transforms
+  double radial_m_per_s = 0;  ///< away from the radar; NaN where a frame has too few loops to tell
 };
 
 /// What the shots of one pose say beyond their average.
@@ -28,7 +28,8 @@ struct ShotResiduals {
   /// stands out of the noise.
   double turn_rad_per_frame = 0, turn_variance = 0;
   int turn_cells = 0;  ///< independent ones that it was read from
-  /// [frame] level of the whole signal against the average, amplitude; 1 where the signal does not stand out of the noise.
+  /// [frame] level of the whole signal against the average, amplitude; 1 where the signal does not stand out of the
+  /// noise.
   std::vector<double> frame_level;
 };
 
@@ -37,6 +38,9 @@ class ShotExaminer {
  public:
   explicit ShotExaminer(const RadarConfig& radar);
   ShotResiduals examine(const FrameStack& stack, const std::vector<std::complex<float>>& average) const;
+  /// Turn from one frame to the next that standing echoes share, rad: the median over the range bins whose phase
+  /// follows from the frame before. 0 where there is none such or fewer than 3 frames.
+  double commonTurn(const FrameStack& stack) const;
   const RangeAngleAxes& axes() const { return chain_.axes(); }
 
  private:

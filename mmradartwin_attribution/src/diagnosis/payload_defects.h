@@ -15,9 +15,9 @@ constexpr int kPacketBytes = 1456;
 /// The frames of one pose as the stream of int16 that the capture card sent, and which of its values can be used.
 struct Payload {
   int frames = 0;
-  std::size_t frame_values = 0;      ///< int16 values per frame in the capture's layout
-  std::vector<std::int16_t> value;   ///< [frame][position]
-  std::vector<std::uint8_t> use;     ///< the same shape
+  std::size_t frame_values = 0;         ///< int16 values per frame in the capture's layout
+  std::vector<std::int16_t> value;      ///< [frame][position]
+  std::vector<std::uint8_t> use;        ///< the same shape
   std::vector<std::uint32_t> sequence;  ///< [frame] number since arming: packets count from there
   std::size_t at(int frame, std::size_t position) const {
     return static_cast<std::size_t>(frame) * frame_values + position;

@@ -163,9 +163,8 @@ class Search {
     FrameFinding f;
     f.cause = "unknown";
     f.log_likelihood_gain = evidence;
-    f.false_alarm_rate =
-        std::min(1.0, std::exp(std::log(static_cast<double>(columns_) * rows_) +
-                               logChance(kTrust * evidence, poses_.size())));
+    f.false_alarm_rate = std::min(
+        1.0, std::exp(std::log(static_cast<double>(columns_) * rows_) + logChance(kTrust * evidence, poses_.size())));
     FindingPlace place;
     const double range_m = bin * radar_.range_bin_m();
     place.range_m = {range_m - radar_.range_bin_m(), range_m + radar_.range_bin_m()};
@@ -232,8 +231,8 @@ class Search {
       Eigen::Vector2d center = Eigen::Vector2d::Zero(), squares = center;
       double weights = 0, speed = 0, speed_squares = 0;
       FindingPlace place;
-      place.range_m = place.azimuth_deg = {std::numeric_limits<double>::infinity(),
-                                           -std::numeric_limits<double>::infinity()};
+      place.range_m =
+          place.azimuth_deg = {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
       std::set<std::string> names;
       for (const Sighting& s : walker) {
         // Good to a range bin along the view and some 2 degrees, the array's errors, across it; a sum of equals.
@@ -272,8 +271,8 @@ class Search {
       f.where = {place};
       std::ostringstream text;
       text << "something moves at (" << center.x() << ", " << center.y() << ") m in the map, at "
-           << walker.front().echo.range_m << " m and " << degrees(walker.front().echo.azimuth_rad)
-           << " deg of pose " << poses_[walker.front().pose].pose.name << ", "
+           << walker.front().echo.range_m << " m and " << degrees(walker.front().echo.azimuth_rad) << " deg of pose "
+           << poses_[walker.front().pose].pose.name << ", "
            << (walker.front().echo.radial_m_per_s > 0 ? "away from" : "towards") << " the radar at " << speed << " m/s";
       f.description = text.str();
       motion.walkers.push_back(std::move(f));
@@ -321,7 +320,8 @@ class Search {
       // A few seconds see part of a walk of some decimetres; angles are good to some 2 degrees, the array's errors.
       const double part_m = 0.2 / std::sqrt(std::max(1.0, t.at.size() / 20.0));
       const double range_m = std::hypot(part_m, 0.05), cross_m = std::hypot(part_m, 0.035 * r);
-      t.information = along * along.transpose() / (range_m * range_m) + across * across.transpose() / (cross_m * cross_m);
+      t.information =
+          along * along.transpose() / (range_m * range_m) + across * across.transpose() / (cross_m * cross_m);
       total += t.information;
       sum += t.information * t.mean;
     }
@@ -441,20 +441,22 @@ class Search {
                     {"y_m", "m", center.y(), interval(center.y(), covariance(1, 1))},
                     {"speed_m_per_s", "m/s", v.value, {{v.low, v.high}}}};
     for (std::size_t i = 0; i < poses_.size(); ++i) {
-      int bin = 0, beam = 0;
       PoseMotion& p = poses_[i];
-      if (p.evidence.size() == 0 || !views_[i].cell(center.x(), center.y(), bin, beam)) continue;
+      const Eigen::Vector3d d =
+          p.pose.T_map_radar.linear().transpose() *
+          Eigen::Vector3d(center.x() - views_[i].position().x(), center.y() - views_[i].position().y(), 0);
+      // The walk's middle may be behind the radar and one of its ends before it.
+      if (p.evidence.size() == 0 || d.x() < -kReach_m || d.norm() > radar_.max_range_m()) continue;
+      const int bin = static_cast<int>(std::lround(d.norm() / radar_.range_bin_m()));
       const int around = static_cast<int>(std::ceil(kReach_m / radar_.range_bin_m()));
-      const int low = std::max(0, bin - around), high = std::min(static_cast<int>(p.evidence.rows()) - 1, bin + around);
+      const int high = std::min(static_cast<int>(p.evidence.rows()) - 1, bin + around);
+      const int low = std::clamp(bin - around, 0, high);
       Eigen::Index peak_bin = 0, peak_beam = 0;
       const float peak = p.evidence.middleRows(low, high - low + 1).maxCoeff(&peak_bin, &peak_beam);
       const double range_m = (views_[i].position() - center).norm();
       if (peak > kPoseEvidence) {
         f.log_likelihood_gain += peak;
         f.poses.push_back(p.pose.name);
-        const Eigen::Vector3d d =
-            p.pose.T_map_radar.linear().transpose() *
-            Eigen::Vector3d(center.x() - views_[i].position().x(), center.y() - views_[i].position().y(), 0);
         const double azimuth_deg = degrees(std::atan2(d.y(), d.x()));
         FindingPlace place;
         place.range_m = {range_m - 0.5, range_m + 0.5};
