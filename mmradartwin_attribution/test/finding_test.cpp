@@ -139,7 +139,7 @@ TEST(Finding, ErrorsNameFileAndKey) {
   expect(changed([](J& j) { j["verdict"] = "none"; }), "/verdict", "named");
   expect(changed([](J& j) { j["findings"][0]["cause"] = "magic"; }), "/findings/0/cause", "range_bias");
   expect(changed([](J& j) { j["findings"][0]["class"] = "C2"; }), "/findings/0/class", "C3");
-  expect(changed([](J& j) { j["findings"][1]["parameters"].erase("gain_db"); }), "/findings/1/", "gain_db");
+  expect(changed([](J& j) { j["findings"][1]["parameters"].erase("gain_db"); }), "findings/1/", "gain_db");
   expect(changed([](J& j) { j["findings"][0]["parameters"].clear(); }), "findings/0/parameters", "cos_exponent or");
   expect(changed([](J& j) { j["findings"][1]["parameters"]["phase_deg"]["unit"] = "rad"; }), "phase_deg", "'deg'");
   expect(changed([](J& j) {

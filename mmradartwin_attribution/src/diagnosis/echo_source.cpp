@@ -218,9 +218,10 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
     } else {
       // The receiver mixes ranges: each path is sent through it alone, less what comes without any path.
       const auto spectra = [&](const ComplexGrid& x) -> Eigen::MatrixXcd { return chain.rangeSpectra(x) / window; };
-      const Eigen::MatrixXcd nothing = spectra(twin.weigh(pose.T_map_radar, {}, pose.stamp_ns).grid.x);
+      const Eigen::MatrixXcd nothing =
+          spectra(twin.weigh(pose.T_map_radar, std::vector<PathRecord>(), pose.stamp_ns).grid.x);
       for (PathRecord& r : mergedWeak(radar, std::move(all))) {
-        const Simulation alone = twin.weigh(pose.T_map_radar, {r}, pose.stamp_ns);
+        const Simulation alone = twin.weigh(pose.T_map_radar, std::vector<PathRecord>{r}, pose.stamp_ns);
         if (!alone.records.empty()) collector.add(alone.records.front(), spectra(alone.grid.x) - nothing);
       }
       if (nothing.squaredNorm() > 0) {

@@ -58,7 +58,12 @@ struct FrameExaminer::State {
   std::vector<PoseJudgement> judged;
   std::vector<PoseMotion> motion;
   std::vector<PoseFrames> poses;
+  mutable std::optional<Motion> located;  ///< of the poses so far, once asked for
 
+  const Motion& locate() const {
+    if (!located) located = locateMotion(radar, motion);
+    return *located;
+  }
   FrameFinding saturation() const;
   FrameFinding packetLoss() const;
   FrameFinding misalignment() const;
@@ -107,7 +112,7 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
 
   judged.rails = countRails(stack);
   ClippedValues clipped = clippedValues(judged.rails, stack);
-  const double turn = commonTurn(stack);
+  const double turn = s.examiner.commonTurn(stack);
   turnFrames(-turn, stack);
   std::vector<Complex> average = medianShot(stack);
   // Where the standing signal itself comes to the converter's limit, clipped values are no bursts.
@@ -138,6 +143,7 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   s.poses.push_back(std::move(result));
   s.motion.push_back({pose, stack.frames, std::move(residuals.evidence), std::move(residuals.echoes)});
   s.judged.push_back(std::move(judged));
+  s.located.reset();
 }
 
 FrameFinding FrameExaminer::State::packetLoss() const {
@@ -335,7 +341,11 @@ FrameFinding FrameExaminer::State::frameGain() const {
 std::vector<FrameFinding> FrameExaminer::findings() const {
   const State& s = *state_;
   std::vector<FrameFinding> all = {s.saturation(), s.packetLoss(), s.misalignment(), s.interference(), s.drift()};
+<<<<<<< HEAD
   for (FrameFinding& walker : locateMotion(s.radar, s.motion).walkers) all.push_back(std::move(walker));
+=======
+  for (const FrameFinding& walker : s.locate().walkers) all.push_back(walker);
+>>>>>>> w_frames
   all.erase(std::remove_if(all.begin(), all.end(), [](const auto& f) { return f.log_likelihood_gain <= 0; }),
             all.end());
   std::stable_sort(all.begin(), all.end(),
@@ -344,7 +354,7 @@ std::vector<FrameFinding> FrameExaminer::findings() const {
 }
 
 std::vector<FrameFinding> FrameExaminer::unexplained() const {
-  std::vector<FrameFinding> all = locateMotion(state_->radar, state_->motion).unexplained;
+  std::vector<FrameFinding> all = state_->locate().unexplained;
   FrameFinding gain = state_->frameGain();
   if (gain.log_likelihood_gain > 0) all.push_back(std::move(gain));
   return all;

@@ -223,28 +223,6 @@ double differenceVariance(const FrameStack& s) {
   return means.empty() ? 1.0 / 6 : std::max<double>(medianOf(means), 1.0 / 6);
 }
 
-double commonTurn(const FrameStack& s) {
-  if (s.frames < 3) return 0;
-  std::vector<std::complex<double>> turns;
-  std::complex<double> all = 0;
-  const std::size_t per_frame = static_cast<std::size_t>(s.loops) * s.values();
-  for (int f = 1; f < s.frames; ++f) {
-    const std::size_t now = static_cast<std::size_t>(f) * per_frame, before = now - per_frame;
-    std::complex<double> sum = 0;
-    for (std::size_t i = 0; i < per_frame; ++i) {
-      sum += std::complex<double>(s.x[now + i] * std::conj(s.x[before + i]));  // values not in use are zero
-    }
-    if (sum == 0.0) continue;
-    turns.push_back(sum);
-    all += sum / std::abs(sum);
-  }
-  if (turns.empty() || all == 0.0) return 0;
-  const std::complex<double> center = all / std::abs(all);
-  std::vector<float> angles;
-  for (const auto& t : turns) angles.push_back(static_cast<float>(std::arg(t * std::conj(center))));
-  return std::arg(center) + medianOf(angles);
-}
-
 void turnFrames(double rad_per_frame, FrameStack& s) {
   const std::size_t per_frame = static_cast<std::size_t>(s.loops) * s.values();
   for (int f = 1; f < s.frames; ++f) {

@@ -56,9 +56,7 @@ std::vector<std::complex<float>> commonGains(const FrameStack& stack, const std:
 /// rounding leaves.
 double differenceVariance(const FrameStack& stack);
 
-/// Turn from one frame to the next that all frames share: the angle that successive frames make, robust against a
-/// minority of frames. 0 with fewer than 3 frames.
-double commonTurn(const FrameStack& stack);
+/// Turns every frame by so much more than the one before.
 void turnFrames(double rad_per_frame, FrameStack& stack);
 
 struct Bursts {

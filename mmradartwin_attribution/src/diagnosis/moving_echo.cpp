@@ -114,6 +114,44 @@ ShotExaminer::Spectra ShotExaminer::spectra(const FrameStack& stack, const std::
   return s;
 }
 
+double ShotExaminer::commonTurn(const FrameStack& stack) const {
+  if (stack.frames < 3) return 0;
+  const auto bins = static_cast<std::size_t>(stack.samples);
+  std::vector<std::complex<double>> turned(bins, 0);
+  std::vector<double> power(bins, 0);
+  std::vector<Complex> in(bins), before(bins), now(bins);
+  // One receiver of each slot tells enough about what is strong.
+  for (int k = 0; k < stack.channels(); k += stack.receivers) {
+    int last = -2;
+    for (int f = 0; f < stack.frames; ++f) {
+      const std::size_t at = stack.at(f * stack.loops, k, 0);
+      const auto use = stack.use.begin() + static_cast<long>(at);
+      if (std::count(use, use + stack.samples, std::uint8_t{0}) > stack.samples / 10) continue;
+      for (std::size_t n = 0; n < bins; ++n) in[n] = stack.x[at + n] * window_[n];
+      std::swap(now, before);
+      fft().fwd(now.data(), in.data(), stack.samples);
+      if (last == f - 1) {
+        for (std::size_t b = 0; b < bins; ++b) {
+          const std::complex<double> z(now[b] * std::conj(before[b]));
+          turned[b] += z;
+          power[b] += std::abs(z);
+        }
+      }
+      last = f;
+    }
+  }
+  std::vector<double> angles;
+  std::complex<double> center = 0;
+  for (std::size_t b = 0; b < bins; ++b) {
+    if (power[b] > 0 && std::abs(turned[b]) > 0.9 * power[b]) center += turned[b] / power[b];
+  }
+  if (center == 0.0) return 0;
+  for (std::size_t b = 0; b < bins; ++b) {
+    if (power[b] > 0 && std::abs(turned[b]) > 0.9 * power[b]) angles.push_back(std::arg(turned[b] * std::conj(center)));
+  }
+  return std::arg(center) + medianOf(angles);
+}
+
 void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotResiduals& result) const {
   s.gain.assign(s.shot.size(), 1);
   result.frame_level.assign(static_cast<std::size_t>(stack.frames), 1);
@@ -207,17 +245,18 @@ void ShotExaminer::readEvidence(const Spectra& s, ShotResiduals& result) const {
     if (c.trace().real() < 0.01f * standing) {
       beams -= still * (still.adjoint() * beams_) / standing;
     }
+    const Eigen::MatrixXcf varied = c * beams;
     for (int a = 0; a < kAngleBins; ++a) {
       const float size = beams.col(a).squaredNorm();
-      ratio(b, a) = size > 0.2f * static_cast<float>(s.channels)
-                        ? (beams.col(a).adjoint() * c * beams.col(a)).value().real() / size
-                        : 1.0f;
+      ratio(b, a) = size > 0.2f * static_cast<float>(s.channels) ? beams.col(a).dot(varied.col(a)).real() / size : 1.0f;
     }
   }
   // Skirts of strong echoes reach over many bins; what is somewhere stands out of its surroundings in range too.
+  std::vector<float> around;
   for (int a = 0; a < kAngleBins; ++a) {
     for (int b = 0; b < s.bins; ++b) {
-      std::vector<float> around;
+      if (ratio(b, a) <= 1) continue;
+      around.clear();
       for (int d = -8; d <= 8; ++d) {
         if (std::abs(d) > 2 && b + d >= 0 && b + d < s.bins) around.push_back(ratio(b + d, a));
       }

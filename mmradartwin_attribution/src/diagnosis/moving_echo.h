@@ -38,6 +38,9 @@ class ShotExaminer {
  public:
   explicit ShotExaminer(const RadarConfig& radar);
   ShotResiduals examine(const FrameStack& stack, const std::vector<std::complex<float>>& average) const;
+  /// Turn from one frame to the next that standing echoes share, rad: the median over the range bins whose phase
+  /// follows from the frame before. 0 where there is none such or fewer than 3 frames.
+  double commonTurn(const FrameStack& stack) const;
   const RangeAngleAxes& axes() const { return chain_.axes(); }
 
  private:

@@ -20,13 +20,15 @@ struct Run {
   std::size_t begin, end;
 };
 
-/// Runs of zeros of a packet's length or more. Values not to be used and missing frames end a run.
+/// Runs of zeros of a packet's length or more; at the end of the recording, whose last packet is short, of a sixteenth
+/// of one. Values not to be used and missing frames end a run.
 std::vector<Run> zeroRuns(const Payload& p, const std::vector<int>& order) {
   std::vector<Run> runs;
   std::size_t begin = 0;
   bool inside = false;
   const auto finish = [&](std::size_t end) {
-    if (inside && end - begin >= kPacketValues) runs.push_back({begin, end});
+    if (inside && end - begin >= (end == p.value.size() ? kPacketValues / 16 : kPacketValues))
+      runs.push_back({begin, end});
     inside = false;
   };
   for (int f = 0; f < p.frames; ++f) {
@@ -153,7 +155,7 @@ ZeroedPackets markZeroedPackets(Payload& p, const std::vector<int>& order) {
   }
   for (std::size_t i = 0; i < lost.size(); ++i) {
     const std::size_t first = firstPacket(p, lost[i].begin, phase);
-    if (first + kPacketValues > lost[i].end) continue;
+    if (first + (lost[i].end == p.value.size() ? 1 : kPacketValues) > lost[i].end) continue;
     const std::size_t whole = (lost[i].end - first) / kPacketValues;
     const std::size_t rest = lost[i].end == p.value.size() ? lost[i].end - first - whole * kPacketValues : 0;
     std::fill(&p.use[first], &p.use[0] + first + whole * kPacketValues + rest, std::uint8_t{0});

@@ -441,20 +441,22 @@ class Search {
                     {"y_m", "m", center.y(), interval(center.y(), covariance(1, 1))},
                     {"speed_m_per_s", "m/s", v.value, {{v.low, v.high}}}};
     for (std::size_t i = 0; i < poses_.size(); ++i) {
-      int bin = 0, beam = 0;
       PoseMotion& p = poses_[i];
-      if (p.evidence.size() == 0 || !views_[i].cell(center.x(), center.y(), bin, beam)) continue;
+      const Eigen::Vector3d d =
+          p.pose.T_map_radar.linear().transpose() *
+          Eigen::Vector3d(center.x() - views_[i].position().x(), center.y() - views_[i].position().y(), 0);
+      // The walk's middle may be behind the radar and one of its ends before it.
+      if (p.evidence.size() == 0 || d.x() < -kReach_m || d.norm() > radar_.max_range_m()) continue;
+      const int bin = static_cast<int>(std::lround(d.norm() / radar_.range_bin_m()));
       const int around = static_cast<int>(std::ceil(kReach_m / radar_.range_bin_m()));
-      const int low = std::max(0, bin - around), high = std::min(static_cast<int>(p.evidence.rows()) - 1, bin + around);
+      const int high = std::min(static_cast<int>(p.evidence.rows()) - 1, bin + around);
+      const int low = std::clamp(bin - around, 0, high);
       Eigen::Index peak_bin = 0, peak_beam = 0;
       const float peak = p.evidence.middleRows(low, high - low + 1).maxCoeff(&peak_bin, &peak_beam);
       const double range_m = (views_[i].position() - center).norm();
       if (peak > kPoseEvidence) {
         f.log_likelihood_gain += peak;
         f.poses.push_back(p.pose.name);
-        const Eigen::Vector3d d =
-            p.pose.T_map_radar.linear().transpose() *
-            Eigen::Vector3d(center.x() - views_[i].position().x(), center.y() - views_[i].position().y(), 0);
         const double azimuth_deg = degrees(std::atan2(d.y(), d.x()));
         FindingPlace place;
         place.range_m = {range_m - 0.5, range_m + 0.5};
