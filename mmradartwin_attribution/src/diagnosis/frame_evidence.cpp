@@ -341,11 +341,7 @@ FrameFinding FrameExaminer::State::frameGain() const {
 std::vector<FrameFinding> FrameExaminer::findings() const {
   const State& s = *state_;
   std::vector<FrameFinding> all = {s.saturation(), s.packetLoss(), s.misalignment(), s.interference(), s.drift()};
-<<<<<<< HEAD
-  for (FrameFinding& walker : locateMotion(s.radar, s.motion).walkers) all.push_back(std::move(walker));
-=======
   for (const FrameFinding& walker : s.locate().walkers) all.push_back(walker);
->>>>>>> w_frames
   all.erase(std::remove_if(all.begin(), all.end(), [](const auto& f) { return f.log_likelihood_gain <= 0; }),
             all.end());
   std::stable_sort(all.begin(), all.end(),
