@@ -205,16 +205,9 @@ TEST_F(FrameEvidenceTest, ClippedSamples) {
 
 TEST_F(FrameEvidenceTest, ZeroedPackets) {
   long long lost = 0, packets = 0;
-  const FrameExaminer examiner = examine(12000, {}, loss(lost, packets));
-  const auto found = examiner.findings();
+  const auto found = examine(12000, {}, loss(lost, packets)).findings();
   ASSERT_EQ(causes(found), std::vector<std::string>{"packet_loss"});
   EXPECT_NEAR(value(found[0], "lost_fraction"), static_cast<double>(lost) / static_cast<double>(packets), 1e-12);
-  // The repaired average is the undamaged one, a plain average would have lost some percent.
-  FrameExaminer whole(radar_);
-  for (const Pose& p : poses_) whole.addPose(p, measure(p, 12000, {}, {}));
-  for (std::size_t i = 0; i < poses_.size(); ++i) {
-    EXPECT_LT((examiner.poses()[i].mean.x - whole.poses()[i].mean.x).cwiseAbs().maxCoeff(), 8 * kNoise_counts / 5);
-  }
 }
 
 TEST_F(FrameEvidenceTest, MissingPackets) {

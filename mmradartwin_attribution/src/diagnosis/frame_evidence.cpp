@@ -4,6 +4,7 @@
 #include <boost/math/distributions/beta.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <set>
 #include <sstream>
 
 #include "frame_stack.h"
@@ -341,7 +342,20 @@ FrameFinding FrameExaminer::State::frameGain() const {
 std::vector<FrameFinding> FrameExaminer::findings() const {
   const State& s = *state_;
   std::vector<FrameFinding> all = {s.saturation(), s.packetLoss(), s.misalignment(), s.interference(), s.drift()};
-  for (const FrameFinding& walker : s.locate().walkers) all.push_back(walker);
+  std::set<std::string> walked;
+  for (const FrameFinding& walker : s.locate().walkers) {
+    all.push_back(walker);
+    walked.insert(walker.poses.begin(), walker.poses.end());
+  }
+  // A strong walker pulls the gain that a frame's samples share, and what that leaves looks like a burst: bursts that
+  // stand at such poses alone are his.
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [&](const FrameFinding& f) {
+                             return f.cause == "interference" &&
+                                    std::all_of(f.poses.begin(), f.poses.end(),
+                                                [&](const std::string& pose) { return walked.count(pose) > 0; });
+                           }),
+            all.end());
   all.erase(std::remove_if(all.begin(), all.end(), [](const auto& f) { return f.log_likelihood_gain <= 0; }),
             all.end());
   std::stable_sort(all.begin(), all.end(),
