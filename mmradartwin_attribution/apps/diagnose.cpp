@@ -56,6 +56,10 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
     diagnosis = diagnose(recording, twin, options);
   }
   std::cerr << '\r' << std::string(width, ' ') << '\r';
+  if (twin_file.empty() && scene == recording.scene_file) {
+    // Scene and radar are the recording's wherever it is read from: a bag's stand in a temporary folder.
+    diagnosis.extended.scene_file.clear();
+  }
   report.write(diagnosis, command);
   for (const PoseProblem& problem : diagnosis.problems) std::cerr << "error: " << problem.message << '\n';
   std::cout << diagnosisText(diagnosis) << "Findings: " << arguments.output << "/findings.json\n"

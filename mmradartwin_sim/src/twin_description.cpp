@@ -123,7 +123,7 @@ void write(std::ostream& out, const Parameters::Value& value) {
 
 std::string TwinDescription::toYaml() const {
   std::ostringstream out;
-  out << "scene: " << quoted(scene_file) << "\n";
+  if (!scene_file.empty()) out << "scene: " << quoted(scene_file) << "\n";
   if (!radar_file.empty()) out << "radar: " << quoted(radar_file) << "\n";
   out << "mechanisms:\n";
   for (const NamedParameters& m : mechanisms) {

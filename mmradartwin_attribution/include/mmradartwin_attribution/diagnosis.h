@@ -41,6 +41,7 @@ struct TriedHypothesis {
 
 struct Diagnosis {
   Findings findings;
+  bool has_twin = true;               ///< false where there was no scene to simulate
   TwinDescription extended;           ///< the twin with all findings' mechanisms
   std::vector<PoseProblem> problems;  ///< poses that were left out
   std::vector<TriedHypothesis> tried;

@@ -592,6 +592,7 @@ Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& o
   result.findings.poses = static_cast<int>(data.poses.size());
   result.findings.locations = static_cast<int>(data.locations.size());
   result.findings.held_out = "nothing: without a scene only frames are judged";
+  result.has_twin = false;
   result.extended.radar = recording.radar;
   result.problems = data.problems;
   return result;

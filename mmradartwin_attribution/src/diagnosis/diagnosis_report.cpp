@@ -95,7 +95,7 @@ std::string diagnosisText(const Diagnosis& d) {
   std::ostringstream out;
   out << "Verdict: " << d.findings.verdict() << ", " << d.findings.poses << " poses at " << d.findings.locations
       << " locations";
-  if (!d.extended.scene_file.empty()) {
+  if (d.has_twin) {
     out << "; the twin as given explains " << shown(d.explained_power) << " of the measured power";
   }
   out << "\n";
@@ -128,7 +128,7 @@ std::string diagnosisText(const Diagnosis& d) {
 
 void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::string>& command) const {
   Findings findings = diagnosis.findings;
-  if (!diagnosis.extended.scene_file.empty()) {
+  if (diagnosis.has_twin) {
     findings.extended_twin = "twin.extended.yaml";
     save(directory_ + "/twin.extended.yaml", diagnosis.extended.toYaml());
   }
