@@ -19,7 +19,8 @@ struct PoseChannels {
   int frames = 0;
   ReceiveGrid grid;        ///< the average itself
   Eigen::MatrixXcd y;      ///< [M][N] range spectra over the window's sum and full scale: a tone's own amplitude
-  double noise_power = 0;  ///< thermal power in a cell of y, from the scatter of the frames; 0 for a single frame
+  int shots = 1;           ///< frames times loops behind the average
+  double noise_power = 0;  ///< thermal power in a cell of y, from the scatter of the frames
 };
 
 struct ChannelData {
