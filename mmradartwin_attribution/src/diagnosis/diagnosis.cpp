@@ -30,10 +30,12 @@ constexpr double kFalseAlarm = 0.01;  ///< family-wise, per round
 constexpr int kMostFindings = 4;
 constexpr std::size_t kScreenPoses = 44;  ///< a part of the session ranks hypotheses well enough
 constexpr std::size_t kFewestPoses = 12;
-constexpr std::size_t kSecondLook = 9;     ///< hypotheses that are looked at on all poses
-constexpr std::size_t kSuspects = 6;       ///< actors whose geometry is tried
-constexpr std::size_t kMostFits = 7;       ///< of one round
-constexpr double kWorthAFit = 6;           ///< nats promised
+constexpr std::size_t kSecondLook = 9;  ///< hypotheses that are looked at on all poses
+constexpr std::size_t kSuspects = 6;    ///< actors whose geometry is tried
+constexpr std::size_t kMostNames = 6;   ///< fits of one round
+constexpr std::size_t kMostLaws = 2;
+constexpr double kWorthAFit = 4;  ///< nats promised
+constexpr double kWorthALaw = 12;
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding
 constexpr double kSharedLatent = 3;    ///< standard deviations from none at which a common error is tried as a cause
 constexpr double kAlike = 5;           ///< nats within which two names are not told apart
@@ -352,12 +354,15 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   }
   std::stable_sort(screened.begin(), screened.end(), better);
   std::vector<HypothesisFit> fits;
+  std::size_t names_fitted = 0, laws_fitted = 0;
   for (const Screened& s : screened) {
     TriedHypothesis tried{s.hypothesis.label(), s.promised, std::numeric_limits<double>::quiet_NaN(), round};
-    const double best = fits.empty() ? 0 : fits.front().gain / fits.front().inflation;
-    // A promise is a quadratic's; what promises a fifth of the best's gain is not going to be better.
-    if (fits.size() < kMostFits && s.promised > std::max(kWorthAFit, 0.02 * best)) {
-      report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / kMostFits);
+    // A promise is a quadratic's and often far too small: names get several chances, laws without a name two.
+    const bool law = !catalogued(s.hypothesis.mechanism.mechanism);
+    std::size_t& fitted = law ? laws_fitted : names_fitted;
+    if (s.promised > (law ? kWorthALaw : kWorthAFit) && fitted < (law ? kMostLaws : kMostNames)) {
+      ++fitted;
+      report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
       HypothesisFit f = fitter_->fit(state_, s.hypothesis, s.start, 4);
       source_->settle(mechanisms_);
       const bool object = s.hypothesis.mechanism.mechanism == "actor_unmodelled";
@@ -408,9 +413,10 @@ Finding Session::describe(const HypothesisFit& best, const std::vector<Hypothesi
   double sum = 0;
   std::vector<std::pair<std::string, double>> alike;
   for (const HypothesisFit& other : fits) {
-    if (best.ranking() - other.ranking() > kAlike || !(other.gain > 0)) continue;
+    const double behind = (best.ranking() - other.ranking()) / best.inflation;
+    if (behind > kAlike || !(other.gain > 0)) continue;
     const std::string& name = other.hypothesis.mechanism.mechanism;
-    const double weight = std::exp(other.ranking() - best.ranking());
+    const double weight = std::exp(-behind);
     const std::string cause = catalogued(name) ? name : "unknown";
     const auto at = std::find_if(alike.begin(), alike.end(), [&](const auto& a) { return a.first == cause; });
     if (at == alike.end()) {

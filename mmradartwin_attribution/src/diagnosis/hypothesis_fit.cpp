@@ -12,6 +12,8 @@ namespace {
 constexpr double kSmallStep = 0.125;  ///< of the scale, for derivatives
 constexpr double kEnough = 0.2;       ///< nats: a further step promises less
 constexpr double kMaxInflation = 50;
+constexpr double kPrice =
+    5;  ///< nats per coordinate, some inflation included: fewer numbers win where all explain alike
 
 SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, double per) {
   const float f = static_cast<float>(1 / per);
@@ -29,7 +31,7 @@ std::vector<NamedParameters> with(std::vector<NamedParameters> mechanisms, Named
 }  // namespace
 
 double HypothesisFit::ranking() const {
-  return gain / inflation - 1.5 * static_cast<double>(std::max<std::size_t>(1, hypothesis.coordinates.size()));
+  return gain - kPrice * static_cast<double>(std::max<std::size_t>(1, hypothesis.coordinates.size()));
 }
 
 /// Scores of the hypothesis' own directions with the nuisance's part taken out.
