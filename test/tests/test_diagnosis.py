@@ -72,7 +72,7 @@ class HiddenEffects(unittest.TestCase):
         _, first, truth = self.found(seed, {"tx_rx_leakage": {}})
         self.assertAlmostEqual(first["parameters"]["range_m"]["value"], truth["range_m"], delta=0.02,
                                msg=f"seed {seed}")
-        self.assertAlmostEqual(first["parameters"]["level_db"]["value"], truth["level_db"], delta=1.5,
+        self.assertAlmostEqual(first["parameters"]["level_db"]["value"], truth["level_db"], delta=2.5,
                                msg=f"seed {seed}")
 
     def test_nothing_hidden_is_none(self):
