@@ -157,16 +157,15 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
     f.scaled = scaled;
   };
   consider(start);
-  if (n == 1 && hypothesis.coordinates[0].min < hypothesis.coordinates[0].neutral &&
-      !hypothesis.coordinates[0].logarithmic()) {
-    for (double scaled : {-3.0, -1.0, 1.0, 3.0}) consider({scaled});  // what latents hide starts from far off
-  }
-  if (n > 0) {
-    for (double factor : {0.4, 2.0}) {
-      std::vector<double> other = start;
-      for (double& v : other) v *= factor;
-      consider(other);
-    }
+  // A quadratic's promise is far off where a level rises from nothing.
+  const bool one_sided =
+      n > 0 && std::any_of(hypothesis.coordinates.begin(), hypothesis.coordinates.end(),
+                           [](const Coordinate& c) { return c.logarithmic() || c.min >= c.neutral; });
+  for (double factor : {0.4, 2.0}) {
+    if (!one_sided) break;
+    std::vector<double> other = start;
+    for (double& v : other) v *= factor;
+    consider(other);
   }
   std::vector<int> everyone(null.echoes.size());
   std::iota(everyone.begin(), everyone.end(), 0);
