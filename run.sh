@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# mmradartwin's commands: ./run.sh demo | test | setup | build | bench | lint | exec CMD...
+# mmradartwin's commands: ./run.sh demo | test | setup | build | bench | fuzz | tsan | lint | exec CMD...
 set -euo pipefail
 
 root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
@@ -10,7 +10,7 @@ unset PYTHONHOME
 
 packages=(
   build-essential cmake ros-desktop-full-dev catkin catkin-lint python3-rostest librviz-dev rosbash rospack-tools
-  libdiagnostic-updater-dev libembree-dev libpcl-dev libpcl-conversions-dev libassimp-dev libyaml-cpp-dev nlohmann-json3-dev libtbb-dev
+  libdiagnostic-updater-dev libembree-dev libpcl-dev libassimp-dev libyaml-cpp-dev libtinyxml2-dev nlohmann-json3-dev libtbb-dev
   libssl-dev libmatio-dev libpcap-dev libusb-1.0-0-dev zlib1g-dev libumockdev-dev umockdev libcli11-dev libgtest-dev libbenchmark-dev libopencv-dev
   ccache xvfb xauth x11-apps x11-utils imagemagick iproute2 python3-numpy python3-scipy python3-yaml)
 
@@ -25,6 +25,9 @@ usage: ./run.sh VERB
   setup        install the Debian packages that are missing
   build        build the workspace (.ws/)
   bench [OUT]  build, then run all benchmarks; JSON and a table in OUT (default bench_out)
+  fuzz [S]     every reader of foreign bytes under libFuzzer with address and undefined-behaviour sanitizer, S seconds
+               each (60); needs clang; corpus and findings stay in .ws/fuzz
+  tsan         the streaming path's tests under the thread sanitizer
   lint         catkin_lint over all packages
   exec CMD...  run CMD in the sourced workspace, e.g. ./run.sh exec rosrun mmradartwin_attribution evaluate --help
 U
@@ -98,12 +101,60 @@ run_bench() {
   for bench in "$ws"/devel/lib/mmradartwin_*/*benchmark*; do
     [ -x "$bench" ] || continue
     say "$(basename "$bench")"
+    case $bench in */benchmark_scenarios | */benchmark_stream) "$bench" | tee "$out/$(basename "$bench").txt"; continue ;; esac
     "$bench" --benchmark_out="$out/$(basename "$bench").json" --benchmark_out_format=json
   done
   say "simulator against generator, path by path"
   rosrun mmradartwin_tests compare_with_simulator.py --seed 1 | tee "$out/paths.txt"
   say "recall of the twin beside its ceiling"
   rosrun mmradartwin_tests recall_ceiling.py --seed 100 --sessions 6 | tee "$out/recall.txt"
+}
+
+# separate_build FOLDER TARGETS CMAKE_ARGUMENTS...: the workspace once more, compiled otherwise
+separate_build() {
+  local folder=$ws/$1 targets=$2
+  shift 2
+  workspace
+  [ -e "$ws/src/CMakeLists.txt" ] || catkin_init_workspace "$ws/src" >&2
+  [ -d /usr/lib/ccache ] && export PATH=/usr/lib/ccache:$PATH
+  cmake -S "$ws/src" -B "$folder/build" -DCATKIN_DEVEL_PREFIX="$folder/devel" -DCMAKE_INSTALL_PREFIX="$folder/install" \
+    -DCMAKE_BUILD_TYPE=RelWithDebInfo "$@" >&2
+  # shellcheck disable=SC2086
+  cmake --build "$folder/build" -j2 --target $targets >&2
+}
+
+run_fuzz() {
+  local seconds=${1:-60} package program input failed=()
+  [[ $seconds =~ ^[0-9]+$ ]] || usage
+  command -v clang++ >/dev/null || die "clang is not here; as root: apt-get install clang"
+  separate_build fuzz fuzz -DCMAKE_C_COMPILER=clang -DCMAKE_CXX_COMPILER=clang++ -Dmmradartwin_tests_FUZZ=ON \
+    "-DCMAKE_CXX_FLAGS=-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined"
+  mkdir -p "$ws/fuzz/findings"
+  for package in dsp driver sim; do
+    program=$ws/fuzz/devel/lib/mmradartwin_tests/fuzz_$package
+    for input in $("$program" -inputs); do
+      say "fuzz: $input, $seconds s"
+      mkdir -p "$ws/fuzz/corpus/$input"
+      FUZZ_INPUT=$input "$program" -seeds="$ws/fuzz/corpus/$input"
+      FUZZ_INPUT=$input "$program" -max_total_time="$seconds" -timeout=30 -rss_limit_mb=2048 -max_len=8192 -verbosity=1 \
+        -artifact_prefix="$ws/fuzz/findings/$input-" "$ws/fuzz/corpus/$input" 2>&1 |
+        { grep -vE '^#[0-9]+.*(NEW|REDUCE|pulse|RELOAD)' || true; } || failed+=("$input")
+    done
+  done
+  [ ${#failed[@]} -eq 0 ] || { say "found something: ${failed[*]}; the inputs are in $ws/fuzz/findings"; exit 1; }
+  say "nothing found"
+}
+
+run_tsan() {
+  local test status=0 tests="test_hand_over test_emulator_loopback test_rig test_dca1000_control test_pcap_recording"
+  separate_build tsan "$tests" "-DCATKIN_WHITELIST_PACKAGES=mmradartwin_msgs;mmradartwin_dsp;mmradartwin_driver" \
+    "-DCMAKE_CXX_FLAGS=-fsanitize=thread"
+  data_folder
+  for test in $tests; do
+    say "thread sanitizer: $test"
+    TSAN_OPTIONS="halt_on_error=0 exitcode=66" "$ws/tsan/devel/lib/mmradartwin_driver/$test" || status=1
+  done
+  return $status
 }
 
 lint() {
@@ -118,6 +169,8 @@ case $verb in
   setup) setup ;;
   build) setup; build ;;
   bench) setup; run_bench "$@" ;;
+  fuzz) setup; run_fuzz "$@" ;;
+  tsan) setup; run_tsan ;;
   lint) setup; lint ;;
   exec) [ $# -gt 0 ] || usage; source_workspace; data_folder; exec "$@" ;;
   *) usage ;;

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The demo: generate a session, play it over UDP through the live loop, evaluate what was recorded.
+# The demo: generate a session that hides an effect, play it over UDP through the live loop, evaluate what was recorded,
+# find the effect, and evaluate again with the twin that knows it.
 # usage: demo.sh OUTPUT [POSES]
 set -euo pipefail
 
@@ -10,11 +11,11 @@ frames=${DEMO_FRAMES:-100}
 say() { printf '== %s\n' "$*" >&2; }
 
 mkdir -p "$out"
-rm -rf "$out/session" "$out/report" "$out/demo.bag" "$out/demo.bag.active" "$out/rviz.png"
+rm -rf "$out/session" "$out/report" "$out/diagnosis" "$out/report_extended" "$out/demo.bag" "$out/demo.bag.active" "$out/rviz.png"
 
-say "1/4 generating a measured session: $locations places x $headings headings, $frames frames each"
+say "1/5 generating a measured session: $locations places x $headings headings, $frames frames each"
 rosrun mmradartwin_tests make_session.py --output "$out/session" --locations "$locations" --headings "$headings" \
-  --frames "$frames" --seed "${DEMO_SEED:-$RANDOM}" --truth "$out/truth.json"
+  --frames "$frames" --seed "${DEMO_SEED:-$RANDOM}" --truth "$out/truth.json" --effect "${DEMO_EFFECT:-element_pattern}"
 
 # A window where there is a display, a virtual one otherwise.
 xvfb=
@@ -48,7 +49,7 @@ trap 'exit 130' INT TERM
 port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
 export ROS_MASTER_URI=http://127.0.0.1:$port ROS_IP=127.0.0.1
 
-say "2/4 playing it over UDP at the real pace: driver, signal chain, twin, attribution and rviz run live"
+say "2/5 playing it over UDP at the real pace: driver, signal chain, twin, attribution and rviz run live"
 roslaunch -p "$port" mmradartwin_launch demo.launch session:="$out/session" bag:="$out/demo.bag" \
   average_frames:="$frames" ${DEMO_ARGS:-} &
 launch=$!
@@ -64,13 +65,21 @@ say "the session was played to its end (roslaunch calls that the death of sessio
 bag=$out/demo.bag
 [ -f "$bag" ] || { printf 'error: %s was not recorded; the messages above say why\n' "$bag" >&2; exit 1; }
 
-say "3/4 evaluating the recording"
+say "3/5 evaluating the recording"
 status=0
 rosrun mmradartwin_attribution evaluate "$bag" --output "$out/report" || status=$?
 
-say "4/4 done"
+say "4/5 what does the twin get wrong? (the answer is in $out/truth.json, which nothing here reads)"
+rosrun mmradartwin_attribution diagnose "$out/session" --output "$out/diagnosis" || status=$?
+
+say "5/5 evaluating again with the extended twin"
+rosrun mmradartwin_attribution evaluate "$out/session" --twin "$out/diagnosis/twin.extended.yaml" \
+  --output "$out/report_extended" --no-bag || status=$?
+
 cat >&2 <<TEXT
    report         $out/report/index.html
+   diagnosis      $out/diagnosis/index.html
+   after it       $out/report_extended/index.html
    rviz           $out/rviz.png
    recording      $bag        (replay: ./run.sh exec roslaunch mmradartwin_launch replay.launch bag:=$bag)
    session        $out/session

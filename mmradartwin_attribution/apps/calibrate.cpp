@@ -37,7 +37,8 @@ void write(const fs::path& file, const std::string& text) {
 void calibrate(TwinDescription& twin, const MountCalibration& c, bool channels) {
   const auto replace = [&twin](const std::string& mechanism, const Parameters* values) {
     auto& all = twin.mechanisms;
-    all.erase(std::remove_if(all.begin(), all.end(), [&](const auto& m) { return m.mechanism == mechanism; }), all.end());
+    all.erase(std::remove_if(all.begin(), all.end(), [&](const auto& m) { return m.mechanism == mechanism; }),
+              all.end());
     if (values) all.push_back({mechanism, *values});
   };
   Parameters yaw, position, range, channel;
@@ -58,7 +59,8 @@ void calibrate(TwinDescription& twin, const MountCalibration& c, bool channels) 
 
 void print(const CalibratedValue& v, const std::string& label) {
   if (v.observable) {
-    std::printf("%-22s %10.4f %-3s  95 %%: %.4f to %.4f\n", label.c_str(), v.value, v.unit.c_str(), v.ci95[0], v.ci95[1]);
+    std::printf("%-22s %10.4f %-3s  95 %%: %.4f to %.4f\n", label.c_str(), v.value, v.unit.c_str(), v.ci95[0],
+                v.ci95[1]);
   } else {
     std::printf("%-22s %s\n", label.c_str(), v.note.c_str());
   }
@@ -80,7 +82,8 @@ int run(const Arguments& arguments) {
     target = wallTarget(loadScene(twin.scene_file, recording.radar.center_frequency_hz()), arguments.wall);
   } else {
     target.name = "the corner reflector";
-    target.reflector_map_m = Eigen::Vector3d(arguments.reflector_m[0], arguments.reflector_m[1], arguments.reflector_m[2]);
+    target.reflector_map_m =
+        Eigen::Vector3d(arguments.reflector_m[0], arguments.reflector_m[1], arguments.reflector_m[2]);
   }
   const std::vector<LaserDistance> lasers =
       arguments.lasers.empty() ? std::vector<LaserDistance>() : readLaserDistances(arguments.lasers);
@@ -109,18 +112,18 @@ int run(const Arguments& arguments) {
   }
   if (!arguments.mount.empty()) {
     const auto& m = arguments.mount;
-    const Eigen::Isometry3d T = Eigen::Translation3d(m[0], m[1], m[2]) *
-                                Eigen::AngleAxisd(m[3], Eigen::Vector3d::UnitZ()) *
-                                Eigen::AngleAxisd(m[4], Eigen::Vector3d::UnitY()) *
-                                Eigen::AngleAxisd(m[5], Eigen::Vector3d::UnitX());
+    const Eigen::Isometry3d T =
+        Eigen::Translation3d(m[0], m[1], m[2]) * Eigen::AngleAxisd(m[3], Eigen::Vector3d::UnitZ()) *
+        Eigen::AngleAxisd(m[4], Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(m[5], Eigen::Vector3d::UnitX());
     const Eigen::Isometry3d better = correctedMount(calibration, T);
     const Eigen::Matrix3d R = better.linear();
-    std::printf("mount:=\"%.4f %.4f %.4f %.5f %.5f %.5f\"  (use it without radar_yaw_offset and radar_position_offset)\n",
-                better.translation().x(), better.translation().y(), better.translation().z(),
-                std::atan2(R(1, 0), R(0, 0)), std::atan2(-R(2, 0), std::hypot(R(2, 1), R(2, 2))),
-                std::atan2(R(2, 1), R(2, 2)));
+    std::printf(
+        "mount:=\"%.4f %.4f %.4f %.5f %.5f %.5f\"  (use it without radar_yaw_offset and radar_position_offset)\n",
+        better.translation().x(), better.translation().y(), better.translation().z(), std::atan2(R(1, 0), R(0, 0)),
+        std::atan2(-R(2, 0), std::hypot(R(2, 1), R(2, 2))), std::atan2(R(2, 1), R(2, 2)));
   }
-  std::cout << "Twin: " << (folder / "twin.yaml").string() << ", picture: " << (folder / "calibration.png").string() << '\n';
+  std::cout << "Twin: " << (folder / "twin.yaml").string() << ", picture: " << (folder / "calibration.png").string()
+            << '\n';
   return calibration.problems.empty() ? 0 : 2;
 }
 
@@ -131,11 +134,13 @@ int main(int argc, char** argv) {
   CLI::App app("Finds the radar's mount, range bias and channel errors from poses in front of a known target.");
   app.name("calibrate");
   app.add_option("recording", arguments.recording, "session directory, session.yaml or bag")->required();
-  app.add_option("--output", arguments.output, "folder for twin.yaml, calibration.yaml and calibration.png")->required();
+  app.add_option("--output", arguments.output, "folder for twin.yaml, calibration.yaml and calibration.png")
+      ->required();
   app.add_option("--reflector", arguments.reflector_m, "corner reflector's apex in map: X Y Z [m]")->expected(3);
   app.add_option("--wall", arguments.wall, "actor of the scene that the radar was held in front of");
   app.add_option("--laser", arguments.lasers, "CSV pose,distance_m: radar to target as a laser meter gave it");
-  app.add_option("--channels", arguments.channels, "twin: channel errors go into twin.yaml; none: they are only reported")
+  app.add_option("--channels", arguments.channels,
+                 "twin: channel errors go into twin.yaml; none: they are only reported")
       ->check(CLI::IsMember({"twin", "none"}))
       ->capture_default_str();
   app.add_option("--twin", arguments.twin, "twin.yaml to complete (default: the session's, or the base mechanisms)");

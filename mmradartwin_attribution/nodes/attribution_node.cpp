@@ -14,6 +14,7 @@
 #include "mmradartwin_attribution/standing_ledger.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/master_watch.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_sim/scene.h"
 
@@ -288,6 +289,7 @@ int main(int argc, char** argv) {
   ros::init(argc, argv, "attribution");
   try {
     AttributionNode node;
+    const mmradartwin::MasterWatch master_watch;
     ros::spin();
   } catch (const mmradartwin::InputError& error) {
     ROS_FATAL("%s", error.what());

@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "../emulator/emulated_card.h"
+#include "../emulator/session_frames.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace {
@@ -36,6 +37,7 @@ int main(int argc, char** argv) {
   mmradartwin::PlayedSelection selection;
   EmulatedCard::Options options;
   std::vector<std::string> status_at;
+  double start_delay_s = 1.0;
   bool once = false, end_with_parent = false;
   app.add_option("input", input, "session directory, or a capture (then --radar says what recorded it)")->required();
   app.add_option("--radar", radar, "radar.yaml of a bare capture");
@@ -50,7 +52,7 @@ int main(int argc, char** argv) {
   app.add_option("--payload-bytes", options.payload_bytes, "sample bytes in a full packet")
       ->capture_default_str()
       ->check(CLI::Range(1, 1462));
-  app.add_option("--start-delay-s", options.start_delay_s, "from the first RECORD_START to the first frame")
+  app.add_option("--start-delay-s", start_delay_s, "from the first RECORD_START to the first frame")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 60.0));
   app.add_option("--flush-s", options.flush_s, "from the last sample to the short last packet")
@@ -66,6 +68,10 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
   app.add_option("--truncate", options.truncate, "probability that its end is missing")->check(CLI::Range(0.0, 1.0));
+  app.add_option("--jitter-us", options.jitter_us, "packets leave late by an exponential time of this mean")
+      ->check(CLI::Range(0.0, 1e5));
+  app.add_option("--stall-us", options.stall_us, "with --jitter-us: one packet in twenty by up to so much more")
+      ->check(CLI::Range(0.0, 1e6));
   app.add_option("--seed", options.seed, "of these chances")->capture_default_str();
   app.add_option("--status-at", status_at, "FRAME:BITS: status datagram as that frame begins");
   app.add_flag("--once", once, "end when the last frame was played");
@@ -91,7 +97,8 @@ int main(int argc, char** argv) {
     for (const auto& problem : session.problems) {
       std::fprintf(stderr, "pose %s left out: %s\n", problem.pose.c_str(), problem.message.c_str());
     }
-    EmulatedCard card(session, options, log);
+    mmradartwin::SessionFrames frames(session, start_delay_s, log);
+    EmulatedCard card(frames, options, log);
     struct sigaction action {};
     action.sa_handler = [](int) { interrupted = 1; };
     sigaction(SIGINT, &action, nullptr);

@@ -25,6 +25,12 @@ int main(int argc, char** argv) {
   app.add_option("--buffer-mb", buffer_mb, "receive buffer asked of the kernel")
       ->capture_default_str()
       ->check(CLI::Range(1, 1024));
+  app.add_flag(
+      "--self-test", options.self_test,
+      "configure the radar over USB, and look at ramps and targets that the chip itself makes: order of lanes, of "
+      "I and Q, sign of angles; the radar must be configured again afterwards");
+  app.add_option("--firmware", options.radar_firmware,
+                 "TI's meta image, for --self-test of a radar with an empty flash");
   app.add_flag("--no-usb", no_usb, "do not look for the radar's USB port");
   return runProgram(app, argc, argv, [&] {
     if (!radar.empty()) options.radar = loadRadarConfig(radar);

@@ -79,6 +79,8 @@ void EmulatedAwr2243::powerOff() {
   outgoing_.clear();
   sending_.clear();
   frames_run = false;
+  last_.clear();
+  tellLanes();
 }
 
 void EmulatedAwr2243::setReset(bool low) {
@@ -310,6 +312,7 @@ int EmulatedAwr2243::carryOut(const Command& command, Bytes& reply) {
     reply = {1, 1, 1, 2, 2, 4, 3, 21, 6, 30, 0, 0, 0, 0, 0, 0};
   }
   last_[command.sub_block] = command.data;
+  if (command.sub_block == 0x404B) tellLanes();
   return 0;
 }
 
@@ -424,7 +427,58 @@ int EmulatedAwr2243::trigger(const Command& command) {
   }
   if (action > 1 || (action == 1) == frames_run) return 7;
   frames_run = action == 1;
+  tellLanes();
   return 0;
+}
+
+LvdsActivity EmulatedAwr2243::activity() const {
+  LvdsActivity lanes;
+  const auto signedHalf = [](const Bytes& data, std::size_t at) { return static_cast<std::int16_t>(half(data, at)); };
+  if (configured(0x4041)) lanes.q_first = last_.at(0x4041)[6] == 1;
+  if (configured(0x4045)) lanes.lanes_reversed = half(last_.at(0x4045), 0) == 1;
+  if (frames_run) {
+    const Bytes &profile = last_.at(0x0100), &frame = last_.at(0x0102);
+    lanes.kind = LvdsActivity::Kind::kFrames;
+    lanes.samples = static_cast<int>(half(profile, 32));
+    lanes.chirps = static_cast<int>(half(frame, 6) * (half(frame, 4) - half(frame, 2) + 1));
+    lanes.period_ns = static_cast<std::int64_t>(full(frame, 12)) * 5;
+    lanes.chirp_ns = static_cast<std::int64_t>(full(profile, 8) + full(profile, 16)) * 10;
+    lanes.sampled_ns = static_cast<std::int64_t>(full(profile, 8) + full(profile, 12)) * 10 +
+                       static_cast<std::int64_t>(half(profile, 32)) * 1000000 / half(profile, 34);
+    lanes.start_frequency_hz = static_cast<double>(full(profile, 4)) * 3.6e9 / 67108864;
+    lanes.slope_hz_per_s = signedHalf(profile, 28) * (3.6e6 * 900 / 67108864) * 1e9;
+    lanes.sample_rate_hz = half(profile, 34) * 1e3;
+    lanes.adc_start_s = static_cast<double>(full(profile, 12)) * 1e-8;
+    lanes.test_source = configured(0x02C2) && configured(0x02C3) && half(last_.at(0x02C3), 0) == 1;
+    if (lanes.test_source) {
+      const Bytes& source = last_.at(0x02C2);
+      for (std::size_t i = 0; i < 2; ++i) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          lanes.targets[i].position_m[axis] = signedHalf(source, 26 * i + 2 * axis) * 0.01;
+          lanes.targets[i].velocity_m_per_s[axis] = signedHalf(source, 26 * i + 6 + 2 * axis) * 0.01;
+        }
+        lanes.targets[i].level_dbfs = -0.1 * half(source, 26 * i + 12);
+      }
+      for (std::size_t rx = 0; rx < 4; ++rx) {
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+          lanes.rx_position_wavelengths[rx][axis] = static_cast<std::int8_t>(source[52 + 2 * rx + axis]) / 8.0;
+        }
+      }
+    }
+  } else if (configured(0x404B) && last_.at(0x404B)[0] == 1) {
+    const Bytes& pattern = last_.at(0x404B);
+    lanes.kind = LvdsActivity::Kind::kTestPattern;
+    lanes.samples = static_cast<int>(half(pattern, 2));
+    lanes.sampled_ns = lanes.period_ns = lanes.samples * std::max<std::int64_t>(pattern[1], 1) * 5;
+    lanes.pattern_packets = static_cast<std::int64_t>(full(pattern, 4));
+    for (std::size_t rx = 0; rx < 4; ++rx) {
+      for (std::size_t part = 0; part < 2; ++part) {
+        lanes.ramps[rx][part] = {static_cast<std::uint16_t>(half(pattern, 8 + 8 * rx + 4 * part)),
+                                 static_cast<std::uint16_t>(half(pattern, 10 + 8 * rx + 4 * part))};
+      }
+    }
+  }
+  return lanes;
 }
 
 void EmulatedAwr2243::raise(std::uint16_t id, const Bytes& data) { event(id, data, milliseconds(0)); }

@@ -3,10 +3,13 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <set>
 #include <string>
 #include <vector>
+
+#include "emulated_lvds.h"
 
 namespace mmradartwin {
 
@@ -59,6 +62,8 @@ class EmulatedAwr2243 {
   int headers_refused = 0, crcs_refused = 0, repeats = 0;
   std::vector<std::uint8_t> flash;  ///< the last image that came whole, with its CRC
   bool frames_run = false;
+  /// Called whenever the lanes begin to carry something else.
+  std::function<void(const LvdsActivity&)> on_lanes;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -79,6 +84,10 @@ class EmulatedAwr2243 {
   int checkValues(const Command& command) const;
   int download(const Command& command);
   int trigger(const Command& command);
+  LvdsActivity activity() const;
+  void tellLanes() const {
+    if (on_lanes) on_lanes(activity());
+  }
   void event(std::uint16_t id, const std::vector<std::uint8_t>& data, std::chrono::milliseconds after);
   void send(std::uint16_t opcode, std::uint16_t flags, const std::vector<std::uint8_t>& blocks, int block_count,
             std::chrono::microseconds after);

@@ -2,6 +2,8 @@
 
 #include <arpa/inet.h>
 #include <poll.h>
+#include <pthread.h>
+#include <sched.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <time.h>
@@ -14,6 +16,8 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "session_frames.h"
+
 namespace mmradartwin {
 namespace {
 
@@ -22,12 +26,6 @@ constexpr std::int64_t kPacketCost_ns = 11200;
 constexpr std::int64_t kTick_ns = 8;
 constexpr std::uint16_t kRecordCompletedBit = 0x0100;
 constexpr std::uint16_t kVersion28 = 0x0402;
-
-std::int64_t clock_ns(clockid_t clock) {
-  timespec now;
-  clock_gettime(clock, &now);
-  return now.tv_sec * 1'000'000'000LL + now.tv_nsec;
-}
 
 sockaddr_in endpoint(const std::string& ip, std::uint16_t port) {
   sockaddr_in address{};
@@ -51,14 +49,8 @@ int boundSocket(const std::string& ip, std::uint16_t port) {
 
 }  // namespace
 
-EmulatedCard::EmulatedCard(const PlayedSession& session, const Options& options, Log log)
-    : session_(session), options_(options), log_(std::move(log)), random_(options.seed) {
-  const RadarConfig& radar = session_.radar;
-  const bool timed = std::isfinite(radar.idle_s) && std::isfinite(radar.ramp_end_s);
-  const double idle_s = timed ? radar.idle_s : 0;
-  const double sampled_s = idle_s + radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
-  sampled_ns_ = std::llround(sampled_s * 1e9);
-  chirp_ns_ = timed ? std::llround((radar.idle_s + radar.ramp_end_s) * 1e9) : sampled_ns_;
+EmulatedCard::EmulatedCard(LvdsSource& radar, const Options& options, Log log)
+    : radar_(radar), options_(options), log_(std::move(log)), random_(options.seed) {
   interval_ns_ = 25000 + kPacketCost_ns;
   host_data_ = endpoint(options_.host_ip, options_.data_port);
   host_config_ = endpoint(options_.host_ip, options_.config_port);
@@ -71,7 +63,8 @@ EmulatedCard::EmulatedCard(const PlayedSession& session, const Options& options,
   }
   const int buffer = 4 << 20;
   setsockopt(card_fd_, SOL_SOCKET, SO_SNDBUF, &buffer, sizeof buffer);
-  thread_ = std::thread([this] { radarThread(); });
+  radar_.connected();
+  thread_ = std::thread([this] { lvdsThread(); });
 }
 
 EmulatedCard::~EmulatedCard() {
@@ -128,9 +121,7 @@ void EmulatedCard::execute(const std::vector<std::uint8_t>& request, const socka
                    ? 0
                    : 1;
       if (result == 0) {
-        const bool two_lanes = session_.radar.layout == CaptureLayout::kTwoLane;
-        if (two_lanes != (request[7] == 2))
-          log_("warning: configured for other lanes than the session was recorded with");
+        if (radar_.lanes() != (request[7] == 2 ? 2 : 4)) log_("warning: configured for other lanes than the radar's");
         deaf_until_ns_ = clock_ns(CLOCK_MONOTONIC) + std::llround(options_.deaf_s * 1e9);
       }
       break;
@@ -155,18 +146,12 @@ void EmulatedCard::execute(const std::vector<std::uint8_t>& request, const socka
 }
 
 void EmulatedCard::startRecord() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  ++recording_;
-  recording_on_ = true;
-  const bool first = radar_start_ns_ == 0;
-  if (first) radar_start_ns_ = clock_ns(CLOCK_MONOTONIC) + std::llround(options_.start_delay_s * 1e9);
-  const std::int64_t first_frame_ns = radar_start_ns_ + clock_ns(CLOCK_REALTIME) - clock_ns(CLOCK_MONOTONIC);
-  log_((first ? "armed first_frame_ns=" : "armed again, playing since first_frame_ns=") +
-       std::to_string(first_frame_ns) + " frames=" + std::to_string(session_.frames));
-}
-
-std::int64_t EmulatedCard::frameOffset_ns(std::int64_t frame) const {
-  return std::llround(static_cast<double>(frame) * session_.radar.frame_period_s * 1e9);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++recording_;
+    recording_on_ = true;
+  }
+  radar_.armed();
 }
 
 /// False where the emulator ends or the recording that was being sent has been stopped.
@@ -176,77 +161,76 @@ bool EmulatedCard::sleepUntil(std::int64_t monotonic_ns) {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (sending_ != 0 && (!recording_on_ || recording_ != sending_)) return false;
     }
-    const std::int64_t now = clock_ns(CLOCK_MONOTONIC);
-    if (now >= monotonic_ns) return true;
-    const std::int64_t until = std::min<std::int64_t>(monotonic_ns, now + 20'000'000);
-    const timespec at{until / 1'000'000'000, until % 1'000'000'000};
-    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+    if (sleepTowards(monotonic_ns)) return true;
   }
   return false;
 }
 
-void EmulatedCard::radarThread() {
+void EmulatedCard::lvdsThread() {
   prctl(PR_SET_TIMERSLACK, 1UL);  // sleep to the microsecond
-  std::int64_t start_ns = 0;
-  while (start_ns == 0 && !stop_) {
+  // The card is hardware: it does not wait for this host's other work. Without the right to that it does.
+  const sched_param priority{1};
+  pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
+  const std::int64_t flush_ns = std::llround(options_.flush_s * 1e9);
+  std::int64_t last_sample_ns = 0;
+  LvdsFrame frame;
+  while (!stop_) {
+    if (radar_.next(frame)) {
+      takeFrame(frame);
+      last_sample_ns = frame.start_ns + (frame.chirps - 1) * frame.chirp_ns + frame.sampled_ns;
+      continue;
+    }
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      start_ns = radar_start_ns_;
+      if (!recording_on_ || sending_ != recording_) sending_ = 0;
     }
-    if (start_ns == 0) sleepUntil(clock_ns(CLOCK_MONOTONIC) + 5'000'000);
+    const bool idle = clock_ns(CLOCK_MONOTONIC) >= last_sample_ns + flush_ns;
+    if (sending_ != 0 && idle) completeRecord();
+    if (!radar_.over() || (sending_ != 0 && !idle)) continue;
+    log_("completed packets=" + std::to_string(sent_.packets) + " bytes=" + std::to_string(bytes_sent_) +
+         " lost=" + std::to_string(sent_.lost) + " duplicated=" + std::to_string(sent_.duplicated) +
+         " reordered=" + std::to_string(sent_.reordered) + " truncated=" + std::to_string(sent_.truncated) +
+         " own_late_us=" + std::to_string(own_late_ns_ / 1000));
+    completed_ = true;
+    return;
   }
-  for (const PlayedPose& pose : session_.poses) {
-    std::ifstream capture(pose.capture, std::ios::binary);
-    std::vector<std::uint8_t> frame(session_.radar.bytes_per_frame());
-    for (std::int64_t i = 0; i < pose.frames && !stop_; ++i) {
-      capture.read(reinterpret_cast<char*>(frame.data()), static_cast<std::streamsize>(frame.size()));
-      if (!capture) log_("warning: " + pose.capture + " has become shorter while it was played");
-      playFrame(pose.first_frame + i, frame);
-    }
-  }
-  const std::int64_t last_sample_ns = start_ns + frameOffset_ns(session_.frames - 1) +
-                                      (session_.radar.chirps_per_frame() - 1) * chirp_ns_ + sampled_ns_;
-  if (sleepUntil(last_sample_ns + std::llround(options_.flush_s * 1e9)) && sending_ != 0) {
-    if (!held_.empty()) sendData(held_.size());
-    while (!delayed_.empty()) {
-      transmit(delayed_.front().datagram);
-      delayed_.pop_front();
-    }
-    status(kRecordCompletedBit);
-  }
-  if (stop_) return;
-  log_("completed packets=" + std::to_string(sent_.packets) + " bytes=" + std::to_string(bytes_sent_) +
-       " lost=" + std::to_string(sent_.lost) + " duplicated=" + std::to_string(sent_.duplicated) +
-       " reordered=" + std::to_string(sent_.reordered) + " truncated=" + std::to_string(sent_.truncated));
-  completed_ = true;
 }
 
-void EmulatedCard::playFrame(std::int64_t index, const std::vector<std::uint8_t>& bytes) {
-  std::int64_t frame_ns;
+void EmulatedCard::completeRecord() {
+  if (!held_.empty()) sendData(held_.size());
+  while (!delayed_.empty()) {
+    transmit(delayed_.front().datagram);
+    delayed_.pop_front();
+  }
+  status(kRecordCompletedBit);
+  sending_ = 0;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  recording_on_ = false;
+}
+
+/// A recording that was started by the time a frame begins takes it from its first byte.
+void EmulatedCard::takeFrame(const LvdsFrame& frame) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    frame_ns = radar_start_ns_ + frameOffset_ns(index);
-    if (sending_ != recording_ || !recording_on_) sending_ = 0;
+    if (!recording_on_) {
+      sending_ = 0;
+      return;
+    }
+    if (sending_ != recording_) {
+      sending_ = recording_;
+      sequence_ = 0;
+      bytes_sent_ = 0;
+      held_.clear();
+      delayed_.clear();
+    }
   }
-  if (sending_ == 0) {
-    // Nobody records. A recording started by the time this frame begins takes it from its first byte.
-    sleepUntil(frame_ns);
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (!recording_on_) return;
-    sending_ = recording_;
-    sequence_ = 0;
-    bytes_sent_ = 0;
-    held_.clear();
-    delayed_.clear();
-  }
-  const auto planned = options_.status_at_frame.find(index);
+  const auto planned = options_.status_at_frame.find(frame.number);
   if (planned != options_.status_at_frame.end()) status(planned->second);
-  const int chirps = session_.radar.chirps_per_frame();
-  const std::size_t chirp_bytes = bytes.size() / static_cast<std::size_t>(chirps);
-  for (int chirp = 0; chirp < chirps && sending_ != 0; ++chirp) {
-    const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(chirp * chirp_bytes);
+  const std::size_t chirp_bytes = frame.bytes.size() / static_cast<std::size_t>(frame.chirps);
+  for (int chirp = 0; chirp < frame.chirps && sending_ != 0; ++chirp) {
+    const auto begin = frame.bytes.begin() + static_cast<std::ptrdiff_t>(chirp * chirp_bytes);
     held_.insert(held_.end(), begin, begin + static_cast<std::ptrdiff_t>(chirp_bytes));
-    sendFull(frame_ns + chirp * chirp_ns_ + sampled_ns_);
+    sendFull(frame.start_ns + chirp * frame.chirp_ns + frame.sampled_ns);
   }
 }
 
@@ -260,12 +244,22 @@ void EmulatedCard::sendFull(std::int64_t available_ns) {
     }
     // By the schedule, not by when the last one really went out: this host's delays must not add up.
     last_sent_ns_ = std::max(available_ns, last_sent_ns_ + interval_ns);
-    if (!sleepUntil(last_sent_ns_)) {
+    const std::int64_t leaves_ns = last_sent_ns_ + noise_ns();
+    if (!sleepUntil(leaves_ns)) {
       sending_ = 0;
       return;
     }
+    own_late_ns_ = std::max(own_late_ns_, clock_ns(CLOCK_MONOTONIC) - leaves_ns);
     sendData(payload);
   }
+}
+
+std::int64_t EmulatedCard::noise_ns() {
+  if (options_.jitter_us <= 0) return 0;
+  double late_us = std::exponential_distribution<double>(1 / options_.jitter_us)(random_);
+  std::uniform_real_distribution<double> chance(0, 1);
+  if (chance(random_) < 0.05) late_us += options_.stall_us * chance(random_);
+  return std::llround(late_us * 1e3);
 }
 
 /// Sequence number (u32, from 1), bytes sent before (u48, from 0), samples.

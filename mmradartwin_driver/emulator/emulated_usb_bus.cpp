@@ -43,6 +43,7 @@ struct EmulatedUsbBus::State {
   UMockdevTestbed* testbed = nullptr;
   UMockdevIoctlBase* handler = nullptr;
   std::string node, device;
+  std::string pulled;  ///< node of the device before
   int number = 0;
   std::atomic<bool> gone{true}, busy{false};
   std::atomic<int> transfers_left{-1};
@@ -177,6 +178,8 @@ void EmulatedUsbBus::plug() {
   State& state = *state_;
   if (!state.gone) return;
   unplug();
+  if (!state.pulled.empty()) umockdev_testbed_detach_ioctl(state.testbed, state.pulled.c_str(), nullptr);
+  state.pulled.clear();
   ++state.number;
   char text[128];
   std::snprintf(text, sizeof text, "/dev/bus/usb/001/%03d", state.number);
@@ -192,8 +195,9 @@ void EmulatedUsbBus::plug() {
       "P: " + state.device + "\nN: " + state.node.substr(5) +
       "\nE: SUBSYSTEM=usb\nE: DRIVER=usb\nE: BUSNUM=001\nE: DEVNUM=" + state.node.substr(17) +
       "\nE: DEVNAME=" + state.node +
-      "\nE: DEVTYPE=usb_device\nA: bConfigurationValue=1\\n\nA: busnum=1\\n\nA: devnum=" + number +
-      "\\n\nA: speed=480\\n\nH: descriptors=" + descriptors() + "\n";
+      "\nE: DEVTYPE=usb_device\nA: idVendor=0451\\n\nA: idProduct=fd03\\n\nA: bConfigurationValue=1\\n\nA: "
+      "busnum=1\\n\nA: devnum=" +
+      number + "\\n\nA: speed=480\\n\nH: descriptors=" + descriptors() + "\n";
   GError* error = nullptr;
   if (!umockdev_testbed_add_from_string(state.testbed, description.c_str(), &error)) {
     const std::string why = error ? error->message : "";
@@ -211,7 +215,8 @@ void EmulatedUsbBus::unplug() {
     umockdev_testbed_uevent(state.testbed, ("/sys" + state.device).c_str(), "remove");
   }
   umockdev_testbed_remove_device(state.testbed, ("/sys" + state.device).c_str());
-  umockdev_testbed_detach_ioctl(state.testbed, state.node.c_str(), nullptr);
+  // Who still holds the device open asks on, and is told that it is gone, until another is plugged in.
+  state.pulled = state.node;
   state.node.clear();
 }
 

@@ -2,11 +2,13 @@
 
 #include "mmradartwin_driver/ros/radar_driver.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/ros/master_watch.h"
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "radar_driver");
   try {
     const mmradartwin::RadarDriver driver(ros::NodeHandle(), ros::NodeHandle("~"));
+    const mmradartwin::MasterWatch master_watch;
     ros::spin();
   } catch (const mmradartwin::InputError& error) {
     ROS_FATAL_STREAM(error.what());

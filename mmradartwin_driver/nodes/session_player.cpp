@@ -1,11 +1,12 @@
-// Plays a session as if it were measured now: starts the DCA1000 emulator on its captures and publishes its poses in tf
-// on the emulator's schedule.
+// Plays a session as if it were measured now: starts the DCA1000 emulator on its captures, or the emulator of a whole
+// rig, and publishes the poses in tf on the emulator's schedule.
 #include <ros/ros.h>
 #include <std_msgs/Float32.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -16,6 +17,7 @@
 #include "mmradartwin_driver/ros/live_session_message.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/master_watch.h"
 #include "mmradartwin_dsp/ros/strict_parameters.h"
 
 namespace mmradartwin {
@@ -39,6 +41,7 @@ class SessionPlayer {
     camera_frame_ = parameters.text("camera_frame", "");
     tf_lead_s_ = parameters.number("tf_lead_s", 0.1, 0.0, 1.0);
     emulator_options_ = parameters.text("emulator_options", "");
+    whole_rig_ = parameters.boolean("whole_rig", false);
     exit_when_done_ = parameters.boolean("exit_when_done", false);
     parameters.rejectUnknown();
     session_ = openPlayedSession(session_path_, "", selection_);
@@ -53,6 +56,7 @@ class SessionPlayer {
   int play() {
     findMount();
     startEmulator();
+    if (whole_rig_) return followRig();
     const std::optional<std::int64_t> start_ns = waitUntilArmed();
     if (!start_ns) return ros::ok() ? 1 : 0;
     publishSession(*start_ns);
@@ -86,28 +90,81 @@ class SessionPlayer {
   }
 
   void startEmulator() {
-    std::vector<std::string> arguments = {session_path_,
-                                          "--first",
-                                          std::to_string(selection_.first),
-                                          "--every",
-                                          std::to_string(selection_.every),
-                                          "--count",
-                                          std::to_string(selection_.count),
-                                          "--card-ip",
-                                          card_ip_,
-                                          "--host-ip",
-                                          host_ip_,
-                                          "--config-port",
-                                          std::to_string(config_port_),
-                                          "--data-port",
-                                          std::to_string(data_port_),
-                                          "--start-delay-s",
-                                          std::to_string(start_delay_s_),
-                                          "--once",
-                                          "--end-with-parent"};
+    std::vector<std::string> arguments = {session_path_, "--end-with-parent"};
+    const auto add = [&arguments](const std::string& option, const std::string& value) {
+      arguments.insert(arguments.end(), {option, value});
+    };
+    add("--first", std::to_string(selection_.first));
+    add("--every", std::to_string(selection_.every));
+    add("--count", std::to_string(selection_.count));
+    add("--card-ip", card_ip_);
+    add("--host-ip", host_ip_);
+    if (!whole_rig_) {
+      add("--config-port", std::to_string(config_port_));
+      add("--data-port", std::to_string(data_port_));
+      add("--start-delay-s", std::to_string(start_delay_s_));
+      arguments.push_back("--once");
+    }
     std::istringstream more(emulator_options_);
     for (std::string word; more >> word;) arguments.push_back(word);
-    emulator_ = std::make_unique<ChildProcess>(programBeside("dca1000_emulator"), arguments);
+    const std::string program = programBeside(whole_rig_ ? "emulated_rig" : "dca1000_emulator");
+    emulator_ = std::make_unique<ChildProcess>(program, arguments);
+  }
+
+  /// Poses for an emulated rig whose radar is started and stopped by others: those of the frames that run, and between
+  /// runs the pose that comes next. A frame's pose stands still from a quarter of a period before its start to a
+  /// quarter after. Returns the exit status.
+  int followRig() {
+    constexpr std::int64_t kHold_ns = 50'000'000;
+    const auto lead_ns = static_cast<std::int64_t>(tf_lead_s_ * 1e9);
+    std::int64_t start_ns = 0, period_ns = 0, first = 0, sent = 0, last_stamp_ns = 0;
+    bool run = false;
+    const auto send = [&](std::int64_t frame, std::int64_t stamp_ns) {
+      if (stamp_ns <= last_stamp_ns) return;
+      last_stamp_ns = stamp_ns;
+      sendPose(poseOfFrame(frame % session_.frames), toRosTime(stamp_ns));
+    };
+    while (ros::ok()) {
+      while (const auto line = emulator_->readLine(5)) {
+        ROS_INFO_STREAM("emulator: " << *line);
+        std::istringstream words(*line);
+        std::string what, how;
+        words >> what >> how;
+        if (what != "frames") continue;
+        run = how == "run";
+        for (std::string word; words >> word;) {
+          const std::size_t equals = word.find('=');
+          const std::int64_t value = std::stoll(word.substr(equals + 1));
+          if (word.compare(0, equals, "first_frame_ns") == 0) start_ns = value;
+          if (word.compare(0, equals, "period_ns") == 0) period_ns = value;
+          if (word.compare(0, equals, "frame") == 0) first = value;
+        }
+        sent = 0;
+      }
+      if (const auto status = emulator_->exitStatus()) {
+        ROS_ERROR_STREAM("the emulated rig has ended with status " << *status << ": its message stands above");
+        return *status;
+      }
+      const std::int64_t now_ns = toNanoseconds(ros::Time::now());
+      if (!run) {
+        if (now_ns >= last_stamp_ns + kHold_ns) send(first, now_ns);
+        continue;
+      }
+      // After a pause of this program only what is still news.
+      sent = std::max(sent, (now_ns - start_ns) / period_ns - 5);
+      for (; start_ns + sent * period_ns - period_ns / 4 < now_ns + lead_ns; ++sent) {
+        send(first + sent, start_ns + sent * period_ns - period_ns / 4);
+        send(first + sent, start_ns + sent * period_ns + period_ns / 4);
+      }
+    }
+    return 0;
+  }
+
+  const Eigen::Isometry3d& poseOfFrame(std::int64_t frame) const {
+    for (const PlayedPose& pose : session_.poses) {
+      if (frame < pose.first_frame + pose.frames) return pose.pose.T_map_radar;
+    }
+    return session_.poses.back().pose.T_map_radar;
   }
 
   std::optional<std::int64_t> waitUntilArmed() {
@@ -216,7 +273,7 @@ class SessionPlayer {
   std::string session_path_, card_ip_, host_ip_, map_frame_, radar_frame_, camera_frame_, emulator_options_;
   int config_port_ = 0, data_port_ = 0;
   double start_delay_s_ = 0, tf_lead_s_ = 0;
-  bool exit_when_done_ = false, completed_ = false;
+  bool exit_when_done_ = false, completed_ = false, whole_rig_ = false;
   PlayedSelection selection_;
   PlayedSession session_;
   Eigen::Isometry3d T_radar_child_ = Eigen::Isometry3d::Identity();  ///< child: what is published below map
@@ -235,7 +292,9 @@ int main(int argc, char** argv) {
   ros::AsyncSpinner spinner(1);
   spinner.start();
   try {
-    return mmradartwin::SessionPlayer().play();
+    mmradartwin::SessionPlayer player;
+    const mmradartwin::MasterWatch master_watch;
+    return player.play();
   } catch (const mmradartwin::InputError& error) {
     ROS_FATAL_STREAM(error.what());
     return 2;

@@ -5,6 +5,11 @@
 #include <vector>
 
 namespace mmradartwin {
+namespace {
+
+constexpr double kLongest_ns = 1e18;  // 30 years: a frame so far away comes of a damaged count
+
+}  // namespace
 
 FrameClock::FrameClock(const RadarConfig& radar, double drift)
     : frame_bytes_(radar.bytes_per_frame()),
@@ -27,6 +32,7 @@ std::int64_t FrameClock::startFromPacket(std::uint64_t frame, std::uint64_t last
 
 std::int64_t FrameClock::observe(std::uint64_t frame, std::int64_t start_ns) {
   const std::int64_t observed_ns = start_ns;
+  if (known_ && static_cast<double>(frame - origin_frame_) * period_ns_ > kLongest_ns) reset();
   if (known_) {
     const double elapsed_ns = static_cast<double>(frame - frame_) * period_ns_;
     const std::int64_t latest_ns = start_ns_ + std::llround(elapsed_ns * (1 + drift_));
@@ -81,7 +87,9 @@ std::optional<double> FrameClock::fittedLate_ns(std::uint64_t frame) const {
 
 std::optional<std::int64_t> FrameClock::predict(std::uint64_t frame) const {
   if (!known_) return std::nullopt;
-  return start_ns_ + std::llround((static_cast<double>(frame) - static_cast<double>(frame_)) * period_ns_);
+  const double elapsed_ns = (static_cast<double>(frame) - static_cast<double>(frame_)) * period_ns_;
+  if (std::abs(elapsed_ns) > kLongest_ns) return std::nullopt;
+  return start_ns_ + std::llround(elapsed_ns);
 }
 
 void FrameClock::reset() {

@@ -1,5 +1,6 @@
 #include "mmradartwin_driver/pcap_capture.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -11,6 +12,9 @@
 
 namespace mmradartwin {
 namespace {
+
+/// A hole that is longer is not filled with zeros: a damaged count must not fill the disk.
+constexpr std::uint64_t kLongestHole_bytes = 64u << 20;
 
 class CaptureOutput {
  public:
@@ -28,8 +32,13 @@ class CaptureOutput {
       expected_ = 0;
       new_recording_ = false;
     }
-    for (; expected_ < cube.sequence; ++expected_) writeMissing();
-    ++expected_;
+    const std::uint64_t missing = cube.sequence - std::min<std::uint64_t>(expected_, cube.sequence);
+    if (missing * radar_.bytes_per_frame() > kLongestHole_bytes) {
+      result.recordings.push_back(result.frames);
+    } else {
+      for (std::uint64_t i = 0; i < missing; ++i) leaveOut();
+    }
+    expected_ = cube.sequence + std::uint64_t{1};
     held_ = std::move(cube);
   }
   /// What came so far belongs to a recording that has ended.
@@ -65,11 +74,13 @@ class CaptureOutput {
     }
     write(encodeFrame(radar_, cube.data));
   }
-  void writeMissing() {
+  /// A frame of zeros, which the file system need not store.
+  void leaveOut() {
     CaptureFlaw flaw{result.frames, radar_.bytes_per_frame(), {}};
     for (int chirp = 0; chirp < radar_.chirps_per_frame(); ++chirp) flaw.chirps.push_back(chirp);
     result.flaws.push_back(flaw);
-    write(std::vector<std::uint8_t>(radar_.bytes_per_frame(), 0));
+    out_.seekp(static_cast<std::streamoff>(radar_.bytes_per_frame()), std::ios::cur);
+    ++result.frames;
   }
   void write(const std::vector<std::uint8_t>& bytes) {
     out_.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));

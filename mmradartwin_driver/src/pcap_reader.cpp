@@ -17,6 +17,8 @@ struct Datagram {
   std::size_t size;  ///< as captured: less than was sent where the capture cut packets
 };
 
+constexpr std::int64_t kLatest_s = 4294967295;  // of a ROS time; a pcapng may say more than 64 bit of ns hold
+
 /// Bytes of link layer before the IPv4 header, or -1.
 int linkHeaderBytes(int link_type, const std::uint8_t* p, std::size_t size) {
   constexpr std::uint16_t kIpv4 = 0x0800, kVlan = 0x8100;
@@ -32,7 +34,7 @@ int linkHeaderBytes(int link_type, const std::uint8_t* p, std::size_t size) {
     case DLT_LINUX_SLL2:
       return size >= 20 && networkOrder16(p) == kIpv4 ? 20 : -1;
     case DLT_NULL:
-      return 4;
+      return size >= 4 ? 4 : -1;
     case DLT_RAW:
       return 0;
     default:
@@ -73,6 +75,9 @@ PcapCounters readPcap(const std::string& file, const PcapVisitor& visitor, const
   int state;
   while ((state = pcap_next_ex(capture.get(), &header, &bytes)) == 1) {
     ++counters.frames;
+    if (header->ts.tv_sec < 0 || header->ts.tv_sec > kLatest_s) {
+      throw InputError(file + ": damaged: packet " + std::to_string(counters.frames) + " has no time that can be");
+    }
     const std::int64_t stamp_ns = header->ts.tv_sec * 1'000'000'000LL + header->ts.tv_usec;  // ns by the precision
     Datagram datagram;
     if (!decodeUdp(link_type, bytes, header->caplen, datagram)) {

@@ -1,6 +1,7 @@
 #include "mmradartwin_driver/pcap_writer.h"
 
 #include <pcap/pcap.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -78,8 +79,11 @@ struct PcapWriter::Output {
   }
 };
 
-PcapWriter::PcapWriter(const std::string& file, std::size_t queue_bytes)
-    : file_(stamped(file)), queue_bytes_(queue_bytes), output_(std::make_unique<Output>()) {
+PcapWriter::PcapWriter(const std::string& file, std::size_t queue_bytes, std::uint64_t min_free_bytes)
+    : file_(stamped(file)),
+      queue_bytes_(queue_bytes),
+      min_free_bytes_(min_free_bytes),
+      output_(std::make_unique<Output>()) {
   if (std::filesystem::is_regular_file(file_)) {
     throw InputError(file_ + ": exists already; give a new name for the packet recording, or one with {stamp} in it");
   }
@@ -150,7 +154,14 @@ void PcapWriter::run() {
 }
 
 void PcapWriter::write(const std::vector<std::uint8_t>& records) {
-  if (!output_->dumper) return;
+  if (!output_->dumper) {  // these waited while it ended
+    for (std::size_t at = 0; at < records.size(); ++left_out_) {
+      std::uint32_t size;
+      std::memcpy(&size, &records[at + sizeof(std::int64_t)], sizeof size);
+      at += sizeof(std::int64_t) + sizeof size + size;
+    }
+    return;
+  }
   std::uint64_t packets = 0;
   for (std::size_t at = 0; at < records.size();) {
     std::int64_t stamp_ns;
@@ -170,10 +181,21 @@ void PcapWriter::write(const std::vector<std::uint8_t>& records) {
   if (pcap_dump_flush(output_->dumper) == 0 && !std::ferror(pcap_dump_file(output_->dumper))) {
     written_ += packets;
     output_->whole = pcap_dump_ftell(output_->dumper);
+    if (!spaceLeft()) end("less than " + std::to_string(min_free_bytes_ >> 20) + " MB are free on its disk");
     return;
   }
-  const std::string why = errno ? std::strerror(errno) : "write error";
   left_out_ += packets;
+  end(errno ? std::strerror(errno) : "write error");
+}
+
+/// Of a disk; what is no file (a pipe into another program, say) has no space to run out of.
+bool PcapWriter::spaceLeft() {
+  struct statvfs disk = {};
+  if (!std::filesystem::is_regular_file(file_) || ::statvfs(file_.c_str(), &disk) != 0) return true;
+  return static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize >= min_free_bytes_;
+}
+
+void PcapWriter::end(const std::string& why) {
   pcap_dump_close(output_->dumper);
   output_->dumper = nullptr;
   const bool cut = ::truncate(file_.c_str(), output_->whole) == 0;

@@ -18,6 +18,8 @@ constexpr milliseconds kAskWhileSilent{2000};
 /// The card sends the rest of a recording about 2 s after its last sample; what is silent for longer has ended.
 constexpr milliseconds kStreamEnded{3500};
 constexpr int kReceiveTimeout_ms = 50;
+/// From the radar's start to its first samples, beyond two frames.
+constexpr seconds kFirstSamples{5};
 
 PacketReceiver::Counters sum(const PacketReceiver::Counters& a, const PacketReceiver::Counters& b) {
   return {a.packets + b.packets, a.bytes + b.bytes, a.kernel_drops + b.kernel_drops, a.foreign + b.foreign,
@@ -41,6 +43,15 @@ Rig::Rig(const RadarConfig& radar, const RigOptions& options, CubeSink cubes, Ev
   parseIpv4(options_.host_ip);
   parseIpv4(options_.card_ip);
   if (!options_.record_pcap.empty()) recording_ = std::make_unique<PcapWriter>(options_.record_pcap);
+  if (options_.radar) {
+    watch_ = std::make_unique<RadarWatch>(*options_.radar, options_.radar_firmware,
+                                          [this](RadarWatch::Level level, const std::string& text) {
+                                            events_(level == RadarWatch::Level::kInfo      ? Level::kInfo
+                                                    : level == RadarWatch::Level::kWarning ? Level::kWarning
+                                                                                           : Level::kError,
+                                                    text);
+                                          });
+  }
   silent_since_ = Clock::now();
   thread_ = std::thread([this] { run(); });
 }
@@ -53,6 +64,7 @@ Rig::~Rig() {
 RigState Rig::state() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   RigState state = state_;
+  if (watch_) state.radar = watch_->state();
   state.silent_s = std::chrono::duration<double>(Clock::now() - silent_since_).count();
   return state;
 }
@@ -61,6 +73,7 @@ void Rig::run() {
   while (!stop_) {
     try {
       open();
+      prepareRadar();
       configure();
       arm();
       stream();
@@ -73,6 +86,11 @@ void Rig::run() {
   }
   assembler_.flush();
   publishState();
+  try {
+    if (watch_) watch_->stop();
+  } catch (const RigError&) {
+    // The radar is gone: nothing to stop.
+  }
   if (!control_ || !configured_) return;
   try {
     control_->stopRecord();
@@ -101,6 +119,12 @@ void Rig::open() {
   }
 }
 
+void Rig::prepareRadar() {
+  if (!watch_ || !watch_->prepare()) return;
+  configured_ = false;  // the card locks to the LVDS clock when it is configured
+  events_(Level::kInfo, "AWR2243 configured, firmware " + watch_->state().version);
+}
+
 void Rig::configure() {
   if (!options_.configure_card || configured_) return;
   control_->connect();
@@ -119,12 +143,14 @@ void Rig::configure() {
 
 void Rig::arm() {
   if (options_.configure_card) {
+    if (watch_) watch_->stop();
     // What an earlier recording left in the socket would be taken for the start of this one.
     receiver_->drain();
     while (control_->takeStatus(milliseconds(0))) {
     }
     assembler_.restart();
     control_->startRecord();
+    if (watch_) watch_->start();
   }
   last_data_ = Clock::now();
   {
@@ -135,14 +161,23 @@ void Rig::arm() {
     ++state_.armings;
   }
   setPhase(RigState::Phase::kArmed);
-  events_(Level::kInfo, options_.configure_card ? "armed: waiting for the radar's frames"
-                                                : "listening for a card that another program configures");
+  events_(Level::kInfo, watch_                    ? "armed, and the radar's frames started"
+                        : options_.configure_card ? "armed: waiting for the radar's frames"
+                                                  : "listening for a card that another program configures");
 }
 
 bool Rig::receiveBatch(int timeout_ms) {
   const int packets = receiver_->receive(timeout_ms, [this](const DataPacket& packet) { assembler_.add(packet); });
   if (packets > 0) last_data_ = Clock::now();
   return packets > 0;
+}
+
+void Rig::checkFirstSamples(Clock::duration silent) {
+  if (silent < kFirstSamples + std::chrono::duration<double>(2 * radar_.frame_period_s)) return;
+  watch_->forget();
+  throw RigError(
+      "the radar runs, and no samples come from the card: seat the LVDS ribbon between the boards; radar and "
+      "card are set up anew");
 }
 
 void Rig::stream() {
@@ -171,6 +206,11 @@ void Rig::stream() {
       }
     }
     if (!options_.configure_card) continue;
+    if (watch_ && !any_data) checkFirstSamples(silent);
+    if (watch_ && watch_->returned()) {
+      events_(Level::kWarning, "the radar's USB port is there again: radar and card are set up anew");
+      return control_->stopRecord();
+    }
     while (const auto status = control_->takeStatus(milliseconds(0))) {
       if (handleStatus(*status)) return;
     }
@@ -195,7 +235,9 @@ bool Rig::handleStatus(std::uint16_t status) {
     return true;
   }
   if (status & kRecordCompleted) {
-    events_(Level::kInfo, "the card has completed its recording: the radar's frames have ended");
+    // Frames that this rig started run until it stops them.
+    events_(watch_ ? Level::kWarning : Level::kInfo,
+            "the card has completed its recording: the radar's frames have ended");
     // The last packets may be behind the status.
     while (receiveBatch(20) && !stop_) {
     }

@@ -14,10 +14,12 @@
 #include <memory>
 #include <sstream>
 
+#include "mmradartwin_driver/awr2243_control.h"
 #include "mmradartwin_driver/capture_link.h"
 #include "mmradartwin_driver/dca1000_control.h"
 #include "mmradartwin_driver/packet_receiver.h"
 #include "mmradartwin_driver/rig_error.h"
+#include "mmradartwin_driver/rig_self_test.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -48,6 +50,8 @@ std::string number(const char* format, double value) {
   std::snprintf(text, sizeof text, format, value);
   return text;
 }
+
+constexpr std::size_t kSelfTestFrames = 20;
 
 struct Interface {
   std::string name;
@@ -80,7 +84,12 @@ class Examination {
     firewall();
     usb();
     const bool ports = linked && openPorts();
-    if (ports && card()) samples();
+    if (!ports || !card()) return !problem_;
+    if (options_.self_test) {
+      selfTest();
+    } else {
+      samples();
+    }
     return !problem_;
   }
 
@@ -228,6 +237,76 @@ class Examination {
     return "";
   }
 
+  /// The radar is brought up before the card is configured: that wants its LVDS clock.
+  void selfTest() {
+    const RadarConfig radar = selfTestRadar(*options_.radar);
+    std::string step = "radar";
+    try {
+      const Awr2243Registers registers = quantiseAwr2243(radar, "radar.yaml");
+      const RadarConfig quantised = withQuantisedValues(radar, registers);
+      const std::vector<std::uint8_t> image =
+          options_.radar_firmware.empty() ? std::vector<std::uint8_t>() : loadFirmwareImage(options_.radar_firmware);
+      UsbDevice usb;
+      FtdiRadarPort port(usb);
+      std::string warnings;
+      Awr2243Control control(port, [&](const awr2243::EventText& event, const SubBlock&) {
+        if (event.level != awr2243::EventText::Level::kInfo) warnings += "; " + event.text;
+      });
+      control.bringUp(registers, image, options_.radar_firmware);
+      tell(warnings.empty() ? Level::kFine : Level::kNote, "radar",
+           "the AWR2243 is configured, firmware " + control.version().text() + ", " +
+               std::to_string(control.temperature_deg_c().value_or(0)) + " deg C at calibration" + warnings);
+      step = "lane pattern";
+      awr2243::TestPattern pattern = selfTestPattern();
+      tell(judgeTestPattern(quantised,
+                            recordBytes(16 * selfTestPacketBytes(), [&] { control.setTestPattern(pattern); })));
+      pattern.enable = 0;
+      control.setTestPattern(pattern);
+      step = "test source";
+      control.enableTestSource(selfTestSource(quantised));
+      const auto bytes = recordBytes(kSelfTestFrames * quantised.bytes_per_frame(), [&] { control.start(); });
+      control.stop();
+      control.disableTestSource();
+      tell(judgeTestSource(quantised, bytes));
+    } catch (const RigError& error) {
+      tell(Level::kProblem, step, error.what(), "run this again; power the boards off and on if it stays so");
+    }
+  }
+
+  /// Arms the card, lets the radar begin, and returns the recording's first `wanted` bytes. Throws RigError where they
+  /// do not come, or not whole.
+  std::vector<std::uint8_t> recordBytes(std::size_t wanted, const std::function<void()>& begin) {
+    control_->resetFpga();
+    control_->configureFpga(4);
+    control_->configurePackets(options_.packet_delay_us);
+    receiver_->drain();
+    control_->startRecord();
+    begin();
+    std::vector<std::uint8_t> bytes(wanted);
+    std::vector<bool> have(wanted);
+    std::size_t missing = wanted;
+    const auto until =
+        Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+                           options_.first_packet_s + 2 * kSelfTestFrames * options_.radar->frame_period_s));
+    while (missing > 0 && Clock::now() < until) {
+      receiver_->receive(20, [&](const DataPacket& packet) {
+        for (std::size_t i = 0; i < packet.size && packet.byte_count + i < wanted; ++i) {
+          const std::size_t at = packet.byte_count + i;
+          missing -= have[at] ? 0 : 1;
+          have[at] = true;
+          bytes[at] = packet.payload[i];
+        }
+      });
+    }
+    control_->stopRecord();
+    if (missing == wanted) throw RigError("no samples came; seat the LVDS ribbon between the boards");
+    if (missing > 0) {
+      throw RigError(std::to_string(missing) + " of " + std::to_string(wanted) +
+                     " bytes were lost; raise net.core.rmem_max, check the network cable");
+    }
+    return bytes;
+  }
+
   void samples() {
     if (!options_.radar) {
       tell(Level::kNote, "samples", "not looked at", "give --radar radar.yaml to arm the card and look at them");
@@ -338,6 +417,9 @@ bool checkRig(const RigCheckOptions& options, const std::function<void(const Che
   parseIpv4(options.host_ip);
   parseIpv4(options.card_ip);
   packetDelayTicks(options.packet_delay_us);
+  if (options.self_test && !(options.radar && options.usb)) {
+    throw InputError("the self-test needs a radar.yaml (--radar) and the radar's USB port");
+  }
   return Examination(options, report).run();
 }
 

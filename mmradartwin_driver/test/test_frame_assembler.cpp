@@ -1,8 +1,6 @@
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <limits>
-
+#include "assembly_scenario.h"
 #include "mmradartwin_driver/frame_assembler.h"
 #include "packet_stream.h"
 
@@ -288,141 +286,20 @@ TEST(FrameClock, LateArrivalsAreNotBelievedPausesAre) {
   EXPECT_EQ(11 * period + 40 * kMillisecond, clock.observe(11, 11 * period + 40 * kMillisecond));
 }
 
-/// Random scenarios per test; MMRADARTWIN_SCENARIOS sets more for a long run.
-int scenarios() {
-  const char* wanted = std::getenv("MMRADARTWIN_SCENARIOS");
-  return wanted ? std::atoi(wanted) : 50;
-}
+/// 900 scenarios; `benchmark_scenarios` runs as many as one likes.
+class AssemblyScenarios : public testing::TestWithParam<int> {};
 
-class OneRecording : public testing::TestWithParam<int> {};
-
-/// Loss, duplication, reordering and truncation of one recording: to the byte what the rule says, and nothing else.
-TEST_P(OneRecording, EveryByteIsInItsPlaceOrFlaggedLost) {
-  for (int scenario = GetParam() * scenarios(); scenario < (GetParam() + 1) * scenarios(); ++scenario) {
-    SCOPED_TRACE("scenario " + std::to_string(scenario));
-    std::mt19937_64 random(scenario);
-    const RadarConfig radar = randomRadar(random);
-    const std::uint64_t frame_bytes = radar.bytes_per_frame();
-    FrameAssembler::Options options;
-    options.window_frames = std::uniform_int_distribution<int>(2, 4)(random);
-    options.window_bytes = std::uniform_int_distribution<std::size_t>(0, 8000)(random);
-    Bench bench(radar, options);
-
-    const std::vector<std::uint64_t> begins = {
-        0, 0, 0, 1456 * 100, (std::uint64_t{1} << 32) - 5000, (std::uint64_t{1} << 48) - 20000};
-    const std::uint64_t begin = begins[random() % begins.size()];
-    const std::size_t bytes = std::uniform_int_distribution<std::size_t>(1, 60000)(random);
-    const auto sent = cutIntoPackets(random, 7, begin, bytes, random() % 2);
-    Impairment how;
-    const auto share = [&] { return random() % 2 ? std::uniform_real_distribution<double>(0, 0.3)(random) : 0.0; };
-    how.loss = share();
-    how.duplicate = share();
-    how.reorder = share();
-    how.truncate = share();
-    how.depth = std::uniform_int_distribution<int>(1, 12)(random);
-    how.spared = begin > options.plausible_gap_bytes ? 4 : 0;  // what confirms a count that begins far off
-    if (sent.size() < how.spared) continue;
-
-    ArrivalOracle oracle(frame_bytes,
-                         std::max<std::uint64_t>(options.window_frames * frame_bytes, options.window_bytes));
-    for (ArrivingPacket& packet : impair(random, sent, how)) {
-      packet.stamp_ns = bench.now_ns += 20'000;
-      bench.assembler.add(packet.view());
-      oracle.arrive(packet.offset, packet.payload.size());
-      if (random() % 200 == 0 && how.spared == 0) {
-        bench.assembler.flush();
-        oracle.flush();
-      }
-    }
-    bench.assembler.flush();
-
-    EXPECT_EQ(1u, bench.assembler.counters().epochs);
-    const auto& cubes = bench.collected.cubes;
-    ASSERT_EQ(oracle.frames().size(), cubes.size());
-    std::size_t i = 0;
-    std::uint64_t received = 0;
-    for (const auto& [frame, arrived] : oracle.frames()) {
-      expectFrame(radar, cubes[i++], 7, frame, arrived);
-      received += static_cast<std::uint64_t>(std::count(arrived.begin(), arrived.end(), true));
-      if (HasFatalFailure()) return;
-    }
-    EXPECT_EQ(received, bench.assembler.counters().bytes);
-    EXPECT_EQ(cubes.size(), bench.assembler.counters().frames);
+TEST_P(AssemblyScenarios, EveryByteIsInItsPlaceOrFlaggedLost) {
+  for (int seed = GetParam() * 50; seed < (GetParam() + 1) * 50; ++seed) {
+    const AssemblyScenario scenario = runAssemblyScenario(static_cast<std::uint64_t>(seed));
+    EXPECT_EQ(0u, scenario.misplaced) << "seed " << seed;
+    EXPECT_EQ(0u, scenario.unflagged) << "seed " << seed;
+    EXPECT_EQ("", scenario.problem) << "seed " << seed;
     if (HasFailure()) return;
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenarios, OneRecording, testing::Range(0, 10));
-
-class Restarts : public testing::TestWithParam<int> {};
-
-/// Several recordings, one after the other, without a word from outside: whatever is handed out holds bytes of one
-/// recording only, in their places, the rest flagged; the frames of a recording come in order and once.
-TEST_P(Restarts, NeverMixRecordings) {
-  for (int scenario = GetParam() * scenarios(); scenario < (GetParam() + 1) * scenarios(); ++scenario) {
-    SCOPED_TRACE("scenario " + std::to_string(scenario));
-    std::mt19937_64 random(1'000'000 + scenario);
-    const RadarConfig radar = randomRadar(random);
-    Bench bench(radar);
-    Impairment how;
-    const bool impaired = random() % 3 != 0;
-    if (impaired) {
-      how.loss = how.duplicate = how.reorder = how.truncate = 0.1;
-      how.depth = 4;
-    }
-    const int recordings = std::uniform_int_distribution<int>(2, 4)(random);
-    std::uint64_t shortest = std::numeric_limits<std::uint64_t>::max();
-    std::uint64_t sent = 0;
-    for (int epoch = 0; epoch < recordings; ++epoch) {
-      const std::size_t bytes = std::uniform_int_distribution<std::size_t>(1, 60000)(random);
-      const auto cut = cutIntoPackets(random, epoch, 0, bytes, random() % 2);
-      sent += cut.back().offset + cut.back().payload.size();
-      const auto arriving = impair(random, cut, how);
-      if (arriving.empty()) continue;
-      // A recording whose first packet to arrive lies beyond the end of one before passes as its continuation; nothing
-      // but being told of the arming helps there.
-      if (arriving.front().offset >= shortest) bench.assembler.restart();
-      std::uint64_t end = 0;
-      for (ArrivingPacket packet : arriving) {
-        packet.stamp_ns = bench.now_ns += 20'000;
-        bench.assembler.add(packet.view());
-        end = std::max(end, packet.offset + packet.payload.size());
-      }
-      shortest = std::min(shortest, end);
-      bench.now_ns += 100 * kMillisecond;
-    }
-    bench.assembler.flush();
-
-    int epoch = 0;
-    std::int64_t last_frame = -1;
-    std::uint64_t counted = 0;
-    const std::uint64_t frame_bytes = radar.bytes_per_frame();
-    for (std::size_t i = 0; i < bench.collected.cubes.size(); ++i) {
-      const AdcCube& cube = bench.collected.cubes[i];
-      if (i > 0 && bench.collected.epochs[i] != bench.collected.epochs[i - 1]) last_frame = -1;
-      ASSERT_GT(static_cast<std::int64_t>(cube.sequence), last_frame);
-      last_frame = cube.sequence;
-      const auto matches = [&](int candidate) {
-        for (std::size_t word = 0; word < cube.data.size(); ++word) {
-          const std::size_t at = byteOfWord(radar, word);
-          const bool valid = cube.chirp_valid[at * cube.chirps / frame_bytes];
-          if (!valid && cube.data[word] == 0) continue;
-          if (cube.data[word] != expectedWord(candidate, cube.sequence * frame_bytes + at)) return false;
-        }
-        return true;
-      };
-      while (epoch < recordings && !matches(epoch)) ++epoch;
-      ASSERT_LT(epoch, recordings) << "frame " << cube.sequence << " holds bytes of no one recording";
-      counted += frame_bytes - cube.lost_bytes;
-    }
-    if (!impaired) {
-      EXPECT_EQ(sent, counted);
-    }
-    if (HasFailure()) return;
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(Scenarios, Restarts, testing::Range(0, 8));
+INSTANTIATE_TEST_SUITE_P(Seeds, AssemblyScenarios, testing::Range(0, 18));
 
 }  // namespace
 }  // namespace mmradartwin

@@ -105,6 +105,22 @@ TEST(PcapWriter, SaysThatTheDiskIsFull) {
   EXPECT_EQ(2u, writer.left_out());
 }
 
+TEST(PcapWriter, LeavesSpaceOnTheDisk) {
+  TemporaryFolder folder;
+  const std::string file = folder.file("a.pcap");
+  PcapWriter writer(file, 1 << 20, std::uint64_t{1} << 62);  // more than any disk has
+  const std::vector<std::uint8_t> datagram(1466);
+  for (int i = 0; i < 3; ++i) {
+    writer.add({endpoint("127.0.0.1", 1024), endpoint("127.0.0.1", 4098), datagram.data(), datagram.size(), i});
+    writer.flush();
+  }
+  EXPECT_NE(std::string::npos, writer.problem().find("ends after 1 packets (less than")) << writer.problem();
+  EXPECT_NE(std::string::npos, writer.problem().find("what it holds is whole")) << writer.problem();
+  EXPECT_EQ(1u, writer.written());
+  EXPECT_EQ(2u, writer.left_out());
+  EXPECT_EQ(1u, readPcap(file, PcapVisitor()).frames);
+}
+
 TEST(PcapCapture, NamesFramesWithLosses) {
   TemporaryFolder folder;
   writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));

@@ -12,8 +12,8 @@ int main(int argc, char** argv) {
   using namespace mmradartwin;
   std::vector<std::string> files;
   std::string output, device;
-  CLI::App app("Makes a radar.yaml of mmWave Studio's Lua script or JSON, and the DCA1000's cf.json.");
-  app.add_option("FILE", files, "*.lua, *.mmwave.json, setup.json, cf.json, of one configuration")->required();
+  CLI::App app("Makes a radar.yaml of mmWave Studio's Lua script, XML or JSON, and the DCA1000's cf.json.");
+  app.add_option("FILE", files, "*.lua, *.xml, *.mmwave.json, setup.json, cf.json, of one configuration")->required();
   app.add_option("--output", output, "radar.yaml to write")->required();
   app.add_option("--device", device, "awr2243, xwr1843, ...: where the files do not say");
   return runProgram(app, argc, argv, [&] {

@@ -113,9 +113,9 @@ std::vector<std::string> captureParts(const std::string& file) {
   const std::string head = match[1], tail = match[2];
   const auto part = [&](std::size_t number) { return path.parent_path() / (head + std::to_string(number) + tail); };
   std::vector<std::string> parts = {file};
-  while (fs::exists(part(parts.size()))) parts.push_back(part(parts.size()).string());
-  // A part that lies beyond a missing one would be taken for another capture's.
   std::error_code error;
+  while (fs::exists(part(parts.size()), error)) parts.push_back(part(parts.size()).string());
+  // A part that lies beyond a missing one would be taken for another capture's.
   for (const auto& entry : fs::directory_iterator(path.has_parent_path() ? path.parent_path() : ".", error)) {
     const std::string other = entry.path().filename().string();
     if (other.size() <= head.size() + tail.size() || other.compare(0, head.size(), head) != 0) continue;

@@ -4,18 +4,20 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/strict_yaml.h"
 #include "raw_settings.h"
+#include "text_file.h"
 
 namespace mmradartwin {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+
+constexpr int kLastChirp = 511;
 
 std::string shortest(double value) { return yamlNumber(value); }
 
@@ -50,15 +52,9 @@ class JsonPlace {
                                                          : std::strtod(text.c_str(), &end);
       if (!text.empty() && *end == 0) return value;
     }
-    throw InputError(where_ + ": " + value_.dump() + " is no number");
+    throw InputError(where_ + ": " + value_.dump().substr(0, 100) + " is no number");
   }
-  int integer() const {
-    const double value = number();
-    if (value != std::floor(value) || std::abs(value) > 4294967295.0) {
-      throw InputError(where_ + ": " + value_.dump() + " must be a whole number");
-    }
-    return static_cast<int>(static_cast<long long>(value));
-  }
+  int integer() const { return wholeNumber(number(), where_); }
   std::string text() const {
     if (!value_.is_string()) throw InputError(where_ + ": must be text");
     return value_.get<std::string>();
@@ -103,11 +99,7 @@ void readMmwave(const JsonPlace& root, RawSettings& settings) {
       throw InputError(p["txPhaseShifter"].where() +
                        ": the transmitters' phases are shifted; only unshifted ones are known here");
     }
-    const int id = p["profileId"].integer();
-    if (!settings.profiles.emplace(id, profile).second) {
-      throw InputError(p.where() + ": profile " + std::to_string(id) + " is given twice");
-    }
-    settings.profile_from = p.where();
+    settings.setProfile(p["profileId"].integer(), profile, p.where());
   }
   for (const JsonPlace& item : rf["rlChirps"].items()) {
     const JsonPlace c = item["rlChirpCfg_t"];
@@ -119,9 +111,8 @@ void readMmwave(const JsonPlace& root, RawSettings& settings) {
                          "are known here");
       }
     }
-    for (int chirp = c["chirpStartIdx"].integer(); chirp <= c["chirpEndIdx"].integer() && chirp < 512; ++chirp) {
-      settings.chirps[chirp] = {c["profileId"].integer(), static_cast<unsigned>(c["txEnable"].integer())};
-    }
+    settings.setChirps(c["chirpStartIdx"].integer(), c["chirpEndIdx"].integer(),
+                       {c["profileId"].integer(), static_cast<unsigned>(c["txEnable"].integer())}, c.where());
   }
   const JsonPlace frame = rf["rlFrameCfg_t"];
   set("chirp_start", frame["chirpStartIdx"]);
@@ -139,9 +130,7 @@ void readMmwave(const JsonPlace& root, RawSettings& settings) {
   set("packet", raw["rlDevDataPathCfg_t"]["transferFmtPkt0"]);
   if (raw.has("rlDevLaneEnable_t")) {
     const JsonPlace lanes = raw["rlDevLaneEnable_t"]["laneEn"];
-    int count = 0;
-    for (int mask = lanes.integer(); mask; mask >>= 1) count += mask & 1;
-    settings.set("lanes", count, lanes.where());
+    settings.set("lanes", __builtin_popcount(static_cast<unsigned>(lanes.integer())), lanes.where());
   }
   if (raw.has("rlDevLvdsLaneCfg_t")) set("lane_format", raw["rlDevLvdsLaneCfg_t"]["laneFormat"]);
 }
@@ -165,12 +154,17 @@ void readCard(const JsonPlace& card, RawSettings& settings) {
   }
 }
 
+/// Deeper than any of TI's files by far; messages quote values, and quoting recurses.
+constexpr int kDeepestJson = 100;
+
 void readJson(const std::string& file, const std::vector<std::string>& files, RawSettings& settings) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw InputError(file + ": cannot be read; give a JSON file that exists");
+  const std::string text = readTextFile(file, "give a JSON file that exists");
   json root;
   try {
-    root = json::parse(in);
+    root = json::parse(text, [&file](int depth, json::parse_event_t, json&) {
+      if (depth > kDeepestJson) throw InputError(file + ": is nested too deeply for a settings file");
+      return true;
+    });
   } catch (const json::exception& error) {
     throw InputError(file + ": is no JSON: " + error.what());
   }
@@ -193,10 +187,15 @@ void readJson(const std::string& file, const std::vector<std::string>& files, Ra
     const bool given = std::any_of(files.begin(), files.end(),
                                    [&](const std::string& other) { return fs::path(other).filename() == name; });
     const std::string beside = (fs::path(file).parent_path() / name).string();
-    if (!given && !fs::exists(beside)) {
+    std::error_code error;
+    if (!given && !fs::exists(beside, error)) {
       throw InputError(file + ": names " + name + ", which is not beside it; put it there or give it too");
     }
-    if (!given) readJson(beside, {file, beside}, settings);
+    if (!given) {
+      std::vector<std::string> known = files;
+      known.insert(known.end(), {file, beside});
+      readJson(beside, known, settings);
+    }
   }
   if (!known) {
     throw InputError(file +
@@ -258,8 +257,30 @@ void RawSettings::setDevice(const std::string& name, const std::string& where) {
   device_from = where;
 }
 
+void RawSettings::setProfile(int id, const Profile& profile, const std::string& where) {
+  if (!profiles.emplace(id, profile).second) {
+    throw InputError(where + ": profile " + std::to_string(id) + " is given twice");
+  }
+  profile_from = where;
+}
+
+void RawSettings::setChirps(int first, int last, const Chirp& chirp, const std::string& where) {
+  if (first < 0 || last < first || last > kLastChirp) {
+    throw InputError(where + ": chirps " + std::to_string(first) + " to " + std::to_string(last) +
+                     ": must be within 0 to " + std::to_string(kLastChirp) + ", in order");
+  }
+  for (int i = first; i <= last; ++i) chirps[i] = chirp;
+}
+
+int wholeNumber(double value, const std::string& what) {
+  if (value != std::floor(value) || std::abs(value) > 4294967295.0) {
+    throw InputError(what + ": " + shortest(value) + " must be a whole number of at most 32 bits");
+  }
+  return static_cast<int>(static_cast<long long>(value));
+}
+
 ImportedSettings importSettings(const std::vector<std::string>& files, const std::string& device) {
-  if (files.empty()) throw InputError("no settings file; give a .lua script or JSON files");
+  if (files.empty()) throw InputError("no settings file; give a .lua script, XML or JSON files");
   RawSettings raw;
   if (!device.empty()) raw.setDevice(device, "--device");
   for (const std::string& file : files) {
@@ -268,10 +289,10 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
       readLuaSettings(file, raw);
     } else if (extension == ".json") {
       readJson(file, files, raw);
+    } else if (extension == ".xml") {
+      readXmlSettings(file, raw);
     } else {
-      throw InputError(file +
-                       ": settings are read from .lua and .json; where mmWave Studio saved XML, save the same "
-                       "as JSON (Import/Export tab), or give the script");
+      throw InputError(file + ": settings are read from .lua, .xml and .json; give one of these");
     }
   }
   if (raw.device.empty()) {
@@ -279,11 +300,9 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
   }
   const std::size_t digit = raw.device.find_first_of("0123456789");
   const std::string digits = digit == std::string::npos ? "" : raw.device.substr(digit, 4);
-  const std::vector<std::string> four = {"1243", "1443", "2243"}, two = {"1642", "1843", "6443", "6843"};
-  const auto among = [&](const std::vector<std::string>& list) {
-    return std::find(list.begin(), list.end(), digits) != list.end();
-  };
-  if (!among(four) && !among(two)) {
+  const std::vector<std::string> known = {"1243", "1443", "2243", "1642", "1843", "6443", "6843"};
+  const std::optional<CaptureLayout> layout = captureLayoutOf(raw.device);
+  if (!layout || std::find(known.begin(), known.end(), digits) == known.end()) {
     throw InputError(raw.device_from + ": device '" + raw.device +
                      "' is not known; known are xWR1243, 1443, 2243, 1642, 1843, 6443 and 6843");
   }
@@ -293,9 +312,10 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
   radar.device = raw.device.compare(0, 3, "xwr") == 0 && digits == "2243" ? "awr2243" : raw.device;
   const int first = static_cast<int>(required(raw, "chirp_start", "which chirps a frame has (FrameConfig)"));
   const int last = static_cast<int>(required(raw, "chirp_end", "which chirps a frame has (FrameConfig)"));
-  if (first < 0 || last < first || last > 511) {
+  if (first < 0 || last < first || last > kLastChirp) {
     throw InputError(raw.values["chirp_end"].where + ": chirps " + std::to_string(first) + " to " +
-                     std::to_string(last) + " of a frame: must be within 0 to 511, in order");
+                     std::to_string(last) + " of a frame: must be within 0 to " + std::to_string(kLastChirp) +
+                     ", in order");
   }
   std::vector<int> transmitters;
   std::optional<int> profile_id;
@@ -303,7 +323,11 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
     const auto found = raw.chirps.find(chirp);
     if (found == raw.chirps.end()) {
       throw InputError(raw.values["chirp_end"].where + ": the frame uses chirp " + std::to_string(chirp) +
-                       ", which is not configured");
+                       ", which is not configured" +
+                       (raw.only_last_chirps.empty() ? ""
+                                                     : " in " + raw.only_last_chirps +
+                                                           ": mmWave Studio's XML keeps the chirps that were set last "
+                                                           "only; give the script or the JSON instead"));
     }
     if (profile_id && *profile_id != found->second.profile) {
       throw InputError(raw.profile_from + ": the frame's chirps have several profiles; a radar.yaml holds one");
@@ -359,14 +383,14 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
   demand(raw, "iq_swap", {0, 1}, "must be 0 (I first) or 1 (Q first)");
   const int lanes =
       static_cast<int>(required(raw, "lanes", "how many LVDS lanes there are (LVDSLaneConfig, laneEn or cf.json)"));
-  const bool four_lanes = lanes == 4 && among(four);
-  if (!four_lanes && !(lanes == 2 && among(two))) {
+  const bool four_lanes = *layout == CaptureLayout::kFourLane;
+  if (lanes != (four_lanes ? 4 : 2)) {
     throw InputError(raw.values["lanes"].where + ": " + std::to_string(lanes) + " LVDS lanes of an " + raw.device +
                      ": known are four of xWR1243, 1443 and 2243, and two of the others");
   }
   demand(raw, "interleave", {four_lanes ? 0 : 1},
          std::string("samples of this device must be ") + (four_lanes ? "interleaved (0)" : "non-interleaved (1)"));
-  radar.layout = four_lanes ? CaptureLayout::kFourLane : CaptureLayout::kTwoLane;
+  radar.layout = *layout;
   if (raw.values.count("iq_swap")) {
     radar.iq_order = raw.values["iq_swap"].value != 0 ? IqOrder::kQi : IqOrder::kIq;
   } else {

@@ -2,24 +2,24 @@
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <set>
 #include <sstream>
 #include <vector>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "raw_settings.h"
+#include "text_file.h"
 
 namespace mmradartwin {
 namespace {
 
-/// Numbers, names of numbers, + - * / and parentheses.
+/// Numbers, names of numbers, + - * / and parentheses. No value where it takes more than kSteps or nests deeper than
+/// kDeepest: names of names grow exponentially.
 class Arithmetic {
  public:
-  Arithmetic(const std::string& text, const std::map<std::string, std::string>& names, int depth = 0)
-      : text_(text), names_(names), depth_(depth) {}
+  Arithmetic(const std::string& text, const std::map<std::string, std::string>& names)
+      : Arithmetic(text, names, own_steps_, 0) {}
   std::optional<double> value() {
     const auto result = sum();
     skip();
@@ -59,12 +59,17 @@ class Arithmetic {
     return left;
   }
   std::optional<double> atom() {
+    if (depth_ > kDeepest || ++steps_ > kSteps) return std::nullopt;
     if (take('-')) {
+      ++depth_;
       const auto value = atom();
+      --depth_;
       return value ? std::optional(-*value) : std::nullopt;
     }
     if (take('(')) {
+      ++depth_;
       const auto value = sum();
+      --depth_;
       return value && take(')') ? value : std::nullopt;
     }
     skip();
@@ -83,12 +88,19 @@ class Arithmetic {
       name += text_[at_++];
     }
     const auto known = names_.find(name);
-    if (known == names_.end() || depth_ > 20) return std::nullopt;
-    return Arithmetic(known->second, names_, depth_ + 1).value();
+    if (known == names_.end()) return std::nullopt;
+    return Arithmetic(known->second, names_, steps_, depth_ + 1).value();
   }
+
+  static constexpr int kDeepest = 100, kSteps = 10000;
+
+  Arithmetic(const std::string& text, const std::map<std::string, std::string>& names, int& steps, int depth)
+      : text_(text), names_(names), steps_(steps), depth_(depth) {}
 
   const std::string& text_;
   const std::map<std::string, std::string>& names_;
+  int own_steps_ = 0;
+  int& steps_;
   int depth_;
   std::size_t at_ = 0;
 };
@@ -128,9 +140,7 @@ struct Call {
 class Script {
  public:
   explicit Script(const std::string& file) : file_(file) {
-    std::ifstream in(file, std::ios::binary);
-    if (!in) throw InputError(file + ": cannot be read; give a Lua script that exists");
-    text_ = withoutComments({std::istreambuf_iterator<char>(in), {}});
+    text_ = withoutComments(readTextFile(file, "give a Lua script that exists"));
     findNames();
     findCalls();
   }
@@ -153,12 +163,8 @@ class Script {
     return *value;
   }
   int integer(const Call& call, std::size_t argument) const {
-    const double value = number(call, argument);
-    if (value != std::floor(value) || std::abs(value) > 4294967295.0) {
-      throw InputError(call.where + ": argument " + std::to_string(argument + 1) + " of ar1." + call.name + ", '" +
-                       call.arguments[argument] + "', must be a whole number");
-    }
-    return static_cast<int>(static_cast<long long>(value));
+    return wholeNumber(number(call, argument), call.where + ": argument " + std::to_string(argument + 1) + " of ar1." +
+                                                   call.name + ", '" + call.arguments[argument] + "'");
   }
   static void count(const Call& call, std::size_t least, std::size_t most) {
     const std::size_t n = call.arguments.size();
@@ -190,9 +196,12 @@ class Script {
   }
 
   void findCalls() {
-    for (std::size_t at = 0; (at = text_.find("ar1.", at)) != std::string::npos;) {
+    std::ptrdiff_t line = 1;
+    for (std::size_t at = 0, counted = 0; (at = text_.find("ar1.", at)) != std::string::npos;) {
       Call call;
-      const auto line = 1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+      line += std::count(text_.begin() + static_cast<std::ptrdiff_t>(counted),
+                         text_.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+      counted = at;
       call.where = file_ + ":" + std::to_string(line);
       at += 4;
       while (at < text_.size() && (std::isalnum(static_cast<unsigned char>(text_[at])) || text_[at] == '_')) {
@@ -254,9 +263,7 @@ void readProfile(const Script& script, const Call& call, RawSettings& settings) 
   profile.hpf1 = script.integer(call, 15) & 0xffff;  // the upper half carries flags
   profile.hpf2 = script.integer(call, 16) & 0xffff;
   profile.rx_gain = script.integer(call, 17);
-  const auto [known, fresh] = settings.profiles.emplace(script.integer(call, 0), profile);
-  if (!fresh) throw InputError(call.where + ": profile " + std::to_string(known->first) + " is given twice");
-  settings.profile_from = call.where;
+  settings.setProfile(script.integer(call, 0), profile, call.where);
 }
 
 void readChirps(const Script& script, const Call& call, RawSettings& settings) {
@@ -269,9 +276,7 @@ void readChirps(const Script& script, const Call& call, RawSettings& settings) {
   }
   unsigned mask = 0;
   for (std::size_t tx = 0; tx < 3; ++tx) mask |= script.integer(call, 7 + tx) ? 1u << tx : 0u;
-  for (int chirp = script.integer(call, 0); chirp <= script.integer(call, 1) && chirp < 512; ++chirp) {
-    settings.chirps[chirp] = {script.integer(call, 2), mask};
-  }
+  settings.setChirps(script.integer(call, 0), script.integer(call, 1), {script.integer(call, 2), mask}, call.where);
 }
 
 }  // namespace

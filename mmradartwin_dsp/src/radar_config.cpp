@@ -35,6 +35,7 @@ RadarConfig read(YamlMap yaml) {
   radar.frame_period_s = yaml.number("frame_period_s", 1e-5, 1000);
   radar.tx_position_m = positions(yaml, "tx_position_m");
   radar.rx_position_m = positions(yaml, "rx_position_m");
+  radar.layout = captureLayoutOf(radar.device).value_or(CaptureLayout::kFourLane);
   if (yaml.has("layout")) {
     radar.layout =
         yaml.choice("layout", {"4lane", "2lane"}) == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
@@ -105,6 +106,18 @@ void writeIntegers(std::ostream& out, const std::vector<int>& values) {
 }
 
 }  // namespace
+
+std::optional<CaptureLayout> captureLayoutOf(const std::string& device) {
+  const std::size_t digit = device.find_first_of("0123456789");
+  const std::string family = digit == std::string::npos ? "" : device.substr(digit, 2);
+  for (const char* four : {"12", "14", "22"}) {
+    if (family == four) return CaptureLayout::kFourLane;
+  }
+  for (const char* two : {"16", "18", "64", "68"}) {
+    if (family == two) return CaptureLayout::kTwoLane;
+  }
+  return std::nullopt;
+}
 
 RadarConfig::RadarConfig() : idle_s(kNaN), ramp_end_s(kNaN), rx_gain_db(kNaN), tx_backoff_db(kNaN) {}
 

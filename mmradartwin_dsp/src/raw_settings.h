@@ -32,13 +32,24 @@ struct RawSettings {
   std::map<std::string, Given> values;
   std::string device, device_from;
   std::string profile_from;
+  std::string only_last_chirps;  ///< a file that keeps one range of chirps only, those configured last
 
   /// Throws InputError where another file said otherwise.
   void set(const std::string& name, double value, const std::string& where);
   void setDevice(const std::string& name, const std::string& where);
+  void setProfile(int id, const Profile& profile, const std::string& where);
+  /// Chirps first to last, both within 0 to 511. What is configured later holds, as in the device.
+  void setChirps(int first, int last, const Chirp& chirp, const std::string& where);
 };
+
+/// `value` as an int; a mask of 32 bits keeps its bits. Throws InputError that begins with `what`.
+int wholeNumber(double value, const std::string& what);
 
 /// Adds what the ar1.* calls of a mmWave Studio script say.
 void readLuaSettings(const std::string& file, RawSettings& settings);
+/// Adds what mmWave Studio's XML says: <configuration>, sections <apiname_profile_cfg> and so on, in them
+/// <param name="..." value="..."/> in the units of its windows (GHz, MHz/us, us, ksps, ms). It keeps one profile and
+/// one range of chirps: those that were set last. What its data path section means is not known; it is not read.
+void readXmlSettings(const std::string& file, RawSettings& settings);
 
 }  // namespace mmradartwin

@@ -93,7 +93,8 @@ std::string resolvePath(const std::string& path, const std::string& base_file) {
                      "' is in neither ROS_PACKAGE_PATH nor CMAKE_PREFIX_PATH; source the workspace's setup.bash first");
   }
   for (const std::string& folder : folders) {
-    if (fs::exists(fs::path(folder) / rest)) return (fs::path(folder) / rest).lexically_normal().string();
+    std::error_code error;  // a name that is too long, say
+    if (fs::exists(fs::path(folder) / rest, error)) return (fs::path(folder) / rest).lexically_normal().string();
   }
   return (fs::path(folders.front()) / rest).lexically_normal().string();
 }

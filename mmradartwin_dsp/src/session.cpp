@@ -12,6 +12,7 @@
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/strict_yaml.h"
+#include "text_file.h"
 
 namespace mmradartwin {
 namespace {
@@ -87,10 +88,7 @@ std::string readRow(const std::vector<std::string>& fields, Pose& pose) {
 }
 
 void readPoses(const std::string& file, Recording& recording) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in || fs::is_directory(file)) {
-    throw InputError(file + ": poses cannot be read; put the file there or correct key poses in session.yaml");
-  }
+  std::istringstream in(readTextFile(file, "put the poses there or correct key poses in session.yaml"));
   std::string line;
   std::getline(in, line);
   if (line.compare(0, 3, "\xEF\xBB\xBF") == 0) line.erase(0, 3);  // spreadsheets put a byte order mark
@@ -200,8 +198,9 @@ void excludeDuplicates(Recording& recording) {
 }
 
 Recording openSession(const std::string& path, const SessionOptions& options) {
-  const fs::path file = fs::is_directory(path) ? fs::path(path) / "session.yaml" : fs::path(path);
-  if (!fs::exists(file)) {
+  std::error_code error;
+  const fs::path file = fs::is_directory(path, error) ? fs::path(path) / "session.yaml" : fs::path(path);
+  if (!fs::exists(file, error)) {
     throw InputError(file.string() +
                      ": no such session; give a folder that holds a session.yaml (an unfinished recording has none)");
   }

@@ -1,7 +1,5 @@
 #include "mmradartwin_dsp/session_files.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -12,6 +10,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/session.h"
+#include "yaml_document.h"
 
 namespace mmradartwin {
 namespace {
@@ -114,9 +113,9 @@ const std::string kCapturesInside = "captures/{pose}.bin";
 
 std::string capturesKey(const std::string& session_yaml) {
   try {
-    const YAML::Node yaml = YAML::Load(session_yaml);
+    const YAML::Node yaml = parseYamlDocument(session_yaml, "session.yaml");
     if (yaml.IsMap() && yaml["captures"] && yaml["captures"].IsScalar()) return yaml["captures"].Scalar();
-  } catch (const YAML::Exception&) {  // whoever reads the session says so
+  } catch (const InputError&) {  // whoever reads the session says so
   }
   return "";
 }
@@ -134,11 +133,7 @@ References findReferences(const std::string& name, const std::string& bytes) {
                  [](char c) { return static_cast<char>(std::tolower(c)); });
   if (extension == ".yaml" || extension == ".yml") {
     found.required = found.yaml = true;
-    try {
-      collectYaml(YAML::Load(bytes), found.names);
-    } catch (const YAML::Exception& error) {
-      throw InputError(name + ": line " + std::to_string(error.mark.line + 1) + ": not valid YAML (" + error.msg + ")");
-    }
+    collectYaml(parseYamlDocument(bytes, name), found.names);
   } else if (extension == ".obj") {
     collectLines(bytes, {"mtllib "}, false, found.names);
   } else if (extension == ".mtl") {
@@ -148,7 +143,8 @@ References findReferences(const std::string& name, const std::string& bytes) {
     for (const char* list : {"buffers", "images"}) {
       if (!gltf.is_object() || !gltf.contains(list)) continue;
       for (const nlohmann::json& entry : gltf.at(list)) {
-        const std::string uri = entry.is_object() ? entry.value("uri", "") : "";
+        const bool named = entry.is_object() && entry.contains("uri") && entry.at("uri").is_string();
+        const std::string uri = named ? entry.at("uri").get<std::string>() : "";
         if (!uri.empty() && uri.compare(0, 5, "data:") != 0) found.names.push_back(uri);
       }
     }
@@ -189,7 +185,8 @@ std::vector<StoredFile> gatherSessionFiles(const std::string& session_file) {
     const References references = findReferences(from.string(), files.back().bytes);
     for (const std::string& reference : references.names) {
       const Place target = place.follow(reference);
-      if (!fs::is_regular_file(target.resolve(directory))) {
+      std::error_code error;  // a name that is too long is none
+      if (!fs::is_regular_file(target.resolve(directory), error)) {
         if (!references.required) continue;
         throw InputError(from.string() + ": names '" + reference +
                          "', which does not exist; correct the name or put the file there");

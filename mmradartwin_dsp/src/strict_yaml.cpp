@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <set>
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "text_file.h"
+#include "yaml_document.h"
 
 namespace mmradartwin {
 
@@ -114,28 +114,14 @@ void checkKeys(const YAML::Node& node, const std::string& file, const std::strin
 YamlMap::YamlMap(std::shared_ptr<State> state) : state_(std::move(state)) {}
 
 YamlMap YamlMap::load(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in || std::filesystem::is_directory(file)) {
-    throw InputError(file + ": cannot be read; check that the file exists and is readable");
-  }
-  std::ostringstream text;
-  text << in.rdbuf();
-  return parse(text.str(), file);
+  return parse(readTextFile(file, "check that the file exists and is readable"), file);
 }
 
 YamlMap YamlMap::parse(const std::string& text, const std::string& name) {
   auto state = std::make_shared<State>();
   state->file = name;
-  try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.empty() || documents.front().IsNull()) {
-      throw InputError(name + ": the file is empty; expected a YAML mapping");
-    }
-    if (documents.size() > 1) throw InputError(name + ": holds several YAML documents; expected one mapping");
-    state->node = documents.front();
-  } catch (const YAML::Exception& error) {
-    throw InputError(name + ": line " + std::to_string(error.mark.line + 1) + ": not valid YAML (" + error.msg + ")");
-  }
+  state->node = parseYamlDocument(text, name);
+  if (state->node.IsNull()) throw InputError(name + ": the file is empty; expected a YAML mapping");
   if (!state->node.IsMap()) throw InputError(name + ": expected a YAML mapping, found " + quote(state->node));
   checkKeys(state->node, name, "");
   return YamlMap(std::move(state));

@@ -163,6 +163,24 @@ TEST(Capture, PartsAreReadAsOne) {
   for (int i = 0; i < 5; ++i) EXPECT_EQ(parts.bytes(i), whole.bytes(i)) << i;
 }
 
+/// Part 10 follows part 9, not part 1.
+TEST(Capture, ManyPartsKeepTheirOrder) {
+  const TestFolder folder;
+  const RadarConfig radar = paperRadar();
+  std::string bytes(13 * radar.bytes_per_frame(), '\0');
+  std::mt19937 random(6);
+  for (char& byte : bytes) byte = static_cast<char>(random());
+  std::ofstream(folder / "whole.bin", std::ios::binary) << bytes;
+  for (std::size_t part = 0; part < 13; ++part) {
+    std::ofstream(folder / ("adc_data_Raw_" + std::to_string(part) + ".bin"), std::ios::binary)
+        << bytes.substr(part * 2000, part == 12 ? std::string::npos : 2000);
+  }
+  EXPECT_EQ(captureParts(folder / "adc_data_Raw_0.bin").size(), 13u);
+  const CaptureReader parts(radar, folder / "adc_data_Raw_0.bin"), whole(radar, folder / "whole.bin");
+  ASSERT_EQ(parts.frames(), 13);
+  for (int i = 0; i < 13; ++i) EXPECT_EQ(parts.bytes(i), whole.bytes(i)) << i;
+}
+
 TEST(Capture, MissingPartIsNamed) {
   const TestFolder folder;
   const RadarConfig radar = paperRadar();

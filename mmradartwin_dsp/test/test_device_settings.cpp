@@ -117,6 +117,135 @@ TEST(ImportSettings, StudioJsonWithItsSetup) {
   EXPECT_EQ(toYaml(importSettings({folder / "a.mmwave.json"}, "AWR1843").radar), toYaml(radar));
 }
 
+std::string section(const std::string& name, const std::vector<std::pair<std::string, std::string>>& values) {
+  std::string text = "\t<apiname_" + name + "_cfg>\n";
+  for (const auto& [key, value] : values) {
+    text += "\t\t<param name=\"" + key + "\" value=\"" + value + "\" />\n";
+  }
+  return text + "\t</apiname_" + name + "_cfg>\n";
+}
+
+/// A file as mmWave Studio's Save() writes it, in the units of its windows.
+std::string studioXml(const std::string& last_chirp = "0", const std::string& second_tx = "0") {
+  return "\xEF\xBB\xBF<?xml version=\"1.0\" encoding=\"utf-8\" ?>\n<configuration>\n" +
+         section("channel", {{"rx1En", "1"},
+                             {"tx0En", "1"},
+                             {"tx1En", "0"},
+                             {"tx2En", "0"},
+                             {"rx0En", "1"},
+                             {"rx2En", "1"},
+                             {"rx3En", "1"},
+                             {"cascadeMode", "0"}}) +
+         section("adc", {{"bitsVal", "2"}, {"formatVal", "1"}, {"IQSwap", "1"}}) +
+         section("lvdslane", {{"laneFormat", "0"},
+                              {"lane1En", "1"},
+                              {"lane2En", "1"},
+                              {"lane3En", "1"},
+                              {"lane4En", "1"},
+                              {"lvdsMsbFirst", "1"}}) +
+         section("profile", {{"pprofileId", "0"},
+                             {"startFreqConst", "77.000000"},
+                             {"idleTimeConst", "100.00"},
+                             {"adcStartTimeConst", "6.00"},
+                             {"rampEndTime", "60.00"},
+                             {"tx1OutPowerBackoffCode", "3"},
+                             {"tx2OutPowerBackoffCode", "0"},
+                             {"tx1PhaseShifter", "0.000"},
+                             {"freqSlopeConst", "29,982"},
+                             {"txStartTime", "0.00"},
+                             {"numAdcSamples", "256"},
+                             {"digOutSampleRate", "10000"},
+                             {"hpfCornerFreq1", "0"},
+                             {"hpfCornerFreq2", "3"},
+                             {"rxGain", "30"}}) +
+         section("chirp", {{"chirpStartIdx", "0"},
+                           {"chirpEndIdx", "0"},
+                           {"cprofileId", "0"},
+                           {"startFreqVar", "0.000"},
+                           {"freqSlopeVar", "0.000"},
+                           {"idleTimeVar", "0.00"},
+                           {"adcStartTimeVar", "0.00"},
+                           {"tx1Enable", "1"},
+                           {"tx2Enable", second_tx},
+                           {"tx3Enable", "0"}}) +
+         section("frame", {{"fchirpStartIdx", "0"},
+                           {"fchirpEndIdx", last_chirp},
+                           {"frameCount", "8"},
+                           {"loopCount", "128"},
+                           {"periodicity", "40.000000"},
+                           {"triggerDelay", "0"}}) +
+         "</configuration>\n";
+}
+
+TEST(ImportSettings, StudioXml) {
+  const TestFolder folder;
+  write(folder / "a.xml", studioXml());
+  const RadarConfig radar = importSettings({folder / "a.xml"}, "xwr1443").radar;
+  EXPECT_EQ(radar.carrier_hz, 77e9);
+  EXPECT_NEAR(radar.slope_hz_per_s, 29.982e12, 1);
+  EXPECT_EQ(radar.idle_s, 100e-6);
+  EXPECT_EQ(radar.adc_start_s, 6e-6);
+  EXPECT_EQ(radar.ramp_end_s, 60e-6);
+  EXPECT_EQ(radar.samples_per_chirp, 256);
+  EXPECT_EQ(radar.sample_rate_hz, 10e6);
+  EXPECT_EQ(radar.loops_per_frame, 128);
+  EXPECT_EQ(radar.frame_period_s, 0.04);
+  EXPECT_EQ(radar.rx_gain_db, 30);
+  EXPECT_EQ(radar.tx_backoff_db, 3);
+  EXPECT_EQ(radar.if_highpass_hz, (std::vector<double>{175e3, 2.8e6}));
+  EXPECT_EQ(radar.tx_enable, (std::vector<std::vector<int>>{{0}}));
+  EXPECT_EQ(radar.layout, CaptureLayout::kFourLane);
+  EXPECT_EQ(radar.iq_order, IqOrder::kQi);
+  // The card's file may come beside it, and must not contradict it.
+  write(folder / "cf.json", R"({"DCA1000Config": {"dataLoggingMode": "raw", "lvdsMode": 2, "dataFormatMode": 3}})");
+  EXPECT_TRUE(saysInOneLine(inputError([&] {
+                              importSettings({folder / "a.xml", folder / "cf.json"}, "xwr1443");
+                            }),
+                            "lanes is 2", "says 4"));
+}
+
+TEST(ImportSettings, StudioXmlKeepsTheLastChirpsOnly) {
+  const TestFolder folder;
+  const auto refusal = [&](const std::string& text) {
+    write(folder / "a.xml", text);
+    return inputError([&] { importSettings({folder / "a.xml"}, "awr2243"); });
+  };
+  EXPECT_TRUE(saysInOneLine(refusal(studioXml("1")), "chirp 1", "not configured", "a.xml", "set last"));
+  EXPECT_TRUE(saysInOneLine(refusal(studioXml("0", "1")), "mask 3"));
+  EXPECT_TRUE(saysInOneLine(refusal("<configuration></configuration>"), "neither profile"));
+  EXPECT_TRUE(saysInOneLine(refusal("<other/>"), "<configuration>"));
+  EXPECT_TRUE(saysInOneLine(refusal("<configuration>"), "is no XML"));
+}
+
+/// Files that would once have kept the reader busy for ever, or used up its stack.
+TEST(ImportSettings, ComesToAnEndWithHostileFiles) {
+  const TestFolder folder;
+  std::string names = "N0 = 1\n";
+  for (int i = 1; i < 60; ++i) {
+    const std::string before = "N" + std::to_string(i - 1);
+    names += "N" + std::to_string(i) + " = " + before + " + " + before + " + " + before + "\n";
+  }
+  write(folder / "a.lua", names + "ar1.FrameConfig(0, 0, 8, N59, 40, 0, 1)\n");
+  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "a.lua"}); }), "is no number"));
+  write(folder / "b.lua", "ar1.FrameConfig(0, 0, 8, " + std::string(100000, '(') + "1, 40, 0, 1)\n");
+  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "b.lua"}); }), "b.lua"));
+  write(folder / "c.lua", "ar1.ChirpConfig(-2147483648, 4294967295, 0, 0, 0, 0, 0, 1, 0, 0)\n");
+  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "c.lua"}); }), "0 to 511"));
+  write(folder / "a.json", std::string(100000, '[') + std::string(100000, ']'));
+  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "a.json"}); }), "nested"));
+  // Three files that name each other in a ring.
+  for (const char* name : {"x", "y", "z"}) {
+    const std::string next = name == std::string("x") ? "y" : name == std::string("y") ? "z" : "x";
+    write(folder / (name + std::string(".json")), "{\"configUsed\": \"" + next + ".json\"}");
+  }
+  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "x.json"}); }), "device"));
+  EXPECT_TRUE(saysInOneLine(inputError([&] {
+                              write(folder / "d.json", mmwaveJson("\\u001b[31m"));
+                              importSettings({folder / "d.json"}, "awr1843");
+                            }),
+                            "laneEn"));
+}
+
 TEST(ImportSettings, RefusesWhatItDoesNotKnow) {
   const TestFolder folder;
   const auto refusal = [&](const std::string& name, const std::string& text) {
@@ -146,7 +275,7 @@ TEST(ImportSettings, RefusesWhatItDoesNotKnow) {
   EXPECT_TRUE(saysInOneLine(refusal("b.json", mmwaveJson("0x3", "0x4", "advancedFrameChirp")), "advancedFrameChirp"));
   EXPECT_TRUE(saysInOneLine(refusal("b.json", "{\"other\": 1}"), "none of the known JSON files"));
   EXPECT_TRUE(saysInOneLine(refusal("b.json", "no json"), "is no JSON"));
-  EXPECT_TRUE(saysInOneLine(refusal("b.xml", "<a/>"), "XML"));
+  EXPECT_TRUE(saysInOneLine(refusal("b.ini", "[a]"), ".xml"));
   write(folder / "a.mmwave.json", mmwaveJson());
   EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "a.mmwave.json"}); }), "which device"));
   write(folder / "cf.json", R"({"DCA1000Config": {"dataLoggingMode": "raw", "lvdsMode": 1, "dataFormatMode": 3}})");

@@ -120,5 +120,48 @@ TEST(RadarYaml, StrictAboutWhatCannotBe) {
                             "even"));
 }
 
+TEST(RadarYaml, LayoutIsTheDevicesWhereTheFileIsSilent) {
+  const auto layout = [](const std::string& device, const std::string& more = "") {
+    std::string yaml = paperRadarYaml();
+    return parseRadarConfig(yaml.replace(yaml.find("awr2243"), 7, device) + more, "radar.yaml").layout;
+  };
+  for (const char* device : {"awr2243", "AWR1243", "xwr1443", "something"}) {
+    EXPECT_EQ(layout(device), CaptureLayout::kFourLane) << device;
+  }
+  for (const char* device : {"awr1642", "iwr1843", "IWR6843AOP", "xwr6443"}) {
+    EXPECT_EQ(layout(device), CaptureLayout::kTwoLane) << device;
+  }
+  EXPECT_EQ(layout("iwr1843", "layout: 4lane\n"), CaptureLayout::kFourLane);
+  EXPECT_EQ(layout("awr2243", "layout: 2lane\n"), CaptureLayout::kTwoLane);
+}
+
+/// What yaml-cpp never comes back from, or what never ends when it is walked.
+TEST(StrictYaml, ComesToAnEndWithHostileText) {
+  const auto refusal = [](const std::string& text) { return inputError([&] { YamlMap::parse(text, "a.yaml"); }); };
+  EXPECT_FALSE(refusal(", a: 1").empty());
+  EXPECT_FALSE(refusal(",").empty());
+  EXPECT_FALSE(refusal("a: 1\n]\n,").empty());
+  EXPECT_FALSE(refusal(std::string(100000, '[')).empty());
+  EXPECT_TRUE(saysInOneLine(refusal("a: &x [1, *x]"), "line 1", "alias"));
+  std::string grows = "a0: &a0 [1, 1]\n";
+  for (int i = 1; i < 40; ++i) {
+    const std::string before = "*a" + std::to_string(i - 1);
+    grows += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [" + before + ", " + before + "]\n";
+  }
+  EXPECT_TRUE(saysInOneLine(refusal(grows), "aliases"));
+  YamlMap shared = YamlMap::parse("a: &x [1, 2]\nb: *x\n", "a.yaml");
+  EXPECT_EQ(shared.numbers("b", 0, 9), (std::vector<double>{1, 2}));
+}
+
+TEST(StrictYaml, InputErrorIsOneLineWithoutControlCharacters) {
+  EXPECT_STREQ(InputError("a\nb\tc\x1b[31m\x7f").what(), "a b c [31m ");
+  EXPECT_STREQ(InputError("Büro \xff\xc3").what(), "Büro ??");
+  EXPECT_STREQ(InputError("\xc2\x9b"
+                          "1m")
+                   .what(),
+               " 1m");
+  EXPECT_LT(std::string(InputError(std::string(1 << 20, 'x')).what()).size(), 5000u);
+}
+
 }  // namespace
 }  // namespace mmradartwin

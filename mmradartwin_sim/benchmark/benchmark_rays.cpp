@@ -11,6 +11,7 @@
 #include <fstream>
 #include <random>
 
+#include "mmradartwin_sim/traced_session.h"
 #include "mmradartwin_sim/twin.h"
 #include "mmradartwin_sim/weight_basis.h"
 
@@ -111,6 +112,7 @@ struct Setting {
   BareEmbree bare{scene};
   std::vector<Eigen::Vector3d> direction;  // a fan of 120 by 30 deg, scan order
   std::vector<Eigen::Vector3d> target;     // what it meets, shuffled: ends of occlusion rays
+  std::vector<Eigen::Vector3d> scan;       // the same, in scan order
   Eigen::Vector3d radar{3.0, 2.6, 1.0};
   Setting() {
     if (std::getenv("MMRADARTWIN_SCENE")) {
@@ -127,6 +129,7 @@ struct Setting {
     for (const auto& d : direction) {
       if (const auto hit = rays.firstHit(radar, d, 1000)) target.push_back(hit->point);
     }
+    scan = target;
     std::shuffle(target.begin(), target.end(), std::mt19937(1));
   }
 };
@@ -190,6 +193,32 @@ void occlusionOurs(benchmark::State& state) {
   report(state, s.target.size());
 }
 BENCHMARK(occlusionOurs)->Unit(benchmark::kMillisecond);
+
+/// The same rays in the order of the facets' points, as the scatterers of a pose are asked for: packets of eight.
+void occlusionInOrderBare(benchmark::State& state) {
+  const Setting& s = setting();
+  std::vector<RTCRay> prepared;
+  for (const auto& t : s.scan) {
+    const Eigen::Vector3d way = t - s.radar, d = way.normalized();
+    prepared.push_back(s.bare.ray(s.radar + 1e-3 * d, d, way.norm() - 2e-3));
+  }
+  for (auto _ : state) {
+    for (const RTCRay& r : prepared) {
+      RTCRay q = r;
+      benchmark::DoNotOptimize(s.bare.occluded(q));
+    }
+  }
+  report(state, prepared.size());
+}
+BENCHMARK(occlusionInOrderBare)->Unit(benchmark::kMillisecond);
+
+void occlusionInOrderOurs(benchmark::State& state) {
+  const Setting& s = setting();
+  const std::vector<double> gap(s.scan.size(), 1e-3);
+  for (auto _ : state) benchmark::DoNotOptimize(s.rays.visible(s.radar, s.scan, gap).data());
+  report(state, s.scan.size());
+}
+BENCHMARK(occlusionInOrderOurs)->Unit(benchmark::kMillisecond);
 
 /// Cosine-distributed bounces, six to a ray: the limit that a full pose is held against.
 void bareBounceRays(benchmark::State& state) {
@@ -271,6 +300,16 @@ void fullPoseWeighAgain(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(twin.weigh(pose(0), traced).grid.x.data());
 }
 BENCHMARK(fullPoseWeighAgain)->Unit(benchmark::kMillisecond);
+
+void fullPoseWeighCondensed(benchmark::State& state) {
+  const Twin& twin = fullTwin();
+  const CondensedTrace traced(twin.radar(), twin.trace(pose(0)));
+  for (auto _ : state) benchmark::DoNotOptimize(twin.weigh(pose(0), traced).grid.x.data());
+  state.counters["nodes"] = static_cast<double>(traced.nodes().size());
+  state.counters["records"] = static_cast<double>(traced.records().size());
+  state.counters["kB"] = static_cast<double>(traced.bytes()) / 1e3;
+}
+BENCHMARK(fullPoseWeighCondensed)->Unit(benchmark::kMicrosecond);
 
 void fullPoseWeighByGroups(benchmark::State& state) {
   const Twin& twin = fullTwin();

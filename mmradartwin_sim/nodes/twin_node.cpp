@@ -3,11 +3,13 @@
 #include <ros/ros.h>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/ros/master_watch.h"
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "twin");
   try {
     const mmradartwin::TwinNode node{ros::NodeHandle(), ros::NodeHandle("~")};
+    const mmradartwin::MasterWatch master_watch;
     ros::spin();
   } catch (const mmradartwin::InputError& error) {
     ROS_FATAL("%s", error.what());

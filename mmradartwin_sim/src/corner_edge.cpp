@@ -86,7 +86,7 @@ std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
   };
   std::vector<Box> boxes;
   for (const Facet& f : scene.facets) {
-    if (!f.present || !takes_part(f)) continue;
+    if (!f.present || f.curved >= 0 || !takes_part(f)) continue;
     Box b{Eigen::AlignedBox3d(), f.id};
     for (double x : {0.0, f.size1_m}) {
       for (double y : {0.0, f.size2_m}) b.box.extend(f.origin + x * f.e1 + y * f.e2);

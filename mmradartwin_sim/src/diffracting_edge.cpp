@@ -54,7 +54,8 @@ void addPieces(const Scene& scene, const Actor& actor, Pieces& pieces) {
         std::swap(first, last);
       }
       const bool rim = end - i == 1;
-      if ((rim || a != b) && scene.facets[a].reflects && scene.facets[b].reflects) {
+      const bool chords = scene.facets[a].curved >= 0 && scene.facets[a].curved == scene.facets[b].curved;
+      if ((rim || (a != b && !chords)) && scene.facets[a].reflects && scene.facets[b].reflects) {
         pieces[{a, b}].push_back({actor.vertices[first.u], actor.vertices[first.v], actor.vertices[first.third],
                                   actor.vertices[last.third]});
       }

@@ -6,6 +6,7 @@
 #include <set>
 #include <unordered_map>
 
+#include "curved_surface.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/scene.h"
 #include "vertex_weld.h"
@@ -276,6 +277,7 @@ std::vector<std::vector<int>> growRegions(const ActorMesh& mesh, const FacetTole
 
 void rebuildFacets(Scene& scene) {
   scene.facets.clear();
+  scene.curved.clear();
   for (std::size_t a = 0; a < scene.actors.size(); ++a) {
     Actor& actor = scene.actors[a];
     actor.facets.clear();
@@ -296,6 +298,7 @@ void rebuildFacets(Scene& scene) {
     if (actor.facets.empty()) {
       throw InputError(scene.file + ": actor " + actor.name + " has no triangle with an area; remove or repair it");
     }
+    findCurvedSurfaces(scene, static_cast<int>(a), mesh.weld);
   }
 }
 
@@ -313,6 +316,11 @@ void moveActor(Scene& scene, int index, const Eigen::Isometry3d& T) {
     f.e2 = T.linear() * f.e2;
     f.normal = T.linear() * f.normal;
     f.reflects = std::abs(f.normal.z()) < std::sqrt(0.5);
+  }
+  for (CurvedSurface& s : scene.curved) {
+    if (s.actor != index) continue;
+    s.center = T * s.center;
+    s.axis = T.linear() * s.axis;
   }
 }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
+#include <map>
 
 namespace mmradartwin {
 namespace {
@@ -21,7 +21,7 @@ double legGap(const Facet& facet, const Eigen::Vector3d& direction) {
 
 ImageSearch::ImageSearch(const Scene& scene, bool all_orientations) : scene_(scene) {
   for (const Facet& f : scene.facets) {
-    if (!f.present || !(f.reflects || all_orientations)) continue;
+    if (!f.present || f.curved >= 0 || !(f.reflects || all_orientations)) continue;
     reflectors_.push_back(f.id);
     Corners c;
     c.point << f.origin, f.origin + f.size1_m * f.e1, f.origin + f.size1_m * f.e1 + f.size2_m * f.e2,
@@ -157,10 +157,10 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
   return unique;
 }
 
-std::vector<std::vector<int>> ImageSearch::seeds(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
-                                                 int rays_launched, const Eigen::Matrix3d& R_map_radar,
-                                                 double max_elevation_rad) const {
-  std::set<std::vector<int>> sequences;
+std::vector<ImageSearch::Seed> ImageSearch::seeds(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
+                                                  int rays_launched, const Eigen::Matrix3d& R_map_radar,
+                                                  double max_elevation_rad) const {
+  std::map<std::vector<int>, bool> sequences;  // and whether an even ray met it
   const double golden = 0.6180339887498949;
   for (int i = 0; i < rays_launched; ++i) {
     const double azimuth = M_PI * ((i + 0.5) / rays_launched - 0.5);
@@ -174,16 +174,19 @@ std::vector<std::vector<int>> ImageSearch::seeds(const Eigen::Vector3d& p, const
       const auto hit = rays.firstHit(from, d, limits.max_length_m - length);
       if (!hit || hit->facet < 0) break;
       const Facet& f = scene_.facets[hit->facet];
-      if (!f.reflects || !f.present) break;
+      if (!f.reflects || !f.present || f.curved >= 0) break;
       sequence.push_back(f.id);
-      sequences.insert(sequence);
+      bool& even = sequences[sequence];
+      even = even || i % 2 == 0;
       length += hit->distance_m;
       d -= 2 * d.dot(f.normal) * f.normal;
       const double side = f.planeDistance(from) > 0 ? 1.0 : -1.0;
       from = hit->point + (1e-4 + f.flatness_m) * side * f.normal;
     }
   }
-  return {sequences.begin(), sequences.end()};
+  std::vector<Seed> found;
+  for (const auto& [facets, even] : sequences) found.push_back({facets, even});
+  return found;
 }
 
 }  // namespace mmradartwin

@@ -43,10 +43,13 @@ class ImageSearch {
   /// The path of one facet sequence, where it exists.
   bool solve(const Eigen::Vector3d& p, const std::vector<int>& sequence, const RayCaster& rays, const Limits& limits,
              ImagePath& path) const;
+  struct Seed {
+    std::vector<int> facets;
+    bool by_half;  ///< every second ray would have been enough to find it
+  };
   /// Facet sequences that launched rays meet, up to max_order: seeds where there are too many facets to try all.
-  std::vector<std::vector<int>> seeds(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
-                                      int rays_launched, const Eigen::Matrix3d& R_map_radar,
-                                      double max_elevation_rad) const;
+  std::vector<Seed> seeds(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits, int rays_launched,
+                          const Eigen::Matrix3d& R_map_radar, double max_elevation_rad) const;
 
   /// Highest order for which all sequences can be tried at this number of facets.
   int exhaustiveOrder() const;

@@ -13,6 +13,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/scene.h"
+#include "ply_check.h"
 
 namespace mmradartwin {
 namespace {
@@ -183,7 +184,9 @@ class Collector {
 }  // namespace
 
 std::vector<Actor> loadMesh(const std::string& file) {
-  if (!std::filesystem::is_regular_file(file)) throw InputError(file + ": no such mesh file");
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) throw InputError(file + ": no such mesh file");
+  if (lowerExtension(file) == ".ply") checkPly(file);
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_LINE | aiPrimitiveType_POINT);
   const aiScene* scene = importer.ReadFile(file, aiProcess_Triangulate | aiProcess_SortByPType);

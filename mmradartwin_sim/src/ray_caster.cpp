@@ -36,10 +36,8 @@ constexpr double kFarthest_m = 1e9;
 /// False where Embree would abort (Debian builds it with assertions on rays) or nothing can be met. NaN fails every
 /// comparison.
 bool castable(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double length) {
-  const auto within = [](const Eigen::Vector3d& v, double limit) {
-    return std::abs(v.x()) < limit && std::abs(v.y()) < limit && std::abs(v.z()) < limit;
-  };
-  return within(origin, kFarthest_m) && within(direction, 1.001) && length > 0 && length < 2 * kFarthest_m;
+  return origin.squaredNorm() < kFarthest_m * kFarthest_m && direction.squaredNorm() < 1.001 && length > 0 &&
+         length < 2 * kFarthest_m;
 }
 
 /// Whole vectors are stored, as Embree loads them: single numbers would have to wait for each other.
@@ -133,6 +131,52 @@ bool RayCaster::visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, doub
   return !embree_->veil || passesVeils(a, b, gap_m);
 }
 
+std::vector<char> RayCaster::visible(const Eigen::Vector3d& a, const std::vector<Eigen::Vector3d>& points,
+                                     const std::vector<double>& gap_m) const {
+  if (points.size() != gap_m.size()) throw std::invalid_argument("RayCaster::visible: one gap per point");
+  constexpr std::size_t kPacket = 8;
+  std::vector<char> free(points.size(), 1);
+  const Eigen::Vector3d from = a - embree_->center;
+  alignas(32) int valid[kPacket];
+  RTCRay8 rays;
+  for (std::size_t first = 0; first < points.size(); first += kPacket) {
+    const std::size_t count = std::min(kPacket, points.size() - first);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      valid[i] = 0;
+      if (i >= count) continue;
+      const Eigen::Vector3d d = points[first + i] - a;
+      const double length = d.norm(), gap = gap_m[first + i], reach = length - 2 * gap;
+      if (reach <= 0) continue;  // nothing has room between them
+      const Eigen::Vector3d unit = (1 / length) * d, origin = from + gap * unit;
+      if (!castable(origin, unit, reach)) {
+        free[first + i] = 0;
+        continue;
+      }
+      valid[i] = -1;
+      rays.org_x[i] = static_cast<float>(origin.x());
+      rays.org_y[i] = static_cast<float>(origin.y());
+      rays.org_z[i] = static_cast<float>(origin.z());
+      rays.dir_x[i] = static_cast<float>(unit.x());
+      rays.dir_y[i] = static_cast<float>(unit.y());
+      rays.dir_z[i] = static_cast<float>(unit.z());
+      rays.tnear[i] = 0;
+      rays.tfar[i] = static_cast<float>(reach);
+      rays.time[i] = 0;
+      rays.mask[i] = static_cast<unsigned>(-1);
+      rays.id[i] = rays.flags[i] = 0;
+    }
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    rtcOccluded8(valid, embree_->scene, &context, &rays);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!valid[i]) continue;
+      free[first + i] = !(rays.tfar[i] < 0) && (!embree_->veil || passesVeils(a, points[first + i], gap_m[first + i]));
+    }
+  }
+  return free;
+}
+
 bool RayCaster::passesVeils(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const {
   const Eigen::Vector3d unit = (b - a).normalized();
   const auto ends_on = [&](const std::vector<Facet>& facets) {
@@ -165,9 +209,11 @@ bool RayCaster::passesVeils(const Eigen::Vector3d& a, const Eigen::Vector3d& b, 
 
 std::optional<RayCaster::Hit> RayCaster::firstHit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                                   double max_m) const {
-  const double norm = direction.norm();
-  if (!(norm > 0)) return std::nullopt;
-  const Eigen::Vector3d unit = (1 / norm) * direction, from = origin - embree_->center;
+  const double square = direction.squaredNorm();
+  if (!(square > 0)) return std::nullopt;
+  const Eigen::Vector3d from = origin - embree_->center;
+  Eigen::Vector3d unit = direction;
+  if (std::abs(square - 1) > 1e-14) unit /= std::sqrt(square);
   // Beyond the scene there is nothing, and Embree wants finite rays.
   const double length = std::min(max_m, from.lpNorm<1>() + embree_->radius_m + 1);
   if (!castable(from, unit, length)) return std::nullopt;

@@ -112,7 +112,6 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
 
   Twin twin(loadTwin(twin_file, recording.scene_file, recording.radar), options.seed);
   SimulateResult result;
-  result.notes = twin.notes();
   result.problems = recording.problems;
   std::vector<Eigen::Isometry3d> poses;
   for (const Pose& p : recording.poses) poses.push_back(p.T_map_radar);
@@ -208,6 +207,7 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
     }
   }
   writer.finish();
+  result.notes = twin.notes();
   std::ofstream resolved(fs::path(options.output) / "twin.resolved.yaml");
   resolved << "# The twin that made this session, with all its parameters.\n" << twin.description().toYaml();
   if (!resolved) throw std::runtime_error(options.output + "/twin.resolved.yaml: cannot be written");

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/traced_session.h"
 #include "twin_impl.h"
 
 namespace mmradartwin {
@@ -62,9 +63,34 @@ Twin::Twin(TwinDescription description, std::uint64_t seed) : impl_(new Impl) {
   Impl& m = *impl_;
   m.description = std::move(description);
   m.seed = seed;
-  const RadarConfig& radar = m.description.radar;
-  m.scene = loadScene(m.description.scene_file, radar.center_frequency_hz());
-  m.rays = std::make_unique<RayCaster>(m.scene);
+  m.scene = loadScene(m.description.scene_file, m.description.radar.center_frequency_hz());
+  m.rays = std::make_shared<RayCaster>(m.scene);
+  m.assemble();
+}
+
+Twin::Twin(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Twin Twin::changed(std::vector<NamedParameters> mechanisms) const {
+  auto other = std::make_unique<Impl>();
+  other->description = impl_->description;
+  other->description.mechanisms = std::move(mechanisms);
+  other->seed = impl_->seed;
+  other->scene = impl_->scene;
+  other->rays = impl_->rays;
+  other->strongest = impl_->strongest;
+  other->session_ns = impl_->session_ns;
+  other->assemble();
+  return Twin(std::move(other));
+}
+
+bool Twin::altersGeometry() const {
+  const Eigen::Isometry3d here = Eigen::Isometry3d::Identity();
+  return impl_->edited || !impl_->modelPose(here).isApprox(here, 0);
+}
+
+void Twin::Impl::assemble() {
+  Impl& m = *this;
+  const RadarConfig& radar = description.radar;
   try {
     for (const NamedParameters& named : m.description.mechanisms) {
       m.mechanisms.push_back(MechanismRegistry::instance().create(named.mechanism));
@@ -166,23 +192,72 @@ std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar) const 
   return records;
 }
 
+std::vector<PathRecord> Twin::Impl::weighted(const PoseContext& c, std::vector<PathRecord> records) const {
+  reweight(c, records, 0);
+  if (!needs_strongest) return records;
+  raise(strongest_so_far, strongestOf(c, records));
+  const std::size_t echoes = records.size();
+  for (const auto& m : mechanisms) {
+    if (m->needsStrongestAmplitude()) m->addPaths(c, records);
+  }
+  reweight(c, records, echoes);
+  return records;
+}
+
+std::vector<PathRecord> Twin::receivedPaths(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
+                                            std::int64_t stamp_ns) const {
+  PoseContext c = impl_->context(T_map_radar, stamp_ns);
+  c.receiver_gain = [this, &c](double length_m) { return impl_->toneGain(c, length_m); };
+  return impl_->filtered(c, impl_->weighted(c, std::move(traced)));
+}
+
+bool Twin::hasReceiveStage() const { return impl_->has_receive || impl_->has_distort; }
+
+std::optional<Eigen::MatrixXcd> Twin::channelMatrix(const Eigen::Isometry3d& T_map_radar,
+                                                    std::int64_t stamp_ns) const {
+  if (impl_->has_distort) return std::nullopt;
+  const PoseContext c = impl_->context(T_map_radar, stamp_ns);
+  const int channels = c.radar.channels(), samples = c.radar.samples_per_chirp;
+  const auto answer = [&](int channel, double cycles) {
+    ComplexGrid x = ComplexGrid::Zero(channels, samples);
+    for (int n = 0; channel >= 0 && n < samples; ++n) x(channel, n) = std::polar(1.0, 2 * M_PI * cycles * n / samples);
+    impl_->receive(c, x);
+    return x;
+  };
+  if (!answer(-1, 0).isZero(0)) return std::nullopt;
+  Eigen::MatrixXcd matrix(channels, channels);
+  constexpr double kCycles[] = {3.3, 17.9};  // a tone that comes back changed, or that another one changes, shows here
+  for (int k = 0; k < channels; ++k) {
+    for (double cycles : kCycles) {
+      const ComplexGrid x = answer(k, cycles);
+      if (cycles == kCycles[0]) matrix.col(k) = x.col(0);
+      for (int n = 0; n < samples; ++n) {
+        const std::complex<double> tone = std::polar(1.0, 2 * M_PI * cycles * n / samples);
+        if ((x.col(n) - matrix.col(k) * tone).norm() > 1e-9 * (1 + matrix.col(k).norm())) return std::nullopt;
+      }
+    }
+  }
+  return matrix;
+}
+
 Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                        std::int64_t stamp_ns) const {
+  return weigh(T_map_radar, std::move(traced), stamp_ns, nullptr);
+}
+
+Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, const CondensedTrace& traced,
+                       std::int64_t stamp_ns) const {
+  return weigh(T_map_radar, traced.records(), stamp_ns, &traced);
+}
+
+Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced, std::int64_t stamp_ns,
+                       const CondensedTrace* condensed) const {
   PoseContext c = impl_->context(T_map_radar, stamp_ns);
   c.receiver_gain = [this, &c](double length_m) { return impl_->toneGain(c, length_m); };
   Simulation s;
   s.stamp_ns = stamp_ns;
   s.T_map_radar = T_map_radar;
-  s.records = std::move(traced);
-  impl_->reweight(c, s.records, 0);
-  if (impl_->needs_strongest) {
-    raise(impl_->strongest_so_far, impl_->strongestOf(c, s.records));
-    const std::size_t echoes = s.records.size();
-    for (const auto& m : impl_->mechanisms) {
-      if (m->needsStrongestAmplitude()) m->addPaths(c, s.records);
-    }
-    impl_->reweight(c, s.records, echoes);
-  }
+  s.records = impl_->weighted(c, std::move(traced));
 
   const RadarConfig& radar = impl_->description.radar;
   s.grid.stamp_ns = stamp_ns;
@@ -198,6 +273,11 @@ Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRec
   if (impl_->has_tone_gain || impl_->has_distort) {
     s.grid.x.setZero();
     impl_->propagate(c, impl_->filtered(c, s.records), s.grid.x);
+  }
+  if (condensed) {
+    std::vector<PathRecord> nodes = condensed->nodes();
+    impl_->reweight(c, nodes, 0);
+    condensed->addNodes(radar, impl_->filtered(c, std::move(nodes)), s.grid.x);
   }
   impl_->receive(c, s.grid.x);
   return s;

@@ -14,7 +14,7 @@ struct Twin::Impl {
   TwinDescription description;
   std::uint64_t seed;
   Scene scene;  // as described
-  std::unique_ptr<RayCaster> rays;
+  std::shared_ptr<const RayCaster> rays;
   std::unique_ptr<Scene> edited;  // null where no mechanism edits the scene
   std::unique_ptr<RayCaster> edited_rays;
   std::vector<std::unique_ptr<Mechanism>> mechanisms;  // by rank
@@ -24,6 +24,9 @@ struct Twin::Impl {
   bool has_chirp_paths = false, has_modulation = false, has_chirp_stage = false, has_digitise = false,
        has_transport = false;
   std::vector<std::int64_t> session_ns;  // stamps of the session's poses in order of time
+
+  /// Makes the mechanisms of the description and all that follows from them; scene and rays are there.
+  void assemble();
 
   const Scene& model() const { return edited ? *edited : scene; }
   const RayCaster& modelRays() const { return edited_rays ? *edited_rays : *rays; }
@@ -67,6 +70,9 @@ struct Twin::Impl {
       for (const auto& m : mechanisms) m->reweight(c, records[i]);
     }
   }
+
+  /// Paths after all weights, with those whose level is relative to the strongest echo.
+  std::vector<PathRecord> weighted(const PoseContext& c, std::vector<PathRecord> records) const;
 
   /// Paths as the receiver's filters leave them; the same records where there are no filters.
   std::vector<PathRecord> filtered(const PoseContext& c, std::vector<PathRecord> records) const {

@@ -85,6 +85,62 @@ class SceneFiles : public ::testing::Test {
     vertices_ += (n + 1) * (n + 1);
   }
 
+  /// Polygons of one object: vertices, and per polygon its vertices' places in that list.
+  void addPolygons(const std::string& actor, const std::string& material, const std::vector<Eigen::Vector3d>& vertices,
+                   const std::vector<std::vector<int>>& polygons) {
+    obj_ << "o " << actor << "\nusemtl " << material << "\n" << std::setprecision(12);
+    for (const auto& v : vertices) obj_ << "v " << v.transpose() << "\n";
+    for (const auto& polygon : polygons) {
+      obj_ << "f";
+      for (int i : polygon) obj_ << " " << vertices_ + 1 + i;
+      obj_ << "\n";
+    }
+    vertices_ += static_cast<int>(vertices.size());
+  }
+
+  /// Sphere of rings x sectors quadrangles, its poles upright.
+  void addSphere(const std::string& actor, const std::string& material, const Eigen::Vector3d& center, double radius,
+                 int rings, int sectors) {
+    std::vector<Eigen::Vector3d> vertices;
+    std::vector<std::vector<int>> polygons;
+    for (int i = 1; i < rings; ++i) {
+      for (int j = 0; j < sectors; ++j) {
+        const double t = M_PI * i / rings, p = 2 * M_PI * j / sectors;
+        vertices.push_back(center +
+                           radius * Eigen::Vector3d(std::sin(t) * std::cos(p), std::sin(t) * std::sin(p), std::cos(t)));
+        const int a = (i - 1) * sectors + j, b = (i - 1) * sectors + (j + 1) % sectors;
+        if (i > 1) polygons.push_back({a - sectors, a, b, b - sectors});
+      }
+    }
+    const int north = static_cast<int>(vertices.size()), last = north - sectors;
+    vertices.push_back(center + Eigen::Vector3d(0, 0, radius));
+    vertices.push_back(center - Eigen::Vector3d(0, 0, radius));
+    for (int j = 0; j < sectors; ++j) {
+      polygons.push_back({north, j, (j + 1) % sectors});
+      polygons.push_back({north + 1, last + (j + 1) % sectors, last + j});
+    }
+    addPolygons(actor, material, vertices, polygons);
+  }
+
+  /// Closed cylinder from one end of its axis to the other.
+  void addCylinder(const std::string& actor, const std::string& material, const Eigen::Vector3d& from,
+                   const Eigen::Vector3d& to, double radius, int sides) {
+    const Eigen::Vector3d axis = (to - from).normalized(), u = axis.unitOrthogonal(), v = axis.cross(u);
+    std::vector<Eigen::Vector3d> vertices;
+    std::vector<std::vector<int>> polygons(2);
+    for (int j = 0; j < sides; ++j) {
+      const double p = 2 * M_PI * j / sides;
+      for (const Eigen::Vector3d& end : {from, to}) {
+        vertices.push_back(end + radius * (std::cos(p) * u + std::sin(p) * v));
+      }
+      const int next = (j + 1) % sides;
+      polygons.push_back({2 * j, 2 * next, 2 * next + 1, 2 * j + 1});
+      polygons[0].push_back(2 * j);
+      polygons[1].push_back(2 * j + 1);
+    }
+    addPolygons(actor, material, vertices, polygons);
+  }
+
   /// Closed box.
   void addBox(const std::string& actor, const std::string& material, const Eigen::Vector3d& low,
               const Eigen::Vector3d& high) {

@@ -107,5 +107,246 @@ TEST_F(ClosedForms, RotatingDihedralFlashesOnItsPlates) {
   }
 }
 
+/// Three metal faces in an octant: edges from the apex along the columns of `axes`, each `a` long; triangles or
+/// squares.
+struct OctantFaces {
+  Eigen::Vector3d apex;
+  Eigen::Matrix3d axes;
+  double a;
+  bool square;
+};
+
+/// Level of the three-bounce return in dBsm by brute force: parallel rays on a grid across the line of sight run
+/// through the mirrors; what comes back after three hits adds up with the phase of a spherical wave from R.
+double tracedTrihedral_dbsm(const OctantFaces& faces, const Eigen::Vector3d& radar) {
+  const Eigen::Vector3d towards = faces.axes.transpose() * (radar - faces.apex);  // in the octant's own axes
+  const double R = towards.norm(), k = 2 * M_PI / kLambda77_m, h = faces.a / 150;
+  const Eigen::Vector3d look = -towards / R, u = look.unitOrthogonal(), v = look.cross(u);
+  std::complex<double> sum = 0;
+  const int n = static_cast<int>(1.5 * faces.a / h);
+  for (int i = -n; i < n; ++i) {
+    for (int j = -n; j < n; ++j) {
+      const double x = (i + 0.5) * h, y = (j + 0.5) * h;
+      Eigen::Vector3d p = x * u + y * v - 10 * faces.a * look, d = look;
+      int bounces = 0;
+      for (; bounces < 4; ++bounces) {
+        int plane = -1;
+        double nearest = 1e300;
+        for (int axis = 0; axis < 3; ++axis) {
+          const double t = -p[axis] / d[axis];
+          if (d[axis] < 0 && t < nearest) {
+            nearest = t;
+            plane = axis;
+          }
+        }
+        if (plane < 0) break;
+        p += nearest * d;
+        const double s = p[(plane + 1) % 3], t = p[(plane + 2) % 3];
+        if (s < 0 || t < 0 || (faces.square ? std::max(s, t) > faces.a : s + t > faces.a)) break;
+        p[plane] = 0;
+        d[plane] = -d[plane];
+      }
+      if (bounces == 3) sum += std::polar(h * h, -k * (x * x + y * y) / R);
+    }
+  }
+  return 10 * std::log10(4 * M_PI / (kLambda77_m * kLambda77_m) * std::norm(sum));
+}
+
+class TrihedralForms : public ClosedForms {
+ protected:
+  void addFaces(const OctantFaces& faces) {
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3d u = faces.a * faces.axes.col((i + 1) % 3), v = faces.a * faces.axes.col((i + 2) % 3);
+      std::vector<Eigen::Vector3d> corners = {faces.apex, faces.apex + u, faces.apex + u + v, faces.apex + v};
+      if (!faces.square) corners.erase(corners.begin() + 2);
+      addPolygons("face" + std::to_string(i), "Metal", corners,
+                  {faces.square ? std::vector<int>{0, 1, 2, 3} : std::vector<int>{0, 1, 2}});
+    }
+  }
+  /// Axes of an octant none of whose faces lies within 45 deg of the floor; it opens 19.5 deg upwards.
+  static Eigen::Matrix3d tiltedAxes() {
+    Eigen::Matrix3d axes;
+    axes.row(2) = Eigen::RowVector3d(1, 1, -1).normalized();
+    axes.row(0) = Eigen::RowVector3d(1, -1, 0).normalized();
+    axes.row(1) = axes.row(2).cross(axes.row(0));
+    return axes;
+  }
+  /// The radar at `range_m` from the apex, in the octant's direction `own`, looking at it.
+  static Eigen::Isometry3d facing(const OctantFaces& faces, const Eigen::Vector3d& own, double range_m) {
+    const Eigen::Vector3d way = faces.axes * own.normalized();
+    return Eigen::Translation3d(faces.apex + range_m * way) *
+           Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), -way);
+  }
+};
+
+// 4 pi a^4/(3 lambda^2) = 2.37 and 14.41 dBsm for 5 and 10 cm (simulation.md 4.2).
+TEST_F(TrihedralForms, FarOffTheTriangularOneHasItsCrossSection) {
+  const OctantFaces faces = {{0, 0, 0}, tiltedAxes(), 0.05, false};
+  addFaces(faces);
+  const Simulation s = makeTwin(writeScene(), "  corner: {}\n", radarAt77GHz()).simulate(facing(faces, {1, 1, 1}, 9.5));
+  std::vector<PathRecord> three = of(s, "corner", 3);
+  ASSERT_EQ(three.size(), 1u);
+  EXPECT_NEAR(dbsm(three[0].amplitude, 9.5, kLambda77_m), 2.37, 0.1);
+  EXPECT_NEAR(three[0].length_m[0], 19, 1e-9);
+  EXPECT_TRUE(s.check.ok());
+}
+
+TEST_F(TrihedralForms, AreTheTracedOnesNearAndFarOnBoresightAndBeside) {
+  for (bool square : {false, true}) {
+    for (double a : {0.05, 0.10}) {
+      const OctantFaces faces = {{0.3, -0.2, 0.1}, tiltedAxes(), a, square};
+      addFaces(faces);
+      const Twin twin = makeTwin(writeScene(), "  corner: {}\n", radarAt77GHz());
+      for (double R : {0.9, 4.0}) {
+        for (const Eigen::Vector3d& own : {Eigen::Vector3d(1, 1, 1), Eigen::Vector3d(1, 0.8, 0.6)}) {
+          const Eigen::Isometry3d pose = facing(faces, own, R);
+          const auto three = of(twin.simulate(pose), "corner", 3);
+          ASSERT_EQ(three.size(), 1u);
+          EXPECT_NEAR(dbsm(three[0].amplitude, R, kLambda77_m), tracedTrihedral_dbsm(faces, pose.translation()), 0.3)
+              << (square ? "square " : "triangular ") << a << " m at " << R << " m, towards " << own.transpose();
+        }
+      }
+    }
+  }
+}
+
+// A reflector that is set up level has a face that the base takes for a floor: named, it returns all the same.
+TEST_F(TrihedralForms, LevelOnesReturnWhereTheyAreNamed) {
+  OctantFaces faces = {{3, 0, 0}, Eigen::Matrix3d::Identity(), 0.1, false};
+  // Boresight along -x.
+  faces.axes = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d(1, 1, 1).normalized(), -Eigen::Vector3d::UnitX())
+                   .toRotationMatrix();
+  addFaces(faces);
+  const std::string scene = writeScene();
+  EXPECT_TRUE(of(makeTwin(scene, "  corner: {}\n", radarAt77GHz()).simulate(radarPose(0, 0, 0)), "corner", 3).empty());
+  const auto three =
+      of(makeTwin(scene, "  corner: {}\n  corner_reflection: {actors: [face0, face1, face2]}\n", radarAt77GHz())
+             .simulate(radarPose(0, 0, 0)),
+         "corner_reflection", 3);
+  ASSERT_EQ(three.size(), 1u);
+  EXPECT_NEAR(dbsm(three[0].amplitude, 3, kLambda77_m), tracedTrihedral_dbsm(faces, Eigen::Vector3d::Zero()), 0.1);
+  // From outside, where the edges are convex, there is nothing.
+  EXPECT_TRUE(of(makeTwin(scene, "  corner_reflection: {actors: [face0, face1, face2]}\n", radarAt77GHz())
+                     .simulate(radarPose(6, 0, 0, 180)),
+                 "corner_reflection", 3)
+                  .empty());
+}
+
+/// Amplitude of a metal surface's echo by physical optics: 1/(4 pi) |integral of cos exp(-2jk rho)/rho^2 dS| over what
+/// faces the radar at the origin. `point` gives position and outward area vector of a cell.
+template <typename Surface>
+double physicalOptics(int n, int m, Surface point) {
+  std::complex<double> sum = 0;
+  const double k = 2 * M_PI / kLambda77_m;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < m; ++j) {
+      const auto [p, area] = point((i + 0.5) / n, (j + 0.5) / m);
+      const double rho = p.norm(), facing = -p.dot(area) / rho;
+      if (facing > 0) sum += std::polar(facing / (rho * rho), -2 * k * rho);
+    }
+  }
+  return std::abs(sum) / (4 * M_PI);
+}
+
+class CurvedForms : public ClosedForms {};
+
+// pi r^2 with the range's square taken between surface and centre: -21.05, -15.03 and -7.07 dBsm (simulation.md 4.2).
+TEST_F(CurvedForms, SpheresHaveTheirCrossSectionHoweverTheyAreTessellated) {
+  for (const auto& [r, expected] :
+       std::vector<std::pair<double, double>>{{0.05, -21.05}, {0.1, -15.03}, {0.25, -7.07}}) {
+    for (int n : {16, 37}) {
+      addSphere("ball", "Metal", {3 + r, 0.2, 0.1}, r, n, 2 * n);
+      const Twin twin = makeTwin(writeScene(), "  specular: {}\n", radarAt77GHz());
+      ASSERT_EQ(twin.scene().curved.size(), 1u) << r << " m, " << n << " rings";
+      EXPECT_NEAR(twin.scene().curved[0].radius_m, r, 1e-6);
+      const Simulation s = look(twin);
+      ASSERT_EQ(s.records.size(), 1u);
+      const double center = Eigen::Vector3d(3 + r, 0.2, 0.1).norm();
+      EXPECT_NEAR(s.records[0].length_m[0], 2 * (center - r), 1e-6);
+      EXPECT_NEAR(dbsm(s.records[0].amplitude, std::sqrt(center * (center - r)), kLambda77_m), expected, 0.05);
+      EXPECT_TRUE(s.check.ok());
+    }
+  }
+  const Eigen::Vector3d c(1.1, 0, 0);
+  const double po = physicalOptics(4000, 400, [&](double u, double v) {
+    const double t = 0.5 * M_PI * u, p = 2 * M_PI * v, r = 0.1;  // the half towards the radar
+    const Eigen::Vector3d n(-std::cos(t), std::sin(t) * std::cos(p), std::sin(t) * std::sin(p));
+    return std::make_pair(Eigen::Vector3d(c + r * n),
+                          Eigen::Vector3d(r * r * std::sin(t) * (0.5 * M_PI / 4000) * (2 * M_PI / 400) * n));
+  });
+  addSphere("ball", "Metal", c, 0.1, 20, 40);
+  EXPECT_NEAR(db(look(makeTwin(writeScene(), "  specular: {}\n", radarAt77GHz())).records.at(0).amplitude), db(po),
+              0.1);
+}
+
+TEST_F(CurvedForms, CylindersDivergeAboutTheirAxis) {
+  for (const auto& [length, sides] : std::vector<std::pair<double, int>>{{0.06, 12}, {0.3, 24}, {0.3, 200}}) {
+    const double r = 0.05, L = length;
+    for (bool upright : {true, false}) {
+      const Eigen::Vector3d axis = upright ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d(0, 1, 0.3).normalized();
+      const Eigen::Vector3d middle(2.05, 0, 0), other = axis.cross(Eigen::Vector3d::UnitX());
+      addCylinder("pipe", "Metal", middle - 0.5 * L * axis, middle + 0.5 * L * axis, r, sides);
+      const Twin twin = makeTwin(writeScene(), "  specular: {}\n", radarAt77GHz());
+      ASSERT_EQ(twin.scene().curved.size(), 1u) << sides;
+      const Simulation s = look(twin);
+      ASSERT_EQ(s.records.size(), 1u) << sides << " sides are one surface, and its ends face away";
+      const double po = physicalOptics(3000, 600, [&](double u, double v) {
+        const double t = M_PI * (u - 0.5);
+        const Eigen::Vector3d n = -std::cos(t) * Eigen::Vector3d::UnitX() + std::sin(t) * other;
+        return std::make_pair(Eigen::Vector3d(middle + r * n + (v - 0.5) * L * axis),
+                              Eigen::Vector3d(r * (M_PI / 3000) * (L / 600) * n));
+      });
+      EXPECT_NEAR(db(s.records[0].amplitude), db(po), 0.1) << sides << " sides, " << L << " m";
+    }
+  }
+}
+
+TEST_F(CurvedForms, FacetsThatAreNoChordsStayFacets) {
+  addBox("box", "Metal", {2, -0.5, -0.5}, {2.5, 0.5, 0.5});
+  addCylinder("octagon", "Metal", {4, 2, -1}, {4, 2, 1}, 0.2, 8);
+  // A cone: its sides are straight, but lean.
+  std::vector<Eigen::Vector3d> cone = {{4, -2, 1}};
+  std::vector<std::vector<int>> sides;
+  for (int i = 0; i < 24; ++i) {
+    cone.emplace_back(4 + 0.5 * std::cos(i * M_PI / 12), -2 + 0.5 * std::sin(i * M_PI / 12), -1);
+    sides.push_back({0, 1 + i, 1 + (i + 1) % 24});
+  }
+  addPolygons("cone", "Metal", cone, sides);
+  EXPECT_TRUE(loadScene(writeScene(), 77e9).curved.empty());
+  addCylinder("pipe", "Metal", {2, 1, -1}, {2, 1, 1}, 0.1, 24);
+  Scene scene = loadScene(writeScene(), 77e9);
+  ASSERT_EQ(scene.curved.size(), 1u);
+  EXPECT_EQ(scene.curved[0].facets.size(), 24u) << "the ends are facets";
+  moveActor(scene, 0, Eigen::Translation3d(0, 0.5, 0) * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX()));
+  EXPECT_NEAR(std::abs(scene.curved[0].axis.y()), 1, 1e-9) << "moves with its actor";
+}
+
+// Lambert's sphere, (8/3) rho pi r^2 far off; here near, and without the caps whose facets lie within 45 deg of the
+// horizontal: (lambda/4 pi)^2 S^2/pi times the integral of cos^2/rho^4.
+TEST_F(CurvedForms, ARoughSphereIsLamberts) {
+  const double r = 0.1, x = 3;
+  addSphere("ball", "RoughMetal", {x, 0, 0}, r, 40, 80);
+  double power = 0, expected = 0, whole = 0;
+  for (const PathRecord& p : look(makeTwin(writeScene(), "  diffuse: {spacing_m: 0.005}\n", radarAt77GHz())).records)
+    power += p.amplitude * p.amplitude;
+  const int n = 400;
+  for (int i = 0; i < n; ++i) {
+    const double t = M_PI * (i + 0.5) / n;
+    for (int j = 0; j < n; ++j) {
+      const double p = 2 * M_PI * (j + 0.5) / n;
+      const Eigen::Vector3d normal(std::sin(t) * std::cos(p), std::sin(t) * std::sin(p), std::cos(t)),
+          at = Eigen::Vector3d(x, 0, 0) + r * normal;
+      const double rho = at.norm(), cosine = -at.dot(normal) / rho;
+      if (cosine <= 0) continue;
+      const double cell = r * r * std::sin(t) * (M_PI / n) * (2 * M_PI / n) * cosine * cosine;
+      whole += 4 * 0.36 * cell;
+      if (std::abs(std::cos(t)) < std::sqrt(0.5)) expected += cell / std::pow(rho, 4);
+    }
+  }
+  EXPECT_NEAR(10 * std::log10(whole / (8.0 / 3 * 0.36 * M_PI * r * r)), 0, 0.3) << "seen from 3 m a little less";
+  expected *= std::pow(kLambda77_m / (4 * M_PI), 2) * 0.36 / M_PI;
+  EXPECT_NEAR(10 * std::log10(power / expected), 0, 0.1);
+}
+
 }  // namespace
 }  // namespace mmradartwin

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <set>
 
 #include "../src/image_paths.h"
 #include "scene_files.h"
@@ -193,6 +194,30 @@ TEST_F(Paths, OfThreeBouncesRunToAndFro) {
   EXPECT_EQ(s.records[1].bounces, 3);
   EXPECT_NEAR(s.records[1].length_m[0], 2 * (2 + 3), 1e-9);
   EXPECT_NEAR(db(s.records[1].amplitude), db(kLambda77_m / (4 * M_PI * 10)), 0.3);
+}
+
+// Fourth order comes from launched rays: enough of them find what twice as many find, and a few say that they are few.
+TEST_F(Paths, OfLaunchedRaysSayWhetherTheyConverged) {
+  addWall("ahead", "Metal", {4, -2}, {4, 3}, -3, 3);
+  addWall("behind", "Metal", {-1.1, -2}, {-1.1, 3}, -3, 3);
+  addWall("left", "Metal", {-1.1, 3}, {4, 3}, -3, 3);
+  addWall("right", "Metal", {-1.1, -2.2}, {3.9, -2}, -3, 3);
+  const std::string scene = writeScene();
+  const auto look = [&](int budget) {
+    const Twin twin = makeTwin(scene, "  specular: {max_bounces: 5, ray_budget: " + std::to_string(budget) + "}\n");
+    EXPECT_TRUE(twin.notes().empty()) << "nothing was launched yet";
+    std::set<std::vector<int>> paths;
+    for (const PathRecord& r : twin.simulate(radarPose(0.3, 0.4, 0, 25)).records) {
+      EXPECT_TRUE(paths.insert(r.facets).second) << "each sequence once";
+    }
+    return std::make_pair(paths, twin.notes().empty() ? std::string() : twin.notes().back());
+  };
+  const auto few = look(16), enough = look(4000), twice = look(8000);
+  EXPECT_NE(enough.second.find("half as many"), std::string::npos) << enough.second;
+  EXPECT_EQ(enough.first, twice.first);
+  EXPECT_LT(few.first.size(), enough.first.size());
+  EXPECT_GT(std::count_if(enough.first.begin(), enough.first.end(), [](const auto& p) { return p.size() > 3; }), 0);
+  EXPECT_NE(few.second.find("raise ray_budget"), std::string::npos) << few.second;
 }
 
 class Corners : public Paths {

@@ -247,6 +247,13 @@ TEST_F(ReceiverTest, PatternsTakeMeasuredCurves) {
           pitched.first,
       elevation_deg, 1e-6)
       << "0.5 dB a degree, twice";
+  EXPECT_NEAR(
+      level("  elevation_pattern: {angles_deg: [-20, 0, 20], gain_db: [-10, 0, -5]}\n", -8).first - pitched.first,
+      elevation_deg, 1e-6)
+      << "the same curve by the cause's own name";
+  EXPECT_NE(
+      errorOf([&] { level("  elevation_pattern: {angles_deg: [0, 1], gain_db: [1]}\n"); }).find("elevation_pattern"),
+      std::string::npos);
   EXPECT_NE(
       errorOf([&] { level("  element_pattern: {angles_deg: [0, 1], gain_db: [1]}\n"); }).find("one gain per angle"),
       std::string::npos);

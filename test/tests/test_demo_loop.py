@@ -36,7 +36,7 @@ class DemoLoop(unittest.TestCase):
         script = os.path.join(rospkg.RosPack().get_path("mmradartwin_launch"), "scripts", "demo.sh")
         environment = dict(os.environ, DEMO_LOCATIONS=str(POSES), DEMO_HEADINGS="1", DEMO_FRAMES=str(FRAMES), DEMO_SEED="11")
         environment.pop("DISPLAY", None)
-        cls.demo = subprocess.run([script, cls.out], env=environment, capture_output=True, text=True, timeout=240)
+        cls.demo = subprocess.run([script, cls.out], env=environment, capture_output=True, text=True, timeout=600)
 
     @classmethod
     def tearDownClass(cls):
@@ -47,6 +47,11 @@ class DemoLoop(unittest.TestCase):
 
     def test_ends_with_status_zero(self):
         self.assertEqual(self.demo.returncode, 0, self.demo.stderr[-3000:])
+
+    def test_ends_with_a_diagnosis_and_the_twin_that_it_extends(self):
+        with open(self.path("diagnosis", "findings.json")) as file:
+            self.assertEqual(json.load(file)["poses"]["count"], POSES)
+        self.assertTrue(os.path.exists(self.path("report_extended", "index.html")))
 
     def test_every_frame_of_the_session_came_through_udp_bit_for_bit(self):
         with open(self.path("session", "poses.csv")) as file:

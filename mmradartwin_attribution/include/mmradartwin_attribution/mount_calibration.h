@@ -31,11 +31,11 @@ struct LaserDistance {
 std::vector<LaserDistance> readLaserDistances(const std::string& file);
 
 struct MountCalibrationOptions {
-  double search_m = 0.4;             ///< the target's echo is looked for within this of where the pose puts it
-  double search_rad = 0.44;          ///< and the mount's yaw within this
-  double min_level_db = 12;          ///< of the target's echo over the pose's median range bin
-  double max_azimuth_rad = 1.05;     ///< poses that hold the target further off boresight are left out
-  double max_laser_error_m = 0.02;   ///< between a laser's distance and the pose's, a common mount offset apart
+  double search_m = 0.4;            ///< the target's echo is looked for within this of where the pose puts it
+  double search_rad = 0.44;         ///< and the mount's yaw within this
+  double min_level_db = 12;         ///< of the target's echo over the pose's median range bin
+  double max_azimuth_rad = 1.05;    ///< poses that hold the target further off boresight are left out
+  double max_laser_error_m = 0.02;  ///< between a laser's distance and the pose's, a common mount offset apart
 };
 
 /// A value with its 95 % interval. Values that the poses do not fix are held at 0 and say so.
@@ -51,9 +51,9 @@ struct CalibratedPose {
   std::string name;
   bool used = false;
   std::string why_not;
-  double azimuth_deg = 0;     ///< of the target in the radar's frame, from the calibrated pose
-  double range_m = 0;         ///< measured one-way range
-  double level_db = 0;        ///< over the pose's median range bin
+  double azimuth_deg = 0;                            ///< of the target in the radar's frame, from the calibrated pose
+  double range_m = 0;                                ///< measured one-way range
+  double level_db = 0;                               ///< over the pose's median range bin
   std::array<double, 2> range_error_m = {0, 0};      ///< measured minus expected, before and after
   std::array<double, 2> azimuth_error_deg = {0, 0};  ///< the same
   std::vector<double> channel_error_deg[2];          ///< [M] phase against the expected, mean taken out

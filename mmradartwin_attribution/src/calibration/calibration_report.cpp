@@ -108,7 +108,8 @@ cv::Mat drawCalibration(const MountCalibration& calibration) {
 
 std::string toYaml(const MountCalibration& c) {
   std::ostringstream out;
-  out << "format: mmradartwin_calibration/1\nlasers: " << (c.lasers ? "true" : "false") << "\nradar_yaw_offset:\n  yaw_deg: ";
+  out << "format: mmradartwin_calibration/1\nlasers: " << (c.lasers ? "true" : "false")
+      << "\nradar_yaw_offset:\n  yaw_deg: ";
   write(out, c.yaw_deg);
   out << "radar_position_offset:\n  forward_m: ";
   write(out, c.forward_m);

@@ -1,5 +1,6 @@
 #include "mmradartwin_attribution/mount_calibration.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -7,8 +8,6 @@
 #include <map>
 #include <set>
 #include <sstream>
-
-#include <Eigen/Eigenvalues>
 #include <unsupported/Eigen/NonLinearOptimization>
 #include <unsupported/Eigen/NumericalDiff>
 
@@ -34,7 +33,7 @@ struct Scatter {
   double range_m = 0.005;  ///< of the radar's range beside the laser's
   double pose_m = 0.005;   ///< of the pose's distance
   double heading_rad = 0.3 * kDeg;
-  double channel = 0.05;   ///< of a channel's real or imaginary part, rms 1
+  double channel = 0.05;  ///< of a channel's real or imaginary part, rms 1
 };
 
 struct Observation {
@@ -59,7 +58,7 @@ struct Residuals {
   const CalibrationTarget& target;
   const std::vector<Observation>& observations;
   Scatter scatter;
-  std::vector<int> free;  ///< parameters that are fitted; the others are 0
+  std::vector<int> free;     ///< parameters that are fitted; the others are 0
   bool level_slope = false;  ///< a linear phase over the channels cannot be told from yaw: held at 0
 
   int channels() const { return radar.channels(); }
@@ -133,9 +132,9 @@ struct Residuals {
 };
 
 struct Fit {
-  VectorXd p;         ///< all parameters
-  MatrixXd inverse;   ///< covariance of the free ones
-  VectorXd deviation; ///< of all; infinite where not observable, 0 where held
+  VectorXd p;          ///< all parameters
+  MatrixXd inverse;    ///< covariance of the free ones
+  VectorXd deviation;  ///< of all; infinite where not observable, 0 where held
 };
 
 Fit solve(const Residuals& residuals, const VectorXd& start) {
@@ -187,8 +186,7 @@ Scatter scatterOf(const Residuals& residuals, const VectorXd& p, bool lasers) {
   scatter.range_m = with_laser > 1 ? std::max(kLeastRange_m, std::sqrt(range2 / (with_laser - 1))) : kLeastRange_m;
   scatter.heading_rad = std::max(kLeastHeading_rad, std::sqrt(heading2 / std::max(1.0, poses - 1)));
   // Of 2M numbers a pose's level takes two and its heading one.
-  scatter.channel =
-      std::max(kLeastChannel, std::sqrt(channel2 / std::max(1.0, poses * (phases - 1) - phases)));
+  scatter.channel = std::max(kLeastChannel, std::sqrt(channel2 / std::max(1.0, poses * (phases - 1) - phases)));
   return scatter;
 }
 
@@ -223,8 +221,8 @@ void checkLasers(const Residuals& residuals, const MountCalibrationOptions& opti
       Eigen::Matrix2d H = 1e-3 * Eigen::Matrix2d::Identity();
       Eigen::Vector2d g = Eigen::Vector2d::Zero();
       for (const Observation* o : with) {
-        const auto paths = targetPaths(residuals.radar, residuals.target,
-                                       placed(o->echo.T_map_radar, 0, offset.x(), offset.y()));
+        const auto paths =
+            targetPaths(residuals.radar, residuals.target, placed(o->echo.T_map_radar, 0, offset.x(), offset.y()));
         if (!paths) continue;
         const Eigen::Vector2d J = -paths->direction.head<2>();
         const double r = difference(*o), weight = 1 / std::max(std::abs(r), 1e-3);
@@ -248,8 +246,8 @@ void checkLasers(const Residuals& residuals, const MountCalibrationOptions& opti
 }
 
 void fillErrors(const Residuals& residuals, const VectorXd& p, int after, const Observation& o, CalibratedPose& pose) {
-  const auto paths = targetPaths(residuals.radar, residuals.target,
-                                 placed(o.echo.T_map_radar, p(kYaw), p(kForward), p(kLeft)));
+  const auto paths =
+      targetPaths(residuals.radar, residuals.target, placed(o.echo.T_map_radar, p(kYaw), p(kForward), p(kLeft)));
   if (!paths) return;
   pose.azimuth_deg = std::atan2(paths->direction.y(), paths->direction.x()) / kDeg;
   pose.range_error_m[after] = o.echo.range_m - p(kRange) - paths->range_m;
@@ -280,9 +278,11 @@ CalibrationTarget wallTarget(const Scene& scene, const std::string& actor) {
   CalibrationTarget target;
   target.name = actor;
   for (int id : scene.actors[static_cast<std::size_t>(index)].facets) {
-    if (scene.facets[static_cast<std::size_t>(id)].reflects) target.wall.push_back(scene.facets[static_cast<std::size_t>(id)]);
+    if (scene.facets[static_cast<std::size_t>(id)].reflects)
+      target.wall.push_back(scene.facets[static_cast<std::size_t>(id)]);
   }
-  if (target.wall.empty()) throw InputError(scene.file + ": actor '" + actor + "' has no upright surface to calibrate on");
+  if (target.wall.empty())
+    throw InputError(scene.file + ": actor '" + actor + "' has no upright surface to calibrate on");
   return target;
 }
 
@@ -359,7 +359,8 @@ MountCalibration calibrateMount(const Recording& recording, const CalibrationTar
   Residuals residuals{recording.radar, target, observations, {}, {}, false};
   for (int i = 0; i < residuals.parameters(); ++i) residuals.free.push_back(i);
   checkLasers(residuals, options);
-  result.lasers = std::any_of(observations.begin(), observations.end(), [](const auto& o) { return o.laser_m.has_value(); });
+  result.lasers =
+      std::any_of(observations.begin(), observations.end(), [](const auto& o) { return o.laser_m.has_value(); });
 
   VectorXd start = VectorXd::Zero(residuals.parameters());
   start(kYaw) = coarseYaw(residuals, options);
@@ -382,8 +383,9 @@ MountCalibration calibrateMount(const Recording& recording, const CalibrationTar
   bool forward = true, left = true, range = true;
   if (fit.deviation(kForward) > kMostOffset_m || fit.deviation(kRange) > kMostOffset_m) {
     forward = false;
-    hold(kForward, "forward_m cannot be told from range_bias with these poses and is held at 0: take poses that hold the "
-                   "target up to 40 deg off boresight on both sides, or laser distances");
+    hold(kForward,
+         "forward_m cannot be told from range_bias with these poses and is held at 0: take poses that hold the "
+         "target up to 40 deg off boresight on both sides, or laser distances");
     refine();
   }
   if (fit.deviation(kLeft) > kMostOffset_m) {
@@ -393,8 +395,9 @@ MountCalibration calibrateMount(const Recording& recording, const CalibrationTar
   }
   range = fit.deviation(kRange) <= kMostOffset_m;
   if (fit.deviation(kYaw) > kMostYaw_rad || fit.deviation.segment(kFirstPhase, M - 1).maxCoeff() > kMostPhase_rad) {
-    result.notes.push_back("a phase that grows evenly over the channels cannot be told from yaw with these poses and "
-                           "counts as yaw: take poses that hold the target off boresight on both sides");
+    result.notes.push_back(
+        "a phase that grows evenly over the channels cannot be told from yaw with these poses and "
+        "counts as yaw: take poses that hold the target off boresight on both sides");
     residuals.level_slope = true;
     fit = solve(residuals, fit.p);
     refine();

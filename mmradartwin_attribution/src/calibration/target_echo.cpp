@@ -67,8 +67,8 @@ Eigen::VectorXcd steering(const RadarConfig& radar, const TargetPaths& paths) {
   for (std::size_t k = 0; k < paths.length_m.size(); ++k) {
     const double tau = paths.length_m[k] / kSpeedOfLight_m_per_s;
     const double frequency = radar.carrier_hz + radar.slope_hz_per_s * radar.window_center_s();
-    const double cycles = frequency * (tau - reference_s) -
-                          0.5 * radar.slope_hz_per_s * (tau - reference_s) * (tau + reference_s);
+    const double cycles =
+        frequency * (tau - reference_s) - 0.5 * radar.slope_hz_per_s * (tau - reference_s) * (tau + reference_s);
     v(static_cast<Eigen::Index>(k)) = std::polar(1.0, 2 * M_PI * cycles);
   }
   return v;

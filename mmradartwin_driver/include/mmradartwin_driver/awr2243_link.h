@@ -30,6 +30,8 @@ class Awr2243Link {
   /// Frames run from their first chirp when this returns; those that ran were stopped. The card must be recording.
   void start();
   void stop();
+  /// Lets go of the radar as it is; the next prepare() brings it up again.
+  void close() { drop(); }
   /// Delivers events. Throws RigError where the radar reported a fault or is gone.
   void poll();
 

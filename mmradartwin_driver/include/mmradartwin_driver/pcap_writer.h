@@ -17,11 +17,13 @@ namespace mmradartwin {
 /// made as the card makes them: no UDP checksum, TTL 255, do not fragment; the host's MAC address is 02:00:00:00:00:01.
 ///
 /// A thread of its own writes; whoever adds never waits for the disk. Where the disk is too slow for `queue_bytes`,
-/// datagrams are left out and counted; where it is full, the recording ends with the last whole packet.
+/// datagrams are left out and counted. Where less than `min_free_bytes` are left on it, the recording ends with the
+/// last whole packet, and problem() says so: the rest is for the bag, the logs and whoever makes room.
 class PcapWriter {
  public:
   /// "{stamp}" in the name becomes the time, as 20250131T235959. Throws InputError: exists already, cannot be written.
-  explicit PcapWriter(const std::string& file, std::size_t queue_bytes = 256u << 20);
+  explicit PcapWriter(const std::string& file, std::size_t queue_bytes = 256u << 20,
+                      std::uint64_t min_free_bytes = 1u << 30);
   ~PcapWriter();  ///< writes what waits
 
   void add(const Datagram& datagram);
@@ -38,9 +40,12 @@ class PcapWriter {
   struct Output;
   void run();
   void write(const std::vector<std::uint8_t>& records);
+  bool spaceLeft();
+  void end(const std::string& why);
 
   std::string file_;
   std::size_t queue_bytes_;
+  std::uint64_t min_free_bytes_;
   std::unique_ptr<Output> output_;
   std::atomic<std::uint64_t> written_{0}, left_out_{0};
 

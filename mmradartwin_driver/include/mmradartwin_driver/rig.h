@@ -15,6 +15,7 @@
 #include "mmradartwin_driver/hand_over.h"
 #include "mmradartwin_driver/packet_receiver.h"
 #include "mmradartwin_driver/pcap_writer.h"
+#include "mmradartwin_driver/radar_watch.h"
 #include "mmradartwin_dsp/radar_config.h"
 
 namespace mmradartwin {
@@ -25,6 +26,10 @@ struct RigOptions {
   std::uint16_t config_port = kDca1000ConfigPort;
   std::uint16_t data_port = kDca1000DataPort;
   double packet_delay_us = 25;
+  /// An AWR2243 to bring up over USB, and to start whenever the card has been armed, so that frames and recording begin
+  /// together. Without it another program runs the radar.
+  std::optional<Awr2243Registers> radar;
+  std::string radar_firmware;  ///< image for a radar whose flash is empty
   bool configure_card = true;  ///< false: another program configures and arms it, only the data port is opened
   std::string record_pcap;     ///< records everything between card and host there; "" = nowhere
   std::size_t hand_over_bytes = 128u << 20;  ///< of frames that may wait for a slow taker; at least 16 frames do
@@ -38,6 +43,7 @@ struct RigState {
   Phase phase = Phase::kConnecting;
   std::string problem;  ///< one line that says the next thing to do; empty while all is well
   std::optional<FpgaVersion> version;
+  std::optional<RadarWatch::State> radar;    ///< where the rig configures it
   std::optional<std::uint16_t> last_status;  ///< of the card, since it was armed
   std::uint64_t armings = 0;
   double silent_s = 0;           ///< since the last packet, or since arming
@@ -53,13 +59,17 @@ struct RigState {
 /// card, receives, and does all of that again when the card or the network was gone, when the recording is completed,
 /// or when the card says that it threw samples away (after which its count no longer tells the place of a byte). A
 /// second thread delivers the cubes: whoever takes them may stall without a packet being lost.
+///
+/// Where the rig configures the radar too, that is brought up first (the card wants its LVDS clock), and its frames are
+/// stopped before the card is armed and started after. Frames that come although the radar's USB port is gone are taken
+/// as before; once the port is there again everything is set up anew.
 class Rig {
  public:
   enum class Level { kInfo, kWarning, kError };
   using CubeSink = std::function<void(AdcCube&&)>;
   using EventSink = std::function<void(Level, const std::string&)>;
 
-  /// Cubes are delivered from one thread, events reported from another, both the rig's own. Throws InputError for
+  /// Cubes are delivered from one thread, events reported from two others, all the rig's own. Throws InputError for
   /// options out of range.
   Rig(const RadarConfig& radar, const RigOptions& options, CubeSink cubes, EventSink events);
   ~Rig();  ///< ends the thread and the recording
@@ -69,6 +79,7 @@ class Rig {
   using Clock = std::chrono::steady_clock;
   void run();
   void open();
+  void prepareRadar();
   void configure();
   void arm();
   /// Receives until the card must be armed anew.
@@ -76,6 +87,8 @@ class Rig {
   /// True where the status ended the recording: the card has been stopped.
   bool handleStatus(std::uint16_t status);
   bool receiveBatch(int timeout_ms);
+  /// Throws where the radar was started and nothing came.
+  void checkFirstSamples(Clock::duration silent);
   void report(const std::string& problem);
   void setPhase(RigState::Phase phase);
   void publishState();
@@ -91,6 +104,7 @@ class Rig {
   FrameAssembler assembler_;
   std::unique_ptr<PacketReceiver> receiver_;
   std::unique_ptr<Dca1000Control> control_;
+  std::unique_ptr<RadarWatch> watch_;
   PacketReceiver::Counters earlier_;  ///< of receivers that were closed
   bool configured_ = false;
   const Clock::time_point started_ = Clock::now();

@@ -39,27 +39,7 @@ std::string seconds(double value_s) {
 
 RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : updater_(nh, private_nh, ros::this_node::getName()), diagnosed_at_(ros::WallTime::now()) {
-  StrictParameters parameters(private_nh);
-  const std::string radar_file = parameters.requiredText("radar", "the path of the device's radar.yaml");
-  options_.host_ip = parameters.text("host_ip", options_.host_ip);
-  options_.card_ip = parameters.text("card_ip", options_.card_ip);
-  options_.config_port = parameters.integer("config_port", options_.config_port, 1, 65535);
-  options_.data_port = parameters.integer("data_port", options_.data_port, 1, 65535);
-  options_.packet_delay_us = parameters.number("packet_delay_us", options_.packet_delay_us, 0, 524.28);
-  options_.record_pcap = parameters.text("record_pcap", "");
-  options_.configure_card = parameters.boolean("configure_card", options_.configure_card);
-  frame_id_ = parameters.text("frame_id", "radar_link");
-  parameters.rejectUnknown();
-
-  radar_ = loadRadarConfig(resolvePath(radar_file, "./"));
-  // Another program's packet delay is not known here.
-  if (options_.configure_card) {
-    try {
-      checkCaptureLink(radar_, options_.packet_delay_us);
-    } catch (const InputError& error) {
-      throw InputError(radar_file + ": " + error.what());
-    }
-  }
+  readParameters(private_nh);
   mmradartwin_msgs::RadarConfig config = toMsg(radar_);
   radar_hash_ = radarHash(config);
   config.header.stamp = ros::Time::now();
@@ -72,14 +52,66 @@ RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& priva
 
   updater_.setHardwareID("DCA1000 " + options_.card_ip);
   updater_.add("radar stream", this, &RadarDriver::diagnose);
+  updater_.add("capture card", this, &RadarDriver::diagnoseCard);
+  if (options_.radar) updater_.add("radar device", this, &RadarDriver::diagnoseDevice);
+  if (!map_frame_.empty()) {
+    updater_.add("radar pose", this, &RadarDriver::diagnosePose);
+    tf_buffer_ = std::make_unique<tf2_ros::Buffer>();
+    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(*tf_buffer_, handle);
+    pose_timer_ =
+        handle.createWallTimer(ros::WallDuration(0.02), [this](const ros::WallTimerEvent&) { observePose(); });
+  }
   rig_ = std::make_unique<Rig>(
       radar_, options_, [this](AdcCube&& cube) { publish(std::move(cube)); }, logEvent);
   // A timer, not the arrival of data: silence is what has to be reported.
   timer_ = handle.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.update(); });
 }
 
+void RadarDriver::readParameters(const ros::NodeHandle& private_nh) {
+  StrictParameters parameters(private_nh);
+  const std::string radar_file = parameters.requiredText("radar", "the path of the device's radar.yaml");
+  options_.host_ip = parameters.text("host_ip", options_.host_ip);
+  options_.card_ip = parameters.text("card_ip", options_.card_ip);
+  options_.config_port = parameters.integer("config_port", options_.config_port, 1, 65535);
+  options_.data_port = parameters.integer("data_port", options_.data_port, 1, 65535);
+  options_.packet_delay_us = parameters.number("packet_delay_us", options_.packet_delay_us, 0, 524.28);
+  options_.record_pcap = parameters.text("record_pcap", "");
+  options_.configure_card = parameters.boolean("configure_card", options_.configure_card);
+  const bool configure_radar = parameters.boolean("configure_radar", false);
+  options_.radar_firmware = parameters.text("radar_firmware", "");
+  frame_id_ = parameters.text("frame_id", "radar_link");
+  map_frame_ = parameters.text("map_frame", "map");
+  PoseWatch::Options pose;
+  pose.age_limit_s = parameters.number("pose_age_limit_s", pose.age_limit_s, 0.05, 3600);
+  pose_watch_ = PoseWatch(pose);
+  parameters.rejectUnknown();
+
+  const std::string file = resolvePath(radar_file, "./");
+  radar_ = loadRadarConfig(file);
+  if (configure_radar) {
+    if (!options_.configure_card) {
+      throw InputError(private_nh.resolveName("configure_radar") +
+                       ": true needs configure_card: true, since the radar is started when the card has been armed");
+    }
+    options_.radar = quantiseAwr2243(radar_, file);
+    radar_ = withQuantisedValues(radar_, *options_.radar);
+  } else if (!options_.radar_firmware.empty()) {
+    throw InputError(private_nh.resolveName("radar_firmware") + ": " + options_.radar_firmware +
+                     ": is used with configure_radar: true only");
+  }
+  // Another program's packet delay is not known here.
+  if (options_.configure_card) {
+    try {
+      checkCaptureLink(radar_, options_.packet_delay_us);
+    } catch (const InputError& error) {
+      throw InputError(radar_file + ": " + error.what());
+    }
+  }
+}
+
 RadarDriver::~RadarDriver() {
   timer_.stop();
+  pose_timer_.stop();
   rig_.reset();
 }
 
@@ -108,7 +140,9 @@ void RadarDriver::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
   } else if (state.silent_s > silence_limit_s) {
     status.summary(DiagnosticStatus::ERROR,
                    "no samples for " + seconds(state.silent_s) +
-                       ": the card is ready; start the radar's frames, and check the LVDS ribbon if they run");
+                       (options_.radar ? ": card and radar were started; check the LVDS ribbon"
+                                       : ": the card is ready; start the radar's frames, and check the LVDS ribbon if "
+                                         "they run"));
   } else if (dropped > 0) {
     status.summary(DiagnosticStatus::WARN, "this host dropped " + std::to_string(dropped) +
                                                " packets: raise net.core.rmem_max or free the processor");
@@ -142,12 +176,86 @@ void RadarDriver::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
     status.add("packets recorded", state.packets_recorded);
     status.add("packets missing from the recording", state.packets_not_recorded);
   }
-  status.add("recordings armed", state.armings);
   status.add("silent for [s]", state.silent_s);
+}
+
+void RadarDriver::diagnoseCard(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const RigState state = rig_->state();
+  const std::uint16_t bits = state.last_status.value_or(0);
+  if (!state.problem.empty()) {
+    status.summary(DiagnosticStatus::ERROR, state.problem);
+  } else if (state.phase == RigState::Phase::kConnecting) {
+    status.summary(DiagnosticStatus::WARN, "setting up the card");
+  } else if (bits & static_cast<std::uint16_t>(~kRecordCompleted)) {
+    status.summary(DiagnosticStatus::WARN, "the card reported " + describeStatus(bits));
+  } else {
+    status.summary(DiagnosticStatus::OK, !options_.configure_card ? "configured by another program" : "armed");
+  }
+  status.add("recordings armed", state.armings);
   status.add("last card status", state.last_status ? describeStatus(*state.last_status) : "none since armed");
   status.add("FPGA version", state.version
                                  ? std::to_string(state.version->major) + "." + std::to_string(state.version->minor)
                                  : "unknown");
+}
+
+void RadarDriver::diagnoseDevice(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const RadarWatch::State state = *rig_->state().radar;
+  const auto now = std::chrono::system_clock::now();
+  const auto recent = std::find_if(state.latest.begin(), state.latest.end(), [&](const RadarWatch::Event& event) {
+    return event.level != RadarWatch::Level::kInfo && now - event.at < std::chrono::seconds(10);
+  });
+  if (!state.problem.empty()) {
+    status.summary(DiagnosticStatus::ERROR, state.problem);
+  } else if (recent != state.latest.end()) {
+    const bool error = recent->level == RadarWatch::Level::kError;
+    status.summary(error ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN, "event: " + recent->text);
+  } else if (!state.running) {
+    status.summary(DiagnosticStatus::WARN,
+                   state.configured ? "configured, its frames do not run" : "not configured yet");
+  } else {
+    status.summary(DiagnosticStatus::OK, "frames run");
+  }
+  status.add("firmware", state.version.empty() ? "unknown" : state.version);
+  status.add("temperature at calibration [deg C]",
+             state.temperature_deg_c ? std::to_string(*state.temperature_deg_c) : "unknown");
+  status.add("slope as configured [MHz/us]", radar_.slope_hz_per_s * 1e-12);
+  status.add("bring-ups", state.bring_ups);
+  status.add("starts of the frames", state.starts);
+  status.add("events", state.events);
+  status.add("events that warn", state.warnings);
+  status.add("events that report an error", state.errors);
+  for (std::size_t i = 0; i < state.latest.size(); ++i) {
+    status.add(
+        "event " + std::to_string(i + 1) + " before now",
+        seconds(std::chrono::duration<double>(now - state.latest[i].at).count()) + " ago: " + state.latest[i].text);
+  }
+}
+
+/// The latest pose, often enough that none of a usual pose source goes by unseen for long.
+void RadarDriver::observePose() {
+  try {
+    const geometry_msgs::TransformStamped T = tf_buffer_->lookupTransform(map_frame_, frame_id_, ros::Time(0));
+    geometry_msgs::Pose pose;
+    pose.position.x = T.transform.translation.x;
+    pose.position.y = T.transform.translation.y;
+    pose.position.z = T.transform.translation.z;
+    pose.orientation = T.transform.rotation;
+    pose_watch_.observe(toNanoseconds(T.header.stamp), fromMsg(pose));
+  } catch (const tf2::TransformException&) {
+    // Not there yet, or its parts do not meet: the report tells its age.
+  }
+}
+
+void RadarDriver::diagnosePose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const PoseWatch::Report report = pose_watch_.report(toNanoseconds(ros::Time::now()));
+  status.summary(report.level == PoseWatch::Level::kFine      ? DiagnosticStatus::OK
+                 : report.level == PoseWatch::Level::kWarning ? DiagnosticStatus::WARN
+                                                              : DiagnosticStatus::ERROR,
+                 report.text);
+  status.add("transform", map_frame_ + " -> " + frame_id_);
+  status.add("age [s]", report.age_s ? seconds(*report.age_s) : "unknown");
+  status.add("gaps", report.gaps);
+  status.add("jumps", report.jumps);
 }
 
 }  // namespace mmradartwin

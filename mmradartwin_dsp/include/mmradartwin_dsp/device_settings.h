@@ -12,8 +12,9 @@ struct ImportedSettings {
   std::vector<std::string> assumed;  ///< lines: what the files do not say, and what radar.yaml has instead
 };
 
-/// Reads the settings of TI's tools: a mmWave Studio Lua script (ar1.* calls), mmWave Studio's JSON (*.mmwave.json;
-/// a setup.json names one) and the DCA1000's cf.json (its lanes), in any combination as long as one of them holds the
+/// Reads the settings of TI's tools: a mmWave Studio Lua script (ar1.* calls), mmWave Studio's XML (which keeps the
+/// chirps that were set last only, so that a frame of several transmitters needs another file) or JSON (*.mmwave.json;
+/// a setup.json names one), and the DCA1000's cf.json (its lanes), in any combination as long as one of them holds the
 /// radar's profile, chirps and frame. Values of two files that contradict each other are an error, as is everything
 /// whose meaning is not known for certain: a profile that changes from chirp to chirp, real samples, fewer than 16
 /// bits, advanced frames, expressions in Lua other than numbers, names and + - * / ( ).

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,10 @@ enum class CaptureLayout {
   kTwoLane    ///< xWR16xx/18xx/68xx: per chirp RX-major, groups I[n] I[n+1] Q[n] Q[n+1]
 };
 enum class IqOrder { kIq, kQi };
+
+/// Layout in which a device of this name sends its samples (awr2243, xWR1443, iwr6843, ...): by SWRA581B and SWRA555A
+/// xWR12xx, 14xx and 22xx have four lanes, xWR16xx, 18xx, 64xx and 68xx two. Empty for any other name.
+std::optional<CaptureLayout> captureLayoutOf(const std::string& device);
 
 /// The radar: what radar.yaml says. SI units; positions in radar_link (x boresight, y left, z up).
 struct RadarConfig {
@@ -61,7 +66,8 @@ struct RadarConfig {
   double virtual_pitch_m() const;
 };
 
-/// Reads radar.yaml strictly. Throws InputError.
+/// Reads radar.yaml strictly. Where it does not name a layout, the device's is taken, four lanes for a device that is
+/// not known. Throws InputError.
 RadarConfig loadRadarConfig(const std::string& file);
 RadarConfig parseRadarConfig(const std::string& yaml_text, const std::string& name);
 /// The text of a radar.yaml that reads back as `radar`.

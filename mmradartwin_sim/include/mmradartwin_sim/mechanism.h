@@ -4,6 +4,7 @@
 #include <complex>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -28,6 +29,9 @@ struct ParameterSpec {
   bool required = true;
   std::variant<double, std::string, std::vector<double>, std::vector<std::string>> default_value = 0.0;
   std::string meaning;  ///< one line
+  /// For a diagnosis that tries the mechanism on data: the value at which it does nothing, and one at which it plainly
+  /// does something. NaN where the parameter keeps its default in a trial. An integer or text is never tried.
+  double neutral = std::numeric_limits<double>::quiet_NaN(), typical = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// Checked values by name; every parameter of the mechanism is present unless it is optional without default.

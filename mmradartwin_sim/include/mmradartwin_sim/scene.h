@@ -24,6 +24,7 @@ struct Facet {
   bool reflects = true;   ///< false where the normal lies within 45 deg of the vertical: it only occludes
   bool present = true;    ///< false where a mechanism took the actor away; ids stay
   double flatness_m = 0;  ///< largest distance of a merged vertex from the plane
+  int curved = -1;        ///< index into Scene::curved of the surface that it is a chord of, -1 where it is a plane
 
   double planeDistance(const Eigen::Vector3d& p) const { return normal.dot(p - origin); }
   bool contains(const Eigen::Vector3d& p_on_plane, double tolerance_m = 0) const;
@@ -41,8 +42,21 @@ struct Actor {
   std::vector<int> triangle_facet;  ///< facet id per triangle, -1 where it has no area
   std::vector<int> facets;          ///< ids
   bool present = true;              ///< false where a mechanism took it away: no paths, no occlusion
-  bool occludes = true;  ///< false where rays pass through it; its own faces stay hidden behind each other
+  bool occludes = true;             ///< false where rays pass through it; its own faces stay hidden behind each other
   Eigen::AlignedBox3d bounds;
+};
+
+/// A sphere or straight circular cylinder that a tessellated part of an actor stands for. Its facets scatter and
+/// occlude one by one; their specular return is that of the surface, first order alone.
+struct CurvedSurface {
+  int actor = -1;
+  std::vector<int> facets;                           ///< ids
+  bool sphere = false;                               ///< else a cylinder
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< of a cylinder: of its lower end on the axis
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();   ///< unit, of a cylinder
+  double length_m = 0;                               ///< of a cylinder, along the axis
+  double radius_m = 0;
+  double sagitta_m = 0;  ///< how far the facets lie within the surface
 };
 
 /// When neighbouring triangles are one facet. Scans need wider limits than drawings.
@@ -56,6 +70,7 @@ struct Scene {
   FacetTolerance tolerance;  ///< scene.yaml's optional `facets: {angle_deg, offset_m}`
   std::vector<Actor> actors;
   std::vector<Facet> facets;
+  std::vector<CurvedSurface> curved;
   std::vector<Actor> screens;  ///< what mechanisms put into the room: they occlude, nothing else
 
   int actorIndex(const std::string& name) const;  ///< -1 where absent
@@ -65,7 +80,8 @@ struct Scene {
 /// key (unknown material, two actors of one name, no triangles, NaN or huge coordinates, material outside its frequency
 /// range).
 Scene loadScene(const std::string& scene_yaml, double frequency_hz);
-/// Facets of all actors, ids in the order of actors and triangles. Throws InputError for an actor without area.
+/// Facets and curved surfaces of all actors, ids in the order of actors and triangles. Throws InputError for an actor
+/// without area.
 void rebuildFacets(Scene& scene);
 /// Moves an actor with its facets; indices and facet-local coordinates stay.
 void moveActor(Scene& scene, int actor, const Eigen::Isometry3d& T_map_map);
@@ -83,6 +99,11 @@ class RayCaster {
   RayCaster(RayCaster&&) noexcept;
   /// True where the open segment a-b meets nothing, both ends shortened by gap_m.
   bool visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m = 1e-3) const;
+  /// visible() from a to many points, each with a gap of its own, one result per point: rays go to Embree in packets,
+  /// which pays where neighbouring points follow each other. Throws std::invalid_argument where the lists differ in
+  /// length.
+  std::vector<char> visible(const Eigen::Vector3d& a, const std::vector<Eigen::Vector3d>& points,
+                            const std::vector<double>& gap_m) const;
   struct Hit {
     double distance_m;
     int actor;

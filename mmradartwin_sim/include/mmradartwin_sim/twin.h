@@ -18,6 +18,8 @@
 
 namespace mmradartwin {
 
+class CondensedTrace;
+
 struct NamedParameters {
   std::string mechanism;
   Parameters values;
@@ -68,6 +70,12 @@ class Twin {
   /// mechanisms that remove an actor keep the indices.
   const Scene& scene() const;
   const RayCaster& rays() const;  ///< of scene()
+  /// A twin of the same scene and radar with other mechanisms; reads no mesh again. What setStrongestAmplitude() and
+  /// setSession() said holds on. Throws InputError as the constructor does.
+  Twin changed(std::vector<NamedParameters> mechanisms) const;
+  /// True where a mechanism edits the scene or moves the radar, so that every path has to be traced anew; else the
+  /// paths of a twin are those of its mechanisms one by one.
+  bool altersGeometry() const;
   /// Tells levels that are relative to the session's strongest echo; without it they refer to the strongest of the
   /// poses simulated so far.
   void setStrongestAmplitude(double amplitude);
@@ -80,6 +88,17 @@ class Twin {
   std::vector<PathRecord> trace(const Eigen::Isometry3d& T_map_radar) const;
   Simulation weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                    std::int64_t stamp_ns = 0) const;
+  /// The paths that weigh() makes a grid of: weighted, with leakage, and as the receiver's filters leave them.
+  std::vector<PathRecord> receivedPaths(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
+                                        std::int64_t stamp_ns = 0) const;
+  /// True where the receiver does more to the grid than filter it path by path.
+  bool hasReceiveStage() const;
+  /// Where all that the receiver does beyond filters is one complex matrix over the channels, the same at all samples:
+  /// that matrix [M][M]; else nothing.
+  std::optional<Eigen::MatrixXcd> channelMatrix(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
+  /// The same of what a trace was condensed to (traced_session.h): some thirty times as fast as tracing. Mechanisms
+  /// that look at the paths for what they do to the grid (second_harmonic) see those that stayed records.
+  Simulation weigh(const Eigen::Isometry3d& T_map_radar, const CondensedTrace& traced, std::int64_t stamp_ns = 0) const;
   /// Throws InputError for a pose that is NaN or inside an actor (names it).
   Simulation simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
 
@@ -100,9 +119,12 @@ class Twin {
                    const std::function<void(const ChirpContext&, const ComplexGrid&)>& visit) const;
 
  private:
+  Simulation weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced, std::int64_t stamp_ns,
+                   const CondensedTrace* condensed) const;
   void forEachChirp(const Simulation& pose, int frames,
                     const std::function<void(const ChirpContext&, ComplexGrid&)>& visit) const;
   struct Impl;
+  explicit Twin(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
 

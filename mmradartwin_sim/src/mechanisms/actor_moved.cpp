@@ -13,9 +13,9 @@ class ActorMoved : public Mechanism {
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("actor", true, "", "name of the actor"),
-            numberSpec("dx_m", "m", -100, 100, 0, "true minus twin, along map's x"),
-            numberSpec("dy_m", "m", -100, 100, 0, "true minus twin, along map's y"),
-            numberSpec("dyaw_deg", "deg", -180, 180, 0, "true minus twin, about the actor's centroid")};
+            tried(numberSpec("dx_m", "m", -100, 100, 0, "true minus twin, along map's x"), 0, 0.05),
+            tried(numberSpec("dy_m", "m", -100, 100, 0, "true minus twin, along map's y"), 0, 0.05),
+            tried(numberSpec("dyaw_deg", "deg", -180, 180, 0, "true minus twin, about the actor's centroid"), 0, 2)};
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
     actor_ = requireActor(scene, kName, values.text("actor"));

@@ -1,14 +1,12 @@
 #include <cmath>
 
-#include "../aperture.h"
+#include "../curved_surface.h"
 #include "propagation_builtin.h"
 
 namespace mmradartwin {
 namespace {
 
 const std::string kName = "actor_unmodelled";
-constexpr double kInset_m = 0.01;
-constexpr double kSmallestFactor = 0.01;
 constexpr int kSides = 24;  // of the screen that stands for the cylinder in occlusion
 
 /// Something in the room that the scene lacks, as an upright metal cylinder of diameter size_m: a shape that shows the
@@ -47,39 +45,19 @@ class ActorUnmodelled : public Mechanism {
   }
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
     const ElementsInMap elements(context);
-    const Eigen::Vector2d to(x_m_ - elements.p.x(), y_m_ - elements.p.y());
-    const double axis = to.norm(), R = axis - radius_m_, wavelength = context.radar.wavelength_m();
-    if (R <= 1e-3) return;
-    const double inset = std::min(kInset_m, 0.5 * (high_m_ - low_m_));
-    const double z = std::min(high_m_ - inset, std::max(low_m_ + inset, elements.p.z()));
-    const auto nearestTo = [&](const Eigen::Vector3d& p) {
-      const Eigen::Vector2d d = (Eigen::Vector2d(x_m_, y_m_) - p.head<2>()).normalized();
-      return Eigen::Vector3d(x_m_ - radius_m_ * d.x(), y_m_ - radius_m_ * d.y(), z);
-    };
-    const Eigen::Vector3d vertex = nearestTo(elements.p), way = vertex - elements.p;
-    const double distance = way.norm();
-    if (distance > context.max_range_m) return;
-    const Eigen::Vector3d direction_radar = context.T_map_radar.linear().transpose() * (way / distance);
-    if (!context.inFieldOfView(direction_radar)) return;
-    const double unit = 2 / std::sqrt(wavelength * R);
-    const std::complex<double> factor =
-        apertureAxis((low_m_ - elements.p.z()) * unit, (high_m_ - elements.p.z()) * unit);
-    if (std::abs(factor) < kSmallestFactor) return;
-    if (!context.rays.visible(elements.p, vertex, 1e-3)) return;
-    const std::complex<double> coefficient =
-        -std::sqrt(radius_m_ / (radius_m_ + R)) * factor * wavelength / (8 * M_PI * R);  // metal: Gamma = -1
+    CurvedSurface cylinder;
+    cylinder.center = {x_m_, y_m_, low_m_};
+    cylinder.radius_m = radius_m_;
+    cylinder.length_m = high_m_ - low_m_;
+    const std::optional<CurvedEcho> echo = curvedEcho(context, elements, cylinder);
+    if (!echo || !context.rays.visible(elements.p, echo->vertex, 1e-3)) return;
     PathRecord record;
     record.event = &kName;
-    record.vertices = {vertex};
-    record.departure = record.arrival = direction_radar;
+    record.vertices = {echo->vertex};
+    record.departure = record.arrival = echo->direction_radar;
     record.bounces = 1;
-    // The reflection point of a transmitter and a receiver that stand close lies at the middle of both.
-    for (const auto& t : elements.tx) {
-      for (const auto& r : elements.rx) {
-        const Eigen::Vector3d q = nearestTo(0.5 * (t + r));
-        record.length_m.push_back((q - t).norm() + (q - r).norm());
-      }
-    }
+    record.length_m = echo->length_m;
+    const std::complex<double> coefficient = -echo->coefficient;  // metal: Gamma = -1
     setContribution(context.radar, std::conj(coefficient), record);
     records.push_back(std::move(record));
   }

@@ -45,6 +45,13 @@ inline ParameterSpec numberSpec(const char* name, const char* unit, double min, 
   return s;
 }
 
+/// Says at which value a diagnosis finds the mechanism doing nothing, and at which plainly something.
+inline ParameterSpec tried(ParameterSpec spec, double neutral, double typical) {
+  spec.neutral = neutral;
+  spec.typical = typical;
+  return spec;
+}
+
 inline ParameterSpec textSpec(const char* name, bool required, const char* default_value, const char* meaning) {
   ParameterSpec s;
   s.name = name;

@@ -11,7 +11,7 @@ class CarrierScale : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("scale", "1", -0.2, 0.2, "epsilon of sin(theta) x (1 + epsilon), 0 is none")};
+    return {tried(numberSpec("scale", "1", -0.2, 0.2, "epsilon of sin(theta) x (1 + epsilon), 0 is none"), 0, 0.01)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     scale_ = values.number("scale");

@@ -17,10 +17,14 @@ class ChannelPhaseError : public Mechanism {
     phase.kind = ParameterKind::kNumbers;
     phase.required = false;
     phase.default_value = std::vector<double>();
+    phase.neutral = 0;
+    phase.typical = 10;
     ParameterSpec gain = numberSpec("gain_db", "dB", -60, 60, "per virtual channel, channel 0 is 0");
     gain.kind = ParameterKind::kNumbers;
     gain.required = false;
     gain.default_value = std::vector<double>();
+    gain.neutral = 0;
+    gain.typical = 1;
     return {phase, gain};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig& radar) override {

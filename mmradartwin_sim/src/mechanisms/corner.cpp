@@ -1,4 +1,4 @@
-#include "../corner_edge.h"
+#include "../trihedral.h"
 #include "builtin.h"
 
 namespace mmradartwin {
@@ -6,7 +6,7 @@ namespace {
 
 const std::string kName = "corner";
 
-/// The retro path of two facets that meet at a concave right angle.
+/// The retro paths of two and of three facets that meet at concave right angles.
 class Corner : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
@@ -17,15 +17,18 @@ class Corner : public Mechanism {
     edges_ = findCornerEdges(
         scene, kFacesMeet_m, [](const Facet& f) { return f.reflects; },
         [](const Facet&, const Facet&) { return true; });
+    trihedra_ = findTrihedra(scene, edges_, kFacesMeet_m);
   }
 
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
     const ElementsInMap elements(context);
     for (const CornerEdge& edge : edges_) addCornerPath(context, elements, edge, kName, 1, records);
+    for (const Trihedral& t : trihedra_) addTrihedralPath(context, elements, t, kName, 1, records);
   }
 
  private:
   std::vector<CornerEdge> edges_;
+  std::vector<Trihedral> trihedra_;
 };
 
 }  // namespace

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <set>
 
-#include "../corner_edge.h"
+#include "../trihedral.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "propagation_builtin.h"
 
@@ -11,7 +11,8 @@ namespace {
 const std::string kName = "corner_reflection";
 
 /// The retro path of corners that the named actors form with each other (or in themselves): the law of `corner`, for
-/// faces that come within gap_m of each other, where `corner` itself does not return that pair already.
+/// faces that come within gap_m of each other, where `corner` itself does not return that pair already. The three faces
+/// of a trihedral may lie any way: one whose boresight is level always has a face within 45 deg of the floor.
 class CornerReflection : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
@@ -30,9 +31,17 @@ class CornerReflection : public Mechanism {
     edges_ = findCornerEdges(
         scene, gap_m_, [this](const Facet& f) { return f.reflects && named_.count(f.actor) > 0; },
         [one](const Facet& a, const Facet& b) { return one || a.actor != b.actor; });
+    const std::vector<CornerEdge> all = findCornerEdges(
+        scene, gap_m_, [this](const Facet& f) { return named_.count(f.actor) > 0; },
+        [](const Facet&, const Facet&) { return true; });
+    for (Trihedral& t : findTrihedra(scene, all, gap_m_)) {
+      std::set<int> actors;
+      for (int id : t.facets) actors.insert(scene.facets[id].actor);
+      if (one || actors.size() > 1) trihedra_.push_back(std::move(t));
+    }
   }
   std::vector<std::string> notes() const override {
-    if (!edges_.empty()) return {};
+    if (!edges_.empty() || !trihedra_.empty()) return {};
     return {"corner_reflection: the named actors form no corner; check actors and gap_m"};
   }
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
@@ -44,12 +53,17 @@ class CornerReflection : public Mechanism {
     for (const CornerEdge& edge : edges_) {
       if (known.count({edge.a, edge.b}) == 0) addCornerPath(context, elements, edge, kName, 1, records);
     }
+    for (const Trihedral& t : trihedra_) {
+      if (known.count({t.facets.begin(), t.facets.end()}) == 0)
+        addTrihedralPath(context, elements, t, kName, 1, records);
+    }
   }
 
  private:
   std::set<int> named_;
   double gap_m_ = 0;
   std::vector<CornerEdge> edges_;
+  std::vector<Trihedral> trihedra_;
 };
 
 }  // namespace

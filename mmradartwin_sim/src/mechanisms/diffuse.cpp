@@ -63,6 +63,10 @@ class Diffuse : public Mechanism {
     const double spreading = context.radar.wavelength_m() / (4 * M_PI);
     const Eigen::Matrix3d to_radar = context.T_map_radar.linear().transpose();
     const double max2 = context.max_range_m * context.max_range_m;
+    // Levels first, then visibility of all that has one: its rays run side by side.
+    std::vector<const ScatterPoint*> lit;
+    std::vector<Eigen::Vector3d> position, seen_along;
+    std::vector<double> level, gap;
     for (const ScatterPoint& point : points_) {
       const Eigen::Vector3d way = point.position - elements.p;
       const double r2 = way.squaredNorm();
@@ -84,17 +88,25 @@ class Diffuse : public Mechanism {
         amplitude *= std::sqrt(M_PI * std::pow(cosine * cosine, alpha_) / (directiveNorm(alpha_, cosine) * cosine));
       }
       if (!(amplitude > 0)) continue;
-      const double gap = std::max(1e-3, 2 * facet.flatness_m / std::max(0.1, cosine));
-      if (!context.rays.visible(elements.p, point.position, gap)) continue;
+      lit.push_back(&point);
+      position.push_back(point.position);
+      seen_along.push_back(direction_radar);
+      level.push_back(amplitude);
+      gap.push_back(std::max(1e-3, 2 * facet.flatness_m / std::max(0.1, cosine)));
+    }
+    const std::vector<char> visible = context.rays.visible(elements.p, position, gap);
+    for (std::size_t i = 0; i < lit.size(); ++i) {
+      if (!visible[i]) continue;
+      const Facet& facet = context.scene.facets[lit[i]->facet];
       PathRecord record;
       record.event = &kName;
       record.actors = {facet.actor};
       record.facets = {facet.id};
-      record.vertices = {point.position};
-      record.departure = record.arrival = direction_radar;
+      record.vertices = {lit[i]->position};
+      record.departure = record.arrival = seen_along[i];
       record.bounces = 1;
-      record.length_m = elements.lengthsVia(point.position);
-      setContribution(context.radar, std::polar(amplitude, point.phase_rad(context.seed)), record);
+      record.length_m = elements.lengthsVia(lit[i]->position);
+      setContribution(context.radar, std::polar(level[i], lit[i]->phase_rad(context.seed)), record);
       records.push_back(std::move(record));
     }
   }

@@ -13,7 +13,8 @@ class DiffuseScattering : public Mechanism {
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("material", true, "", "material tag"),
-            numberSpec("scattering_coefficient", "1", 0, 1, "S: the share S^2 of the reflected power scatters")};
+            tried(numberSpec("scattering_coefficient", "1", 0, 1, "S: the share S^2 of the reflected power scatters"),
+                  0, 0.4)};
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
     affected_ = requireMaterial(scene, kName, values.text("material"));

@@ -16,7 +16,7 @@ class EdgeDiffraction : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("level", "1", 0, 100, 1, "factor of amplitude, 1 = UTD")};
+    return {tried(numberSpec("level", "1", 0, 100, 1, "factor of amplitude, 1 = UTD"), 0, 1)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     level_ = values.number("level");

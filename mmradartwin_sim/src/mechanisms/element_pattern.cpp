@@ -14,7 +14,7 @@ class ElementPattern : public Mechanism {
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
     return {
-        numberSpec("cos_exponent", "1", 0, 100, 0, "n of the one-way power cos^n of the azimuth"),
+        tried(numberSpec("cos_exponent", "1", 0, 100, 0, "n of the one-way power cos^n of the azimuth"), 0, 1.5),
         optionalListSpec("angles_deg", "deg", -180, 180, "azimuths of a measured curve, rising, positive to the left"),
         optionalListSpec("gain_db", "dB", -200, 60, "one-way power at angles_deg"),
         optionalListSpec("elevation_angles_deg", "deg", -90, 90, "elevations of a measured curve, rising"),

@@ -12,7 +12,9 @@ class ExcessAttenuation : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("db_per_m", "dB/m", -20, 20, "loss of power per metre of one-way range, positive is a loss")};
+    return {
+        tried(numberSpec("db_per_m", "dB/m", -20, 20, "loss of power per metre of one-way range, positive is a loss"),
+              0, 0.5)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     db_per_m_ = values.number("db_per_m");

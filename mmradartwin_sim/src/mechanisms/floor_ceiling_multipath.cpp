@@ -17,7 +17,7 @@ class FloorCeilingMultipath : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("level", "1", 0, 100, 1, "factor of amplitude, 1 = full"),
+    return {tried(numberSpec("level", "1", 0, 100, 1, "factor of amplitude, 1 = full"), 0, 1),
             numberSpec("gap_m", "m", 0, 1, 0.025, "upright faces that end this near to a floor stand on it")};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {

@@ -13,7 +13,7 @@ class GainDrift : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("db_per_hour", "dB/h", -1000, 1000, 0, "give this or steps_db"),
+    return {tried(numberSpec("db_per_hour", "dB/h", -1000, 1000, 0, "give this or steps_db"), 0, 5),
             optionalListSpec("steps_db", "dB", -100, 100, "steps of the gain in time order, between equal parts")};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {

@@ -15,7 +15,7 @@ class IfHighpass : public Mechanism {
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
     return {
-        numberSpec("corner_hz", "Hz", 1e3, 1e7, "-3 dB of the whole"),
+        tried(numberSpec("corner_hz", "Hz", 1e3, 1e7, "-3 dB of the whole"), 1000, 350000),
         numberSpec("ratio", "1", 0, 100, 0, "of the second section's corner to the first; 0: radar.yaml's, else 2")};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig& radar) override {

@@ -13,7 +13,7 @@ class IfLowpass : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("corner_hz", "Hz", 1e3, 1e9, "-3 dB of the whole"),
+    return {tried(numberSpec("corner_hz", "Hz", 1e3, 1e9, "-3 dB of the whole"), 1e+09, 4.5e+06),
             integerSpec("order", "1", 1, 20, 6, "of the Butterworth edge")};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {

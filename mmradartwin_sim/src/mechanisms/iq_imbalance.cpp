@@ -12,7 +12,7 @@ class IqImbalance : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("image_db", "dB", -200, 0, "of the image against its host"),
+    return {tried(numberSpec("image_db", "dB", -200, 0, "of the image against its host"), -200, -25),
             numberSpec("phase_deg", "deg", -360, 360, 0, "of beta")};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {

@@ -15,7 +15,7 @@ class MaterialReflectivity : public Mechanism {
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("material", false, "", "material tag; give this or actor"),
             textSpec("actor", false, "", "actor; give this or material"),
-            numberSpec("delta_db", "dB", -200, 60, "echo, measured minus twin")};
+            tried(numberSpec("delta_db", "dB", -200, 60, "echo, measured minus twin"), 0, -3)};
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
     const std::string& material = values.text("material");

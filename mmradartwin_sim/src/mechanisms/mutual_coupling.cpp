@@ -13,7 +13,7 @@ class MutualCoupling : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("level_db", "dB", -200, 0, "of the next element's signal"),
+    return {tried(numberSpec("level_db", "dB", -200, 0, "of the next element's signal"), -200, -25),
             numberSpec("decay_db", "dB", 0, 200, 6, "less for every element further"),
             numberSpec("phase_deg", "deg", -360, 360, 0, "per element of distance")};
   }

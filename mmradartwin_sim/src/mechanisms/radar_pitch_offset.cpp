@@ -12,7 +12,7 @@ class RadarPitchOffset : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("pitch_deg", "deg", -90, 90, "true minus reported, about y, nose down positive")};
+    return {tried(numberSpec("pitch_deg", "deg", -90, 90, "true minus reported, about y, nose down positive"), 0, 5)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     pitch_rad_ = values.number("pitch_deg") * M_PI / 180;

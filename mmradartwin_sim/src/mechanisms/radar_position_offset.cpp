@@ -10,8 +10,8 @@ class RadarPositionOffset : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("forward_m", "m", -10, 10, 0, "true minus reported, along boresight"),
-            numberSpec("left_m", "m", -10, 10, 0, "true minus reported, to the left")};
+    return {tried(numberSpec("forward_m", "m", -10, 10, 0, "true minus reported, along boresight"), 0, 0.03),
+            tried(numberSpec("left_m", "m", -10, 10, 0, "true minus reported, to the left"), 0, 0.03)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     offset_ = Eigen::Vector3d(values.number("forward_m"), values.number("left_m"), 0);

@@ -12,7 +12,8 @@ class RadarYawOffset : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("yaw_deg", "deg", -180, 180, "true heading minus reported, positive to the left")};
+    return {
+        tried(numberSpec("yaw_deg", "deg", -180, 180, "true heading minus reported, positive to the left"), 0, 0.5)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     yaw_rad_ = values.number("yaw_deg") * M_PI / 180;

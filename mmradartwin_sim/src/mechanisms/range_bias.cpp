@@ -10,7 +10,7 @@ class RangeBias : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("range_m", "m", -5, 5, "added to every one-way range")};
+    return {tried(numberSpec("range_m", "m", -5, 5, "added to every one-way range"), 0, 0.02)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     range_m_ = values.number("range_m");

@@ -10,7 +10,7 @@ class RangeScale : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("scale", "1", -0.5, 0.5, "epsilon of range x (1 + epsilon)")};
+    return {tried(numberSpec("scale", "1", -0.5, 0.5, "epsilon of range x (1 + epsilon)"), 0, 0.005)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     scale_ = values.number("scale");

@@ -12,9 +12,9 @@ class SceneRegistration : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("x_m", "m", -100, 100, 0, "true minus twin, along map's x"),
-            numberSpec("y_m", "m", -100, 100, 0, "true minus twin, along map's y"),
-            numberSpec("yaw_deg", "deg", -180, 180, 0, "true minus twin, about map's origin")};
+    return {tried(numberSpec("x_m", "m", -100, 100, 0, "true minus twin, along map's x"), 0, 0.03),
+            tried(numberSpec("y_m", "m", -100, 100, 0, "true minus twin, along map's y"), 0, 0.03),
+            tried(numberSpec("yaw_deg", "deg", -180, 180, 0, "true minus twin, about map's origin"), 0, 0.5)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     T_ = Eigen::Translation3d(values.number("x_m"), values.number("y_m"), 0) *

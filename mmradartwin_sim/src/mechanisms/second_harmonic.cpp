@@ -15,7 +15,8 @@ class SecondHarmonic : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("level_db", "dB", -200, 0, "against the host, at the session's strongest host")};
+    return {
+        tried(numberSpec("level_db", "dB", -200, 0, "against the host, at the session's strongest host"), -200, -25)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     level_ = std::pow(10.0, values.number("level_db") / 20);

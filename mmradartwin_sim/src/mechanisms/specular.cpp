@@ -1,6 +1,8 @@
+#include <atomic>
 #include <cmath>
 
 #include "../aperture.h"
+#include "../curved_surface.h"
 #include "../image_paths.h"
 #include "../image_record.h"
 #include "../polarisation.h"
@@ -39,17 +41,29 @@ class Specular : public Mechanism {
   }
 
   std::vector<std::string> notes() const override {
-    if (exhaustive_ >= max_bounces_) return {};
-    if (max_bounces_ > 3 && exhaustive_ == 3) return {};
-    return {"specular: " + std::to_string(search_->reflectors().size()) +
-            " facets are too many to try all sequences of more than " + std::to_string(exhaustive_) +
-            "; higher orders come from " + std::to_string(ray_budget_) + " launched rays per pose"};
+    std::vector<std::string> notes;
+    if (exhaustive_ < max_bounces_ && !(max_bounces_ > 3 && exhaustive_ == 3)) {
+      notes.push_back("specular: " + std::to_string(search_->reflectors().size()) +
+                      " facets are too many to try all sequences of more than " + std::to_string(exhaustive_) +
+                      "; higher orders come from " + std::to_string(ray_budget_) + " launched rays per pose");
+    }
+    if (seeded_poses_ > 0) {
+      notes.push_back("specular: launched rays found " + std::to_string(seeded_paths_) + " paths at " +
+                      std::to_string(seeded_poses_) + " poses, " +
+                      (late_paths_ == 0
+                           ? "half as many rays would have found the same"
+                           : std::to_string(late_paths_) +
+                                 " of them only when the rays were doubled; raise ray_budget until none is"));
+    }
+    return notes;
   }
 
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
     if (max_bounces_ < 1) return;
     const ElementsInMap elements(context);
     for (int id : search_->reflectors()) addFirstOrder(context, elements, context.scene.facets[id], records);
+    for (std::size_t i = 0; i < context.scene.curved.size(); ++i)
+      addCurved(context, elements, static_cast<int>(i), records);
     if (max_bounces_ < 2) return;
     ImageSearch::Limits limits;
     limits.max_order = exhaustive_;
@@ -64,13 +78,18 @@ class Specular : public Mechanism {
     if (exhaustive_ < max_bounces_ && ray_budget_ > 0) {
       limits.max_order = max_bounces_;
       ImagePath path;
-      for (const auto& sequence : search_->seeds(elements.p, context.rays, limits, ray_budget_,
-                                                 context.T_map_radar.linear(), 20 * M_PI / 180)) {
+      ++seeded_poses_;
+      for (const auto& [sequence, by_half] : search_->seeds(elements.p, context.rays, limits, ray_budget_,
+                                                            context.T_map_radar.linear(), 20 * M_PI / 180)) {
         if (static_cast<int>(sequence.size()) <= std::max(1, exhaustive_)) continue;
         if (sequence.size() == 2 && perpendicular(context.scene.facets[sequence[0]], context.scene.facets[sequence[1]]))
           continue;
-        if (search_->solve(elements.p, sequence, context.rays, limits, path))
-          addImageRecord(context, elements, path, kName, 1, cutoff_, records);
+        if (!search_->solve(elements.p, sequence, context.rays, limits, path)) continue;
+        const std::size_t before = records.size();
+        addImageRecord(context, elements, path, kName, 1, cutoff_, records);
+        if (records.size() == before) continue;
+        ++seeded_paths_;
+        late_paths_ += !by_half;
       }
     }
   }
@@ -128,9 +147,45 @@ class Specular : public Mechanism {
     records.push_back(std::move(record));
   }
 
+  void addCurved(const PoseContext& context, const ElementsInMap& elements, int index,
+                 std::vector<PathRecord>& records) const {
+    const CurvedSurface& surface = context.scene.curved[index];
+    const Actor& actor = context.scene.actors[surface.actor];
+    if (!actor.present) return;
+    const std::optional<CurvedEcho> echo = curvedEcho(context, elements, surface);
+    if (!echo || std::abs(echo->straight.z()) > std::sqrt(0.5)) return;  // facets there take no part
+    // The facets lie a little behind the surface; one of them has to be what is met first. A second ray beside the
+    // first, where that slips through between two triangles.
+    const double reach = echo->distance_m + 4 * surface.sagitta_m + 2 * kInset_m;
+    const auto met = [&](const Eigen::Vector3d& direction) {
+      const auto hit = context.rays.firstHit(elements.p, direction, reach);
+      return hit && hit->facet >= 0 && context.scene.facets[hit->facet].curved == index;
+    };
+    if (!met(echo->direction) && !met(echo->direction + 1e-4 * echo->direction.unitOrthogonal())) return;
+    const Eigen::Vector3d e = verticalField(elements.up, echo->straight);
+    const ComplexVector back = reflectField(e.cast<std::complex<double>>(), echo->straight, echo->straight,
+                                            actor.material, context.frequency_hz);
+    const std::complex<double> gamma = (e.cast<std::complex<double>>().transpose() * back)(0);
+    const std::complex<double> coefficient = echo->coefficient * specularShare(actor.material) * gamma;
+    if (std::abs(coefficient) < cutoff_ || !(std::abs(coefficient) > 0)) return;
+    PathRecord record;
+    record.event = &kName;
+    record.actors = {surface.actor};
+    record.facets = {surface.facets.front()};
+    record.vertices = {echo->vertex};
+    record.departure = record.arrival = echo->direction_radar;
+    record.bounces = 1;
+    record.reflection_cosine = {1.0};
+    record.length_m = echo->length_m;
+    setContribution(context.radar, std::conj(coefficient), record);
+    records.push_back(std::move(record));
+  }
+
   int max_bounces_ = 3, ray_budget_ = 0, exhaustive_ = 0;
   double cutoff_ = 0;
   std::unique_ptr<ImageSearch> search_;
+  // What notes() says of convergence; no result depends on it.
+  mutable std::atomic<int> seeded_poses_{0}, seeded_paths_{0}, late_paths_{0};
 };
 
 }  // namespace

@@ -15,7 +15,7 @@ class SurfaceRoughness : public Mechanism {
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("material", true, "", "material tag"),
-            numberSpec("roughness_rms_m", "m", 0, 0.01, "rms height of the surface")};
+            tried(numberSpec("roughness_rms_m", "m", 0, 0.01, "rms height of the surface"), 0, 0.0003)};
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
     rough_ = requireMaterial(scene, kName, values.text("material"));

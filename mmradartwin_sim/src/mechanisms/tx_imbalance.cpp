@@ -13,8 +13,8 @@ class TxImbalance : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("phase_deg", "deg", -360, 360, 0, "of the second transmitter's channels"),
-            numberSpec("gain_db", "dB", -60, 60, 0, "of the second transmitter's channels")};
+    return {tried(numberSpec("phase_deg", "deg", -360, 360, 0, "of the second transmitter's channels"), 0, 10),
+            tried(numberSpec("gain_db", "dB", -60, 60, 0, "of the second transmitter's channels"), 0, 1)};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig& radar) override {
     if (radar.slots() < 2)

@@ -23,7 +23,8 @@ class WallGhost : public Mechanism {
   std::vector<ParameterSpec> parameters() const override {
     return {textsSpec("walls", "names of the actors that mirror"),
             numberSpec("spacing_m", "m", 0.005, 5, 0.2, "mean distance of scatter points"),
-            numberSpec("gain_db", "dB", -60, 60, 0, "how much more than its law a scatterer sends sideways")};
+            tried(numberSpec("gain_db", "dB", -60, 60, 0, "how much more than its law a scatterer sends sideways"), -60,
+                  0)};
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
     if (values.texts("walls").empty()) throw InputError("mechanism wall_ghost: key walls: names no actor");

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_attribution/evaluation.h"
+#include "mmradartwin_attribution/finding.h"
+#include "mmradartwin_dsp/session.h"
+#include "mmradartwin_sim/twin.h"
+
+namespace mmradartwin {
+
+/// Where a diagnosis is; `share` of the stage from 0 to 1.
+struct DiagnosisProgress {
+  std::string stage;
+  double share = 0;
+};
+
+struct DiagnosisOptions {
+  int jobs = 0;  ///< 0: as many as there are cores
+  std::function<void(const DiagnosisProgress&)> on_progress;
+  std::function<bool()> cancelled;  ///< asked between steps
+  AttributionConfig config;         ///< of the paper's metrics
+};
+
+/// Thrown where DiagnosisOptions::cancelled said so.
+class DiagnosisCancelled : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A hypothesis that was looked at, for the report.
+struct TriedHypothesis {
+  std::string label;
+  double promised = 0;  ///< nats by the score test
+  double gain = 0;      ///< nats after the fit, NaN where it was not fitted
+  int round = 0;
+};
+
+struct Diagnosis {
+  Findings findings;
+  TwinDescription extended;           ///< the twin with all findings' mechanisms
+  std::vector<PoseProblem> problems;  ///< poses that were left out
+  std::vector<TriedHypothesis> tried;
+  double explained_power = 0;    ///< of the twin as given, all poses
+  bool nothing_matches = false;  ///< scene and measurement have nothing in common
+};
+
+/// Finds what the twin gets wrong about a recording, names it and measures on held-out places what saying so gains
+/// (DESIGN sections 4, 5 and 7). Sets the twin's strongest amplitude and session. Throws InputError for a recording
+/// that cannot be judged at all, DiagnosisCancelled.
+Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOptions& options);
+
+/// The same without a scene: then only frames can be judged, and the extended twin is none.
+Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& options);
+
+}  // namespace mmradartwin

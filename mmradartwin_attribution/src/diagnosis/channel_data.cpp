@@ -1,0 +1,70 @@
+#include "channel_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/range_angle.h"
+
+namespace mmradartwin {
+namespace {
+
+double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
+
+}  // namespace
+
+void transformGrid(const SignalChain& chain, PoseChannels& pose) {
+  const double window = sum(hannWindow(chain.radar().samples_per_chirp));
+  pose.y = chain.rangeSpectra(pose.grid.x) / (window * pose.grid.full_scale);
+}
+
+ChannelData readChannels(const Recording& recording, FrameExaminer& examiner,
+                         const std::function<void(std::size_t done, std::size_t all)>& on_progress) {
+  ChannelData data;
+  data.radar = recording.radar;
+  data.problems = recording.problems;
+  const SignalChain chain(recording.radar);
+  const std::vector<double> window = hannWindow(recording.radar.samples_per_chirp);
+  double window2 = 0;
+  for (double w : window) window2 += w * w;
+  const double per_sample = window2 / (sum(window) * sum(window) * 32768.0 * 32768.0);
+  std::size_t done = 0;
+  for (const Pose& pose : recording.poses) {
+    try {
+      std::vector<AdcCube> frames;
+      recording.forEachFrame(pose, [&](const AdcCube& cube) { frames.push_back(cube); });
+      if (frames.empty()) throw InputError("its capture holds no frame; record it again");
+      const bool silent = std::all_of(frames.begin(), frames.end(), [](const AdcCube& cube) {
+        return std::all_of(cube.data.begin(), cube.data.end(), [](std::int16_t v) { return v == 0; });
+      });
+      if (silent) throw InputError("all its samples are zero; check the capture");
+      examiner.addPose(pose, frames);
+      const PoseFrames& seen = examiner.poses().back();
+      PoseChannels channels;
+      channels.pose = pose;
+      channels.frames = static_cast<int>(frames.size());
+      channels.grid = seen.mean;
+      channels.noise_power = per_sample * sum(seen.noise_variance) / static_cast<double>(seen.noise_variance.size()) /
+                             std::max(1, seen.shots);
+      channels.shots = std::max(1, seen.shots);
+      transformGrid(chain, channels);
+      const auto at = std::find(data.locations.begin(), data.locations.end(), pose.location);
+      channels.location = static_cast<int>(at - data.locations.begin());
+      if (at == data.locations.end()) data.locations.push_back(pose.location);
+      data.poses.push_back(std::move(channels));
+    } catch (const InputError& error) {
+      const std::string message = error.what();
+      const bool named = message.rfind("pose '" + pose.name, 0) == 0 || message.rfind("pose " + pose.name, 0) == 0;
+      data.problems.push_back({pose.name, named ? message : "pose '" + pose.name + "': " + message});
+    }
+    if (on_progress) on_progress(++done, recording.poses.size());
+  }
+  if (data.poses.empty()) {
+    throw InputError(recording.source + ": no pose can be used" +
+                     (data.problems.empty() ? "" : "; the first problem: " + data.problems.front().message));
+  }
+  return data;
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_attribution/frame_evidence.h"
+#include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_dsp/receive_grid.h"
+#include "mmradartwin_dsp/session.h"
+
+namespace mmradartwin {
+
+/// What the diagnosis knows of one pose: windowed range spectra of its coherent average, as complex channels.
+struct PoseChannels {
+  Pose pose;
+  int location = 0;  ///< index of its place, for what is held out
+  int frames = 0;
+  ReceiveGrid grid;        ///< the average itself
+  Eigen::MatrixXcd y;      ///< [M][N] range spectra over the window's sum and full scale: a tone's own amplitude
+  double noise_power = 0;  ///< thermal power in a cell of y, from the scatter of the frames; 0 for a single frame
+};
+
+struct ChannelData {
+  RadarConfig radar;
+  std::vector<PoseChannels> poses;
+  std::vector<std::string> locations;  ///< names, in order of appearance
+  std::vector<PoseProblem> problems;   ///< poses left out, with the reason
+};
+
+/// Reads all captures once, frames through the examiner, whose repaired averages are taken. Throws InputError where no
+/// pose is left.
+ChannelData readChannels(const Recording& recording, FrameExaminer& examiner,
+                         const std::function<void(std::size_t done, std::size_t all)>& on_progress);
+
+class SignalChain;
+/// Fills y of a pose from its grid (again, after the grid was changed).
+void transformGrid(const SignalChain& chain, PoseChannels& pose);
+
+}  // namespace mmradartwin

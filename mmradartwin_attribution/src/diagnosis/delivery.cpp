@@ -1,0 +1,111 @@
+#include "delivery.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "mmradartwin_dsp/range_angle.h"
+#include "session_model.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr std::size_t kPoses = 24;  ///< a delivery shows in every pose; so many decide by thousands of nats
+constexpr double kPerPose = 2;      ///< nats per pose below which nothing is claimed
+constexpr int kIterations = 3;
+
+/// What the mechanism of that name does to a grid; each conjugation is its own inverse.
+ComplexGrid delivered(const ComplexGrid& x, const NamedParameters& mechanism) {
+  ComplexGrid y(x.rows(), x.cols());
+  if (mechanism.mechanism == "iq_conjugation") return x.conjugate();
+  if (mechanism.mechanism == "channel_conjugation") {
+    for (Eigen::Index n = 0; n < x.cols(); ++n) y.col(n) = x.col((x.cols() - n) % x.cols()).conjugate();
+    return y;
+  }
+  // order[i] is the true channel that stands in place i.
+  const std::vector<double>& order = mechanism.values.numbers("order");
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    y.row(static_cast<Eigen::Index>(order[static_cast<std::size_t>(i)])) = x.row(i);
+  }
+  return y;
+}
+
+NamedParameters permutation(const std::vector<int>& order) {
+  NamedParameters m = defaultMechanism("channel_permutation");
+  m.values.set("order", std::vector<double>(order.begin(), order.end()));
+  return m;
+}
+
+}  // namespace
+
+void undoDelivery(const Delivery& delivery, ChannelData& data) {
+  const SignalChain chain(data.radar);
+  for (PoseChannels& p : data.poses) {
+    p.grid.x = delivered(p.grid.x, delivery.mechanism);
+    transformGrid(chain, p);
+  }
+}
+
+std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data) {
+  ChannelData some = data;
+  if (some.poses.size() > kPoses) {
+    std::vector<PoseChannels> chosen;
+    for (std::size_t i = 0; i < kPoses; ++i) chosen.push_back(data.poses[i * data.poses.size() / kPoses]);
+    some.poses = std::move(chosen);
+  }
+  const PoseAccuracy accuracy;
+  EchoSource source(twin, some, accuracy);
+  const std::vector<PoseEchoes> echoes = source.echoes(twin.description().mechanisms);
+  const SessionModel model(some, static_cast<int>(twin.scene().actors.size()), accuracy);
+  const Nuisance start = model.start(echoes);
+  const ChannelData as_it_is = some;
+  const auto likelihood = [&](const NamedParameters* mechanism, int iterations) {
+    some.poses = as_it_is.poses;
+    if (mechanism != nullptr) undoDelivery({*mechanism, 0, {}}, some);
+    Nuisance nuisance = start;
+    if (iterations > 0) return model.fit(echoes, nuisance, iterations);
+    return model.logLikelihood(echoes, nuisance);
+  };
+  std::vector<std::pair<double, NamedParameters>> tried;
+  for (const char* name : {"iq_conjugation", "channel_conjugation"}) {
+    const NamedParameters m = defaultMechanism(name);
+    tried.emplace_back(likelihood(&m, kIterations), m);
+  }
+  // Orders: exchanges of two places as long as they help, from the order as it is and from its reverse.
+  const int channels = data.radar.channels();
+  std::vector<int> same(static_cast<std::size_t>(channels));
+  std::iota(same.begin(), same.end(), 0);
+  std::vector<int> reverse(same.rbegin(), same.rend());
+  for (std::vector<int> order : {same, reverse}) {
+    NamedParameters m = permutation(order);
+    double best = likelihood(&m, 0);
+    for (bool better = true; better;) {
+      better = false;
+      std::vector<int> found = order;
+      for (std::size_t i = 0; i < order.size(); ++i) {
+        for (std::size_t j = i + 1; j < order.size(); ++j) {
+          std::vector<int> next = order;
+          std::swap(next[i], next[j]);
+          m = permutation(next);
+          const double value = likelihood(&m, 0);
+          if (value <= best + 1) continue;
+          best = value;
+          found = next;
+          better = true;
+        }
+      }
+      order = found;
+    }
+    if (order == same) continue;
+    m = permutation(order);
+    tried.emplace_back(likelihood(&m, kIterations), m);
+  }
+  const double as_said = likelihood(nullptr, kIterations);
+  std::stable_sort(tried.begin(), tried.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  const double gain = tried.front().first - as_said;
+  if (gain < kPerPose * static_cast<double>(some.poses.size())) return std::nullopt;
+  Delivery d{tried.front().second, gain, std::nullopt};
+  if (tried.size() > 1) d.margin = tried[0].first - tried[1].first;
+  return d;
+}
+
+}  // namespace mmradartwin

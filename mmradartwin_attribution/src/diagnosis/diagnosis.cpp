@@ -1,0 +1,609 @@
+#include "mmradartwin_attribution/diagnosis.h"
+
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <iomanip>
+#include <memory>
+#include <numeric>
+#include <set>
+#include <sstream>
+
+#include "back_projection.h"
+#include "body_fixed_tone.h"
+#include "channel_data.h"
+#include "delivery.h"
+#include "empirical_hypothesis.h"
+#include "held_out_gain.h"
+#include "hypothesis_fit.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "session_model.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr int kFolds = 5;
+constexpr double kFalseAlarm = 0.01;  ///< family-wise, per round
+constexpr int kMostFindings = 4;
+constexpr std::size_t kScreenPoses = 44;  ///< a part of the session ranks hypotheses well enough
+constexpr std::size_t kFewestPoses = 12;
+constexpr std::size_t kSecondLook = 9;     ///< hypotheses that are looked at on all poses
+constexpr std::size_t kSuspects = 6;       ///< actors whose geometry is tried
+constexpr std::size_t kMostFits = 7;       ///< of one round
+constexpr double kWorthAFit = 6;           ///< nats promised
+constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding
+constexpr double kAlike = 5;               ///< nats within which two names are not told apart
+constexpr double kObjectPlaces = 500;      ///< places of an 8 by 6 m room that a session resolves, as a family
+
+std::string number(double value, int digits = 3) {
+  std::ostringstream out;
+  out << std::setprecision(digits) << value;
+  return out.str();
+}
+
+bool catalogued(const std::string& name) {
+  const auto& all = causeDescriptions();
+  return std::any_of(all.begin(), all.end(), [&](const CauseDescription& c) { return c.name == name; });
+}
+
+Finding findingOf(const FrameFinding& frames) {
+  Finding f;
+  f.cause = frames.cause;
+  f.parameters = frames.parameters;
+  f.candidates = {{f.cause, 1.0}};
+  f.evidence.log_likelihood_gain = frames.log_likelihood_gain;
+  f.evidence.false_alarm_rate = frames.false_alarm_rate;
+  f.where = frames.where;
+  if (f.where.empty()) f.where.emplace_back();
+  for (FindingPlace& place : f.where) {
+    if (place.poses.empty()) place.poses = frames.poses;
+  }
+  f.description = frames.description;
+  if (f.cause == "unknown") return f;
+  NamedParameters m = defaultMechanism(f.cause);
+  for (const FindingParameter& p : f.parameters) {
+    if (m.values.has(p.name)) m.values.set(p.name, p.value);
+  }
+  f.mechanism = m;
+  return f;
+}
+
+class Session {
+ public:
+  Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options);
+  Diagnosis run();
+
+ private:
+  void report(const std::string& stage, double share) const {
+    if (options_.cancelled && options_.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
+    if (options_.on_progress) options_.on_progress({stage, share});
+  }
+  void checkPlaces() const;
+  void judgeDelivery();
+  void judgeTone();
+  void judgeNoise();
+  bool judgeChannels(int round);
+  std::vector<HypothesisFit> fitBest(int round);
+  Finding describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const;
+  std::vector<PoseEchoes> heldOutEchoes(const HypothesisFit& fit);
+  FindingGain gainOf(const HypothesisFit& fit);
+  void addMetrics(const HypothesisFit& fit, FindingGain& gain) const;
+  FindingGain gainOf(const ChannelData& before_data, const std::vector<NamedParameters>& before,
+                     const ChannelData& after_data, const std::vector<NamedParameters>& after);
+  double strongestMeasured() const;
+
+  const Recording& recording_;
+  Twin& twin_;
+  const DiagnosisOptions& options_;
+  FrameExaminer examiner_;
+  ChannelData data_;
+  PoseAccuracy accuracy_;
+  std::unique_ptr<EchoSource> source_;
+  std::unique_ptr<SessionModel> model_;
+  std::unique_ptr<HypothesisFitter> fitter_;
+  std::vector<NamedParameters> mechanisms_;  ///< as the engine simulates them
+  std::vector<NamedParameters> extended_;    ///< the same with what was taken out of the data instead
+  ModelState state_;
+  Diagnosis result_;
+};
+
+Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options)
+    : recording_(recording), twin_(twin), options_(options), examiner_(recording.radar) {
+  data_ = readChannels(recording, examiner_, [&](std::size_t done, std::size_t all) {
+    report("reading captures", static_cast<double>(done) / static_cast<double>(all));
+  });
+  twin_.setSession(recording.poses);
+  if (data_.radar.channels() > kMaxChannels) {
+    throw InputError(recording.radar_file + ": has " + std::to_string(data_.radar.channels()) +
+                     " virtual channels; a diagnosis takes up to " + std::to_string(kMaxChannels) +
+                     ", record with fewer transmitters or receivers");
+  }
+  checkPlaces();
+  // Levels relative to the strongest echo refer to this session's; poses inside something are left out here.
+  double strongest = 0;
+  std::vector<PoseChannels> usable;
+  for (PoseChannels& p : data_.poses) {
+    try {
+      for (const PathRecord& r : twin_.trace(p.pose.T_map_radar)) strongest = std::max(strongest, r.amplitude);
+      usable.push_back(std::move(p));
+    } catch (const InputError& error) {
+      data_.problems.push_back({p.pose.name, "pose '" + p.pose.name + "': " + error.what()});
+    }
+  }
+  data_.poses = std::move(usable);
+  if (data_.poses.empty()) throw InputError(recording.source + ": " + data_.problems.back().message);
+  if (strongest == 0) {
+    throw InputError(recording.source + ": the twin has no echo at any pose; check that poses.csv and scene " +
+                     twin.description().scene_file + " share one map, in metres");
+  }
+  twin_.setStrongestAmplitude(strongest);
+  mechanisms_ = extended_ = twin_.description().mechanisms;
+  source_ = std::make_unique<EchoSource>(twin_, data_, accuracy_);
+  model_ = std::make_unique<SessionModel>(data_, static_cast<int>(twin_.scene().actors.size()), accuracy_);
+  fitter_ = std::make_unique<HypothesisFitter>(*source_, *model_, kFolds);
+}
+
+void Session::checkPlaces() const {
+  Eigen::AlignedBox3d room;
+  for (const Actor& a : twin_.scene().actors) room.extend(a.bounds);
+  const double reach = 2 * room.diagonal().norm();
+  for (const PoseChannels& p : data_.poses) {
+    const double apart = room.exteriorDistance(p.pose.T_map_radar.translation());
+    if (apart > reach) {
+      throw InputError(recording_.source + ": pose '" + p.pose.name + "' stands " + number(apart) +
+                       " m outside the scene, whose diagonal is " + number(reach / 2) +
+                       " m; poses are in metres in the scene's map: check units and origin");
+    }
+  }
+}
+
+double Session::strongestMeasured() const {
+  double strongest = 0;
+  for (const PoseChannels& p : data_.poses) {
+    const Eigen::VectorXd power = p.y.colwise().squaredNorm().transpose() / static_cast<double>(p.y.rows());
+    for (Eigen::Index r = model_->firstBin() + 2; r + 2 < power.size(); ++r) {
+      // A tone's power summed over Hann's lobe is 1.5 times its own, wherever it lies between the bins.
+      if (power[r] >= power[r - 1] && power[r] >= power[r + 1]) {
+        strongest = std::max(strongest, power.segment(r - 2, 5).sum() / 1.5);
+      }
+    }
+  }
+  return std::sqrt(strongest);
+}
+
+void Session::judgeDelivery() {
+  report("conventions", 0);
+  const std::optional<Delivery> delivery = findDelivery(twin_, data_);
+  if (!delivery) return;
+  const ChannelData recorded = data_;
+  undoDelivery(*delivery, data_);
+  Finding f;
+  f.cause = delivery->mechanism.mechanism;
+  f.mechanism = delivery->mechanism;
+  f.candidates = {{f.cause, 1.0}};
+  std::vector<double> reversed(static_cast<std::size_t>(data_.radar.channels()));
+  std::iota(reversed.rbegin(), reversed.rend(), 0.0);
+  const bool is_reversed = f.cause == "channel_permutation" && f.mechanism->values.numbers("order") == reversed;
+  if (f.cause == "channel_permutation") {
+    f.parameters.push_back({"order", "1", f.mechanism->values.numbers("order"), {}});
+  }
+  if (f.cause == "channel_conjugation" || is_reversed) {
+    f.cause = "channel_conjugation";  // the same data; the convention is the likelier mistake
+    f.mechanism = defaultMechanism(f.cause);
+    f.parameters.clear();
+    f.candidates = {{"channel_conjugation", 0.5}, {"channel_permutation", 0.5}};
+    f.experiment =
+        "look into the order of the receivers' lanes (self-test pattern): data alone cannot tell a reversed order of "
+        "all channels from conjugated channels";
+  }
+  f.evidence.log_likelihood_gain = delivery->gain;
+  f.evidence.false_alarm_rate = std::min(1.0, 50 * std::exp(-delivery->gain));
+  f.evidence.margin = delivery->margin;
+  if (data_.locations.size() > 1) f.gain = gainOf(recorded, mechanisms_, data_, mechanisms_);
+  extended_.push_back(*f.mechanism);
+  result_.findings.findings.push_back(std::move(f));
+}
+
+void Session::judgeTone() {
+  report("radar's own echo", 0);
+  const BodyFixedTone tone = findBodyFixedTone(data_);
+  if (tone.false_alarm_rate > 1e-6 || tone.gain < 30) return;
+  const ChannelData recorded = data_;
+  subtractTone(tone, data_);
+  const double rms = std::sqrt(tone.channels.squaredNorm() / static_cast<double>(tone.channels.size()));
+  const double level_db = 20 * std::log10(rms / strongestMeasured());
+  const double error_db = 8.686 / std::sqrt(2 * std::max(1.0, tone.gain));
+  Finding f;
+  // A constant has no range at all; leakage travels some centimetres.
+  const bool constant = tone.range_m < std::max(0.01, 3 * tone.range_error_m);
+  f.cause = constant ? "dc_offset" : "tx_rx_leakage";
+  NamedParameters m = defaultMechanism(f.cause);
+  m.values.set("level_db", level_db);
+  if (!constant) {
+    std::vector<double> phase_deg, gain_db;
+    for (Eigen::Index k = 0; k < tone.channels.size(); ++k) {
+      phase_deg.push_back(std::arg(tone.channels[k] / tone.channels[0]) * 180 / M_PI);
+      gain_db.push_back(std::max(-60.0, 20 * std::log10(std::abs(tone.channels[k]) / rms)));
+    }
+    m.values.set("range_m", tone.range_m);
+    m.values.set("phase_deg", phase_deg);
+    m.values.set("gain_db", gain_db);
+    f.parameters.push_back({"range_m",
+                            "m",
+                            tone.range_m,
+                            {{tone.range_m - 1.96 * tone.range_error_m, tone.range_m + 1.96 * tone.range_error_m}}});
+  }
+  f.parameters.push_back({"level_db", "dB", level_db, {{level_db - 1.96 * error_db, level_db + 1.96 * error_db}}});
+  f.mechanism = m;
+  f.candidates = {{f.cause, 1.0}};
+  f.evidence.log_likelihood_gain = tone.gain;
+  f.evidence.false_alarm_rate = tone.false_alarm_rate;
+  f.where.push_back({{{0.0, tone.range_m + 2 * data_.radar.range_bin_m()}}, {}, {}, {}, {}, {}});
+  std::vector<NamedParameters> with = mechanisms_;
+  with.push_back(m);
+  if (data_.locations.size() > 1) f.gain = gainOf(recorded, mechanisms_, recorded, with);
+  extended_.push_back(m);
+  result_.findings.findings.push_back(std::move(f));
+}
+
+void Session::judgeNoise() {
+  for (const NamedParameters& m : mechanisms_) {
+    if (m.mechanism != "noise_floor") continue;
+    // A sample's noise from that of a cell of the average: Hann's sums over N samples, N/2 and 3N/8.
+    std::vector<double> levels_db;
+    for (const PoseChannels& p : data_.poses) {
+      if (!(p.noise_power > 0)) continue;
+      levels_db.push_back(10 * std::log10(p.noise_power * p.shots * 2.0 / 3 * data_.radar.samples_per_chirp));
+    }
+    if (levels_db.size() < 2) return;
+    const double stated = m.values.number("level_dbfs") + m.values.number("delta_db");
+    const double delta_db = quantile(levels_db, 0.5) - stated;
+    const double scatter = (quantile(levels_db, 0.84) - quantile(levels_db, 0.16)) / 2;
+    const double error = std::max(0.02, scatter / std::sqrt(static_cast<double>(levels_db.size())));
+    if (std::abs(delta_db) < std::max(0.3, 6 * error)) return;
+    Finding f;
+    f.cause = "noise_floor";
+    f.mechanism = m;
+    f.mechanism->values.set("delta_db", m.values.number("delta_db") + delta_db);
+    f.parameters = {{"delta_db", "dB", delta_db, {{delta_db - 1.96 * error, delta_db + 1.96 * error}}}};
+    f.candidates = {{f.cause, 1.0}};
+    f.evidence.log_likelihood_gain = 0.5 * delta_db * delta_db / (error * error);
+    f.evidence.false_alarm_rate = std::min(1.0, std::exp(-f.evidence.log_likelihood_gain));
+    for (NamedParameters& e : extended_) {
+      if (e.mechanism == "noise_floor") e = *f.mechanism;
+    }
+    result_.findings.findings.push_back(std::move(f));
+    return;
+  }
+}
+
+std::vector<HypothesisFit> Session::fitBest(int round) {
+  std::vector<Hypothesis> all = hypotheses(twin_, mechanisms_);
+  const std::vector<Hypothesis> laws = empiricalHypotheses(data_, mechanisms_);
+  all.insert(all.end(), laws.begin(), laws.end());
+  const auto suspects = fitter_->suspects(state_);
+  std::set<std::string> suspicious;
+  for (std::size_t i = 0; i < std::min(kSuspects, suspects.size()); ++i) {
+    suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(suspects[i].first)].name);
+  }
+  const auto spread = [&](std::size_t wanted) {
+    const std::size_t count = data_.poses.size();
+    wanted = std::min(count, wanted);
+    std::vector<int> poses;
+    for (std::size_t i = 0; i < wanted; ++i) poses.push_back(static_cast<int>(i * count / wanted));
+    return poses;
+  };
+  // The more numbers a hypothesis has, the more evaluations, and the fewer poses rank it.
+  const auto some = [&](const Hypothesis& h) {
+    return spread(std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
+  };
+  const auto better = [](const Screened& a, const Screened& b) { return a.promised > b.promised; };
+  std::vector<Screened> screened;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    report("trying " + all[i].label(), static_cast<double>(i) / static_cast<double>(all.size()));
+    const bool of_actor = twin_.scene().actorIndex(all[i].subject) >= 0;
+    const double numbers = static_cast<double>(all[i].coordinates.size());
+    const std::vector<double> typical(all[i].coordinates.size(), 1.0);
+    if (of_actor && source_->altersGeometry(all[i].at(typical)) && suspicious.count(all[i].subject) == 0) continue;
+    const std::vector<int> poses = some(all[i]);
+    Screened s = fitter_->screen(state_, all[i], poses);
+    // What chance promises: half a nat per number on the poses looked at, scaled up like the rest.
+    s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
+    screened.push_back(std::move(s));
+    source_->settle(mechanisms_);
+  }
+  std::stable_sort(screened.begin(), screened.end(), better);
+  if (screened.size() > kSecondLook) screened.resize(kSecondLook);
+  for (Screened& s : screened) {
+    report("looking again at " + s.hypothesis.label(), 0);
+    const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
+    const std::vector<int> poses = spread(numbers > 3 ? kScreenPoses : data_.poses.size());
+    s = fitter_->screen(state_, s.hypothesis, poses);
+    s.promised -= numbers + 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
+    source_->settle(mechanisms_);
+  }
+  if (const auto place = projectBack(twin_, *model_, state_)) {
+    screened.push_back({objectAt(*place), place->promised, {0, 0, 1}});
+  }
+  std::stable_sort(screened.begin(), screened.end(), better);
+  std::vector<HypothesisFit> fits;
+  for (const Screened& s : screened) {
+    TriedHypothesis tried{s.hypothesis.label(), s.promised, std::numeric_limits<double>::quiet_NaN(), round};
+    const double best = fits.empty() ? 0 : fits.front().gain / fits.front().inflation;
+    // A promise is a quadratic's; what promises a fifth of the best's gain is not going to be better.
+    if (fits.size() < kMostFits && s.promised > std::max(kWorthAFit, 0.02 * best)) {
+      report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / kMostFits);
+      HypothesisFit f = fitter_->fit(state_, s.hypothesis, s.start, 4);
+      source_->settle(mechanisms_);
+      const bool object = s.hypothesis.mechanism.mechanism == "actor_unmodelled";
+      fitter_->judge(f, all.size() + static_cast<std::size_t>(object ? kObjectPlaces : 0));
+      tried.gain = f.gain;
+      fits.push_back(std::move(f));
+      std::stable_sort(fits.begin(), fits.end(),
+                       [](const HypothesisFit& a, const HypothesisFit& b) { return a.ranking() > b.ranking(); });
+    }
+    result_.tried.push_back(tried);
+  }
+  return fits;
+}
+
+Finding Session::describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const {
+  Finding f;
+  const NamedParameters m = best.hypothesis.at(best.scaled);
+  const bool named = catalogued(m.mechanism);
+  f.cause = named ? m.mechanism : "unknown";
+  f.mechanism = m;
+  const double locations = static_cast<double>(data_.locations.size());
+  const double t = boost::math::quantile(boost::math::students_t(std::max(1.0, locations - 1)), 0.975);
+  for (const CauseParameter& wanted : causeDescription(f.cause).parameters) {
+    if (!m.values.has(wanted.name)) continue;
+    FindingParameter p{wanted.name, wanted.unit, m.values.all().at(wanted.name), {}};
+    const auto* text = std::get_if<std::string>(&p.value);
+    const auto* list = std::get_if<std::vector<double>>(&p.value);
+    if ((text && text->empty()) || (list && list->empty())) continue;
+    if (const auto* value = std::get_if<double>(&p.value)) {
+      for (std::size_t j = 0; j < best.hypothesis.coordinates.size(); ++j) {
+        if (best.hypothesis.coordinates[j].parameter != wanted.name) continue;
+        p.ci95 = {{*value - t * best.standard_error[j], *value + t * best.standard_error[j]}};
+      }
+      if (p.ci95.empty() && wanted.one_of > 0) continue;
+    } else if (list != nullptr) {
+      p.ci95.assign(list->size(), {0, 0});
+      for (std::size_t k = 0; k < list->size(); ++k) p.ci95[k] = {(*list)[k], (*list)[k]};
+      for (std::size_t j = 0; j < best.hypothesis.coordinates.size(); ++j) {
+        const Coordinate& c = best.hypothesis.coordinates[j];
+        if (c.parameter != wanted.name || c.element < 0) continue;
+        const double v = (*list)[static_cast<std::size_t>(c.element)];
+        p.ci95[static_cast<std::size_t>(c.element)] = {v - t * best.standard_error[j], v + t * best.standard_error[j]};
+      }
+    }
+    f.parameters.push_back(std::move(p));
+  }
+  // Names that explain nearly as much, by their share of probability.
+  double sum = 0;
+  std::vector<std::pair<std::string, double>> alike;
+  for (const HypothesisFit& other : fits) {
+    if (best.ranking() - other.ranking() > kAlike || !(other.gain > 0)) continue;
+    const std::string& name = other.hypothesis.mechanism.mechanism;
+    const double weight = std::exp(other.ranking() - best.ranking());
+    const std::string cause = catalogued(name) ? name : "unknown";
+    const auto at = std::find_if(alike.begin(), alike.end(), [&](const auto& a) { return a.first == cause; });
+    if (at == alike.end()) {
+      alike.emplace_back(cause, weight);
+      sum += weight;
+    }
+  }
+  for (const auto& [cause, weight] : alike) f.candidates.push_back({cause, weight / sum});
+  if (f.candidates.size() > 1) f.experiment = experimentFor(f.candidates);
+  f.evidence.log_likelihood_gain = best.gain;
+  f.evidence.false_alarm_rate = best.false_alarm_rate;
+  for (const HypothesisFit& other : fits) {
+    if (other.hypothesis.mechanism.mechanism == m.mechanism) continue;
+    const std::string& name = other.hypothesis.mechanism.mechanism;
+    f.evidence.runner_up = catalogued(name) ? name : "unknown";
+    f.evidence.margin = best.gain - std::max(0.0, other.gain);
+    break;
+  }
+  FindingPlace place;
+  if (twin_.scene().actorIndex(best.hypothesis.subject) >= 0) place.actors = {best.hypothesis.subject};
+  if (f.cause == "actor_unmodelled") {
+    place.x_m = m.values.number("x_m");
+    place.y_m = m.values.number("y_m");
+  }
+  std::vector<std::pair<double, std::string>> poses;
+  for (std::size_t i = 0; i < state_.by_pose.size(); ++i) {
+    poses.emplace_back(best.state.by_pose[i] - state_.by_pose[i], data_.poses[i].pose.name);
+  }
+  std::stable_sort(poses.begin(), poses.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  for (std::size_t i = 0; i < std::min<std::size_t>(10, poses.size()) && poses[i].first > 1; ++i) {
+    place.poses.push_back(poses[i].second);
+  }
+  f.where.push_back(std::move(place));
+  if (!named) {
+    f.description = "no cause of the catalogue explains this; what it looks like: " + describeLaw(best.hypothesis, m) +
+                    "; " + number(best.gain, 4) + " nats over " + std::to_string(data_.poses.size()) + " poses";
+  }
+  return f;
+}
+
+std::vector<PoseEchoes> Session::heldOutEchoes(const HypothesisFit& fit) {
+  std::vector<PoseEchoes> echoes(data_.poses.size());
+  for (int k = 0; k < kFolds; ++k) {
+    std::vector<int> poses;
+    for (std::size_t i = 0; i < data_.poses.size(); ++i) {
+      if (fitter_->fold(data_.poses[i].location) == k) poses.push_back(static_cast<int>(i));
+    }
+    if (poses.empty()) continue;
+    std::vector<NamedParameters> mechanisms = mechanisms_;
+    mechanisms.push_back(fit.hypothesis.at(fit.fold_scaled[static_cast<std::size_t>(k)]));
+    std::vector<PoseEchoes> part = source_->echoes(mechanisms, poses);
+    for (std::size_t j = 0; j < poses.size(); ++j) echoes[static_cast<std::size_t>(poses[j])] = std::move(part[j]);
+  }
+  source_->settle(mechanisms_);
+  return echoes;
+}
+
+FindingGain Session::gainOf(const HypothesisFit& fit) {
+  report("gain on held-out places", 0);
+  const std::vector<PoseEchoes> after = heldOutEchoes(fit);
+  FindingGain gain;
+  gain.explained_power = explainedPowerGain(data_, cellPowers(data_, state_.echoes), cellPowers(data_, after));
+  std::vector<double> likelihood;
+  model_->logLikelihood(after, fit.state.nuisance, &likelihood);
+  gain.log_likelihood_per_pose = likelihoodGain(data_, state_.by_pose, likelihood);
+  return gain;
+}
+
+FindingGain Session::gainOf(const ChannelData& before_data, const std::vector<NamedParameters>& before,
+                            const ChannelData& after_data, const std::vector<NamedParameters>& after) {
+  FindingGain gain;
+  const std::vector<PoseEchoes> b = source_->echoes(before), a = source_->echoes(after);
+  source_->settle(mechanisms_);
+  gain.explained_power = explainedPowerGain(data_, cellPowers(before_data, b), cellPowers(after_data, a));
+  return gain;
+}
+
+void Session::addMetrics(const HypothesisFit& fit, FindingGain& gain) const {
+  const std::vector<std::vector<NamedParameters>> before = {extended_};
+  std::vector<std::vector<NamedParameters>> after;
+  for (int k = 0; k < kFolds; ++k) {
+    after.push_back(extended_);
+    after.back().push_back(fit.hypothesis.at(fit.fold_scaled[static_cast<std::size_t>(k)]));
+  }
+  Recording used = recording_;
+  used.poses.clear();
+  for (const PoseChannels& p : data_.poses) used.poses.push_back(p.pose);
+  EvaluationOptions options;
+  options.config = options_.config;
+  options.jobs = options_.jobs;
+  const auto summary = [&](const std::vector<std::vector<NamedParameters>>& folds) {
+    std::vector<Twin> twins;
+    for (const auto& mechanisms : folds) twins.push_back(twin_.changed(mechanisms));
+    std::vector<SimulatedBranch> branches;
+    for (const Twin& t : twins) branches.push_back(simulatedByTwin(t));
+    const SimulatedBranch simulated = [&](const Pose& pose) {
+      const auto at = std::find_if(data_.poses.begin(), data_.poses.end(),
+                                   [&](const PoseChannels& p) { return p.pose.name == pose.name; });
+      const std::size_t fold = static_cast<std::size_t>(fitter_->fold(at->location)) % branches.size();
+      return branches[fold](pose);
+    };
+    return evaluate(used, simulated, twin_.scene(), twin_.rays(), options).central;
+  };
+  const LedgerSummary b = summary(before), a = summary(after);
+  const auto set = [](GainMetric& m, double from, double to) { m = {from, to, {}}; };
+  set(gain.recall, b.recall, a.recall);
+  for (std::size_t i = 0; i < 3; ++i) set(gain.recall_band[i], b.recall_band[i], a.recall_band[i]);
+  set(gain.q1, b.q1_energy, a.q1_energy);
+  set(gain.q2, b.q2_energy, a.q2_energy);
+  set(gain.q3_median_db, b.q3_median_db, a.q3_median_db);
+  for (std::size_t i = 0; i < 5; ++i) set(gain.classes[i], b.class_count[i], a.class_count[i]);
+}
+
+bool Session::judgeChannels(int round) {
+  std::vector<HypothesisFit> fits = fitBest(round);
+  for (const HypothesisFit& f : fits) {
+    if (f.false_alarm_rate > kFalseAlarm || !(f.held_out_gain > 0) || f.ranking() <= 0) continue;
+    Finding finding = describe(f, fits);
+    if (data_.locations.size() > 1) {
+      finding.gain = gainOf(f);
+      // Where the likelihood gains and the maps do not, it is the likelihood's own shortcomings that were fitted: what
+      // a pose's error does at edges looks like a little of many things.
+      const GainMetric& explained = finding.gain->explained_power;
+      if (!((*explained.difference_ci95)[0] > 0) || explained.after - explained.before < kLeastExplained) continue;
+      addMetrics(f, *finding.gain);
+    }
+    report("found " + f.hypothesis.label() + ", " + number(f.gain, 4) + " nats", 1);
+    const bool unknown = finding.cause == "unknown";
+    mechanisms_ = f.state.mechanisms;
+    extended_.push_back(*finding.mechanism);
+    result_.findings.findings.push_back(std::move(finding));
+    const Nuisance nuisance = f.state.nuisance;
+    source_->settle(mechanisms_);
+    state_ = fitter_->state(mechanisms_, &nuisance);
+    return !unknown;  // an unknown stands last
+  }
+  return false;
+}
+
+Diagnosis Session::run() {
+  for (const FrameFinding& f : examiner_.findings()) {
+    Finding finding = findingOf(f);
+    const bool there = std::any_of(extended_.begin(), extended_.end(),
+                                   [&](const NamedParameters& m) { return m.mechanism == finding.cause; });
+    if (!there) extended_.push_back(*finding.mechanism);
+    result_.findings.findings.push_back(std::move(finding));
+  }
+  judgeDelivery();
+  source_->settle(mechanisms_);
+  judgeTone();
+  judgeNoise();
+  report("fitting the twin as it is", 0);
+  state_ = fitter_->state(mechanisms_, nullptr);
+  const std::vector<CellPowers> powers = cellPowers(data_, state_.echoes);
+  result_.explained_power = explainedPower(powers);
+  // The same expectations, each at another pose's place: what chance explains.
+  std::vector<PoseEchoes> elsewhere = state_.echoes;
+  std::rotate(elsewhere.begin(), elsewhere.begin() + static_cast<std::ptrdiff_t>(elsewhere.size() / 2),
+              elsewhere.end());
+  const double by_chance = explainedPower(cellPowers(data_, elsewhere));
+  result_.nothing_matches = data_.poses.size() > 4 && result_.explained_power - by_chance < 0.05;
+  Findings& findings = result_.findings;
+  findings.poses = static_cast<int>(data_.poses.size());
+  findings.locations = static_cast<int>(data_.locations.size());
+  findings.held_out =
+      data_.locations.size() > 1 ? std::to_string(kFolds) + "-fold by location" : "nothing: one location";
+  if (result_.nothing_matches) {
+    Finding f;
+    f.cause = "unknown";
+    f.candidates = {{"unknown", 1.0}};
+    f.description = "nothing matches: the twin explains " + number(result_.explained_power) +
+                    " of the measured power, and " + number(by_chance) +
+                    " with its poses exchanged; check that scene, poses and captures belong together";
+    findings.findings.push_back(std::move(f));
+  } else {
+    for (int round = 0; round < kMostFindings; ++round) {
+      if (!judgeChannels(round)) break;
+    }
+  }
+  result_.extended = twin_.description();
+  result_.extended.mechanisms = extended_;
+  result_.problems = data_.problems;
+  return std::move(result_);
+}
+
+}  // namespace
+
+Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& options) {
+  FrameExaminer examiner(recording.radar);
+  const ChannelData data = readChannels(recording, examiner, [&](std::size_t done, std::size_t all) {
+    if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
+    if (options.on_progress) {
+      options.on_progress({"reading captures", static_cast<double>(done) / static_cast<double>(all)});
+    }
+  });
+  Diagnosis result;
+  for (const FrameFinding& f : examiner.findings()) {
+    result.findings.findings.push_back(findingOf(f));
+    result.extended.mechanisms.push_back(*result.findings.findings.back().mechanism);
+  }
+  result.findings.poses = static_cast<int>(data.poses.size());
+  result.findings.locations = static_cast<int>(data.locations.size());
+  result.findings.held_out = "nothing: without a scene only frames are judged";
+  result.extended.radar = recording.radar;
+  result.problems = data.problems;
+  return result;
+}
+
+Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOptions& options) {
+  std::unique_ptr<tbb::global_control> limit;
+  if (options.jobs > 0) {
+    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                  static_cast<std::size_t>(options.jobs));
+  }
+  return Session(recording, twin, options).run();
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,219 @@
+#include "mmradartwin_attribution/diagnosis_report.h"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <sstream>
+
+#include "mmradartwin_attribution/report.h"
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string shown(double value, int digits = 3) {
+  if (std::isnan(value)) return "-";
+  std::ostringstream out;
+  out << std::setprecision(digits) << value;
+  return out.str();
+}
+
+std::string shown(const FindingParameter& p) {
+  std::ostringstream out;
+  out << p.name << " = ";
+  if (const auto* number = std::get_if<double>(&p.value)) {
+    out << shown(*number, 4) << (p.unit == "1" ? "" : " " + p.unit);
+    if (!p.ci95.empty()) out << " (" << shown(p.ci95[0][0], 4) << " to " << shown(p.ci95[0][1], 4) << ")";
+  } else if (const auto* text = std::get_if<std::string>(&p.value)) {
+    out << *text;
+  } else if (const auto* numbers = std::get_if<std::vector<double>>(&p.value)) {
+    for (std::size_t i = 0; i < numbers->size(); ++i) out << (i ? ", " : "") << shown((*numbers)[i]);
+    if (p.unit != "1") out << " " << p.unit;
+  } else if (const auto* texts = std::get_if<std::vector<std::string>>(&p.value)) {
+    for (std::size_t i = 0; i < texts->size(); ++i) out << (i ? ", " : "") << (*texts)[i];
+  }
+  return out.str();
+}
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (char c : text) {
+    if (c == '<') {
+      out += "&lt;";
+    } else if (c == '>') {
+      out += "&gt;";
+    } else if (c == '&') {
+      out += "&amp;";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+struct GainRow {
+  const char* name;
+  const GainMetric* metric;
+};
+
+std::vector<GainRow> gainRows(const FindingGain& g) {
+  return {{"explained power", &g.explained_power},
+          {"log-likelihood per pose", &g.log_likelihood_per_pose},
+          {"recall", &g.recall},
+          {"recall, near", &g.recall_band[0]},
+          {"recall, mid", &g.recall_band[1]},
+          {"recall, far", &g.recall_band[2]},
+          {"Q1 energy", &g.q1},
+          {"Q2 energy", &g.q2},
+          {"Q3 median, dB", &g.q3_median_db},
+          {"C1", &g.classes[0]},
+          {"C2", &g.classes[1]},
+          {"C3", &g.classes[2]},
+          {"C4", &g.classes[3]},
+          {"C5", &g.classes[4]}};
+}
+
+void save(const std::string& file, const std::string& text) {
+  std::ofstream out(file);
+  out << text;
+  out.flush();
+  if (!out) throw InputError(file + ": cannot be written; check free space and rights");
+}
+
+}  // namespace
+
+DiagnosisReport::DiagnosisReport(const std::string& directory) : directory_(directory) {
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error) throw InputError(directory + ": cannot be created (" + error.message() + "); choose another --output");
+}
+
+std::string diagnosisText(const Diagnosis& d) {
+  std::ostringstream out;
+  out << "Verdict: " << d.findings.verdict() << ", " << d.findings.poses << " poses at " << d.findings.locations
+      << " locations";
+  if (!d.extended.scene_file.empty()) {
+    out << "; the twin as given explains " << shown(d.explained_power) << " of the measured power";
+  }
+  out << "\n";
+  int i = 0;
+  for (const Finding& f : d.findings.findings) {
+    out << ++i << ". " << f.cause << " (" << className(causeDescription(f.cause).residual_class) << ")";
+    for (const FindingParameter& p : f.parameters) out << ", " << shown(p);
+    out << "\n";
+    if (f.description) out << "   " << *f.description << "\n";
+    if (f.gain) {
+      const GainMetric& e = f.gain->explained_power;
+      out << "   explained power on held-out places " << shown(e.before) << " -> " << shown(e.after);
+      if (e.difference_ci95) {
+        out << " (" << shown((*e.difference_ci95)[0]) << " to " << shown((*e.difference_ci95)[1]) << ")";
+      }
+      if (!std::isnan(f.gain->recall.after)) {
+        out << ", recall " << shown(f.gain->recall.before) << " -> " << shown(f.gain->recall.after);
+      }
+      out << "\n";
+    }
+    if (f.candidates.size() > 1) {
+      out << "   not told apart:";
+      for (const CauseProbability& c : f.candidates) out << " " << c.cause << " (" << shown(c.probability, 2) << ")";
+      if (f.experiment) out << "; to tell: " << *f.experiment;
+      out << "\n";
+    }
+  }
+  return out.str();
+}
+
+void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::string>& command) const {
+  Findings findings = diagnosis.findings;
+  if (!diagnosis.extended.scene_file.empty()) {
+    findings.extended_twin = "twin.extended.yaml";
+    save(directory_ + "/twin.extended.yaml", diagnosis.extended.toYaml());
+  }
+  writeFindings(findings, directory_ + "/findings.json");
+  std::ostringstream tried;
+  tried << "round,hypothesis,promised_nats,gain_nats\n";
+  for (const TriedHypothesis& t : diagnosis.tried) {
+    tried << t.round << ",\"" << t.label << "\"," << shown(t.promised, 6) << ","
+          << (std::isnan(t.gain) ? "" : shown(t.gain, 6)) << "\n";
+  }
+  save(directory_ + "/tried.csv", tried.str());
+
+  std::ostringstream html;
+  html << "<!doctype html><meta charset=\"utf-8\"><title>Diagnosis</title><style>body{font:15px "
+          "sans-serif;max-width:60em;"
+          "margin:2em auto;color:#222}table{border-collapse:collapse;margin:.5em 0}td,th{padding:.2em "
+          ".8em;text-align:right;"
+          "border-bottom:1px solid #ddd}td:first-child,th:first-child{text-align:left}h2{margin-top:1.5em}"
+          ".bar{background:#48c;height:.8em;display:inline-block}</style><h1>What the simulation gets wrong</h1>";
+  html << "<p>Verdict <b>" << findings.verdict() << "</b>; " << findings.poses << " poses at " << findings.locations
+       << " locations; held out: " << escaped(findings.held_out) << ". The twin as given explains "
+       << shown(diagnosis.explained_power) << " of the measured power. "
+       << "<a href=\"twin.extended.yaml\">twin.extended.yaml</a>, <a href=\"findings.json\">findings.json</a></p>";
+  int i = 0;
+  for (const Finding& f : findings.findings) {
+    const CauseDescription& cause = causeDescription(f.cause);
+    html << "<h2>" << ++i << ". " << f.cause << " (" << className(cause.residual_class)
+         << ")</h2><p>Action: " << escaped(cause.action()) << "</p><ul>";
+    for (const FindingParameter& p : f.parameters) html << "<li>" << escaped(shown(p)) << "</li>";
+    html << "</ul>";
+    if (f.description) html << "<p>" << escaped(*f.description) << "</p>";
+    html << "<p>Evidence: " << shown(f.evidence.log_likelihood_gain, 4) << " nats, false alarms at most "
+         << shown(f.evidence.false_alarm_rate, 2);
+    if (f.evidence.runner_up) {
+      html << "; next: " << *f.evidence.runner_up << ", " << shown(f.evidence.margin.value_or(0), 4) << " nats less";
+    }
+    html << "</p>";
+    if (f.candidates.size() > 1) {
+      html << "<p>Not told apart:";
+      for (const CauseProbability& c : f.candidates) html << " " << c.cause << " (" << shown(c.probability, 2) << ")";
+      if (f.experiment) html << ". To tell: " << escaped(*f.experiment);
+      html << "</p>";
+    }
+    for (const FindingPlace& place : f.where) {
+      if (place.x_m && place.y_m) {
+        html << "<p>At x = " << shown(*place.x_m) << " m, y = " << shown(*place.y_m) << " m in map</p>";
+      }
+      if (!place.actors.empty()) html << "<p>Actor: " << escaped(place.actors.front()) << "</p>";
+      if (!place.poses.empty()) {
+        html << "<p>Poses that carry it most:";
+        for (const std::string& pose : place.poses) html << " " << escaped(pose);
+        html << "</p>";
+      }
+    }
+    if (f.gain) {
+      html << "<table><tr><th>on held-out places</th><th>before</th><th>after</th><th>difference, 95 %</th></tr>";
+      for (const GainRow& row : gainRows(*f.gain)) {
+        if (std::isnan(row.metric->before) && std::isnan(row.metric->after)) continue;
+        html << "<tr><td>" << row.name << "</td><td>" << shown(row.metric->before, 4) << "</td><td>"
+             << shown(row.metric->after, 4) << "</td><td>";
+        if (row.metric->difference_ci95) {
+          html << shown((*row.metric->difference_ci95)[0]) << " to " << shown((*row.metric->difference_ci95)[1]);
+        }
+        html << "</td></tr>";
+      }
+      html << "</table>";
+    }
+  }
+  html << "<h2>Hypotheses</h2><p>Nats that the score test promised, and those that were "
+          "fitted.</p><table><tr><th>hypothesis"
+          "</th><th>round</th><th>promised</th><th>gain</th><th></th></tr>";
+  double most = 1;
+  for (const TriedHypothesis& t : diagnosis.tried) most = std::max(most, t.promised);
+  int rows = 0;
+  for (const TriedHypothesis& t : diagnosis.tried) {
+    if (t.promised < 1 || ++rows > 60) continue;
+    html << "<tr><td>" << escaped(t.label) << "</td><td>" << t.round + 1 << "</td><td>" << shown(t.promised, 4)
+         << "</td><td>" << shown(t.gain, 4)
+         << "</td><td><span class=\"bar\" style=\"width:" << 10 * std::sqrt(std::max(0.0, t.promised) / most)
+         << "em\"></span></td></tr>";
+  }
+  html << "</table><h2>Run</h2><p>mmradartwin " << escaped(packageVersion()) << "</p><pre>";
+  for (const std::string& word : command) html << escaped(word) << " ";
+  html << "</pre>";
+  save(directory_ + "/index.html", html.str());
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,257 @@
+#include "echo_source.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <tuple>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/range_angle.h"
+
+namespace mmradartwin {
+namespace {
+
+// Paths below this share of the pose's strongest echo's power are summed by place before a receiver sees them, and
+// reach no further than their main lobe.
+constexpr double kWeakPower = 1e-3;
+// A path whose amplitude changes by less than this share within the pose's accuracy does not graze anything.
+constexpr double kSteady = 0.02;
+constexpr double kReceiverSine = 1.0 / 16;  // of sin(azimuth), where weak paths go through the receiver together
+// From so many paths of one mechanism on they are a cloud of scatter points.
+constexpr std::size_t kCloud = 300;
+constexpr double kCloud_m = 0.12, kCloudHeight_m = 0.3;
+
+std::string keyOf(const std::vector<NamedParameters>& geometry) {
+  std::string key;
+  for (const NamedParameters& m : geometry) key += mechanismKey(m) + "|";
+  return key;
+}
+
+/// Paths of one cell become one with their power; those for which cell() gives nothing stay.
+template <typename Key, typename Cell>
+std::vector<PathRecord> merged(std::vector<PathRecord> records, Cell cell) {
+  std::map<Key, std::pair<std::size_t, double>> cells;
+  std::vector<PathRecord> result;
+  for (PathRecord& r : records) {
+    const std::optional<Key> key = cell(r);
+    if (key) {
+      const auto [at, fresh] = cells.try_emplace(*key, result.size(), 0.0);
+      at->second.second += r.amplitude * r.amplitude;
+      if (!fresh) continue;
+    }
+    result.push_back(std::move(r));
+  }
+  for (const auto& [key, sum] : cells) {
+    PathRecord& r = result[sum.first];
+    if (r.amplitude > 0) scaleRecord(std::sqrt(sum.second) / r.amplitude, r);
+  }
+  return result;
+}
+
+/// Scatter points of a surface, thousands a pose, in cells of the room that are small beside what the radar resolves;
+/// cells of the room, so that a turned or moved radar sees the same ones.
+std::vector<PathRecord> mergedCloud(std::vector<PathRecord> records) {
+  using Key = std::tuple<int, int, int, int>;
+  return merged<Key>(std::move(records), [](const PathRecord& r) -> std::optional<Key> {
+    if (r.bounces != 1 || r.facets.empty()) return std::nullopt;
+    const Eigen::Vector3d p = r.vertices.front().cwiseQuotient(Eigen::Vector3d(kCloud_m, kCloud_m, kCloudHeight_m));
+    return Key{r.facets.front(), static_cast<int>(std::floor(p.x())), static_cast<int>(std::floor(p.y())),
+               static_cast<int>(std::floor(p.z()))};
+  });
+}
+
+/// Weak paths by range, direction and actors, for a receiver that they have to go through one by one.
+std::vector<PathRecord> mergedWeak(const RadarConfig& radar, std::vector<PathRecord> records) {
+  double strongest = 0;
+  for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude * r.amplitude);
+  using Key = std::tuple<std::vector<int>, int, int>;
+  return merged<Key>(std::move(records), [&](const PathRecord& r) -> std::optional<Key> {
+    if (r.amplitude * r.amplitude > kWeakPower * strongest) return std::nullopt;
+    const int direction = static_cast<int>(std::floor(0.5 * (r.departure.y() + r.arrival.y()) / kReceiverSine));
+    return Key{r.actors, rangeBin(radar, r.length_m[0]), direction};
+  });
+}
+
+}  // namespace
+
+std::string mechanismKey(const NamedParameters& mechanism) {
+  TwinDescription description;
+  description.mechanisms = {mechanism};
+  const std::string text = description.toYaml();
+  return text.substr(text.find("mechanisms:"));
+}
+
+NamedParameters defaultMechanism(const std::string& name) {
+  NamedParameters named{name, {}};
+  for (const ParameterSpec& s : MechanismRegistry::instance().create(name)->parameters()) {
+    named.values.set(s.name, s.default_value);
+  }
+  return named;
+}
+
+EchoSource::EchoSource(const Twin& base, const ChannelData& data, const PoseAccuracy& accuracy)
+    : base_(base), data_(data), accuracy_(accuracy) {}
+
+bool EchoSource::altersGeometry(const NamedParameters& mechanism) {
+  const std::string key = mechanismKey(mechanism);
+  const auto at = alters_.find(key);
+  if (at != alters_.end()) return at->second;
+  return alters_[key] = base_.changed({mechanism}).altersGeometry();
+}
+
+std::vector<NamedParameters> EchoSource::geometryOf(const std::vector<NamedParameters>& mechanisms) {
+  std::vector<NamedParameters> geometry;
+  for (const NamedParameters& m : mechanisms) {
+    if (altersGeometry(m)) geometry.push_back(m);
+  }
+  return geometry;
+}
+
+const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>& geometry,
+                                             const NamedParameters& mechanism, const std::vector<int>& poses) {
+  Entry& entry = cache_[keyOf(geometry) + mechanismKey(mechanism)];
+  entry.paths.resize(data_.poses.size());
+  entry.known.resize(data_.poses.size(), 0);
+  std::vector<int> missing;
+  for (int i : poses) {
+    if (!entry.known[i]) missing.push_back(i);
+  }
+  if (missing.empty()) return entry.paths;
+  std::vector<NamedParameters> all;
+  for (const NamedParameters& m : geometry) {
+    if (m.mechanism != mechanism.mechanism) all.push_back(m);
+  }
+  all.push_back(mechanism);
+  const Twin twin = base_.changed(all);
+  tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t j) {
+    const std::size_t i = static_cast<std::size_t>(missing[j]);
+    std::vector<PathRecord> records = twin.trace(data_.poses[i].pose.T_map_radar);
+    // Paths of the geometry's own mechanisms (an unmodelled actor's echo) are theirs, not this one's.
+    records.erase(std::remove_if(records.begin(), records.end(),
+                                 [&](const PathRecord& r) {
+                                   return std::any_of(geometry.begin(), geometry.end(), [&](const NamedParameters& g) {
+                                     return g.mechanism == *r.event && g.mechanism != mechanism.mechanism;
+                                   });
+                                 }),
+                  records.end());
+    if (records.size() > kCloud) records = mergedCloud(std::move(records));
+    entry.paths[i] = std::move(records);
+    entry.known[i] = 1;
+  });
+  return entry.paths;
+}
+
+void EchoSource::findGraze(const std::vector<NamedParameters>& mechanisms) {
+  const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
+  std::vector<NamedParameters> smooth;
+  for (const NamedParameters& m : mechanisms) {
+    if (m.mechanism != "diffuse") smooth.push_back(m);  // its many points fade in and out one by one
+  }
+  const Twin twin = base_.changed(smooth);
+  graze_.assign(data_.poses.size(), {});
+  tbb::parallel_for(std::size_t{0}, data_.poses.size(), [&](std::size_t i) {
+    const Eigen::Isometry3d& here = data_.poses[i].pose.T_map_radar;
+    const std::vector<PathRecord> at = twin.trace(here);
+    EchoCollector collector(base_.radar(), accuracy_.path_angle_rad);
+    const auto compare = [&](const std::vector<PathRecord>& from, const std::vector<PathRecord>& to) {
+      for (const PathRecord& r : from) {
+        const auto same = std::find_if(to.begin(), to.end(),
+                                       [&](const PathRecord& o) { return o.event == r.event && o.facets == r.facets; });
+        const double other = same == to.end() ? 0 : same->amplitude;
+        if (r.amplitude <= other || r.amplitude == 0) continue;
+        const double lost = (r.amplitude - other) / r.amplitude;
+        if (lost > kSteady) collector.addGraze(r, 0.5 * lost * lost);
+      }
+    };
+    // One standard deviation in all three, turned from pose to pose so that no direction is preferred.
+    const double turn = 2.4 * static_cast<double>(i);
+    const Eigen::Vector3d error =
+        accuracy_.position_m * Eigen::Vector3d(std::sqrt(2.0) * std::cos(turn), std::sqrt(2.0) * std::sin(turn), 1);
+    for (const double sign : {-1.0, 1.0}) {
+      Eigen::Isometry3d T = here;
+      T.translation() += sign * error;
+      try {
+        const std::vector<PathRecord> there = twin.trace(T);
+        compare(at, there);
+        compare(there, at);
+      } catch (const InputError&) {
+        // The shifted pose lies inside something; the pose itself does not.
+      }
+    }
+    graze_[i] = collector.take().graze;
+  });
+}
+
+std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& mechanisms,
+                                           const std::vector<int>& poses) {
+  const Twin twin = base_.changed(mechanisms);
+  const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
+  std::vector<const Traced*> parts;
+  for (const NamedParameters& m : mechanisms) parts.push_back(&traced(geometry, m, poses));
+  const RadarConfig& radar = base_.radar();
+  const SignalChain chain(radar);
+  const int channels = radar.channels();
+  const double window = 0.5 * radar.samples_per_chirp;  // Hann's sum
+
+  std::vector<PoseEchoes> result(poses.size());
+  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
+    const std::size_t i = static_cast<std::size_t>(poses[j]);
+    const Pose& pose = data_.poses[i].pose;
+    std::vector<PathRecord> all;
+    for (const Traced* part : parts) all.insert(all.end(), (*part)[i].begin(), (*part)[i].end());
+    EchoCollector collector(radar, accuracy_.path_angle_rad);
+    std::optional<Eigen::MatrixXcd> matrix;
+    if (twin.hasReceiveStage()) matrix = twin.channelMatrix(pose.T_map_radar, pose.stamp_ns);
+    if (!twin.hasReceiveStage() || matrix) {
+      std::vector<PathRecord> seen = twin.receivedPaths(pose.T_map_radar, std::move(all), pose.stamp_ns);
+      double strongest = 0;
+      for (const PathRecord& r : seen) strongest = std::max(strongest, r.amplitude * r.amplitude);
+      for (PathRecord& r : seen) {
+        if (matrix)
+          Eigen::Map<Eigen::VectorXcd>(r.c.data(), channels) =
+              *matrix * Eigen::Map<Eigen::VectorXcd>(r.c.data(), channels).eval();
+        collector.add(r, r.amplitude * r.amplitude < kWeakPower * strongest);
+      }
+    } else {
+      // The receiver mixes ranges: each path is sent through it alone, less what comes without any path.
+      const auto spectra = [&](const ComplexGrid& x) -> Eigen::MatrixXcd { return chain.rangeSpectra(x) / window; };
+      const Eigen::MatrixXcd nothing =
+          spectra(twin.weigh(pose.T_map_radar, std::vector<PathRecord>(), pose.stamp_ns).grid.x);
+      for (PathRecord& r : mergedWeak(radar, std::move(all))) {
+        const Simulation alone = twin.weigh(pose.T_map_radar, std::vector<PathRecord>{r}, pose.stamp_ns);
+        if (!alone.records.empty()) collector.add(alone.records.front(), spectra(alone.grid.x) - nothing);
+      }
+      if (nothing.squaredNorm() > 0) {
+        PathRecord fixed;
+        fixed.departure = fixed.arrival = Eigen::Vector3d::UnitX();
+        fixed.length_m.assign(static_cast<std::size_t>(channels), 0.0);
+        collector.add(fixed, nothing);
+      }
+    }
+    result[j] = collector.take();
+    if (!graze_.empty()) result[j].graze = graze_[i];
+  });
+  return result;
+}
+
+std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& mechanisms) {
+  std::vector<int> all(data_.poses.size());
+  std::iota(all.begin(), all.end(), 0);
+  return echoes(mechanisms, all);
+}
+
+void EchoSource::settle(const std::vector<NamedParameters>& mechanisms) {
+  const std::string geometry = keyOf(geometryOf(mechanisms));
+  std::vector<std::string> wanted;
+  for (const NamedParameters& m : mechanisms) wanted.push_back(geometry + mechanismKey(m));
+  if (wanted != settled_) findGraze(mechanisms);
+  settled_ = wanted;
+  for (auto at = cache_.begin(); at != cache_.end();) {
+    at = std::find(wanted.begin(), wanted.end(), at->first) == wanted.end() ? cache_.erase(at) : std::next(at);
+  }
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "channel_data.h"
+#include "echo_field.h"
+#include "mmradartwin_sim/twin.h"
+
+namespace mmradartwin {
+
+/// What is known of the accuracy of poses; standard deviations.
+struct PoseAccuracy {
+  double position_m = 0.004, heading_rad = 0.3 * M_PI / 180;
+  double path_angle_rad = 0.2 * M_PI / 180;  ///< of one path on its own: facets are not exactly where the mesh says
+  double path_range_m = 0.005;
+};
+
+/// The expected channels of a session for any list of mechanisms. Paths are traced once per mechanism and geometry;
+/// what only weighs or receives traces nothing (DESIGN section 4).
+class EchoSource {
+ public:
+  /// Keeps references to base and data.
+  EchoSource(const Twin& base, const ChannelData& data, const PoseAccuracy& accuracy);
+
+  /// Echoes of the poses named by index, in that order. Throws InputError where the scene does not know what a
+  /// mechanism names.
+  std::vector<PoseEchoes> echoes(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
+  /// Of all poses.
+  std::vector<PoseEchoes> echoes(const std::vector<NamedParameters>& mechanisms);
+  /// What hypotheses are compared with from now on: paths of other mechanisms are forgotten (memory stays bounded so),
+  /// and what grazes an edge within the pose's accuracy is found for these.
+  void settle(const std::vector<NamedParameters>& mechanisms);
+  /// True where the mechanism edits the scene or moves the radar: trying it traces everything again.
+  bool altersGeometry(const NamedParameters& mechanism);
+  const Twin& base() const { return base_; }
+
+ private:
+  using Traced = std::vector<std::vector<PathRecord>>;  // by pose; empty where not traced
+  const Traced& traced(const std::vector<NamedParameters>& geometry, const NamedParameters& mechanism,
+                       const std::vector<int>& poses);
+  std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);
+  void findGraze(const std::vector<NamedParameters>& mechanisms);
+
+  const Twin& base_;
+  const ChannelData& data_;
+  PoseAccuracy accuracy_;
+  struct Entry {
+    Traced paths;
+    std::vector<char> known;  // by pose
+  };
+  std::map<std::string, Entry> cache_;
+  std::vector<BinCovariance> graze_;  // by pose
+  std::vector<std::string> settled_;
+  std::map<std::string, bool> alters_;  // geometry, by mechanism text
+};
+
+/// One line that tells two mechanisms with different values apart.
+std::string mechanismKey(const NamedParameters& mechanism);
+/// Defaults of every parameter of a mechanism. Throws InputError for an unknown name.
+NamedParameters defaultMechanism(const std::string& name);
+
+}  // namespace mmradartwin

@@ -1,0 +1,373 @@
+#include "mmradartwin_attribution/frame_evidence.h"
+
+#include <algorithm>
+#include <boost/math/distributions/beta.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <set>
+#include <sstream>
+
+#include "frame_stack.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "moving_echo.h"
+#include "payload_defects.h"
+#include "walker.h"
+
+namespace mmradartwin {
+namespace {
+
+using Complex = std::complex<float>;
+
+// Chance of a false finding of one kind in a session; six kinds stay far below the one in a hundred that a diagnosis
+// may afford for all its hypotheses.
+constexpr double kFalseAlarm = 1e-6;
+
+/// Clopper and Pearson's 95 % interval of a share.
+std::array<double, 2> shareInterval(double hits, double of) {
+  const auto quantile = [](double a, double b, double p) {
+    return boost::math::quantile(boost::math::beta_distribution<double>(a, b), p);
+  };
+  return {hits > 0 ? quantile(hits, of - hits + 1, 0.025) : 0.0,
+          hits < of ? quantile(hits + 1, of - hits, 0.975) : 1.0};
+}
+
+FindingParameter number(const char* name, const char* unit, double value, const std::array<double, 2>& ci95) {
+  return {name, unit, value, {ci95}};
+}
+
+/// Of one pose, what findings() judges.
+struct PoseJudgement {
+  std::string pose;
+  ZeroedPackets packets;
+  double slip_gain = 0;
+  Rails rails;
+  double clipped = 0, counted = 0;  ///< I and Q values per shot: beyond the converter, and all that were looked at
+  Bursts bursts;
+  double turn_rad_per_frame = 0, turn_variance = 0;
+  int turn_cells = 0, frames = 0;
+  std::vector<double> frame_gain_db;  ///< common to all channels and samples
+};
+
+}  // namespace
+
+struct FrameExaminer::State {
+  explicit State(const RadarConfig& config) : radar(config), order(payloadOrder(config)), examiner(config) {}
+
+  RadarConfig radar;
+  std::vector<int> order;
+  ShotExaminer examiner;
+  std::vector<PoseJudgement> judged;
+  std::vector<PoseMotion> motion;
+  std::vector<PoseFrames> poses;
+  mutable std::optional<Motion> located;  ///< of the poses so far, once asked for
+
+  const Motion& locate() const {
+    if (!located) located = locateMotion(radar, motion);
+    return *located;
+  }
+  FrameFinding saturation() const;
+  FrameFinding packetLoss() const;
+  FrameFinding misalignment() const;
+  FrameFinding interference() const;
+  FrameFinding drift() const;
+  FrameFinding frameGain() const;
+};
+
+FrameExaminer::FrameExaminer(const RadarConfig& radar) : state_(std::make_unique<State>(radar)) {}
+FrameExaminer::~FrameExaminer() = default;
+FrameExaminer::FrameExaminer(FrameExaminer&&) noexcept = default;
+FrameExaminer& FrameExaminer::operator=(FrameExaminer&&) noexcept = default;
+
+const std::vector<PoseFrames>& FrameExaminer::poses() const { return state_->poses; }
+
+void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames) {
+  State& s = *state_;
+  const RadarConfig& radar = s.radar;
+  for (const AdcCube& cube : frames) {
+    if (cube.chirps == radar.chirps_per_frame() && cube.samples == radar.samples_per_chirp &&
+        cube.receivers == radar.receivers() && cube.chirp_valid.size() == static_cast<std::size_t>(cube.chirps) &&
+        cube.data.size() == static_cast<std::size_t>(cube.chirps) * cube.samples * cube.receivers * 2) {
+      continue;
+    }
+    throw InputError("pose " + pose.name + ": frame " + std::to_string(cube.sequence) + " has " +
+                     std::to_string(cube.chirps) + " chirps x " + std::to_string(cube.samples) + " samples x " +
+                     std::to_string(cube.receivers) + " receivers; the radar's radar.yaml says " +
+                     std::to_string(radar.chirps_per_frame()) + " x " + std::to_string(radar.samples_per_chirp) +
+                     " x " + std::to_string(radar.receivers()));
+  }
+  PoseJudgement judged;
+  judged.pose = pose.name;
+  judged.frames = static_cast<int>(frames.size());
+
+  // Bytes first: all that follows takes samples for what they are.
+  Payload payload = toPayload(frames, s.order);
+  judged.packets = markZeroedPackets(payload, s.order);
+  for (int slips = 0; slips < 3; ++slips) {
+    const std::optional<Slip> slip = findSlip(payload);
+    if (!slip) break;
+    closeSlip(*slip, payload);
+    judged.slip_gain += slip->log_likelihood_gain;
+  }
+  FrameStack stack(radar, payload, s.order);
+  payload = Payload();
+
+  judged.rails = countRails(stack);
+  ClippedValues clipped = clippedValues(judged.rails, stack);
+  const double turn = s.examiner.commonTurn(stack);
+  turnFrames(-turn, stack);
+  std::vector<Complex> average = medianShot(stack);
+  // Where the standing signal itself comes to the converter's limit, clipped values are no bursts.
+  dropStandingClipped(clipped, average, stack);
+  Bursts bursts = dropBursts(average, differenceVariance(stack), stack);
+  countClipped(clipped, bursts, stack, judged.clipped, judged.counted);
+  judged.bursts = bursts;
+
+  average = meanShot(stack);
+  ShotResiduals residuals = s.examiner.examine(stack, average);
+  judged.turn_rad_per_frame = turn + residuals.turn_rad_per_frame;
+  judged.turn_variance = residuals.turn_variance;
+  judged.turn_cells = residuals.turn_cells;
+  for (double level : residuals.frame_level) judged.frame_gain_db.push_back(20 * std::log10(std::max(level, 1e-6)));
+
+  PoseFrames result;
+  result.pose = pose.name;
+  result.mean.stamp_ns = pose.stamp_ns;
+  result.mean.frames = stack.frames;
+  result.mean.pose_valid = true;
+  result.mean.T_map_radar = pose.T_map_radar;
+  result.mean.x.resize(stack.channels(), stack.samples);
+  for (int k = 0; k < stack.channels(); ++k) {
+    for (int n = 0; n < stack.samples; ++n) result.mean.x(k, n) = average[stack.at(0, k, n)];
+  }
+  result.noise_variance = std::move(residuals.noise_variance);
+  result.shots = residuals.shots;
+  s.poses.push_back(std::move(result));
+  s.motion.push_back({pose, stack.frames, std::move(residuals.evidence), std::move(residuals.echoes)});
+  s.judged.push_back(std::move(judged));
+  s.located.reset();
+}
+
+FrameFinding FrameExaminer::State::packetLoss() const {
+  FrameFinding f;
+  f.cause = "packet_loss";
+  long long lost = 0, packets = 0;
+  for (const PoseJudgement& p : judged) {
+    packets += p.packets.packets;
+    lost += p.packets.lost;
+    f.log_likelihood_gain += p.packets.log_likelihood_gain;
+    if (p.packets.lost > 0) f.poses.push_back(p.pose);
+  }
+  if (lost == 0) return f;
+  f.false_alarm_rate = kFalseAlarm;
+  const double share = static_cast<double>(lost) / static_cast<double>(packets);
+  f.parameters = {number("lost_fraction", "1", share, shareInterval(lost, packets))};
+  std::ostringstream text;
+  text << lost << " of " << packets << " packets of " << kPacketBytes << " bytes are filled with zeros and not flagged";
+  f.description = text.str();
+  return f;
+}
+
+FrameFinding FrameExaminer::State::misalignment() const {
+  FrameFinding f;
+  f.cause = "packet_misalignment";
+  for (const PoseJudgement& p : judged) {
+    if (p.slip_gain <= 0) continue;
+    f.poses.push_back(p.pose);
+    f.log_likelihood_gain += p.slip_gain;
+  }
+  if (f.poses.empty()) return f;
+  f.false_alarm_rate = kFalseAlarm;
+  f.parameters = {{"pose", "", f.poses.front(), {}}};
+  f.description = "packets are missing and were not filled: from there on samples belong to other channels and times";
+  return f;
+}
+
+FrameFinding FrameExaminer::State::saturation() const {
+  FrameFinding f;
+  f.cause = "adc_saturation";
+  // One converter: its limits are the outermost codes of the whole session.
+  int high = 0, low = 0;
+  for (const PoseJudgement& p : judged) {
+    high = std::max(high, p.rails.high.code);
+    low = std::min(low, p.rails.low.code);
+  }
+  double at_code = 0, next_codes = 0, clipped = 0, counted = 0, spread = 0;
+  for (const PoseJudgement& p : judged) {
+    counted += p.counted;
+    const bool top = p.rails.high.code == high, bottom = p.rails.low.code == low;
+    if ((!top && !bottom) || p.clipped <= 0) continue;
+    at_code += p.clipped;
+    next_codes += (top ? p.rails.high.next_codes : 0) + (bottom ? p.rails.low.next_codes : 0);
+    clipped += p.clipped;
+    spread += p.clipped;
+    f.poses.push_back(p.pose);
+  }
+  f.log_likelihood_gain = pileUp({0, at_code, next_codes});
+  f.false_alarm_rate = std::exp(-f.log_likelihood_gain);
+  if (f.false_alarm_rate > kFalseAlarm || counted == 0) {
+    f.log_likelihood_gain = 0;
+    return f;
+  }
+  const double share = clipped / counted;
+  // Samples of one pose clip together or not at all only where noise decides: their number is as good as its root.
+  f.parameters = {number("clipped_fraction", "1", share,
+                         {std::max(0.0, share - 1.96 * std::sqrt(spread) / counted * 0.2),
+                          share + 1.96 * std::sqrt(spread) / counted * 0.2})};
+  std::ostringstream text;
+  text << "samples pile up at the outermost codes " << low << " and " << high << ": " << 100 * share
+       << " % of all I and Q values";
+  f.description = text.str();
+  return f;
+}
+
+FrameFinding FrameExaminer::State::interference() const {
+  FrameFinding f;
+  f.cause = "interference";
+  double frames = 0, hit = 0;
+  for (const PoseJudgement& p : judged) {
+    frames += p.bursts.frames;
+    hit += p.bursts.hit_frames;
+    f.log_likelihood_gain += p.bursts.log_likelihood_gain;
+    if (p.bursts.hit_frames > 0) f.poses.push_back(p.pose);
+  }
+  if (hit == 0) return f;
+  // dropBursts' thresholds: 1e-12 per window, some 1e7 windows in a session at most.
+  f.false_alarm_rate = 1e-5;
+  f.parameters = {number("frame_fraction", "1", hit / frames, shareInterval(hit, frames))};
+  std::ostringstream text;
+  text << "bursts within single chirps, the same wave at all receivers, in " << hit << " of " << frames << " frames";
+  f.description = text.str();
+  return f;
+}
+
+FrameFinding FrameExaminer::State::drift() const {
+  FrameFinding f;
+  f.cause = "phase_drift";
+  std::vector<const PoseJudgement*> used;
+  for (const PoseJudgement& p : judged) {
+    if (std::isfinite(p.turn_variance)) used.push_back(&p);
+  }
+  if (used.empty()) return f;
+  // Random-effects mean (DerSimonian and Laird): poses may differ by more than each one's own error.
+  const auto mean = [&](double between, double& weights) {
+    double sum = 0;
+    weights = 0;
+    for (const PoseJudgement* p : used) {
+      sum += p->turn_rad_per_frame / (p->turn_variance + between);
+      weights += 1 / (p->turn_variance + between);
+    }
+    return sum / weights;
+  };
+  double weights = 0, squares = 0, chi2 = 0;
+  const double fixed = mean(0, weights);
+  for (const PoseJudgement* p : used) {
+    squares += 1 / (p->turn_variance * p->turn_variance);
+    chi2 += std::pow(p->turn_rad_per_frame - fixed, 2) / p->turn_variance;
+  }
+  const double poses = static_cast<double>(used.size());
+  const double room = weights - squares / weights;
+  const double between = room > 0 ? std::max(0.0, (chi2 - (poses - 1)) / room) : 0;
+  const double turn = mean(between, weights);
+  const double error = std::sqrt(1 / weights);
+  // Common to all cells is what makes it drift of the radar: what one echo of one pose does may be that echo's own
+  // motion.
+  int cells = 0;
+  for (const PoseJudgement* p : used) cells += p->turn_cells;
+  const double freedom = std::max(poses, static_cast<double>(cells)) - 1;
+  if (freedom < 2) return f;
+  const double t = std::abs(turn) / error;
+  const boost::math::students_t_distribution<double> student(freedom);
+  f.false_alarm_rate = 2 * boost::math::cdf(boost::math::complement(student, t));
+  if (!(f.false_alarm_rate < kFalseAlarm)) return f;
+  f.log_likelihood_gain = 0.5 * t * t;
+  const double half = boost::math::quantile(student, 0.975) * error;
+  f.parameters = {number("rad_per_frame", "rad", turn, {turn - half, turn + half})};
+  for (const PoseJudgement* p : used) {
+    if (std::abs(p->turn_rad_per_frame) > 3 * std::sqrt(p->turn_variance)) f.poses.push_back(p->pose);
+  }
+  std::ostringstream text;
+  text << "all cells turn alike by " << turn << " rad from each frame to the next; an average over "
+       << used.front()->frames << " frames loses "
+       << -20 * std::log10(std::max(1e-9, std::abs(std::sin(0.5 * turn * used.front()->frames) /
+                                                   (used.front()->frames * std::sin(0.5 * turn)))))
+       << " dB by it";
+  f.description = text.str();
+  return f;
+}
+
+FrameFinding FrameExaminer::State::frameGain() const {
+  FrameFinding f;
+  f.cause = "unknown";
+  std::size_t frames = 0;
+  for (const PoseJudgement& p : judged) frames = std::max(frames, p.frame_gain_db.size());
+  // The mean over poses of each frame's level against the pose's other frames; it changes where it differs between
+  // frames by far more than its error over poses.
+  double chi2 = 0, lowest = 0, highest = 0;
+  std::size_t lowest_at = 0, highest_at = 0, counted = 0;
+  for (std::size_t i = 0; i < frames; ++i) {
+    double sum = 0, squares = 0, n = 0;
+    for (const PoseJudgement& p : judged) {
+      if (i >= p.frame_gain_db.size() || p.frame_gain_db.size() < 3) continue;
+      sum += p.frame_gain_db[i];
+      squares += p.frame_gain_db[i] * p.frame_gain_db[i];
+      ++n;
+    }
+    if (n < 3) continue;
+    const double mean = sum / n, variance = std::max((squares - n * mean * mean) / (n - 1), 1e-8) / n;
+    chi2 += mean * mean / variance;
+    ++counted;
+    if (mean < lowest) {
+      lowest = mean;
+      lowest_at = i;
+    }
+    if (mean > highest) {
+      highest = mean;
+      highest_at = i;
+    }
+  }
+  // A tenth of a decibel matters to nobody, whatever its error.
+  if (counted < 3 || highest - lowest < 0.1) return f;
+  const double excess = (chi2 - static_cast<double>(counted)) / std::sqrt(2.0 * static_cast<double>(counted));
+  if (excess < 12) return f;
+  f.log_likelihood_gain = 0.5 * (chi2 - static_cast<double>(counted));
+  f.false_alarm_rate = std::exp(-0.5 * excess);
+  for (const PoseJudgement& p : judged) f.poses.push_back(p.pose);
+  std::ostringstream text;
+  text << "the common level of frames changes within a pose, at all poses alike: lowest in frame " << lowest_at << " ("
+       << lowest << " dB), highest in frame " << highest_at << " (" << highest << " dB against the mean)";
+  f.description = text.str();
+  return f;
+}
+
+std::vector<FrameFinding> FrameExaminer::findings() const {
+  const State& s = *state_;
+  std::vector<FrameFinding> all = {s.saturation(), s.packetLoss(), s.misalignment(), s.interference(), s.drift()};
+  std::set<std::string> walked;
+  for (const FrameFinding& walker : s.locate().walkers) {
+    all.push_back(walker);
+    walked.insert(walker.poses.begin(), walker.poses.end());
+  }
+  // A strong walker pulls the gain that a frame's samples share, and what that leaves looks like a burst: bursts that
+  // stand at such poses alone are his.
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [&](const FrameFinding& f) {
+                             return f.cause == "interference" &&
+                                    std::all_of(f.poses.begin(), f.poses.end(),
+                                                [&](const std::string& pose) { return walked.count(pose) > 0; });
+                           }),
+            all.end());
+  all.erase(std::remove_if(all.begin(), all.end(), [](const auto& f) { return f.log_likelihood_gain <= 0; }),
+            all.end());
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.log_likelihood_gain > b.log_likelihood_gain; });
+  return all;
+}
+
+std::vector<FrameFinding> FrameExaminer::unexplained() const {
+  std::vector<FrameFinding> all = state_->locate().unexplained;
+  FrameFinding gain = state_->frameGain();
+  if (gain.log_likelihood_gain > 0) all.push_back(std::move(gain));
+  return all;
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "channel_data.h"
+#include "echo_field.h"
+#include "mmradartwin_attribution/finding.h"
+
+namespace mmradartwin {
+
+/// Measured and expected power in the cells of a map beyond 0.16 m and within 60 deg (DESIGN section 5).
+struct CellPowers {
+  std::vector<double> measured, expected;
+};
+std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<PoseEchoes>& echoes);
+
+/// explained_power = 1 - sum (sqrt(P_meas) - sqrt(g P_twin))^2 / sum P_meas over all poses, with the one gain of the
+/// session sqrt(g) = sum sqrt(P_meas P_twin)/sum P_twin.
+double explainedPower(const std::vector<CellPowers>& poses);
+/// Before and after, and the difference's 95 % interval by bootstrap over locations.
+GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPowers>& before,
+                              const std::vector<CellPowers>& after);
+
+/// Mean difference per pose with its 95 % interval by bootstrap over locations.
+GainMetric likelihoodGain(const ChannelData& data, const std::vector<double>& before, const std::vector<double>& after);
+
+}  // namespace mmradartwin

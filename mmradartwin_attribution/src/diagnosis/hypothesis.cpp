@@ -1,0 +1,160 @@
+#include "hypothesis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "echo_source.h"
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin {
+namespace {
+
+// Pairs of actors are tried as a corner where their bounds come this near.
+constexpr double kNear_m = 0.1;
+// A face has to be this large to mirror a room.
+constexpr double kMirrorArea_m2 = 0.5;
+
+bool hasTried(const std::vector<ParameterSpec>& specs) {
+  return std::any_of(specs.begin(), specs.end(), [](const ParameterSpec& s) { return !std::isnan(s.neutral); });
+}
+
+/// Mechanisms without a number that are there or not, about something in the scene.
+bool isPresence(const std::vector<ParameterSpec>& specs) {
+  return std::any_of(specs.begin(), specs.end(), [](const ParameterSpec& s) {
+    return (s.kind == ParameterKind::kText && s.required && s.name == "actor") ||
+           (s.kind == ParameterKind::kTexts && s.name == "actors");
+  });
+}
+
+double mirrorArea_m2(const Scene& scene, const Actor& actor) {
+  double largest = 0;
+  for (int id : actor.facets) {
+    const Facet& f = scene.facets[static_cast<std::size_t>(id)];
+    if (f.present && f.reflects) largest = std::max(largest, f.area_m2);
+  }
+  return largest;
+}
+
+void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<ParameterSpec>& specs,
+                 std::vector<Hypothesis>& out) {
+  const Scene& scene = twin.scene();
+  const auto spec = [&](const char* name) {
+    return std::find_if(specs.begin(), specs.end(), [&](const ParameterSpec& s) { return s.name == name; });
+  };
+  const auto with = [&](const char* parameter, Parameters::Value value, const std::string& subject) {
+    Hypothesis h = bare;
+    h.mechanism.values.set(parameter, std::move(value));
+    h.subject = subject;
+    out.push_back(std::move(h));
+  };
+  const bool material = spec("material") != specs.end() && spec("material")->kind == ParameterKind::kText;
+  const bool actor = spec("actor") != specs.end() && spec("actor")->kind == ParameterKind::kText;
+  if (material) {
+    std::set<std::string> tags;
+    for (const Actor& a : scene.actors) {
+      // Where a material scatters already there is nothing to find missing.
+      const bool scatters = a.material.scattering_coefficient > 0 && spec("scattering_coefficient") != specs.end();
+      if (a.present && !scatters) tags.insert(a.material_tag);
+    }
+    for (const std::string& tag : tags) with("material", tag, tag);
+  }
+  if (actor) {
+    for (const Actor& a : scene.actors) {
+      if (a.present) with("actor", a.name, a.name);
+    }
+  }
+  if (spec("walls") != specs.end()) {
+    for (const Actor& a : scene.actors) {
+      if (a.present && mirrorArea_m2(scene, a) > kMirrorArea_m2) {
+        with("walls", std::vector<std::string>{a.name}, a.name);
+      }
+    }
+  }
+  if (spec("actors") != specs.end()) {
+    for (std::size_t i = 0; i < scene.actors.size(); ++i) {
+      for (std::size_t j = i + 1; j < scene.actors.size(); ++j) {
+        const Actor &a = scene.actors[i], &b = scene.actors[j];
+        if (!a.present || !b.present || a.bounds.exteriorDistance(b.bounds) > kNear_m) continue;
+        if (mirrorArea_m2(scene, a) == 0 || mirrorArea_m2(scene, b) == 0) continue;
+        with("actors", std::vector<std::string>{a.name, b.name}, a.name + ";" + b.name);
+      }
+    }
+  }
+  if (!material && !actor && spec("walls") == specs.end() && spec("actors") == specs.end()) out.push_back(bare);
+}
+
+}  // namespace
+
+double Coordinate::value(double scaled) const {
+  if (logarithmic()) return std::clamp(typical + 10 * std::log10(std::max(scaled, 1e-12)), min, max);
+  return std::clamp(neutral + scaled * (typical - neutral), min, max);
+}
+
+double Coordinate::scaled(double v) const {
+  if (logarithmic()) return std::pow(10.0, (v - typical) / 10);
+  return (v - neutral) / (typical - neutral);
+}
+
+double Coordinate::slope(double scaled) const {
+  if (logarithmic()) return 10 / std::log(10.0) / std::max(scaled, 1e-12);
+  return typical - neutral;
+}
+
+NamedParameters Hypothesis::at(const std::vector<double>& scaled) const {
+  NamedParameters m = mechanism;
+  for (std::size_t i = 0; i < coordinates.size(); ++i) {
+    const Coordinate& c = coordinates[i];
+    if (c.element < 0) {
+      m.values.set(c.parameter, c.value(scaled[i]));
+    } else {
+      std::vector<double> list = m.values.numbers(c.parameter);
+      list[static_cast<std::size_t>(c.element)] = c.value(scaled[i]);
+      m.values.set(c.parameter, std::move(list));
+    }
+  }
+  return m;
+}
+
+std::string Hypothesis::label() const { return mechanism.mechanism + (subject.empty() ? "" : " of " + subject); }
+
+std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedParameters>& present) {
+  std::vector<Hypothesis> result;
+  const MechanismRegistry& registry = MechanismRegistry::instance();
+  const std::size_t channels = static_cast<std::size_t>(twin.radar().channels());
+  for (const std::string& name : registry.names()) {
+    const bool there =
+        std::any_of(present.begin(), present.end(), [&](const NamedParameters& m) { return m.mechanism == name; });
+    if (there) continue;  // twin.yaml knows each mechanism once
+    const std::vector<ParameterSpec> specs = registry.create(name)->parameters();
+    if (!hasTried(specs) && !isPresence(specs)) continue;
+    Hypothesis bare;
+    bare.mechanism = defaultMechanism(name);
+    for (const ParameterSpec& s : specs) {
+      if (std::isnan(s.neutral)) continue;
+      Coordinate c{s.name, s.unit, -1, s.neutral, s.typical, s.min, s.max};
+      if (s.kind == ParameterKind::kNumber) {
+        bare.mechanism.values.set(s.name, s.neutral);
+        bare.coordinates.push_back(c);
+      } else if (s.kind == ParameterKind::kNumbers) {  // per channel, the first one being the reference
+        bare.mechanism.values.set(s.name, std::vector<double>(channels, s.neutral));
+        for (std::size_t k = 1; k < channels; ++k) {
+          c.element = static_cast<int>(k);
+          bare.coordinates.push_back(c);
+        }
+      }
+    }
+    std::vector<Hypothesis> all;
+    addSubjects(twin, bare, specs, all);
+    for (Hypothesis& h : all) {
+      try {  // what the scene or the radar does not allow is no hypothesis
+        twin.changed({h.at(std::vector<double>(h.coordinates.size(), 1.0))});
+        result.push_back(std::move(h));
+      } catch (const InputError&) {
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace mmradartwin

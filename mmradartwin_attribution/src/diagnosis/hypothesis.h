@@ -1,0 +1,40 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "mmradartwin_sim/mechanism.h"
+#include "mmradartwin_sim/scene.h"
+#include "mmradartwin_sim/twin.h"
+
+namespace mmradartwin {
+
+/// A number of a mechanism that is fitted, on a scale where 0 is where it does nothing and 1 its typical value.
+struct Coordinate {
+  std::string parameter, unit;
+  int element = -1;  ///< of a list, -1 for a plain number
+  double neutral = 0, typical = 1, min = 0, max = 0;
+
+  /// True for levels in dB whose neutral value stands for nothing at all: then the scale is one of power.
+  bool logarithmic() const { return unit == "dB" && neutral <= -60; }
+  double value(double scaled) const;
+  double scaled(double value) const;
+  /// Derivative of value() by the scale.
+  double slope(double scaled) const;
+};
+
+/// A change of the twin that data may support: one mechanism with what is free in it.
+struct Hypothesis {
+  NamedParameters mechanism;            ///< texts set, numbers at their neutral values
+  std::vector<Coordinate> coordinates;  ///< empty: it is there or not
+  std::string subject;                  ///< actor or material it is about, "" for none
+
+  NamedParameters at(const std::vector<double>& scaled) const;
+  std::string label() const;
+};
+
+/// Every registered mechanism that says how to try it, once per actor or material where it concerns one, and those that
+/// are there or not. Mechanisms that the twin has already are left out unless they concern another subject.
+std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedParameters>& present);
+
+}  // namespace mmradartwin

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "echo_source.h"
+#include "hypothesis.h"
+#include "session_model.h"
+
+namespace mmradartwin {
+
+/// A state of the model: mechanisms, what they make of the session, and everything else fitted to it.
+struct ModelState {
+  std::vector<NamedParameters> mechanisms;
+  std::vector<PoseEchoes> echoes;
+  Nuisance nuisance;
+  double log_likelihood = 0;
+  std::vector<double> by_pose;
+  Basis basis;  ///< at nuisance; filled by HypothesisFitter::state() alone
+};
+
+/// One hypothesis, all else refitted.
+struct HypothesisFit {
+  Hypothesis hypothesis;
+  std::vector<double> scaled;  ///< of its coordinates
+  ModelState state;
+  double gain = 0;                     ///< nats over the state without it
+  double inflation = 1;                ///< of the scores' variance over places against what the likelihood expects
+  double false_alarm_rate = 1;         ///< family-wise: of the best of all hypotheses that were tried
+  double held_out_gain = 0;            ///< nats on places that the fit did not see, each fold by one step from the fit
+  std::vector<double> standard_error;  ///< of the values (not scaled), by location
+  std::vector<std::vector<double>> fold_scaled;  ///< coordinates without each fold of locations
+  double ranking() const;                        ///< gain less a price per coordinate
+};
+
+struct Screened {
+  Hypothesis hypothesis;
+  double promised = 0;  ///< nats by the score test, inflation taken off
+  std::vector<double> start;
+};
+
+/// Scores and fits hypotheses against a state.
+class HypothesisFitter {
+ public:
+  HypothesisFitter(EchoSource& source, const SessionModel& model, int folds);
+
+  ModelState state(const std::vector<NamedParameters>& mechanisms, const Nuisance* start);
+  /// Actors by how far their echoes' level and range are from where the twin has them, the priors of their errors
+  /// included: most suspicious first, with nats (inflation taken off).
+  std::vector<std::pair<int, double>> suspects(const ModelState& null) const;
+  /// Score test of one hypothesis: no refit, one evaluation of its echoes at the typical values.
+  Screened screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
+  /// Maximum likelihood of the coordinates from `start`, the nuisance refitted along.
+  HypothesisFit fit(const ModelState& null, const Hypothesis& hypothesis, const std::vector<double>& start,
+                    int iterations);
+  /// Fold of a location.
+  int fold(int location) const { return location % folds_; }
+  int folds() const { return folds_; }
+  /// Sets false_alarm_rate for a family of that many hypotheses.
+  void judge(HypothesisFit& fit, std::size_t family) const;
+
+ private:
+  struct Effective;
+  Effective effective(const Scores& scores, int globals) const;
+
+  EchoSource& source_;
+  const SessionModel& model_;
+  int folds_;
+};
+
+}  // namespace mmradartwin

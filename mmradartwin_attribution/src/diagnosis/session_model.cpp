@@ -1,0 +1,530 @@
+#include "session_model.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace mmradartwin {
+namespace {
+
+using Matrix = SessionModel::Matrix;
+using Vector = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, 1, 0, kMaxChannels, 1>;
+
+constexpr double kTail = 4;  ///< degrees of freedom of the complex t
+
+constexpr double kEnough = 0.1;  ///< nats: what a further step would bring is not worth it
+
+enum Global { kGain, kFloor, kSlope, kRelative, kGraze, kRange, kActors };
+
+void unpack(const std::complex<float>* packed, double factor, Matrix& to) {
+  std::size_t i = 0;
+  for (Eigen::Index k = 0; k < to.rows(); ++k) {
+    for (Eigen::Index l = 0; l <= k; ++l) to(k, l) += factor * std::complex<double>(packed[i++]);
+  }
+}
+
+void mirror(Matrix& m) {
+  for (Eigen::Index k = 0; k < m.rows(); ++k) {
+    m(k, k) = m(k, k).real();
+    for (Eigen::Index l = 0; l < k; ++l) m(l, k) = std::conj(m(k, l));
+  }
+}
+
+/// Turns a lower triangle by phases: a heading's error moves a group's mean direction, and phases alone keep the matrix
+/// definite. `power` and `cosine` are the group's fields of the bin.
+void turnBy(double yaw_rad, const std::vector<double>& element_phase, const std::complex<float>* power,
+            const std::complex<float>* cosine, Matrix& m) {
+  if (yaw_rad == 0 || power == nullptr || cosine == nullptr || !(power[0].real() > 0)) return;
+  const double turn = yaw_rad * cosine[0].real() / power[0].real();
+  Vector phase(m.rows());
+  for (Eigen::Index k = 0; k < m.rows(); ++k) {
+    phase[k] = std::polar(1.0, element_phase[static_cast<std::size_t>(k)] * turn);
+  }
+  for (Eigen::Index k = 0; k < m.rows(); ++k) {
+    for (Eigen::Index l = 0; l < k; ++l) m(k, l) *= phase[k] * std::conj(phase[l]);
+  }
+}
+
+double groupGain(const EchoGroup& group, const Nuisance& nuisance) {
+  double sum = 0;
+  for (int a : group.actors) {
+    if (a >= 0 && a < static_cast<int>(nuisance.actor_gain.size())) sum += nuisance.actor_gain[a];
+  }
+  return std::exp(sum);
+}
+
+/// One-way range that the group's actors add: the mean over its interactions, as each shifts the path by its own share.
+double groupShift_m(const EchoGroup& group, const Nuisance& nuisance) {
+  double sum = 0;
+  for (int a : group.actors) {
+    if (a >= 0 && a < static_cast<int>(nuisance.actor_range_m.size())) sum += nuisance.actor_range_m[a];
+  }
+  return sum;
+}
+
+}  // namespace
+
+namespace {
+
+/// A whitened Hermitian matrix as M^2 real numbers, so that tr(D~ E~) is a dot product: L^-1 D L^-H.
+void whiten(const Matrix& inverse_lower, Matrix& m, double* v) {
+  mirror(m);
+  const Matrix w = inverse_lower * m * inverse_lower.adjoint();
+  for (Eigen::Index k = 0; k < w.rows(); ++k) {
+    *v++ = w(k, k).real();
+    for (Eigen::Index l = 0; l < k; ++l) {
+      *v++ = M_SQRT2 * w(k, l).real();
+      *v++ = M_SQRT2 * w(k, l).imag();
+    }
+  }
+}
+
+double traceOf(const double* v, int channels) {
+  double sum = 0;
+  for (int k = 0; k < channels; ++k) sum += v[k * k];  // row k begins after 1 + 3 + ... = k^2 numbers
+  return sum;
+}
+
+}  // namespace
+
+SessionModel::SessionModel(const ChannelData& data, int actors, const PoseAccuracy& accuracy,
+                           const LatentSpread& spread)
+    : data_(data),
+      actors_(actors),
+      accuracy_(accuracy),
+      spread_(spread),
+      channels_(data.radar.channels()),
+      samples_(data.radar.samples_per_chirp),
+      size_(static_cast<std::size_t>(channels_) * (channels_ + 1) / 2) {
+  for (int k = 0; k < channels_; ++k) {
+    element_phase_.push_back(2 * M_PI / data.radar.wavelength_m() * data.radar.virtual_element_m(k).y());
+  }
+}
+
+double SessionModel::floorPower(const Nuisance& n, int pose, int bin) const {
+  const double range_m = std::max(0.3, bin * data_.radar.range_bin_m());
+  return data_.poses[pose].noise_power + std::exp(n.log_floor + n.floor_slope * std::log(range_m / 3));
+}
+
+SessionModel::Matrix SessionModel::sigma(const PoseEchoes& echoes, const Nuisance& n, int pose, int bin) const {
+  Matrix s = Matrix::Zero(channels_, channels_);
+  const double gain = std::exp(n.log_gain);
+  const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
+  Matrix own(channels_, channels_);
+  for (const EchoGroup& g : echoes.groups) {
+    const auto *power = g.power.at(bin, size_), *bend = g.bend.at(bin, size_);
+    if (power == nullptr && bend == nullptr) continue;
+    const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
+    own.setZero();
+    if (power != nullptr) unpack(power, u, own);
+    if (shift != 0) {
+      if (const auto* p = g.shift.at(bin, size_)) unpack(p, u * shift, own);
+    }
+    if (bend != nullptr) unpack(bend, u * (shift * shift + range_variance), own);
+    turnBy(n.yaw_rad[pose], element_phase_, power, g.cosine.at(bin, size_), own);
+    s.triangularView<Eigen::Lower>() += own;
+  }
+  if (const auto* p = echoes.graze.at(bin, size_)) unpack(p, gain * std::exp(n.log_graze), s);
+  // At least a share of the mean power everywhere keeps the matrix definite where the first-order terms would not.
+  const double relative = std::exp(n.log_relative), mean = s.diagonal().real().mean();
+  for (int k = 0; k < channels_; ++k) s(k, k) += relative * std::max(mean, 0.0) + floorPower(n, pose, bin);
+  mirror(s);
+  return s;
+}
+
+double SessionModel::prior(const Nuisance& n) const {
+  double sum = 0;
+  for (double v : n.actor_gain) sum -= 0.5 * v * v / (spread_.actor_gain * spread_.actor_gain);
+  for (double v : n.actor_range_m) sum -= 0.5 * v * v / (spread_.actor_range_m * spread_.actor_range_m);
+  for (double v : n.yaw_rad) sum -= 0.5 * v * v / (accuracy_.heading_rad * accuracy_.heading_rad);
+  return sum;
+}
+
+double SessionModel::poseLikelihood(const PoseEchoes& echoes, const Nuisance& n, int pose) const {
+  double sum = 0;
+  for (int bin = firstBin(); bin < samples_; ++bin) {
+    const Matrix s = sigma(echoes, n, pose, bin);
+    const Eigen::LLT<Matrix> llt(s);
+    if (llt.info() != Eigen::Success) return -1e9;
+    Vector y = data_.poses[pose].y.col(bin);
+    llt.matrixL().solveInPlace(y);
+    double log_det = 0;
+    for (int k = 0; k < channels_; ++k) log_det += 2 * std::log(llt.matrixLLT()(k, k).real());
+    sum += -log_det - (channels_ + kTail) * std::log1p(y.squaredNorm() / kTail);
+  }
+  return weight() * sum;
+}
+
+double SessionModel::logLikelihood(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
+                                   std::vector<double>* by_pose) const {
+  std::vector<double> each(data_.poses.size());
+  tbb::parallel_for(std::size_t{0}, each.size(),
+                    [&](std::size_t i) { each[i] = poseLikelihood(echoes[i], nuisance, static_cast<int>(i)); });
+  const double sum = std::accumulate(each.begin(), each.end(), 0.0);
+  if (by_pose != nullptr) *by_pose = std::move(each);
+  return sum + prior(nuisance);
+}
+
+SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes, const Nuisance& n,
+                                           const std::vector<int>& poses) const {
+  SessionCovariance result(poses.size());
+  const double gain = std::exp(n.log_gain);
+  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
+    result[i].assign(static_cast<std::size_t>(samples_) * size_, {});
+    Matrix own(channels_, channels_);
+    for (const EchoGroup& g : echoes[i].groups) {
+      const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
+      for (int bin = g.power.first; bin < g.power.first + g.power.bins; ++bin) {
+        const auto* power = g.power.at(bin, size_);
+        own.setZero();
+        unpack(power, u, own);
+        if (shift != 0) {
+          if (const auto* p = g.shift.at(bin, size_)) unpack(p, u * shift, own);
+          if (const auto* p = g.bend.at(bin, size_)) unpack(p, u * shift * shift, own);
+        }
+        turnBy(n.yaw_rad[poses[i]], element_phase_, power, g.cosine.at(bin, size_), own);
+        std::complex<float>* to = result[i].data() + static_cast<std::size_t>(bin) * size_;
+        for (int k = 0; k < channels_; ++k) {
+          for (int l = 0; l <= k; ++l) *to++ += std::complex<float>(own(k, l));
+        }
+      }
+    }
+  });
+  return result;
+}
+
+void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pose, PoseBasis& out) const {
+  const int globals = n.globals(), heading = globals;
+  const int numbers = channels_ * channels_;
+  out.score = Eigen::VectorXd::Zero(globals + 1);
+  out.information = Eigen::MatrixXd::Zero(globals + 1, globals + 1);
+  out.log_likelihood = 0;
+  out.bins.clear();
+  const double gain = std::exp(n.log_gain), relative = std::exp(n.log_relative);
+  const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
+  // Only directions that do something in a bin enter its products.
+  std::vector<int> active;
+  Matrix own(channels_, channels_);
+  std::vector<char> is_active(static_cast<std::size_t>(globals + 1));
+  std::vector<Matrix> raw(static_cast<std::size_t>(globals + 1), Matrix::Zero(channels_, channels_));
+  const auto touch = [&](int j) -> Matrix& {
+    if (!is_active[j]) {
+      is_active[j] = 1;
+      active.push_back(j);
+      raw[j].setZero();
+    }
+    return raw[j];
+  };
+  for (int bin = firstBin(); bin < samples_; ++bin) {
+    for (int j : active) is_active[j] = 0;
+    active.clear();
+    const Matrix s = sigma(echoes, n, pose, bin);
+    const Eigen::LLT<Matrix> llt(s);
+    if (llt.info() != Eigen::Success) continue;
+    Vector y = data_.poses[pose].y.col(bin);
+    llt.matrixL().solveInPlace(y);
+    const double q = y.squaredNorm(), w = (channels_ + kTail) / (kTail + q);
+    double log_det = 0;
+    for (int k = 0; k < channels_; ++k) log_det += 2 * std::log(llt.matrixLLT()(k, k).real());
+    out.log_likelihood += -log_det - (channels_ + kTail) * std::log1p(q / kTail);
+
+    for (const EchoGroup& g : echoes.groups) {
+      const auto *power = g.power.at(bin, size_), *shift = g.shift.at(bin, size_), *bend = g.bend.at(bin, size_);
+      if (power == nullptr && bend == nullptr) continue;
+      const auto* cosine = g.cosine.at(bin, size_);
+      const double f = gain * groupGain(g, n), moved = groupShift_m(g, n);
+      const auto add = [&](int direction) {
+        turnBy(n.yaw_rad[pose], element_phase_, power, cosine, own);
+        touch(direction).triangularView<Eigen::Lower>() += own;
+      };
+      for (int a : g.actors) {
+        if (a < 0 || a >= actors_) continue;
+        own.setZero();
+        if (power != nullptr) unpack(power, f, own);
+        if (shift != nullptr && moved != 0) unpack(shift, f * moved, own);
+        add(kActors + a);
+        own.setZero();
+        if (shift != nullptr) unpack(shift, f, own);
+        if (bend != nullptr && moved != 0) unpack(bend, 2 * f * moved, own);
+        add(kActors + actors_ + a);
+      }
+      if (bend != nullptr) {
+        own.setZero();
+        unpack(bend, f * range_variance, own);
+        add(kRange);
+      }
+      if (cosine != nullptr) {
+        own.setZero();
+        std::size_t i = 0;
+        for (int k = 0; k < channels_; ++k) {
+          for (int l = 0; l <= k; ++l, ++i) {
+            own(k, l) =
+                f * std::complex<double>(0, element_phase_[k] - element_phase_[l]) * std::complex<double>(cosine[i]);
+          }
+        }
+        add(heading);
+      }
+    }
+    if (const auto* p = echoes.graze.at(bin, size_)) unpack(p, gain * std::exp(n.log_graze), touch(kGraze));
+    const double floor = floorPower(n, pose, bin), clutter = floor - data_.poses[pose].noise_power;
+    const double range_m = std::max(0.3, bin * data_.radar.range_bin_m());
+    Matrix& level = touch(kGain);
+    level = s;
+    level.diagonal().array() -= floor;
+    const double mean = level.diagonal().real().mean() / (1 + relative);
+    touch(kRelative).diagonal().array() += relative * mean;
+    touch(kFloor).diagonal().array() += clutter;
+    touch(kSlope).diagonal().array() += clutter * std::log(range_m / 3);
+    BinBasis basis;
+    basis.bin = bin;
+    Matrix inverse = Matrix::Identity(channels_, channels_);
+    llt.matrixL().solveInPlace(inverse);
+    basis.inverse_lower = inverse;
+    basis.active = active;
+    basis.whitened.resize(numbers, static_cast<Eigen::Index>(active.size()));
+    for (std::size_t a = 0; a < active.size(); ++a) {
+      whiten(inverse, raw[active[a]], basis.whitened.col(static_cast<Eigen::Index>(a)).data());
+    }
+    // Data in the same numbers: w y y^H - I.
+    basis.data.resize(numbers);
+    int i = 0;
+    for (int k = 0; k < channels_; ++k) {
+      basis.data[i++] = w * std::norm(y[k]) - 1;
+      for (int l = 0; l < k; ++l) {
+        const std::complex<double> v = w * y[k] * std::conj(y[l]);
+        basis.data[i++] = M_SQRT2 * v.real();
+        basis.data[i++] = M_SQRT2 * v.imag();
+      }
+    }
+    const Eigen::VectorXd score = basis.whitened.transpose() * basis.data;
+    const Eigen::MatrixXd products = basis.whitened.transpose() * basis.whitened;
+    basis.traces.resize(static_cast<Eigen::Index>(active.size()));
+    for (std::size_t a = 0; a < active.size(); ++a) {
+      const Eigen::Index ia = static_cast<Eigen::Index>(a);
+      basis.traces[ia] = traceOf(basis.whitened.col(ia).data(), channels_);
+      out.score[active[a]] += weight() * score[ia];
+      for (std::size_t b = 0; b <= a; ++b) {
+        const Eigen::Index ib = static_cast<Eigen::Index>(b);
+        const double v = weight() * informationOf(products(ia, ib), basis.traces[ia], basis.traces[ib]);
+        out.information(active[a], active[b]) += v;
+        if (a != b) out.information(active[b], active[a]) += v;
+      }
+    }
+    out.bins.push_back(std::move(basis));
+  }
+  out.log_likelihood *= weight();
+}
+
+/// Information of the complex t about its covariance (Lange, Little and Taylor 1989, in complex form).
+double SessionModel::informationOf(double product, double trace_a, double trace_b) const {
+  return ((channels_ + kTail) * product - trace_a * trace_b) / (channels_ + kTail + 1);
+}
+
+Basis SessionModel::basis(const std::vector<PoseEchoes>& echoes, const Nuisance& n) const {
+  Basis b;
+  b.nuisance = n;
+  b.poses.resize(echoes.size());
+  tbb::parallel_for(std::size_t{0}, echoes.size(),
+                    [&](std::size_t i) { addBasis(echoes[i], n, static_cast<int>(i), b.poses[i]); });
+  return b;
+}
+
+Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
+                            const std::vector<int>& poses) const {
+  const Nuisance& n = basis.nuisance;
+  const int globals = n.globals(), more = static_cast<int>(directions.size()), all = globals + more;
+  const int numbers = channels_ * channels_;
+  struct Own {
+    Eigen::VectorXd score;
+    Eigen::MatrixXd information;  // last row and column: heading
+  };
+  std::vector<Own> each(poses.size());
+  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
+    const PoseBasis& p = basis.poses[static_cast<std::size_t>(poses[j])];
+    Own& own = each[j];
+    own.score.resize(all + 1);
+    own.score << p.score.head(globals), Eigen::VectorXd::Zero(more), p.score[globals];
+    own.information = Eigen::MatrixXd::Zero(all + 1, all + 1);
+    own.information.topLeftCorner(globals, globals) = p.information.topLeftCorner(globals, globals);
+    own.information.col(all).head(globals) = p.information.col(globals).head(globals);
+    own.information.row(all).head(globals) = p.information.row(globals).head(globals);
+    own.information(all, all) = p.information(globals, globals);
+    Eigen::MatrixXd v(numbers, more);
+    Matrix m(channels_, channels_);
+    for (const BinBasis& bin : p.bins) {
+      std::vector<int> active;
+      Eigen::VectorXd traces(more);
+      for (int h = 0; h < more; ++h) {
+        const PoseCovariance& field = directions[static_cast<std::size_t>(h)][j];
+        if (field.empty()) continue;
+        const auto* from = field.data() + static_cast<std::size_t>(bin.bin) * size_;
+        if (std::all_of(from, from + size_, [](auto x) { return x == 0.0f; })) continue;
+        m.setZero();
+        unpack(from, 1, m);
+        whiten(bin.inverse_lower, m, v.col(h).data());
+        traces[h] = traceOf(v.col(h).data(), channels_);
+        active.push_back(h);
+      }
+      for (int h : active) {
+        own.score[globals + h] += weight() * v.col(h).dot(bin.data);
+        const Eigen::VectorXd products = bin.whitened.transpose() * v.col(h);
+        for (std::size_t a = 0; a < bin.active.size(); ++a) {
+          const int g = bin.active[a] == globals ? all : bin.active[a];
+          const Eigen::Index ia = static_cast<Eigen::Index>(a);
+          const double x = weight() * informationOf(products[ia], bin.traces[ia], traces[h]);
+          own.information(globals + h, g) += x;
+          own.information(g, globals + h) += x;
+        }
+        for (int k : active) {
+          if (k > h) continue;
+          const double x = weight() * informationOf(v.col(h).dot(v.col(k)), traces[h], traces[k]);
+          own.information(globals + h, globals + k) += x;
+          if (k != h) own.information(globals + k, globals + h) += x;
+        }
+      }
+    }
+  });
+  Scores s;
+  s.by_location = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.locations.size()), all);
+  s.information = Eigen::MatrixXd::Zero(all, all);
+  s.yaw_step.assign(data_.poses.size(), 0.0);
+  s.yaw_coupling = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.poses.size()), all);
+  const double heading_prior = 1 / (accuracy_.heading_rad * accuracy_.heading_rad);
+  for (std::size_t j = 0; j < each.size(); ++j) {
+    const Own& p = each[j];
+    const std::size_t i = static_cast<std::size_t>(poses[j]);
+    s.log_likelihood += basis.poses[i].log_likelihood;
+    const double own = p.information(all, all) + heading_prior;
+    const double yaw = p.score[all] - heading_prior * n.yaw_rad[i];
+    const Eigen::VectorXd coupling = p.information.col(all).head(all) / own;
+    s.by_location.row(data_.poses[i].location) += (p.score.head(all) - coupling * yaw).transpose();
+    s.information += p.information.topLeftCorner(all, all) - own * coupling * coupling.transpose();
+    s.yaw_step[i] = yaw / own;
+    s.yaw_coupling.row(static_cast<Eigen::Index>(i)) = coupling.transpose();
+  }
+  s.total = s.by_location.colwise().sum().transpose();
+  for (int a = 0; a < actors_; ++a) {
+    const double gain = 1 / (spread_.actor_gain * spread_.actor_gain);
+    const double range = 1 / (spread_.actor_range_m * spread_.actor_range_m);
+    s.information(kActors + a, kActors + a) += gain;
+    s.total[kActors + a] -= gain * n.actor_gain[a];
+    s.information(kActors + actors_ + a, kActors + actors_ + a) += range;
+    s.total[kActors + actors_ + a] -= range * n.actor_range_m[a];
+  }
+  // Levels of errors are known roughly (a factor of 10 in power), so that none runs away where nothing shows it.
+  const double rough = 1 / (2.3 * 2.3);
+  const Nuisance usual;
+  s.information(kRelative, kRelative) += rough;
+  s.total[kRelative] -= rough * (n.log_relative - usual.log_relative);
+  s.information(kGraze, kGraze) += rough;
+  s.total[kGraze] -= rough * (n.log_graze - usual.log_graze);
+  s.information(kRange, kRange) += rough;
+  s.total[kRange] -= rough * (n.log_range - usual.log_range);
+  s.information(kSlope, kSlope) += 1;
+  s.total[kSlope] -= n.floor_slope - usual.floor_slope;
+  s.log_likelihood += prior(n);
+  return s;
+}
+
+Nuisance SessionModel::stepped(const Nuisance& from, const Eigen::VectorXd& g, const Scores& scores,
+                               const Eigen::VectorXd& whole_step, double share) const {
+  Nuisance n = from;
+  const auto held = [share](double step, double limit) { return std::clamp(share * step, -limit, limit); };
+  n.log_gain += held(g[kGain], 2);
+  n.log_floor += held(g[kFloor], 2);
+  n.floor_slope = std::clamp(n.floor_slope + held(g[kSlope], 1), -8.0, 2.0);
+  n.log_relative = std::clamp(n.log_relative + held(g[kRelative], 2), -14.0, -2.0);
+  n.log_graze = std::clamp(n.log_graze + held(g[kGraze], 2), -6.0, 6.0);
+  n.log_range = std::clamp(n.log_range + held(g[kRange], 2), -6.0, 4.0);
+  for (int a = 0; a < actors_; ++a) {
+    n.actor_gain[a] = std::clamp(n.actor_gain[a] + held(g[kActors + a], 0.5), -2.0, 2.0);
+    n.actor_range_m[a] = std::clamp(n.actor_range_m[a] + held(g[kActors + actors_ + a], 0.02), -0.08, 0.08);
+  }
+  for (std::size_t i = 0; i < n.yaw_rad.size(); ++i) {
+    const double step =
+        scores.yaw_step[i] - scores.yaw_coupling.row(static_cast<Eigen::Index>(i)).dot(whole_step.transpose());
+    n.yaw_rad[i] = std::clamp(n.yaw_rad[i] + held(step, 0.02), -0.06, 0.06);
+  }
+  return n;
+}
+
+double SessionModel::fit(const std::vector<PoseEchoes>& echoes, Nuisance& nuisance, int iterations) const {
+  double best = -1e300;
+  std::vector<int> all(echoes.size());
+  std::iota(all.begin(), all.end(), 0);
+  for (int i = 0; i < iterations; ++i) {
+    const Scores s = scores(basis(echoes, nuisance), {}, all);
+    best = s.log_likelihood;
+    const Eigen::VectorXd step = s.information.ldlt().solve(s.total);
+    const double promised = 0.5 * s.total.dot(step);
+    bool better = false;
+    const Eigen::VectorXd none = Eigen::VectorXd::Zero(step.size());
+    // Together; else, where the headings are far off, one after the other.
+    for (int attempt = 0; attempt < 6 && !better; ++attempt) {
+      constexpr double kShares[] = {1.0, 0.5, 0.2, 0.05};
+      Nuisance next = attempt < 4    ? stepped(nuisance, step, s, step, kShares[attempt])
+                      : attempt == 4 ? stepped(nuisance, none, s, none, 1)
+                                     : stepped(nuisance, step, s, step, 0.5);
+      if (attempt == 5) next.yaw_rad = nuisance.yaw_rad;
+      const double value = logLikelihood(echoes, next);
+      if (value <= best) continue;
+      nuisance = std::move(next);
+      best = value;
+      better = true;
+    }
+    if (!better || promised < kEnough) break;
+  }
+  return best;
+}
+
+Nuisance SessionModel::start(const std::vector<PoseEchoes>& echoes) const {
+  Nuisance n;
+  n.actor_gain.assign(static_cast<std::size_t>(actors_), 0.0);
+  n.actor_range_m.assign(static_cast<std::size_t>(actors_), 0.0);
+  n.yaw_rad.assign(data_.poses.size(), 0.0);
+  // Gain: median over poses of power over expected power. Floor: the lower quartile of cells, taken to 3 m.
+  std::vector<double> ratio, low;
+  for (std::size_t i = 0; i < echoes.size(); ++i) {
+    double expected = 0;
+    for (const EchoGroup& g : echoes[i].groups) {
+      for (int bin = std::max(firstBin(), g.power.first); bin < g.power.first + g.power.bins; ++bin) {
+        const auto* p = g.power.at(bin, size_);
+        for (int k = 0; k < channels_; ++k) expected += p[static_cast<std::size_t>(k) * (k + 3) / 2].real();
+      }
+    }
+    double measured = 0;
+    for (int bin = firstBin(); bin < samples_; ++bin) {
+      const double power = data_.poses[i].y.col(bin).squaredNorm();
+      measured += power;
+      const double range_m = std::max(0.3, bin * data_.radar.range_bin_m());
+      low.push_back(std::log(power / channels_ + 1e-300) - n.floor_slope * std::log(range_m / 3));
+    }
+    if (expected > 0) ratio.push_back(std::log(measured / expected));
+  }
+  const auto quantile = [](std::vector<double>& v, double share) {
+    if (v.empty()) return 0.0;
+    const auto at = v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
+    std::nth_element(v.begin(), at, v.end());
+    return *at;
+  };
+  n.log_gain = quantile(ratio, 0.5);
+  n.log_floor = quantile(low, 0.25);
+  // Wide errors first: far outliers of a narrow t pull on nothing, and headings would not find their place.
+  n.log_relative = -3;
+  return n;
+}
+
+SessionModel::Whitened SessionModel::whitened(const PoseEchoes& echoes, const Nuisance& n, int pose, int bin) const {
+  Whitened w;
+  const Eigen::LLT<Eigen::MatrixXcd> llt(sigma(echoes, n, pose, bin));
+  w.inverse = llt.solve(Eigen::MatrixXcd::Identity(channels_, channels_));
+  const Eigen::VectorXcd y = data_.poses[pose].y.col(bin);
+  w.solved = w.inverse * y;
+  w.weight = (channels_ + kTail) / (kTail + y.dot(w.solved).real());
+  return w;
+}
+
+}  // namespace mmradartwin

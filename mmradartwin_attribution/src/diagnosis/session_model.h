@@ -1,0 +1,129 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <complex>
+#include <vector>
+
+#include "channel_data.h"
+#include "echo_field.h"
+#include "echo_source.h"
+
+namespace mmradartwin {
+
+/// What no cause is: fitted in every hypothesis alike. Powers as natural logarithms.
+struct Nuisance {
+  double log_gain = 0;                ///< of measured power over the twin's
+  double log_floor = 0;               ///< clutter's power in a cell at 3 m
+  double floor_slope = -3;            ///< exponent of the clutter's power over range
+  double log_relative = -8;           ///< what differs from channel to channel of an echo, of its power
+  double log_graze = 0;               ///< factor of PoseEchoes::graze
+  double log_range = 0;               ///< factor of the variance of a path's own range
+  std::vector<double> actor_gain;     ///< [actors] natural logarithm of power, per interaction
+  std::vector<double> actor_range_m;  ///< [actors] added one-way range, shared by the interactions of a path
+  std::vector<double> yaw_rad;        ///< [poses] error of the heading
+
+  int globals() const { return 6 + static_cast<int>(actor_gain.size() + actor_range_m.size()); }
+};
+
+/// Standard deviations that the latent errors are given.
+struct LatentSpread {
+  double actor_gain = 1.5 / 4.343;  ///< 1.5 dB of power
+  double actor_range_m = 0.02;
+};
+
+/// Expected covariance of the channels in all bins of a pose, packed as BinCovariance.
+using PoseCovariance = std::vector<std::complex<float>>;
+using SessionCovariance = std::vector<PoseCovariance>;
+
+/// Derivatives of the log-likelihood at one place: by location, so that their scatter shows what the model omits.
+struct Scores {
+  double log_likelihood = 0;     ///< with the priors of the latents
+  Eigen::MatrixXd by_location;   ///< [locations][directions] scores; the heading of each pose eliminated
+  Eigen::MatrixXd information;   ///< [directions][directions], priors included; the same
+  Eigen::VectorXd total;         ///< [directions] scores, priors included
+  std::vector<double> yaw_step;  ///< [poses] best change of the heading, all else as it is
+  Eigen::MatrixXd yaw_coupling;  ///< [poses][directions] of that change by a change of the directions
+};
+
+constexpr int kMaxChannels = 16;
+
+/// One bin's whitened directions of the nuisance and the data in the same numbers: the likelihood's derivatives are
+/// then products, and a further direction costs nothing but its own.
+struct BinBasis {
+  int bin = 0;
+  Eigen::Matrix<std::complex<double>, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxChannels, kMaxChannels> inverse_lower;
+  std::vector<int> active;   ///< directions that do something here; the heading is the last of all
+  Eigen::MatrixXd whitened;  ///< [M^2][active]
+  Eigen::VectorXd data, traces;
+};
+struct PoseBasis {
+  double log_likelihood = 0;
+  Eigen::VectorXd score;        ///< [globals + 1]
+  Eigen::MatrixXd information;  ///< [globals + 1][globals + 1], the heading last
+  std::vector<BinBasis> bins;
+};
+struct Basis {
+  Nuisance nuisance;
+  std::vector<PoseBasis> poses;
+};
+
+/// Likelihood of a session's channels under expected echoes. Every bin's channels are complex t-distributed (4 degrees
+/// of freedom in their complex form) about zero, with the covariance
+///   gain * (echoes + range errors + graze + relative) + floor;
+/// neighbouring bins overlap through the window, so that each counts half (composite likelihood).
+class SessionModel {
+ public:
+  using Matrix = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxChannels, kMaxChannels>;
+  /// Keeps a reference. actors: Scene::actors' number.
+  SessionModel(const ChannelData& data, int actors, const PoseAccuracy& accuracy, const LatentSpread& spread = {});
+
+  /// A start for fit(): levels from the data.
+  Nuisance start(const std::vector<PoseEchoes>& echoes) const;
+  /// Log-likelihood with priors; by_pose without.
+  double logLikelihood(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
+                       std::vector<double>* by_pose = nullptr) const;
+  /// Expected covariance of the echoes alone, with their gain and latents; echoes[i] are those of poses[i].
+  SessionCovariance covariance(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
+                               const std::vector<int>& poses) const;
+  Basis basis(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance) const;
+  /// Scores by the globals of Nuisance (in the order of its members) and by more directions: changes of covariance(),
+  /// [poses named]. Poses that are not named do not count.
+  Scores scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
+                const std::vector<int>& poses) const;
+  /// Improves nuisance by Fisher scoring from where it is; returns the log-likelihood.
+  double fit(const std::vector<PoseEchoes>& echoes, Nuisance& nuisance, int iterations) const;
+  /// A step of the globals and what the headings do with it; held within sane bounds.
+  Nuisance stepped(const Nuisance& from, const Eigen::VectorXd& globals, const Scores& scores,
+                   const Eigen::VectorXd& whole_step, double share) const;
+
+  /// Rank one sums for a point scatterer: see back_projection.h.
+  struct Whitened {
+    Eigen::MatrixXcd inverse;  ///< [M][M] Sigma^-1
+    Eigen::VectorXcd solved;   ///< [M] Sigma^-1 y
+    double weight;             ///< of the tail
+  };
+  Whitened whitened(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, int bin) const;
+
+  const ChannelData& data() const { return data_; }
+  const LatentSpread& spread() const { return spread_; }
+  int firstBin() const { return 2; }  ///< the radar's own near range is judged apart
+  double weight() const { return 0.5; }
+
+ private:
+  Matrix sigma(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, int bin) const;
+  double floorPower(const Nuisance& nuisance, int pose, int bin) const;
+  double prior(const Nuisance& nuisance) const;
+  double poseLikelihood(const PoseEchoes& echoes, const Nuisance& nuisance, int pose) const;
+  void addBasis(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, PoseBasis& out) const;
+  double informationOf(double product, double trace_a, double trace_b) const;
+
+  const ChannelData& data_;
+  int actors_;
+  PoseAccuracy accuracy_;
+  LatentSpread spread_;
+  int channels_, samples_;
+  std::size_t size_;
+  std::vector<double> element_phase_;
+};
+
+}  // namespace mmradartwin

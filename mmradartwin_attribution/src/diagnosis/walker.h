@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "mmradartwin_attribution/frame_evidence.h"
+#include "mmradartwin_dsp/session.h"
+#include "moving_echo.h"
+
+namespace mmradartwin {
+
+/// What moved at one pose.
+struct PoseMotion {
+  Pose pose;
+  int frames = 0;
+  Eigen::ArrayXXf evidence;  ///< [range][azimuth] nats
+  std::vector<MovingEcho> echoes;
+};
+
+struct Motion {
+  std::vector<FrameFinding> walkers;      ///< moving_target
+  std::vector<FrameFinding> unexplained;  ///< the same cell at every pose: nothing in the room
+};
+
+/// Puts what moved into the map: a person is seen from many poses at one place, what is fixed to the radar in one cell.
+Motion locateMotion(const RadarConfig& radar, std::vector<PoseMotion> poses);
+
+}  // namespace mmradartwin

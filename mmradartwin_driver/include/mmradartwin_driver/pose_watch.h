@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace mmradartwin {
+
+/// Watches the radar's pose as it is announced: how old the latest one is, gaps, and jumps that no trolley makes.
+class PoseWatch {
+ public:
+  struct Options {
+    double age_limit_s = 1.0;  ///< an older pose, or poses further apart than this, is a gap
+    double speed_limit_m_per_s = 3.0, turn_limit_rad_per_s = 6.3;
+    double jump_m = 0.1, jump_rad = 0.09;  ///< what is smaller is noise of the pose source, however fast
+    double remember_s = 10.0;              ///< how long a gap or a jump is spoken of
+  };
+  enum class Level { kFine, kWarning, kError };
+  struct Report {
+    Level level = Level::kError;
+    std::string text;             ///< one line, with the next thing to do where something is wrong
+    std::optional<double> age_s;  ///< nothing before the first pose, and for one without a time of its own
+    std::uint64_t gaps = 0, jumps = 0;
+  };
+
+  PoseWatch() = default;
+  explicit PoseWatch(const Options& options) : options_(options) {}
+
+  /// The latest pose known and its stamp (0: static); older or the same stamps than before are passed over.
+  void observe(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_radar);
+  Report report(std::int64_t now_ns) const;
+
+ private:
+  Options options_;
+  std::optional<std::int64_t> stamp_ns_;
+  Eigen::Isometry3d T_map_radar_ = Eigen::Isometry3d::Identity();
+  std::uint64_t gaps_ = 0, jumps_ = 0;
+  std::int64_t told_ns_ = 0;  ///< stamp after the last gap or jump
+  std::string told_;
+};
+
+}  // namespace mmradartwin
