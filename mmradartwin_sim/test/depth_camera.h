@@ -63,16 +63,19 @@ class DepthCamera {
   }
 };
 
-/// A place to stand: nothing within clearance_m, floor below, inside the scene's bounds.
+/// A place to stand: nothing within clearance_m, walls on most sides, and something like a floor below.
 inline bool freePlace(const RayCaster& rays, const Eigen::Vector3d& p, double clearance_m) {
+  int met = 0;
   for (int i = 0; i < 24; ++i) {
     const double a = i * M_PI / 12;
     for (const double dz : {-0.3, 0.0, 0.3}) {
-      const auto hit = rays.firstHit(p, {std::cos(a), std::sin(a), dz}, 20);
-      if (!hit || hit->distance_m < clearance_m) return false;
+      const auto hit = rays.firstHit(p, Eigen::Vector3d(std::cos(a), std::sin(a), dz).normalized(), 20);
+      if (hit && hit->distance_m < clearance_m) return false;
+      if (hit) ++met;
     }
   }
-  return rays.firstHit(p, {0, 0, -1}, 3).has_value() && !rays.insideActor(p);
+  const auto floor = rays.firstHit(p, {0, 0, -1}, 2.2);
+  return met > 48 && floor && floor->distance_m > 0.7;
 }
 
 }  // namespace mmradartwin

@@ -97,14 +97,14 @@ class RoomPoseNodeTest : public ::testing::Test {
 TEST_F(RoomPoseNodeTest, PublishesWhatIsTrustedAndRefusesTheRest) {
   using Level = diagnostic_msgs::DiagnosticStatus;
   ASSERT_TRUE(waitFor([this] {
-    return cloud_out.getNumSubscribers() > 0 && imu_out.getNumSubscribers() > 0 && initial_out.getNumSubscribers() > 0 &&
-           pose_in.getNumPublishers() > 0;
+    return cloud_out.getNumSubscribers() > 0 && imu_out.getNumSubscribers() > 0 &&
+           initial_out.getNumSubscribers() > 0 && pose_in.getNumPublishers() > 0;
   })) << "room_pose did not come up";
   sensor_msgs::PointCloud2 seen = message(truth);
 
   // Nobody has said where the camera is.
-  ASSERT_TRUE(waitFor([this] { return status.message.find("2D Pose Estimate") != std::string::npos; },
-                      [&] { send(seen); }));
+  ASSERT_TRUE(
+      waitFor([this] { return status.message.find("2D Pose Estimate") != std::string::npos; }, [&] { send(seen); }));
   EXPECT_EQ(status.level, Level::ERROR);
   EXPECT_FALSE(tf.canTransform("map", "camera_link", ros::Time(0)));
 
@@ -118,16 +118,19 @@ TEST_F(RoomPoseNodeTest, PublishesWhatIsTrustedAndRefusesTheRest) {
   }
   sendGuess(truth.translation().x() + 0.2, truth.translation().y() - 0.2, 0.8);
   status = {};
-  ASSERT_TRUE(waitFor([this] { return status.level == Level::ERROR && status.message.find("waiting") == std::string::npos &&
-                                      status.message.find("nobody") == std::string::npos; },
-                      [&] { send(wall); }));
+  ASSERT_TRUE(waitFor(
+      [this] {
+        return status.level == Level::ERROR && status.message.find("waiting") == std::string::npos &&
+               status.message.find("nobody") == std::string::npos;
+      },
+      [&] { send(wall); }));
   EXPECT_FALSE(status.message.empty());
   EXPECT_FALSE(tf.canTransform("map", "camera_link", ros::Time(0))) << status.message;
   EXPECT_FALSE(pose);
 
   // The true cloud does.
-  ASSERT_TRUE(waitFor([this] { return pose && tf.canTransform("map", "camera_link", ros::Time(0)); },
-                      [&] { send(seen); }))
+  ASSERT_TRUE(
+      waitFor([this] { return pose && tf.canTransform("map", "camera_link", ros::Time(0)); }, [&] { send(seen); }))
       << status.message;
   const auto T = tf.lookupTransform("map", "camera_link", ros::Time(0)).transform;
   const Eigen::Vector3d p(T.translation.x, T.translation.y, T.translation.z);

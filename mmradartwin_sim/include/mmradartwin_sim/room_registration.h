@@ -19,13 +19,13 @@ struct RegistrationOptions {
   /// A first fix is looked for within this of the guess, horizontally, and within this turn.
   double search_m = 0.8, search_rad = 0.6;
   double max_step_m = 0.5, max_step_rad = 0.35;  ///< from the last pose, while tracking
-  double min_agreement = 0.8;      ///< share of points that stand where the scene has a surface
+  double min_agreement = 0.8;                    ///< share of points that stand where the scene has a surface
   double max_behind = 0.08;        ///< share of points behind a surface of the scene: nothing can be seen there
   double min_coverage = 0.6;       ///< share of points in whose direction the scene has anything at all
-  double min_information = 0.006;  ///< of the weakest of the six directions, 1/6 where all are alike
+  double min_information = 0.004;  ///< of the weakest of the six directions, 1/6 where all are alike
   double max_std_m = 0.02, max_std_rad = 0.009;
   double max_tilt_rad = 0.05;  ///< between the fit's vertical and gravity's
-  int min_points = 300;        ///< 5 cm voxels
+  int min_points = 300;        ///< cells of 1.5 deg of the camera's view
 };
 
 /// What a cloud's fit came out as.
@@ -36,21 +36,21 @@ struct Registration {
   /// x, y, z [m], turns about map's x, y, z axes through the camera [rad]. From the residuals themselves, those within
   /// 0.5 m of each other taken as one: errors of a scene are alike over a surface.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  double rms_m = 0;        ///< distance of agreeing points from the scene's surfaces
+  double rms_m = 0;  ///< distance of agreeing points from the scene's surfaces
   double agreement = 0, behind = 0, before = 0, coverage = 0;  ///< shares, see RegistrationOptions
-  double information = 0;  ///< see RegistrationOptions::min_information
+  double information = 0;                                      ///< see RegistrationOptions::min_information
   Eigen::Matrix<double, 6, 1> weakest = Eigen::Matrix<double, 6, 1>::Zero();  ///< the least certain direction
   int points = 0, starts = 0;
 };
 
 enum class GuessKind {
-  kPerson,   ///< a first fix: several starts around the guess, and a look over the whole scene for rivals
-  kTracking  ///< the last trusted pose: one start; more around it where that one is not trusted
+  kPerson,   ///< a first fix: several starts around the guess
+  kTracking  ///< the last trusted pose: one start; more around it where the cloud does not fit from there
 };
 
-/// Registers clouds of a depth camera to a scene: point-to-plane ICP on points sampled from the mesh, restricted to
-/// what is visible from the estimate, then a verdict by casting the camera's own rays. Const functions may be called
-/// from several threads at once. Deterministic.
+/// Registers clouds of a depth camera to a scene: trimmed point-to-plane ICP on points sampled from what is visible of
+/// the mesh, then a verdict by casting the camera's own rays. Const functions may be called from several threads at
+/// once. Deterministic.
 class RoomRegistration {
  public:
   /// The scene must outlive it. Throws InputError where the scene has no surface.

@@ -82,8 +82,8 @@ void RoomPoseNode::readParameters(const ros::NodeHandle& private_nh) {
     throw InputError("parameter " + private_nh.getNamespace() + "/initial_pose: '" + initial +
                      "' must be x [m], y [m] and yaw [deg] of the camera in map, apart by blanks");
   }
-  person_ = Eigen::Translation3d(x, y, camera_height_m_) *
-            Eigen::AngleAxisd(yaw_deg * M_PI / 180, Eigen::Vector3d::UnitZ());
+  person_ =
+      Eigen::Translation3d(x, y, camera_height_m_) * Eigen::AngleAxisd(yaw_deg * M_PI / 180, Eigen::Vector3d::UnitZ());
 }
 
 void RoomPoseNode::onImu(const sensor_msgs::Imu::ConstPtr& imu) {
@@ -107,8 +107,7 @@ void RoomPoseNode::onInitialPose(const geometry_msgs::PoseWithCovarianceStamped:
   }
   const auto& p = pose->pose.pose.position;
   const auto& q = pose->pose.pose.orientation;
-  const Eigen::Vector3d forward =
-      Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized() * Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d forward = Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized() * Eigen::Vector3d::UnitX();
   // An arrow in rviz lies on the floor; the camera does not.
   person_ = Eigen::Translation3d(p.x, p.y, camera_height_m_) *
             Eigen::AngleAxisd(std::atan2(forward.y(), forward.x()), Eigen::Vector3d::UnitZ());
@@ -131,11 +130,13 @@ void RoomPoseNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {
   }
   if (!last_ && !person_) {
     fit_.reset();
-    return refuse("nobody has said yet where the camera is; give a 2D Pose Estimate in rviz, or the parameter initial_pose");
+    return refuse(
+        "nobody has said yet where the camera is; give a 2D Pose Estimate in rviz, or the parameter initial_pose");
   }
   Eigen::Isometry3d T_camera_cloud;
   try {
-    T_camera_cloud = toIsometry(tf_buffer_.lookupTransform(camera_frame_, cloud->header.frame_id, ros::Time(0)).transform);
+    T_camera_cloud =
+        toIsometry(tf_buffer_.lookupTransform(camera_frame_, cloud->header.frame_id, ros::Time(0)).transform);
   } catch (const tf2::TransformException& error) {
     return refuse("tf does not know " + camera_frame_ + " -> " + cloud->header.frame_id +
                   ", which the camera's driver should publish: " + error.what());
@@ -149,7 +150,8 @@ void RoomPoseNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {
   const ros::WallTime begin = ros::WallTime::now();
   const std::optional<Eigen::Vector3d> up = gravity_.up(stamp.toSec());
   upright_ = up.has_value();
-  fit_ = registration_->locate(points, last_ ? *last_ : *person_, last_ ? GuessKind::kTracking : GuessKind::kPerson, up);
+  fit_ =
+      registration_->locate(points, last_ ? *last_ : *person_, last_ ? GuessKind::kTracking : GuessKind::kPerson, up);
   register_ms_ = (ros::WallTime::now() - begin).toSec() * 1e3;
   if (!fit_->trusted) return refuse(fit_->reason);
   publish(*fit_, stamp);
@@ -202,7 +204,8 @@ void RoomPoseNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   status.add("share of the cloud behind them", fit_->behind);
   status.add("share of the cloud before them", fit_->before);
   status.add("information of the weakest direction", fit_->information);
-  status.add("standard deviation of place [m]", std::sqrt(std::max(0.0, fit_->covariance.diagonal().head<3>().maxCoeff())));
+  status.add("standard deviation of place [m]",
+             std::sqrt(std::max(0.0, fit_->covariance.diagonal().head<3>().maxCoeff())));
   status.add("standard deviation of turn [deg]",
              std::sqrt(std::max(0.0, fit_->covariance.diagonal().tail<3>().maxCoeff())) * 180 / M_PI);
 }
