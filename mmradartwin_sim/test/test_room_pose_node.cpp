@@ -33,7 +33,7 @@ class RoomPoseNodeTest : public ::testing::Test {
             if (s.name.find("pose from the room") != std::string::npos) status = s;
           }
         });
-    truth = Eigen::Translation3d(3.0, 3.0, 1.25) * Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()) *
+    truth = Eigen::Translation3d(6.0, 1.5, 1.25) * Eigen::AngleAxisd(1.6, Eigen::Vector3d::UnitZ()) *
             Eigen::AngleAxisd(0.08, Eigen::Vector3d::UnitY());
   }
 
@@ -116,7 +116,7 @@ TEST_F(RoomPoseNodeTest, PublishesWhatIsTrustedAndRefusesTheRest) {
       *x /= *z, *y /= *z, *z = 1;
     }
   }
-  sendGuess(truth.translation().x() + 0.2, truth.translation().y() - 0.2, 0.8);
+  sendGuess(truth.translation().x() + 0.2, truth.translation().y() - 0.2, 1.7);
   status = {};
   ASSERT_TRUE(waitFor(
       [this] {
