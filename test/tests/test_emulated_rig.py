@@ -124,10 +124,10 @@ class EmulatedRig(unittest.TestCase):
         process.wait(60)
 
     def test_faults_are_named_and_overcome_and_no_frame_is_mislabelled(self):
-        # A small disk for the recording of packets.
+        # A disk for the recording of packets that soon comes to the 1 GiB that the recorder leaves free.
         disk = self.path("disk")
         os.mkdir(disk)
-        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", disk], check=True)
+        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1049576k", "tmpfs", disk], check=True)
         self.addCleanup(subprocess.run, ["umount", "-l", disk])
         port = free_port()
         core = self.core(port)
