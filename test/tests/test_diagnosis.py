@@ -27,7 +27,10 @@ def diagnose(session, output):
 
 @unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
 class HiddenEffects(unittest.TestCase):
-    """24 poses at some nine places, 20 frames each: the smallest campaign that tells laws over angle from materials."""
+    """24 poses at some nine places, 20 frames each: the smallest campaign that tells laws over angle from materials.
+
+    MMRADARTWIN_DIAGNOSIS_SEED gives other sessions than the usual ones.
+    """
 
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
@@ -55,7 +58,7 @@ class HiddenEffects(unittest.TestCase):
         return findings, first, truth[0]["parameters"]
 
     def test_an_element_pattern_is_named_and_its_gain_is_real(self):
-        seed = int.from_bytes(os.urandom(3), "little")
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "31"))
         findings, first, truth = self.found(seed, {"element_pattern": {}})
         self.assertEqual(first["class"], "C3")
         self.assertAlmostEqual(first["parameters"]["cos_exponent"]["value"], truth["cos_exponent"], delta=0.6,
@@ -68,7 +71,7 @@ class HiddenEffects(unittest.TestCase):
                                first["parameters"]["cos_exponent"]["value"], places=6)
 
     def test_leakage_is_named_with_place_and_level(self):
-        seed = int.from_bytes(os.urandom(3), "little")
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "32"))
         _, first, truth = self.found(seed, {"tx_rx_leakage": {}})
         self.assertAlmostEqual(first["parameters"]["range_m"]["value"], truth["range_m"], delta=0.02,
                                msg=f"seed {seed}")
