@@ -342,20 +342,24 @@ FrameFinding FrameExaminer::State::frameGain() const {
 std::vector<FrameFinding> FrameExaminer::findings() const {
   const State& s = *state_;
   std::vector<FrameFinding> all = {s.saturation(), s.packetLoss(), s.misalignment(), s.interference(), s.drift()};
-  std::set<std::string> walked;
-  for (const FrameFinding& walker : s.locate().walkers) {
-    all.push_back(walker);
-    walked.insert(walker.poses.begin(), walker.poses.end());
-  }
-  // A strong walker pulls the gain that a frame's samples share, and what that leaves looks like a burst: bursts that
-  // stand at such poses alone are his.
+  // A strong walker pulls the gain that a frame's samples share, and what that leaves looks like a burst; what is left
+  // of bursts looks like something that moves. Of two that stand at the same poses the one with more poses is the
+  // cause.
+  const std::vector<FrameFinding> walkers = s.locate().walkers;
+  std::set<std::string> walked, hit;
+  for (const FrameFinding& walker : walkers) walked.insert(walker.poses.begin(), walker.poses.end());
+  const auto within = [](const FrameFinding& f, const std::set<std::string>& poses) {
+    return std::all_of(f.poses.begin(), f.poses.end(), [&](const std::string& p) { return poses.count(p) > 0; });
+  };
   all.erase(std::remove_if(all.begin(), all.end(),
-                           [&](const FrameFinding& f) {
-                             return f.cause == "interference" &&
-                                    std::all_of(f.poses.begin(), f.poses.end(),
-                                                [&](const std::string& pose) { return walked.count(pose) > 0; });
-                           }),
+                           [&](const FrameFinding& f) { return f.cause == "interference" && within(f, walked); }),
             all.end());
+  for (const FrameFinding& f : all) {
+    if (f.cause == "interference" && f.log_likelihood_gain > 0) hit.insert(f.poses.begin(), f.poses.end());
+  }
+  for (const FrameFinding& walker : walkers) {
+    if (!within(walker, hit)) all.push_back(walker);
+  }
   all.erase(std::remove_if(all.begin(), all.end(), [](const auto& f) { return f.log_likelihood_gain <= 0; }),
             all.end());
   std::stable_sort(all.begin(), all.end(),
