@@ -43,7 +43,6 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner,
       const PoseFrames& seen = examiner.poses().back();
       PoseChannels channels;
       channels.pose = pose;
-      channels.frames = static_cast<int>(frames.size());
       channels.grid = seen.mean;
       channels.noise_power = per_sample * sum(seen.noise_variance) / static_cast<double>(seen.noise_variance.size()) /
                              std::max(1, seen.shots);

@@ -96,16 +96,25 @@ double sessionGain(const std::vector<CellPowers>& poses) {
   return own > 0 ? cross / own : 0;
 }
 
+/// Sums of one pose under the session's gain.
+Sums sumsOf(const CellPowers& pose, double root_gain) {
+  Sums s;
+  for (std::size_t j = 0; j < pose.measured.size(); ++j) {
+    const double d = std::sqrt(pose.measured[j]) - root_gain * std::sqrt(pose.expected[j]);
+    s.missed += d * d;
+    s.measured += pose.measured[j];
+  }
+  return s;
+}
+
 std::vector<Sums> sumsByLocation(const ChannelData& data, const std::vector<CellPowers>& poses) {
   const double root = sessionGain(poses);
   std::vector<Sums> sums(data.locations.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Sums own = sumsOf(poses[i], root);
     Sums& s = sums[static_cast<std::size_t>(data.poses[i].location)];
-    for (std::size_t j = 0; j < poses[i].measured.size(); ++j) {
-      const double d = std::sqrt(poses[i].measured[j]) - root * std::sqrt(poses[i].expected[j]);
-      s.missed += d * d;
-      s.measured += poses[i].measured[j];
-    }
+    s.missed += own.missed;
+    s.measured += own.measured;
   }
   return sums;
 }
@@ -124,15 +133,9 @@ double explained(const std::vector<Sums>& sums, const std::vector<int>* times) {
 
 double explainedPower(const std::vector<CellPowers>& poses) {
   const double root = sessionGain(poses);
-  double missed = 0, measured = 0;
-  for (const CellPowers& p : poses) {
-    for (std::size_t j = 0; j < p.measured.size(); ++j) {
-      const double d = std::sqrt(p.measured[j]) - root * std::sqrt(p.expected[j]);
-      missed += d * d;
-      measured += p.measured[j];
-    }
-  }
-  return measured > 0 ? 1 - missed / measured : 0;
+  std::vector<Sums> sums;
+  for (const CellPowers& p : poses) sums.push_back(sumsOf(p, root));
+  return explained(sums, nullptr);
 }
 
 GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPowers>& before,
