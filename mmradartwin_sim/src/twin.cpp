@@ -88,6 +88,25 @@ bool Twin::altersGeometry() const {
   return impl_->edited || !impl_->modelPose(here).isApprox(here, 0);
 }
 
+bool Twin::addsScreensAlone() const {
+  const Eigen::Isometry3d here = Eigen::Isometry3d::Identity();
+  return impl_->screens && impl_->modelPose(here).isApprox(here, 0);
+}
+
+void Twin::removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord>& records) const {
+  if (!impl_->screens) return;
+  const Eigen::Vector3d radar = impl_->modelPose(T_map_radar).translation();
+  const auto hidden = [&](const PathRecord& r) {
+    Eigen::Vector3d from = radar;
+    for (const Eigen::Vector3d& v : r.vertices) {
+      if (!impl_->screens->visible(from, v)) return true;
+      from = v;
+    }
+    return !r.vertices.empty() && !impl_->screens->visible(from, radar);
+  };
+  records.erase(std::remove_if(records.begin(), records.end(), hidden), records.end());
+}
+
 void Twin::Impl::assemble() {
   Impl& m = *this;
   const RadarConfig& radar = description.radar;
@@ -102,7 +121,7 @@ void Twin::Impl::assemble() {
     m.edited = std::make_unique<Scene>(m.scene);
     for (const auto& mechanism : m.mechanisms) mechanism->editScene(*m.edited);
     // Whether anything was edited shows in what Embree and the facets would see.
-    bool same = m.edited->actors.size() == m.scene.actors.size() && m.edited->screens.empty();
+    bool same = m.edited->actors.size() == m.scene.actors.size();
     for (std::size_t i = 0; same && i < m.scene.actors.size(); ++i) {
       same = m.edited->actors[i].present == m.scene.actors[i].present &&
              m.edited->actors[i].vertices == m.scene.actors[i].vertices &&
@@ -110,10 +129,15 @@ void Twin::Impl::assemble() {
              m.edited->actors[i].occludes == m.scene.actors[i].occludes &&
              m.edited->actors[i].material.scattering_coefficient == m.scene.actors[i].material.scattering_coefficient;
     }
-    if (same) {
+    if (same && m.edited->screens.empty()) {
       m.edited.reset();
     } else {
       m.edited_rays = std::make_unique<RayCaster>(*m.edited);
+    }
+    if (same && m.edited) {
+      Scene alone;
+      alone.screens = m.edited->screens;
+      m.screens = std::make_unique<RayCaster>(alone);
     }
     for (const auto& mechanism : m.mechanisms) {
       mechanism->build(m.model(), radar);

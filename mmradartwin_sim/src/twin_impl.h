@@ -17,6 +17,7 @@ struct Twin::Impl {
   std::shared_ptr<const RayCaster> rays;
   std::unique_ptr<Scene> edited;  // null where no mechanism edits the scene
   std::unique_ptr<RayCaster> edited_rays;
+  std::unique_ptr<RayCaster> screens;  // of the screens alone; null where they are not all that was added
   std::vector<std::unique_ptr<Mechanism>> mechanisms;  // by rank
   double strongest = -1;                               // of the session, where it is known
   mutable std::atomic<double> strongest_so_far{0};

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "bin_covariance.h"
+#include "echo_beam.h"
 #include "mmradartwin_attribution/frame_evidence.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
@@ -19,6 +21,8 @@ struct PoseChannels {
   ReceiveGrid grid;        ///< the average itself
   Eigen::MatrixXcd y;      ///< [M][N] range spectra over the window's sum and full scale: a tone's own amplitude
   int shots = 1;           ///< frames times loops behind the average
+  std::vector<EchoBeam> beams;
+  BinCovariance clutter;  ///< of all bins: see clutter_field.h
   double noise_power = 0;  ///< thermal power in a cell of y, from the scatter of the frames
 };
 

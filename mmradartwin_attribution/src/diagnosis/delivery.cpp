@@ -70,7 +70,8 @@ std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data) 
     const NamedParameters m = defaultMechanism(name);
     tried.emplace_back(likelihood(&m, kIterations), m);
   }
-  // Orders: exchanges of two places as long as they help, from the order as it is and from its reverse.
+  // Orders: two places exchanged, or one channel taken out and put elsewhere, as long as that helps, from the order as
+  // it is and from its reverse. Exchanges alone stop at an order that is the right one but for a shift of all.
   const int channels = data.radar.channels();
   std::vector<int> same(static_cast<std::size_t>(channels));
   std::iota(same.begin(), same.end(), 0);
@@ -83,14 +84,19 @@ std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data) 
       std::vector<int> found = order;
       for (std::size_t i = 0; i < order.size(); ++i) {
         for (std::size_t j = i + 1; j < order.size(); ++j) {
-          std::vector<int> next = order;
-          std::swap(next[i], next[j]);
-          m = permutation(next);
-          const double value = likelihood(&m, 0);
-          if (value <= best + 1) continue;
-          best = value;
-          found = next;
-          better = true;
+          std::vector<int> exchanged = order, later = order, earlier = order;
+          std::swap(exchanged[i], exchanged[j]);
+          const auto first = static_cast<std::ptrdiff_t>(i), last = static_cast<std::ptrdiff_t>(j) + 1;
+          std::rotate(later.begin() + first, later.begin() + first + 1, later.begin() + last);
+          std::rotate(earlier.begin() + first, earlier.begin() + last - 1, earlier.begin() + last);
+          for (const std::vector<int>& next : {exchanged, later, earlier}) {
+            m = permutation(next);
+            const double value = likelihood(&m, 0);
+            if (value <= best + 1) continue;
+            best = value;
+            found = next;
+            better = true;
+          }
         }
       }
       order = found;

@@ -15,6 +15,7 @@
 #include "back_projection.h"
 #include "body_fixed_tone.h"
 #include "channel_data.h"
+#include "clutter_field.h"
 #include "delivery.h"
 #include "empirical_hypothesis.h"
 #include "held_out_gain.h"
@@ -92,7 +93,10 @@ class Session {
   void addSharedLatents(const std::vector<Hypothesis>& all, std::vector<Screened>& screened) const;
   std::vector<HypothesisFit> fitBest(int round);
   Finding describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const;
-  std::vector<PoseEchoes> heldOutEchoes(const HypothesisFit& fit);
+  std::vector<FindingParameter> parametersOf(const Hypothesis& hypothesis, const std::vector<double>& scaled,
+                                             const std::vector<double>& standard_error, const std::string& cause) const;
+  void refitTogether();
+  std::vector<PoseEchoes> heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m);
   FindingGain gainOf(const HypothesisFit& fit);
   void addMetrics(const HypothesisFit& fit, FindingGain& gain) const;
   FindingGain gainOf(const ChannelData& before_data, const std::vector<NamedParameters>& before,
@@ -111,6 +115,15 @@ class Session {
   std::vector<NamedParameters> mechanisms_;  ///< as the engine simulates them
   std::vector<NamedParameters> extended_;    ///< the same with what was taken out of the data instead
   ModelState state_;
+  /// What rounds have found, as it was fitted last; `finding` is its place in result_.findings.
+  struct Accepted {
+    Hypothesis hypothesis;
+    std::vector<double> scaled;
+    std::size_t finding;
+  };
+  std::vector<Accepted> accepted_;
+  std::vector<NamedParameters> before_rounds_;  ///< mechanisms without what rounds have found
+  std::size_t family_ = 1;                      ///< hypotheses of a round
   Diagnosis result_;
 };
 
@@ -145,6 +158,7 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
   }
   twin_.setStrongestAmplitude(strongest);
   mechanisms_ = extended_ = twin_.description().mechanisms;
+  expectClutter(twin_.scene(), data_);
   source_ = std::make_unique<EchoSource>(twin_, data_, accuracy_);
   model_ = std::make_unique<SessionModel>(data_, static_cast<int>(twin_.scene().actors.size()), accuracy_);
   fitter_ = std::make_unique<HypothesisFitter>(*source_, *model_, kFolds);
@@ -353,6 +367,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     screened.push_back({objectAt(*place), place->promised, {0, 0, 1}});
   }
   std::stable_sort(screened.begin(), screened.end(), better);
+  family_ = all.size();
   std::vector<HypothesisFit> fits;
   std::size_t names_fitted = 0, laws_fitted = 0;
   for (const Screened& s : screened) {
@@ -377,44 +392,54 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   return fits;
 }
 
-Finding Session::describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const {
-  Finding f;
-  const NamedParameters m = best.hypothesis.at(best.scaled);
-  const bool named = catalogued(m.mechanism);
-  f.cause = named ? m.mechanism : "unknown";
-  f.mechanism = m;
+/// Values and 95 % intervals, by the scatter over locations, of the parameters that the cause is described by.
+std::vector<FindingParameter> Session::parametersOf(const Hypothesis& hypothesis, const std::vector<double>& scaled,
+                                                    const std::vector<double>& standard_error,
+                                                    const std::string& cause) const {
+  std::vector<FindingParameter> parameters;
+  const NamedParameters m = hypothesis.at(scaled);
   const double locations = static_cast<double>(data_.locations.size());
   const double t = boost::math::quantile(boost::math::students_t(std::max(1.0, locations - 1)), 0.975);
-  for (const CauseParameter& wanted : causeDescription(f.cause).parameters) {
+  for (const CauseParameter& wanted : causeDescription(cause).parameters) {
     if (!m.values.has(wanted.name)) continue;
     FindingParameter p{wanted.name, wanted.unit, m.values.all().at(wanted.name), {}};
     const auto* text = std::get_if<std::string>(&p.value);
     const auto* list = std::get_if<std::vector<double>>(&p.value);
     if ((text && text->empty()) || (list && list->empty())) continue;
     if (const auto* value = std::get_if<double>(&p.value)) {
-      for (std::size_t j = 0; j < best.hypothesis.coordinates.size(); ++j) {
-        if (best.hypothesis.coordinates[j].parameter != wanted.name) continue;
-        p.ci95 = {{*value - t * best.standard_error[j], *value + t * best.standard_error[j]}};
+      for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
+        if (hypothesis.coordinates[j].parameter != wanted.name) continue;
+        p.ci95 = {{*value - t * standard_error[j], *value + t * standard_error[j]}};
       }
       if (p.ci95.empty() && wanted.one_of > 0) continue;
     } else if (list != nullptr) {
       p.ci95.assign(list->size(), {0, 0});
       for (std::size_t k = 0; k < list->size(); ++k) p.ci95[k] = {(*list)[k], (*list)[k]};
-      for (std::size_t j = 0; j < best.hypothesis.coordinates.size(); ++j) {
-        const Coordinate& c = best.hypothesis.coordinates[j];
+      for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
+        const Coordinate& c = hypothesis.coordinates[j];
         if (c.parameter != wanted.name || c.element < 0) continue;
         const double v = (*list)[static_cast<std::size_t>(c.element)];
-        p.ci95[static_cast<std::size_t>(c.element)] = {v - t * best.standard_error[j], v + t * best.standard_error[j]};
+        p.ci95[static_cast<std::size_t>(c.element)] = {v - t * standard_error[j], v + t * standard_error[j]};
       }
     }
-    f.parameters.push_back(std::move(p));
+    parameters.push_back(std::move(p));
   }
+  return parameters;
+}
+
+Finding Session::describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const {
+  Finding f;
+  const NamedParameters m = best.hypothesis.at(best.scaled);
+  const bool named = catalogued(m.mechanism);
+  f.cause = named ? m.mechanism : "unknown";
+  f.mechanism = m;
+  f.parameters = parametersOf(best.hypothesis, best.scaled, best.standard_error, f.cause);
   // Names that explain nearly as much, by their share of probability.
   double sum = 0;
   std::vector<std::pair<std::string, double>> alike;
   for (const HypothesisFit& other : fits) {
     const double behind = (best.ranking() - other.ranking()) / best.inflation;
-    if (behind > kAlike || !(other.gain > 0)) continue;
+    if (behind > kAlike || behind < 0 || !(other.gain > 0)) continue;  // those ahead were refused
     const std::string& name = other.hypothesis.mechanism.mechanism;
     const double weight = std::exp(-behind);
     const std::string cause = catalogued(name) ? name : "unknown";
@@ -457,7 +482,7 @@ Finding Session::describe(const HypothesisFit& best, const std::vector<Hypothesi
   return f;
 }
 
-std::vector<PoseEchoes> Session::heldOutEchoes(const HypothesisFit& fit) {
+std::vector<PoseEchoes> Session::heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m) {
   std::vector<PoseEchoes> echoes(data_.poses.size());
   for (int k = 0; k < kFolds; ++k) {
     std::vector<int> poses;
@@ -467,20 +492,20 @@ std::vector<PoseEchoes> Session::heldOutEchoes(const HypothesisFit& fit) {
     if (poses.empty()) continue;
     std::vector<NamedParameters> mechanisms = mechanisms_;
     mechanisms.push_back(fit.hypothesis.at(fit.fold_scaled[static_cast<std::size_t>(k)]));
-    std::vector<PoseEchoes> part = source_->echoes(mechanisms, poses);
+    std::vector<PoseEchoes> part = source_->echoes(mechanisms, poses, actor_range_m);
     for (std::size_t j = 0; j < poses.size(); ++j) echoes[static_cast<std::size_t>(poses[j])] = std::move(part[j]);
   }
-  source_->settle(mechanisms_);
   return echoes;
 }
 
 FindingGain Session::gainOf(const HypothesisFit& fit) {
   report("gain on held-out places", 0);
-  const std::vector<PoseEchoes> after = heldOutEchoes(fit);
   FindingGain gain;
-  gain.explained_power = explainedPowerGain(data_, cellPowers(data_, state_.echoes), cellPowers(data_, after));
+  gain.explained_power = explainedPowerGain(data_, cellPowers(data_, source_->echoes(mechanisms_)),
+                                            cellPowers(data_, heldOutEchoes(fit, {})));
   std::vector<double> likelihood;
-  model_->logLikelihood(after, fit.state.nuisance, &likelihood);
+  model_->logLikelihood(heldOutEchoes(fit, fit.state.actor_range_m), fit.state.nuisance, &likelihood);
+  source_->settle(mechanisms_);
   gain.log_likelihood_per_pose = likelihoodGain(data_, state_.by_pose, likelihood);
   return gain;
 }
@@ -530,6 +555,53 @@ void Session::addMetrics(const HypothesisFit& fit, FindingGain& gain) const {
   for (std::size_t i = 0; i < 5; ++i) set(gain.classes[i], b.class_count[i], a.class_count[i]);
 }
 
+/// All that rounds have found, fitted at once; what is then worth nothing beside the rest is taken back.
+void Session::refitTogether() {
+  while (true) {
+    report("fitting all findings together", 0);
+    std::vector<Hypothesis> parts;
+    std::vector<std::vector<double>> start;
+    for (const Accepted& a : accepted_) {
+      parts.push_back(a.hypothesis);
+      start.push_back(a.scaled);
+    }
+    const JointFit fit = fitter_->refit(before_rounds_, state_.nuisance, parts, start);
+    state_.nuisance = fit.nuisance;
+    mechanisms_ = fit.mechanisms;
+    std::size_t weakest = 0;
+    double weakest_rate = -1;
+    for (std::size_t i = 0; i < accepted_.size(); ++i) {
+      Accepted& a = accepted_[i];
+      a.scaled = fit.scaled[i];
+      Finding& f = result_.findings.findings[a.finding];
+      f.mechanism = a.hypothesis.at(a.scaled);
+      f.parameters = parametersOf(a.hypothesis, a.scaled, fit.standard_error[i], f.cause);
+      for (NamedParameters& e : extended_) {
+        if (e.mechanism == f.mechanism->mechanism) e = *f.mechanism;
+      }
+      const std::size_t numbers = a.hypothesis.coordinates.size();
+      if (numbers == 0) continue;  // there or not: its own round has judged it
+      const double rate = fitter_->falseAlarmRate(fit.worth[i], numbers, family_);
+      if (rate > weakest_rate) {
+        weakest = i;
+        weakest_rate = rate;
+      }
+    }
+    if (weakest_rate <= kFalseAlarm || accepted_.size() < 2) return;
+    const Accepted gone = accepted_[weakest];
+    report("taken back: " + gone.hypothesis.label(), 1);
+    std::vector<Finding>& findings = result_.findings.findings;
+    findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(gone.finding));
+    accepted_.erase(accepted_.begin() + static_cast<std::ptrdiff_t>(weakest));
+    for (Accepted& a : accepted_) a.finding -= a.finding > gone.finding ? 1 : 0;
+    extended_.erase(std::remove_if(extended_.begin(), extended_.end(),
+                                   [&](const NamedParameters& m) {
+                                     return m.mechanism == gone.hypothesis.mechanism.mechanism;
+                                   }),
+                    extended_.end());
+  }
+}
+
 bool Session::judgeChannels(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
   for (const HypothesisFit& f : fits) {
@@ -547,10 +619,12 @@ bool Session::judgeChannels(int round) {
     const bool unknown = finding.cause == "unknown";
     mechanisms_ = f.state.mechanisms;
     extended_.push_back(*finding.mechanism);
+    accepted_.push_back({f.hypothesis, f.scaled, result_.findings.findings.size()});
     result_.findings.findings.push_back(std::move(finding));
-    const Nuisance nuisance = f.state.nuisance;
+    state_.nuisance = f.state.nuisance;
+    if (accepted_.size() > 1) refitTogether();
     source_->settle(mechanisms_);
-    state_ = fitter_->state(mechanisms_, &nuisance);
+    state_ = fitter_->state(mechanisms_, std::make_unique<Nuisance>(state_.nuisance).get());
     return !unknown;  // an unknown stands last
   }
   return false;
@@ -569,11 +643,12 @@ Diagnosis Session::run() {
   judgeTone();
   judgeNoise();
   report("fitting the twin as it is", 0);
+  source_->pointBeams(data_, mechanisms_, model_->firstBin());
+  source_->settle(mechanisms_);
   state_ = fitter_->state(mechanisms_, nullptr);
-  const std::vector<CellPowers> powers = cellPowers(data_, state_.echoes);
-  result_.explained_power = explainedPower(powers);
+  std::vector<PoseEchoes> elsewhere = source_->echoes(mechanisms_);
+  result_.explained_power = explainedPower(cellPowers(data_, elsewhere));
   // The same expectations, each at another pose's place: what chance explains.
-  std::vector<PoseEchoes> elsewhere = state_.echoes;
   std::rotate(elsewhere.begin(), elsewhere.begin() + static_cast<std::ptrdiff_t>(elsewhere.size() / 2),
               elsewhere.end());
   const double by_chance = explainedPower(cellPowers(data_, elsewhere));
@@ -592,6 +667,7 @@ Diagnosis Session::run() {
                     " with its poses exchanged; check that scene, poses and captures belong together";
     findings.findings.push_back(std::move(f));
   } else {
+    before_rounds_ = mechanisms_;
     for (int round = 0; round < kMostFindings; ++round) {
       if (!judgeChannels(round)) break;
     }

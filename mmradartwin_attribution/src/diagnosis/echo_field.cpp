@@ -1,18 +1,28 @@
 #include "echo_field.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 namespace mmradartwin {
 namespace {
 
 constexpr int kLobe = 2;   ///< bins to either side that a weak path reaches
 constexpr int kSkirt = 6;  ///< and a strong one
+constexpr std::size_t kMostBeamBins = 16;
+constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;  ///< of a path's power: a beam that takes less does not see it
 
-void reserve(BinCovariance& field, int bins, std::size_t size) {
-  if (!field.packed.empty()) return;
-  field.bins = bins;
-  field.packed.assign(static_cast<std::size_t>(bins) * size, {});
+/// Makes room for the bins from low to high.
+void cover(BinCovariance& field, int low, int high, std::size_t size) {
+  if (field.packed.empty()) field.first = low;
+  if (low < field.first) {
+    field.packed.insert(field.packed.begin(), static_cast<std::size_t>(field.first - low) * size, {});
+    field.first = low;
+  }
+  const std::size_t bins = static_cast<std::size_t>(high + 1 - field.first);
+  if (bins * size > field.packed.size()) field.packed.resize(bins * size);
+  field.bins = static_cast<int>(field.packed.size() / size);
 }
 
 void accumulate(BinCovariance& field, int bin, double factor, const std::vector<std::complex<float>>& packed) {
@@ -32,22 +42,6 @@ double meanLength_m(const PathRecord& record) {
   return sum / static_cast<double>(record.length_m.size());
 }
 
-/// Cuts the empty bins off both ends.
-void trim(BinCovariance& field, std::size_t size) {
-  const auto empty = [&](int i) {
-    const auto begin = field.packed.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(i) * size);
-    return std::all_of(begin, begin + static_cast<std::ptrdiff_t>(size), [](auto v) { return v == 0.0f; });
-  };
-  int low = 0, high = field.bins;
-  while (low < high && empty(low)) ++low;
-  while (high > low && empty(high - 1)) --high;
-  field.packed = std::vector<std::complex<float>>(
-      field.packed.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(low) * size),
-      field.packed.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(high) * size));
-  field.first += low;
-  field.bins = high - low;
-}
-
 }  // namespace
 
 double hannResponse(double offset) {
@@ -57,13 +51,39 @@ double hannResponse(double offset) {
   return std::sin(M_PI * d) / (M_PI * d * (1 - d * d));
 }
 
-double hannSlope(double offset) {
-  constexpr double kStep = 1e-3;
-  return (hannResponse(offset + kStep) - hannResponse(offset - kStep)) / (2 * kStep);
-}
+namespace {
 
-EchoCollector::EchoCollector(const RadarConfig& radar, double angle_error_rad)
+/// hannResponse() and its slope where a path may reach, straight between entries: right to 2e-6.
+class HannTable {
+ public:
+  HannTable() {
+    constexpr double kStep = 1e-3;
+    for (int i = 0; i <= kSize; ++i) {
+      const double d = static_cast<double>(i) / kPerBin;
+      response_[i] = hannResponse(d);
+      slope_[i] = (hannResponse(d + kStep) - hannResponse(d - kStep)) / (2 * kStep);
+    }
+  }
+  std::pair<double, double> at(double offset) const {
+    const double place = std::min(std::abs(offset) * kPerBin, kSize - 1.0);
+    const int i = static_cast<int>(place);
+    const double f = place - i, slope = slope_[i] + f * (slope_[i + 1] - slope_[i]);
+    return {response_[i] + f * (response_[i + 1] - response_[i]), offset < 0 ? -slope : slope};
+  }
+
+ private:
+  static constexpr int kPerBin = 512, kSize = (kSkirt + 1) * kPerBin;
+  std::array<double, kSize + 1> response_, slope_;
+};
+const HannTable kHann;
+
+}  // namespace
+
+EchoCollector::EchoCollector(const RadarConfig& radar, double angle_error_rad, const std::vector<EchoBeam>& beams,
+                             const std::vector<double>& actor_range_m)
     : radar_(radar),
+      beams_(beams),
+      actor_range_m_(actor_range_m),
       angle_error_rad_(angle_error_rad),
       channels_(radar.channels()),
       samples_(radar.samples_per_chirp),
@@ -81,7 +101,9 @@ EchoGroup& EchoCollector::group(const std::vector<int>& actors) {
   echoes_.groups.emplace_back();
   EchoGroup& g = echoes_.groups.back();
   g.actors = actors;
-  for (BinCovariance* field : {&g.power, &g.shift, &g.bend, &g.cosine}) reserve(*field, samples_, size_);
+  for (int a : actors) {
+    if (a >= 0 && a < static_cast<int>(actor_range_m_.size())) g.added_range_m += actor_range_m_[a];
+  }
   return g;
 }
 
@@ -108,32 +130,52 @@ void EchoCollector::outer(const std::complex<double>* c, double cosine,
 
 void EchoCollector::add(const PathRecord& record, bool weak) {
   EchoGroup& g = group(record.actors);
-  const double cosine = pathCosine(record), place = 0.5 * meanLength_m(record) / bin_m_;
+  const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + g.added_range_m) / bin_m_;
   std::vector<std::complex<float>> packed;
   outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error drowns in the others
   const int reach = weak ? kLobe : kSkirt, middle = static_cast<int>(std::lround(place));
-  for (int r = std::max(0, middle - reach); r <= std::min(samples_ - 1, middle + reach); ++r) {
-    const double w = hannResponse(r - place), slope = -hannSlope(r - place) / bin_m_;
-    accumulate(g.power, r, w * w, packed);
-    accumulate(g.shift, r, 2 * w * slope, packed);
-    accumulate(g.bend, r, slope * slope, packed);
-    accumulate(g.cosine, r, w * w * cosine, packed);
+  const int low = std::max(0, middle - reach), high = std::min(samples_ - 1, middle + reach);
+  if (low > high) return;
+  EchoGroup::Fields& f = g.bins;
+  for (BinCovariance* field : {&f.power, &f.shift, &f.bend, &f.cosine}) cover(*field, low, high, size_);
+  for (int r = low; r <= high; ++r) {
+    const auto [w, per_bin] = kHann.at(r - place);
+    const double slope = -per_bin / bin_m_;
+    accumulate(f.power, r, w * w, packed);
+    accumulate(f.shift, r, 2 * w * slope, packed);
+    accumulate(f.bend, r, slope * slope, packed);
+    accumulate(f.cosine, r, w * w * cosine, packed);
   }
+  addToBeams(record.c.data(), place, 1, weak ? kOffBeamWeak : kOffBeam, &g.beams.power, &g.beams.shift, &g.beams.bend);
 }
 
 void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y) {
   EchoGroup& g = group(record.actors);
-  const double cosine = pathCosine(record), place = 0.5 * meanLength_m(record) / bin_m_;
-  const double strongest = y.colwise().squaredNorm().maxCoeff();
-  if (!(strongest > 0)) return;
+  const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + g.added_range_m) / bin_m_;
+  const Eigen::VectorXd level = y.colwise().squaredNorm().transpose();
+  const double least = 1e-7 * level.maxCoeff();
+  if (!(least > 0)) return;
+  int first = 0, last = samples_ - 1;
+  while (level[first] < least) ++first;
+  while (level[last] < least) --last;
+  EchoGroup::Fields& f = g.bins;
+  for (BinCovariance* field : {&f.power, &f.cosine}) cover(*field, first, last, size_);
   std::vector<std::complex<float>> packed;
   std::vector<std::complex<double>> c(static_cast<std::size_t>(channels_));
-  for (int r = 0; r < samples_; ++r) {
-    if (y.col(r).squaredNorm() < 1e-7 * strongest) continue;
+  for (int r = first; r <= last; ++r) {
+    if (level[r] < least) continue;
     for (int k = 0; k < channels_; ++k) c[k] = y(k, r);
     outer(c.data(), cosine, packed);
-    accumulate(g.power, r, 1, packed);
-    accumulate(g.cosine, r, cosine, packed);
+    accumulate(f.power, r, 1, packed);
+    accumulate(f.cosine, r, cosine, packed);
+  }
+  for (std::size_t b = 0; b < beams_.size(); ++b) {
+    const EchoBeam& beam = beams_[b];
+    const Eigen::VectorXcd formed = formBeam(beam, y);
+    if (formed.squaredNorm() < least) continue;
+    cover(g.beams.power, static_cast<int>(b), static_cast<int>(b), size_);
+    outer(formed.data(), 0, packed);
+    accumulate(g.beams.power, static_cast<int>(b), 1, packed);
   }
   // The range derivative moves the tone alone: its channels are those at its own bin.
   const int middle = std::clamp(static_cast<int>(std::lround(place)), 0, samples_ - 1);
@@ -141,30 +183,68 @@ void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y) {
   if (!(std::abs(peak) > 0.1)) return;
   for (int k = 0; k < channels_; ++k) c[k] = y(k, middle) / peak;
   outer(c.data(), cosine, packed);
-  for (int r = std::max(0, middle - kLobe); r <= std::min(samples_ - 1, middle + kLobe); ++r) {
-    const double w = hannResponse(r - place), slope = -hannSlope(r - place) / bin_m_;
-    accumulate(g.shift, r, 2 * w * slope, packed);
-    accumulate(g.bend, r, slope * slope, packed);
+  const int low = std::max(0, middle - kLobe), high = std::min(samples_ - 1, middle + kLobe);
+  for (BinCovariance* field : {&f.shift, &f.bend}) cover(*field, low, high, size_);
+  for (int r = low; r <= high; ++r) {
+    const auto [w, per_bin] = kHann.at(r - place);
+    const double slope = -per_bin / bin_m_;
+    accumulate(f.shift, r, 2 * w * slope, packed);
+    accumulate(f.bend, r, slope * slope, packed);
+  }
+  addToBeams(c.data(), place, 1, kOffBeam, nullptr, &g.beams.shift, &g.beams.bend);
+}
+
+void EchoCollector::addToBeams(const std::complex<double>* c, double place, double share, double off,
+                               BinCovariance* power, BinCovariance* shift, BinCovariance* bend) const {
+  std::array<double, kMostBeamBins> w, slope;
+  for (std::size_t b = 0; b < beams_.size(); ++b) {
+    const EchoBeam& beam = beams_[b];
+    const int at = static_cast<int>(b);
+    const double middle = place - beam.first_bin;
+    if (middle < -kLobe || middle > channels_ - 1 + kLobe) continue;
+    std::complex<double> formed = 0;
+    double all = 0;
+    for (int k = 0; k < channels_; ++k) {
+      formed += std::conj(beam.weights[k]) * c[k];
+      all += std::norm(c[k]);
+    }
+    const double level = share * std::norm(formed);
+    if (level < share * off * all) continue;
+    for (int i = 0; i < channels_; ++i) {
+      const auto [response, per_bin] = kHann.at(i - middle);
+      w[static_cast<std::size_t>(i)] = response;
+      slope[static_cast<std::size_t>(i)] = -per_bin / bin_m_;
+    }
+    const auto add = [&](BinCovariance* field, auto value) {
+      if (field == nullptr) return;
+      cover(*field, at, at, size_);
+      std::complex<float>* to = field->at(at, size_);
+      for (int i = 0; i < channels_; ++i) {
+        for (int j = 0; j <= i; ++j) *to++ += static_cast<float>(level * value(i, j));
+      }
+    };
+    add(power, [&](int i, int j) { return w[i] * w[j]; });
+    add(shift, [&](int i, int j) { return w[i] * slope[j] + slope[i] * w[j]; });
+    add(bend, [&](int i, int j) { return slope[i] * slope[j]; });
   }
 }
 
 void EchoCollector::addGraze(const PathRecord& record, double share) {
-  reserve(echoes_.graze, samples_, size_);
   const double place = 0.5 * meanLength_m(record) / bin_m_;
   std::vector<std::complex<float>> packed;
   outer(record.c.data(), pathCosine(record), packed);
   const int middle = static_cast<int>(std::lround(place));
-  for (int r = std::max(0, middle - kLobe); r <= std::min(samples_ - 1, middle + kLobe); ++r) {
-    const double w = hannResponse(r - place);
+  const int low = std::max(0, middle - kLobe), high = std::min(samples_ - 1, middle + kLobe);
+  if (low > high) return;
+  cover(echoes_.graze, low, high, size_);
+  for (int r = low; r <= high; ++r) {
+    const double w = kHann.at(r - place).first;
     accumulate(echoes_.graze, r, share * w * w, packed);
   }
+  addToBeams(record.c.data(), place, share, kOffBeam, &echoes_.graze_beams, nullptr, nullptr);
 }
 
 PoseEchoes EchoCollector::take() {
-  for (EchoGroup& g : echoes_.groups) {
-    for (BinCovariance* field : {&g.power, &g.shift, &g.bend, &g.cosine}) trim(*field, size_);
-  }
-  if (!echoes_.graze.packed.empty()) trim(echoes_.graze, size_);
   PoseEchoes result = std::move(echoes_);
   echoes_ = {};
   return result;

@@ -95,11 +95,18 @@ NamedParameters defaultMechanism(const std::string& name) {
 EchoSource::EchoSource(const Twin& base, const ChannelData& data, const PoseAccuracy& accuracy)
     : base_(base), data_(data), accuracy_(accuracy) {}
 
-bool EchoSource::altersGeometry(const NamedParameters& mechanism) {
+EchoSource::Geometry EchoSource::geometryAfter(const NamedParameters& mechanism) {
   const std::string key = mechanismKey(mechanism);
-  const auto at = alters_.find(key);
-  if (at != alters_.end()) return at->second;
-  return alters_[key] = base_.changed({mechanism}).altersGeometry();
+  const auto at = geometry_.find(key);
+  if (at != geometry_.end()) return at->second;
+  const Twin twin = base_.changed({mechanism});
+  return geometry_[key] = twin.addsScreensAlone() ? Geometry::kMoreScreens
+                          : twin.altersGeometry() ? Geometry::kOther
+                                                  : Geometry::kSame;
+}
+
+bool EchoSource::altersGeometry(const NamedParameters& mechanism) {
+  return geometryAfter(mechanism) != Geometry::kSame;
 }
 
 std::vector<NamedParameters> EchoSource::geometryOf(const std::vector<NamedParameters>& mechanisms) {
@@ -120,6 +127,19 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
     if (!entry.known[i]) missing.push_back(i);
   }
   if (missing.empty()) return entry.paths;
+  if (!geometry.empty() && geometry.back().mechanism != mechanism.mechanism &&
+      geometryAfter(geometry.back()) == Geometry::kMoreScreens) {
+    // What only hides needs no new trace: paths without it, less those that it stands in the way of.
+    const Traced& open = traced({geometry.begin(), geometry.end() - 1}, mechanism, missing);
+    const Twin twin = base_.changed(geometry);
+    tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t j) {
+      const std::size_t i = static_cast<std::size_t>(missing[j]);
+      entry.paths[i] = open[i];
+      twin.removeHidden(data_.poses[i].pose.T_map_radar, entry.paths[i]);
+      entry.known[i] = 1;
+    });
+    return entry.paths;
+  }
   std::vector<NamedParameters> all;
   for (const NamedParameters& m : geometry) {
     if (m.mechanism != mechanism.mechanism) all.push_back(m);
@@ -155,7 +175,8 @@ void EchoSource::findGraze(const std::vector<NamedParameters>& mechanisms) {
   tbb::parallel_for(std::size_t{0}, data_.poses.size(), [&](std::size_t i) {
     const Eigen::Isometry3d& here = data_.poses[i].pose.T_map_radar;
     const std::vector<PathRecord> at = twin.trace(here);
-    EchoCollector collector(base_.radar(), accuracy_.path_angle_rad);
+    const std::vector<double> none;
+    EchoCollector collector(base_.radar(), accuracy_.path_angle_rad, data_.poses[i].beams, none);
     const auto compare = [&](const std::vector<PathRecord>& from, const std::vector<PathRecord>& to) {
       for (const PathRecord& r : from) {
         const auto same = std::find_if(to.begin(), to.end(),
@@ -181,12 +202,13 @@ void EchoSource::findGraze(const std::vector<NamedParameters>& mechanisms) {
         // The shifted pose lies inside something; the pose itself does not.
       }
     }
-    graze_[i] = collector.take().graze;
+    graze_[i] = collector.take();
   });
 }
 
 std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& mechanisms,
-                                           const std::vector<int>& poses) {
+                                           const std::vector<int>& poses,
+                                           const std::vector<double>& actor_range_m) {
   const Twin twin = base_.changed(mechanisms);
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
   std::vector<const Traced*> parts;
@@ -202,7 +224,7 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
     const Pose& pose = data_.poses[i].pose;
     std::vector<PathRecord> all;
     for (const Traced* part : parts) all.insert(all.end(), (*part)[i].begin(), (*part)[i].end());
-    EchoCollector collector(radar, accuracy_.path_angle_rad);
+    EchoCollector collector(radar, accuracy_.path_angle_rad, data_.poses[i].beams, actor_range_m);
     std::optional<Eigen::MatrixXcd> matrix;
     if (twin.hasReceiveStage()) matrix = twin.channelMatrix(pose.T_map_radar, pose.stamp_ns);
     if (!twin.hasReceiveStage() || matrix) {
@@ -232,15 +254,30 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
       }
     }
     result[j] = collector.take();
-    if (!graze_.empty()) result[j].graze = graze_[i];
+    if (!graze_.empty()) {
+      result[j].graze = graze_[i].graze;
+      result[j].graze_beams = graze_[i].graze_beams;
+    }
   });
   return result;
 }
 
-std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& mechanisms) {
+std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& mechanisms,
+                                           const std::vector<double>& actor_range_m) {
   std::vector<int> all(data_.poses.size());
   std::iota(all.begin(), all.end(), 0);
-  return echoes(mechanisms, all);
+  return echoes(mechanisms, all, actor_range_m);
+}
+
+void EchoSource::pointBeams(ChannelData& data, const std::vector<NamedParameters>& mechanisms, int first_bin) {
+  const Twin twin = base_.changed(mechanisms);
+  tbb::parallel_for(std::size_t{0}, data.poses.size(), [&](std::size_t i) {
+    PoseChannels& p = data.poses[i];
+    const Eigen::Isometry3d& T = p.pose.T_map_radar;
+    p.beams = chooseBeams(base_.radar(), twin.receivedPaths(T, twin.trace(T), p.pose.stamp_ns), first_bin);
+    for (EchoBeam& beam : p.beams) beam.y = formBeam(beam, p.y);
+  });
+  settled_.clear();  // what grazes is to be found in the beams, too
 }
 
 void EchoSource::settle(const std::vector<NamedParameters>& mechanisms) {

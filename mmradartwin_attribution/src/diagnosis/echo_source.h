@@ -24,14 +24,18 @@ class EchoSource {
   /// Keeps references to base and data.
   EchoSource(const Twin& base, const ChannelData& data, const PoseAccuracy& accuracy);
 
-  /// Echoes of the poses named by index, in that order. Throws InputError where the scene does not know what a
-  /// mechanism names.
-  std::vector<PoseEchoes> echoes(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
+  /// Echoes of the poses named by index, in that order; actor_range_m as EchoCollector takes it. Throws InputError
+  /// where the scene does not know what a mechanism names.
+  std::vector<PoseEchoes> echoes(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
+                                 const std::vector<double>& actor_range_m);
   /// Of all poses.
-  std::vector<PoseEchoes> echoes(const std::vector<NamedParameters>& mechanisms);
+  std::vector<PoseEchoes> echoes(const std::vector<NamedParameters>& mechanisms,
+                                 const std::vector<double>& actor_range_m = {});
   /// What hypotheses are compared with from now on: paths of other mechanisms are forgotten (memory stays bounded so),
   /// and what grazes an edge within the pose's accuracy is found for these.
   void settle(const std::vector<NamedParameters>& mechanisms);
+  /// Points beams at what the mechanisms expect, in the data given to the constructor.
+  void pointBeams(ChannelData& data, const std::vector<NamedParameters>& mechanisms, int first_bin);
   /// True where the mechanism edits the scene or moves the radar: trying it traces everything again.
   bool altersGeometry(const NamedParameters& mechanism);
   const Twin& base() const { return base_; }
@@ -51,9 +55,11 @@ class EchoSource {
     std::vector<char> known;  // by pose
   };
   std::map<std::string, Entry> cache_;
-  std::vector<BinCovariance> graze_;  // by pose
+  std::vector<PoseEchoes> graze_;  // by pose; nothing but graze
   std::vector<std::string> settled_;
-  std::map<std::string, bool> alters_;  // geometry, by mechanism text
+  enum class Geometry { kSame, kMoreScreens, kOther };
+  Geometry geometryAfter(const NamedParameters& mechanism);
+  std::map<std::string, Geometry> geometry_;  // by mechanism text
 };
 
 /// One line that tells two mechanisms with different values apart.

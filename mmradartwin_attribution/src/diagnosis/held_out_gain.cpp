@@ -61,7 +61,7 @@ std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<Po
       if (axes.range_m[static_cast<std::size_t>(bin)] <= kMinRange_m) continue;
       s.setZero();
       for (const EchoGroup& g : echoes[i].groups) {
-        const auto* p = g.power.at(bin, size);
+        const auto* p = g.bins.power.at(bin, size);
         if (p == nullptr) continue;
         std::size_t j = 0;
         for (int k = 0; k < channels; ++k) {

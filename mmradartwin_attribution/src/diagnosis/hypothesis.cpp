@@ -88,16 +88,19 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
 
 double Coordinate::value(double scaled) const {
   if (logarithmic()) return std::clamp(typical + 10 * std::log10(std::max(scaled, 1e-12)), min, max);
+  if (reciprocal()) return std::clamp(typical / std::max(scaled, 1e-12), min, max);
   return std::clamp(neutral + scaled * (typical - neutral), min, max);
 }
 
 double Coordinate::scaled(double v) const {
   if (logarithmic()) return std::pow(10.0, (v - typical) / 10);
+  if (reciprocal()) return typical / v;
   return (v - neutral) / (typical - neutral);
 }
 
 double Coordinate::slope(double scaled) const {
   if (logarithmic()) return 10 / std::log(10.0) / std::max(scaled, 1e-12);
+  if (reciprocal()) return -typical / std::max(scaled * scaled, 1e-12);
   return typical - neutral;
 }
 

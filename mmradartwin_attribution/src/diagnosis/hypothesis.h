@@ -17,6 +17,10 @@ struct Coordinate {
 
   /// True for levels in dB whose neutral value stands for nothing at all: then the scale is one of power.
   bool logarithmic() const { return unit == "dB" && neutral <= -60; }
+  /// True for corner frequencies that do nothing when they are far above: then the scale is one of 1/frequency.
+  bool reciprocal() const { return unit == "Hz" && neutral > typical; }
+  /// True where it has one side: what is there or not, more or less.
+  bool oneSided() const { return logarithmic() || min >= neutral || max <= neutral; }
   double value(double scaled) const;
   double scaled(double value) const;
   /// Derivative of value() by the scale.

@@ -15,12 +15,21 @@ constexpr double kMaxInflation = 50;
 constexpr double kPrice =
     5;  ///< nats per coordinate, some inflation included: fewer numbers win where all explain alike
 
-SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, double per) {
+/// of[i] is of poses[i], from is of all poses.
+SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, const std::vector<int>& poses,
+                             double per) {
   const float f = static_cast<float>(1 / per);
   for (std::size_t i = 0; i < of.size(); ++i) {
-    for (std::size_t j = 0; j < of[i].size(); ++j) of[i][j] = (of[i][j] - from[i][j]) * f;
+    const PoseCovariance& base = from[static_cast<std::size_t>(poses[i])];
+    for (std::size_t j = 0; j < of[i].size(); ++j) of[i][j] = (of[i][j] - base[j]) * f;
   }
   return of;
+}
+
+std::vector<int> everyPose(const ModelState& state) {
+  std::vector<int> poses(state.echoes.size());
+  std::iota(poses.begin(), poses.end(), 0);
+  return poses;
 }
 
 std::vector<NamedParameters> with(std::vector<NamedParameters> mechanisms, NamedParameters added) {
@@ -68,11 +77,18 @@ HypothesisFitter::Effective HypothesisFitter::effective(const Scores& s, int glo
 ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanisms, const Nuisance* start) {
   ModelState s;
   s.mechanisms = mechanisms;
-  s.echoes = source_.echoes(mechanisms);
+  if (start != nullptr) s.actor_range_m = start->actor_range_m;
+  s.echoes = source_.echoes(mechanisms, s.actor_range_m);
   s.nuisance = start != nullptr ? *start : model_.start(s.echoes);
-  model_.fit(s.echoes, s.nuisance, start != nullptr ? 4 : 16);
+  model_.fit(s.echoes, s.nuisance, start != nullptr ? 3 : 14);
+  for (int i = 0; i < 2; ++i) {  // ranges that are far off are no matter of first order
+    s.actor_range_m = s.nuisance.actor_range_m;
+    s.echoes = source_.echoes(mechanisms, s.actor_range_m);
+    model_.fit(s.echoes, s.nuisance, 3);
+  }
   s.log_likelihood = model_.logLikelihood(s.echoes, s.nuisance, &s.by_pose);
   s.basis = model_.basis(s.echoes, s.nuisance);
+  s.covariance = model_.covariance(s.echoes, s.nuisance, everyPose(s));
   return s;
 }
 
@@ -90,16 +106,16 @@ std::vector<std::pair<int, double>> HypothesisFitter::suspects(const ModelState&
 
 Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses) {
   Screened result{hypothesis, 0, std::vector<double>(hypothesis.coordinates.size(), 1.0)};
-  std::vector<PoseEchoes> looked_at;
-  for (int i : poses) looked_at.push_back(null.echoes[static_cast<std::size_t>(i)]);
-  const SessionCovariance base = model_.covariance(looked_at, null.nuisance, poses);
   std::vector<SessionCovariance> directions;
   const std::size_t count = std::max<std::size_t>(1, hypothesis.coordinates.size());
   for (std::size_t j = 0; j < count; ++j) {
     std::vector<double> at(hypothesis.coordinates.size(), 0.0);
-    if (!at.empty()) at[j] = 1;
-    const auto echoes = source_.echoes(with(null.mechanisms, hypothesis.at(at)), poses);
-    directions.push_back(difference(model_.covariance(echoes, null.nuisance, poses), base, 1));
+    // What rises from nothing does so with its power: its typical value shows more than the slope at nothing. What
+    // shifts or turns does so to first order for small amounts alone.
+    const double step = at.empty() || hypothesis.coordinates[j].oneSided() ? 1 : kSmallStep;
+    if (!at.empty()) at[j] = step;
+    const auto echoes = source_.echoes(with(null.mechanisms, hypothesis.at(at)), poses, null.actor_range_m);
+    directions.push_back(difference(model_.covariance(echoes, null.nuisance, poses), null.covariance, poses, step));
   }
   const Effective e = effective(model_.scores(null.basis, directions, poses), null.nuisance.globals());
   const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
@@ -111,14 +127,153 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
   }
   bool possible = true;
   for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
-    const Coordinate& c = hypothesis.coordinates[j];
-    const bool one_sided =
-        c.logarithmic() || c.min == c.neutral || c.max == c.neutral || hypothesis.coordinates[j].min > -1e-12;
+    const bool one_sided = hypothesis.coordinates[j].oneSided();
     if (one_sided && step[static_cast<Eigen::Index>(j)] <= 0) possible = false;
     result.start[j] = std::clamp(step[static_cast<Eigen::Index>(j)], one_sided ? 0.02 : -8.0, 8.0);
   }
   if (possible) result.promised = whole * 0.5 * e.total.dot(step) / e.inflation;
   return result;
+}
+
+HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedParameters>& base,
+                                                     const Nuisance& nuisance, const std::vector<Hypothesis>& parts,
+                                                     const std::vector<double>& start, int iterations) {
+  std::vector<Coordinate> coordinates;
+  for (const Hypothesis& h : parts) coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
+  const int globals = nuisance.globals();
+  const Eigen::Index n = static_cast<Eigen::Index>(coordinates.size());
+  const auto mechanisms = [&](const std::vector<double>& scaled) {
+    std::vector<NamedParameters> all = base;
+    auto from = scaled.begin();
+    for (const Hypothesis& h : parts) {
+      const auto to = from + static_cast<std::ptrdiff_t>(h.coordinates.size());
+      all.push_back(h.at({from, to}));
+      from = to;
+    }
+    return all;
+  };
+  const auto evaluate = [&](const std::vector<double>& scaled, const Nuisance& with_nuisance) {
+    ModelState s;
+    s.mechanisms = mechanisms(scaled);
+    s.actor_range_m = with_nuisance.actor_range_m;
+    s.echoes = source_.echoes(s.mechanisms, s.actor_range_m);
+    s.nuisance = with_nuisance;
+    s.log_likelihood = model_.logLikelihood(s.echoes, with_nuisance, &s.by_pose);
+    return s;
+  };
+  // A cause may have been fitted as the latents of all poses or actors: it starts without them, too.
+  Nuisance without = nuisance;
+  std::fill(without.yaw_rad.begin(), without.yaw_rad.end(), 0.0);
+  Nuisance bare = without;
+  std::fill(bare.actor_gain.begin(), bare.actor_gain.end(), 0.0);
+  std::fill(bare.actor_range_m.begin(), bare.actor_range_m.end(), 0.0);
+  Optimum o;
+  const auto consider = [&](const std::vector<double>& scaled) {
+    ModelState s = evaluate(scaled, nuisance);
+    for (const Nuisance* other : {&without, &bare}) {
+      ModelState t = evaluate(scaled, *other);
+      if (t.log_likelihood > s.log_likelihood) s = std::move(t);
+    }
+    if (!o.state.echoes.empty() && s.log_likelihood <= o.state.log_likelihood) return;
+    o.state = std::move(s);
+    o.scaled = scaled;
+  };
+  consider(start);
+  // A quadratic's promise is far off where a level rises from nothing.
+  const bool one_sided =
+      parts.size() == 1 &&
+      std::any_of(coordinates.begin(), coordinates.end(), [](const Coordinate& c) { return c.oneSided(); });
+  for (double factor : {0.4, 2.0}) {
+    if (!one_sided) break;
+    std::vector<double> other = start;
+    for (double& v : other) v *= factor;
+    consider(other);
+  }
+  const std::vector<int> everyone = everyPose(o.state);
+  const auto derivatives = [&](const ModelState& s, const std::vector<double>& scaled) {
+    std::vector<SessionCovariance> directions;
+    const SessionCovariance here = model_.covariance(s.echoes, s.nuisance, everyone);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      std::vector<double> moved = scaled;
+      const double step = coordinates[static_cast<std::size_t>(j)].logarithmic()
+                              ? kSmallStep * std::max(1e-4, std::abs(scaled[static_cast<std::size_t>(j)]))
+                              : kSmallStep;
+      moved[static_cast<std::size_t>(j)] += step;
+      directions.push_back(difference(model_.covariance(source_.echoes(mechanisms(moved), s.actor_range_m), s.nuisance, everyone),
+                                      here, everyone, step));
+    }
+    return model_.scores(model_.basis(s.echoes, s.nuisance), directions, everyone);
+  };
+  for (int i = 0;; ++i) {
+    o.scores = derivatives(o.state, o.scaled);
+    Eigen::MatrixXd information = o.scores.information;
+    information.diagonal().array() += 1e-9 * information.diagonal().array().abs() + 1e-12;
+    const Eigen::VectorXd step = information.ldlt().solve(o.scores.total);
+    if (i >= iterations || 0.5 * o.scores.total.dot(step) < kEnough) break;
+    bool better = false;
+    for (double share : {1.0, 0.4, 0.1}) {
+      std::vector<double> next = o.scaled;
+      for (Eigen::Index j = 0; j < n; ++j) {
+        const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
+        double& v = next[static_cast<std::size_t>(j)];
+        v += share * std::clamp(step[globals + j], -3.0, 3.0);
+        if (c.logarithmic()) v = std::max(v, 0.3 * o.scaled[static_cast<std::size_t>(j)]);
+        const double low = std::min(c.scaled(c.min), c.scaled(c.max)),
+                     high = std::max(c.scaled(c.min), c.scaled(c.max));
+        v = std::clamp(v, low, high);
+      }
+      ModelState s = evaluate(next, model_.stepped(o.state.nuisance, step.head(globals), o.scores, step, share));
+      if (s.log_likelihood <= o.state.log_likelihood) continue;
+      o.state = std::move(s);
+      o.scaled = next;
+      better = true;
+      break;
+    }
+    if (!better) break;
+  }
+  return o;
+}
+
+Eigen::MatrixXd HypothesisFitter::robustCovariance(const Effective& e) const {
+  const double locations = static_cast<double>(e.by_location.rows());
+  const Eigen::MatrixXd covariance = e.information.inverse();
+  if (locations <= 2) return covariance;
+  const Eigen::MatrixXd centred = e.by_location.rowwise() - e.by_location.colwise().mean();
+  const Eigen::MatrixXd scatter = centred.transpose() * centred * (locations / (locations - 1));
+  Eigen::MatrixXd robust = covariance * scatter * covariance;
+  for (Eigen::Index j = 0; j < robust.rows(); ++j) {  // never below what the likelihood itself says
+    const double factor = std::sqrt(std::max(1.0, covariance(j, j) / robust(j, j)));
+    robust.row(j) *= factor;
+    robust.col(j) *= factor;
+  }
+  return robust;
+}
+
+JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
+                                 const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start) {
+  std::vector<double> from;
+  for (const std::vector<double>& s : start) from.insert(from.end(), s.begin(), s.end());
+  Optimum o = maximise(base, nuisance, parts, from, 3);
+  const Effective e = effective(o.scores, nuisance.globals());
+  const Eigen::MatrixXd robust = robustCovariance(e);
+  JointFit fit;
+  Eigen::Index at = 0;
+  for (const Hypothesis& h : parts) {
+    const Eigen::Index n = static_cast<Eigen::Index>(h.coordinates.size());
+    const Eigen::VectorXd v = Eigen::Map<const Eigen::VectorXd>(o.scaled.data() + at, n);
+    fit.scaled.emplace_back(v.data(), v.data() + n);
+    std::vector<double> errors;
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const Coordinate& c = h.coordinates[static_cast<std::size_t>(j)];
+      errors.push_back(std::sqrt(robust(at + j, at + j)) * std::abs(c.slope(v[j])));
+    }
+    fit.standard_error.push_back(std::move(errors));
+    fit.worth.push_back(n > 0 ? 0.5 * v.dot(robust.block(at, at, n, n).ldlt().solve(v)) : 0);
+    at += n;
+  }
+  fit.mechanisms = std::move(o.state.mechanisms);
+  fit.nuisance = std::move(o.state.nuisance);
+  return fit;
 }
 
 HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hypothesis,
@@ -127,91 +282,10 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
   f.hypothesis = hypothesis;
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());
-  const auto evaluate = [&](const std::vector<double>& scaled, const Nuisance& nuisance) {
-    ModelState s;
-    s.mechanisms = with(null.mechanisms, hypothesis.at(scaled));
-    s.echoes = source_.echoes(s.mechanisms);
-    s.nuisance = nuisance;
-    s.log_likelihood = model_.logLikelihood(s.echoes, nuisance, &s.by_pose);
-    return s;
-  };
-  // A cause may have been fitted as the latents of all poses or actors: it starts without them, too.
-  Nuisance without = null.nuisance;
-  std::fill(without.yaw_rad.begin(), without.yaw_rad.end(), 0.0);
-  Nuisance bare = without;
-  std::fill(bare.actor_gain.begin(), bare.actor_gain.end(), 0.0);
-  std::fill(bare.actor_range_m.begin(), bare.actor_range_m.end(), 0.0);
-  const auto consider = [&](const std::vector<double>& scaled) {
-    ModelState s = evaluate(scaled, null.nuisance);
-    for (const Nuisance* other : {&without, &bare}) {
-      std::vector<double> by_pose;
-      const double value = model_.logLikelihood(s.echoes, *other, &by_pose);
-      if (value <= s.log_likelihood) continue;
-      s.log_likelihood = value;
-      s.nuisance = *other;
-      s.by_pose = std::move(by_pose);
-    }
-    if (f.scaled.size() == scaled.size() && !f.state.echoes.empty() && s.log_likelihood <= f.state.log_likelihood)
-      return;
-    f.state = std::move(s);
-    f.scaled = scaled;
-  };
-  consider(start);
-  // A quadratic's promise is far off where a level rises from nothing.
-  const bool one_sided =
-      n > 0 && std::any_of(hypothesis.coordinates.begin(), hypothesis.coordinates.end(),
-                           [](const Coordinate& c) { return c.logarithmic() || c.min >= c.neutral; });
-  for (double factor : {0.4, 2.0}) {
-    if (!one_sided) break;
-    std::vector<double> other = start;
-    for (double& v : other) v *= factor;
-    consider(other);
-  }
-  std::vector<int> everyone(null.echoes.size());
-  std::iota(everyone.begin(), everyone.end(), 0);
-  const auto derivatives = [&](const ModelState& s, const std::vector<double>& scaled) {
-    std::vector<SessionCovariance> directions;
-    const SessionCovariance here = model_.covariance(s.echoes, s.nuisance, everyone);
-    for (Eigen::Index j = 0; j < n; ++j) {
-      std::vector<double> moved = scaled;
-      const double step = hypothesis.coordinates[static_cast<std::size_t>(j)].logarithmic()
-                              ? kSmallStep * std::max(1e-4, std::abs(scaled[static_cast<std::size_t>(j)]))
-                              : kSmallStep;
-      moved[static_cast<std::size_t>(j)] += step;
-      directions.push_back(difference(
-          model_.covariance(source_.echoes(with(null.mechanisms, hypothesis.at(moved))), s.nuisance, everyone), here,
-          step));
-    }
-    return model_.scores(model_.basis(s.echoes, s.nuisance), directions, everyone);
-  };
-  Scores scores;
-  for (int i = 0;; ++i) {
-    scores = derivatives(f.state, f.scaled);
-    Eigen::MatrixXd information = scores.information;
-    information.diagonal().array() += 1e-9 * information.diagonal().array().abs() + 1e-12;
-    const Eigen::VectorXd step = information.ldlt().solve(scores.total);
-    if (i >= iterations || 0.5 * scores.total.dot(step) < kEnough) break;
-    bool better = false;
-    for (double share : {1.0, 0.4, 0.1}) {
-      std::vector<double> next = f.scaled;
-      for (Eigen::Index j = 0; j < n; ++j) {
-        const Coordinate& c = hypothesis.coordinates[static_cast<std::size_t>(j)];
-        double& v = next[static_cast<std::size_t>(j)];
-        v += share * std::clamp(step[globals + j], -3.0, 3.0);
-        if (c.logarithmic()) v = std::max(v, 0.3 * f.scaled[static_cast<std::size_t>(j)]);
-        const double low = std::min(c.scaled(c.min), c.scaled(c.max)),
-                     high = std::max(c.scaled(c.min), c.scaled(c.max));
-        v = std::clamp(v, low, high);
-      }
-      ModelState s = evaluate(next, model_.stepped(f.state.nuisance, step.head(globals), scores, step, share));
-      if (s.log_likelihood <= f.state.log_likelihood) continue;
-      f.state = std::move(s);
-      f.scaled = next;
-      better = true;
-      break;
-    }
-    if (!better) break;
-  }
+  Optimum o = maximise(null.mechanisms, null.nuisance, {hypothesis}, start, iterations);
+  f.scaled = std::move(o.scaled);
+  f.state = std::move(o.state);
+  const Scores& scores = o.scores;
   f.gain = f.state.log_likelihood - null.log_likelihood;
 
   // Scatter over places: of the scores at the fit where there is a number, else of the gain itself.
@@ -219,17 +293,10 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
   if (n > 0) {
     const Effective e = effective(scores, globals);
     f.inflation = e.inflation;
-    const Eigen::MatrixXd covariance = e.information.inverse();
-    Eigen::MatrixXd middle = e.information;
-    if (locations > 2) {
-      const Eigen::MatrixXd centred = e.by_location.rowwise() - e.by_location.colwise().mean();
-      middle = centred.transpose() * centred * (locations / (locations - 1));
-    }
-    const Eigen::MatrixXd robust = covariance * middle * covariance;
+    const Eigen::MatrixXd covariance = e.information.inverse(), robust = robustCovariance(e);
     for (Eigen::Index j = 0; j < n; ++j) {
-      const double variance = std::max(robust(j, j), covariance(j, j));
       f.standard_error.push_back(
-          std::sqrt(variance) *
+          std::sqrt(robust(j, j)) *
           std::abs(hypothesis.coordinates[static_cast<std::size_t>(j)].slope(f.scaled[static_cast<std::size_t>(j)])));
     }
     // Without a fold: one step away from the fit by that fold's scores.
@@ -266,13 +333,17 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
 }
 
 void HypothesisFitter::judge(HypothesisFit& f, std::size_t family) const {
-  // Twice the gain over its inflation against F: the inflation itself was estimated from the places.
-  const double n = static_cast<double>(std::max<std::size_t>(1, f.hypothesis.coordinates.size()));
+  f.false_alarm_rate = falseAlarmRate(f.gain / f.inflation, f.hypothesis.coordinates.size(), family);
+}
+
+double HypothesisFitter::falseAlarmRate(double gain, std::size_t numbers, std::size_t family) const {
+  // Twice the gain against F: the inflation that it was divided by was estimated from the places.
+  const double n = static_cast<double>(std::max<std::size_t>(1, numbers));
   const double locations = static_cast<double>(model_.data().locations.size());
-  const double statistic = 2 * std::max(0.0, f.gain) / f.inflation / n;
   const boost::math::fisher_f distribution(n, std::max(1.0, locations - n));
-  f.false_alarm_rate =
-      std::min(1.0, static_cast<double>(family) * boost::math::cdf(boost::math::complement(distribution, statistic)));
+  const double statistic = 2 * std::max(0.0, gain) / n;
+  return std::min(1.0,
+                  static_cast<double>(family) * boost::math::cdf(boost::math::complement(distribution, statistic)));
 }
 
 }  // namespace mmradartwin

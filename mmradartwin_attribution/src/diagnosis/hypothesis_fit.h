@@ -13,11 +13,14 @@ namespace mmradartwin {
 /// A state of the model: mechanisms, what they make of the session, and everything else fitted to it.
 struct ModelState {
   std::vector<NamedParameters> mechanisms;
+  std::vector<double> actor_range_m;  ///< about which the echoes were taken
   std::vector<PoseEchoes> echoes;
   Nuisance nuisance;
   double log_likelihood = 0;
   std::vector<double> by_pose;
-  Basis basis;  ///< at nuisance; filled by HypothesisFitter::state() alone
+  // At nuisance; filled by HypothesisFitter::state() alone:
+  Basis basis;
+  SessionCovariance covariance;
 };
 
 /// One hypothesis, all else refitted.
@@ -32,6 +35,15 @@ struct HypothesisFit {
   std::vector<double> standard_error;  ///< of the values (not scaled), by location
   std::vector<std::vector<double>> fold_scaled;  ///< coordinates without each fold of locations
   double ranking() const;                        ///< gain less a price per coordinate
+};
+
+/// Several hypotheses, fitted together.
+struct JointFit {
+  std::vector<std::vector<double>> scaled;          ///< by hypothesis, of its coordinates
+  std::vector<std::vector<double>> standard_error;  ///< of the values (not scaled), by location
+  std::vector<double> worth;  ///< nats that each is worth beside the others, by the scatter over places; 0 without number
+  std::vector<NamedParameters> mechanisms;
+  Nuisance nuisance;
 };
 
 struct Screened {
@@ -54,15 +66,28 @@ class HypothesisFitter {
   /// Maximum likelihood of the coordinates from `start`, the nuisance refitted along.
   HypothesisFit fit(const ModelState& null, const Hypothesis& hypothesis, const std::vector<double>& start,
                     int iterations);
+  /// Maximum likelihood of several hypotheses at once over `base`, which holds none of them.
+  JointFit refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
+                 const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start);
   /// Fold of a location.
   int fold(int location) const { return location % folds_; }
   int folds() const { return folds_; }
   /// Sets false_alarm_rate for a family of that many hypotheses.
   void judge(HypothesisFit& fit, std::size_t family) const;
+  /// Of a gain in nats, inflation taken off, by that many numbers: chance that one of a family comes by it.
+  double falseAlarmRate(double gain, std::size_t numbers, std::size_t family) const;
 
  private:
   struct Effective;
+  struct Optimum {
+    std::vector<double> scaled;
+    ModelState state;
+    Scores scores;  ///< at the last derivative
+  };
   Effective effective(const Scores& scores, int globals) const;
+  Eigen::MatrixXd robustCovariance(const Effective& effective) const;
+  Optimum maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
+                   const std::vector<Hypothesis>& parts, const std::vector<double>& start, int iterations);
 
   EchoSource& source_;
   const SessionModel& model_;

@@ -56,9 +56,9 @@ double groupGain(const EchoGroup& group, const Nuisance& nuisance) {
   return std::exp(sum);
 }
 
-/// One-way range that the group's actors add: the mean over its interactions, as each shifts the path by its own share.
+/// One-way range that the group's actors add beyond what its fields hold already.
 double groupShift_m(const EchoGroup& group, const Nuisance& nuisance) {
-  double sum = 0;
+  double sum = -group.added_range_m;
   for (int a : group.actors) {
     if (a >= 0 && a < static_cast<int>(nuisance.actor_range_m.size())) sum += nuisance.actor_range_m[a];
   }
@@ -72,7 +72,9 @@ namespace {
 /// A whitened Hermitian matrix as M^2 real numbers, so that tr(D~ E~) is a dot product: L^-1 D L^-H.
 void whiten(const Matrix& inverse_lower, Matrix& m, double* v) {
   mirror(m);
-  const Matrix w = inverse_lower * m * inverse_lower.adjoint();
+  // Matrices this small are multiplied faster without the blocks of large ones.
+  const Matrix half = inverse_lower.lazyProduct(m);
+  const Matrix w = half.lazyProduct(inverse_lower.adjoint());
   for (Eigen::Index k = 0; k < w.rows(); ++k) {
     *v++ = w(k, k).real();
     for (Eigen::Index l = 0; l < k; ++l) {
@@ -104,33 +106,69 @@ SessionModel::SessionModel(const ChannelData& data, int actors, const PoseAccura
   }
 }
 
-double SessionModel::floorPower(const Nuisance& n, int pose, int bin) const {
+void SessionModel::addClutter(const Nuisance& n, int pose, int cell, double factor, Matrix& to) const {
+  const PoseChannels& p = data_.poses[pose];
+  const int bin = binOf(pose, cell);
   const double range_m = std::max(0.3, bin * data_.radar.range_bin_m());
-  return data_.poses[pose].noise_power + std::exp(n.log_floor + n.floor_slope * std::log(range_m / 3));
+  const auto* packed = p.clutter.at(bin, size_);
+  const double level = factor * std::exp(n.log_floor + n.floor_slope * std::log(range_m / 3));
+  if (!isBeam(cell)) {
+    unpack(packed, level, to);
+    return;
+  }
+  Matrix clutter = Matrix::Zero(channels_, channels_);
+  unpack(packed, level, clutter);
+  mirror(clutter);
+  const EchoBeam& beam = p.beams[static_cast<std::size_t>(cell - samples_)];
+  addApart(cell, beam.weights.dot(clutter * beam.weights).real(), to);
 }
 
-SessionModel::Matrix SessionModel::sigma(const PoseEchoes& echoes, const Nuisance& n, int pose, int bin) const {
+int SessionModel::binOf(int pose, int cell) const {
+  return isBeam(cell) ? data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)].first_bin + channels_ / 2
+                      : cell;
+}
+
+Eigen::VectorXcd SessionModel::dataOf(int pose, int cell) const {
+  if (isBeam(cell)) return data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)].y;
+  return data_.poses[pose].y.col(cell);
+}
+
+void SessionModel::addApart(int cell, double power, Matrix& to) const {
+  to.diagonal().array() += power;
+  if (!isBeam(cell)) return;
+  // Hann's neighbours share what falls between them: sum of w^2 exp(j 2 pi n/N) over that of w^2.
+  for (int k = 1; k < channels_; ++k) {
+    to(k, k - 1) += 2.0 / 3 * power;
+    if (k > 1) to(k, k - 2) += 1.0 / 6 * power;
+  }
+}
+
+SessionModel::Matrix SessionModel::sigma(const PoseEchoes& echoes, const Nuisance& n, int pose, int cell) const {
+  const int at = isBeam(cell) ? cell - samples_ : cell;
   Matrix s = Matrix::Zero(channels_, channels_);
   const double gain = std::exp(n.log_gain);
   const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
   Matrix own(channels_, channels_);
   for (const EchoGroup& g : echoes.groups) {
-    const auto *power = g.power.at(bin, size_), *bend = g.bend.at(bin, size_);
+    const EchoGroup::Fields& f = isBeam(cell) ? g.beams : g.bins;
+    const auto *power = f.power.at(at, size_), *bend = f.bend.at(at, size_);
     if (power == nullptr && bend == nullptr) continue;
     const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
     own.setZero();
     if (power != nullptr) unpack(power, u, own);
     if (shift != 0) {
-      if (const auto* p = g.shift.at(bin, size_)) unpack(p, u * shift, own);
+      if (const auto* p = f.shift.at(at, size_)) unpack(p, u * shift, own);
     }
     if (bend != nullptr) unpack(bend, u * (shift * shift + range_variance), own);
-    turnBy(n.yaw_rad[pose], element_phase_, power, g.cosine.at(bin, size_), own);
+    turnBy(n.yaw_rad[pose], element_phase_, power, f.cosine.at(at, size_), own);
     s.triangularView<Eigen::Lower>() += own;
   }
-  if (const auto* p = echoes.graze.at(bin, size_)) unpack(p, gain * std::exp(n.log_graze), s);
+  const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
+  if (const auto* p = graze.at(at, size_)) unpack(p, gain * std::exp(n.log_graze), s);
   // At least a share of the mean power everywhere keeps the matrix definite where the first-order terms would not.
   const double relative = std::exp(n.log_relative), mean = s.diagonal().real().mean();
-  for (int k = 0; k < channels_; ++k) s(k, k) += relative * std::max(mean, 0.0) + floorPower(n, pose, bin);
+  addApart(cell, relative * std::max(mean, 0.0) + data_.poses[pose].noise_power, s);
+  addClutter(n, pose, cell, 1, s);
   mirror(s);
   return s;
 }
@@ -145,11 +183,11 @@ double SessionModel::prior(const Nuisance& n) const {
 
 double SessionModel::poseLikelihood(const PoseEchoes& echoes, const Nuisance& n, int pose) const {
   double sum = 0;
-  for (int bin = firstBin(); bin < samples_; ++bin) {
-    const Matrix s = sigma(echoes, n, pose, bin);
+  for (int cell = firstBin(); cell < cells(pose); ++cell) {
+    const Matrix s = sigma(echoes, n, pose, cell);
     const Eigen::LLT<Matrix> llt(s);
     if (llt.info() != Eigen::Success) return -1e9;
-    Vector y = data_.poses[pose].y.col(bin);
+    Vector y = dataOf(pose, cell);
     llt.matrixL().solveInPlace(y);
     double log_det = 0;
     for (int k = 0; k < channels_; ++k) log_det += 2 * std::log(llt.matrixLLT()(k, k).real());
@@ -173,22 +211,25 @@ SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes
   SessionCovariance result(poses.size());
   const double gain = std::exp(n.log_gain);
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
-    result[i].assign(static_cast<std::size_t>(samples_) * size_, {});
+    result[i].assign(static_cast<std::size_t>(cells(poses[i])) * size_, {});
     Matrix own(channels_, channels_);
     for (const EchoGroup& g : echoes[i].groups) {
       const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
-      for (int bin = g.power.first; bin < g.power.first + g.power.bins; ++bin) {
-        const auto* power = g.power.at(bin, size_);
-        own.setZero();
-        unpack(power, u, own);
-        if (shift != 0) {
-          if (const auto* p = g.shift.at(bin, size_)) unpack(p, u * shift, own);
-          if (const auto* p = g.bend.at(bin, size_)) unpack(p, u * shift * shift, own);
-        }
-        turnBy(n.yaw_rad[poses[i]], element_phase_, power, g.cosine.at(bin, size_), own);
-        std::complex<float>* to = result[i].data() + static_cast<std::size_t>(bin) * size_;
-        for (int k = 0; k < channels_; ++k) {
-          for (int l = 0; l <= k; ++l) *to++ += std::complex<float>(own(k, l));
+      for (const EchoGroup::Fields* f : {&g.bins, &g.beams}) {
+        for (int at = f->power.first; at < f->power.first + f->power.bins; ++at) {
+          const auto* power = f->power.at(at, size_);
+          own.setZero();
+          unpack(power, u, own);
+          if (shift != 0) {
+            if (const auto* p = f->shift.at(at, size_)) unpack(p, u * shift, own);
+            if (const auto* p = f->bend.at(at, size_)) unpack(p, u * shift * shift, own);
+          }
+          turnBy(n.yaw_rad[poses[i]], element_phase_, power, f->cosine.at(at, size_), own);
+          const int cell = f == &g.beams ? samples_ + at : at;
+          std::complex<float>* to = result[i].data() + static_cast<std::size_t>(cell) * size_;
+          for (int k = 0; k < channels_; ++k) {
+            for (int l = 0; l <= k; ++l) *to++ += std::complex<float>(own(k, l));
+          }
         }
       }
     }
@@ -218,13 +259,14 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     }
     return raw[j];
   };
-  for (int bin = firstBin(); bin < samples_; ++bin) {
+  for (int cell = firstBin(); cell < cells(pose); ++cell) {
     for (int j : active) is_active[j] = 0;
     active.clear();
-    const Matrix s = sigma(echoes, n, pose, bin);
+    const int at = isBeam(cell) ? cell - samples_ : cell;
+    const Matrix s = sigma(echoes, n, pose, cell);
     const Eigen::LLT<Matrix> llt(s);
     if (llt.info() != Eigen::Success) continue;
-    Vector y = data_.poses[pose].y.col(bin);
+    Vector y = dataOf(pose, cell);
     llt.matrixL().solveInPlace(y);
     const double q = y.squaredNorm(), w = (channels_ + kTail) / (kTail + q);
     double log_det = 0;
@@ -232,9 +274,11 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     out.log_likelihood += -log_det - (channels_ + kTail) * std::log1p(q / kTail);
 
     for (const EchoGroup& g : echoes.groups) {
-      const auto *power = g.power.at(bin, size_), *shift = g.shift.at(bin, size_), *bend = g.bend.at(bin, size_);
+      const EchoGroup::Fields& fields = isBeam(cell) ? g.beams : g.bins;
+      const auto *power = fields.power.at(at, size_), *shift = fields.shift.at(at, size_),
+                 *bend = fields.bend.at(at, size_);
       if (power == nullptr && bend == nullptr) continue;
-      const auto* cosine = g.cosine.at(bin, size_);
+      const auto* cosine = fields.cosine.at(at, size_);
       const double f = gain * groupGain(g, n), moved = groupShift_m(g, n);
       const auto add = [&](int direction) {
         turnBy(n.yaw_rad[pose], element_phase_, power, cosine, own);
@@ -268,18 +312,19 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
         add(heading);
       }
     }
-    if (const auto* p = echoes.graze.at(bin, size_)) unpack(p, gain * std::exp(n.log_graze), touch(kGraze));
-    const double floor = floorPower(n, pose, bin), clutter = floor - data_.poses[pose].noise_power;
-    const double range_m = std::max(0.3, bin * data_.radar.range_bin_m());
+    const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
+    if (const auto* p = graze.at(at, size_)) unpack(p, gain * std::exp(n.log_graze), touch(kGraze));
+    const double range_m = std::max(0.3, binOf(pose, cell) * data_.radar.range_bin_m());
+    addClutter(n, pose, cell, 1, touch(kFloor));
+    addClutter(n, pose, cell, std::log(range_m / 3), touch(kSlope));
     Matrix& level = touch(kGain);
     level = s;
-    level.diagonal().array() -= floor;
+    level.triangularView<Eigen::Lower>() -= raw[kFloor];
+    addApart(cell, -data_.poses[pose].noise_power, level);
     const double mean = level.diagonal().real().mean() / (1 + relative);
-    touch(kRelative).diagonal().array() += relative * mean;
-    touch(kFloor).diagonal().array() += clutter;
-    touch(kSlope).diagonal().array() += clutter * std::log(range_m / 3);
+    addApart(cell, relative * mean, touch(kRelative));
     BinBasis basis;
-    basis.bin = bin;
+    basis.cell = cell;
     Matrix inverse = Matrix::Identity(channels_, channels_);
     llt.matrixL().solveInPlace(inverse);
     basis.inverse_lower = inverse;
@@ -360,7 +405,7 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
       for (int h = 0; h < more; ++h) {
         const PoseCovariance& field = directions[static_cast<std::size_t>(h)][j];
         if (field.empty()) continue;
-        const auto* from = field.data() + static_cast<std::size_t>(bin.bin) * size_;
+        const auto* from = field.data() + static_cast<std::size_t>(bin.cell) * size_;
         if (std::all_of(from, from + size_, [](auto x) { return x == 0.0f; })) continue;
         m.setZero();
         unpack(from, 1, m);
@@ -435,8 +480,9 @@ Nuisance SessionModel::stepped(const Nuisance& from, const Eigen::VectorXd& g, c
   const auto held = [share](double step, double limit) { return std::clamp(share * step, -limit, limit); };
   n.log_gain += held(g[kGain], 2);
   n.log_floor += held(g[kFloor], 2);
-  n.floor_slope = std::clamp(n.floor_slope + held(g[kSlope], 1), -8.0, 2.0);
-  n.log_relative = std::clamp(n.log_relative + held(g[kRelative], 2), -14.0, -2.0);
+  n.floor_slope = std::clamp(n.floor_slope + held(g[kSlope], 1), -4.0, 4.0);
+  // Below -11.5 single precision would no longer keep every matrix definite.
+  n.log_relative = std::clamp(n.log_relative + held(g[kRelative], 2), -11.5, -2.0);
   n.log_graze = std::clamp(n.log_graze + held(g[kGraze], 2), -6.0, 6.0);
   n.log_range = std::clamp(n.log_range + held(g[kRange], 2), -6.0, 4.0);
   for (int a = 0; a < actors_; ++a) {
@@ -490,8 +536,9 @@ Nuisance SessionModel::start(const std::vector<PoseEchoes>& echoes) const {
   for (std::size_t i = 0; i < echoes.size(); ++i) {
     double expected = 0;
     for (const EchoGroup& g : echoes[i].groups) {
-      for (int bin = std::max(firstBin(), g.power.first); bin < g.power.first + g.power.bins; ++bin) {
-        const auto* p = g.power.at(bin, size_);
+      const BinCovariance& power = g.bins.power;
+      for (int bin = std::max(firstBin(), power.first); bin < power.first + power.bins; ++bin) {
+        const auto* p = power.at(bin, size_);
         for (int k = 0; k < channels_; ++k) expected += p[static_cast<std::size_t>(k) * (k + 3) / 2].real();
       }
     }
@@ -499,8 +546,8 @@ Nuisance SessionModel::start(const std::vector<PoseEchoes>& echoes) const {
     for (int bin = firstBin(); bin < samples_; ++bin) {
       const double power = data_.poses[i].y.col(bin).squaredNorm();
       measured += power;
-      const double range_m = std::max(0.3, bin * data_.radar.range_bin_m());
-      low.push_back(std::log(power / channels_ + 1e-300) - n.floor_slope * std::log(range_m / 3));
+      low.push_back(std::log(power / channels_ + 1e-300) -
+                    std::log(data_.poses[i].clutter.at(bin, size_)[0].real() + 1e-300));
     }
     if (expected > 0) ratio.push_back(std::log(measured / expected));
   }

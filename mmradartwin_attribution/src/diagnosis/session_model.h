@@ -14,7 +14,7 @@ namespace mmradartwin {
 struct Nuisance {
   double log_gain = 0;                ///< of measured power over the twin's
   double log_floor = 0;               ///< clutter's power in a cell at 3 m
-  double floor_slope = -3;            ///< exponent of the clutter's power over range
+  double floor_slope = 0;             ///< exponent over range by which that departs from PoseChannels::clutter
   double log_relative = -8;           ///< what differs from channel to channel of an echo, of its power
   double log_graze = 0;               ///< factor of PoseEchoes::graze
   double log_range = 0;               ///< factor of the variance of a path's own range
@@ -47,10 +47,10 @@ struct Scores {
 
 constexpr int kMaxChannels = 16;
 
-/// One bin's whitened directions of the nuisance and the data in the same numbers: the likelihood's derivatives are
+/// One cell's whitened directions of the nuisance and the data in the same numbers: the likelihood's derivatives are
 /// then products, and a further direction costs nothing but its own.
 struct BinBasis {
-  int bin = 0;
+  int cell = 0;
   Eigen::Matrix<std::complex<double>, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxChannels, kMaxChannels> inverse_lower;
   std::vector<int> active;   ///< directions that do something here; the heading is the last of all
   Eigen::MatrixXd whitened;  ///< [M^2][active]
@@ -69,8 +69,9 @@ struct Basis {
 
 /// Likelihood of a session's channels under expected echoes. Every bin's channels are complex t-distributed (4 degrees
 /// of freedom in their complex form) about zero, with the covariance
-///   gain * (echoes + range errors + graze + relative) + floor;
-/// neighbouring bins overlap through the window, so that each counts half (composite likelihood).
+///   gain * (echoes + range errors + graze + relative) + clutter + noise,
+/// and so are every beam's bins (EchoBeam). Cells are the bins and, after them, the beams. Neighbouring bins overlap
+/// through the window and beams are formed of them, so that each counts half (composite likelihood).
 class SessionModel {
  public:
   using Matrix = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxChannels, kMaxChannels>;
@@ -110,8 +111,15 @@ class SessionModel {
   double weight() const { return 0.5; }
 
  private:
-  Matrix sigma(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, int bin) const;
-  double floorPower(const Nuisance& nuisance, int pose, int bin) const;
+  int cells(int pose) const { return samples_ + static_cast<int>(data_.poses[pose].beams.size()); }
+  bool isBeam(int cell) const { return cell >= samples_; }
+  int binOf(int pose, int cell) const;
+  Eigen::VectorXcd dataOf(int pose, int cell) const;
+  /// Adds power that no two channels share, and that a beam's bins share as their window has it.
+  void addApart(int cell, double power, Matrix& to) const;
+  Matrix sigma(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, int cell) const;
+  /// Clutter's covariance in a cell, lower triangle, times factor.
+  void addClutter(const Nuisance& nuisance, int pose, int cell, double factor, Matrix& to) const;
   double prior(const Nuisance& nuisance) const;
   double poseLikelihood(const PoseEchoes& echoes, const Nuisance& nuisance, int pose) const;
   void addBasis(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, PoseBasis& out) const;

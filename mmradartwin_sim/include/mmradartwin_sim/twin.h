@@ -76,6 +76,11 @@ class Twin {
   /// True where a mechanism edits the scene or moves the radar, so that every path has to be traced anew; else the
   /// paths of a twin are those of its mechanisms one by one.
   bool altersGeometry() const;
+  /// True where all that the edits add are screens (things that hide what is behind them): its paths are those of the
+  /// scene without them, less what removeHidden() takes.
+  bool addsScreensAlone() const;
+  /// Takes away the records that a screen stands in the way of. T_map_radar: where they were traced from.
+  void removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord>& records) const;
   /// Tells levels that are relative to the session's strongest echo; without it they refer to the strongest of the
   /// poses simulated so far.
   void setStrongestAmplitude(double amplitude);
