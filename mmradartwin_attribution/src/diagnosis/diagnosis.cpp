@@ -36,8 +36,10 @@ constexpr std::size_t kSuspects = 6;    ///< actors whose geometry is tried
 constexpr std::size_t kMostNames = 5;   ///< fits of one round
 constexpr std::size_t kMostLaws = 2;
 constexpr double kWorthAFit = 4;  ///< nats promised
+constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kWorthALaw = 12;
-constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding
+constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
+constexpr double kMuch = 40;               ///< unless it is worth so many nats, inflation taken off
 constexpr double kSharedLatent = 3;    ///< standard deviations from none at which a common error is tried as a cause
 constexpr double kAlike = 5;           ///< nats within which two names are not told apart
 constexpr double kObjectPlaces = 500;  ///< places of an 8 by 6 m room that a session resolves, as a family
@@ -51,6 +53,12 @@ std::string number(double value, int digits = 3) {
 bool catalogued(const std::string& name) {
   const auto& all = causeDescriptions();
   return std::any_of(all.begin(), all.end(), [&](const CauseDescription& c) { return c.name == name; });
+}
+
+/// Errors of all ranges or directions in a few numbers.
+bool isGeometry(const Hypothesis& h) {
+  return h.subject.empty() && h.coordinates.size() <= 3 && catalogued(h.mechanism.mechanism) &&
+         causeDescription(h.mechanism.mechanism).residual_class == ResidualClass::kShiftedResponse;
 }
 
 Finding findingOf(const FrameFinding& frames) {
@@ -353,7 +361,12 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     source_->settle(mechanisms_);
   }
   std::stable_sort(screened.begin(), screened.end(), better);
-  if (screened.size() > kSecondLook) screened.resize(kSecondLook);
+  // Geometry before materials: what is wrong with all ranges or directions stands in every latent, and its score is
+  // small for that.
+  std::size_t kept = 0;
+  screened.erase(std::remove_if(screened.begin(), screened.end(),
+                                [&](const Screened& s) { return ++kept > kSecondLook && !isGeometry(s.hypothesis); }),
+                 screened.end());
   for (Screened& s : screened) {
     report("looking again at " + s.hypothesis.label(), 0);
     const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
@@ -375,7 +388,8 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     // A promise is a quadratic's and often far too small: names get several chances, laws without a name two.
     const bool law = !catalogued(s.hypothesis.mechanism.mechanism);
     std::size_t& fitted = law ? laws_fitted : names_fitted;
-    if (s.promised > (law ? kWorthALaw : kWorthAFit) && fitted < (law ? kMostLaws : kMostNames)) {
+    const double worth = law ? kWorthALaw : isGeometry(s.hypothesis) ? kWorthAFitOfGeometry : kWorthAFit;
+    if (s.promised > worth && fitted < (law ? kMostLaws : kMostNames)) {
       ++fitted;
       report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
       HypothesisFit f = fitter_->fit(state_, s.hypothesis, s.start, 4);
@@ -609,10 +623,15 @@ bool Session::judgeChannels(int round) {
     Finding finding = describe(f, fits);
     if (data_.locations.size() > 1) {
       finding.gain = gainOf(f);
-      // Where the likelihood gains and the maps do not, it is the likelihood's own shortcomings that were fitted: what
-      // a pose's error does at edges looks like a little of many things.
-      const GainMetric& explained = finding.gain->explained_power;
-      if (!((*explained.difference_ci95)[0] > 0) || explained.after - explained.before < kLeastExplained) continue;
+      // Where the likelihood gains little and the maps nothing, it is the likelihood's own shortcomings that were
+      // fitted: what a pose's error does at edges looks like a little of many things. Much of it may be real though no
+      // map shows it (an image at -26 dB), unless the maps get worse.
+      const auto explained = *finding.gain->explained_power.difference_ci95;
+      const double by = finding.gain->explained_power.after - finding.gain->explained_power.before;
+      const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
+      const bool much = (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0 &&
+                        f.gain / f.inflation > kMuch && explained[1] >= 0;
+      if (!in_maps && !much) continue;
       addMetrics(f, *finding.gain);
     }
     report("found " + f.hypothesis.label() + ", " + number(f.gain, 4) + " nats", 1);

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kSmallStep = 0.125;  ///< of the scale, for derivatives
 constexpr double kEnough = 0.2;       ///< nats: a further step promises less
+constexpr double kRising = 5;         ///< nats of the last step that are worth going on for
 constexpr double kMaxInflation = 50;
 constexpr double kPrice =
     5;  ///< nats per coordinate, some inflation included: fewer numbers win where all explain alike
@@ -204,12 +205,14 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
     }
     return model_.scores(model_.basis(s.echoes, s.nuisance), directions, everyone);
   };
+  double risen = 0;
   for (int i = 0;; ++i) {
     o.scores = derivatives(o.state, o.scaled);
     Eigen::MatrixXd information = o.scores.information;
     information.diagonal().array() += 1e-9 * information.diagonal().array().abs() + 1e-12;
     const Eigen::VectorXd step = information.ldlt().solve(o.scores.total);
-    if (i >= iterations || 0.5 * o.scores.total.dot(step) < kEnough) break;
+    // On a ridge between a cause and the latents that stood in for it, every step widens the next.
+    if (i >= (risen > kRising ? 4 * iterations : iterations) || 0.5 * o.scores.total.dot(step) < kEnough) break;
     bool better = false;
     for (double share : {1.0, 0.4, 0.1}) {
       std::vector<double> next = o.scaled;
@@ -224,6 +227,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
       }
       ModelState s = evaluate(next, model_.stepped(o.state.nuisance, step.head(globals), o.scores, step, share));
       if (s.log_likelihood <= o.state.log_likelihood) continue;
+      risen = s.log_likelihood - o.state.log_likelihood;
       o.state = std::move(s);
       o.scaled = next;
       better = true;
