@@ -121,7 +121,7 @@ class AttributionNode {
 
   void onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, MapMsg::ConstPtr>& own,
              std::map<std::int64_t, MapMsg::ConstPtr>& other, bool measured) {
-    ++received_;
+    if (measured) ++received_;  // of a stream that has paused the twin goes on by itself
     const std::int64_t stamp = toNanoseconds(msg->header.stamp);
     const auto match = other.find(stamp);
     if (match == other.end()) {
@@ -131,6 +131,7 @@ class AttributionNode {
     }
     const MapMsg::ConstPtr counterpart = match->second;
     other.erase(other.begin(), std::next(match));  // older ones will find no partner any more
+    last_measured_ = measured ? msg : counterpart;
     try {
       compare(measured ? *msg : *counterpart, measured ? *counterpart : *msg);
     } catch (const std::exception& error) {
@@ -171,14 +172,12 @@ class AttributionNode {
   }
 
   // Another twin: its table counts from here. A pair of the one before that is still on its way is replaced by the
-  // next at the same place, since of a stretch the last of the longest averages counts.
+  // next at the same place, since of a stretch the last of the longest averages counts. The last measured map is
+  // compared once more, with what the new twin makes of it.
   void beginAnew() {
     standing_ = StandingLedger();
-    simulated_.clear();
-    records_.clear();
-    records_of_.reset();
-    paths_.reset();
     publishLedger(ros::Time::now());
+    if (const MapMsg::ConstPtr measured = last_measured_) onMeasured(measured);
     ROS_INFO("another twin is simulated: the ledger begins anew");
   }
 
@@ -284,6 +283,7 @@ class AttributionNode {
   std::size_t pairs_ = 0, pairs_before_ = 0, received_ = 0, received_before_ = 0;
 
   std::map<std::int64_t, MapMsg::ConstPtr> measured_, simulated_;  // waiting, by stamp
+  MapMsg::ConstPtr last_measured_;                                 // of the last pair
   mmradartwin_msgs::PathRecords::ConstPtr paths_, records_of_;
   std::vector<PathRecord> records_;
   std::map<std::int64_t, std::string> pose_names_;

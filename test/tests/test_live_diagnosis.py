@@ -16,7 +16,7 @@ import numpy
 import rosgraph
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from mmradartwin_msgs.msg import DiagnoseAction, DiagnoseGoal, Findings, Ledger, RangeAngleMap, Scene
+from mmradartwin_msgs.msg import DiagnoseAction, DiagnoseGoal, Findings, Ledger, RangeAngleMap, Residuals, Scene
 from mmradartwin_msgs.srv import ApplyTwin
 
 from mmradartwin_tests import effects
@@ -208,12 +208,17 @@ class LiveDiagnosis(unittest.TestCase):
         cause = self.result.findings.findings[0].cause
         self.assertNotIn(cause, next_message("twin/scene", Scene).twin_yaml)
         self.assertGreater(next_message("attribution/ledger", Ledger).poses, 0)
-        before = simulated()
+        before, residuals = simulated(), []
+        subscriber = rospy.Subscriber("attribution/residuals", Residuals, residuals.append)
+        self.addCleanup(subscriber.unregister)
+        wait_until(subscriber.get_num_connections, "attribution/residuals")
         answer = self.apply(self.result.extended_twin_file)
         self.assertTrue(answer.success, answer.message)
         self.assertIn(cause, next_message("twin/scene", Scene).twin_yaml)
         wait_until(lambda: numpy.abs(simulated() - before).max() > 3, "the map of the extended twin")
         wait_until(lambda: next_message("attribution/ledger", Ledger).poses == 0, "a ledger of the new twin's own")
+        # The stream has ended, and its last map is compared with the new twin all the same.
+        wait_until(lambda: residuals, "residuals of the new twin")
         answer = self.apply("")
         self.assertTrue(answer.success, answer.message)
         wait_until(lambda: numpy.abs(simulated() - before).max() < 1e-3, "the map of the twin at the start")

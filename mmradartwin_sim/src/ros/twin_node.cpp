@@ -155,6 +155,8 @@ bool TwinNode::onApply(mmradartwin_msgs::ApplyTwin::Request& request, mmradartwi
     response.success = true;
     response.message = what + " is simulated from now on";
     ROS_INFO("%s", response.message.c_str());
+    // A stream that has paused or ended shows it too.
+    if (measured_) simulate(measured_->first, measured_->second);
   } catch (const std::exception& error) {
     response.success = false;
     response.message = "refused, the twin stays as it was: " + std::string(error.what());
@@ -196,6 +198,7 @@ void TwinNode::onPending(const ros::WallTimerEvent&) {
   }
   const std::int64_t stamp_ns = toNanoseconds(pending_->header.stamp);
   pending_.reset();
+  measured_.emplace(T_map_radar, stamp_ns);
   simulate(T_map_radar, stamp_ns);
 }
 

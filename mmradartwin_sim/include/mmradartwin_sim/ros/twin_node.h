@@ -13,6 +13,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "mmradartwin_dsp/temporary_folder.h"
 #include "mmradartwin_sim/twin.h"
@@ -27,8 +28,8 @@ namespace mmradartwin {
 /// time.
 ///
 /// The scene is that of the parameter `scene`, else of the latched session message, whose files are unpacked into a
-/// temporary folder. twin/apply puts another twin in the place of the one simulated, from the next grid on; twin/scene
-/// says which. It stays until another is applied, or a session with other files comes.
+/// temporary folder. twin/apply puts another twin in the place of the one simulated, from the last measured grid on;
+/// twin/scene says which. It stays until another is applied, or a session with other files comes.
 class TwinNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
@@ -66,6 +67,8 @@ class TwinNode {
   std::string problem_;  ///< why there is no twin, or the last pose gave nothing
   std::optional<Simulation> last_;
 
+  /// Where and when the last measured grid was simulated.
+  std::optional<std::pair<Eigen::Isometry3d, std::int64_t>> measured_;
   mmradartwin_msgs::ReceiveGrid::ConstPtr pending_;
   ros::WallTime pending_since_, measured_at_, published_at_;
   std::uint64_t simulated_ = 0, reused_ = 0, skipped_ = 0, without_pose_ = 0;
