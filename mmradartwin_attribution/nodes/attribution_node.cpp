@@ -80,11 +80,8 @@ class AttributionNode {
     subscribers_.push_back(nh_.subscribe("twin/paths", 10, &AttributionNode::onPaths, this));
     subscribers_.push_back(nh_.subscribe("radar/range_angle", 50, &AttributionNode::onMeasured, this));
     subscribers_.push_back(nh_.subscribe("twin/range_angle", 50, &AttributionNode::onSimulated, this));
-    if (scene_file.empty()) {
-      subscribers_.push_back(nh_.subscribe("twin/scene", 1, &AttributionNode::onScene, this));
-    } else {
-      scene_file_ = scene_file;
-    }
+    subscribers_.push_back(nh_.subscribe("twin/scene", 1, &AttributionNode::onScene, this));
+    scene_file_ = scene_file;
     watchdog_ = nh_.createWallTimer(ros::WallDuration(5), &AttributionNode::watch, this);
   }
 
@@ -104,8 +101,12 @@ class AttributionNode {
 
   void onScene(const mmradartwin_msgs::Scene::ConstPtr& msg) {
     try {
-      setScene(sceneFromMsg(*msg));
-      rebuild();
+      if (scene_file_.empty()) {
+        setScene(sceneFromMsg(*msg));
+        rebuild();
+      }
+      if (!twin_yaml_.empty() && msg->twin_yaml != twin_yaml_) beginAnew();
+      twin_yaml_ = msg->twin_yaml;
     } catch (const std::exception& error) {
       ROS_ERROR("twin/scene: %s", error.what());
     }
@@ -120,7 +121,7 @@ class AttributionNode {
 
   void onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, MapMsg::ConstPtr>& own,
              std::map<std::int64_t, MapMsg::ConstPtr>& other, bool measured) {
-    ++received_;
+    if (measured) ++received_;  // of a stream that has paused the twin goes on by itself
     const std::int64_t stamp = toNanoseconds(msg->header.stamp);
     const auto match = other.find(stamp);
     if (match == other.end()) {
@@ -130,6 +131,7 @@ class AttributionNode {
     }
     const MapMsg::ConstPtr counterpart = match->second;
     other.erase(other.begin(), std::next(match));  // older ones will find no partner any more
+    last_measured_ = measured ? msg : counterpart;
     try {
       compare(measured ? *msg : *counterpart, measured ? *counterpart : *msg);
     } catch (const std::exception& error) {
@@ -167,6 +169,23 @@ class AttributionNode {
     if (scene_) regions_ = std::make_unique<RegionModel>(*scene_, *rays_, *field_, *radar_);
     regions_of_pose_.clear();
     regions_valid_ = false;
+  }
+
+  // Another twin: its table counts from here. A pair of the one before that is still on its way is replaced by the
+  // next at the same place, since of a stretch the last of the longest averages counts. The last measured map is
+  // compared once more, with what the new twin makes of it.
+  void beginAnew() {
+    standing_ = StandingLedger();
+    publishLedger(ros::Time::now());
+    if (const MapMsg::ConstPtr measured = last_measured_) onMeasured(measured);
+    ROS_INFO("another twin is simulated: the ledger begins anew");
+  }
+
+  void publishLedger(const ros::Time& stamp) {
+    mmradartwin_msgs::Ledger ledger = toMsg(standing_.summary(), standing_.duplicates());
+    ledger.header.stamp = stamp;
+    ledger.header.frame_id = radar_frame_;
+    ledger_.publish(ledger);
   }
 
   const std::vector<ResponseRegion>& regionsAt(const Eigen::Isometry3d& T) {
@@ -219,9 +238,7 @@ class AttributionNode {
     const ros::WallTime now = ros::WallTime::now();
     if ((now - last_markers_).toSec() >= 1 / markers_hz_) {
       last_markers_ = now;
-      mmradartwin_msgs::Ledger ledger = toMsg(standing_.summary(), standing_.duplicates());
-      ledger.header = residuals.header;
-      ledger_.publish(ledger);
+      publishLedger(residuals.header.stamp);
       if (markers_.getNumSubscribers() > 0) {
         if (had_subscribers_ == 0) builder_ = std::make_unique<MarkerBuilder>(*field_, frames_, max_paths_);
         markers_.publish(builder_->build(pose, records_, T, name));
@@ -254,7 +271,7 @@ class AttributionNode {
   ros::NodeHandle nh_, private_nh_;
   AttributionConfig config_;
   MarkerFrames frames_;
-  std::string radar_frame_, scene_file_;
+  std::string radar_frame_, scene_file_, twin_yaml_;
   double markers_hz_ = 2;
   int max_paths_ = 200;
   ros::Publisher residuals_, ledger_, markers_, scene_markers_;
@@ -266,6 +283,7 @@ class AttributionNode {
   std::size_t pairs_ = 0, pairs_before_ = 0, received_ = 0, received_before_ = 0;
 
   std::map<std::int64_t, MapMsg::ConstPtr> measured_, simulated_;  // waiting, by stamp
+  MapMsg::ConstPtr last_measured_;                                 // of the last pair
   mmradartwin_msgs::PathRecords::ConstPtr paths_, records_of_;
   std::vector<PathRecord> records_;
   std::map<std::int64_t, std::string> pose_names_;

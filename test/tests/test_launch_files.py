@@ -107,7 +107,7 @@ class LaunchFiles(unittest.TestCase):
 
     def test_live_starts_and_stays_without_a_card(self):
         with Launched("live.launch", "rviz:=false", "card_ip:=127.77.1.2", "host_ip:=127.77.1.1") as launched:
-            nodes = launched.wait_for_nodes({"/driver", "/signal_chain", "/twin", "/attribution"})
+            nodes = launched.wait_for_nodes({"/driver", "/signal_chain", "/twin", "/attribution", "/diagnosis"})
             time.sleep(6)
             self.assertNotIn("has died", launched.text())
             self.assertIn("/driver", nodes)
@@ -115,7 +115,7 @@ class LaunchFiles(unittest.TestCase):
 
     def test_replay_runs_the_chain_on_the_bags_clock_without_the_driver(self):
         with Launched("replay.launch", "bag:=" + self.bag, "rviz:=false") as launched:
-            nodes = launched.wait_for_nodes({"/player", "/signal_chain", "/twin", "/attribution"})
+            nodes = launched.wait_for_nodes({"/player", "/signal_chain", "/twin", "/attribution", "/diagnosis"})
             self.assertNotIn("/driver", nodes)
             sim_time = rosgraph.Master("/test", launched.environment["ROS_MASTER_URI"]).getParam("/use_sim_time")
             self.assertTrue(sim_time)

@@ -1,6 +1,7 @@
 #include "mmradartwin_attribution/ros/conversions.h"
 
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <set>
 
@@ -15,6 +16,57 @@ const std::string* interned(const std::string& name) {
   static std::set<std::string> names;
   const std::lock_guard<std::mutex> lock(mutex);
   return &*names.insert(name).first;
+}
+
+mmradartwin_msgs::FindingParameter toMsg(const FindingParameter& p) {
+  mmradartwin_msgs::FindingParameter msg;
+  msg.name = p.name;
+  msg.unit = p.unit;
+  if (const auto* number = std::get_if<double>(&p.value)) msg.value = {*number};
+  if (const auto* numbers = std::get_if<std::vector<double>>(&p.value)) msg.value = *numbers;
+  if (const auto* text = std::get_if<std::string>(&p.value)) msg.text = {*text};
+  if (const auto* texts = std::get_if<std::vector<std::string>>(&p.value)) msg.text = *texts;
+  for (const std::array<double, 2>& interval : p.ci95) {
+    msg.ci95_low.push_back(interval[0]);
+    msg.ci95_high.push_back(interval[1]);
+  }
+  return msg;
+}
+
+mmradartwin_msgs::FindingPlace toMsg(const FindingPlace& place) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  constexpr std::array<double, 2> kNowhere = {kNone, kNone};
+  mmradartwin_msgs::FindingPlace msg;
+  msg.range_min_m = place.range_m.value_or(kNowhere)[0];
+  msg.range_max_m = place.range_m.value_or(kNowhere)[1];
+  msg.azimuth_min_rad = place.azimuth_deg.value_or(kNowhere)[0] * M_PI / 180;
+  msg.azimuth_max_rad = place.azimuth_deg.value_or(kNowhere)[1] * M_PI / 180;
+  msg.x_m = place.x_m.value_or(kNone);
+  msg.y_m = place.y_m.value_or(kNone);
+  msg.actors = place.actors;
+  msg.poses = place.poses;
+  return msg;
+}
+
+mmradartwin_msgs::Finding toMsg(const Finding& finding) {
+  const CauseDescription& cause = causeDescription(finding.cause);
+  mmradartwin_msgs::Finding msg;
+  msg.cause = finding.cause;
+  msg.residual_class = className(cause.residual_class);
+  msg.action = cause.action();
+  msg.description = finding.description.value_or("");
+  for (const CauseProbability& candidate : finding.candidates) {
+    if (candidate.cause == finding.cause) msg.probability = candidate.probability;
+  }
+  msg.false_alarm_rate = finding.evidence.false_alarm_rate;
+  msg.log_likelihood_gain = finding.evidence.log_likelihood_gain;
+  const GainMetric explained = finding.gain ? finding.gain->explained_power : GainMetric();
+  msg.explained_power_before = explained.before;
+  msg.explained_power_after = explained.after;
+  for (const FindingParameter& p : finding.parameters) msg.parameters.push_back(toMsg(p));
+  for (const FindingPlace& place : finding.where) msg.where.push_back(toMsg(place));
+  msg.json = toJson(finding);
+  return msg;
 }
 
 Eigen::Vector3d vector(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
@@ -75,6 +127,14 @@ mmradartwin_msgs::Ledger toMsg(const LedgerSummary& s, const std::vector<std::st
   msg.q2_energy = s.q2_energy;
   msg.q4_mae_db = s.q4_mae_db;
   for (int i = 0; i < 5; ++i) msg.class_count[i] = static_cast<std::uint32_t>(s.class_count[i]);
+  return msg;
+}
+
+mmradartwin_msgs::Findings toMsg(const Findings& findings) {
+  mmradartwin_msgs::Findings msg;
+  msg.verdict = findings.verdict();
+  for (const Finding& finding : findings.findings) msg.findings.push_back(toMsg(finding));
+  msg.json = toJson(findings);
   return msg;
 }
 

@@ -20,6 +20,7 @@
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/session_files.h"
 #include "mmradartwin_dsp/stationary_poses.h"
+#include "mmradartwin_dsp/temporary_folder.h"
 
 namespace mmradartwin {
 namespace {
@@ -35,22 +36,6 @@ struct CubeIndex {
   std::int64_t stamp_ns;
   ros::Time recorded;
   std::optional<Eigen::Isometry3d> T_map_radar;
-};
-
-/// A temporary folder that goes with its last user.
-struct Folder {
-  Folder() {
-    std::string pattern = (fs::temp_directory_path() / "mmradartwin_XXXXXX").string();
-    if (!::mkdtemp(pattern.data())) throw std::runtime_error(pattern + ": temporary folder cannot be made");
-    path = pattern;
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  ~Folder() {
-    std::error_code ignored;
-    fs::remove_all(path, ignored);
-  }
-  std::string path;
 };
 
 std::string withoutSlash(const std::string& name) {
@@ -331,20 +316,37 @@ Recording fromStretches(BagContents& bag, const std::string& file, const std::st
   return recording;
 }
 
+std::string captureOf(const std::string& pattern, const std::string& pose) {
+  std::string file = pattern;
+  return pattern.empty() ? pattern : file.replace(file.find("{pose}"), 6, pose);
+}
+
+void leaveOutUnseen(Recording& recording, const CubesByPose& assigned) {
+  const auto unseen = [&](const Pose& pose) {
+    return !assigned.count(pose.name) && !fs::exists(captureOf(recording.capture_pattern, pose.name));
+  };
+  recording.poses.erase(std::remove_if(recording.poses.begin(), recording.poses.end(), unseen), recording.poses.end());
+  if (recording.poses.empty() && recording.problems.empty()) {
+    throw InputError("no frame of any of the session's " + std::to_string(recording.pose_names.size()) +
+                     " poses came yet; wait for the first one, and check that tf puts the radar where poses.csv does");
+  }
+}
+
 }  // namespace
 
 Recording openBag(const std::string& file, const BagOptions& options) {
   const auto bag = std::make_shared<BagContents>(file, options);
-  std::shared_ptr<Folder> temporary;
+  std::shared_ptr<TemporaryFolder> temporary;
   std::string folder = options.unpack_to;
   if (folder.empty()) {
-    temporary = std::make_shared<Folder>();
-    folder = temporary->path;
+    temporary = std::make_shared<TemporaryFolder>();
+    folder = temporary->path();
   }
   fs::create_directories(folder);
   auto assigned = std::make_shared<CubesByPose>();
   Recording recording =
       bag->session ? fromSessionMessage(*bag, folder, *assigned) : fromStretches(*bag, file, folder, *assigned);
+  if (options.seen_only && bag->session) leaveOutUnseen(recording, *assigned);
   recording.source = file;
   recording.radar = bag->radar;
   recording.radar_file = bag->label();
@@ -359,9 +361,7 @@ Recording openBag(const std::string& file, const BagOptions& options) {
                                                                  const std::function<void(const AdcCube&)>& visit) {
     const auto cubes = assigned->find(pose.name);
     if (cubes != assigned->end() && !cubes->second.empty()) return bag->forEachFrame(pose.name, cubes->second, visit);
-    std::string capture = pattern;
-    if (!capture.empty() && fs::exists(capture.replace(capture.find("{pose}"), 6, pose.name)))
-      return from_files(pose, visit);
+    if (fs::exists(captureOf(pattern, pose.name))) return from_files(pose, visit);
     throw InputError(file + ": pose '" + pose.name +
                      "': bag holds no frames of it; its capture was missing or its time was cut out");
   };

@@ -2,10 +2,8 @@
 
 #include <mmradartwin_msgs/PathRecords.h>
 #include <mmradartwin_msgs/Scene.h>
-#include <stdlib.h>
 
 #include <cmath>
-#include <filesystem>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
@@ -18,16 +16,8 @@
 namespace mmradartwin {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr double kWarnEvery_s = 5;
 constexpr double kMeasuredFor_s = 1;  // without a grid for so long the twin goes on at its own rate
-
-std::string temporaryFolder() {
-  std::string pattern = (fs::temp_directory_path() / "mmradartwin_session_XXXXXX").string();
-  if (!mkdtemp(pattern.data())) throw InputError(pattern + ": cannot be made; free some space in the temporary folder");
-  return pattern;
-}
 
 Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& T) {
   return Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
@@ -49,16 +39,12 @@ TwinNode::TwinNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   config_subscriber_ = nh.subscribe("radar/config", 1, &TwinNode::onConfig, this);
   session_subscriber_ = nh.subscribe("session", 1, &TwinNode::onSession, this);
   grid_subscriber_ = nh.subscribe("radar/grid", 100, &TwinNode::onGrid, this);
+  apply_service_ = nh.advertiseService("twin/apply", &TwinNode::onApply, this);
   pending_timer_ = nh.createWallTimer(ros::WallDuration(0.005), &TwinNode::onPending, this);
   if (rate_hz_ > 0) rate_timer_ = nh.createWallTimer(ros::WallDuration(1 / rate_hz_), &TwinNode::onRate, this);
   diagnostics_timer_ =
       nh.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
   if (!scene_file_.empty() && radar_) rebuild();
-}
-
-TwinNode::~TwinNode() {
-  std::error_code ignored;
-  if (!session_folder_.empty()) fs::remove_all(session_folder_, ignored);
 }
 
 void TwinNode::readParameters(const ros::NodeHandle& private_nh) {
@@ -96,14 +82,17 @@ void TwinNode::onSession(const mmradartwin_msgs::Session::ConstPtr& session) {
   try {
     std::vector<StoredFile> files;
     for (const auto& f : session->files) files.push_back({f.name, std::string(f.data.begin(), f.data.end())});
-    const std::string folder = temporaryFolder();
-    std::error_code ignored;
-    if (!session_folder_.empty()) fs::remove_all(session_folder_, ignored);
-    session_folder_ = folder;
-    restoreSessionFiles(files, folder);
+    if (session_ && session_->files == session->files) return;  // once more, of a master that was restarted
+    if (session_ && applied_twin_) {
+      ROS_WARN("another session: the twin of %s is no longer applied", applied_twin_->c_str());
+      applied_twin_.reset();
+    }
+    session_ = session;
+    session_folder_ = std::make_unique<TemporaryFolder>();
+    restoreSessionFiles(files, session_folder_->path());
     SessionOptions options;
     options.need_captures = false;
-    const Recording recording = openSession(folder, options);
+    const Recording recording = openSession(session_folder_->path(), options);
     session_scene_ = recording.scene_file;
     session_twin_ = recording.twin_file;
     if (!radar_) radar_ = recording.radar;
@@ -114,29 +103,66 @@ void TwinNode::onSession(const mmradartwin_msgs::Session::ConstPtr& session) {
   }
 }
 
+std::optional<std::string> TwinNode::sceneFile() const {
+  return scene_file_.empty() ? session_scene_ : resolvePath(scene_file_, "/");
+}
+
+std::string TwinNode::startingTwin() const {
+  return twin_file_.empty() ? session_twin_.value_or("") : resolvePath(twin_file_, "/");
+}
+
+std::unique_ptr<Twin> TwinNode::makeTwin(const std::string& twin_file) const {
+  return std::make_unique<Twin>(loadTwin(twin_file, sceneFile(), *radar_), seed_);
+}
+
+void TwinNode::use(std::unique_ptr<Twin> twin) {
+  last_.reset();
+  radar_hash_ = radarHash(twin->radar());
+  for (const std::string& note : twin->notes()) ROS_WARN("%s", note.c_str());
+  mmradartwin_msgs::Scene msg = toMsg(twin->scene(), twin->description().toYaml());
+  msg.header.frame_id = map_frame_;
+  msg.header.stamp = ros::Time::now();
+  scene_publisher_.publish(msg);
+  ROS_INFO("twin of %s: %zu actors, %zu facets", twin->scene().file.c_str(), twin->scene().actors.size(),
+           twin->scene().facets.size());
+  twin_ = std::move(twin);
+  problem_.clear();
+}
+
 void TwinNode::rebuild() {
   twin_.reset();
   last_.reset();
-  std::optional<std::string> scene = session_scene_;
-  if (!scene_file_.empty()) scene = resolvePath(scene_file_, "/");
-  const std::string twin_file = !twin_file_.empty() ? resolvePath(twin_file_, "/") : session_twin_.value_or("");
-  if (!radar_ || (!scene && twin_file.empty())) return;
+  const std::string twin_file = applied_twin_ ? *applied_twin_ : startingTwin();
+  if (!radar_ || (!sceneFile() && twin_file.empty())) return;
   try {
-    auto twin = std::make_unique<Twin>(loadTwin(twin_file, scene, *radar_), seed_);
-    radar_hash_ = radarHash(twin->radar());
-    for (const std::string& note : twin->notes()) ROS_WARN("%s", note.c_str());
-    mmradartwin_msgs::Scene msg = toMsg(twin->scene(), twin->description().toYaml());
-    msg.header.frame_id = map_frame_;
-    msg.header.stamp = ros::Time::now();
-    scene_publisher_.publish(msg);
-    ROS_INFO("twin of %s: %zu actors, %zu facets", twin->scene().file.c_str(), twin->scene().actors.size(),
-             twin->scene().facets.size());
-    twin_ = std::move(twin);
-    problem_.clear();
+    use(makeTwin(twin_file));
   } catch (const std::exception& error) {
     problem_ = error.what();
     ROS_ERROR("no twin: %s", error.what());
   }
+}
+
+bool TwinNode::onApply(mmradartwin_msgs::ApplyTwin::Request& request, mmradartwin_msgs::ApplyTwin::Response& response) {
+  const std::string what = request.file.empty() ? "the twin that this node was started with" : request.file;
+  try {
+    if (!request.file.empty() && request.file.front() != '/' && request.file.rfind("package://", 0) != 0) {
+      throw InputError(request.file + ": give an absolute path or package://PACKAGE/PATH");
+    }
+    if (!radar_) throw InputError("no radar/config came yet: start the driver or the replay first");
+    use(makeTwin(request.file.empty() ? startingTwin() : resolvePath(request.file, "/")));
+    applied_twin_.reset();
+    if (!request.file.empty()) applied_twin_ = resolvePath(request.file, "/");
+    response.success = true;
+    response.message = what + " is simulated from now on";
+    ROS_INFO("%s", response.message.c_str());
+    // A stream that has paused or ended shows it too.
+    if (measured_) simulate(measured_->first, measured_->second);
+  } catch (const std::exception& error) {
+    response.success = false;
+    response.message = "refused, the twin stays as it was: " + std::string(error.what());
+    ROS_ERROR("twin/apply: %s", response.message.c_str());
+  }
+  return true;
 }
 
 void TwinNode::onGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid) {
@@ -172,6 +198,7 @@ void TwinNode::onPending(const ros::WallTimerEvent&) {
   }
   const std::int64_t stamp_ns = toNanoseconds(pending_->header.stamp);
   pending_.reset();
+  measured_.emplace(T_map_radar, stamp_ns);
   simulate(T_map_radar, stamp_ns);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <mmradartwin_msgs/Findings.h>
 #include <mmradartwin_msgs/Ledger.h>
 #include <mmradartwin_msgs/PathRecords.h>
 #include <mmradartwin_msgs/Residuals.h>
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_attribution/ledger.h"
 #include "mmradartwin_attribution/residual.h"
 
@@ -17,6 +19,8 @@ namespace mmradartwin {
 mmradartwin_msgs::Residuals toMsg(const EvaluationField& field, const PoseAttribution& pose, const std::string& name,
                                   const Eigen::Isometry3d& T_map_radar);
 mmradartwin_msgs::Ledger toMsg(const LedgerSummary& summary, const std::vector<std::string>& duplicates);
+/// Throws std::logic_error as toJson() does.
+mmradartwin_msgs::Findings toMsg(const Findings& findings);
 
 /// Records with the indices of `scene`'s actors (-1 for a name it lacks); facets are not in the message.
 std::vector<PathRecord> pathsFromMsg(const mmradartwin_msgs::PathRecords& msg, const Scene& scene);

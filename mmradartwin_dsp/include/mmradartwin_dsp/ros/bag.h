@@ -16,6 +16,9 @@ struct BagOptions {
   /// Recording.
   std::string unpack_to;
   bool exclude_duplicates = true;
+  /// Of the session message's poses only those of which the bag holds frames; the others are otherwise errors where
+  /// they are read.
+  bool seen_only = false;
 };
 
 /// Opens a bag as a Recording. With a `session` message its poses.csv defines the poses; otherwise a pose is a stretch

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <mmradartwin_msgs/ApplyTwin.h>
 #include <mmradartwin_msgs/RadarConfig.h>
 #include <mmradartwin_msgs/ReceiveGrid.h>
 #include <mmradartwin_msgs/Session.h>
@@ -12,12 +13,14 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "mmradartwin_dsp/temporary_folder.h"
 #include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
 
-/// radar/config, session, radar/grid, tf -> twin/grid, twin/paths, twin/scene, diagnostics.
+/// radar/config, session, radar/grid, tf -> twin/grid, twin/paths, twin/scene, diagnostics; service twin/apply.
 ///
 /// Simulates at the pose of each measured grid (the grid's own, else tf at its stamp) and at `rate_hz` along tf while
 /// no measurement comes. Records are used again while the radar stands within `reuse_m` and `reuse_deg`. Of grids that
@@ -25,12 +28,12 @@ namespace mmradartwin {
 /// time.
 ///
 /// The scene is that of the parameter `scene`, else of the latched session message, whose files are unpacked into a
-/// temporary folder.
+/// temporary folder. twin/apply puts another twin in the place of the one simulated, from the last measured grid on;
+/// twin/scene says which. It stays until another is applied, or a session with other files comes.
 class TwinNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
   TwinNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
-  ~TwinNode();
 
  private:
   void readParameters(const ros::NodeHandle& private_nh);
@@ -39,6 +42,13 @@ class TwinNode {
   void onGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid);
   void onPending(const ros::WallTimerEvent&);
   void onRate(const ros::WallTimerEvent&);
+  bool onApply(mmradartwin_msgs::ApplyTwin::Request& request, mmradartwin_msgs::ApplyTwin::Response& response);
+  std::optional<std::string> sceneFile() const;
+  /// twin.yaml of the parameter, else of the session; "" for the base mechanisms.
+  std::string startingTwin() const;
+  /// Throws InputError where it cannot be simulated.
+  std::unique_ptr<Twin> makeTwin(const std::string& twin_file) const;
+  void use(std::unique_ptr<Twin> twin);
   void rebuild();
   void simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
@@ -49,12 +59,16 @@ class TwinNode {
 
   std::optional<RadarConfig> radar_;
   std::uint64_t radar_hash_ = 0;  ///< of the twin's radar
-  std::string session_folder_;    ///< unpacked session, "" where there is none
+  mmradartwin_msgs::Session::ConstPtr session_;
+  std::unique_ptr<TemporaryFolder> session_folder_;  ///< the session, unpacked
   std::optional<std::string> session_scene_, session_twin_;
+  std::optional<std::string> applied_twin_;  ///< file that twin/apply named
   std::unique_ptr<Twin> twin_;
   std::string problem_;  ///< why there is no twin, or the last pose gave nothing
   std::optional<Simulation> last_;
 
+  /// Where and when the last measured grid was simulated.
+  std::optional<std::pair<Eigen::Isometry3d, std::int64_t>> measured_;
   mmradartwin_msgs::ReceiveGrid::ConstPtr pending_;
   ros::WallTime pending_since_, measured_at_, published_at_;
   std::uint64_t simulated_ = 0, reused_ = 0, skipped_ = 0, without_pose_ = 0;
@@ -64,6 +78,7 @@ class TwinNode {
   std::optional<tf2_ros::TransformListener> tf_listener_;
   ros::Publisher grid_publisher_, paths_publisher_, scene_publisher_;
   ros::Subscriber config_subscriber_, session_subscriber_, grid_subscriber_;
+  ros::ServiceServer apply_service_;
   ros::WallTimer pending_timer_, rate_timer_, diagnostics_timer_;
   std::unique_ptr<diagnostic_updater::Updater> updater_;
 };

@@ -1,0 +1,309 @@
+// Keeps the frames of the poses seen so far and finds, when asked, what the twin gets wrong about them: the action
+// attribution/diagnose. A process of its own, since it may take minutes of all cores and much memory, and the stream
+// has to go on whatever becomes of it.
+
+#include <actionlib/server/simple_action_server.h>
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <mmradartwin_msgs/DiagnoseAction.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <std_srvs/Trigger.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/message_filter.h>
+#include <tf2_ros/transform_listener.h>
+
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <sstream>
+
+#include "mmradartwin_attribution/diagnosis.h"
+#include "mmradartwin_attribution/diagnosis_report.h"
+#include "mmradartwin_attribution/ros/conversions.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/frame_spool.h"
+#include "mmradartwin_dsp/ros/master_watch.h"
+#include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_sim/plugin.h"
+
+namespace {
+
+using namespace mmradartwin;
+namespace fs = std::filesystem;
+
+constexpr double kWarnEvery_s = 30;
+constexpr double kFeedbackEvery_s = 0.2;
+/// Frames that may wait for tf, or while those kept so far are indexed for a diagnosis.
+constexpr std::uint32_t kLongestQueue = 1000;
+
+struct Settings {
+  FrameSpoolLimits limits;
+  std::string map_frame, output_folder, config_file;
+  int jobs = 0;
+};
+
+Settings readSettings(const ros::NodeHandle& private_nh) {
+  StrictParameters parameters(private_nh);
+  Settings s;
+  loadMechanismPlugins(parameters.text("plugins", ""), "parameter plugins");
+  s.config_file = parameters.text("config", "");
+  s.map_frame = parameters.text("map_frame", "map");
+  s.output_folder = parameters.text("output", "");
+  s.jobs = parameters.integer("jobs", 0, 0, 1024);
+  s.limits.folder = parameters.text("spool_folder", "");
+  s.limits.frames_per_pose = parameters.integer("frames_per_pose", s.limits.frames_per_pose, 1, 1000000);
+  s.limits.max_bytes = static_cast<std::uint64_t>(1e6 * parameters.number("max_mb", 2000, 1, 1e6));
+  s.limits.min_free_bytes = static_cast<std::uint64_t>(1e6 * parameters.number("min_free_mb", 1000, 0, 1e6));
+  parameters.number("diagnostic_period", 1.0, 0.01, 3600);  // read by diagnostic_updater
+  parameters.boolean("diagnostic_updater_use_fqn", false);
+  parameters.rejectUnknown();
+  return s;
+}
+
+/// Where ROS keeps what nodes leave behind.
+fs::path rosHome() {
+  if (const char* home = std::getenv("ROS_HOME")) return home;
+  if (const char* home = std::getenv("HOME")) return fs::path(home) / ".ros";
+  return fs::temp_directory_path();
+}
+
+std::string newFolderName() {
+  const std::time_t now = std::time(nullptr);
+  char text[40];
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  std::strftime(text, sizeof text, "diagnosis_%Y%m%d_%H%M%S", &utc);
+  return text;
+}
+
+bool sameBytes(const std::string& a, const std::string& b) {
+  std::ifstream x(a, std::ios::binary), y(b, std::ios::binary);
+  std::ostringstream s, t;
+  s << x.rdbuf();
+  t << y.rdbuf();
+  return x && y && s.str() == t.str();
+}
+
+class DiagnosisNode {
+ public:
+  using Goal = mmradartwin_msgs::DiagnoseGoalConstPtr;
+  using Cube = mmradartwin_msgs::AdcCube;
+
+  explicit DiagnosisNode(const Settings& settings)
+      : settings_(settings),
+        spool_(settings.limits),
+        tf_listener_(tf_buffer_),
+        posed_frames_(tf_buffer_, settings.map_frame, kLongestQueue, &spool_queue_),
+        updater_(nh_, ros::NodeHandle("~")),
+        server_(
+            nh_, "attribution/diagnose", [this](const Goal& goal) { execute(goal); }, false) {
+    if (!settings_.config_file.empty()) config_ = loadAttributionConfig(settings_.config_file);
+    findings_ = nh_.advertise<mmradartwin_msgs::Findings>("attribution/findings", 1, true);
+    forget_ = nh_.advertiseService("attribution/forget_poses", &DiagnosisNode::onForget, this);
+    // What feeds the spool has a queue of its own: it may wait there while goals and cancels go on.
+    ros::NodeHandle spool_nh;
+    spool_nh.setCallbackQueue(&spool_queue_);
+    subscribers_.push_back(spool_nh.subscribe("radar/config", 2, &DiagnosisNode::onRadar, this));
+    subscribers_.push_back(spool_nh.subscribe("session", 2, &DiagnosisNode::onSession, this));
+    subscribers_.push_back(spool_nh.subscribe("twin/scene", 2, &DiagnosisNode::onScene, this));
+    subscribers_.push_back(spool_nh.subscribe("radar/adc", kLongestQueue, &DiagnosisNode::onCube, this));
+    posed_frames_.registerCallback(&DiagnosisNode::onPosedCube, this);
+    spool_spinner_.start();
+    updater_.setHardwareID("none");
+    updater_.add("diagnosis", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { describe(status); });
+    diagnostics_timer_ = nh_.createWallTimer(ros::WallDuration(1), &DiagnosisNode::onSecond, this);
+    server_.start();
+  }
+
+  ~DiagnosisNode() {
+    spool_spinner_.stop();
+    server_.shutdown();
+  }
+
+ private:
+  void onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg) { spool_.setRadar(*msg); }
+  void onSession(const mmradartwin_msgs::Session::ConstPtr& msg) { spool_.setSession(*msg); }
+  void onScene(const mmradartwin_msgs::Scene::ConstPtr& msg) { spool_.setScene(*msg); }
+
+  void onCube(const Cube::ConstPtr& cube) {
+    // With simulated time the listener clears tf by itself when time goes back.
+    if (cube->header.stamp < newest_ && !ros::Time::isSimTime()) tf_buffer_.clear();
+    newest_ = cube->header.stamp;
+    posed_frames_.add(cube);
+  }
+
+  void onPosedCube(const Cube::ConstPtr& cube) {
+    try {
+      const geometry_msgs::Transform T =
+          tf_buffer_.lookupTransform(settings_.map_frame, cube->header.frame_id, cube->header.stamp).transform;
+      spool_.add(cube, Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
+                           Eigen::Quaterniond(T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z).normalized());
+    } catch (const tf2::TransformException& error) {  // forgotten by tf in between
+      ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f left out: %s", cube->header.stamp.toSec(), error.what());
+    }
+  }
+
+  bool onForget(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    spool_.forget();
+    response.success = true;
+    response.message = "poses begin anew";
+    return true;
+  }
+
+  void onSecond(const ros::WallTimerEvent&) {
+    updater_.force_update();
+    const std::string problem = spool_.state().problem;
+    if (!problem.empty()) ROS_WARN_THROTTLE(kWarnEvery_s, "%s", problem.c_str());
+  }
+
+  void describe(diagnostic_updater::DiagnosticStatusWrapper& status) const {
+    using Level = diagnostic_msgs::DiagnosticStatus;
+    const FrameSpoolState s = spool_.state();
+    if (!s.problem.empty()) {
+      status.summary(Level::WARN, s.problem);
+    } else {
+      status.summary(Level::OK, s.frames > 0 ? "keeping frames" : "waiting for frames with a pose");
+    }
+    status.add("frames kept", s.frames);
+    status.add("frames left out", s.left_out);
+    status.add("kept [MB]", static_cast<double>(s.bytes) / 1e6);
+  }
+
+  std::string outputFolder(const std::string& asked) const {
+    if (asked.empty()) {
+      const fs::path given = settings_.output_folder;
+      return ((given.empty() ? rosHome() / "mmradartwin" : given) / newFolderName()).string();
+    }
+    if (asked.front() != '/') throw InputError("output '" + asked + "': give an absolute path, or none");
+    return asked;
+  }
+
+  struct ChosenTwin {
+    TwinDescription description;
+    bool scene_of_session = false;  ///< then it stands in a temporary folder and is better not named
+  };
+
+  /// Nothing where there is no scene.
+  std::optional<ChosenTwin> chooseTwin(const std::string& asked, const Recording& recording) const {
+    const std::optional<mmradartwin_msgs::Scene> in_use = spool_.scene();
+    std::optional<std::string> scene = recording.scene_file;
+    const bool session_scene = spool_.session() && scene;
+    // The twin node has unpacked the same session elsewhere.
+    if (in_use && !(session_scene && sameBytes(in_use->scene_file, *scene))) scene = in_use->scene_file;
+    const bool of_session = session_scene && scene == recording.scene_file;
+    if (!asked.empty() && asked.front() != '/') {
+      throw InputError("twin '" + asked + "': give an absolute path, or none");
+    }
+    if (asked.empty() && in_use) {
+      const TemporaryFolder folder;
+      const std::string file = folder.path() + "/twin.yaml";
+      std::ofstream(file, std::ios::binary) << in_use->twin_yaml;
+      ChosenTwin twin{loadTwin(file, scene, recording.radar), of_session};
+      twin.description.scene_file = *scene;
+      if (!fs::exists(*scene)) {
+        throw InputError(*scene +
+                         ": the scene that is simulated is not on this machine; run the diagnosis where the "
+                         "twin runs, or give a twin with the goal");
+      }
+      return twin;
+    }
+    const std::string file = asked.empty() ? recording.twin_file.value_or("") : asked;
+    if (file.empty() && !scene) return std::nullopt;
+    ChosenTwin twin{loadTwin(file, scene, recording.radar), false};
+    twin.scene_of_session = of_session && twin.description.scene_file == *scene;
+    return twin;
+  }
+
+  Diagnosis diagnosePoses(const Recording& recording, const std::string& asked_twin) {
+    DiagnosisOptions options;
+    options.jobs = settings_.jobs;
+    options.config = config_;
+    options.cancelled = [this] { return server_.isPreemptRequested() || !ros::ok(); };
+    options.on_progress = [this](const DiagnosisProgress& p) { tell(p.stage, p.share); };
+    const std::optional<ChosenTwin> chosen = chooseTwin(asked_twin, recording);
+    if (!chosen) return diagnoseReceiver(recording, options);
+    Twin twin(chosen->description);
+    Diagnosis diagnosis = diagnose(recording, twin, options);
+    if (chosen->scene_of_session) diagnosis.extended.scene_file.clear();
+    return diagnosis;
+  }
+
+  void tell(const std::string& stage, double share) {
+    const ros::WallTime now = ros::WallTime::now();
+    if (stage == told_.stage && (now - told_at_).toSec() < kFeedbackEvery_s) return;
+    told_at_ = now;
+    told_.stage = stage;
+    told_.share = static_cast<float>(share);
+    server_.publishFeedback(told_);
+  }
+
+  void execute(const Goal& goal) {
+    mmradartwin_msgs::DiagnoseResult result;
+    try {
+      const std::string output = outputFolder(goal->output);
+      tell("collecting poses", 0);
+      const Recording recording = spool_.recording();
+      const Diagnosis diagnosis = diagnosePoses(recording, goal->twin);
+      DiagnosisReport(output).write(diagnosis, {"attribution/diagnose", output, goal->twin});
+      result.findings_file = output + "/findings.json";
+      result.report_file = output + "/index.html";
+      const Findings written = readFindings(result.findings_file);
+      if (written.extended_twin) result.extended_twin_file = output + "/" + *written.extended_twin;
+      result.findings = toMsg(written);
+      result.findings.header.stamp = ros::Time::now();
+      result.findings.header.frame_id = settings_.map_frame;
+      result.poses = static_cast<std::uint32_t>(written.poses);
+      result.locations = static_cast<std::uint32_t>(written.locations);
+      for (const PoseProblem& problem : diagnosis.problems) result.problems.push_back(problem.message);
+      findings_.publish(result.findings);
+      const std::string text = diagnosisText(diagnosis);
+      ROS_INFO("%sReport: %s", text.c_str(), result.report_file.c_str());
+      server_.setSucceeded(result, text);
+    } catch (const DiagnosisCancelled&) {
+      server_.setPreempted(result, "cancelled; nothing was written");
+    } catch (const InputError& error) {
+      ROS_ERROR("diagnosis: %s", error.what());
+      server_.setAborted(result, error.what());
+    } catch (const std::exception& error) {
+      ROS_ERROR("diagnosis failed: %s", error.what());
+      server_.setAborted(result, std::string("failed: ") + error.what());
+    }
+  }
+
+  const Settings settings_;
+  AttributionConfig config_;
+  ros::NodeHandle nh_;
+  FrameSpool spool_;
+  ros::CallbackQueue spool_queue_;
+  tf2_ros::Buffer tf_buffer_;
+  tf2_ros::TransformListener tf_listener_;
+  tf2_ros::MessageFilter<Cube> posed_frames_;
+  ros::Time newest_;
+  std::vector<ros::Subscriber> subscribers_;
+  ros::Publisher findings_;
+  ros::ServiceServer forget_;
+  diagnostic_updater::Updater updater_;
+  ros::WallTimer diagnostics_timer_;
+  mmradartwin_msgs::DiagnoseFeedback told_;
+  ros::WallTime told_at_;
+  ros::AsyncSpinner spool_spinner_{1, &spool_queue_};
+  actionlib::SimpleActionServer<mmradartwin_msgs::DiagnoseAction> server_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "diagnosis");
+  try {
+    DiagnosisNode node(readSettings(ros::NodeHandle("~")));
+    const MasterWatch master_watch;
+    ros::spin();
+  } catch (const InputError& error) {
+    ROS_FATAL("%s", error.what());
+    return 2;
+  }
+  return 0;
+}
