@@ -2,20 +2,37 @@
 
 The recording is one frame of 128 loops, 2 transmitters, 4 receivers and 128 samples in the byte order of four lanes.
 """
+import functools
 import json
 import math
 import os
 import shutil
 
 import numpy as np
+import yaml
+
+from mmradartwin_tests.effects import make_effect
+from mmradartwin_tests.radar import SPEED_OF_LIGHT, Radar
 
 REPOSITORY = os.path.realpath(os.path.join(os.path.dirname(os.path.realpath(__file__)), *[".."] * 4))
-RADAR = os.path.join(REPOSITORY, "mmradartwin_dsp", "test", "data", "openradar_indoor.yaml")
-LOOPS, SLOTS, SAMPLES, RECEIVERS = 128, 2, 128, 4
-CARRIER_HZ, SLOPE_HZ_PER_S, SAMPLE_RATE_HZ, ADC_START_S, CHIRP_S = 77.4201e9, 60e12, 2.5e6, 7e-6, 92e-6
-TX_Y_M, RX_Y_M = (0.0, 0.0077446), (0.0, 0.0019361, 0.0038723, 0.0058084)
-SPEED_OF_LIGHT = 299792458.0
-PACKET_BYTES = 1456
+DESCRIPTION = os.path.join(REPOSITORY, "mmradartwin_dsp", "test", "data", "openradar_indoor.yaml")
+
+
+@functools.lru_cache(maxsize=None)
+def description():
+    """(radar of the recording, time from one chirp to the next in s)."""
+    with open(DESCRIPTION, encoding="ascii") as text:
+        told = yaml.safe_load(text)
+    radar = Radar(told["carrier_hz"], told["slope_hz_per_s"], told["samples_per_chirp"], told["sample_rate_hz"],
+                  told["adc_start_s"], told["loops_per_frame"], told["frame_period_s"],
+                  np.array(told["tx_position_m"], float), np.array(told["rx_position_m"], float))
+    return radar, told["idle_s"] + told["ramp_end_s"]
+
+
+def shape():
+    """Loops, slots, samples, receivers."""
+    radar, _ = description()
+    return radar.loops, len(radar.tx), radar.samples, len(radar.rx)
 
 
 def capture_file():
@@ -27,7 +44,8 @@ def capture_file():
 
 def read_capture():
     """Complex samples [loop, slot, sample, receiver]."""
-    raw = np.fromfile(capture_file(), "<i2").reshape(LOOPS, SLOTS, SAMPLES, 2, RECEIVERS)
+    *outer, receivers = shape()
+    raw = np.fromfile(capture_file(), "<i2").reshape(*outer, 2, receivers)
     return raw[:, :, :, 0] + 1j * raw[:, :, :, 1]
 
 
@@ -40,7 +58,7 @@ def payload(x):
 def write_payload(directory, data):
     """A session of one pose, without a scene."""
     os.makedirs(os.path.join(directory, "captures"))
-    shutil.copy(RADAR, os.path.join(directory, "radar.yaml"))
+    shutil.copy(DESCRIPTION, os.path.join(directory, "radar.yaml"))
     with open(os.path.join(directory, "session.yaml"), "w", encoding="ascii") as out:
         out.write("format: mmradartwin_session/1\nradar: radar.yaml\nposes: poses.csv\n"
                   "captures: captures/{pose}.bin\n")
@@ -58,7 +76,8 @@ def write_untouched(directory):
 
 def strongest(x):
     """Amplitude of the strongest echo beyond 0.3 m, rms over channels, of the mean over loops."""
-    window = 0.5 * (1 - np.cos(2 * np.pi * np.arange(SAMPLES) / SAMPLES))
+    samples = x.shape[2]
+    window = 0.5 * (1 - np.cos(2 * np.pi * np.arange(samples) / samples))
     spectrum = np.fft.fft(x.mean(axis=0) * window[:, None], axis=1) / window.sum()
     return float(np.sqrt((np.abs(spectrum)**2).mean(axis=(0, 2)))[6:].max())
 
@@ -67,8 +86,8 @@ def channel_phase_error(x, rng):
     """A phase and gain per virtual channel, channel 0 as it was."""
     phase_deg, gain_db = rng.uniform(12, 30) * rng.standard_normal(8), rng.uniform(0.5, 1.5) * rng.standard_normal(8)
     phase_deg, gain_db = phase_deg - phase_deg[0], gain_db - gain_db[0]
-    factor = (10**(gain_db / 20) * np.exp(1j * np.radians(phase_deg))).reshape(SLOTS, 1, RECEIVERS)
-    return x * factor, {"phase_deg": list(phase_deg), "gain_db": list(gain_db)}
+    factor = 10**(gain_db / 20) * np.exp(1j * np.radians(phase_deg))
+    return x * factor.reshape(x.shape[1], 1, x.shape[3]), {"phase_deg": list(phase_deg), "gain_db": list(gain_db)}
 
 
 def iq_conjugation(x, rng):
@@ -78,17 +97,18 @@ def iq_conjugation(x, rng):
 
 def channel_conjugation(x, rng):
     """The order 7..0 of the virtual channels."""
-    order = x.transpose(0, 2, 1, 3).reshape(LOOPS, SAMPLES, -1)[:, :, ::-1]
-    return order.reshape(LOOPS, SAMPLES, SLOTS, RECEIVERS).transpose(0, 2, 1, 3), {}
+    return x[:, ::-1, :, ::-1], {}
 
 
 def tx_rx_leakage(x, rng):
     """A tone at some centimetres, the same in every chirp, with its own complex vector over the channels."""
     range_m, level_db = float(rng.uniform(0.05, 0.15)), float(rng.uniform(3, 12))
-    vector = rng.standard_normal((SLOTS, 1, RECEIVERS)) + 1j * rng.standard_normal((SLOTS, 1, RECEIVERS))
+    radar, _ = description()
+    _, slots, samples, receivers = shape()
+    vector = rng.standard_normal((slots, 1, receivers)) + 1j * rng.standard_normal((slots, 1, receivers))
     vector /= math.sqrt(np.mean(np.abs(vector)**2))
-    t = np.arange(SAMPLES) / SAMPLE_RATE_HZ
-    tone = np.exp(2j * math.pi * SLOPE_HZ_PER_S * 2 * range_m / SPEED_OF_LIGHT * t)[None, :, None]
+    t = np.arange(samples) / radar.sample_rate_hz
+    tone = np.exp(2j * math.pi * radar.slope_hz_per_s * 2 * range_m / SPEED_OF_LIGHT * t)[None, :, None]
     return x + strongest(x) * 10**(level_db / 20) * vector * tone, {"range_m": range_m, "level_db": level_db}
 
 
@@ -104,29 +124,18 @@ def moving_target(x, rng):
     range_m, azimuth = float(rng.uniform(1.2, 2.2)), float(rng.uniform(-0.6, 0.6))
     speed = float(rng.uniform(0.4, 1.2) * rng.choice([-1, 1]))
     level = strongest(x) * 10**(rng.uniform(-16, -6) / 20)
-    chirp = np.arange(LOOPS * SLOTS).reshape(LOOPS, SLOTS, 1, 1)
-    r = range_m + speed * chirp * CHIRP_S
-    place = np.stack([r * math.cos(azimuth), r * math.sin(azimuth)])
-    tx = np.array(TX_Y_M).reshape(1, SLOTS, 1, 1)
-    rx = np.array(RX_Y_M).reshape(1, 1, 1, RECEIVERS)
-    tau = (np.hypot(place[0], place[1] - tx) + np.hypot(place[0], place[1] - rx)) / SPEED_OF_LIGHT
-    t = (ADC_START_S + np.arange(SAMPLES) / SAMPLE_RATE_HZ).reshape(1, 1, SAMPLES, 1)
-    cycles = CARRIER_HZ * tau + SLOPE_HZ_PER_S * tau * t - 0.5 * SLOPE_HZ_PER_S * tau**2
-    echo = level * np.exp(2j * math.pi * (cycles + rng.random()))
+    radar, chirp_s = description()
+    loops, slots, samples, receivers = shape()
+    r = range_m + speed * chirp_s * np.arange(loops * slots).reshape(loops, slots, 1)
+    place = np.stack([r * math.cos(azimuth), r * math.sin(azimuth), 0 * r], axis=-1)
+    out = np.linalg.norm(place - radar.tx[:, None], axis=-1)
+    lengths = (out + np.linalg.norm(place - radar.rx, axis=-1)).reshape(loops, -1)
+    turn = level * np.exp(2j * math.pi * rng.random())
+    echo = np.array([radar.grid(lengths[i:i + 1], [turn]) for i in range(loops)])
+    echo = echo.reshape(loops, slots, receivers, samples).transpose(0, 1, 3, 2)
     # The radar stands at the session's map origin and looks along x.
     return x + echo, {"x_m": range_m * math.cos(azimuth), "y_m": range_m * math.sin(azimuth),
                       "speed_m_per_s": abs(speed)}
-
-
-def packet_loss(data, rng):
-    """Lost packets filled with zeros: bytes in, bytes out."""
-    data = bytearray(data)
-    count = -(-len(data) // PACKET_BYTES)
-    lost = rng.choice(count, max(3, int(rng.uniform(0.01, 0.06) * count)), replace=False)
-    for packet in lost:
-        start, stop = packet * PACKET_BYTES, min((packet + 1) * PACKET_BYTES, len(data))
-        data[start:stop] = bytes(stop - start)
-    return bytes(data), {"lost_fraction": len(lost) / count}
 
 
 ON_SAMPLES = {f.__name__: f for f in (channel_phase_error, iq_conjugation, channel_conjugation, tx_rx_leakage,
@@ -137,7 +146,8 @@ INJECTIONS = (*ON_SAMPLES, "packet_loss")
 def inject(name, rng):
     """(bytes of the recording with one effect in it, its parameters)."""
     if name == "packet_loss":
-        return packet_loss(payload(read_capture()), rng)
+        lossy = make_effect(name, {"lost_fraction": float(rng.uniform(0.01, 0.06))})
+        return lossy.payload(None, 0, None, payload(read_capture()), rng), lossy.truth(None)
     x, parameters = ON_SAMPLES[name](read_capture(), rng)
     return payload(x), parameters
 
