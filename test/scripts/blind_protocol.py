@@ -6,6 +6,7 @@ finished trial does not run again. The table is printed at the end and written t
 """
 import argparse
 import os
+import signal
 import sys
 import time
 
@@ -133,8 +134,15 @@ def run(arguments):
     print_table(arguments.output, results, sealed)
 
 
+def stop(number, frame):
+    """Ends the trial that runs, with its diagnosis and its session, on SIGTERM too and in the background of a shell."""
+    raise KeyboardInterrupt
+
+
 def main():
     """Entry point; returns the exit status."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
     arguments = parse()
     try:
         os.makedirs(arguments.output, exist_ok=True)

@@ -3,6 +3,7 @@ import hashlib
 import json
 import math
 import os
+import signal
 import stat
 import subprocess
 import sys
@@ -220,8 +221,8 @@ class WholeTrials(WithProgram):
 
 
 class ProtocolProgram(WithProgram):
-    def call(self, *arguments, program=None):
-        """(exit status, output, errors) of the protocol with a program in place of diagnose."""
+    def environment(self, program):
+        """Of a process that finds the program where diagnose would be."""
         environment = dict(os.environ)
         if program:
             place = self.at("prefix", "lib", "mmradartwin_attribution")
@@ -229,9 +230,16 @@ class ProtocolProgram(WithProgram):
             if not os.path.exists(os.path.join(place, "diagnose")):
                 os.symlink(program, os.path.join(place, "diagnose"))
             environment["CMAKE_PREFIX_PATH"] = self.at("prefix")
-        run = subprocess.run([sys.executable, PROTOCOL, "--output", self.at("run"), "--poses", "2", "--frames", "2",
-                              *arguments],
-                             capture_output=True, text=True, check=False, env=environment)
+        return environment
+
+    def command(self, *arguments):
+        """Of the protocol, on the smallest of sessions."""
+        return [sys.executable, PROTOCOL, "--output", self.at("run"), "--poses", "2", "--frames", "2", *arguments]
+
+    def call(self, *arguments, program=None):
+        """(exit status, output, errors) of the protocol with a program in place of diagnose."""
+        run = subprocess.run(self.command(*arguments), capture_output=True, text=True, check=False,
+                             env=self.environment(program))
         return run.returncode, run.stdout, run.stderr
 
     def test_finished_trials_do_not_run_again(self):
@@ -252,6 +260,24 @@ class ProtocolProgram(WithProgram):
         status, _, errors = self.call("--table")
         self.assertEqual(status, 2)
         self.assertIn("not what was sealed", errors)
+
+    def test_ended_from_outside_it_leaves_nothing_behind(self):
+        told = self.at("told")
+        program = self.program(f"echo $$ $session > {told}.part; mv {told}.part {told}; exec sleep 600")
+        command = self.command("--rows", "clean", "--trials", "clean=1")
+        with open(self.at("errors"), "w", encoding="utf-8") as errors, \
+                subprocess.Popen(command, stderr=errors, env=self.environment(program)) as run:
+            while not os.path.exists(told):
+                self.assertIsNone(run.poll(), "it ended by itself")
+                time.sleep(0.1)
+            run.send_signal(signal.SIGTERM)
+            self.assertEqual(run.wait(120), 1)
+        with open(told, encoding="utf-8") as text:
+            pid, session = text.read().split()
+        self.assertFalse(os.path.exists(session))
+        self.assertFalse(os.path.exists(f"/proc/{pid}"))
+        with open(self.at("errors"), encoding="utf-8") as text:
+            self.assertIn("goes on where this one ended", text.read())
 
     def test_wrong_use_is_told(self):
         for arguments, word in ((["--rows", "singles"], "singles"), (["--trials", "clean=many"], "clean=many"),
