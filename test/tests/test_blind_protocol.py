@@ -130,11 +130,11 @@ class KeptResults(InFolder):
 class MeasuredRuns(InFolder):
     def test_memory_of_the_child_alone_and_its_status(self):
         grow = "import sys; b = b'x' * (300 << 20); sys.exit(3)"
-        status, seconds, peak_mib = trials.run_measured([sys.executable, "-c", grow], 300, self.at("log"))
+        status, seconds, cpu_s, peak_mib = trials.run_measured([sys.executable, "-c", grow], 300, self.at("log"))
         self.assertEqual(status, 3)
-        self.assertGreater(seconds, 0)
+        self.assertTrue(0 < cpu_s < seconds + 0.1, msg=(cpu_s, seconds))    # one thread; ticks are 10 ms
         self.assertTrue(300 < peak_mib < 600, msg=peak_mib)
-        status, _, small_mib = trials.run_measured([sys.executable, "-c", "print('told')"], 300, self.at("log"))
+        status, _, _, small_mib = trials.run_measured([sys.executable, "-c", "print('told')"], 300, self.at("log"))
         self.assertEqual(status, 0)
         self.assertLess(small_mib, 200)
         with open(self.at("log"), encoding="ascii") as text:
@@ -142,7 +142,7 @@ class MeasuredRuns(InFolder):
 
     def test_the_limit_ends_children_too(self):
         script = f"sleep 600 & echo $! > {self.at('pid')}; wait"
-        status, _, _ = trials.run_measured(["/bin/sh", "-c", script], 2, self.at("log"))
+        status, *_ = trials.run_measured(["/bin/sh", "-c", script], 2, self.at("log"))
         self.assertIsNone(status)
         with open(self.at("pid"), encoding="ascii") as text:
             pid = int(text.read())
@@ -451,7 +451,7 @@ class Table(InFolder):
         for i, (row, truths, findings, status) in enumerate(rows):
             ledger.seal(str(i), {"effects": truths})
             records.append({"key": str(i), "row": row, "findings": findings, "status": status, "seconds": 10.0 + i,
-                            "peak_mib": 100.0})
+                            "cpu_s": 8.0 + i, "peak_mib": 100.0})
         return table.Scores(records, ledger)
 
     def measured(self, scores):
@@ -471,6 +471,8 @@ class Table(InFolder):
         self.assertTrue(told["pairs: one right and none wrong"][0].startswith("100.0 %"))
         self.assertEqual(told["no answer (failed or over the time limit)"], ("2", 7))
         self.assertEqual(told["decoys: material blamed"], ("not run", 0))
+        self.assertEqual(told["wall time of one diagnosis, median and longest"], ("13 s, 16 s", 7))
+        self.assertEqual(told["CPU time of one diagnosis, median and longest"], ("11 s, 14 s", 7))
 
     def test_causes_by_name(self):
         rows = self.scores([("single", [BIAS], [finding("range_bias")], "ok"),

@@ -44,7 +44,7 @@ class Results:
 
 
 def run_measured(command, limit_s, log):
-    """Runs a program in a process group of its own: (exit status or None after limit_s, seconds, peak MiB).
+    """Runs a program in a session of its own: (exit status or None after limit_s, wall s, CPU s, peak MiB).
 
     Its output goes to the file log. On whatever ends the wait, the whole group is ended.
     """
@@ -64,7 +64,7 @@ def run_measured(command, limit_s, log):
             os.killpg(child.pid, signal.SIGKILL)
             _, _, usage = os.wait4(child.pid, 0)
         child.returncode = status if status is not None else -signal.SIGKILL   # waited for above
-    return status, time.monotonic() - start, usage.ru_maxrss / 1024
+    return status, time.monotonic() - start, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
 
 
 def kept(finding):
@@ -81,9 +81,9 @@ def answer(program, session, folder, limit_s, jobs):
     output, log = os.path.join(folder, "out"), os.path.join(folder, "log")
     shutil.rmtree(output, ignore_errors=True)
     command = [program, session, "--output", output, "--jobs", str(jobs)]
-    status, seconds, peak_mib = run_measured(command, limit_s, log)
-    record = {"status": "ok", "exit": status, "seconds": round(seconds, 2), "peak_mib": round(peak_mib, 1),
-              "verdict": None, "findings": []}
+    status, seconds, cpu_s, peak_mib = run_measured(command, limit_s, log)
+    record = {"status": "ok", "exit": status, "seconds": round(seconds, 2), "cpu_s": round(cpu_s, 2),
+              "peak_mib": round(peak_mib, 1), "verdict": None, "findings": []}
     file = os.path.join(output, "findings.json")
     if status in (0, 2) and os.path.exists(file):
         with open(file, encoding="utf-8") as text:
