@@ -545,15 +545,14 @@ class OutsideTheCatalogue(WithBaseline):
             np.testing.assert_allclose(others(measurement.room.actors), others(measurement.described_actors))
 
     def test_no_strength_is_no_effect(self):
-        plain, clean = measure(poses=2)
+        plain, clean = measure(poses=1)
         for name in UNCATALOGUED:
             made = make_effect(name)
             made.scale(0.0)
-            measurement, received = measure(made, poses=2)
-            for i in range(2):
-                np.testing.assert_allclose(received[i], clean[i], atol=1e-9 * np.abs(clean[i]).max(), err_msg=name)
-                changed = measurement.measure(i, received[i]).astype(int) - plain.measure(i, clean[i])
-                self.assertLessEqual(np.abs(changed).max(), 1, msg=name)
+            measurement, received = measure(made, poses=1)
+            np.testing.assert_allclose(received[0], clean[0], atol=1e-9 * np.abs(clean[0]).max(), err_msg=name)
+            changed = measurement.measure(0, received[0]).astype(int) - plain.measure(0, clean[0])
+            self.assertLessEqual(np.abs(changed).max(), 1, msg=name)    # roundings may fall to the other side
 
     def test_strength_of_a_level_is_of_its_amplitude(self):
         made = make_effect("trailing_echo", {"level_db": -12.0}, 2.0)
