@@ -24,7 +24,8 @@ usage: ./run.sh VERB
   test         install, build, run every test; the last line is "N passed, N failed, N skipped"
   setup        install the Debian packages that are missing
   build        build the workspace (.ws/)
-  bench [OUT]  build, then run all benchmarks; JSON and a table in OUT (default bench_out)
+  bench [OUT]  build, then run all benchmarks; JSON and a table in OUT (default bench_out). Its last part, the blind
+               protocol, stops after 90 min; called again with the same OUT it goes on
   fuzz [S]     every reader of foreign bytes under libFuzzer with address and undefined-behaviour sanitizer, S seconds
                each (60); needs clang; corpus and findings stay in .ws/fuzz
   tsan         the streaming path's tests under the thread sanitizer
@@ -108,6 +109,9 @@ run_bench() {
   rosrun mmradartwin_tests compare_with_simulator.py --seed 1 | tee "$out/paths.txt"
   say "recall of the twin beside its ceiling"
   rosrun mmradartwin_tests recall_ceiling.py --seed 100 --sessions 6 | tee "$out/recall.txt"
+  # A trial that is finished does not run again: the same call goes on where the last one ended.
+  say "blind protocol of the diagnosis, 90 min of it at most"
+  rosrun mmradartwin_tests blind_protocol.py --output "$out/blind" --rows all --seed 1 --budget 90 | tee "$out/blind.txt"
 }
 
 # separate_build FOLDER TARGETS CMAKE_ARGUMENTS...: the workspace once more, compiled otherwise

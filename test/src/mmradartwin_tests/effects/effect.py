@@ -1,4 +1,6 @@
 """The interface of hidden effects and their table."""
+import math
+
 import numpy as np
 
 EFFECTS = {}        # of the catalogue, by the binding name
@@ -36,10 +38,13 @@ class Effect:
         self.p = {**self.defaults, **parameters}
 
     def scale(self, strength):
-        """Multiplies the main parameter."""
+        """Multiplies the main parameter; where that is a level in dB, the amplitude that it stands for."""
         if self.main is None:
             raise ValueError(f"effect {self.name} has no strength; it is there or not")
         value = self.p[self.main]
+        if self.main in ("level_db", "image_db"):
+            self.p[self.main] = value + 20 * math.log10(strength) if strength > 0 else -math.inf
+            return
         self.p[self.main] = [strength * v for v in value] if isinstance(value, list) else strength * value
 
     def radar(self, radar):

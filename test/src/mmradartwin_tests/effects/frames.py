@@ -67,6 +67,10 @@ class Interference(Effect):
     name, main = "interference", "frame_fraction"
     defaults = {"frame_fraction": 0.1, "level_db": 20.0, "slope_difference_hz_per_s": 1.5e12}
 
+    def __init__(self, **parameters):
+        super().__init__(**parameters)
+        self.struck = self.seen = 0
+
     def frames(self, measurement, index, station, frames, rng):
         radar = measurement.radar
         result = np.array(frames)
@@ -75,7 +79,9 @@ class Interference(Effect):
         t = np.arange(radar.samples) / radar.sample_rate_hz
         bearing = rng.uniform(-0.9, 0.9)
         steering = np.exp(-2j * math.pi * radar.rx[:, 1] * bearing / radar.wavelength_m)
-        for f in np.flatnonzero(rng.random(len(frames)) < self.p["frame_fraction"]):
+        struck = np.flatnonzero(rng.random(len(frames)) < self.p["frame_fraction"])
+        self.struck, self.seen = self.struck + len(struck), self.seen + len(frames)
+        for f in struck:
             for slot in range(len(radar.tx)):
                 crossing = rng.uniform(t[0], t[-1])
                 offset = self.p["slope_difference_hz_per_s"] * (t - crossing)
@@ -85,7 +91,8 @@ class Interference(Effect):
         return result
 
     def truth(self, measurement):
-        return {"frame_fraction": self.p["frame_fraction"]}
+        # What came to pass, which is all that the recording can tell.
+        return {"frame_fraction": self.struck / self.seen if self.seen else self.p["frame_fraction"]}
 
 
 @effect
@@ -105,13 +112,23 @@ class PacketLoss(Effect):
     name, main, rank = "packet_loss", "lost_fraction", 2
     defaults = {"lost_fraction": 0.03}
 
+    def __init__(self, **parameters):
+        super().__init__(**parameters)
+        self.lost = self.sent = 0
+
     def payload(self, measurement, index, station, payload, rng):
         data = bytearray(payload)
         count = -(-len(data) // PACKET_BYTES)
-        for packet in np.flatnonzero(rng.random(count) < self.p["lost_fraction"]):
+        lost = np.flatnonzero(rng.random(count) < self.p["lost_fraction"])
+        self.lost, self.sent = self.lost + len(lost), self.sent + count
+        for packet in lost:
             start, stop = packet * PACKET_BYTES, min((packet + 1) * PACKET_BYTES, len(data))
             data[start:stop] = bytes(stop - start)
         return bytes(data)
+
+    def truth(self, measurement):
+        # What came to pass, which is all that the recording can tell.
+        return {"lost_fraction": self.lost / self.sent if self.sent else self.p["lost_fraction"]}
 
 
 @effect

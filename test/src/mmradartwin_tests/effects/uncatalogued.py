@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from mmradartwin_tests.campaign import rotation_from_vector
 from mmradartwin_tests.effects.effect import Effect, uncatalogued
 from mmradartwin_tests.tracing import Path
 
@@ -38,11 +39,25 @@ def azimuth(directions):
     return np.arctan2(directions[:, 1], directions[:, 0])
 
 
+def delayed_copies(echoes, which, delay_m, factor):
+    """Paths like those of `which` (indices), delay_m of one-way range later and `factor` times as strong."""
+    copies = []
+    for i in which:
+        p, lengths = echoes.paths[i], echoes.lengths_m[i] + 2 * delay_m
+        copies.append(Path(p.event, p.facets, p.actors, p.vertices, p.departure, p.arrival, p.length_m + 2 * delay_m,
+                           complex(np.conj(echoes.coefficients[i] * factor)), lengths, p.cosines))
+    return copies
+
+
 @uncatalogued
 class RadomeRipple(EchoLaw):
     """A cover in front of the antenna: level and phase ripple over the azimuth, both legs."""
     name, main, variable = "radome_ripple", "ripple_db", "azimuth"
     defaults = {"ripple_db": 2.0, "ripple_deg": 15.0, "period_sine": 0.35}
+
+    def scale(self, strength):
+        self.p["ripple_db"] *= strength
+        self.p["ripple_deg"] *= strength
 
     def factor(self, measurement, station, departure, arrival, length_m, size):
         total = 0
@@ -136,6 +151,127 @@ class DampSpot(EchoLaw):
 
 
 @uncatalogued
+class RangeBump(EchoLaw):
+    """Level rises and falls over a stretch of range (a filter that is not as flat as drawn): a parabola, 0 outside."""
+    name, main, variable = "range_bump", "bump_db", "range"
+    defaults = {"bump_db": 5.0, "center_m": 3.2, "half_width_m": 1.8}
+
+    def factor(self, measurement, station, departure, arrival, length_m, size):
+        away = (length_m / 2 - self.p["center_m"]) / self.p["half_width_m"]
+        return 10**(self.p["bump_db"] * np.maximum(0, 1 - away**2) / 20)
+
+
+@uncatalogued
+class IncidenceGain(Effect):
+    """Surfaces return more at oblique incidence than any dielectric does, after the angle at the first of them."""
+    name, main = "incidence_gain", "rise_db"
+    defaults = {"rise_db": 8.0}
+
+    def factor(self, cosine):
+        """Of cosines of incidence [P]: rise_db times sin^2."""
+        return 10**(self.p["rise_db"] * (1 - np.clip(np.abs(cosine), 0, 1)**2) / 20)
+
+    def echoes(self, measurement, station, echoes):
+        if len(echoes.paths):
+            echoes.coefficients = echoes.coefficients * self.factor(np.array([p.cosines[0] for p in echoes.paths]))
+        ray = echoes.scatter.points - station.true.position
+        ray /= np.linalg.norm(ray, axis=1)[:, None]
+        cosine = np.sum(ray * measurement.room.normal[echoes.scatter.facet], axis=1)
+        echoes.scatter_coefficients = echoes.scatter_coefficients * self.factor(cosine)
+
+    def truth(self, measurement):
+        return {**self.p, "variable": "incidence"}
+
+
+class DelayLaw(Effect):
+    """Lengthens every echo's one-way range by a law."""
+    variable = ""
+
+    def shift_m(self, measurement, station, azimuth_rad):
+        """[P] from azimuths [P] in radar_link, the mean of departure and arrival."""
+        return np.zeros(len(azimuth_rad))
+
+    def echoes(self, measurement, station, echoes):
+        if len(echoes.paths):
+            legs = [azimuth(station.true.to_radar(np.array([getattr(p, side) for p in echoes.paths])))
+                    for side in ("departure", "arrival")]
+            echoes.lengths_m = echoes.lengths_m + 2 * self.shift_m(measurement, station, sum(legs) / 2)[:, None]
+        ray = station.true.to_radar(echoes.scatter.points - station.true.position)
+        shift = self.shift_m(measurement, station, azimuth(ray))
+        echoes.scatter.lengths_m = echoes.scatter.lengths_m + 2 * shift[:, None]
+
+    def truth(self, measurement):
+        return {**self.p, "variable": self.variable}
+
+
+@uncatalogued
+class LensDelay(DelayLaw):
+    """A cover that is thicker to the sides: range grows with the azimuth."""
+    name, main, variable = "lens_delay", "side_m", "azimuth"
+    defaults = {"side_m": 0.10}
+
+    def shift_m(self, measurement, station, azimuth_rad):
+        return self.p["side_m"] * np.sin(azimuth_rad)**2
+
+
+@uncatalogued
+class DelayCreep(DelayLaw):
+    """Range creeps while the campaign lasts."""
+    name, main, variable = "delay_creep", "total_m", "time"
+    defaults = {"total_m": 0.12}
+
+    def shift_m(self, measurement, station, azimuth_rad):
+        first, last = measurement.stations[0].stamp_ns, measurement.stations[-1].stamp_ns
+        return np.full(len(azimuth_rad), self.p["total_m"] * (station.stamp_ns - first) / max(1, last - first))
+
+
+@uncatalogued
+class LayeredPanel(Effect):
+    """An actor is hollow: behind its face a second one returns, so that its reflectivity changes over the band."""
+    name, main = "layered_panel", "level"
+    defaults = {"actor": None, "depth_m": 0.09, "level": 0.7}
+
+    def prepare(self, measurement):
+        rng = measurement.rng(161)
+        self.p["actor"] = self.p["actor"] or str(rng.choice(["wall_east", "wall_west", "bookshelf", "wardrobe"]))
+        self.index = measurement.described_room.actor_index(self.p["actor"])
+        self.turn = np.exp(2j * np.pi * rng.random())
+
+    def echoes(self, measurement, station, echoes):
+        hit = [i for i, p in enumerate(echoes.paths) if self.index in p.actors]
+        echoes.add(delayed_copies(echoes, hit, self.p["depth_m"], self.turn * self.p["level"]))
+
+    def truth(self, measurement):
+        x_m, y_m = measurement.described_actors[self.index].centroid()[:2]
+        return {**self.p, "variable": "actor", "x_m": float(x_m), "y_m": float(y_m)}
+
+
+@uncatalogued
+class TiltedPanel(Effect):
+    """A decoy: a flat thing on a wall hangs forward, and its specular point is lower than thought or off its face."""
+    name, main = "tilted_panel", "tilt_deg"
+    defaults = {"actor": "tv", "tilt_deg": 4.0}
+
+    def room(self, measurement, actors, materials):
+        return [self.tilted(a) if a.name == self.p["actor"] else a for a in actors], materials
+
+    def prepare(self, measurement):
+        measurement.described_room.actor_index(self.p["actor"])
+
+    def tilted(self, actor):
+        """Turned about its lower edge at the wall, the top into the room."""
+        (part,) = actor.parts
+        thin = int(np.argmin(part.size[:2]))
+        inward = part.rotation[:, thin] * np.sign(part.rotation[:, thin] @ (np.array([4.0, 3.0, 0]) - part.center))
+        hinge = part.center - 0.5 * part.size[2] * np.array([0, 0, 1]) - 0.5 * part.size[thin] * inward
+        turn = rotation_from_vector(math.radians(self.p["tilt_deg"]) * np.cross([0, 0, 1], inward))
+        return actor.moved(turn, np.zeros(3), hinge)
+
+    def truth(self, measurement):
+        return {**self.p, "variable": "actor"}
+
+
+@uncatalogued
 class TrailingEcho(Effect):
     """Every echo is followed by a weaker copy of itself (a mismatch in the signal path)."""
     name, main, rank = "trailing_echo", "level_db", 1
@@ -145,12 +281,8 @@ class TrailingEcho(Effect):
         self.turn = np.exp(2j * np.pi * measurement.rng(160).random())
 
     def echoes(self, measurement, station, echoes):
-        copies = [Path(p.event, p.facets, p.actors, p.vertices, p.departure, p.arrival,
-                       p.length_m + 2 * self.p["delay_m"],
-                       complex(np.conj(c * self.turn * 10**(self.p["level_db"] / 20))),
-                       lengths + 2 * self.p["delay_m"], p.cosines)
-                  for p, c, lengths in zip(echoes.paths, echoes.coefficients, echoes.lengths_m)]
-        echoes.add(copies)
+        factor = self.turn * 10**(self.p["level_db"] / 20)
+        echoes.add(delayed_copies(echoes, range(len(echoes.paths)), self.p["delay_m"], factor))
 
     def truth(self, measurement):
         return {**self.p, "variable": "range behind an echo"}

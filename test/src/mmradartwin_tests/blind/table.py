@@ -1,0 +1,154 @@
+"""The protocol's table: figures, what is required, what was measured, with exact binomial bounds."""
+import collections
+import statistics
+
+from scipy.stats import binomtest
+
+from mmradartwin_tests.blind.scoring import score
+
+HEAD = ("figure", "required", "measured", "trials")
+
+
+def bounds(count, trials):
+    """95 % Clopper-Pearson bounds of a share."""
+    interval = binomtest(count, trials).proportion_ci(0.95, method="exact")
+    return interval.low, interval.high
+
+
+def share(values):
+    """'hits of trials, share and bounds' of a list of truth values, with their number."""
+    values = [bool(v) for v in values]
+    if not values:
+        return "not run", 0
+    count, n = sum(values), len(values)
+    low, high = bounds(count, n)
+    return f"{100 * count / n:.1f} % ({100 * low:.1f} to {100 * high:.1f})", n
+
+
+class Scores:
+    """Scores of all results of one tier and campaign. LedgerError where a truth was changed after it was sealed."""
+
+    def __init__(self, records, ledger):
+        self.rows = collections.defaultdict(list)    # row: [(record, truths, score)]
+        self.silent = 0                              # trials without an answer
+        for record in records:
+            truths = ledger.open(record["key"])["effects"]
+            if record["status"] != "ok":
+                self.silent += 1
+            self.rows[record["row"]].append((record, truths, score(record["row"], truths, record["findings"])))
+
+    def each(self, row, figure, answered=False):
+        """A figure of all trials of a row that have it; `answered`: of those only where the program gave an answer."""
+        return [s[figure] for record, _, s in self.rows[row]
+                if s.get(figure) is not None and (record["status"] == "ok" or not answered)]
+
+    def coverage(self):
+        """[(parameter, covered, quantile)] over all rows where truths are named."""
+        return [c for row in self.rows.values() for _, _, s in row for c in s.get("coverage", [])]
+
+    def table(self):
+        """Rows of text: figure, required, measured, trials."""
+        named = self.each("pair", "named")
+        sizes = self.each("single", "group_size")
+        covered = [c[1] for c in self.coverage()]
+        gains = self.each("clean", "gain")
+        rows = [
+            ("false alarms on clean sessions", "≤ 1 %", *share(self.each("clean", "alarm", answered=True))),
+            ("single effects: right name first", "≥ 92 %", *share(self.each("single", "first"))),
+            ("single effects: wrong with confidence", "≤ 2 %", *share(self.each("single", "wrong"))),
+            ("single effects: truth within the first group", "≥ 98 %", *share(self.each("single", "in_group"))),
+            ("mean size of that group", "≤ 1.6", f"{statistics.mean(sizes):.2f}" if sizes else "not run",
+             len(sizes)),
+            ("actor, material, walls, pose or order right where the name is", "",
+             *share([v for row in ("single", "pair") for s in self.each(row, "subjects") for v in s])),
+            ("pairs: both named", "≥ 85 %", *share([all(n) for n in named])),
+            ("pairs: one right and none wrong", "≥ 97 %",
+             *share([any(n) and not w for n, w in zip(named, self.each("pair", "wrong"))])),
+            ("outside the catalogue: called unknown", "≥ 90 %", *share(self.each("outside", "unknown"))),
+            ("outside the catalogue: given a catalogue name", "≤ 3 %", *share(self.each("outside", "wrong"))),
+            ("outside the catalogue: right variable", "≥ 90 %", *share(self.each("outside", "variable"))),
+            ("outside the catalogue: place within 0.3 m", "all", *share(self.each("outside", "place"))),
+            ("decoys: material blamed", "≤ 2 %", *share(self.each("decoy", "material_blamed", answered=True))),
+            ("95 % intervals that hold the truth, right names only", "93 to 97 %", *share(covered)),
+            ("clean sessions: held-out gain of what was claimed negative", "never", *share([g < 0 for g in gains])),
+            ("put into a real recording: named", "", *share([n[0] for n in self.each("recording", "named")])),
+            ("put into a real recording: something else claimed", "", *share(self.each("recording", "wrong"))),
+        ]
+        records = [r for row in self.rows.values() for r, _, _ in row]
+        generated = [r for r in records if r["row"] != "recording"]
+        if generated:
+            for name, figure in (("wall", "seconds"), ("CPU", "cpu_s")):
+                times = [r[figure] for r in generated]
+                rows.append((f"{name} time of one diagnosis, median and longest", "",
+                             f"{statistics.median(times):.0f} s, {max(times):.0f} s", len(times)))
+            rows.append(("peak memory of one diagnosis", "≤ 2048 MiB", f"{max(r['peak_mib'] for r in records):.0f} MiB",
+                         len(records)))
+        rows.append(("no answer (failed or over the time limit)", "0", str(self.silent), len(records)))
+        return rows
+
+    def by_cause(self):
+        """Rows of text over the hidden effects of the rows with one: effect, trials, right, what else was said first."""
+        groups = collections.defaultdict(list)
+        for row in ("single", "outside", "decoy", "recording"):
+            for record, truths, s in self.rows[row]:
+                groups[(row, truths[0]["cause"])].append((record, s))
+        rows = []
+        for (row, cause), trials in sorted(groups.items()):
+            right = {"single": "first", "outside": "unknown"}.get(row)
+            if row == "recording":
+                good = sum(s["named"][0] for _, s in trials)
+            else:
+                good = sum(s[right] if right else not s["material_blamed"] for _, s in trials)
+            said = collections.Counter(r["findings"][0]["cause"] if r["findings"] else
+                                       "nothing" if r["status"] == "ok" else r["status"] for r, _ in trials)
+            rows.append((row, cause, f"{good} of {len(trials)}",
+                         ", ".join(f"{name} {n}" if n > 1 else name for name, n in said.most_common())))
+        return rows
+
+    def by_parameter(self):
+        """Rows of text: parameter, covered, bounds."""
+        groups = collections.defaultdict(list)
+        for name, covered, _ in self.coverage():
+            groups[name].append(covered)
+        return [(name, *(str(v) for v in share(values))) for name, values in sorted(groups.items())]
+
+
+def markdown(head, rows):
+    """A Markdown table."""
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    return "\n".join(lines + ["| " + " | ".join(str(c) for c in row) + " |" for row in rows])
+
+
+COLORS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#bcbd22", "#17becf")
+SIDE = 400    # of the plot's square, pixels
+
+
+def quantile_plot(coverage, fewest=5):
+    """P-P plot as SVG text: share of the trials over the truth's quantile in its interval's normal law.
+
+    A line for every parameter with at least `fewest` values and a black one for all; on the diagonal intervals are
+    honest, an S across it means that they are too narrow.
+    """
+    groups = collections.defaultdict(list)
+    for name, _, quantile in coverage:
+        groups[name].append(quantile)
+        groups["all"].append(quantile)
+    shown = [name for name, values in sorted(groups.items()) if len(values) >= fewest]
+    lines = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{SIDE + 330}" height="{SIDE + 60}" '
+             'font-family="sans-serif" font-size="11">',
+             '<rect width="100%" height="100%" fill="white"/><g transform="translate(40,10)">',
+             f'<rect width="{SIDE}" height="{SIDE}" fill="none" stroke="black"/>',
+             f'<line x1="0" y1="{SIDE}" x2="{SIDE}" y2="0" stroke="#999999"/>',
+             f'<text x="{SIDE / 2}" y="{SIDE + 35}" text-anchor="middle">quantile of the truth in its interval</text>',
+             f'<text x="-25" y="{SIDE / 2}" text-anchor="middle" transform="rotate(-90 -25 {SIDE / 2})">'
+             'share of trials</text>']
+    for tick in (0, 0.5, 1):
+        lines.append(f'<text x="{SIDE * tick}" y="{SIDE + 15}" text-anchor="middle">{tick:g}</text>')
+        lines.append(f'<text x="-4" y="{SIDE * (1 - tick) + 4}" text-anchor="end">{tick:g}</text>')
+    for place, name in enumerate(shown):
+        values = sorted(groups[name])
+        color, width = ("black", 2.5) if name == "all" else (COLORS[place % len(COLORS)], 1)
+        points = " ".join(f"{SIDE * q:.1f},{SIDE * (1 - (i + 0.5) / len(values)):.1f}" for i, q in enumerate(values))
+        lines.append(f'<polyline points="{points}" fill="none" stroke="{color}" stroke-width="{width}"/>')
+        lines.append(f'<text x="{SIDE + 10}" y="{12 + 14 * place}" fill="{color}">{name} ({len(values)})</text>')
+    return "\n".join(lines + ["</g></svg>"]) + "\n"

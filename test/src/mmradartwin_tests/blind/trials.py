@@ -1,0 +1,128 @@
+"""Runs one blind trial: hide, seal, diagnose, open, keep what came out. And keeps results, so that none runs twice."""
+import json
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+
+from mmradartwin_tests import effects
+from mmradartwin_tests.blind import draws, recordings
+from mmradartwin_tests.session import Measurement, Settings
+
+KEPT = ("cause", "parameters", "candidates", "evidence", "mechanism", "where", "description")
+
+
+class Results:
+    """A file of JSON lines, one per finished trial. An incomplete last line (the machine stopped) is dropped."""
+
+    def __init__(self, file):
+        self.file, self.records = file, {}
+        if not os.path.exists(file):
+            return
+        with open(file, "rb") as stream:
+            data = stream.read()
+        whole = data[:data.rfind(b"\n") + 1]
+        if len(whole) < len(data):
+            os.truncate(file, len(whole))
+        for number, line in enumerate(whole.splitlines(), 1):
+            try:
+                record = json.loads(line)
+                self.records[record["key"]] = record
+            except (ValueError, KeyError, TypeError):
+                raise ValueError(f"{file}: line {number} is no result; take the line out, its trial runs again") \
+                    from None
+
+    def add(self, record):
+        """Keeps a finished trial."""
+        self.records[record["key"]] = record
+        with open(self.file, "a", encoding="utf-8") as out:
+            out.write(json.dumps(record) + "\n")
+            out.flush()
+            os.fsync(out.fileno())
+
+
+def run_measured(command, limit_s, log):
+    """Runs a program in a session of its own: (exit status or None after limit_s, wall s, CPU s, peak MiB).
+
+    Its output goes to the file log. On whatever ends the wait, the whole group is ended.
+    """
+    start = time.monotonic()
+    with open(log, "wb") as out:
+        child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True)
+    status = usage = None
+    try:
+        while time.monotonic() - start < limit_s:
+            pid, raw, usage = os.wait4(child.pid, os.WNOHANG)
+            if pid:
+                status = os.waitstatus_to_exitcode(raw)
+                break
+            time.sleep(0.05)
+    finally:
+        if status is None:
+            os.killpg(child.pid, signal.SIGKILL)
+            _, _, usage = os.wait4(child.pid, 0)
+        child.returncode = status if status is not None else -signal.SIGKILL   # waited for above
+    return status, time.monotonic() - start, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+
+
+def kept(finding):
+    """What the results keep of a finding: pose lists and most metrics are left out."""
+    small = {key: finding[key] for key in KEPT if finding.get(key) is not None}
+    small["where"] = [{k: v for k, v in w.items() if k != "poses" and v} for w in finding.get("where") or []]
+    if finding.get("gain"):
+        small["gain"] = {"explained_power": finding["gain"]["explained_power"]}
+    return small
+
+
+def answer(program, session, folder, limit_s, jobs):
+    """Diagnoses a session; a record without key and truth."""
+    output, log = os.path.join(folder, "out"), os.path.join(folder, "log")
+    shutil.rmtree(output, ignore_errors=True)
+    command = [program, session, "--output", output, "--jobs", str(jobs)]
+    status, seconds, cpu_s, peak_mib = run_measured(command, limit_s, log)
+    record = {"status": "ok", "exit": status, "seconds": round(seconds, 2), "cpu_s": round(cpu_s, 2),
+              "peak_mib": round(peak_mib, 1), "verdict": None, "findings": []}
+    file = os.path.join(output, "findings.json")
+    if status in (0, 2) and os.path.exists(file):
+        with open(file, encoding="utf-8") as text:
+            told = json.load(text)
+        record.update(verdict=told["verdict"], findings=[kept(f) for f in told["findings"]])
+        return record
+    with open(log, encoding="utf-8", errors="replace") as text:
+        lines = text.read().replace("\r", "\n").splitlines()
+    record.update(status="timeout" if status is None else "failed", log=lines[-3:])
+    return record
+
+
+def hide(trial, session):
+    """Writes the session of a trial; returns its truths."""
+    if trial.row == "recording":
+        return recordings.write_session(trial, session)
+    chosen = [effects.make_effect(name, parameters, strength) for name, parameters, strength in draws.draw(trial)]
+    measurement = Measurement(Settings(output=session, seed=trial.session_seed(), poses=trial.poses,
+                                       frames=trial.frames, tier=trial.tier, effects=chosen, jobs=1))
+    measurement.run()
+    return measurement.truth()["effects"]
+
+
+def run_trial(trial, ledger, program, limit_s=600.0, jobs=1):
+    """One trial from drawing to its record. The session lives in a temporary folder and is gone afterwards."""
+    with tempfile.TemporaryDirectory(prefix="session") as folder:
+        session = os.path.join(folder, "session")
+        start = time.monotonic()
+        truths = hide(trial, session)
+        ledger.seal(trial.key(), {"key": trial.key(), "effects": truths})
+        made_s = time.monotonic() - start
+        record = answer(program, session, folder, limit_s, jobs)
+        if trial.row == "recording":
+            plain = os.path.join(folder, "plain")
+            recordings.write_untouched(plain)
+            before = answer(program, plain, folder, limit_s, jobs)
+            record["findings"] = recordings.beyond(record["findings"], before["findings"])
+            record["untouched"] = [f["cause"] for f in before["findings"]]
+    record.update(key=trial.key(), row=trial.row, tier=trial.tier, seed=trial.seed, trial=trial.trial,
+                  poses=trial.poses, frames=trial.frames, made_s=round(made_s, 2))
+    ledger.open(trial.key())     # refuses a truth that was changed meanwhile
+    return record
