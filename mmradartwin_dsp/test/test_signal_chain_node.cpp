@@ -133,6 +133,27 @@ TEST_F(SignalChainNodeTest, AveragesFramesAndPutsTheirPoseIn) {
   EXPECT_NEAR(maps_.messages.back()->range_m[static_cast<std::size_t>(r)], 3.0, 0.08);
 }
 
+// The second node of the launch files has a channels.yaml.
+TEST_F(SignalChainNodeTest, CorrectsTheMeasuredChannels) {
+  Inbox<mmradartwin_msgs::ReceiveGrid> corrected(nh_, "corrected/radar/grid");
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10);
+  while (ros::WallTime::now() < end && (!corrected.connected() || cubes_.getNumSubscribers() < 2)) {
+    ros::spinOnce();
+    ros::WallDuration(0.01).sleep();
+  }
+  ASSERT_TRUE(corrected.connected());
+  ros::WallDuration(0.5).sleep();  // the latched configuration
+  sendPose(stamp(-0.5), 1.0);
+  sendPose(stamp(10), 1.0);
+  send(0);
+  ASSERT_TRUE(grids_.wait(1, 10) && corrected.wait(1, 10));
+  const ComplexGrid raw = fromMsg(*grids_.messages[0]).x, x = fromMsg(*corrected.messages[0]).x;
+  EXPECT_TRUE(raw.row(0) == x.row(0));
+  const std::complex<double> f = raw(5, 9) / x(5, 9);
+  EXPECT_NEAR(std::arg(f) * 180 / M_PI, -30, 1e-4);
+  EXPECT_NEAR(20 * std::log10(std::abs(f)), 2, 1e-4);
+}
+
 TEST_F(SignalChainNodeTest, BeginsAnewWhenTheRadarMovesOrTurns) {
   sendPose(stamp(-0.5), 0);
   sendPose(stamp(1.5), 0);

@@ -6,6 +6,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/stationary_poses.h"
 
 namespace mmradartwin {
@@ -38,6 +39,8 @@ void SignalChainNode::readParameters(const ros::NodeHandle& private_nh) {
   pose_timeout_s_ = parameters.number("pose_timeout_s", pose_timeout_s_, 0, 60);
   map_frame_ = parameters.text("map_frame", map_frame_);
   radar_frame_ = parameters.text("radar_frame", radar_frame_);
+  const std::string channels = parameters.text("channels", "");
+  if (!channels.empty()) channels_ = loadChannelCorrection(resolvePath(channels, "/"));
   parameters.rejectUnknown();
 }
 
@@ -47,6 +50,7 @@ void SignalChainNode::onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& co
   try {
     const RadarConfig radar = fromMsg(*config);
     SignalChain chain(radar);
+    if (channels_) requireChannelsOf(radar, *channels_);
     chain_.emplace(std::move(chain));
     average_.emplace(radar, average_frames_);
     radar_hash_ = hash;
@@ -138,6 +142,7 @@ void SignalChainNode::process(const mmradartwin_msgs::AdcCube& msg,
 
 void SignalChainNode::publish(const std::optional<Eigen::Isometry3d>& T_map_radar) {
   ReceiveGrid grid = average_->grid();
+  if (channels_) correctChannels(*channels_, grid.x);
   grid.pose_valid = T_map_radar.has_value();
   if (T_map_radar) grid.T_map_radar = *T_map_radar;
   if (grid_publisher_.getNumSubscribers() > 0) {

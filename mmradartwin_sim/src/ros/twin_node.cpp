@@ -67,6 +67,8 @@ void TwinNode::readParameters(const ros::NodeHandle& private_nh) {
   scene_file_ = parameters.text("scene", "");
   twin_file_ = parameters.text("twin", "");
   radar_file_ = parameters.text("radar", "");
+  const std::string channels = parameters.text("channels", "");
+  if (!channels.empty()) channels_ = loadChannelCorrection(resolvePath(channels, "/"));
   map_frame_ = parameters.text("map_frame", map_frame_);
   radar_frame_ = parameters.text("radar_frame", radar_frame_);
   rate_hz_ = parameters.number("rate_hz", rate_hz_, 0, 1000);
@@ -122,7 +124,9 @@ void TwinNode::rebuild() {
   const std::string twin_file = !twin_file_.empty() ? resolvePath(twin_file_, "/") : session_twin_.value_or("");
   if (!radar_ || (!scene && twin_file.empty())) return;
   try {
-    auto twin = std::make_unique<Twin>(loadTwin(twin_file, scene, *radar_), seed_);
+    TwinDescription description = loadTwin(twin_file, scene, *radar_);
+    if (channels_) refuseSameChannelError(description, *channels_);
+    auto twin = std::make_unique<Twin>(std::move(description), seed_);
     radar_hash_ = radarHash(twin->radar());
     for (const std::string& note : twin->notes()) ROS_WARN("%s", note.c_str());
     mmradartwin_msgs::Scene msg = toMsg(twin->scene(), twin->description().toYaml());

@@ -10,6 +10,7 @@
 #include <deque>
 #include <optional>
 
+#include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/range_angle.h"
 
@@ -21,7 +22,8 @@ namespace mmradartwin {
 /// A frame waits until tf knows T_map_radar at its stamp, `pose_timeout_s` at most; without a pose it goes on with
 /// pose_valid = false. The average begins anew when the radar has moved by more than `moved_m` or `moved_deg` since the
 /// window's first pose, when radar/config changes, and when stamps go back (a bag that loops). Frames of another radar
-/// configuration than the latched one are refused.
+/// configuration than the latched one are refused. With `channels`, a channels.yaml, grids and maps of the measured
+/// branch are corrected by it; a radar/config that it does not fit is refused.
 class SignalChainNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
@@ -60,6 +62,7 @@ class SignalChainNode {
   std::uint64_t radar_hash_ = 0;
   std::optional<SignalChain> chain_;
   std::optional<CoherentAverage> average_;
+  std::optional<ChannelCorrection> channels_;
   std::optional<Eigen::Isometry3d> window_pose_;  ///< first known pose of the window
   std::deque<Waiting> queue_;
   ros::Time newest_;

@@ -25,7 +25,8 @@ namespace mmradartwin {
 /// time.
 ///
 /// The scene is that of the parameter `scene`, else of the latched session message, whose files are unpacked into a
-/// temporary folder.
+/// temporary folder. `channels` names what the measured branch is corrected by: a twin with the same channel errors is
+/// refused.
 class TwinNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
@@ -46,6 +47,7 @@ class TwinNode {
   std::string scene_file_, twin_file_, radar_file_, map_frame_ = "map", radar_frame_ = "radar_link";
   double rate_hz_ = 10, reuse_m_ = 1e-4, reuse_rad_ = 0, pose_timeout_s_ = 0.2;
   std::uint64_t seed_ = 1;
+  std::optional<ChannelCorrection> channels_;
 
   std::optional<RadarConfig> radar_;
   std::uint64_t radar_hash_ = 0;  ///< of the twin's radar
