@@ -81,8 +81,10 @@ int run(const Arguments& arguments) {
   if (!twin.scene_file.empty()) twin.scene_file = fs::absolute(twin.scene_file).lexically_normal().string();
 
   CalibrationTarget target;
+  std::optional<Twin> room;  // says where a wall's echo comes alone
   if (!arguments.wall.empty()) {
-    target = wallTarget(loadScene(twin.scene_file, recording.radar.center_frequency_hz()), arguments.wall);
+    room.emplace(twin);
+    target = wallTarget(room->scene(), arguments.wall);
   } else {
     target.name = "the corner reflector";
     target.reflector_map_m =
@@ -93,7 +95,8 @@ int run(const Arguments& arguments) {
   MountCalibration calibration;
   {
     ProgressBar progress(static_cast<int>(recording.poses.size()));
-    calibration = calibrateMount(recording, target, lasers, arguments.options, [&](int done) { progress.show(done); });
+    calibration = calibrateMount(recording, target, lasers, arguments.options, room ? &*room : nullptr,
+                                 [&](int done) { progress.show(done); });
   }
 
   fs::create_directories(arguments.output);
