@@ -174,14 +174,32 @@ TEST_F(SignalChainNodeTest, WaitsForThePoseAtTheStampAndGoesOnWithoutOne) {
   ros::WallDuration(0.1).sleep();
   ros::spinOnce();
   EXPECT_TRUE(grids_.messages.empty()) << "did not wait for tf";
-  sendPose(stamp(0.5), 6);
+  sendPose(stamp(0.5), 5.08);
   ASSERT_TRUE(grids_.wait(1));
   EXPECT_TRUE(grids_.messages[0]->pose_valid);
-  EXPECT_NEAR(grids_.messages[0]->T_map_radar.position.x, 5.5, 1e-9);  // between the two, at the frame's stamp
+  EXPECT_NEAR(grids_.messages[0]->T_map_radar.position.x, 5.04, 1e-9);  // between the two, at the frame's stamp
   send(1);
   ASSERT_TRUE(grids_.wait(2));
   EXPECT_FALSE(grids_.messages[1]->pose_valid);
   EXPECT_EQ(grids_.messages[1]->T_map_radar.orientation.w, 1);
+}
+
+TEST_F(SignalChainNodeTest, GivesNoPoseToFramesWithinAJumpOrAGapOfTf) {
+  // A jump of 1 m at frame 2, 0.25 s of silence over which the radar goes 0.3 m on at frames 5 to 9, as long a silence
+  // that ends where it began at frames 11 to 15.
+  for (double at : {-0.5, 0.5, 1.5}) sendPose(stamp(at), 1.0);
+  for (double at : {2.5, 3.5, 4.5}) sendPose(stamp(at), 2.0);
+  for (double at : {9.5, 10.5, 15.5, 16.5}) sendPose(stamp(at), 2.3);
+  const std::vector<int> sent = {0, 1, 2, 3, 4, 5, 7, 9, 10, 11, 14, 16};
+  for (int i : sent) send(i);
+  ASSERT_TRUE(grids_.wait(sent.size(), 20));
+  std::vector<std::string> got;
+  for (const auto& grid : grids_.messages) {
+    got.push_back(grid->pose_valid ? std::to_string(grid->T_map_radar.position.x).substr(0, 3) : "-");
+    got.back() += " " + std::to_string(grid->frames);
+  }
+  EXPECT_EQ(got, (std::vector<std::string>{"1.0 1", "1.0 2", "- 1", "2.0 1", "2.0 2", "- 1", "- 2", "- 3", "2.3 1",
+                                           "2.3 2", "2.3 3", "2.3 3"}));
 }
 
 TEST_F(SignalChainNodeTest, SurvivesBadMessagesAndForeignRadars) {

@@ -19,10 +19,9 @@ namespace mmradartwin {
 
 /// radar/config, session, radar/grid, tf -> twin/grid, twin/paths, twin/scene, diagnostics.
 ///
-/// Simulates at the pose of each measured grid (the grid's own, else tf at its stamp) and at `rate_hz` along tf while
-/// no measurement comes. Records are used again while the radar stands within `reuse_m` and `reuse_deg`. Of grids that
-/// come while one is simulated the newest is taken and the others are counted as skipped. Callbacks must come one at a
-/// time.
+/// Simulates at the pose of each measured grid that has one, and at `rate_hz` along tf while no measurement comes.
+/// Records are used again while the radar stands within `reuse_m` and `reuse_deg`. Of grids that come while one is
+/// simulated the newest is taken and the others are counted as skipped. Callbacks must come one at a time.
 ///
 /// The scene is that of the parameter `scene`, else of the latched session message, whose files are unpacked into a
 /// temporary folder. `channels` names what the measured branch is corrected by: a twin with the same channel errors is
@@ -45,7 +44,7 @@ class TwinNode {
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
   std::string scene_file_, twin_file_, radar_file_, map_frame_ = "map", radar_frame_ = "radar_link";
-  double rate_hz_ = 10, reuse_m_ = 1e-4, reuse_rad_ = 0, pose_timeout_s_ = 0.2;
+  double rate_hz_ = 10, reuse_m_ = 1e-4, reuse_rad_ = 0;
   std::uint64_t seed_ = 1;
   std::optional<ChannelCorrection> channels_;
 
@@ -58,7 +57,7 @@ class TwinNode {
   std::optional<Simulation> last_;
 
   mmradartwin_msgs::ReceiveGrid::ConstPtr pending_;
-  ros::WallTime pending_since_, measured_at_, published_at_;
+  ros::WallTime measured_at_, published_at_;
   std::uint64_t simulated_ = 0, reused_ = 0, skipped_ = 0, without_pose_ = 0;
   double simulate_ms_ = 0;
 
