@@ -11,8 +11,8 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/map_picture.h"
 #include "mmradartwin_dsp/program.h"
-#include "mmradartwin_dsp/ros/bag.h"
 #include "mmradartwin_sim/twin.h"
+#include "recording_arguments.h"
 
 namespace {
 
@@ -20,8 +20,9 @@ namespace fs = std::filesystem;
 using namespace mmradartwin;
 
 struct Arguments {
-  std::string recording, output, twin, scene, radar, wall, lasers;
-  std::string channels = "twin";
+  RecordingArguments input;
+  std::string output, wall, lasers;
+  std::string channels_to = "twin";
   std::vector<double> reflector_m, mount;
   MountCalibrationOptions options;
 };
@@ -33,8 +34,16 @@ void write(const fs::path& file, const std::string& text) {
   if (!out) throw InputError(file.string() + ": cannot be written; is there space, and may you write there?");
 }
 
-/// The mechanisms that a calibration answers, in place of what the twin had of them.
-void calibrate(TwinDescription& twin, const MountCalibration& c, bool channels) {
+/// Values of a list, in its order.
+std::vector<double> valuesOf(const std::vector<CalibratedValue>& list) {
+  std::vector<double> values;
+  for (const CalibratedValue& v : list) values.push_back(v.value);
+  return values;
+}
+
+/// The mechanisms that a calibration answers, in place of what the twin had of them. Channel errors go into the twin,
+/// or the measured branch takes them out and the twin has none, or all stays as it is.
+void calibrate(TwinDescription& twin, const MountCalibration& c, const std::string& channels) {
   const auto replace = [&twin](const std::string& mechanism, const Parameters* values) {
     auto& all = twin.mechanisms;
     all.erase(std::remove_if(all.begin(), all.end(), [&](const auto& m) { return m.mechanism == mechanism; }),
@@ -46,15 +55,12 @@ void calibrate(TwinDescription& twin, const MountCalibration& c, bool channels) 
   position.set("forward_m", c.forward_m.value);
   position.set("left_m", c.left_m.value);
   range.set("range_m", c.range_m.value);
-  std::vector<double> phase, gain;
-  for (const CalibratedValue& v : c.phase_deg) phase.push_back(v.value);
-  for (const CalibratedValue& v : c.gain_db) gain.push_back(v.value);
-  channel.set("phase_deg", phase);
-  channel.set("gain_db", gain);
+  channel.set("phase_deg", valuesOf(c.phase_deg));
+  channel.set("gain_db", valuesOf(c.gain_db));
   if (c.yaw_deg.observable) replace("radar_yaw_offset", &yaw);
   if (c.forward_m.observable || c.left_m.observable) replace("radar_position_offset", &position);
   if (c.range_m.observable) replace("range_bias", &range);
-  if (channels) replace("channel_phase_error", &channel);
+  if (channels != "none") replace("channel_phase_error", channels == "twin" ? &channel : nullptr);
 }
 
 void print(const CalibratedValue& v, const std::string& label) {
@@ -70,16 +76,15 @@ int run(const Arguments& arguments) {
   if (arguments.reflector_m.empty() == arguments.wall.empty()) {
     throw InputError("give what the radar was held in front of: either --reflector X Y Z (map, m) or --wall ACTOR");
   }
-  const Recording recording = openRecording(arguments.recording, arguments.radar);
-  std::optional<std::string> scene_file = recording.scene_file;
-  if (!arguments.scene.empty()) scene_file = arguments.scene;
-  const std::string twin_file = !arguments.twin.empty() ? arguments.twin : recording.twin_file.value_or("");
-  TwinDescription twin = loadTwin(twin_file, scene_file, recording.radar);
+  const Recording recording = arguments.input.open();
+  TwinDescription twin = arguments.input.loadTwinOf(recording);
   if (!twin.scene_file.empty()) twin.scene_file = fs::absolute(twin.scene_file).lexically_normal().string();
 
   CalibrationTarget target;
+  std::optional<Twin> room;  // says where a wall's echo comes alone
   if (!arguments.wall.empty()) {
-    target = wallTarget(loadScene(twin.scene_file, recording.radar.center_frequency_hz()), arguments.wall);
+    room.emplace(twin);
+    target = wallTarget(room->scene(), arguments.wall);
   } else {
     target.name = "the corner reflector";
     target.reflector_map_m =
@@ -90,13 +95,19 @@ int run(const Arguments& arguments) {
   MountCalibration calibration;
   {
     ProgressBar progress(static_cast<int>(recording.poses.size()));
-    calibration = calibrateMount(recording, target, lasers, arguments.options, [&](int done) { progress.show(done); });
+    calibration = calibrateMount(recording, target, lasers, arguments.options, room ? &*room : nullptr,
+                                 [&](int done) { progress.show(done); });
   }
 
   fs::create_directories(arguments.output);
   const fs::path folder(arguments.output);
-  calibrate(twin, calibration, arguments.channels == "twin");
+  calibrate(twin, calibration, arguments.channels_to);
   write(folder / "twin.yaml", twin.toYaml());
+  fs::remove(folder / "channels.yaml");  // an earlier run's would correct what this twin may have
+  if (arguments.channels_to == "measured") {
+    write(folder / "channels.yaml",
+          toYaml(ChannelCorrection{"", valuesOf(calibration.phase_deg), valuesOf(calibration.gain_db)}));
+  }
   write(folder / "calibration.yaml", toYaml(calibration));
   writePicture(drawCalibration(calibration), (folder / "calibration.png").string());
 
@@ -124,6 +135,10 @@ int run(const Arguments& arguments) {
   }
   std::cout << "Twin: " << (folder / "twin.yaml").string() << ", picture: " << (folder / "calibration.png").string()
             << '\n';
+  if (arguments.channels_to == "measured") {
+    std::cout << "Channels: " << (folder / "channels.yaml").string()
+              << "; give it as --channels to process, evaluate and diagnose, and as channels:= to live.launch\n";
+  }
   return calibration.problems.empty() ? 0 : 2;
 }
 
@@ -133,19 +148,17 @@ int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app("Finds the radar's mount, range bias and channel errors from poses in front of a known target.");
   app.name("calibrate");
-  app.add_option("recording", arguments.recording, "session directory, session.yaml or bag")->required();
-  app.add_option("--output", arguments.output, "folder for twin.yaml, calibration.yaml and calibration.png")
-      ->required();
+  arguments.input.addTo(app);
+  app.add_option("--output", arguments.output, "folder for twin.yaml, calibration.yaml, calibration.png")->required();
   app.add_option("--reflector", arguments.reflector_m, "corner reflector's apex in map: X Y Z [m]")->expected(3);
   app.add_option("--wall", arguments.wall, "actor of the scene that the radar was held in front of");
   app.add_option("--laser", arguments.lasers, "CSV pose,distance_m: radar to target as a laser meter gave it");
-  app.add_option("--channels", arguments.channels,
-                 "twin: channel errors go into twin.yaml; none: they are only reported")
-      ->check(CLI::IsMember({"twin", "none"}))
+  app.add_option(
+         "--channels", arguments.channels_to,
+         "twin: channel errors go into twin.yaml; measured: into channels.yaml, by which the measured branch is "
+         "corrected; none: they are only reported")
+      ->check(CLI::IsMember({"twin", "measured", "none"}))
       ->capture_default_str();
-  app.add_option("--twin", arguments.twin, "twin.yaml to complete (default: the session's, or the base mechanisms)");
-  app.add_option("--scene", arguments.scene, "scene.yaml where the recording names none");
-  app.add_option("--radar", arguments.radar, "radar.yaml for a recording without one");
   app.add_option("--mount", arguments.mount,
                  "camera_link -> radar_link that the poses were made with, x y z yaw pitch roll [m, rad]: prints the "
                  "corrected one for live.launch")

@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <boost/timer/progress_display.hpp>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -11,48 +10,38 @@
 #include "mmradartwin_attribution/pose_picture.h"
 #include "mmradartwin_attribution/report.h"
 #include "mmradartwin_attribution/ros/results_bag.h"
-#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/map_picture.h"
-#include "mmradartwin_dsp/ros/bag.h"
+#include "mmradartwin_dsp/program.h"
+#include "recording_arguments.h"
 
 namespace {
 
 using namespace mmradartwin;
 
 struct Arguments {
-  std::string recording, output, twin, simulated, config, radar, layout, scene;
+  RecordingArguments input;
+  std::string output, simulated, config;
   int jobs = 0;
   bool no_pictures = false, no_bag = false;
 };
 
-Recording open(const std::string& path, const Arguments& arguments) {
-  if (std::filesystem::path(path).extension() == ".bag") return openRecording(path, arguments.radar);
-  SessionOptions options;
-  options.radar_file = arguments.radar;
-  if (arguments.layout == "4lane") options.layout = CaptureLayout::kFourLane;
-  if (arguments.layout == "2lane") options.layout = CaptureLayout::kTwoLane;
-  return openSession(path, options);
-}
-
 int run(const Arguments& arguments, const std::vector<std::string>& command) {
-  const Recording recording = open(arguments.recording, arguments);
-  std::optional<std::string> scene_file = recording.scene_file;
-  if (!arguments.scene.empty()) scene_file = arguments.scene;
-  std::string twin_file = arguments.twin;
-  if (twin_file.empty() && recording.twin_file && arguments.simulated.empty()) twin_file = *recording.twin_file;
-
-  // The twin also brings the scene that the expected regions come from.
-  Twin twin(loadTwin(arguments.simulated.empty() ? twin_file : "", scene_file, recording.radar));
+  const Recording recording = arguments.input.open();
+  const bool from_twin = arguments.simulated.empty();
+  // The twin also brings the scene that the expected regions come from; beside a simulated session it is that of the
+  // base mechanisms.
+  Twin twin(from_twin ? arguments.input.loadTwinOf(recording)
+                      : loadTwin("", arguments.input.sceneFile(recording), recording.radar));
   Recording other;
   SimulatedBranch simulated;
-  if (arguments.simulated.empty()) {
+  if (from_twin) {
     std::vector<Eigen::Isometry3d> poses;
     for (const Pose& pose : recording.poses) poses.push_back(pose.T_map_radar);
     twin.prepare(poses);
     twin.setSession(recording.poses);
     simulated = simulatedByTwin(twin);
   } else {
-    other = open(arguments.simulated, arguments);
+    other = arguments.input.open(arguments.simulated);
     simulated = simulatedBySession(other);
   }
 
@@ -84,19 +73,20 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
 
   RunDescription description;
   description.command = command;
-  description.recording = arguments.recording;
-  description.simulated = arguments.simulated.empty() ? "twin" : arguments.simulated;
+  description.recording = arguments.input.recording;
+  description.simulated = from_twin ? "twin" : arguments.simulated;
   description.version = packageVersion();
   description.attribution_yaml = toYaml(options.config);
   description.radar_yaml = toYaml(recording.radar);
-  std::vector<std::string> more = {arguments.config, arguments.radar, twin_file, twin.description().scene_file};
-  if (arguments.simulated.empty()) {
+  std::vector<std::string> more = {arguments.config, arguments.input.radar, arguments.input.channels,
+                                   twin.description().file, twin.description().scene_file};
+  if (from_twin) {
     description.twin_yaml = twin.description().toYaml();
   } else {
     const std::vector<std::string> files = inputFiles(arguments.simulated, other, {});
     more.insert(more.end(), files.begin(), files.end());
   }
-  description.inputs = hashFiles(inputFiles(arguments.recording, recording, more));
+  description.inputs = hashFiles(inputFiles(arguments.input.recording, recording, more));
   report.write(evaluation, options.config, description);
 
   for (const PoseProblem& problem : evaluation.problems) std::cerr << "error: " << problem.message << '\n';
@@ -110,31 +100,14 @@ int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app("Compares a recorded session with its twin and attributes what differs.");
   app.name("evaluate");
-  app.add_option("recording", arguments.recording, "session directory, session.yaml or bag")->required();
+  arguments.input.addTo(app);
+  arguments.input.addChannelsTo(app);
   app.add_option("--output", arguments.output, "folder for table, CSV, pictures and report")->required();
-  app.add_option("--twin", arguments.twin, "twin.yaml (default: the session's, or the base mechanisms)");
-  app.add_option("--scene", arguments.scene, "scene.yaml where the recording names none");
   app.add_option("--simulated", arguments.simulated, "take the simulated maps from this session instead of a twin");
   app.add_option("--config", arguments.config, "attribution.yaml (default: the built-in values, as shipped)");
-  app.add_option("--radar", arguments.radar, "radar.yaml for a recording without one");
-  app.add_option("--layout", arguments.layout, "byte layout of the captures, instead of radar.yaml's")
-      ->check(CLI::IsMember({"4lane", "2lane"}));
   app.add_option("--jobs", arguments.jobs, "threads (default: one per core)")->check(CLI::Range(1, 1024));
   app.add_flag("--no-pictures", arguments.no_pictures, "leave the per-pose pictures out");
   app.add_flag("--no-bag", arguments.no_bag, "leave results.bag (for rviz) out");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    const int status = app.exit(error, std::cout, std::cerr);
-    return status == 0 ? 0 : 2;
-  }
-  try {
-    return run(arguments, std::vector<std::string>(argv, argv + argc));
-  } catch (const InputError& error) {
-    std::cerr << "error: " << error.what() << '\n';
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << "error: " << error.what() << '\n';
-    return 1;
-  }
+  const std::vector<std::string> command(argv, argv + argc);
+  return runProgram(app, argc, argv, [&] { return run(arguments, command); });
 }

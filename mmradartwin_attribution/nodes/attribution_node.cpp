@@ -305,6 +305,7 @@ class AttributionNode {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "attribution");
+  const ros::NodeHandle keep_alive;  // outlives the node: with the last handle gone, roscpp prints nothing any more
   try {
     AttributionNode node;
     const mmradartwin::MasterWatch master_watch;

@@ -7,23 +7,13 @@
 
 #include <mutex>
 
-#include "mmradartwin_dsp/coherent_average.h"
+#include "mmradartwin_dsp/average_pose.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
 
 RangeAngleMap averagedMap(const Recording& recording, const SignalChain& chain, const Pose& pose) {
-  CoherentAverage average(recording.radar, 0);
-  recording.forEachFrame(pose, [&](const AdcCube& cube) { average.add(cube); });
-  if (!average.complete()) {
-    throw InputError("pose '" + pose.name + "': its capture holds no valid chirp for some TDM slot; record it again");
-  }
-  ReceiveGrid grid = average.grid();
-  grid.pose_valid = true;
-  grid.T_map_radar = pose.T_map_radar;
-  RangeAngleMap map = chain.map(grid);
-  map.frames = average.frames();
-  return map;
+  return chain.map(averagePose(recording, pose));
 }
 
 SimulatedBranch simulatedByTwin(const Twin& twin) {
@@ -80,7 +70,7 @@ Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated
       out.used = true;
     } catch (const InputError& error) {
       const std::string prefix = "pose '" + out.pose.name + "': ", message = error.what();
-      out.problem = message.rfind(prefix, 0) == 0 ? message : prefix + message;
+      out.problem = message.find(prefix) != std::string::npos ? message : prefix + message;
     }
     if (options.on_pose && out.used) options.on_pose(out);
     if (!options.keep_records) out.records = {};

@@ -20,7 +20,6 @@ namespace mmradartwin {
 namespace {
 
 using Complex = std::complex<double>;
-using synthetic::paperRadar;
 
 constexpr int kFrames = 60;
 constexpr double kNoise_counts = 6;  // rms of I and of Q

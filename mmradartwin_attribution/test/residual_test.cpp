@@ -12,7 +12,7 @@ using synthetic::Target;
 
 class ResidualTest : public ::testing::Test {
  protected:
-  RadarConfig radar_ = synthetic::paperRadar();
+  RadarConfig radar_ = paperRadar();
   SignalChain chain_{radar_};
   EvaluationField field_{AttributionConfig(), radar_, chain_.axes()};
   const Target anchor_{3.0, 0, 0};  // in both branches, at a region: what the others are relative to

@@ -79,7 +79,7 @@ class RoomTest : public ::testing::Test {
         std::count_if(regions.begin(), regions.end(), [kind](const ResponseRegion& r) { return r.kind == kind; }));
   }
 
-  RadarConfig radar_ = synthetic::paperRadar();
+  RadarConfig radar_ = paperRadar();
   EvaluationField field_{AttributionConfig(), radar_, SignalChain(radar_).axes()};
   Scene scene_;
   std::unique_ptr<RayCaster> rays_;

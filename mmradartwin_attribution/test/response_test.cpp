@@ -9,7 +9,6 @@ namespace mmradartwin {
 namespace {
 
 using synthetic::kDegree;
-using synthetic::paperRadar;
 
 class ResponseTest : public ::testing::Test {
  protected:

@@ -3,26 +3,22 @@
 #include "../emulator/emulated_rig.h"
 
 #include <signal.h>
-#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
 
+#include "emulator_program.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace {
 
 namespace fs = std::filesystem;
-
-volatile sig_atomic_t interrupted = 0;
 
 /// The folder in which a running rig is found: `usb` (the bus), `pid`, and `control`, a socket that takes commands.
 class RunFolder {
@@ -79,78 +75,34 @@ int main(int argc, char** argv) {
       "Emulates an AWR2243BOOST on a DCA1000EVM: USB, LVDS and Ethernet. The radar sees the session's captures while "
       "its frames run. Needs root for the card's network, or --loopback."};
   std::string session_path, folder = defaultFolder();
-  mmradartwin::PlayedSelection selection;
   EmulatedRig::Options options;
-  bool no_firmware = false, end_with_parent = false;
+  bool no_firmware = false;
   app.add_option("session", session_path, "session directory")->required();
-  app.add_option("--first", selection.first, "index of the first pose")->check(CLI::NonNegativeNumber);
-  app.add_option("--every", selection.every, "then every so-manieth pose")->check(CLI::PositiveNumber);
-  app.add_option("--count", selection.count, "poses at most; 0: all")->check(CLI::NonNegativeNumber);
+  mmradartwin::EmulatorProgram program(app, options.card);
   app.add_option("--run-folder", folder, "where with_emulated_usb and the control socket find this rig")
       ->capture_default_str();
   app.add_option("--interface", options.interface, "this host's end of the cable")->capture_default_str();
-  app.add_option("--card-ip", options.card.card_ip, "address of the card")->capture_default_str();
-  app.add_option("--host-ip", options.card.host_ip, "address of this host on the card's network")
-      ->capture_default_str();
   app.add_flag("--loopback", options.loopback, "no network of its own: both addresses are this host's");
   app.add_flag("--once", options.lanes.once, "end with the session instead of beginning it anew");
   app.add_flag("--no-firmware", no_firmware, "the radar's flash is empty");
   app.add_flag("--lanes-reversed", options.lanes.lanes_reversed, "wiring fault: lane k carries receiver 3 - k");
   app.add_flag("--iq-swapped", options.lanes.iq_swapped, "wiring fault: Q comes before I");
-  app.add_option("--deaf-s", options.card.deaf_s, "silence after CONFIG_FPGA")->check(CLI::Range(0.0, 60.0));
-  app.add_option("--flush-s", options.card.flush_s, "from the last sample to the short last packet")
-      ->check(CLI::Range(0.0, 60.0));
-  app.add_option("--loss", options.card.loss, "probability that a data packet is lost")->check(CLI::Range(0.0, 1.0));
-  app.add_option("--jitter-us", options.card.jitter_us, "packets leave late by an exponential time of this mean")
-      ->check(CLI::Range(0.0, 1e5));
-  app.add_option("--stall-us", options.card.stall_us, "with --jitter-us: one packet in twenty by up to so much more")
-      ->check(CLI::Range(0.0, 1e6));
-  app.add_option("--seed", options.card.seed, "of these chances")->capture_default_str();
-  app.add_flag("--end-with-parent", end_with_parent, "end when the program ends that started this one");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  if (end_with_parent) {
-    prctl(PR_SET_PDEATHSIG, SIGTERM);
-    if (getppid() == 1) return 1;
-  }
-  options.firmware_in_flash = !no_firmware;
-  std::setvbuf(stdout, nullptr, _IOLBF, 0);
-  std::mutex output;
-  const auto log = [&output](const std::string& line) {
-    const std::lock_guard<std::mutex> lock(output);
-    std::printf("%s\n", line.c_str());
-  };
-  struct sigaction action {};
-  action.sa_handler = [](int) { interrupted = 1; };
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-  signal(SIGPIPE, SIG_IGN);
-  try {
-    const auto session = mmradartwin::openPlayedSession(session_path, "", selection);
-    for (const auto& problem : session.problems) {
-      std::fprintf(stderr, "pose %s left out: %s\n", problem.pose.c_str(), problem.message.c_str());
-    }
-    EmulatedRig rig(session, options, log);
+  return program.run(argc, argv, [&] {
+    options.firmware_in_flash = !no_firmware;
+    signal(SIGPIPE, SIG_IGN);
+    const auto session = program.open(session_path, "");
+    EmulatedRig rig(session, options, [&program](const std::string& line) { program.log(line); });
     const RunFolder run(folder, rig.usb_root());
-    log("ready poses=" + std::to_string(session.poses.size()) + " frames=" + std::to_string(session.frames) +
-        " card=" + options.card.card_ip);
-    while (!interrupted && !rig.completed()) {
+    program.log("ready poses=" + std::to_string(session.poses.size()) + " frames=" + std::to_string(session.frames) +
+                " card=" + options.card.card_ip);
+    while (!program.interrupted() && !rig.completed()) {
       rig.serve(50);
       const std::string command = run.command();
       const std::string wrong = command.empty() ? "" : rig.handle(command);
-      if (!wrong.empty()) log("error: " + command + ": " + wrong);
+      if (!wrong.empty()) program.log("error: " + command + ": " + wrong);
     }
     // The host answers the end of a recording with RECORD_STOP.
-    for (int i = 0; i < 10 && !interrupted; ++i) rig.serve(100);
+    for (int i = 0; i < 10 && !program.interrupted(); ++i) rig.serve(100);
     return session.problems.empty() ? 0 : 2;
-  } catch (const mmradartwin::InputError& error) {
-    std::fprintf(stderr, "error: %s\n", error.what());
-    return 2;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "error: %s\n", error.what());
-    return 1;
-  }
+  });
 }

@@ -8,6 +8,7 @@
 
 #include "mmradartwin_driver/frame_assembler.h"
 #include "mmradartwin_driver/packet_receiver.h"
+#include "mmradartwin_dsp/paper_radar.h"
 
 namespace mmradartwin {
 namespace {
@@ -15,17 +16,8 @@ namespace {
 constexpr std::size_t kPayload = 1456;
 
 RadarConfig radarWithLoops(int loops) {
-  RadarConfig radar;
-  radar.device = "awr2243";
-  radar.carrier_hz = 77e9;
-  radar.slope_hz_per_s = 75e12;
-  radar.samples_per_chirp = 64;
-  radar.sample_rate_hz = 5e6;
-  radar.adc_start_s = 6e-6;
+  RadarConfig radar = paperRadar();
   radar.loops_per_frame = loops;
-  radar.frame_period_s = 0.05;
-  radar.tx_position_m.assign(2, Eigen::Vector3d::Zero());
-  radar.rx_position_m.assign(4, Eigen::Vector3d::Zero());
   return radar;
 }
 

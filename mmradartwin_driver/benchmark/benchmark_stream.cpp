@@ -21,6 +21,7 @@
 #include "mmradartwin_driver/frame_assembler.h"
 #include "mmradartwin_driver/hand_over.h"
 #include "mmradartwin_driver/packet_receiver.h"
+#include "mmradartwin_dsp/paper_radar.h"
 #include "mmradartwin_dsp/program.h"
 
 namespace {
@@ -211,17 +212,9 @@ Result receiveOnly(const Options& options, const std::function<void()>& ready, c
 
 /// 128 loops of 2 x 64 samples: 262,144 bytes a frame, as fast as they come.
 Result receiveFrames(const Options& options, const std::function<void()>& ready, const std::atomic<bool>& over) {
-  RadarConfig radar;
-  radar.device = "awr2243";
-  radar.carrier_hz = 77e9;
-  radar.slope_hz_per_s = 75e12;
-  radar.samples_per_chirp = 64;
-  radar.sample_rate_hz = 5e6;
-  radar.adc_start_s = 6e-6;
+  RadarConfig radar = paperRadar();
   radar.loops_per_frame = 128;
   radar.frame_period_s = 262144 * 8 / (options.mbit_per_s * 1e6);
-  radar.tx_position_m.assign(2, Eigen::Vector3d::Zero());
-  radar.rx_position_m.assign(4, Eigen::Vector3d::Zero());
   Result result;
   {
     std::uint64_t taken = 0;

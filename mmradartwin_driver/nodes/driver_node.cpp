@@ -6,8 +6,9 @@
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "radar_driver");
+  const ros::NodeHandle nh;  // outlives the node: with the last handle gone, roscpp prints nothing any more
   try {
-    const mmradartwin::RadarDriver driver(ros::NodeHandle(), ros::NodeHandle("~"));
+    const mmradartwin::RadarDriver driver(nh, ros::NodeHandle("~"));
     const mmradartwin::MasterWatch master_watch;
     ros::spin();
   } catch (const mmradartwin::InputError& error) {

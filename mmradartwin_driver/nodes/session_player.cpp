@@ -288,6 +288,7 @@ class SessionPlayer {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "session_player");
+  const ros::NodeHandle keep_alive;  // outlives the player: with the last handle gone, roscpp prints nothing any more
   // tf listener and broadcaster are served while this thread keeps the schedule.
   ros::AsyncSpinner spinner(1);
   spinner.start();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mmradartwin_driver/frame_assembler.h"
+#include "mmradartwin_dsp/paper_radar.h"
 #include "mmradartwin_dsp/radar_config.h"
 
 namespace mmradartwin {
@@ -34,15 +35,9 @@ inline std::uint8_t streamByte(std::uint64_t epoch, std::uint64_t offset) {
 /// Four lanes and four receivers, of random size: 16 bytes per sample.
 inline RadarConfig randomRadar(std::mt19937_64& random) {
   const auto between = [&](int a, int b) { return std::uniform_int_distribution<int>(a, b)(random); };
-  RadarConfig radar;
-  radar.device = "awr2243";
-  radar.carrier_hz = 77e9;
-  radar.slope_hz_per_s = 75e12;
+  RadarConfig radar = paperRadar();
   radar.samples_per_chirp = between(0, 2) ? between(1, 12) : between(32, 128);
-  radar.sample_rate_hz = 5e6;
-  radar.adc_start_s = 6e-6;
   radar.loops_per_frame = between(1, 6);
-  radar.frame_period_s = 0.05;
   radar.tx_position_m.assign(between(1, 2), Eigen::Vector3d::Zero());
   radar.rx_position_m.assign(4, Eigen::Vector3d::Zero());
   return radar;

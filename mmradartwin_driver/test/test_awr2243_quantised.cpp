@@ -7,23 +7,14 @@
 
 #include "mmradartwin_driver/awr2243_quantised.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/paper_radar.h"
 
 namespace mmradartwin {
 namespace {
 
 /// The paper's deployment, with what a device needs besides.
 RadarConfig deployment() {
-  RadarConfig radar;
-  radar.device = "awr2243";
-  radar.carrier_hz = 77e9;
-  radar.slope_hz_per_s = 75e12;
-  radar.samples_per_chirp = 64;
-  radar.sample_rate_hz = 5e6;
-  radar.adc_start_s = 6e-6;
-  radar.loops_per_frame = 1;
-  radar.frame_period_s = 0.05;
-  radar.tx_position_m = {{0, 0, 0}, {0, 0.0077867, 0}};
-  radar.rx_position_m = {{0, 0, 0}, {0, 0.0019467, 0}, {0, 0.0038934, 0}, {0, 0.0058401, 0}};
+  RadarConfig radar = paperRadar();
   radar.idle_s = 7e-6;
   radar.ramp_end_s = 20e-6;
   radar.tx_enable = {{0}, {2}};

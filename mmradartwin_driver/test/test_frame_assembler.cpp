@@ -2,27 +2,13 @@
 
 #include "assembly_scenario.h"
 #include "mmradartwin_driver/frame_assembler.h"
+#include "mmradartwin_dsp/paper_radar.h"
 #include "packet_stream.h"
 
 namespace mmradartwin {
 namespace {
 
 constexpr std::int64_t kMillisecond = 1'000'000;
-
-RadarConfig paperRadar() {  // 2048 bytes per frame, 1024 per chirp
-  RadarConfig radar;
-  radar.device = "awr2243";
-  radar.carrier_hz = 77e9;
-  radar.slope_hz_per_s = 75e12;
-  radar.samples_per_chirp = 64;
-  radar.sample_rate_hz = 5e6;
-  radar.adc_start_s = 6e-6;
-  radar.loops_per_frame = 1;
-  radar.frame_period_s = 0.05;
-  radar.tx_position_m.assign(2, Eigen::Vector3d::Zero());
-  radar.rx_position_m.assign(4, Eigen::Vector3d::Zero());
-  return radar;
-}
 
 /// Frames handed out, with the epoch they were counted in.
 struct Collected {

@@ -6,22 +6,14 @@
 #include <random>
 
 #include "mmradartwin_driver/frame_clock.h"
+#include "mmradartwin_dsp/paper_radar.h"
 
 namespace mmradartwin {
 namespace {
 
 RadarConfig radarWithPeriod(double period_s) {
-  RadarConfig radar;
-  radar.device = "awr2243";
-  radar.carrier_hz = 77e9;
-  radar.slope_hz_per_s = 75e12;
-  radar.samples_per_chirp = 64;
-  radar.sample_rate_hz = 5e6;
-  radar.adc_start_s = 6e-6;
-  radar.loops_per_frame = 1;
+  RadarConfig radar = paperRadar();
   radar.frame_period_s = period_s;
-  radar.tx_position_m.assign(2, Eigen::Vector3d::Zero());
-  radar.rx_position_m.assign(4, Eigen::Vector3d::Zero());
   return radar;
 }
 

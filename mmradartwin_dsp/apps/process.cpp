@@ -18,7 +18,7 @@ using namespace mmradartwin;
 namespace {
 
 struct Options {
-  std::string input, output, radar, layout;
+  std::string input, output, radar, layout, channels;
   BagOptions bag;
   bool mat = false;
   bool cubes = false;
@@ -54,7 +54,8 @@ void writeMat(const Options& options, const Recording& recording, const Pose& po
 int process(const Options& options) {
   std::optional<CaptureLayout> layout;
   if (!options.layout.empty()) layout = options.layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
-  const Recording recording = openRecording(options.input, options.radar, layout, options.bag);
+  Recording recording = openRecording(options.input, options.radar, layout, options.bag);
+  if (!options.channels.empty()) recording.channels = loadChannelCorrection(options.channels, recording.radar);
   const SignalChain chain = [&] {
     try {
       return SignalChain(recording.radar);
@@ -104,6 +105,7 @@ int main(int argc, char** argv) {
   app.add_option("--radar", options.radar, "radar.yaml; needed for a bare capture, else instead of the session's");
   app.add_option("--layout", options.layout, "byte layout of the captures, instead of the radar's")
       ->check(CLI::IsMember({"4lane", "2lane"}));
+  app.add_option("--channels", options.channels, "channels.yaml of calibrate: channel errors to take out of the grids");
   app.add_option("--map-frame", options.bag.map_frame, "tf frame of the room, for bags")->capture_default_str();
   app.add_option("--radar-frame", options.bag.radar_frame, "tf frame of the radar, for bags")->capture_default_str();
   app.add_option("--ns", options.bag.ns, "namespace of the bag's topics; needed only where it holds several");

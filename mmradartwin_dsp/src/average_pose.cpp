@@ -14,6 +14,7 @@ ReceiveGrid averagePose(const Recording& recording, const Pose& pose) {
   } catch (const InputError& error) {
     throw InputError(recording.source + ": pose '" + pose.name + "': " + error.what());
   }
+  if (recording.channels) correctChannels(*recording.channels, grid.x);
   grid.pose_valid = true;
   grid.T_map_radar = pose.T_map_radar;
   return grid;

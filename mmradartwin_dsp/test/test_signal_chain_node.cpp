@@ -133,6 +133,27 @@ TEST_F(SignalChainNodeTest, AveragesFramesAndPutsTheirPoseIn) {
   EXPECT_NEAR(maps_.messages.back()->range_m[static_cast<std::size_t>(r)], 3.0, 0.08);
 }
 
+// The second node of the launch files has a channels.yaml.
+TEST_F(SignalChainNodeTest, CorrectsTheMeasuredChannels) {
+  Inbox<mmradartwin_msgs::ReceiveGrid> corrected(nh_, "corrected/radar/grid");
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10);
+  while (ros::WallTime::now() < end && (!corrected.connected() || cubes_.getNumSubscribers() < 2)) {
+    ros::spinOnce();
+    ros::WallDuration(0.01).sleep();
+  }
+  ASSERT_TRUE(corrected.connected());
+  ros::WallDuration(0.5).sleep();  // the latched configuration
+  sendPose(stamp(-0.5), 1.0);
+  sendPose(stamp(10), 1.0);
+  send(0);
+  ASSERT_TRUE(grids_.wait(1, 10) && corrected.wait(1, 10));
+  const ComplexGrid raw = fromMsg(*grids_.messages[0]).x, x = fromMsg(*corrected.messages[0]).x;
+  EXPECT_TRUE(raw.row(0) == x.row(0));
+  const std::complex<double> f = raw(5, 9) / x(5, 9);
+  EXPECT_NEAR(std::arg(f) * 180 / M_PI, -30, 1e-4);
+  EXPECT_NEAR(20 * std::log10(std::abs(f)), 2, 1e-4);
+}
+
 TEST_F(SignalChainNodeTest, BeginsAnewWhenTheRadarMovesOrTurns) {
   sendPose(stamp(-0.5), 0);
   sendPose(stamp(1.5), 0);
@@ -153,14 +174,32 @@ TEST_F(SignalChainNodeTest, WaitsForThePoseAtTheStampAndGoesOnWithoutOne) {
   ros::WallDuration(0.1).sleep();
   ros::spinOnce();
   EXPECT_TRUE(grids_.messages.empty()) << "did not wait for tf";
-  sendPose(stamp(0.5), 6);
+  sendPose(stamp(0.5), 5.08);
   ASSERT_TRUE(grids_.wait(1));
   EXPECT_TRUE(grids_.messages[0]->pose_valid);
-  EXPECT_NEAR(grids_.messages[0]->T_map_radar.position.x, 5.5, 1e-9);  // between the two, at the frame's stamp
+  EXPECT_NEAR(grids_.messages[0]->T_map_radar.position.x, 5.04, 1e-9);  // between the two, at the frame's stamp
   send(1);
   ASSERT_TRUE(grids_.wait(2));
   EXPECT_FALSE(grids_.messages[1]->pose_valid);
   EXPECT_EQ(grids_.messages[1]->T_map_radar.orientation.w, 1);
+}
+
+TEST_F(SignalChainNodeTest, GivesNoPoseToFramesWithinAJumpOrAGapOfTf) {
+  // A jump of 1 m at frame 2, 0.25 s of silence over which the radar goes 0.3 m on at frames 5 to 9, as long a silence
+  // that ends where it began at frames 11 to 15.
+  for (double at : {-0.5, 0.5, 1.5}) sendPose(stamp(at), 1.0);
+  for (double at : {2.5, 3.5, 4.5}) sendPose(stamp(at), 2.0);
+  for (double at : {9.5, 10.5, 15.5, 16.5}) sendPose(stamp(at), 2.3);
+  const std::vector<int> sent = {0, 1, 2, 3, 4, 5, 7, 9, 10, 11, 14, 16};
+  for (int i : sent) send(i);
+  ASSERT_TRUE(grids_.wait(sent.size(), 20));
+  std::vector<std::string> got;
+  for (const auto& grid : grids_.messages) {
+    got.push_back(grid->pose_valid ? std::to_string(grid->T_map_radar.position.x).substr(0, 3) : "-");
+    got.back() += " " + std::to_string(grid->frames);
+  }
+  EXPECT_EQ(got, (std::vector<std::string>{"1.0 1", "1.0 2", "- 1", "2.0 1", "2.0 2", "- 1", "- 2", "- 3", "2.3 1",
+                                           "2.3 2", "2.3 3", "2.3 3"}));
 }
 
 TEST_F(SignalChainNodeTest, SurvivesBadMessagesAndForeignRadars) {

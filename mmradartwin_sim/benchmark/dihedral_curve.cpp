@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "mmradartwin_dsp/paper_radar.h"
 #include "mmradartwin_sim/twin.h"
 
 using namespace mmradartwin;
@@ -16,15 +17,7 @@ using namespace mmradartwin;
 namespace {
 
 RadarConfig oneElement() {
-  RadarConfig radar;
-  radar.device = "awr2243";
-  radar.carrier_hz = 77e9;
-  radar.slope_hz_per_s = 75e12;
-  radar.samples_per_chirp = 64;
-  radar.sample_rate_hz = 5e6;
-  radar.adc_start_s = 6e-6;
-  radar.loops_per_frame = 1;
-  radar.frame_period_s = 0.05;
+  RadarConfig radar = paperRadar();
   radar.tx_position_m = {{0, 0, 0}};
   radar.rx_position_m = {{0, 0, 0}};
   return radar;

@@ -7,8 +7,9 @@
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "twin");
+  const ros::NodeHandle nh;  // outlives the node: with the last handle gone, roscpp prints nothing any more
   try {
-    const mmradartwin::TwinNode node{ros::NodeHandle(), ros::NodeHandle("~")};
+    const mmradartwin::TwinNode node{nh, ros::NodeHandle("~")};
     const mmradartwin::MasterWatch master_watch;
     ros::spin();
   } catch (const mmradartwin::InputError& error) {

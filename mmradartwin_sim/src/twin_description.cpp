@@ -1,3 +1,4 @@
+#include <Eigen/Core>
 #include <cmath>
 #include <iomanip>
 #include <sstream>
@@ -180,6 +181,29 @@ TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::
   }
   yaml.rejectUnknownKeys();
   return twin;
+}
+
+void refuseSameChannelError(const TwinDescription& twin, const ChannelCorrection& correction) {
+  const auto channels = static_cast<Eigen::Index>(correction.phase_deg.size());
+  Eigen::VectorXcd corrected(channels);
+  for (Eigen::Index k = 0; k < channels; ++k) corrected(k) = correction.error(static_cast<std::size_t>(k));
+  for (const NamedParameters& m : twin.mechanisms) {
+    if (m.mechanism != "channel_phase_error") continue;
+    ChannelCorrection own{twin.file, m.values.numbers("phase_deg"), m.values.numbers("gain_db")};
+    for (std::vector<double>* list : {&own.phase_deg, &own.gain_db}) {
+      if (list->empty()) list->resize(correction.phase_deg.size());
+      if (list->size() != correction.phase_deg.size()) return;  // the twin's own check names this
+    }
+    Eigen::VectorXcd simulated(channels);
+    for (Eigen::Index k = 0; k < channels; ++k) simulated(k) = own.error(static_cast<std::size_t>(k));
+    // A common level and phase mean nothing. More like the corrected error than like none: the same.
+    const double same = std::abs(corrected.dot(simulated)) / corrected.norm();
+    const double none = std::abs(simulated.sum()) / std::sqrt(static_cast<double>(channels));
+    if (same <= none) continue;
+    throw InputError(correction.file + ": takes channel errors out of the measurement which the twin" +
+                     (twin.file.empty() ? "" : " " + twin.file) +
+                     " has as channel_phase_error: they would count twice; leave one of the two out");
+  }
 }
 
 }  // namespace mmradartwin

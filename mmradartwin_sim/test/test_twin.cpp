@@ -307,6 +307,27 @@ TEST_F(TwinTest, ChannelErrorsTurnTheReceivedGridOnly) {
   EXPECT_NEAR(db(std::abs(f1)), 1, 1e-9);
 }
 
+TEST_F(TwinTest, AnErrorThatTheMeasurementIsCorrectedByIsRefused) {
+  addPlate(3, 20);
+  const ChannelCorrection correction{"channels.yaml", {0, 12, -8, 5, 20, -15, 9, -4}, std::vector<double>(8, 0.0)};
+  const auto error = [&](const std::string& mechanisms) {
+    write("twin.yaml", "mechanisms:\n  specular: {}\n" + mechanisms);
+    const TwinDescription twin = loadTwin(path("twin.yaml"), path("scene.yaml"), paperRadar());
+    return errorOf([&] { refuseSameChannelError(twin, correction); });
+  };
+  EXPECT_EQ(error(""), "");
+  const std::string same = error("  channel_phase_error: {phase_deg: [0, 12, -8, 5, 20, -15, 9, -4]}\n");
+  for (const char* part : {"channels.yaml", "twin.yaml", "channel_phase_error", "twice"}) {
+    EXPECT_NE(same.find(part), std::string::npos) << same;
+  }
+  // The same but for what another calibration of the same radar comes to.
+  EXPECT_NE(error("  channel_phase_error: {phase_deg: [0, 10, -5, 7, 18, -17, 11, -1], gain_db: [0, 0.3, 0, 0, 0.2, "
+                  "0, 0, 0]}\n"),
+            "");
+  // What a diagnosis still finds in corrected data is another error.
+  EXPECT_EQ(error("  channel_phase_error: {phase_deg: [0, -2, -3, 1, -2, 2, -1, 3]}\n"), "");
+}
+
 TEST_F(TwinTest, WeighsTracedRecordsAgain) {
   addRoom();
   const std::string scene = writeScene();

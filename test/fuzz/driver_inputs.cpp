@@ -10,6 +10,7 @@
 #include "mmradartwin_driver/mpsse_spi.h"
 #include "mmradartwin_driver/pcap_capture.h"
 #include "mmradartwin_driver/rig_error.h"
+#include "mmradartwin_dsp/paper_radar.h"
 
 namespace mmradartwin {
 namespace {
@@ -17,17 +18,8 @@ namespace {
 const std::uint8_t* bytesOf(const std::string& text) { return reinterpret_cast<const std::uint8_t*>(text.data()); }
 
 RadarConfig smallRadar() {  // 512 bytes per frame
-  RadarConfig radar;
-  radar.device = "awr2243";
-  radar.carrier_hz = 77e9;
-  radar.slope_hz_per_s = 75e12;
+  RadarConfig radar = paperRadar();
   radar.samples_per_chirp = 16;
-  radar.sample_rate_hz = 5e6;
-  radar.adc_start_s = 6e-6;
-  radar.loops_per_frame = 1;
-  radar.frame_period_s = 0.05;
-  radar.tx_position_m.assign(2, Eigen::Vector3d::Zero());
-  radar.rx_position_m.assign(4, Eigen::Vector3d::Zero());
   return radar;
 }
 

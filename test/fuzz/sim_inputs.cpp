@@ -1,4 +1,5 @@
 #include "hostile_input.h"
+#include "mmradartwin_dsp/paper_radar.h"
 #include "mmradartwin_sim/material.h"
 #include "mmradartwin_sim/scene.h"
 #include "mmradartwin_sim/twin.h"
@@ -96,15 +97,7 @@ void readScene(const std::string& bytes) {
 }
 
 void readTwin(const std::string& bytes) {
-  RadarConfig radar;
-  radar.device = "awr2243";
-  radar.carrier_hz = 77e9;
-  radar.slope_hz_per_s = 75e12;
-  radar.samples_per_chirp = 64;
-  radar.sample_rate_hz = 5e6;
-  radar.adc_start_s = 6e-6;
-  radar.loops_per_frame = 1;
-  radar.frame_period_s = 0.05;
+  RadarConfig radar = paperRadar();
   radar.tx_position_m = {{0, 0, 0}};
   radar.rx_position_m = {{0, 0, 0}, {0, 0.0019, 0}};
   const std::string scene = sceneFile(kScene), file = inputFolder() + "/twin.yaml";

@@ -17,7 +17,7 @@ import rosbag
 import rosgraph
 
 from mmradartwin_tests.installed_programs import find_program
-from test_launch_files import Launched, free_port
+from test_launch_files import Launched, end, free_port
 
 POSES, FRAMES, PERIOD_S = 2, 60, 0.05
 RECORD = "/usr/lib/rosbag/record"  # itself: the Python front end takes long to start on a busy machine
@@ -111,7 +111,7 @@ class EmulatedRig(unittest.TestCase):
         uri = f"http://127.0.0.1:{port}"
         core = subprocess.Popen(["roscore", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                                 env=dict(os.environ, ROS_MASTER_URI=uri, ROS_IP="127.0.0.1"))
-        self.addCleanup(lambda: core.poll() is None and core.kill())
+        self.addCleanup(end, core)
         self.assertTrue(wait_until(lambda: rosgraph.is_master_online(uri), 240), "roscore does not start")
         return core
 
@@ -180,6 +180,8 @@ class EmulatedRig(unittest.TestCase):
             self.stop(later)
             self.stop(recorder)
             text, runs, played = rig.text(), rig.runs(), rig.played()
+        end(core)
+        self.assertTrue(wait_until(lambda: not processes("rosmaster", str(port)), 60), "a rosmaster was left behind")
         self.assertNotIn("error: radar:", text)  # no violation of its protocol, as the emulated chip sees it
         self.assertTrue(wait_until(lambda: not rig.network_is_there(), 60), "the emulated network was left behind")
         self.assertGreaterEqual(len(runs), 5)

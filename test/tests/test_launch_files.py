@@ -23,6 +23,17 @@ def free_port():
         return s.getsockname()[1]
 
 
+def end(process, seconds=60):
+    """Ends a process as by Ctrl-C, so that what it started ends with it: a killed roscore leaves its rosmaster."""
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
 def same_pose(a, b):
     """True where two geometry_msgs/Pose differ by rounding alone."""
     dot = sum(getattr(a.orientation, k) * getattr(b.orientation, k) for k in "xyzw")
@@ -104,6 +115,29 @@ class LaunchFiles(unittest.TestCase):
 
     def path(self, name):
         return os.path.join(self.folder, name)
+
+    def test_nodes_say_why_they_do_not_start(self):
+        port = free_port()
+        environment = dict(os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1",
+                           ROSCONSOLE_STDOUT_LINE_BUFFERED="1")
+        master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], env=environment,
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.addCleanup(end, master)
+        deadline = time.time() + 120
+        while not rosgraph.is_master_online(environment["ROS_MASTER_URI"]) and time.time() < deadline:
+            time.sleep(0.2)
+        for package, program, argument, words in (
+                ("mmradartwin_dsp", "dsp_node", "_average_frames:=0", "average_frames"),
+                ("mmradartwin_driver", "driver_node", "_radar:=/nowhere/radar.yaml", "/nowhere/radar.yaml"),
+                ("mmradartwin_driver", "session_player", "_session:=/nowhere", "/nowhere"),
+                ("mmradartwin_sim", "twin_node", "_rate_hz:=-1", "rate_hz"),
+                ("mmradartwin_sim", "room_pose", "_scene:=/nowhere/scene.yaml", "/nowhere/scene.yaml"),
+                ("mmradartwin_attribution", "attribution_node", "_markers_hz:=-1", "markers_hz")):
+            run = subprocess.run([find_program(package, program), argument], env=environment, capture_output=True,
+                                 text=True, timeout=120, check=False)
+            self.assertEqual(run.returncode, 2, msg=f"{program}: {run.stdout}{run.stderr}")
+            self.assertIn("FATAL", run.stdout + run.stderr, msg=program)
+            self.assertIn(words, run.stdout + run.stderr, msg=program)
 
     def test_live_starts_and_stays_without_a_card(self):
         with Launched("live.launch", "rviz:=false", "card_ip:=127.77.1.2", "host_ip:=127.77.1.1") as launched:

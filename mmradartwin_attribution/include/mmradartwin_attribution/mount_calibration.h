@@ -10,6 +10,7 @@
 
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_sim/scene.h"
+#include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
 
@@ -35,6 +36,8 @@ struct MountCalibrationOptions {
   double search_rad = 0.44;         ///< and the mount's yaw within this
   double min_level_db = 12;         ///< of the target's echo over the pose's median range bin
   double max_azimuth_rad = 1.05;    ///< poses that hold the target further off boresight are left out
+  double most_other_db = -20;       ///< echoes of other things in a wall's range cell, by the scene, against the wall's
+  double most_beside_db = -6;       ///< those beside it, within search_m
   double max_laser_error_m = 0.02;  ///< between a laser's distance and the pose's, a common mount offset apart
 };
 
@@ -72,10 +75,11 @@ struct MountCalibration {
 /// channel errors to the target's echo in a few poses. Only delay, phase between channels and power count: each pose's
 /// absolute phase and level are free. Intervals come from the scatter of the poses (Student's t), with a heading error
 /// and a range error of each pose's own. Throws InputError where fewer than three poses show the target, and where a
-/// laser's distance contradicts its pose (names it). `progress` is told poses done.
+/// laser's distance contradicts its pose (names it). With a twin, poses at which something else hides a wall or shares
+/// its range cell are left out and listed. `progress` is told poses done.
 MountCalibration calibrateMount(const Recording& recording, const CalibrationTarget& target,
                                 const std::vector<LaserDistance>& lasers, const MountCalibrationOptions& options = {},
-                                const std::function<void(int)>& progress = {});
+                                const Twin* twin = nullptr, const std::function<void(int)>& progress = {});
 
 /// Errors of range, azimuth and channel phases, pose by pose, before and after.
 cv::Mat drawCalibration(const MountCalibration& calibration);

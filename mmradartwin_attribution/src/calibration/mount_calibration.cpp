@@ -320,7 +320,7 @@ std::vector<LaserDistance> readLaserDistances(const std::string& file) {
 
 MountCalibration calibrateMount(const Recording& recording, const CalibrationTarget& target,
                                 const std::vector<LaserDistance>& lasers, const MountCalibrationOptions& options,
-                                const std::function<void(int)>& progress) {
+                                const Twin* twin, const std::function<void(int)>& progress) {
   MountCalibration result;
   std::map<std::string, double> laser_of;
   for (const LaserDistance& laser : lasers) {
@@ -336,6 +336,7 @@ MountCalibration calibrateMount(const Recording& recording, const CalibrationTar
     CalibratedPose entry;
     entry.name = pose.name;
     try {
+      if (twin) requireClearEcho(*twin, target, pose, options);
       Observation o{findEcho(recording.radar, target, pose, averagePose(recording, pose), options), {}};
       if (const auto it = laser_of.find(pose.name); it != laser_of.end()) o.laser_m = it->second;
       entry.used = true;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/range_angle.h"
@@ -72,6 +73,57 @@ Eigen::VectorXcd steering(const RadarConfig& radar, const TargetPaths& paths) {
     v(static_cast<Eigen::Index>(k)) = std::polar(1.0, 2 * M_PI * cycles);
   }
   return v;
+}
+
+void requireClearEcho(const Twin& twin, const CalibrationTarget& target, const Pose& pose,
+                      const MountCalibrationOptions& options) {
+  if (target.wall.empty()) return;
+  const auto paths = targetPaths(twin.radar(), target, pose.T_map_radar);
+  if (!paths) return;  // findEcho says so
+  const int wall = target.wall.front().actor;
+  const Simulation simulation = twin.simulate(pose.T_map_radar, pose.stamp_ns);
+  const auto ofWall = [wall](const PathRecord& record) {
+    return std::all_of(record.actors.begin(), record.actors.end(), [wall](int actor) { return actor == wall; });
+  };
+  const PathRecord* echo = nullptr;
+  for (const PathRecord& record : simulation.records) {
+    if (*record.event != "specular" || record.bounces != 1 || !ofWall(record)) continue;
+    if (!echo || record.amplitude > echo->amplitude) echo = &record;
+  }
+  const std::string here = "pose '" + pose.name + "': ";
+  if (!echo) {
+    const auto hit = twin.rays().firstHit(pose.T_map_radar.translation(), pose.T_map_radar.linear() * paths->direction,
+                                          paths->range_m + 0.01);
+    if (!hit || hit->actor < 0 || hit->actor == wall) {
+      throw InputError(here + target.name + " sends no echo back by the scene; is the pose right?");
+    }
+    throw InputError(here + "'" + twin.scene().actors[static_cast<std::size_t>(hit->actor)].name + "' stands before " +
+                     target.name + "; take the pose where nothing does");
+  }
+  // What falls into the echo's main lobe disturbs its phases; a strong one beside it would be taken for it.
+  const double lobe_m = 2 * twin.radar().range_bin_m();
+  std::map<int, double> power;
+  for (const PathRecord& record : simulation.records) {
+    if (ofWall(record)) continue;
+    const double apart_m = std::abs(record.length_m.front() - echo->length_m.front()) / 2;
+    if (apart_m > std::max(lobe_m, options.search_m)) continue;
+    const double weight = apart_m <= lobe_m ? 1 : std::pow(10, (options.most_other_db - options.most_beside_db) / 10);
+    power[record.actors.empty() ? -1 : record.actors.front()] += weight * record.amplitude * record.amplitude;
+  }
+  double all = 0;
+  auto strongest = power.end();
+  for (auto it = power.begin(); it != power.end(); ++it) {
+    all += it->second;
+    if (strongest == power.end() || it->second > strongest->second) strongest = it;
+  }
+  const double level_db = 10 * std::log10(std::max(all, 1e-300) / (echo->amplitude * echo->amplitude));
+  if (level_db <= options.most_other_db) return;
+  throw InputError(here + "echoes of " +
+                   (strongest->first < 0
+                        ? std::string("something else")
+                        : "'" + twin.scene().actors[static_cast<std::size_t>(strongest->first)].name + "'") +
+                   " reach the radar at the distance of " + target.name +
+                   " and cannot be told from its echo; take the pose elsewhere, or with another heading");
 }
 
 TargetEcho findEcho(const RadarConfig& radar, const CalibrationTarget& target, const Pose& pose,

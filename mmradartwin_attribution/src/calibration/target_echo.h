@@ -9,6 +9,7 @@
 #include "mmradartwin_attribution/mount_calibration.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
+#include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
 
@@ -32,6 +33,10 @@ struct TargetEcho {
   double range_m = 0, level_db = 0;
   Eigen::VectorXcd channels;  ///< [M], unit norm
 };
+/// Throws InputError, which says what is in the way, where the twin expects no echo of the target's wall at this pose,
+/// or others that the radar cannot tell from it. Nothing is known of a corner reflector: it is no part of a scene.
+void requireClearEcho(const Twin& twin, const CalibrationTarget& target, const Pose& pose,
+                      const MountCalibrationOptions& options);
 /// The strongest tone within search_m of where the pose puts the target. Throws InputError that says why there is none.
 TargetEcho findEcho(const RadarConfig& radar, const CalibrationTarget& target, const Pose& pose,
                     const ReceiveGrid& grid, const MountCalibrationOptions& options);

@@ -44,8 +44,12 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner,
       PoseChannels channels;
       channels.pose = pose;
       channels.grid = seen.mean;
-      channels.noise_power = per_sample * sum(seen.noise_variance) / static_cast<double>(seen.noise_variance.size()) /
-                             std::max(1, seen.shots);
+      std::vector<double> noise = seen.noise_variance;
+      if (recording.channels) {
+        correctChannels(*recording.channels, channels.grid.x);
+        for (std::size_t k = 0; k < noise.size(); ++k) noise[k] /= std::norm(recording.channels->error(k));
+      }
+      channels.noise_power = per_sample * sum(noise) / static_cast<double>(noise.size()) / std::max(1, seen.shots);
       channels.shots = std::max(1, seen.shots);
       transformGrid(chain, channels);
       const auto at = std::find(data.locations.begin(), data.locations.end(), pose.location);

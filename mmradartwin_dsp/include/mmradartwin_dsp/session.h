@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mmradartwin_dsp/adc_cube.h"
+#include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/radar_config.h"
 
 namespace mmradartwin {
@@ -34,6 +35,7 @@ struct Recording {
   std::optional<std::string> scene_file;         ///< absolute path of scene.yaml, where the session names one
   std::optional<std::string> twin_file;          ///< absolute path of twin.yaml, where the session names one
   std::optional<double> gain_db;                 ///< of a simulated session
+  std::optional<ChannelCorrection> channels;     ///< what averages of its frames are corrected by; set by the user
   std::vector<Pose> poses;                       ///< in file order, duplicates and unusable ones left out
   std::vector<std::string> duplicates;           ///< names of excluded poses (10 cm, 2 cm, 1 deg of an earlier one)
   std::vector<PoseProblem> problems;             ///< poses that cannot be used (NaN, unreadable, ...)

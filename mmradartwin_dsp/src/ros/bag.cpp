@@ -18,6 +18,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/transform_record.h"
 #include "mmradartwin_dsp/session_files.h"
 #include "mmradartwin_dsp/stationary_poses.h"
 #include "mmradartwin_dsp/temporary_folder.h"
@@ -36,6 +37,7 @@ struct CubeIndex {
   std::int64_t stamp_ns;
   ros::Time recorded;
   std::optional<Eigen::Isometry3d> T_map_radar;
+  bool on_the_way = false;  ///< within a jump of tf, or a gap with two different ends: no pose is its own
 };
 
 std::string withoutSlash(const std::string& name) {
@@ -177,6 +179,8 @@ class BagContents {
     const auto feed = [&](const rosbag::MessageInstance& message, bool is_static) {
       const auto tf = message.instantiate<tf2_msgs::TFMessage>();
       if (!tf) return;
+      record_.add(*tf, is_static);
+      record_.keep(kTfCache_s);
       for (const geometry_msgs::TransformStamped& transform : tf->transforms) {
         transforms += buffer.setTransform(transform, "bag", is_static) ? 1 : 0;
         if (!is_static) newest_tf_ns_ = std::max(newest_tf_ns_, toNanoseconds(transform.header.stamp));
@@ -193,7 +197,7 @@ class BagContents {
       }
       const auto cube = message.instantiate<mmradartwin_msgs::AdcCube>();
       if (!cube) refuseVersion(message);
-      waiting.push_back({toNanoseconds(cube->header.stamp), message.getTime(), std::nullopt});
+      waiting.push_back({toNanoseconds(cube->header.stamp), message.getTime(), std::nullopt, false});
     }
     settle(buffer, waiting, true);
     std::stable_sort(cubes.begin(), cubes.end(), [](const auto& a, const auto& b) { return a.stamp_ns < b.stamp_ns; });
@@ -212,7 +216,11 @@ class BagContents {
             buffer.lookupTransform(options_.map_frame, options_.radar_frame, toRosTime(cube.stamp_ns));
         const auto& p = T.transform.translation;
         const auto& q = T.transform.rotation;
-        cube.T_map_radar = Eigen::Translation3d(p.x, p.y, p.z) * Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized();
+        cube.on_the_way =
+            !record_.whyNotBetween(cube.stamp_ns, options_.map_frame, options_.radar_frame, TransformLimits()).empty();
+        if (!cube.on_the_way) {
+          cube.T_map_radar = Eigen::Translation3d(p.x, p.y, p.z) * Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized();
+        }
       } catch (const tf2::TransformException&) {
         const bool late = newest_tf_ns_ > cube.stamp_ns + static_cast<std::int64_t>(kTfPatience_s * 1e9);
         if (!last && !late) return;
@@ -227,6 +235,7 @@ class BagContents {
   rosbag::Bag bag_;
   std::mutex mutex_;
   std::string prefix_;
+  TransformRecord record_;
   std::int64_t newest_tf_ns_ = 0;
 };
 
@@ -244,7 +253,7 @@ CubesByPose assignByStamp(const std::vector<Pose>& poses, const std::vector<Cube
                                        [](std::int64_t stamp, const Pose* pose) { return stamp < pose->stamp_ns; });
     if (next == by_time.begin()) continue;
     const Pose& pose = **(next - 1);
-    if (cube.T_map_radar && !standsStill(*cube.T_map_radar, pose.T_map_radar)) continue;
+    if (cube.on_the_way || (cube.T_map_radar && !standsStill(*cube.T_map_radar, pose.T_map_radar))) continue;
     assigned[pose.name].push_back(cube);
   }
   return assigned;

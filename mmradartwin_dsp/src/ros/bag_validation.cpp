@@ -7,7 +7,6 @@
 #include <rosbag/view.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -17,6 +16,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/transform_record.h"
 
 namespace mmradartwin {
 namespace {
@@ -39,76 +39,6 @@ class Findings {
     }
   }
   std::vector<BagFinding> all;
-};
-
-struct StampedEdge {
-  std::int64_t stamp_ns;
-  Eigen::Isometry3d T;
-};
-
-/// What tf says, edge by edge, from child to parent.
-class TransformRecord {
- public:
-  void add(const tf2_msgs::TFMessage& message, bool fixed) {
-    for (const geometry_msgs::TransformStamped& transform : message.transforms) {
-      const std::string child = withoutSlash(transform.child_frame_id);
-      parents_[child] = withoutSlash(transform.header.frame_id);
-      if (fixed) continue;
-      const auto& p = transform.transform.translation;
-      const auto& q = transform.transform.rotation;
-      const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
-      const bool usable = std::abs(rotation.norm() - 1) < 0.01 && std::isfinite(p.x + p.y + p.z);
-      if (!usable) {
-        ++unusable_;
-        continue;
-      }
-      edges_[child].push_back({toNanoseconds(transform.header.stamp),
-                               Eigen::Isometry3d(Eigen::Translation3d(p.x, p.y, p.z) * rotation.normalized())});
-    }
-  }
-  bool empty() const { return parents_.empty(); }
-  std::uint64_t unusable() const { return unusable_; }
-
-  /// Children of the edges between the two frames; nothing where they are not connected.
-  std::optional<std::vector<std::string>> chain(const std::string& map, const std::string& radar) const {
-    const std::vector<std::string> up = toRoot(withoutSlash(radar)), down = toRoot(withoutSlash(map));
-    for (std::size_t i = 0; i < up.size(); ++i) {
-      const auto meet = std::find(down.begin(), down.end(), up[i]);
-      if (meet == down.end()) continue;
-      std::vector<std::string> edges(up.begin(), up.begin() + static_cast<std::ptrdiff_t>(i));
-      edges.insert(edges.end(), down.begin(), meet);
-      return edges;
-    }
-    return std::nullopt;
-  }
-
-  /// Moving edges of the chain, in order of time.
-  std::map<std::string, std::vector<StampedEdge>> moving(const std::vector<std::string>& chain) {
-    std::map<std::string, std::vector<StampedEdge>> found;
-    for (const std::string& child : chain) {
-      const auto edge = edges_.find(child);
-      if (edge == edges_.end()) continue;
-      std::stable_sort(edge->second.begin(), edge->second.end(),
-                       [](const StampedEdge& a, const StampedEdge& b) { return a.stamp_ns < b.stamp_ns; });
-      found[child] = edge->second;
-    }
-    return found;
-  }
-  std::string nameOf(const std::string& child) const { return parents_.at(child) + " -> " + child; }
-
- private:
-  std::vector<std::string> toRoot(std::string frame) const {
-    std::vector<std::string> frames = {frame};
-    while (frames.size() < 100) {
-      const auto parent = parents_.find(frame);
-      if (parent == parents_.end()) break;
-      frames.push_back(frame = parent->second);
-    }
-    return frames;
-  }
-  std::map<std::string, std::string> parents_;
-  std::map<std::string, std::vector<StampedEdge>> edges_;
-  std::uint64_t unusable_ = 0;
 };
 
 /// One radar of the bag.
@@ -219,7 +149,7 @@ class RadarRecord {
   std::map<int, std::pair<std::uint64_t, std::string>> silent_;
 };
 
-void checkTransforms(TransformRecord& tf, const BagOptions& options, const BagLimits& limits, bool session,
+void checkTransforms(const TransformRecord& tf, const BagOptions& options, const BagLimits& limits, bool session,
                      const std::vector<std::int64_t>& stamps_ns, Findings& findings) {
   const std::string wanted = options.map_frame + " -> " + options.radar_frame;
   if (tf.empty()) {
@@ -232,12 +162,13 @@ void checkTransforms(TransformRecord& tf, const BagOptions& options, const BagLi
     findings.add("tf does not connect " + wanted, "");
     return;
   }
-  const auto gap_ns = static_cast<std::int64_t>(limits.tf_gap_s * 1e9);
+  const auto gap_ns = static_cast<std::int64_t>(limits.tf.gap_s * 1e9);
   const auto moving = tf.moving(*chain);
   for (const std::int64_t stamp_ns : stamps_ns) {
     for (const auto& [child, edges] : moving) {
-      const auto after = std::lower_bound(edges.begin(), edges.end(), stamp_ns,
-                                          [](const StampedEdge& e, std::int64_t stamp) { return e.stamp_ns < stamp; });
+      const auto after =
+          std::lower_bound(edges.begin(), edges.end(), stamp_ns,
+                           [](const TransformRecord::Stamped& e, std::int64_t stamp) { return e.stamp_ns < stamp; });
       if (after != edges.end() && after->stamp_ns == stamp_ns) continue;
       const bool before_all = after == edges.begin(), after_all = after == edges.end();
       if (before_all || after_all) {
@@ -256,12 +187,7 @@ void checkTransforms(TransformRecord& tf, const BagOptions& options, const BagLi
   if (session) return;  // its poses follow each other as they were listed, not as a radar moves
   for (const auto& [child, edges] : moving) {
     for (std::size_t i = 1; i < edges.size(); ++i) {
-      const double elapsed_s = std::max(static_cast<double>(edges[i].stamp_ns - edges[i - 1].stamp_ns) * 1e-9, 1e-3);
-      const Eigen::Isometry3d step = edges[i - 1].T.inverse() * edges[i].T;
-      const double distance_m = step.translation().norm();
-      const double angle_rad = Eigen::AngleAxisd(step.linear()).angle();
-      if ((distance_m > limits.tf_jump_m && distance_m / elapsed_s > limits.tf_jump_m_per_s) ||
-          (angle_rad > limits.tf_jump_rad && angle_rad / elapsed_s > limits.tf_jump_rad_per_s)) {
+      if (isJump(edges[i - 1], edges[i], limits.tf)) {
         findings.add("jump(s) in tf", seconds(edges[i].stamp_ns) + ", " + tf.nameOf(child));
       }
     }

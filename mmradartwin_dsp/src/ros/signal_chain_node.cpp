@@ -6,6 +6,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/stationary_poses.h"
 
 namespace mmradartwin {
@@ -19,13 +20,17 @@ constexpr std::size_t kLongestQueue = 1000;
 
 SignalChainNode::SignalChainNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   readParameters(private_nh);
-  tf_listener_.emplace(tf_buffer_, nh);
   grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("radar/grid", 10);
   map_publisher_ = nh.advertise<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", 10);
   twin_map_publisher_ = nh.advertise<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", 10);
   config_subscriber_ = nh.subscribe("radar/config", 2, &SignalChainNode::onConfig, this);
   cube_subscriber_ = nh.subscribe("radar/adc", 200, &SignalChainNode::onCube, this);
   twin_subscriber_ = nh.subscribe("twin/grid", 50, &SignalChainNode::onTwinGrid, this);
+  // Not tf2_ros::TransformListener: buffer and record have to know the same transforms at any time.
+  tf_subscriber_ = nh.subscribe<tf2_msgs::TFMessage>(
+      "/tf", 100, [this](const tf2_msgs::TFMessage::ConstPtr& message) { onTransforms(*message, false); });
+  tf_static_subscriber_ = nh.subscribe<tf2_msgs::TFMessage>(
+      "/tf_static", 100, [this](const tf2_msgs::TFMessage::ConstPtr& message) { onTransforms(*message, true); });
   timer_ = nh.createWallTimer(ros::WallDuration(0.01), [this](const ros::WallTimerEvent&) { drain(); });
 }
 
@@ -36,8 +41,11 @@ void SignalChainNode::readParameters(const ros::NodeHandle& private_nh) {
   moved_m_ = parameters.number("moved_m", moved_m_, 1e-4, 1e3);
   moved_rad_ = parameters.number("moved_deg", 1.0, 1e-2, 180) * M_PI / 180;
   pose_timeout_s_ = parameters.number("pose_timeout_s", pose_timeout_s_, 0, 60);
+  tf_limits_.gap_s = parameters.number("tf_gap_s", 0.2, 0, 60);
   map_frame_ = parameters.text("map_frame", map_frame_);
   radar_frame_ = parameters.text("radar_frame", radar_frame_);
+  const std::string channels = parameters.text("channels", "");
+  if (!channels.empty()) channels_ = loadChannelCorrection(resolvePath(channels, "/"));
   parameters.rejectUnknown();
 }
 
@@ -47,6 +55,7 @@ void SignalChainNode::onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& co
   try {
     const RadarConfig radar = fromMsg(*config);
     SignalChain chain(radar);
+    if (channels_) requireChannelsOf(radar, *channels_);
     chain_.emplace(std::move(chain));
     average_.emplace(radar, average_frames_);
     radar_hash_ = hash;
@@ -83,13 +92,29 @@ void SignalChainNode::onCube(const mmradartwin_msgs::AdcCube::ConstPtr& cube) {
   if (cube->header.stamp < newest_) {
     ROS_INFO("stamps went back by %.3f s: the average begins anew", (newest_ - cube->header.stamp).toSec());
     restart();
-    // What tf holds lies in the future now and would keep older transforms out. With simulated time its listener has
+    // What tf holds lies in the future now and would keep older transforms out. With simulated time onTransforms() has
     // seen the jump itself, and has begun to fill again.
-    if (!ros::Time::isSimTime()) tf_buffer_.clear();
+    if (!ros::Time::isSimTime()) forgetTransforms();
   }
   newest_ = cube->header.stamp;
   queue_.push_back({cube, ros::Time::now()});
   drain();
+}
+
+void SignalChainNode::forgetTransforms() {
+  tf_buffer_.clear();
+  tf_record_.clearMoving();
+}
+
+void SignalChainNode::onTransforms(const tf2_msgs::TFMessage& message, bool fixed) {
+  const ros::Time now = ros::Time::now();
+  if (now < tf_heard_) forgetTransforms();
+  tf_heard_ = now;
+  tf_record_.add(message, fixed);
+  tf_record_.keep(tf_buffer_.getCacheLength().toSec());
+  for (const geometry_msgs::TransformStamped& transform : message.transforms) {
+    tf_buffer_.setTransform(transform, "tf", fixed);  // says itself what is wrong with one that it does not take
+  }
 }
 
 void SignalChainNode::drain() {
@@ -99,8 +124,13 @@ void SignalChainNode::drain() {
     std::optional<Eigen::Isometry3d> T_map_radar;
     try {
       const geometry_msgs::Transform T = tf_buffer_.lookupTransform(map_frame_, radar_frame_, stamp).transform;
-      T_map_radar = Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
-                    Eigen::Quaterniond(T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z).normalized();
+      const std::string why = tf_record_.whyNotBetween(toNanoseconds(stamp), map_frame_, radar_frame_, tf_limits_);
+      if (why.empty()) {
+        T_map_radar = Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
+                      Eigen::Quaterniond(T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z).normalized();
+      } else {
+        ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f goes on without a pose: %s", stamp.toSec(), why.c_str());
+      }
     } catch (const tf2::TransformException& error) {
       const double waited_s = (ros::Time::now() - front.since).toSec();
       // Time that went back while the frame waited counts as waited out.
@@ -117,7 +147,8 @@ void SignalChainNode::process(const mmradartwin_msgs::AdcCube& msg,
                               const std::optional<Eigen::Isometry3d>& T_map_radar) {
   try {
     const AdcCube cube = fromMsg(msg);
-    if (T_map_radar && window_pose_ && !standsStill(*T_map_radar, *window_pose_, moved_m_, moved_rad_)) {
+    const bool moved = T_map_radar && window_pose_ && !standsStill(*T_map_radar, *window_pose_, moved_m_, moved_rad_);
+    if (moved || T_map_radar.has_value() != window_pose_.has_value()) {
       average_->reset();
       window_pose_.reset();
     }
@@ -138,6 +169,7 @@ void SignalChainNode::process(const mmradartwin_msgs::AdcCube& msg,
 
 void SignalChainNode::publish(const std::optional<Eigen::Isometry3d>& T_map_radar) {
   ReceiveGrid grid = average_->grid();
+  if (channels_) correctChannels(*channels_, grid.x);
   grid.pose_valid = T_map_radar.has_value();
   if (T_map_radar) grid.T_map_radar = *T_map_radar;
   if (grid_publisher_.getNumSubscribers() > 0) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mmradartwin_dsp/adc_cube.h"
+#include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
 #include "mmradartwin_dsp/session.h"
@@ -39,6 +40,10 @@ struct TwinDescription {
 /// Throws InputError (unknown mechanism or parameter, value out of range, no scene at all).
 TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::string>& default_scene,
                          const RadarConfig& default_radar);
+
+/// Throws InputError where the twin's channel_phase_error is the error that `correction` takes out of the measurement:
+/// it would count twice. Tells by likeness: a smaller error that was found in corrected data may stand in a twin.
+void refuseSameChannelError(const TwinDescription& twin, const ChannelCorrection& correction);
 
 struct Simulation {
   std::int64_t stamp_ns = 0;

@@ -53,12 +53,13 @@ void TwinNode::readParameters(const ros::NodeHandle& private_nh) {
   scene_file_ = parameters.text("scene", "");
   twin_file_ = parameters.text("twin", "");
   radar_file_ = parameters.text("radar", "");
+  const std::string channels = parameters.text("channels", "");
+  if (!channels.empty()) channels_ = loadChannelCorrection(resolvePath(channels, "/"));
   map_frame_ = parameters.text("map_frame", map_frame_);
   radar_frame_ = parameters.text("radar_frame", radar_frame_);
   rate_hz_ = parameters.number("rate_hz", rate_hz_, 0, 1000);
   reuse_m_ = parameters.number("reuse_m", reuse_m_, 0, 1);
   reuse_rad_ = parameters.number("reuse_deg", 0.01, 0, 10) * M_PI / 180;
-  pose_timeout_s_ = parameters.number("pose_timeout_s", pose_timeout_s_, 0, 10);
   seed_ = static_cast<std::uint64_t>(parameters.integer("seed", 1, 0, 2147483647));
   parameters.number("diagnostic_period", 1.0, 0.01, 3600);  // read by diagnostic_updater
   parameters.boolean("diagnostic_updater_use_fqn", false);
@@ -112,7 +113,9 @@ std::string TwinNode::startingTwin() const {
 }
 
 std::unique_ptr<Twin> TwinNode::makeTwin(const std::string& twin_file) const {
-  return std::make_unique<Twin>(loadTwin(twin_file, sceneFile(), *radar_), seed_);
+  TwinDescription description = loadTwin(twin_file, sceneFile(), *radar_);
+  if (channels_) refuseSameChannelError(description, *channels_);
+  return std::make_unique<Twin>(std::move(description), seed_);
 }
 
 void TwinNode::use(std::unique_ptr<Twin> twin) {
@@ -176,26 +179,19 @@ void TwinNode::onGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid) {
   }
   if (pending_) ++skipped_;
   pending_ = grid;
-  pending_since_ = ros::WallTime::now();
 }
 
 void TwinNode::onPending(const ros::WallTimerEvent&) {
   if (!pending_ || !twin_) return;
-  Eigen::Isometry3d T_map_radar;
-  if (pending_->pose_valid) {
-    T_map_radar = fromMsg(pending_->T_map_radar);
-  } else {
-    try {
-      T_map_radar = toIsometry(tf_buffer_.lookupTransform(map_frame_, radar_frame_, pending_->header.stamp).transform);
-    } catch (const tf2::TransformException& error) {
-      if ((ros::WallTime::now() - pending_since_).toSec() < pose_timeout_s_) return;
-      ++without_pose_;
-      ROS_WARN_THROTTLE(kWarnEvery_s, "no pose at %.6f, nothing simulated: %s", pending_->header.stamp.toSec(),
-                        error.what());
-      pending_.reset();
-      return;
-    }
+  if (!pending_->pose_valid) {
+    // The measured branch has looked: what tf would interpolate now is no place where the radar was.
+    ++without_pose_;
+    ROS_WARN_THROTTLE(kWarnEvery_s, "no pose at %.6f, nothing simulated: the measured grid has none",
+                      pending_->header.stamp.toSec());
+    pending_.reset();
+    return;
   }
+  const Eigen::Isometry3d T_map_radar = fromMsg(pending_->T_map_radar);
   const std::int64_t stamp_ns = toNanoseconds(pending_->header.stamp);
   pending_.reset();
   measured_.emplace(T_map_radar, stamp_ns);

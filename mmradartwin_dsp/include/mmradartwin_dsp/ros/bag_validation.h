@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mmradartwin_dsp/ros/bag.h"
+#include "mmradartwin_dsp/ros/transform_record.h"
 
 namespace mmradartwin {
 
@@ -18,10 +19,8 @@ struct BagFinding {
 
 /// From where on something is odd.
 struct BagLimits {
-  double stamp_tolerance_s = 1e-3;              ///< of the step between two frames against sequence and frame period
-  double tf_gap_s = 0.5;                        ///< between the transforms on either side of a frame
-  double tf_jump_m = 0.1, tf_jump_m_per_s = 3;  ///< both: a jump is far and fast
-  double tf_jump_rad = 0.2, tf_jump_rad_per_s = 6;
+  double stamp_tolerance_s = 1e-3;  ///< of the step between two frames against sequence and frame period
+  TransformLimits tf;               ///< around a frame, and from one transform to the next
 };
 
 /// Looks for everything that would trouble whoever works with the bag later: no or several radar configurations, frames

@@ -5,13 +5,14 @@
 #include <mmradartwin_msgs/ReceiveGrid.h>
 #include <ros/ros.h>
 #include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <deque>
 #include <optional>
 
+#include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/ros/transform_record.h"
 
 namespace mmradartwin {
 
@@ -19,9 +20,12 @@ namespace mmradartwin {
 /// and as a nodelet; callbacks must come one at a time.
 ///
 /// A frame waits until tf knows T_map_radar at its stamp, `pose_timeout_s` at most; without a pose it goes on with
-/// pose_valid = false. The average begins anew when the radar has moved by more than `moved_m` or `moved_deg` since the
-/// window's first pose, when radar/config changes, and when stamps go back (a bag that loops). Frames of another radar
-/// configuration than the latched one are refused.
+/// pose_valid = false. So does a frame within a jump of tf, or within more than `tf_gap_s` without transforms at whose
+/// ends the radar stands elsewhere: what tf interpolates there is no place where it was. Frames with and without a pose
+/// are not averaged with each other. The average begins anew when the radar has moved by more than `moved_m` or
+/// `moved_deg` since the window's first pose, when radar/config changes, and when stamps go back (a bag that loops).
+/// Frames of another radar configuration than the latched one are refused. With `channels`, a channels.yaml, grids and
+/// maps of the measured branch are corrected by it; a radar/config that it does not fit is refused.
 class SignalChainNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
@@ -36,6 +40,8 @@ class SignalChainNode {
   void readParameters(const ros::NodeHandle& private_nh);
   void onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& config);
   void onCube(const mmradartwin_msgs::AdcCube::ConstPtr& cube);
+  void forgetTransforms();
+  void onTransforms(const tf2_msgs::TFMessage& message, bool fixed);
   void onTwinGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid);
   /// Takes all frames from the queue whose pose is known or will not come.
   void drain();
@@ -48,18 +54,21 @@ class SignalChainNode {
   double moved_m_ = 0.02;
   double moved_rad_ = 0;
   double pose_timeout_s_ = 0.5;
+  TransformLimits tf_limits_;
   std::string map_frame_ = "map";
   std::string radar_frame_ = "radar_link";
 
   tf2_ros::Buffer tf_buffer_;
-  std::optional<tf2_ros::TransformListener> tf_listener_;
+  TransformRecord tf_record_;
+  ros::Time tf_heard_;
   ros::Publisher grid_publisher_, map_publisher_, twin_map_publisher_;
-  ros::Subscriber config_subscriber_, cube_subscriber_, twin_subscriber_;
+  ros::Subscriber config_subscriber_, cube_subscriber_, twin_subscriber_, tf_subscriber_, tf_static_subscriber_;
   ros::WallTimer timer_;
 
   std::uint64_t radar_hash_ = 0;
   std::optional<SignalChain> chain_;
   std::optional<CoherentAverage> average_;
+  std::optional<ChannelCorrection> channels_;
   std::optional<Eigen::Isometry3d> window_pose_;  ///< first known pose of the window
   std::deque<Waiting> queue_;
   ros::Time newest_;

@@ -22,14 +22,14 @@ namespace mmradartwin {
 
 /// radar/config, session, radar/grid, tf -> twin/grid, twin/paths, twin/scene, diagnostics; service twin/apply.
 ///
-/// Simulates at the pose of each measured grid (the grid's own, else tf at its stamp) and at `rate_hz` along tf while
-/// no measurement comes. Records are used again while the radar stands within `reuse_m` and `reuse_deg`. Of grids that
-/// come while one is simulated the newest is taken and the others are counted as skipped. Callbacks must come one at a
-/// time.
+/// Simulates at the pose of each measured grid that has one, and at `rate_hz` along tf while no measurement comes.
+/// Records are used again while the radar stands within `reuse_m` and `reuse_deg`. Of grids that come while one is
+/// simulated the newest is taken and the others are counted as skipped. Callbacks must come one at a time.
 ///
 /// The scene is that of the parameter `scene`, else of the latched session message, whose files are unpacked into a
 /// temporary folder. twin/apply puts another twin in the place of the one simulated, from the last measured grid on;
 /// twin/scene says which. It stays until another is applied, or a session with other files comes.
+/// `channels` names what the measured branch is corrected by: a twin with the same channel errors is refused.
 class TwinNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
@@ -54,8 +54,9 @@ class TwinNode {
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
   std::string scene_file_, twin_file_, radar_file_, map_frame_ = "map", radar_frame_ = "radar_link";
-  double rate_hz_ = 10, reuse_m_ = 1e-4, reuse_rad_ = 0, pose_timeout_s_ = 0.2;
+  double rate_hz_ = 10, reuse_m_ = 1e-4, reuse_rad_ = 0;
   std::uint64_t seed_ = 1;
+  std::optional<ChannelCorrection> channels_;
 
   std::optional<RadarConfig> radar_;
   std::uint64_t radar_hash_ = 0;  ///< of the twin's radar
@@ -70,7 +71,7 @@ class TwinNode {
   /// Where and when the last measured grid was simulated.
   std::optional<std::pair<Eigen::Isometry3d, std::int64_t>> measured_;
   mmradartwin_msgs::ReceiveGrid::ConstPtr pending_;
-  ros::WallTime pending_since_, measured_at_, published_at_;
+  ros::WallTime measured_at_, published_at_;
   std::uint64_t simulated_ = 0, reused_ = 0, skipped_ = 0, without_pose_ = 0;
   double simulate_ms_ = 0;
 

@@ -1,0 +1,49 @@
+#include "recording_arguments.h"
+
+#include <CLI/CLI.hpp>
+
+#include "mmradartwin_dsp/ros/bag.h"
+
+namespace mmradartwin {
+
+void RecordingArguments::addTo(CLI::App& app) {
+  app.add_option("recording", recording, "session directory, session.yaml or bag")->required();
+  app.add_option("--twin", twin, "twin.yaml (default: the session's, or the base mechanisms)");
+  app.add_option("--scene", scene, "scene.yaml where the recording names none");
+  app.add_option("--radar", radar, "radar.yaml for a recording without one");
+  app.add_option("--layout", layout, "byte layout of the captures, instead of radar.yaml's")
+      ->check(CLI::IsMember({"4lane", "2lane"}));
+}
+
+void RecordingArguments::addChannelsTo(CLI::App& app) {
+  app.add_option("--channels", channels,
+                 "channels.yaml of calibrate: channel errors to take out of the measured branch");
+}
+
+Recording RecordingArguments::open() const {
+  Recording opened = open(recording);
+  if (!channels.empty()) opened.channels = loadChannelCorrection(channels, opened.radar);
+  return opened;
+}
+
+Recording RecordingArguments::open(const std::string& path) const {
+  std::optional<CaptureLayout> lanes;
+  if (!layout.empty()) lanes = layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
+  return openRecording(path, radar, lanes);
+}
+
+std::optional<std::string> RecordingArguments::sceneFile(const Recording& opened) const {
+  return scene.empty() ? opened.scene_file : scene;
+}
+
+std::string RecordingArguments::twinFile(const Recording& opened) const {
+  return twin.empty() ? opened.twin_file.value_or("") : twin;
+}
+
+TwinDescription RecordingArguments::loadTwinOf(const Recording& opened) const {
+  TwinDescription description = loadTwin(twinFile(opened), sceneFile(opened), opened.radar);
+  if (opened.channels) refuseSameChannelError(description, *opened.channels);
+  return description;
+}
+
+}  // namespace mmradartwin

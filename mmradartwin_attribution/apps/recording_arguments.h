@@ -1,0 +1,35 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "mmradartwin_dsp/session.h"
+#include "mmradartwin_sim/twin.h"
+
+namespace CLI {
+class App;
+}
+
+namespace mmradartwin {
+
+/// What evaluate, diagnose and calibrate take alike: a recording and what stands beside it.
+struct RecordingArguments {
+  std::string recording, twin, scene, radar, layout, channels;
+
+  /// Adds the argument `recording` and --twin, --scene, --radar and --layout.
+  void addTo(CLI::App& app);
+  /// Adds --channels.
+  void addChannelsTo(CLI::App& app);
+
+  /// Throws InputError.
+  Recording open() const;
+  /// Another recording of the same radar and layout, without `channels`.
+  Recording open(const std::string& path) const;
+  /// The one given, else the recording's; nothing and "" where there is none.
+  std::optional<std::string> sceneFile(const Recording& recording) const;
+  std::string twinFile(const Recording& recording) const;
+  /// loadTwin() with these. Throws InputError, also for a twin with the channel errors that `channels` takes out.
+  TwinDescription loadTwinOf(const Recording& recording) const;
+};
+
+}  // namespace mmradartwin
