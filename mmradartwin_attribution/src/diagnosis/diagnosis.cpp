@@ -190,7 +190,7 @@ double Session::strongestMeasured() const {
   double strongest = 0;
   for (const PoseChannels& p : data_.poses) {
     const Eigen::VectorXd power = p.y.colwise().squaredNorm().transpose() / static_cast<double>(p.y.rows());
-    for (Eigen::Index r = model_->firstBin() + 2; r + 2 < power.size(); ++r) {
+    for (Eigen::Index r = 2; r + 2 < power.size(); ++r) {
       // A tone's power summed over Hann's lobe is 1.5 times its own, wherever it lies between the bins.
       if (power[r] >= power[r - 1] && power[r] >= power[r + 1]) {
         strongest = std::max(strongest, power.segment(r - 2, 5).sum() / 1.5);
@@ -235,6 +235,9 @@ void Session::judgeDelivery() {
 
 void Session::judgeTone() {
   report("radar's own echo", 0);
+  for (const NamedParameters& m : mechanisms_) {
+    if (m.mechanism == "tx_rx_leakage" || m.mechanism == "dc_offset") return;  // the twin has it already
+  }
   const BodyFixedTone tone = findBodyFixedTone(data_);
   if (tone.false_alarm_rate > 1e-6 || tone.gain < 30) return;
   const ChannelData recorded = data_;

@@ -75,6 +75,26 @@ std::vector<PathRecord> mergedWeak(const RadarConfig& radar, std::vector<PathRec
   });
 }
 
+using PathKey = std::tuple<const std::string*, std::vector<int>>;
+
+/// Paths of `there` that `here` has, too, and those of `here` that `there` lacks. Scatter points of one facet are many
+/// under one name, and their cells change with every step: they stay as they are here.
+void addShared(const std::vector<PathRecord>& there, const std::vector<PathRecord>& here,
+               std::vector<PathRecord>& all) {
+  std::map<PathKey, int> count;
+  for (const PathRecord& r : here) ++count[PathKey{r.event, r.facets}];
+  std::map<PathKey, int> found;
+  for (const PathRecord& r : there) {
+    const auto at = count.find(PathKey{r.event, r.facets});
+    if (at == count.end() || at->second > 1) continue;
+    ++found[at->first];
+    all.push_back(r);
+  }
+  for (const PathRecord& r : here) {
+    if (found.find(PathKey{r.event, r.facets}) == found.end()) all.push_back(r);
+  }
+}
+
 }  // namespace
 
 std::string mechanismKey(const NamedParameters& mechanism) {
@@ -209,10 +229,46 @@ void EchoSource::findGraze(const std::vector<NamedParameters>& mechanisms) {
 std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& mechanisms,
                                            const std::vector<int>& poses,
                                            const std::vector<double>& actor_range_m) {
-  const Twin twin = base_.changed(mechanisms);
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
   std::vector<const Traced*> parts;
   for (const NamedParameters& m : mechanisms) parts.push_back(&traced(geometry, m, poses));
+  return collect(mechanisms, poses, actor_range_m, [&](std::size_t i) {
+    std::vector<PathRecord> all;
+    for (const Traced* part : parts) all.insert(all.end(), (*part)[i].begin(), (*part)[i].end());
+    return all;
+  });
+}
+
+std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters>& mechanisms,
+                                               const std::vector<NamedParameters>& from, const std::vector<int>& poses,
+                                               const std::vector<double>& actor_range_m) {
+  const std::vector<NamedParameters> geometry = geometryOf(mechanisms), geometry_from = geometryOf(from);
+  if (keyOf(geometry) == keyOf(geometry_from)) return echoes(mechanisms, poses, actor_range_m);
+  std::vector<std::pair<const Traced*, const Traced*>> parts;  // there and here
+  for (const NamedParameters& m : mechanisms) {
+    const auto same = std::find_if(from.begin(), from.end(),
+                                   [&](const NamedParameters& f) { return f.mechanism == m.mechanism; });
+    parts.emplace_back(&traced(geometry, m, poses),
+                       same == from.end() ? nullptr : &traced(geometry_from, *same, poses));
+  }
+  return collect(mechanisms, poses, actor_range_m, [&](std::size_t i) {
+    std::vector<PathRecord> all;
+    for (const auto& [there, here] : parts) {
+      if (here == nullptr) {
+        all.insert(all.end(), (*there)[i].begin(), (*there)[i].end());
+      } else {
+        addShared((*there)[i], (*here)[i], all);
+      }
+    }
+    return all;
+  });
+}
+
+std::vector<PoseEchoes> EchoSource::collect(
+    const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
+    const std::vector<double>& actor_range_m,
+    const std::function<std::vector<PathRecord>(std::size_t pose)>& paths) const {
+  const Twin twin = base_.changed(mechanisms);
   const RadarConfig& radar = base_.radar();
   const SignalChain chain(radar);
   const int channels = radar.channels();
@@ -222,8 +278,7 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
     const std::size_t i = static_cast<std::size_t>(poses[j]);
     const Pose& pose = data_.poses[i].pose;
-    std::vector<PathRecord> all;
-    for (const Traced* part : parts) all.insert(all.end(), (*part)[i].begin(), (*part)[i].end());
+    std::vector<PathRecord> all = paths(i);
     EchoCollector collector(radar, accuracy_.path_angle_rad, data_.poses[i].beams, actor_range_m);
     std::optional<Eigen::MatrixXcd> matrix;
     if (twin.hasReceiveStage()) matrix = twin.channelMatrix(pose.T_map_radar, pose.stamp_ns);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -31,6 +32,11 @@ class EchoSource {
   /// Of all poses.
   std::vector<PoseEchoes> echoes(const std::vector<NamedParameters>& mechanisms,
                                  const std::vector<double>& actor_range_m = {});
+  /// The same a small step away from `from`, of the paths that both have: what comes or goes within the step says
+  /// nothing about the slope.
+  std::vector<PoseEchoes> echoesNear(const std::vector<NamedParameters>& mechanisms,
+                                     const std::vector<NamedParameters>& from, const std::vector<int>& poses,
+                                     const std::vector<double>& actor_range_m);
   /// What hypotheses are compared with from now on: paths of other mechanisms are forgotten (memory stays bounded so),
   /// and what grazes an edge within the pose's accuracy is found for these.
   void settle(const std::vector<NamedParameters>& mechanisms);
@@ -45,6 +51,9 @@ class EchoSource {
   const Traced& traced(const std::vector<NamedParameters>& geometry, const NamedParameters& mechanism,
                        const std::vector<int>& poses);
   std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);
+  std::vector<PoseEchoes> collect(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
+                                  const std::vector<double>& actor_range_m,
+                                  const std::function<std::vector<PathRecord>(std::size_t pose)>& paths) const;
   void findGraze(const std::vector<NamedParameters>& mechanisms);
 
   const Twin& base_;

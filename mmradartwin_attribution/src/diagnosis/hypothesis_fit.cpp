@@ -110,12 +110,16 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
   std::vector<SessionCovariance> directions;
   const std::size_t count = std::max<std::size_t>(1, hypothesis.coordinates.size());
   for (std::size_t j = 0; j < count; ++j) {
-    std::vector<double> at(hypothesis.coordinates.size(), 0.0);
+    const std::vector<double> nothing(hypothesis.coordinates.size(), 0.0);
+    std::vector<double> at = nothing;
     // What rises from nothing does so with its power: its typical value shows more than the slope at nothing. What
     // shifts or turns does so to first order for small amounts alone.
     const double step = at.empty() || hypothesis.coordinates[j].oneSided() ? 1 : kSmallStep;
     if (!at.empty()) at[j] = step;
-    const auto echoes = source_.echoes(with(null.mechanisms, hypothesis.at(at)), poses, null.actor_range_m);
+    const auto echoes =
+        step < 1 ? source_.echoesNear(with(null.mechanisms, hypothesis.at(at)),
+                                      with(null.mechanisms, hypothesis.at(nothing)), poses, null.actor_range_m)
+                 : source_.echoes(with(null.mechanisms, hypothesis.at(at)), poses, null.actor_range_m);
     directions.push_back(difference(model_.covariance(echoes, null.nuisance, poses), null.covariance, poses, step));
   }
   const Effective e = effective(model_.scores(null.basis, directions, poses), null.nuisance.globals());
@@ -200,7 +204,8 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
                               ? kSmallStep * std::max(1e-4, std::abs(scaled[static_cast<std::size_t>(j)]))
                               : kSmallStep;
       moved[static_cast<std::size_t>(j)] += step;
-      directions.push_back(difference(model_.covariance(source_.echoes(mechanisms(moved), s.actor_range_m), s.nuisance, everyone),
+      directions.push_back(difference(model_.covariance(source_.echoesNear(mechanisms(moved), s.mechanisms, everyone, s.actor_range_m),
+                                                          s.nuisance, everyone),
                                       here, everyone, step));
     }
     return model_.scores(model_.basis(s.echoes, s.nuisance), directions, everyone);

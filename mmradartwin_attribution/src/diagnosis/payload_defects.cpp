@@ -255,8 +255,9 @@ std::optional<Slip> findSlip(const Payload& p) {
         const double fit = template_after ? shifted[b] : shifted[blocks] - shifted[b];
         const double was = template_after ? still[b] : still[blocks] - still[b];
         const double noise = variance * (template_after ? used[b] : used[blocks] - used[b]);
-        // What was so is unexplained beyond noise; a slip explains nearly all of that, in whatever frames it is.
-        if (was - noise < least || fit - noise > 0.5 * (was - noise)) continue;
+        // What was so is unexplained beyond noise; a slip explains nearly all of that, in whatever frames it is. Of a
+        // walker close by, some other order of samples explains half.
+        if (was - noise < least || fit - noise > 0.2 * (was - noise)) continue;
         const double gain = (was - fit) / (2 * variance);
         if (!best || gain > best_cost) {
           best_cost = gain;
