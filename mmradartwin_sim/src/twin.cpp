@@ -237,8 +237,7 @@ std::vector<PathRecord> Twin::receivedPaths(const Eigen::Isometry3d& T_map_radar
 
 bool Twin::hasReceiveStage() const { return impl_->has_receive || impl_->has_distort; }
 
-std::optional<Eigen::MatrixXcd> Twin::channelMatrix(const Eigen::Isometry3d& T_map_radar,
-                                                    std::int64_t stamp_ns) const {
+std::optional<Eigen::MatrixXcd> Twin::channelMatrix(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) const {
   if (impl_->has_distort) return std::nullopt;
   const PoseContext c = impl_->context(T_map_radar, stamp_ns);
   const int channels = c.radar.channels(), samples = c.radar.samples_per_chirp;

@@ -17,12 +17,12 @@ namespace mmradartwin {
 /// What the diagnosis knows of one pose: windowed range spectra of its coherent average, as complex channels.
 struct PoseChannels {
   Pose pose;
-  int location = 0;        ///< index of its place, for what is held out
-  ReceiveGrid grid;        ///< the average itself
-  Eigen::MatrixXcd y;      ///< [M][N] range spectra over the window's sum and full scale: a tone's own amplitude
-  int shots = 1;           ///< frames times loops behind the average
+  int location = 0;    ///< index of its place, for what is held out
+  ReceiveGrid grid;    ///< the average itself
+  Eigen::MatrixXcd y;  ///< [M][N] range spectra over the window's sum and full scale: a tone's own amplitude
+  int shots = 1;       ///< frames times loops behind the average
   std::vector<EchoBeam> beams;
-  BinCovariance clutter;  ///< of all bins: see clutter_field.h
+  BinCovariance clutter;   ///< of all bins: see clutter_field.h
   double noise_power = 0;  ///< thermal power in a cell of y, from the scatter of the frames
 };
 

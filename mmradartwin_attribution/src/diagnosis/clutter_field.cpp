@@ -43,8 +43,7 @@ void expectClutter(const Scene& scene, ChannelData& data) {
           if (r < kNearest_m || p.x() <= 0 || std::abs(p.z()) > kFieldOfView_sine * r) continue;
           const double place = r / radar.range_bin_m(), power = std::pow(r / kReference_m, -4);
           for (int k = 0; k < channels; ++k) {
-            steering[static_cast<std::size_t>(k)] =
-                std::polar(1.0, -wave * radar.virtual_element_m(k).y() * p.y() / r);
+            steering[static_cast<std::size_t>(k)] = std::polar(1.0, -wave * radar.virtual_element_m(k).y() * p.y() / r);
           }
           const int middle = static_cast<int>(std::lround(place));
           for (int b = std::max(0, middle - 2); b <= std::min(bins - 1, middle + 2); ++b) {

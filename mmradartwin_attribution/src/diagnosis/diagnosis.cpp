@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <iomanip>
 #include <memory>
@@ -18,6 +17,7 @@
 #include "clutter_field.h"
 #include "delivery.h"
 #include "empirical_hypothesis.h"
+#include "fitted_parameters.h"
 #include "held_out_gain.h"
 #include "hypothesis_fit.h"
 #include "mmradartwin_dsp/input_error.h"
@@ -101,8 +101,6 @@ class Session {
   void addSharedLatents(const std::vector<Hypothesis>& all, std::vector<Screened>& screened) const;
   std::vector<HypothesisFit> fitBest(int round);
   Finding describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const;
-  std::vector<FindingParameter> parametersOf(const Hypothesis& hypothesis, const std::vector<double>& scaled,
-                                             const std::vector<double>& standard_error, const std::string& cause) const;
   void refitTogether();
   std::vector<PoseEchoes> heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m);
   FindingGain gainOf(const HypothesisFit& fit);
@@ -409,48 +407,13 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   return fits;
 }
 
-/// Values and 95 % intervals, by the scatter over locations, of the parameters that the cause is described by.
-std::vector<FindingParameter> Session::parametersOf(const Hypothesis& hypothesis, const std::vector<double>& scaled,
-                                                    const std::vector<double>& standard_error,
-                                                    const std::string& cause) const {
-  std::vector<FindingParameter> parameters;
-  const NamedParameters m = hypothesis.at(scaled);
-  const double locations = static_cast<double>(data_.locations.size());
-  const double t = boost::math::quantile(boost::math::students_t(std::max(1.0, locations - 1)), 0.975);
-  for (const CauseParameter& wanted : causeDescription(cause).parameters) {
-    if (!m.values.has(wanted.name)) continue;
-    FindingParameter p{wanted.name, wanted.unit, m.values.all().at(wanted.name), {}};
-    const auto* text = std::get_if<std::string>(&p.value);
-    const auto* list = std::get_if<std::vector<double>>(&p.value);
-    if ((text && text->empty()) || (list && list->empty())) continue;
-    if (const auto* value = std::get_if<double>(&p.value)) {
-      for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
-        if (hypothesis.coordinates[j].parameter != wanted.name) continue;
-        p.ci95 = {{*value - t * standard_error[j], *value + t * standard_error[j]}};
-      }
-      if (p.ci95.empty() && wanted.one_of > 0) continue;
-    } else if (list != nullptr) {
-      p.ci95.assign(list->size(), {0, 0});
-      for (std::size_t k = 0; k < list->size(); ++k) p.ci95[k] = {(*list)[k], (*list)[k]};
-      for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
-        const Coordinate& c = hypothesis.coordinates[j];
-        if (c.parameter != wanted.name || c.element < 0) continue;
-        const double v = (*list)[static_cast<std::size_t>(c.element)];
-        p.ci95[static_cast<std::size_t>(c.element)] = {v - t * standard_error[j], v + t * standard_error[j]};
-      }
-    }
-    parameters.push_back(std::move(p));
-  }
-  return parameters;
-}
-
 Finding Session::describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const {
   Finding f;
   const NamedParameters m = best.hypothesis.at(best.scaled);
   const bool named = catalogued(m.mechanism);
   f.cause = named ? m.mechanism : "unknown";
   f.mechanism = m;
-  f.parameters = parametersOf(best.hypothesis, best.scaled, best.standard_error, f.cause);
+  f.parameters = fittedParameters(best.hypothesis, best.scaled, best.standard_error, f.cause, data_.locations.size());
   // Names that explain nearly as much, by their share of probability.
   double sum = 0;
   std::vector<std::pair<std::string, double>> alike;
@@ -592,7 +555,7 @@ void Session::refitTogether() {
       a.scaled = fit.scaled[i];
       Finding& f = result_.findings.findings[a.finding];
       f.mechanism = a.hypothesis.at(a.scaled);
-      f.parameters = parametersOf(a.hypothesis, a.scaled, fit.standard_error[i], f.cause);
+      f.parameters = fittedParameters(a.hypothesis, a.scaled, fit.standard_error[i], f.cause, data_.locations.size());
       for (NamedParameters& e : extended_) {
         if (e.mechanism == f.mechanism->mechanism) e = *f.mechanism;
       }
@@ -611,11 +574,10 @@ void Session::refitTogether() {
     findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(gone.finding));
     accepted_.erase(accepted_.begin() + static_cast<std::ptrdiff_t>(weakest));
     for (Accepted& a : accepted_) a.finding -= a.finding > gone.finding ? 1 : 0;
-    extended_.erase(std::remove_if(extended_.begin(), extended_.end(),
-                                   [&](const NamedParameters& m) {
-                                     return m.mechanism == gone.hypothesis.mechanism.mechanism;
-                                   }),
-                    extended_.end());
+    extended_.erase(
+        std::remove_if(extended_.begin(), extended_.end(),
+                       [&](const NamedParameters& m) { return m.mechanism == gone.hypothesis.mechanism.mechanism; }),
+        extended_.end());
   }
 }
 

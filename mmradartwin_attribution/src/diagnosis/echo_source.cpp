@@ -227,8 +227,7 @@ void EchoSource::findGraze(const std::vector<NamedParameters>& mechanisms) {
 }
 
 std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& mechanisms,
-                                           const std::vector<int>& poses,
-                                           const std::vector<double>& actor_range_m) {
+                                           const std::vector<int>& poses, const std::vector<double>& actor_range_m) {
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
   std::vector<const Traced*> parts;
   for (const NamedParameters& m : mechanisms) parts.push_back(&traced(geometry, m, poses));
@@ -246,8 +245,8 @@ std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters
   if (keyOf(geometry) == keyOf(geometry_from)) return echoes(mechanisms, poses, actor_range_m);
   std::vector<std::pair<const Traced*, const Traced*>> parts;  // there and here
   for (const NamedParameters& m : mechanisms) {
-    const auto same = std::find_if(from.begin(), from.end(),
-                                   [&](const NamedParameters& f) { return f.mechanism == m.mechanism; });
+    const auto same =
+        std::find_if(from.begin(), from.end(), [&](const NamedParameters& f) { return f.mechanism == m.mechanism; });
     parts.emplace_back(&traced(geometry, m, poses),
                        same == from.end() ? nullptr : &traced(geometry_from, *same, poses));
   }

@@ -140,8 +140,8 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
   return result;
 }
 
-HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedParameters>& base,
-                                                     const Nuisance& nuisance, const std::vector<Hypothesis>& parts,
+HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
+                                                     const std::vector<Hypothesis>& parts,
                                                      const std::vector<double>& start, int iterations) {
   std::vector<Coordinate> coordinates;
   for (const Hypothesis& h : parts) coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
@@ -185,9 +185,8 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   };
   consider(start);
   // A quadratic's promise is far off where a level rises from nothing.
-  const bool one_sided =
-      parts.size() == 1 &&
-      std::any_of(coordinates.begin(), coordinates.end(), [](const Coordinate& c) { return c.oneSided(); });
+  const bool one_sided = parts.size() == 1 && std::any_of(coordinates.begin(), coordinates.end(),
+                                                          [](const Coordinate& c) { return c.oneSided(); });
   for (double factor : {0.4, 2.0}) {
     if (!one_sided) break;
     std::vector<double> other = start;
@@ -204,9 +203,10 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
                               ? kSmallStep * std::max(1e-4, std::abs(scaled[static_cast<std::size_t>(j)]))
                               : kSmallStep;
       moved[static_cast<std::size_t>(j)] += step;
-      directions.push_back(difference(model_.covariance(source_.echoesNear(mechanisms(moved), s.mechanisms, everyone, s.actor_range_m),
-                                                          s.nuisance, everyone),
-                                      here, everyone, step));
+      directions.push_back(
+          difference(model_.covariance(source_.echoesNear(mechanisms(moved), s.mechanisms, everyone, s.actor_range_m),
+                                       s.nuisance, everyone),
+                     here, everyone, step));
     }
     return model_.scores(model_.basis(s.echoes, s.nuisance), directions, everyone);
   };

@@ -1,0 +1,42 @@
+#include "fitted_parameters.h"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+
+namespace mmradartwin {
+
+std::vector<FindingParameter> fittedParameters(const Hypothesis& hypothesis, const std::vector<double>& scaled,
+                                               const std::vector<double>& standard_error, const std::string& cause,
+                                               std::size_t locations) {
+  std::vector<FindingParameter> parameters;
+  const NamedParameters m = hypothesis.at(scaled);
+  const double t =
+      boost::math::quantile(boost::math::students_t(std::max(1.0, static_cast<double>(locations) - 1)), 0.975);
+  for (const CauseParameter& wanted : causeDescription(cause).parameters) {
+    if (!m.values.has(wanted.name)) continue;
+    FindingParameter p{wanted.name, wanted.unit, m.values.all().at(wanted.name), {}};
+    const auto* text = std::get_if<std::string>(&p.value);
+    const auto* list = std::get_if<std::vector<double>>(&p.value);
+    if ((text && text->empty()) || (list && list->empty())) continue;
+    if (const auto* value = std::get_if<double>(&p.value)) {
+      for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
+        if (hypothesis.coordinates[j].parameter != wanted.name) continue;
+        p.ci95 = {{*value - t * standard_error[j], *value + t * standard_error[j]}};
+      }
+      if (p.ci95.empty() && wanted.one_of > 0) continue;
+    } else if (list != nullptr) {
+      p.ci95.assign(list->size(), {0, 0});
+      for (std::size_t k = 0; k < list->size(); ++k) p.ci95[k] = {(*list)[k], (*list)[k]};
+      for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
+        const Coordinate& c = hypothesis.coordinates[j];
+        if (c.parameter != wanted.name || c.element < 0) continue;
+        const double v = (*list)[static_cast<std::size_t>(c.element)];
+        p.ci95[static_cast<std::size_t>(c.element)] = {v - t * standard_error[j], v + t * standard_error[j]};
+      }
+    }
+    parameters.push_back(std::move(p));
+  }
+  return parameters;
+}
+
+}  // namespace mmradartwin

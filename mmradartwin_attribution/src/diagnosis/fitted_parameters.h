@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "hypothesis.h"
+#include "mmradartwin_attribution/finding.h"
+
+namespace mmradartwin {
+
+/// Values and 95 % intervals of the parameters that a cause is described by. scaled: of the hypothesis' coordinates;
+/// standard_error: of their values, from the scatter over that many locations (Student's t).
+std::vector<FindingParameter> fittedParameters(const Hypothesis& hypothesis, const std::vector<double>& scaled,
+                                               const std::vector<double>& standard_error, const std::string& cause,
+                                               std::size_t locations);
+
+}  // namespace mmradartwin
