@@ -22,6 +22,7 @@
 #include "hypothesis_fit.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "session_model.h"
+#include "shared_latents.h"
 
 namespace mmradartwin {
 namespace {
@@ -40,9 +41,8 @@ constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kWorthALaw = 12;
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
 constexpr double kMuch = 40;               ///< unless it is worth so many nats, inflation taken off
-constexpr double kSharedLatent = 3;    ///< standard deviations from none at which a common error is tried as a cause
-constexpr double kAlike = 5;           ///< nats within which two names are not told apart
-constexpr double kObjectPlaces = 500;  ///< places of an 8 by 6 m room that a session resolves, as a family
+constexpr double kAlike = 5;               ///< nats within which two names are not told apart
+constexpr double kObjectPlaces = 500;      ///< places of an 8 by 6 m room that a session resolves, as a family
 
 std::string number(double value, int digits = 3) {
   std::ostringstream out;
@@ -98,7 +98,6 @@ class Session {
   void judgeTone();
   void judgeNoise();
   bool judgeChannels(int round);
-  void addSharedLatents(const std::vector<Hypothesis>& all, std::vector<Screened>& screened) const;
   std::vector<HypothesisFit> fitBest(int round);
   Finding describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const;
   void refitTogether();
@@ -307,25 +306,6 @@ void Session::judgeNoise() {
   }
 }
 
-void Session::addSharedLatents(const std::vector<Hypothesis>& all, std::vector<Screened>& screened) const {
-  // An error that all poses or all actors share is no error of theirs. The score test cannot see it: the latents hold
-  // it.
-  const Nuisance& n = state_.nuisance;
-  const auto add = [&](const char* name, std::vector<double> latents, double spread, double unit) {
-    latents.erase(std::remove(latents.begin(), latents.end(), 0.0), latents.end());  // nothing shows these
-    if (latents.size() < 4) return;
-    const double middle = quantile(latents, 0.5);
-    const double z = middle / spread * std::sqrt(static_cast<double>(latents.size()) * 2 / M_PI);  // of a median
-    if (std::abs(z) < kSharedLatent) return;
-    for (const Hypothesis& h : all) {
-      if (h.mechanism.mechanism != name) continue;
-      screened.push_back({h, 0.5 * z * z, {h.coordinates.front().scaled(middle * unit)}});
-    }
-  };
-  add("radar_yaw_offset", n.yaw_rad, accuracy_.heading_rad, 180 / M_PI);
-  add("range_bias", n.actor_range_m, model_->spread().actor_range_m, 1);
-}
-
 std::vector<HypothesisFit> Session::fitBest(int round) {
   std::vector<Hypothesis> all = hypotheses(twin_, mechanisms_);
   const std::vector<Hypothesis> laws = empiricalHypotheses(data_, mechanisms_);
@@ -376,7 +356,9 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     s.promised -= numbers + 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
     source_->settle(mechanisms_);
   }
-  addSharedLatents(all, screened);
+  for (Screened& s : sharedLatents(twin_.scene(), state_.nuisance, model_->spread(), accuracy_, all)) {
+    screened.push_back(std::move(s));
+  }
   if (const auto place = projectBack(twin_, *model_, state_)) {
     screened.push_back({objectAt(*place), place->promised, {0, 0, 1}});
   }
@@ -594,8 +576,8 @@ bool Session::judgeChannels(int round) {
       const auto explained = *finding.gain->explained_power.difference_ci95;
       const double by = finding.gain->explained_power.after - finding.gain->explained_power.before;
       const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
-      const bool much = (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0 &&
-                        f.gain / f.inflation > kMuch && explained[1] >= 0;
+      const bool much = finding.cause != "unknown" && by >= 0 &&
+                        (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0 && f.gain / f.inflation > kMuch;
       if (!in_maps && !much) continue;
       addMetrics(f, *finding.gain);
     }
