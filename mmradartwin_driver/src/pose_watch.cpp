@@ -26,16 +26,15 @@ void PoseWatch::observe(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_ra
         Eigen::Quaterniond(T_map_radar.linear()).angularDistance(Eigen::Quaterniond(T_map_radar_.linear()));
     if (apart_s > options_.age_limit_s) {
       ++gaps_;
-      told_ = text("poses were missing for %.1f s: frames of that time have no pose that can be trusted", apart_s);
-      told_ns_ = stamp_ns;
+      gap_ = {text("poses were missing for %.1f s: frames of that time have no pose that can be trusted", apart_s),
+              stamp_ns};
     } else if ((moved_m > options_.jump_m && moved_m > options_.speed_limit_m_per_s * apart_s) ||
                (turned_rad > options_.jump_rad && turned_rad > options_.turn_limit_rad_per_s * apart_s)) {
       ++jumps_;
-      told_ = text(
-          "the pose jumped by %.2f m and %.0f deg within %.2f s: was the radar put elsewhere, or did its "
-          "localisation correct itself?",
-          moved_m, turned_rad * 57.29578, apart_s);
-      told_ns_ = stamp_ns;
+      jump_ = {text("the pose jumped by %.2f m and %.0f deg within %.2f s: was the radar put elsewhere, or did its "
+                    "localisation correct itself?",
+                    moved_m, turned_rad * 57.29578, apart_s),
+               stamp_ns};
     }
   }
   stamp_ns_ = stamp_ns;
@@ -60,10 +59,15 @@ PoseWatch::Report PoseWatch::report(std::int64_t now_ns) const {
   if (*report.age_s > options_.age_limit_s) {
     report.text =
         text("the latest pose is %.1f s old: see to the node that publishes the camera's pose", *report.age_s);
-  } else if (!told_.empty() && static_cast<double>(now_ns - told_ns_) * 1e-9 < options_.remember_s) {
+    return report;
+  }
+  // A jump at a gap's end must not hide the gap, nor the gap the jump.
+  for (const Event* event : {&gap_, &jump_}) {
+    if (event->text.empty() || static_cast<double>(now_ns - event->stamp_ns) * 1e-9 >= options_.remember_s) continue;
     report.level = Level::kWarning;
-    report.text = told_;
-  } else {
+    report.text += (report.text.empty() ? "" : "; ") + event->text;
+  }
+  if (report.text.empty()) {
     report.level = Level::kFine;
     report.text = "poses come";
   }

@@ -63,6 +63,16 @@ TEST(PoseWatch, JumpsOfPlaceAndHeading) {
   EXPECT_EQ(watch.report(at(0.2)).jumps, 2u);
 }
 
+TEST(PoseWatch, AJumpAfterAGapHidesNeither) {
+  PoseWatch watch;
+  walk(watch, 0, 5);
+  watch.observe(at(8), pose(5));
+  watch.observe(at(8.05), pose(8));
+  const std::string text = watch.report(at(8.1)).text;
+  EXPECT_NE(text.find("were missing for"), std::string::npos) << text;
+  EXPECT_NE(text.find("jumped by 3.00 m"), std::string::npos) << text;
+}
+
 TEST(PoseWatch, AStaticPoseHasNoAge) {
   PoseWatch watch;
   watch.observe(0, pose(1));

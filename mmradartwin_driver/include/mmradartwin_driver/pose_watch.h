@@ -36,8 +36,11 @@ class PoseWatch {
   std::optional<std::int64_t> stamp_ns_;
   Eigen::Isometry3d T_map_radar_ = Eigen::Isometry3d::Identity();
   std::uint64_t gaps_ = 0, jumps_ = 0;
-  std::int64_t told_ns_ = 0;  ///< stamp after the last gap or jump
-  std::string told_;
+  struct Event {
+    std::string text;
+    std::int64_t stamp_ns = 0;  ///< of the first pose after it
+  };
+  Event gap_, jump_;  ///< the last of each
 };
 
 }  // namespace mmradartwin
