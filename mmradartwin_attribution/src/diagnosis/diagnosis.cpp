@@ -34,13 +34,16 @@ constexpr std::size_t kScreenPoses = 44;  ///< a part of the session ranks hypot
 constexpr std::size_t kFewestPoses = 12;
 constexpr std::size_t kSecondLook = 9;  ///< hypotheses that are looked at on all poses
 constexpr std::size_t kSuspects = 6;    ///< actors whose geometry is tried
-constexpr std::size_t kMostNames = 5;   ///< fits of one round
+constexpr double kOutOfPlace = 4;       ///< nats of an actor's own errors from which on it is looked for elsewhere
+constexpr std::size_t kMostOutOfPlace = 2;
+constexpr std::size_t kMostNames = 5;  ///< fits of one round
 constexpr std::size_t kMostLaws = 2;
 constexpr double kWorthAFit = 4;  ///< nats promised
 constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kWorthALaw = 12;
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
-constexpr double kMuch = 40;               ///< unless it is worth so many nats, inflation taken off
+constexpr double kMuch = 80;               ///< unless it is worth so many nats, inflation taken off;
+constexpr double kMuchOfGeometry = 100;    ///< of what moves echoes, whose likelihood is rough
 constexpr double kAlike = 5;               ///< nats within which two names are not told apart
 constexpr double kObjectPlaces = 500;      ///< places of an 8 by 6 m room that a session resolves, as a family
 
@@ -53,12 +56,6 @@ std::string number(double value, int digits = 3) {
 bool catalogued(const std::string& name) {
   const auto& all = causeDescriptions();
   return std::any_of(all.begin(), all.end(), [&](const CauseDescription& c) { return c.name == name; });
-}
-
-/// Errors of all ranges or directions in a few numbers.
-bool isGeometry(const Hypothesis& h) {
-  return h.subject.empty() && h.coordinates.size() <= 3 && catalogued(h.mechanism.mechanism) &&
-         causeDescription(h.mechanism.mechanism).residual_class == ResidualClass::kShiftedResponse;
 }
 
 Finding findingOf(const FrameFinding& frames) {
@@ -315,6 +312,10 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   for (std::size_t i = 0; i < std::min(kSuspects, suspects.size()); ++i) {
     suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(suspects[i].first)].name);
   }
+  std::set<int> out_of_place;
+  for (const auto& [actor, nats] : suspects) {
+    if (nats > kOutOfPlace && out_of_place.size() < kMostOutOfPlace) out_of_place.insert(actor);
+  }
   const auto spread = [&](std::size_t wanted) {
     const std::size_t count = data_.poses.size();
     wanted = std::min(count, wanted);
@@ -326,6 +327,12 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   const auto some = [&](const Hypothesis& h) {
     return spread(std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
   };
+  const auto look = [&](const Hypothesis& h, const std::vector<int>& poses) {
+    const int actor = twin_.scene().actorIndex(h.subject);
+    return out_of_place.count(actor) > 0 && h.mechanism.mechanism == "actor_moved"
+               ? fitter_->screenAround(state_, h, actor, poses)
+               : fitter_->screen(state_, h, poses);
+  };
   const auto better = [](const Screened& a, const Screened& b) { return a.promised > b.promised; };
   std::vector<Screened> screened;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -333,9 +340,13 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     const bool of_actor = twin_.scene().actorIndex(all[i].subject) >= 0;
     const double numbers = static_cast<double>(all[i].coordinates.size());
     const std::vector<double> typical(all[i].coordinates.size(), 1.0);
-    if (of_actor && source_->altersGeometry(all[i].at(typical)) && suspicious.count(all[i].subject) == 0) continue;
-    const std::vector<int> poses = some(all[i]);
-    Screened s = fitter_->screen(state_, all[i], poses);
+    // Each of these traces the session anew: of actors without suspicion, what is there or not on a few poses, and
+    // nothing else.
+    const bool costly =
+        of_actor && suspicious.count(all[i].subject) == 0 && source_->altersGeometry(all[i].at(typical));
+    if (costly && !all[i].isOneSided()) continue;
+    const std::vector<int> poses = costly ? spread(kScreenPoses / 2) : some(all[i]);
+    Screened s = look(all[i], poses);
     // What chance promises: half a nat per number on the poses looked at, scaled up like the rest.
     s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
     screened.push_back(std::move(s));
@@ -346,21 +357,30 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   // small for that.
   std::size_t kept = 0;
   screened.erase(std::remove_if(screened.begin(), screened.end(),
-                                [&](const Screened& s) { return ++kept > kSecondLook && !isGeometry(s.hypothesis); }),
+                                [&](const Screened& s) { return ++kept > kSecondLook && !s.hypothesis.isGeometry(); }),
                  screened.end());
   for (Screened& s : screened) {
     report("looking again at " + s.hypothesis.label(), 0);
     const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
     const std::vector<int> poses = spread(numbers > 3 ? kScreenPoses : data_.poses.size());
-    s = fitter_->screen(state_, s.hypothesis, poses);
+    s = look(s.hypothesis, poses);
     s.promised -= numbers + 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
     source_->settle(mechanisms_);
   }
-  for (Screened& s : sharedLatents(twin_.scene(), state_.nuisance, model_->spread(), accuracy_, all)) {
-    screened.push_back(std::move(s));
+  for (Screened& s : sharedLatents(*source_, state_, model_->spread(), accuracy_, all, spread(kScreenPoses))) {
+    const auto same = std::find_if(screened.begin(), screened.end(), [&](const Screened& other) {
+      return other.hypothesis.label() == s.hypothesis.label();
+    });
+    if (same == screened.end()) {
+      screened.push_back(std::move(s));
+    } else {
+      same->promised = std::max(same->promised, s.promised);
+      same->starts.push_back(s.starts.front());
+    }
   }
+  source_->settle(mechanisms_);
   if (const auto place = projectBack(twin_, *model_, state_)) {
-    screened.push_back({objectAt(*place), place->promised, {0, 0, 1}});
+    screened.push_back({objectAt(*place), place->promised, {{0, 0, 1}}});
   }
   std::stable_sort(screened.begin(), screened.end(), better);
   family_ = all.size();
@@ -371,13 +391,16 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     // A promise is a quadratic's and often far too small: names get several chances, laws without a name two.
     const bool law = !catalogued(s.hypothesis.mechanism.mechanism);
     std::size_t& fitted = law ? laws_fitted : names_fitted;
-    const double worth = law ? kWorthALaw : isGeometry(s.hypothesis) ? kWorthAFitOfGeometry : kWorthAFit;
+    const bool object = s.hypothesis.mechanism.mechanism == "actor_unmodelled";
+    const double worth = object                      ? kWorthAFit + std::log(kObjectPlaces)
+                         : law                       ? kWorthALaw
+                         : s.hypothesis.isGeometry() ? kWorthAFitOfGeometry
+                                                     : kWorthAFit;
     if (s.promised > worth && fitted < (law ? kMostLaws : kMostNames)) {
       ++fitted;
       report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
-      HypothesisFit f = fitter_->fit(state_, s.hypothesis, s.start, 4);
+      HypothesisFit f = fitter_->fit(state_, s.hypothesis, s.starts, 4);
       source_->settle(mechanisms_);
-      const bool object = s.hypothesis.mechanism.mechanism == "actor_unmodelled";
       fitter_->judge(f, all.size() + static_cast<std::size_t>(object ? kObjectPlaces : 0));
       tried.gain = f.gain;
       fits.push_back(std::move(f));
@@ -575,9 +598,12 @@ bool Session::judgeChannels(int round) {
       // map shows it (an image at -26 dB), unless the maps get worse.
       const auto explained = *finding.gain->explained_power.difference_ci95;
       const double by = finding.gain->explained_power.after - finding.gain->explained_power.before;
+      const bool moves =
+          f.hypothesis.isGeometry() || (source_->altersGeometry(*finding.mechanism) && !f.scaled.empty());
       const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
       const bool much = finding.cause != "unknown" && by >= 0 &&
-                        (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0 && f.gain / f.inflation > kMuch;
+                        (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0 &&
+                        f.gain / f.inflation > (moves ? kMuchOfGeometry : kMuch);
       if (!in_maps && !much) continue;
       addMetrics(f, *finding.gain);
     }
@@ -590,7 +616,8 @@ bool Session::judgeChannels(int round) {
     state_.nuisance = f.state.nuisance;
     if (accepted_.size() > 1) refitTogether();
     source_->settle(mechanisms_);
-    state_ = fitter_->state(mechanisms_, std::make_unique<Nuisance>(state_.nuisance).get());
+    const Nuisance nuisance = state_.nuisance;
+    state_ = fitter_->state(mechanisms_, &nuisance);
     return !unknown;  // an unknown stands last
   }
   return false;

@@ -10,6 +10,9 @@ namespace {
 
 constexpr int kLobe = 2;   ///< bins to either side that a weak path reaches
 constexpr int kSkirt = 6;  ///< and a strong one
+constexpr int kFarSkirt =
+    32;  ///< and the strongest: at -60 to -100 dB, but where no clutter stands that is above the noise
+constexpr double kWeak = 1e-3, kStrong = 0.03;  ///< of the pose's strongest path's power
 constexpr std::size_t kMostBeamBins = 16;
 constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;  ///< of a path's power: a beam that takes less does not see it
 
@@ -72,7 +75,7 @@ class HannTable {
   }
 
  private:
-  static constexpr int kPerBin = 512, kSize = (kSkirt + 1) * kPerBin;
+  static constexpr int kPerBin = 512, kSize = (kFarSkirt + 1) * kPerBin;
   std::array<double, kSize + 1> response_, slope_;
 };
 const HannTable kHann;
@@ -128,70 +131,72 @@ void EchoCollector::outer(const std::complex<double>* c, double cosine,
   }
 }
 
-void EchoCollector::add(const PathRecord& record, bool weak) {
+void EchoCollector::add(const PathRecord& record, double share) {
+  const bool weak = share < kWeak;
   EchoGroup& g = group(record.actors);
   const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + g.added_range_m) / bin_m_;
   std::vector<std::complex<float>> packed;
   outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error drowns in the others
-  const int reach = weak ? kLobe : kSkirt, middle = static_cast<int>(std::lround(place));
-  const int low = std::max(0, middle - reach), high = std::min(samples_ - 1, middle + reach);
-  if (low > high) return;
+  const bool strong = share >= kStrong;
+  const int reach = weak ? kLobe : strong ? std::min(kFarSkirt, samples_ / 2 - 1) : kSkirt;
+  const int middle = static_cast<int>(std::lround(place));
+  if (middle + reach < 0 || middle - reach > samples_ - 1) return;
+  // Spectra are periodic: the skirt of an echo near the first bin stands in the last ones.
+  const bool around = strong && (middle - reach < 0 || middle + reach > samples_ - 1);
+  const int low = around ? 0 : std::max(0, middle - reach),
+            high = around ? samples_ - 1 : std::min(samples_ - 1, middle + reach);
   EchoGroup::Fields& f = g.bins;
   for (BinCovariance* field : {&f.power, &f.shift, &f.bend, &f.cosine}) cover(*field, low, high, size_);
-  for (int r = low; r <= high; ++r) {
+  for (int r = middle - reach; r <= middle + reach; ++r) {
+    if (!around && (r < low || r > high)) continue;
+    const int bin = (r + samples_) % samples_;
     const auto [w, per_bin] = kHann.at(r - place);
     const double slope = -per_bin / bin_m_;
-    accumulate(f.power, r, w * w, packed);
-    accumulate(f.shift, r, 2 * w * slope, packed);
-    accumulate(f.bend, r, slope * slope, packed);
-    accumulate(f.cosine, r, w * w * cosine, packed);
+    accumulate(f.power, bin, w * w, packed);
+    accumulate(f.shift, bin, 2 * w * slope, packed);
+    accumulate(f.bend, bin, slope * slope, packed);
+    accumulate(f.cosine, bin, w * w * cosine, packed);
   }
   addToBeams(record.c.data(), place, 1, weak ? kOffBeamWeak : kOffBeam, &g.beams.power, &g.beams.shift, &g.beams.bend);
 }
 
-void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y) {
+void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, const Eigen::MatrixXcd& slope) {
   EchoGroup& g = group(record.actors);
-  const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + g.added_range_m) / bin_m_;
+  const double cosine = pathCosine(record);
   const Eigen::VectorXd level = y.colwise().squaredNorm().transpose();
-  const double least = 1e-7 * level.maxCoeff();
+  const double least = 1e-11 * level.maxCoeff();
   if (!(least > 0)) return;
   int first = 0, last = samples_ - 1;
   while (level[first] < least) ++first;
   while (level[last] < least) --last;
-  EchoGroup::Fields& f = g.bins;
-  for (BinCovariance* field : {&f.power, &f.cosine}) cover(*field, first, last, size_);
+  // Responses and their derivatives as one: what a shift makes of their outer products is then definite again.
   std::vector<std::complex<float>> packed;
-  std::vector<std::complex<double>> c(static_cast<std::size_t>(channels_));
+  const auto addProducts = [&](EchoGroup::Fields& f, int at, const Eigen::VectorXcd& c, const Eigen::VectorXcd& d,
+                               double turns) {
+    for (BinCovariance* field : {&f.power, &f.shift, &f.bend}) cover(*field, at, at, size_);
+    outer(c.data(), turns, packed);
+    accumulate(f.power, at, 1, packed);
+    if (turns != 0) {
+      cover(f.cosine, at, at, size_);
+      accumulate(f.cosine, at, turns, packed);
+    }
+    accumulate(f.shift, at, -1, packed);
+    outer(d.data(), turns, packed);
+    accumulate(f.shift, at, -1, packed);
+    accumulate(f.bend, at, 1, packed);
+    const Eigen::VectorXcd both = c + d;  // (c + d)(c + d)^H - c c^H - d d^H = c d^H + d c^H
+    outer(both.data(), turns, packed);
+    accumulate(f.shift, at, 1, packed);
+  };
   for (int r = first; r <= last; ++r) {
-    if (level[r] < least) continue;
-    for (int k = 0; k < channels_; ++k) c[k] = y(k, r);
-    outer(c.data(), cosine, packed);
-    accumulate(f.power, r, 1, packed);
-    accumulate(f.cosine, r, cosine, packed);
+    if (level[r] >= least) addProducts(g.bins, r, y.col(r), slope.col(r), cosine);
   }
   for (std::size_t b = 0; b < beams_.size(); ++b) {
-    const EchoBeam& beam = beams_[b];
-    const Eigen::VectorXcd formed = formBeam(beam, y);
-    if (formed.squaredNorm() < least) continue;
-    cover(g.beams.power, static_cast<int>(b), static_cast<int>(b), size_);
-    outer(formed.data(), 0, packed);
-    accumulate(g.beams.power, static_cast<int>(b), 1, packed);
+    const Eigen::VectorXcd formed = formBeam(beams_[b], y);
+    if (formed.squaredNorm() >= least) {
+      addProducts(g.beams, static_cast<int>(b), formed, formBeam(beams_[b], slope), 0);
+    }
   }
-  // The range derivative moves the tone alone: its channels are those at its own bin.
-  const int middle = std::clamp(static_cast<int>(std::lround(place)), 0, samples_ - 1);
-  const double peak = hannResponse(middle - place);
-  if (!(std::abs(peak) > 0.1)) return;
-  for (int k = 0; k < channels_; ++k) c[k] = y(k, middle) / peak;
-  outer(c.data(), cosine, packed);
-  const int low = std::max(0, middle - kLobe), high = std::min(samples_ - 1, middle + kLobe);
-  for (BinCovariance* field : {&f.shift, &f.bend}) cover(*field, low, high, size_);
-  for (int r = low; r <= high; ++r) {
-    const auto [w, per_bin] = kHann.at(r - place);
-    const double slope = -per_bin / bin_m_;
-    accumulate(f.shift, r, 2 * w * slope, packed);
-    accumulate(f.bend, r, slope * slope, packed);
-  }
-  addToBeams(c.data(), place, 1, kOffBeam, nullptr, &g.beams.shift, &g.beams.bend);
 }
 
 void EchoCollector::addToBeams(const std::complex<double>* c, double place, double share, double off,

@@ -40,10 +40,12 @@ class EchoCollector {
   /// order, good to some 2 cm.
   EchoCollector(const RadarConfig& radar, double angle_error_rad, const std::vector<EchoBeam>& beams,
                 const std::vector<double>& actor_range_m);
-  /// A path as its tone stands on the channels. weak: only its main lobe counts.
-  void add(const PathRecord& record, bool weak);
-  /// A path whose response the receiver has changed: y [M][N] instead of the tone; range and direction are the path's.
-  void add(const PathRecord& record, const Eigen::MatrixXcd& y);
+  /// A path as its tone stands on the channels. share: of the pose's strongest path's power; of a weak one only the
+  /// main lobe counts.
+  void add(const PathRecord& record, double share);
+  /// A path whose response the receiver has changed: y [M][N] instead of the tone, its actors' added range already in
+  /// it, and its derivative by the one-way range, per metre. Actors and direction are the record's.
+  void add(const PathRecord& record, const Eigen::MatrixXcd& y, const Eigen::MatrixXcd& slope);
   /// Power without an actor, direction or range of its own.
   void addGraze(const PathRecord& record, double share);
   PoseEchoes take();

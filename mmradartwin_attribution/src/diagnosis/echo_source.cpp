@@ -14,9 +14,8 @@
 namespace mmradartwin {
 namespace {
 
-// Paths below this share of the pose's strongest echo's power are summed by place before a receiver sees them, and
-// reach no further than their main lobe.
-constexpr double kWeakPower = 1e-3;
+// Paths below this share of the pose's strongest echo's power are summed by place before a receiver sees them.
+constexpr double kWeakPower = 1e-4;
 // A path whose amplitude changes by less than this share within the pose's accuracy does not graze anything.
 constexpr double kSteady = 0.02;
 constexpr double kReceiverSine = 1.0 / 16;  // of sin(azimuth), where weak paths go through the receiver together
@@ -73,6 +72,17 @@ std::vector<PathRecord> mergedWeak(const RadarConfig& radar, std::vector<PathRec
     const int direction = static_cast<int>(std::floor(0.5 * (r.departure.y() + r.arrival.y()) / kReceiverSine));
     return Key{r.actors, rangeBin(radar, r.length_m[0]), direction};
   });
+}
+
+/// Derivative of a path's samples by its one-way range, per metre, the phase in the window's middle held.
+ComplexGrid byRange(const RadarConfig& radar, const ComplexGrid& x) {
+  const double samples = static_cast<double>(x.cols());
+  ComplexGrid slope = x;
+  for (Eigen::Index n = 0; n < x.cols(); ++n) {
+    const double turn = 2 * M_PI * (static_cast<double>(n) - 0.5 * samples) / (samples * radar.range_bin_m());
+    slope.col(n) *= std::complex<double>(0, turn);
+  }
+  return slope;
 }
 
 using PathKey = std::tuple<const std::string*, std::vector<int>>;
@@ -263,6 +273,46 @@ std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters
   });
 }
 
+EchoShift EchoSource::shift(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& from,
+                            const std::vector<int>& poses, int actors) {
+  const std::vector<NamedParameters> geometry = geometryOf(mechanisms), geometry_from = geometryOf(from);
+  std::vector<std::pair<const Traced*, const Traced*>> parts;  // there and here
+  for (const NamedParameters& f : from) {
+    for (const NamedParameters& m : mechanisms) {
+      if (m.mechanism == f.mechanism) parts.emplace_back(&traced(geometry, m, poses), &traced(geometry_from, f, poses));
+    }
+  }
+  const Twin there_twin = base_.changed(mechanisms), here_twin = base_.changed(from);
+  EchoShift shift;
+  shift.range_m.assign(static_cast<std::size_t>(actors), 0.0);
+  std::vector<double> weights(shift.range_m.size(), 1e-30);
+  for (const int pose : poses) {
+    const std::size_t i = static_cast<std::size_t>(pose);
+    const Pose& at = data_.poses[i].pose;
+    double turned = 0, sum = 1e-30;
+    for (const auto& [there, here] : parts) {
+      std::map<PathKey, std::vector<PathRecord>> pairs;
+      for (PathRecord& r : here_twin.receivedPaths(at.T_map_radar, (*here)[i], at.stamp_ns)) {
+        pairs[PathKey{r.event, r.facets}].push_back(std::move(r));
+      }
+      for (const PathRecord& r : there_twin.receivedPaths(at.T_map_radar, (*there)[i], at.stamp_ns)) {
+        const auto same = pairs.find(PathKey{r.event, r.facets});
+        if (same == pairs.end() || same->second.size() > 1 || r.actors.size() != 1 || r.actors[0] < 0) continue;
+        const PathRecord& s = same->second.front();
+        const auto azimuth = [](const PathRecord& p) { return std::atan2(p.departure.y(), p.departure.x()); };
+        const std::size_t actor = static_cast<std::size_t>(r.actors[0]);
+        shift.range_m[actor] += r.amplitude * 0.5 * (r.length_m[0] - s.length_m[0]);
+        weights[actor] += r.amplitude;
+        turned += r.amplitude * (azimuth(r) - azimuth(s));
+        sum += r.amplitude;
+      }
+    }
+    shift.azimuth_rad.push_back(turned / sum);
+  }
+  for (std::size_t a = 0; a < weights.size(); ++a) shift.range_m[a] /= weights[a];
+  return shift;
+}
+
 std::vector<PoseEchoes> EchoSource::collect(
     const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
     const std::vector<double>& actor_range_m,
@@ -289,22 +339,27 @@ std::vector<PoseEchoes> EchoSource::collect(
         if (matrix)
           Eigen::Map<Eigen::VectorXcd>(r.c.data(), channels) =
               *matrix * Eigen::Map<Eigen::VectorXcd>(r.c.data(), channels).eval();
-        collector.add(r, r.amplitude * r.amplitude < kWeakPower * strongest);
+        collector.add(r, r.amplitude * r.amplitude / strongest);
       }
     } else {
       // The receiver mixes ranges: each path is sent through it alone, less what comes without any path.
       const auto spectra = [&](const ComplexGrid& x) -> Eigen::MatrixXcd { return chain.rangeSpectra(x) / window; };
-      const Eigen::MatrixXcd nothing =
-          spectra(twin.weigh(pose.T_map_radar, std::vector<PathRecord>(), pose.stamp_ns).grid.x);
+      const ComplexGrid nothing = twin.weigh(pose.T_map_radar, std::vector<PathRecord>(), pose.stamp_ns).grid.x;
       for (PathRecord& r : mergedWeak(radar, std::move(all))) {
+        for (int a : r.actors) {
+          if (a < 0 || a >= static_cast<int>(actor_range_m.size())) continue;
+          for (double& l : r.length_m) l += 2 * actor_range_m[a];
+        }
         const Simulation alone = twin.weigh(pose.T_map_radar, std::vector<PathRecord>{r}, pose.stamp_ns);
-        if (!alone.records.empty()) collector.add(alone.records.front(), spectra(alone.grid.x) - nothing);
+        if (alone.records.empty()) continue;
+        const ComplexGrid x = alone.grid.x - nothing;
+        collector.add(alone.records.front(), spectra(x), spectra(byRange(radar, x)));
       }
       if (nothing.squaredNorm() > 0) {
-        PathRecord fixed;
-        fixed.departure = fixed.arrival = Eigen::Vector3d::UnitX();
+        PathRecord fixed;  // to the radar: it turns with it and has no range
+        fixed.departure = fixed.arrival = Eigen::Vector3d::UnitY();
         fixed.length_m.assign(static_cast<std::size_t>(channels), 0.0);
-        collector.add(fixed, nothing);
+        collector.add(fixed, spectra(nothing), Eigen::MatrixXcd::Zero(channels, radar.samples_per_chirp));
       }
     }
     result[j] = collector.take();

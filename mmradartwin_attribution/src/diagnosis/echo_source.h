@@ -18,6 +18,12 @@ struct PoseAccuracy {
   double path_range_m = 0.005;
 };
 
+/// How far a change of mechanisms moves echoes.
+struct EchoShift {
+  std::vector<double> range_m;      ///< [actors] one-way, mean over echoes that meet this actor alone, by amplitude
+  std::vector<double> azimuth_rad;  ///< [poses named] the same over a pose's echoes
+};
+
 /// The expected channels of a session for any list of mechanisms. Paths are traced once per mechanism and geometry;
 /// what only weighs or receives traces nothing (DESIGN section 4).
 class EchoSource {
@@ -37,6 +43,9 @@ class EchoSource {
   std::vector<PoseEchoes> echoesNear(const std::vector<NamedParameters>& mechanisms,
                                      const std::vector<NamedParameters>& from, const std::vector<int>& poses,
                                      const std::vector<double>& actor_range_m);
+  /// What `mechanisms` do to the echoes that they share with `from`.
+  EchoShift shift(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& from,
+                  const std::vector<int>& poses, int actors);
   /// What hypotheses are compared with from now on: paths of other mechanisms are forgotten (memory stays bounded so),
   /// and what grazes an edge within the pose's accuracy is found for these.
   void settle(const std::vector<NamedParameters>& mechanisms);

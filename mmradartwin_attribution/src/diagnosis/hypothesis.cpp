@@ -5,6 +5,7 @@
 #include <set>
 
 #include "echo_source.h"
+#include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -120,6 +121,18 @@ NamedParameters Hypothesis::at(const std::vector<double>& scaled) const {
 }
 
 std::string Hypothesis::label() const { return mechanism.mechanism + (subject.empty() ? "" : " of " + subject); }
+
+bool Hypothesis::isOneSided() const {
+  return std::all_of(coordinates.begin(), coordinates.end(), [](const Coordinate& c) { return c.oneSided(); });
+}
+
+bool Hypothesis::isGeometry() const {
+  const auto& causes = causeDescriptions();
+  const auto cause = std::find_if(causes.begin(), causes.end(),
+                                  [&](const CauseDescription& c) { return c.name == mechanism.mechanism; });
+  return subject.empty() && !coordinates.empty() && coordinates.size() <= 3 && cause != causes.end() &&
+         cause->residual_class == ResidualClass::kShiftedResponse;
+}
 
 std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedParameters>& present) {
   std::vector<Hypothesis> result;

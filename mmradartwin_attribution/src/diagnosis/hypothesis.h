@@ -35,6 +35,10 @@ struct Hypothesis {
 
   NamedParameters at(const std::vector<double>& scaled) const;
   std::string label() const;
+  /// True where all of it is there or not, more or less.
+  bool isOneSided() const;
+  /// True for a named error of all ranges or directions in a few numbers.
+  bool isGeometry() const;
 };
 
 /// Every registered mechanism that says how to try it, once per actor or material where it concerns one, and those that

@@ -1,20 +1,39 @@
 #include "hypothesis_fit.h"
 
+#include <nlopt.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
+#include <functional>
+#include <memory>
 #include <numeric>
 
 namespace mmradartwin {
 namespace {
 
-constexpr double kSmallStep = 0.125;  ///< of the scale, for derivatives
-constexpr double kEnough = 0.2;       ///< nats: a further step promises less
-constexpr double kRising = 5;         ///< nats of the last step that are worth going on for
+constexpr double kSmallStep = 0.125;           ///< of the scale, for derivatives
+constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what rises from nothing is looked at first
+constexpr double kHopeless = 50;               ///< nats lost there: less of it would not gain either
+constexpr double kRadii[] = {1, 2, 4};         ///< of the scale, about a place where an object may have stood before
+constexpr int kDirections = 8;
+constexpr double kEnough = 0.2;  ///< nats: a further step promises less
+constexpr double kRising = 5;    ///< nats of the last step that are worth going on for
 constexpr double kMaxInflation = 50;
+constexpr Eigen::Index kMostRough = 4;  ///< coordinates for which values without slopes are worth their number
 constexpr double kPrice =
     5;  ///< nats per coordinate, some inflation included: fewer numbers win where all explain alike
+
+/// Of a gain that scatters over places more than one by chance would: of G nats, sqrt(2 G).
+double inflationOf(double gain, const std::vector<double>& by_location) {
+  const double locations = static_cast<double>(by_location.size());
+  if (by_location.size() < 2 || !(gain > 0)) return 1;
+  const double mean = std::accumulate(by_location.begin(), by_location.end(), 0.0) / locations;
+  double squares = 0;
+  for (double v : by_location) squares += (v - mean) * (v - mean);
+  return std::clamp(squares * locations / (locations - 1) / (2 * gain), 1.0, kMaxInflation);
+}
 
 /// of[i] is of poses[i], from is of all poses.
 SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, const std::vector<int>& poses,
@@ -25,6 +44,12 @@ SessionCovariance difference(SessionCovariance of, const SessionCovariance& from
     for (std::size_t j = 0; j < of[i].size(); ++j) of[i][j] = (of[i][j] - base[j]) * f;
   }
   return of;
+}
+
+Nuisance withoutErrors(Nuisance nuisance, int actor) {
+  nuisance.actor_range_m[static_cast<std::size_t>(actor)] = 0;
+  nuisance.actor_gain[static_cast<std::size_t>(actor)] = 0;
+  return nuisance;
 }
 
 std::vector<int> everyPose(const ModelState& state) {
@@ -38,6 +63,30 @@ std::vector<NamedParameters> with(std::vector<NamedParameters> mechanisms, Named
   return mechanisms;
 }
 
+/// Calls `value` at places that lead to its maximum (BOBYQA, Powell 2009: no slopes).
+void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector<double> scaled, double initial_step,
+                         const std::function<double(const std::vector<double>&)>& value) {
+  const unsigned n = static_cast<unsigned>(coordinates.size());
+  const std::unique_ptr<std::remove_pointer_t<nlopt_opt>, void (*)(nlopt_opt)> search(nlopt_create(NLOPT_LN_BOBYQA, n),
+                                                                                      nlopt_destroy);
+  std::vector<double> low, high;
+  for (const Coordinate& c : coordinates) {
+    low.push_back(std::min(c.scaled(c.min), c.scaled(c.max)));
+    high.push_back(std::max(c.scaled(c.min), c.scaled(c.max)));
+  }
+  const auto call = [](unsigned size, const double* x, double*, void* function) {
+    return (*static_cast<const std::function<double(const std::vector<double>&)>*>(function))({x, x + size});
+  };
+  nlopt_set_lower_bounds(search.get(), low.data());
+  nlopt_set_upper_bounds(search.get(), high.data());
+  nlopt_set_max_objective(search.get(), call, const_cast<std::function<double(const std::vector<double>&)>*>(&value));
+  nlopt_set_initial_step1(search.get(), initial_step);
+  nlopt_set_xtol_abs1(search.get(), 0.02);
+  nlopt_set_maxeval(search.get(), 12 * static_cast<int>(n));
+  double best = 0;
+  nlopt_optimize(search.get(), scaled.data(), &best);
+}
+
 }  // namespace
 
 double HypothesisFit::ranking() const {
@@ -48,6 +97,7 @@ double HypothesisFit::ranking() const {
 struct HypothesisFitter::Effective {
   Eigen::MatrixXd by_location;  // [L][n]
   Eigen::MatrixXd information;  // [n][n]
+  Eigen::MatrixXd scatter;      // [n][n] of the scores' sums, over places and the latents' priors
   Eigen::VectorXd total;
   double inflation = 1;
 };
@@ -68,8 +118,10 @@ HypothesisFitter::Effective HypothesisFitter::effective(const Scores& s, int glo
   const double locations = static_cast<double>(e.by_location.rows());
   if (locations > 1 && n > 0) {
     const Eigen::MatrixXd centred = e.by_location.rowwise() - e.by_location.colwise().mean();
-    const Eigen::MatrixXd scatter = centred.transpose() * centred * (locations / (locations - 1));
-    const Eigen::MatrixXd ratio = e.information.ldlt().solve(scatter);
+    e.scatter = centred.transpose() * centred * (locations / (locations - 1));
+    // Errors of actors are the same at all places: no scatter over places shows them, their priors do.
+    e.scatter += projection.transpose() * s.prior.asDiagonal() * projection;
+    const Eigen::MatrixXd ratio = e.information.ldlt().solve(e.scatter);
     e.inflation = std::clamp(ratio.trace() / static_cast<double>(n), 1.0, kMaxInflation);
   }
   return e;
@@ -105,17 +157,88 @@ std::vector<std::pair<int, double>> HypothesisFitter::suspects(const ModelState&
   return result;
 }
 
+double HypothesisFitter::offset(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses) {
+  // Nothing but the IF's images and harmonics has its echoes sent through the receiver one by one, which is not to the
+  // last digit what their tones are.
+  if (hypothesis.coordinates.size() != 1 || !hypothesis.coordinates[0].logarithmic()) return 0;
+  const std::vector<double> there = model_.byPose(
+      source_.echoes(with(null.mechanisms, hypothesis.at({0.0})), poses, null.actor_range_m), null.nuisance, poses);
+  double sum = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) sum += there[i] - null.by_pose[static_cast<std::size_t>(poses[i])];
+  return sum;
+}
+
+std::pair<double, double> HypothesisFitter::valueAt(const ModelState& null, const Hypothesis& hypothesis,
+                                                    const std::vector<double>& scaled, const std::vector<int>& poses,
+                                                    const Nuisance& nuisance, double offset_per_pose) {
+  const auto echoes = source_.echoes(with(null.mechanisms, hypothesis.at(scaled)), poses, nuisance.actor_range_m);
+  const std::vector<double> there = model_.byPose(echoes, nuisance, poses);
+  std::vector<double> by_location(model_.data().locations.size(), 0.0);
+  double gain = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::size_t pose = static_cast<std::size_t>(poses[i]);
+    const double v = there[i] - null.by_pose[pose] - offset_per_pose;
+    gain += v;
+    by_location[static_cast<std::size_t>(model_.data().poses[pose].location)] += v;
+  }
+  const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
+  return {gain, whole * gain / inflationOf(gain, by_location)};
+}
+
+Screened HypothesisFitter::screenAround(const ModelState& null, const Hypothesis& hypothesis, int actor,
+                                        const std::vector<int>& poses) {
+  Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 0.0)}};
+  const Nuisance nuisance = withoutErrors(null.nuisance, actor);  // they have stood in for the move
+  for (double radius : kRadii) {
+    for (int k = 0; k < kDirections; ++k) {
+      std::vector<double> at(hypothesis.coordinates.size(), 0.0);
+      at[0] = radius * std::cos(2 * M_PI * k / kDirections);
+      at[1] = radius * std::sin(2 * M_PI * k / kDirections);
+      const double promised = valueAt(null, hypothesis, at, poses, nuisance, 0).second;
+      source_.settle(null.mechanisms);
+      if (promised <= result.promised) continue;
+      result.promised = promised;
+      result.starts.front() = at;
+    }
+  }
+  return result;
+}
+
+Screened HypothesisFitter::screenDirectly(const ModelState& null, const Hypothesis& hypothesis,
+                                          const std::vector<int>& poses) {
+  std::vector<double> start(hypothesis.coordinates.size(), kLittle);
+  double best = 0;
+  const double without = offset(null, hypothesis, poses) / static_cast<double>(poses.size());
+  const auto tryAt = [&](double scaled) {
+    const std::vector<double> at(hypothesis.coordinates.size(), scaled);
+    const auto [gain, promised] = valueAt(null, hypothesis, at, poses, null.nuisance, without);
+    if (promised > best) {
+      best = promised;
+      start = at;
+    }
+    return gain;
+  };
+  if (hypothesis.coordinates.empty()) {
+    tryAt(1);
+  } else {
+    const double gain = tryAt(kSome);
+    const bool costly = source_.altersGeometry(hypothesis.at(start));
+    if (gain > (costly ? 0 : -kHopeless)) tryAt(gain > 0 ? 1 : kLittle);
+  }
+  return {hypothesis, best, {start}};
+}
+
 Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses) {
-  Screened result{hypothesis, 0, std::vector<double>(hypothesis.coordinates.size(), 1.0)};
+  if (hypothesis.isOneSided()) return screenDirectly(null, hypothesis, poses);
+  Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 1.0)}};
   std::vector<SessionCovariance> directions;
-  const std::size_t count = std::max<std::size_t>(1, hypothesis.coordinates.size());
-  for (std::size_t j = 0; j < count; ++j) {
+  for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
     const std::vector<double> nothing(hypothesis.coordinates.size(), 0.0);
     std::vector<double> at = nothing;
     // What rises from nothing does so with its power: its typical value shows more than the slope at nothing. What
     // shifts or turns does so to first order for small amounts alone.
-    const double step = at.empty() || hypothesis.coordinates[j].oneSided() ? 1 : kSmallStep;
-    if (!at.empty()) at[j] = step;
+    const double step = hypothesis.coordinates[j].oneSided() ? 1 : kSmallStep;
+    at[j] = step;
     const auto echoes =
         step < 1 ? source_.echoesNear(with(null.mechanisms, hypothesis.at(at)),
                                       with(null.mechanisms, hypothesis.at(nothing)), poses, null.actor_range_m)
@@ -125,16 +248,11 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
   const Effective e = effective(model_.scores(null.basis, directions, poses), null.nuisance.globals());
   const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
   Eigen::VectorXd step = e.information.ldlt().solve(e.total);
-  if (hypothesis.coordinates.empty()) {
-    // There or not: the promise of being there at all, by the quadratic at 1.
-    result.promised = whole * (e.total[0] - 0.5 * e.information(0, 0)) / e.inflation;
-    return result;
-  }
   bool possible = true;
   for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
     const bool one_sided = hypothesis.coordinates[j].oneSided();
     if (one_sided && step[static_cast<Eigen::Index>(j)] <= 0) possible = false;
-    result.start[j] = std::clamp(step[static_cast<Eigen::Index>(j)], one_sided ? 0.02 : -8.0, 8.0);
+    result.starts.front()[j] = std::clamp(step[static_cast<Eigen::Index>(j)], one_sided ? 0.02 : -8.0, 8.0);
   }
   if (possible) result.promised = whole * 0.5 * e.total.dot(step) / e.inflation;
   return result;
@@ -142,7 +260,7 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
 
 HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                                                      const std::vector<Hypothesis>& parts,
-                                                     const std::vector<double>& start, int iterations) {
+                                                     const std::vector<std::vector<double>>& starts, int iterations) {
   std::vector<Coordinate> coordinates;
   for (const Hypothesis& h : parts) coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
   const int globals = nuisance.globals();
@@ -169,27 +287,33 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   // A cause may have been fitted as the latents of all poses or actors: it starts without them, too.
   Nuisance without = nuisance;
   std::fill(without.yaw_rad.begin(), without.yaw_rad.end(), 0.0);
-  Nuisance bare = without;
+  Nuisance placed = without;
+  std::fill(placed.actor_range_m.begin(), placed.actor_range_m.end(), 0.0);
+  Nuisance bare = placed;
   std::fill(bare.actor_gain.begin(), bare.actor_gain.end(), 0.0);
-  std::fill(bare.actor_range_m.begin(), bare.actor_range_m.end(), 0.0);
+  std::vector<Nuisance> others = {without, placed, bare};
+  for (const Hypothesis& h : parts) {
+    const int actor = source_.base().scene().actorIndex(h.subject);
+    if (actor >= 0) others.push_back(withoutErrors(nuisance, actor));
+  }
   Optimum o;
   const auto consider = [&](const std::vector<double>& scaled) {
     ModelState s = evaluate(scaled, nuisance);
-    for (const Nuisance* other : {&without, &bare}) {
-      ModelState t = evaluate(scaled, *other);
+    for (const Nuisance& other : others) {
+      ModelState t = evaluate(scaled, other);
       if (t.log_likelihood > s.log_likelihood) s = std::move(t);
     }
     if (!o.state.echoes.empty() && s.log_likelihood <= o.state.log_likelihood) return;
     o.state = std::move(s);
     o.scaled = scaled;
   };
-  consider(start);
+  for (const std::vector<double>& start : starts) consider(start);
   // A quadratic's promise is far off where a level rises from nothing.
   const bool one_sided = parts.size() == 1 && std::any_of(coordinates.begin(), coordinates.end(),
                                                           [](const Coordinate& c) { return c.oneSided(); });
   for (double factor : {0.4, 2.0}) {
     if (!one_sided) break;
-    std::vector<double> other = start;
+    std::vector<double> other = starts.front();
     for (double& v : other) v *= factor;
     consider(other);
   }
@@ -240,6 +364,33 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
     }
     if (!better) break;
   }
+  const bool geometric = std::any_of(parts.begin(), parts.end(), [&](const Hypothesis& h) {
+    return source_.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0)));
+  });
+  if (!geometric || n == 0 || n > kMostRough) return o;
+  // Where paths come and go with every millimetre the likelihood is rough: slopes end at the first bump, a quadratic
+  // through values some millimetres apart does not. The latents follow to first order.
+  for (double initial : {0.3, 0.15}) {
+    const Optimum from = o;
+    Eigen::MatrixXd information = from.scores.information;
+    information.diagonal().array() += 1e-9 * information.diagonal().array().abs() + 1e-12;
+    const Eigen::LDLT<Eigen::MatrixXd> latents(information.topLeftCorner(globals, globals));
+    searchQuadratically(coordinates, from.scaled, initial, [&](const std::vector<double>& next) {
+      Eigen::VectorXd step(globals + n);
+      for (Eigen::Index j = 0; j < n; ++j) step[globals + j] = next[j] - from.scaled[j];
+      step.head(globals) =
+          latents.solve(from.scores.total.head(globals) - information.topRightCorner(globals, n) * step.tail(n));
+      ModelState s = evaluate(next, model_.stepped(from.state.nuisance, step.head(globals), from.scores, step, 1));
+      const double value = s.log_likelihood;
+      if (value > o.state.log_likelihood) {
+        o.state = std::move(s);
+        o.scaled = next;
+      }
+      return value;
+    });
+    o.scores = derivatives(o.state, o.scaled);
+    if (o.state.log_likelihood - from.state.log_likelihood < kRising) break;
+  }
   return o;
 }
 
@@ -247,9 +398,7 @@ Eigen::MatrixXd HypothesisFitter::robustCovariance(const Effective& e) const {
   const double locations = static_cast<double>(e.by_location.rows());
   const Eigen::MatrixXd covariance = e.information.inverse();
   if (locations <= 2) return covariance;
-  const Eigen::MatrixXd centred = e.by_location.rowwise() - e.by_location.colwise().mean();
-  const Eigen::MatrixXd scatter = centred.transpose() * centred * (locations / (locations - 1));
-  Eigen::MatrixXd robust = covariance * scatter * covariance;
+  Eigen::MatrixXd robust = covariance * e.scatter * covariance;
   for (Eigen::Index j = 0; j < robust.rows(); ++j) {  // never below what the likelihood itself says
     const double factor = std::sqrt(std::max(1.0, covariance(j, j) / robust(j, j)));
     robust.row(j) *= factor;
@@ -262,7 +411,7 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
                                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start) {
   std::vector<double> from;
   for (const std::vector<double>& s : start) from.insert(from.end(), s.begin(), s.end());
-  Optimum o = maximise(base, nuisance, parts, from, 3);
+  Optimum o = maximise(base, nuisance, parts, {from}, 3);
   const Effective e = effective(o.scores, nuisance.globals());
   const Eigen::MatrixXd robust = robustCovariance(e);
   JointFit fit;
@@ -286,16 +435,16 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
 }
 
 HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hypothesis,
-                                    const std::vector<double>& start, int iterations) {
+                                    const std::vector<std::vector<double>>& starts, int iterations) {
   HypothesisFit f;
   f.hypothesis = hypothesis;
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());
-  Optimum o = maximise(null.mechanisms, null.nuisance, {hypothesis}, start, iterations);
+  Optimum o = maximise(null.mechanisms, null.nuisance, {hypothesis}, starts, iterations);
   f.scaled = std::move(o.scaled);
   f.state = std::move(o.state);
   const Scores& scores = o.scores;
-  f.gain = f.state.log_likelihood - null.log_likelihood;
+  f.gain = f.state.log_likelihood - null.log_likelihood - offset(null, hypothesis, everyPose(null));
 
   // Scatter over places: of the scores at the fit where there is a number, else of the gain itself.
   const double locations = static_cast<double>(model_.data().locations.size());
@@ -329,13 +478,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
     for (std::size_t i = 0; i < f.state.by_pose.size(); ++i) {
       by_location[static_cast<std::size_t>(model_.data().poses[i].location)] += f.state.by_pose[i] - null.by_pose[i];
     }
-    double mean = 0, squares = 0;
-    for (double v : by_location) mean += v / locations;
-    for (double v : by_location) squares += (v - mean) * (v - mean);
-    // A gain of G nats by chance scatters by sqrt(2 G).
-    if (locations > 1 && f.gain > 0) {
-      f.inflation = std::clamp(squares * locations / (locations - 1) / (2 * f.gain), 1.0, kMaxInflation);
-    }
+    f.inflation = inflationOf(f.gain, by_location);
   }
   f.held_out_gain += f.gain;
   return f;

@@ -49,8 +49,8 @@ struct JointFit {
 
 struct Screened {
   Hypothesis hypothesis;
-  double promised = 0;  ///< nats by the score test, inflation taken off
-  std::vector<double> start;
+  double promised = 0;                      ///< nats with little or nothing refitted, inflation taken off
+  std::vector<std::vector<double>> starts;  ///< of a fit
 };
 
 /// Scores and fits hypotheses against a state.
@@ -62,11 +62,15 @@ class HypothesisFitter {
   /// Actors by how far their echoes' level and range are from where the twin has them, the priors of their errors
   /// included: most suspicious first, with nats (inflation taken off).
   std::vector<std::pair<int, double>> suspects(const ModelState& null) const;
-  /// Score test of one hypothesis: no refit, one evaluation of its echoes at the typical values.
+  /// What a hypothesis promises without a refit. Of what is there or not, more or less, the likelihood at some values:
+  /// a quadratic about nothing says little of it. Of all others a score test.
   Screened screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
-  /// Maximum likelihood of the coordinates from `start`, the nuisance refitted along.
-  HypothesisFit fit(const ModelState& null, const Hypothesis& hypothesis, const std::vector<double>& start,
-                    int iterations);
+  /// Of an actor whose place is free, by the first two coordinates: the likelihood at places around it, farther away
+  /// than slopes reach.
+  Screened screenAround(const ModelState& null, const Hypothesis& hypothesis, int actor, const std::vector<int>& poses);
+  /// Maximum likelihood of the coordinates from the best of `starts`, the nuisance refitted along.
+  HypothesisFit fit(const ModelState& null, const Hypothesis& hypothesis,
+                    const std::vector<std::vector<double>>& starts, int iterations);
   /// Maximum likelihood of several hypotheses at once over `base`, which holds none of them.
   JointFit refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start);
@@ -86,9 +90,17 @@ class HypothesisFitter {
     Scores scores;  ///< at the last derivative
   };
   Effective effective(const Scores& scores, int globals) const;
+  /// Nats by which the null differs from itself when it is evaluated as the hypothesis is.
+  double offset(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
+  /// Gain in nats over the poses named, and what it promises for all with its inflation taken off.
+  std::pair<double, double> valueAt(const ModelState& null, const Hypothesis& hypothesis,
+                                    const std::vector<double>& scaled, const std::vector<int>& poses,
+                                    const Nuisance& nuisance, double offset_per_pose);
+  Screened screenDirectly(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
   Eigen::MatrixXd robustCovariance(const Effective& effective) const;
   Optimum maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
-                   const std::vector<Hypothesis>& parts, const std::vector<double>& start, int iterations);
+                   const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& starts,
+                   int iterations);
 
   EchoSource& source_;
   const SessionModel& model_;

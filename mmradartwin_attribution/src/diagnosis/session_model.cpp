@@ -15,6 +15,10 @@ using Vector = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, 1, 0, kMaxCha
 
 constexpr double kTail = 4;  ///< degrees of freedom of the complex t
 
+// Hann's neighbours are so alike that a beam's least eigenvalue drowns in single precision's errors without this share
+// of its power.
+constexpr double kBeamShare = 3e-6;
+
 constexpr double kEnough = 0.1;  ///< nats: what a further step would bring is not worth it
 
 enum Global { kGain, kFloor, kSlope, kRelative, kGraze, kRange, kActors };
@@ -168,6 +172,7 @@ SessionModel::Matrix SessionModel::sigma(const PoseEchoes& echoes, const Nuisanc
   // At least a share of the mean power everywhere keeps the matrix definite where the first-order terms would not.
   const double relative = std::exp(n.log_relative), mean = s.diagonal().real().mean();
   addApart(cell, relative * std::max(mean, 0.0) + data_.poses[pose].noise_power, s);
+  if (isBeam(cell)) s.diagonal().array() += kBeamShare * std::max(mean, 0.0);
   addClutter(n, pose, cell, 1, s);
   mirror(s);
   return s;
@@ -196,11 +201,19 @@ double SessionModel::poseLikelihood(const PoseEchoes& echoes, const Nuisance& n,
   return weight() * sum;
 }
 
+std::vector<double> SessionModel::byPose(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
+                                         const std::vector<int>& poses) const {
+  std::vector<double> each(poses.size());
+  tbb::parallel_for(std::size_t{0}, each.size(),
+                    [&](std::size_t i) { each[i] = poseLikelihood(echoes[i], nuisance, poses[i]); });
+  return each;
+}
+
 double SessionModel::logLikelihood(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
                                    std::vector<double>* by_pose) const {
-  std::vector<double> each(data_.poses.size());
-  tbb::parallel_for(std::size_t{0}, each.size(),
-                    [&](std::size_t i) { each[i] = poseLikelihood(echoes[i], nuisance, static_cast<int>(i)); });
+  std::vector<int> all(data_.poses.size());
+  std::iota(all.begin(), all.end(), 0);
+  std::vector<double> each = byPose(echoes, nuisance, all);
   const double sum = std::accumulate(each.begin(), each.end(), 0.0);
   if (by_pose != nullptr) *by_pose = std::move(each);
   return sum + prior(nuisance);
@@ -451,9 +464,12 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
     s.yaw_coupling.row(static_cast<Eigen::Index>(i)) = coupling.transpose();
   }
   s.total = s.by_location.colwise().sum().transpose();
+  s.prior = Eigen::VectorXd::Zero(globals);
   for (int a = 0; a < actors_; ++a) {
     const double gain = 1 / (spread_.actor_gain * spread_.actor_gain);
     const double range = 1 / (spread_.actor_range_m * spread_.actor_range_m);
+    s.prior[kActors + a] = gain;
+    s.prior[kActors + actors_ + a] = range;
     s.information(kActors + a, kActors + a) += gain;
     s.total[kActors + a] -= gain * n.actor_gain[a];
     s.information(kActors + actors_ + a, kActors + actors_ + a) += range;

@@ -41,6 +41,7 @@ struct Scores {
   Eigen::MatrixXd by_location;   ///< [locations][directions] scores; the heading of each pose eliminated
   Eigen::MatrixXd information;   ///< [directions][directions], priors included; the same
   Eigen::VectorXd total;         ///< [directions] scores, priors included
+  Eigen::VectorXd prior;         ///< [globals] precision of what the latents of actors are known by beforehand
   std::vector<double> yaw_step;  ///< [poses] best change of the heading, all else as it is
   Eigen::MatrixXd yaw_coupling;  ///< [poses][directions] of that change by a change of the directions
 };
@@ -83,6 +84,9 @@ class SessionModel {
   /// Log-likelihood with priors; by_pose without.
   double logLikelihood(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
                        std::vector<double>* by_pose = nullptr) const;
+  /// The same of the poses named alone, without priors; echoes[i] are those of poses[i].
+  std::vector<double> byPose(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
+                             const std::vector<int>& poses) const;
   /// Expected covariance of the echoes alone, with their gain and latents; echoes[i] are those of poses[i].
   SessionCovariance covariance(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
                                const std::vector<int>& poses) const;

@@ -1,35 +1,69 @@
 #include "shared_latents.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-
-#include "mmradartwin_attribution/ledger.h"
 
 namespace mmradartwin {
 namespace {
 
 constexpr double kSharedLatent = 3;  // standard deviations from none at which a common error is tried as a cause
+constexpr double kStep = 0.125;      // of the scale, for derivatives
+
+/// What a hypothesis' geometry makes of ranges and directions stands in the latents of actors and poses; least squares
+/// of both takes it out of them, as z = D v with the latents in standard deviations.
+Screened sharedGeometry(EchoSource& source, const Hypothesis& h, const ModelState& null, const LatentSpread& spread,
+                        const PoseAccuracy& accuracy, const std::vector<int>& poses) {
+  const Nuisance& n = null.nuisance;
+  const Eigen::Index actors = static_cast<Eigen::Index>(n.actor_range_m.size());
+  const Eigen::Index rows = actors + static_cast<Eigen::Index>(poses.size());
+  const Eigen::Index columns = static_cast<Eigen::Index>(h.coordinates.size());
+  Eigen::VectorXd latents(rows);
+  for (Eigen::Index a = 0; a < actors; ++a) latents[a] = n.actor_range_m[a] / spread.actor_range_m;
+  for (std::size_t j = 0; j < poses.size(); ++j) {
+    latents[actors + static_cast<Eigen::Index>(j)] = n.yaw_rad[poses[j]] / accuracy.heading_rad;
+  }
+  const auto with = [&](std::vector<double> scaled) {
+    std::vector<NamedParameters> all = null.mechanisms;
+    all.push_back(h.at(scaled));
+    return all;
+  };
+  const std::vector<double> nothing(h.coordinates.size(), 0.0);
+  Eigen::MatrixXd design(rows, columns);
+  for (Eigen::Index c = 0; c < columns; ++c) {
+    std::vector<double> moved = nothing;
+    moved[static_cast<std::size_t>(c)] = kStep;
+    const EchoShift shift = source.shift(with(moved), with(nothing), poses, static_cast<int>(actors));
+    for (Eigen::Index a = 0; a < actors; ++a) design(a, c) = shift.range_m[a] / kStep / spread.actor_range_m;
+    for (std::size_t j = 0; j < poses.size(); ++j) {
+      design(actors + static_cast<Eigen::Index>(j), c) = -shift.azimuth_rad[j] / kStep / accuracy.heading_rad;
+    }
+  }
+  for (Eigen::Index r = 0; r < rows; ++r) {
+    if (latents[r] == 0) design.row(r).setZero();  // nothing shows these
+  }
+  const Eigen::VectorXd v = design.completeOrthogonalDecomposition().solve(latents);
+  std::vector<double> start;
+  for (Eigen::Index c = 0; c < columns; ++c) start.push_back(std::clamp(v[c], -8.0, 8.0));
+  return {h, 0.5 * (design * v).squaredNorm(), {start}};
+}
 
 }  // namespace
 
-std::vector<Screened> sharedLatents(const Scene& scene, const Nuisance& n, const LatentSpread& spread,
-                                    const PoseAccuracy& accuracy, const std::vector<Hypothesis>& all) {
+std::vector<Screened> sharedLatents(EchoSource& source, const ModelState& null, const LatentSpread& spread,
+                                    const PoseAccuracy& accuracy, const std::vector<Hypothesis>& all,
+                                    const std::vector<int>& poses) {
+  const Scene& scene = source.base().scene();
+  const Nuisance& n = null.nuisance;
   // An error that all poses or all actors share is no error of theirs. The score test cannot see it: the latents hold
   // it.
   std::vector<Screened> screened;
-  const auto add = [&](const char* name, std::vector<double> latents, double deviation, double unit) {
-    latents.erase(std::remove(latents.begin(), latents.end(), 0.0), latents.end());  // nothing shows these
-    if (latents.size() < 4) return;
-    const double middle = quantile(latents, 0.5);
-    const double z = middle / deviation * std::sqrt(static_cast<double>(latents.size()) * 2 / M_PI);  // of a median
-    if (std::abs(z) < kSharedLatent) return;
-    for (const Hypothesis& h : all) {
-      if (h.mechanism.mechanism != name) continue;
-      screened.push_back({h, 0.5 * z * z, {h.coordinates.front().scaled(middle * unit)}});
-    }
-  };
-  add("radar_yaw_offset", n.yaw_rad, accuracy.heading_rad, 180 / M_PI);
-  add("range_bias", n.actor_range_m, spread.actor_range_m, 1);
+  for (const Hypothesis& h : all) {
+    if (!h.isGeometry()) continue;
+    const double numbers = static_cast<double>(h.coordinates.size());
+    Screened s = sharedGeometry(source, h, null, spread, accuracy, poses);
+    if (s.promised > 0.5 * kSharedLatent * kSharedLatent * numbers) screened.push_back(std::move(s));
+  }
   // Levels of one material's actors, or of one actor, further off than such errors are: the same for them.
   for (const Hypothesis& h : all) {
     if (h.mechanism.mechanism != "material_reflectivity" || h.coordinates.size() != 1) continue;
@@ -43,7 +77,7 @@ std::vector<Screened> sharedLatents(const Scene& scene, const Nuisance& n, const
     const double z = count > 0 ? sum / (spread.actor_gain * std::sqrt(count)) : 0;
     if (std::abs(z) < kSharedLatent) continue;
     const double delta_db = 10 / std::log(10.0) * sum / count;
-    screened.push_back({h, 0.5 * z * z, {h.coordinates.front().scaled(delta_db)}});
+    screened.push_back({h, 0.5 * z * z, {{h.coordinates.front().scaled(delta_db)}}});
   }
   return screened;
 }
