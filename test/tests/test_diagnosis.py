@@ -126,6 +126,39 @@ class BadInput(unittest.TestCase):
         self.assertEqual(status, 2)
         self.assertIn("zero", errors)
 
+    def captures(self):
+        folder = os.path.join(self.session, "captures")
+        return [os.path.join(folder, name) for name in sorted(os.listdir(folder))]
+
+    def test_captures_of_other_places_match_nothing(self):
+        Measurement(Settings(output=self.session, seed=7, poses=8, frames=2)).run()
+        files = self.captures()
+        contents = []
+        for file in files:
+            with open(file, "rb") as capture:
+                contents.append(capture.read())
+        for file, content in zip(files, contents[3:] + contents[:3]):
+            with open(file, "wb") as capture:
+                capture.write(content)
+        status, findings, errors = diagnose(self.session, self.output)
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["unknown"])
+        self.assertIn("nothing matches", findings["findings"][0]["description"])
+
+    def test_one_pose_alone_names_nothing_of_a_clean_session(self):
+        Measurement(Settings(output=self.session, seed=8, poses=1, frames=2)).run()
+        status, findings, errors = diagnose(self.session, self.output)
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual(findings["verdict"], "none")
+
+    def test_a_capture_of_another_radar_is_left_out_by_name(self):
+        with open(self.captures()[1], "ab") as capture:
+            capture.write(bytes(5))
+        status, findings, errors = diagnose(self.session, self.output)
+        self.assertEqual(status, 2)
+        self.assertIn(self.captures()[1], errors)
+        self.assertEqual(findings["poses"]["count"], 2)
+
     def test_a_recording_that_is_not_there(self):
         status, _, errors = diagnose(os.path.join(self.folder.name, "nowhere"), self.output)
         self.assertEqual(status, 2)

@@ -92,6 +92,7 @@ class Session {
   }
   void checkPlaces() const;
   void judgeDelivery();
+  void takeBackDelivery();
   void judgeTone();
   void judgeNoise();
   bool judgeChannels(int round);
@@ -225,6 +226,23 @@ void Session::judgeDelivery() {
   if (data_.locations.size() > 1) f.gain = gainOf(recorded, mechanisms_, data_, mechanisms_);
   extended_.push_back(*f.mechanism);
   result_.findings.findings.push_back(std::move(f));
+}
+
+/// A convention that lets nothing match is no convention: one of several does best by chance.
+void Session::takeBackDelivery() {
+  for (const char* name : {"iq_conjugation", "channel_conjugation", "channel_permutation"}) {
+    std::vector<Finding>& findings = result_.findings.findings;
+    findings.erase(std::remove_if(findings.begin(), findings.end(), [&](const Finding& f) { return f.cause == name; }),
+                   findings.end());
+    extended_.erase(std::remove_if(extended_.begin(), extended_.end(),
+                                   [&](const NamedParameters& m) {
+                                     const auto& given = twin_.description().mechanisms;
+                                     return m.mechanism == name &&
+                                            std::none_of(given.begin(), given.end(),
+                                                         [&](const auto& g) { return g.mechanism == m.mechanism; });
+                                   }),
+                    extended_.end());
+  }
 }
 
 void Session::judgeTone() {
@@ -652,6 +670,7 @@ Diagnosis Session::run() {
   findings.held_out =
       data_.locations.size() > 1 ? std::to_string(kFolds) + "-fold by location" : "nothing: one location";
   if (result_.nothing_matches) {
+    takeBackDelivery();
     Finding f;
     f.cause = "unknown";
     f.candidates = {{"unknown", 1.0}};
