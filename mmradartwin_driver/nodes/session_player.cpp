@@ -64,7 +64,7 @@ class SessionPlayer {
     if (!followSchedule(*start_ns) || !waitForEnd()) return ros::ok() ? 1 : 0;
     publishProgress(1.0);
     ROS_INFO("the session has been played");
-    if (!exit_when_done_) ros::spin();
+    if (!exit_when_done_) ros::waitForShutdown();  // the spinner of main() goes on
     return session_.problems.empty() ? 0 : 2;
   }
 

@@ -41,13 +41,13 @@ def same_pose(a, b):
 
 
 class Launched:
-    """One roslaunch on a master of its own, ended with SIGINT as by Ctrl-C."""
+    """One roslaunch on a master of its own, ended with SIGINT as by Ctrl-C. Without a package, of a file by its path."""
 
-    def __init__(self, *arguments, port=None):
+    def __init__(self, *arguments, port=None, package="mmradartwin_launch"):
         self.port = port or free_port()
         self.environment = dict(os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{self.port}", ROS_IP="127.0.0.1")
         self.log = tempfile.NamedTemporaryFile("w+", prefix="mmradartwin_launch_", suffix=".log")
-        self.process = subprocess.Popen(["roslaunch", "-p", str(self.port), "mmradartwin_launch", *arguments],
+        self.process = subprocess.Popen(["roslaunch", "-p", str(self.port), *filter(None, [package]), *arguments],
                                         env=self.environment, stdout=self.log, stderr=subprocess.STDOUT,
                                         stdin=subprocess.DEVNULL, start_new_session=True)
 
@@ -197,18 +197,24 @@ class LaunchFiles(unittest.TestCase):
             counts = launched.record(["/attribution/markers", "/attribution/residuals"], 5, self.path("inspected.bag"))
             self.assertGreater(counts.get("/attribution/markers", 0), 0)
 
-    def test_record_writes_a_bag_that_stands_alone(self):
+    def test_record_writes_bags_that_stand_alone(self):
         with Launched("replay.launch", "bag:=" + self.bag, "rviz:=false") as replay:
             replay.wait_for_nodes({"/player"})
-            with Launched("record.launch", "output:=" + self.path("recorded"), port=replay.port) as recorder:
+            with Launched("record.launch", "output:=" + self.path("recorded"), "results:=true", "split_mb:=1",
+                          "min_free:=1M", port=replay.port) as recorder:
                 recorder.wait_for_nodes({"/recorder"})
-                time.sleep(5)
-        bags = glob.glob(self.path("recorded*.bag"))
-        self.assertEqual(len(bags), 1, os.listdir(self.folder))
-        with rosbag.Bag(bags[0]) as bag:
-            topics = {topic.lstrip("/") for topic in bag.get_type_and_topic_info().topics}  # rosbag keeps them as asked for
-        for topic in ("radar/config", "radar/adc", "session", "tf"):
-            self.assertIn(topic, topics)
+                deadline = time.time() + 60
+                while len(glob.glob(self.path("recorded*.bag"))) < 3 and time.time() < deadline:
+                    time.sleep(0.2)
+        bags = sorted(glob.glob(self.path("recorded*.bag")))
+        self.assertGreater(len(bags), 2, os.listdir(self.folder))
+        for file in bags:
+            with rosbag.Bag(file) as bag:
+                topics = {topic.lstrip("/") for topic in bag.get_type_and_topic_info().topics}  # rosbag keeps them as asked for
+            self.assertTrue({"radar/config", "session", "twin/scene"} <= topics, f"{file}: {topics}")
+        with rosbag.Bag(bags[1]) as bag:
+            topics = {topic.lstrip("/") for topic in bag.get_type_and_topic_info().topics}
+        self.assertTrue({"radar/adc", "radar/grid", "tf"} <= topics, topics)
 
 
 if __name__ == "__main__":
