@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""rosbag record that a full disk does not surprise: it looks at the free space twice a second (rosbag itself every 20 s),
-closes the bag while there is room for its index, says so, and begins a new one when there is room again.
+"""rosbag record that a full disk does not surprise: it looks at the free space twice a second (rosbag itself every
+20 s), closes the bag while there is room for its index, says so, and begins a new one when there is room again.
 
 usage: recorder.py --min-free SIZE --output-prefix PREFIX [ROSBAG_RECORD_ARGUMENTS...]      SIZE as in 500M, 2G
 """
@@ -48,7 +48,8 @@ class Recorder:
         self.min_free_bytes = bytes_of(min_free)
         self.prefix = os.path.abspath(prefix)
         self.folder = os.path.dirname(self.prefix)
-        self.command = [*find_node("rosbag", "record")[:1], "--output-prefix", self.prefix, "--min-space", min_free, *arguments]
+        self.record_program = find_node("rosbag", "record")[:1]
+        self.command = [*self.record_program, "--output-prefix", self.prefix, "--min-space", min_free, *arguments]
         self.child, self.stopping, self.known = None, False, set()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self.stop)
@@ -93,12 +94,15 @@ class Recorder:
         if not os.path.isdir(self.folder):
             say(f"{self.folder}: is no folder; give output:= with a folder that exists", error=True)
             return 2
+        if not self.record_program:
+            say("rosbag's record is not here; install rosbag", error=True)
+            return 2
         self.bags()
         while not self.stopping:
             if self.free_bytes() < self.min_free_bytes:
                 say(f"nothing is recorded yet: {text_of(self.free_bytes())} are free in {self.folder}, and min_free is "
-                    f"{text_of(self.min_free_bytes)}; recording begins by itself with {text_of(ROOM * self.min_free_bytes)}: "
-                    "make room, or record to another disk", error=True)
+                    f"{text_of(self.min_free_bytes)}; recording begins by itself with "
+                    f"{text_of(ROOM * self.min_free_bytes)}: make room, or record to another disk", error=True)
                 self.wait_for_room()
                 continue
             status, full = self.record()

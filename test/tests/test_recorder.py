@@ -73,8 +73,8 @@ class FullDisk(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
         self.disk = Disk(self, os.path.join(self.folder, "disk"), 48)
         self.session = os.path.join(self.folder, "session")
-        subprocess.run([find_program("mmradartwin_tests", "make_session.py"), "--output", self.session, "--locations", "1",
-                        "--headings", "1", "--duplicates", "0", "--frames", str(FRAMES), "--seed", "31"],
+        subprocess.run([find_program("mmradartwin_tests", "make_session.py"), "--output", self.session, "--seed", "31",
+                        "--locations", "1", "--headings", "1", "--duplicates", "0", "--frames", str(FRAMES)],
                        check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=600)
 
     def test_recording_stops_says_so_goes_on_and_loses_nothing_of_what_it_had(self):
@@ -100,7 +100,7 @@ class FullDisk(unittest.TestCase):
                 self.disk.clear()
                 recording.wait_for_text("recording goes on in a new bag", 2)
                 whole = len(self.disk.bags(".bag"))
-                self.assertTrue(wait_until(lambda: len(self.disk.bags(".active")) + len(self.disk.bags(".bag")) > 2, 240))
+                self.assertTrue(wait_until(lambda: len(self.disk.bags(".active") + self.disk.bags(".bag")) > 2, 240))
                 time.sleep(4)
                 recording.process.send_signal(signal.SIGINT)
                 self.assertEqual(recording.process.wait(60), 0)
