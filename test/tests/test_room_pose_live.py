@@ -106,7 +106,6 @@ class RoomPoseLive(unittest.TestCase):
 
         for messages, task, level, words in ((before, "pose from the room", 2, "no cloud on"),
                                              (seen, "pose from the room", 0, "publishing"),
-                                             (seen, "radar pose", 0, "poses come"),
                                              (blind, "pose from the room", 2, "no cloud on"),
                                              (blind, "radar pose", 2, "old")):
             said = {(s.level, s.message) for t, m in messages if t == "/diagnostics" for s in m.status
