@@ -60,7 +60,8 @@ void calibrate(TwinDescription& twin, const MountCalibration& c, const std::stri
   if (c.yaw_deg.observable) replace("radar_yaw_offset", &yaw);
   if (c.forward_m.observable || c.left_m.observable) replace("radar_position_offset", &position);
   if (c.range_m.observable) replace("range_bias", &range);
-  if (channels != "none") replace("channel_phase_error", channels == "twin" ? &channel : nullptr);
+  const bool known = c.phase_deg.back().observable;
+  if (channels != "none" && known) replace("channel_phase_error", channels == "twin" ? &channel : nullptr);
 }
 
 void print(const CalibratedValue& v, const std::string& label) {
@@ -104,7 +105,8 @@ int run(const Arguments& arguments) {
   calibrate(twin, calibration, arguments.channels_to);
   write(folder / "twin.yaml", twin.toYaml());
   fs::remove(folder / "channels.yaml");  // an earlier run's would correct what this twin may have
-  if (arguments.channels_to == "measured") {
+  const bool measured_channels = arguments.channels_to == "measured" && calibration.phase_deg.back().observable;
+  if (measured_channels) {
     write(folder / "channels.yaml",
           toYaml(ChannelCorrection{"", valuesOf(calibration.phase_deg), valuesOf(calibration.gain_db)}));
   }
@@ -113,6 +115,7 @@ int run(const Arguments& arguments) {
 
   for (const PoseProblem& problem : calibration.problems) std::cerr << "error: " << problem.message << '\n';
   for (const std::string& note : calibration.notes) std::cerr << "note: " << note << '\n';
+  if (!calibration.undetermined.empty()) std::cerr << "error: " << calibration.undetermined << '\n';
   print(calibration.yaw_deg, "yaw");
   print(calibration.forward_m, "forward");
   print(calibration.left_m, "left");
@@ -135,11 +138,11 @@ int run(const Arguments& arguments) {
   }
   std::cout << "Twin: " << (folder / "twin.yaml").string() << ", picture: " << (folder / "calibration.png").string()
             << '\n';
-  if (arguments.channels_to == "measured") {
+  if (measured_channels) {
     std::cout << "Channels: " << (folder / "channels.yaml").string()
               << "; give it as --channels to process, evaluate and diagnose, and as channels:= to live.launch\n";
   }
-  return calibration.problems.empty() ? 0 : 2;
+  return calibration.problems.empty() && calibration.undetermined.empty() ? 0 : 2;
 }
 
 }  // namespace

@@ -22,6 +22,18 @@ std::pair<std::int64_t, std::uint16_t> parseStatusAt(const std::string& text) {
   }
 }
 
+std::pair<std::int64_t, std::int64_t> parseSilenceAt(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  try {
+    if (colon == std::string::npos) throw std::invalid_argument(text);
+    const long long frames = std::stoll(text.substr(colon + 1));
+    if (frames < 1) throw std::out_of_range(text);
+    return {std::stoll(text.substr(0, colon)), frames};
+  } catch (const std::logic_error&) {
+    throw mmradartwin::InputError("--silence-at " + text + ": must be FRAME:FRAMES, as in 40:5");
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -29,7 +41,7 @@ int main(int argc, char** argv) {
   CLI::App app{"Emulates a DCA1000EVM that plays recorded captures over UDP at the radar's pace."};
   std::string input, radar;
   EmulatedCard::Options options;
-  std::vector<std::string> status_at;
+  std::vector<std::string> status_at, silence_at;
   double start_delay_s = 1.0;
   bool once = false;
   app.add_option("input", input, "session directory, or a capture (then --radar says what recorded it)")->required();
@@ -51,9 +63,12 @@ int main(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   app.add_option("--truncate", options.truncate, "probability that its end is missing")->check(CLI::Range(0.0, 1.0));
   app.add_option("--status-at", status_at, "FRAME:BITS: status datagram as that frame begins");
+  app.add_option("--restart-at", options.restart_at_frame, "both counts begin anew with that frame");
+  app.add_option("--silence-at", silence_at, "FRAME:FRAMES: nothing leaves for so many frames, and the counts go on");
   app.add_flag("--once", once, "end when the last frame was played");
   return program.run(argc, argv, [&] {
     for (const std::string& text : status_at) options.status_at_frame.insert(parseStatusAt(text));
+    for (const std::string& text : silence_at) options.silence_at_frame.insert(parseSilenceAt(text));
     const auto log = [&program](const std::string& line) { program.log(line); };
     const auto session = program.open(input, radar);
     mmradartwin::SessionFrames frames(session, start_delay_s, log);

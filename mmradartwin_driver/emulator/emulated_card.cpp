@@ -226,6 +226,15 @@ void EmulatedCard::takeFrame(const LvdsFrame& frame) {
   }
   const auto planned = options_.status_at_frame.find(frame.number);
   if (planned != options_.status_at_frame.end()) status(planned->second);
+  if (options_.restart_at_frame.count(frame.number)) {
+    log_("the counts begin anew with frame " + std::to_string(frame.number));
+    sequence_ = 0;
+    bytes_sent_ = 0;
+    held_.clear();
+  }
+  const auto silence = options_.silence_at_frame.find(frame.number);
+  if (silence != options_.silence_at_frame.end()) silent_until_frame_ = frame.number + silence->second;
+  silent_ = frame.number < silent_until_frame_;
   const std::size_t chirp_bytes = frame.bytes.size() / static_cast<std::size_t>(frame.chirps);
   for (int chirp = 0; chirp < frame.chirps && sending_ != 0; ++chirp) {
     const auto begin = frame.bytes.begin() + static_cast<std::ptrdiff_t>(chirp * chirp_bytes);
@@ -274,6 +283,10 @@ void EmulatedCard::sendData(std::size_t bytes) {
   held_.erase(held_.begin(), end);
   bytes_sent_ += bytes;
   ++sent_.packets;
+  if (silent_) {
+    ++sent_.lost;
+    return;
+  }
   impair(std::move(datagram));
 }
 

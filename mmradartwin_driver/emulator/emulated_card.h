@@ -9,6 +9,7 @@
 #include <map>
 #include <mutex>
 #include <random>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -35,6 +36,9 @@ class EmulatedCard {
     double loss = 0, duplicate = 0, reorder = 0, truncate = 0;  ///< probability per data packet
     int reorder_depth = 2;                                      ///< so many packets overtake a reordered one, at most
     std::map<std::int64_t, std::uint16_t> status_at_frame;      ///< unsolicited status bits
+    /// Both counts begin anew with these frames, as after a moment without power; what waits for a full packet is gone.
+    std::set<std::int64_t> restart_at_frame;
+    std::map<std::int64_t, std::int64_t> silence_at_frame;  ///< nothing leaves for so many frames; the counts go on
     /// Scheduling noise: each packet leaves later than the card would send it, by an exponential time of this mean, and
     /// one in twenty by up to `stall_us` more.
     double jitter_us = 0, stall_us = 0;
@@ -85,6 +89,8 @@ class EmulatedCard {
   std::uint32_t sequence_ = 0;
   std::uint64_t bytes_sent_ = 0;
   std::vector<std::uint8_t> held_;  ///< bytes waiting for a full payload
+  std::int64_t silent_until_frame_ = 0;
+  bool silent_ = false;
   std::int64_t last_sent_ns_ = 0;
   std::int64_t own_late_ns_ = 0;  ///< the most that this host, not the noise asked for, made a packet late
   struct Delayed {

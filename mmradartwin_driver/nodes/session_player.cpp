@@ -42,6 +42,7 @@ class SessionPlayer {
     tf_lead_s_ = parameters.number("tf_lead_s", 0.1, 0.0, 1.0);
     emulator_options_ = parameters.text("emulator_options", "");
     whole_rig_ = parameters.boolean("whole_rig", false);
+    publish_poses_ = parameters.boolean("publish_poses", true);
     exit_when_done_ = parameters.boolean("exit_when_done", false);
     parameters.rejectUnknown();
     session_ = openPlayedSession(session_path_, "", selection_);
@@ -63,14 +64,14 @@ class SessionPlayer {
     if (!followSchedule(*start_ns) || !waitForEnd()) return ros::ok() ? 1 : 0;
     publishProgress(1.0);
     ROS_INFO("the session has been played");
-    if (!exit_when_done_) ros::spin();
+    if (!exit_when_done_) ros::waitForShutdown();  // the spinner of main() goes on
     return session_.problems.empty() ? 0 : 2;
   }
 
  private:
   /// T_radar_camera, from the static transform of the mount.
   void findMount() {
-    if (camera_frame_.empty()) return;
+    if (camera_frame_.empty() || !publish_poses_) return;
     tf2_ros::Buffer buffer;
     const tf2_ros::TransformListener listener(buffer);
     constexpr double kWait_s = 20;
@@ -247,6 +248,7 @@ class SessionPlayer {
   }
 
   void sendPose(const Eigen::Isometry3d& T_map_radar, const ros::Time& stamp) {
+    if (!publish_poses_) return;  // another node finds them
     geometry_msgs::TransformStamped message;
     message.header.stamp = stamp;
     message.header.frame_id = map_frame_;
@@ -273,7 +275,7 @@ class SessionPlayer {
   std::string session_path_, card_ip_, host_ip_, map_frame_, radar_frame_, camera_frame_, emulator_options_;
   int config_port_ = 0, data_port_ = 0;
   double start_delay_s_ = 0, tf_lead_s_ = 0;
-  bool exit_when_done_ = false, completed_ = false, whole_rig_ = false;
+  bool exit_when_done_ = false, completed_ = false, whole_rig_ = false, publish_poses_ = true;
   PlayedSelection selection_;
   PlayedSession session_;
   Eigen::Isometry3d T_radar_child_ = Eigen::Isometry3d::Identity();  ///< child: what is published below map

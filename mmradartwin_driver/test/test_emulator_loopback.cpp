@@ -1,6 +1,8 @@
 // The emulator, as its own program, over real UDP into receiver and assembler.
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "emulated_rig.h"
 #include "mmradartwin_driver/dca1000_control.h"
 #include "mmradartwin_driver/frame_assembler.h"
@@ -136,6 +138,35 @@ TEST(EmulatorLoopback, WhatIsImpairedOnTheWayIsFlaggedAndNothingElse) {
   }
   EXPECT_GT(valid, 200u * 1024 * 7 / 10);
   EXPECT_EQ(sent.size(), recorded.frames.bytes + recorded.frames.lost_bytes);
+}
+
+TEST(EmulatorLoopback, CountsThatBeginAnewAndSilenceMisplaceNothing) {
+  TemporaryFolder folder;
+  writeSession(folder, 0.01, {60});
+  const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  const Recorded recorded = record(radar, {folder.file(""), "--restart-at", "20", "--silence-at", "40:5"});
+  const auto sent = readBytes(folder.file("captures/a.bin"));
+  EXPECT_EQ(2u, recorded.frames.epochs);
+  std::set<std::size_t> whole;
+  std::size_t first = 0;
+  std::int64_t last = -1;
+  for (const AdcCube& cube : recorded.cubes) {
+    if (static_cast<std::int64_t>(cube.sequence) <= last) first = 20;
+    last = cube.sequence;
+    const std::size_t frame = first + cube.sequence;
+    ASSERT_LT(frame, 60u);
+    std::vector<std::int16_t> expected;
+    decodeFrame(radar, sent.data() + frame * 2048, expected);
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      if (cube.chirp_valid[i / 512] == 0) continue;
+      ASSERT_EQ(expected[i], cube.data[i]) << frame;
+    }
+    if (cube.lost_bytes == 0) whole.insert(frame);
+  }
+  for (const std::size_t frame : {41u, 42u, 43u}) EXPECT_EQ(0u, whole.count(frame));
+  // A packet holds bytes of two frames: those beside what was lost may be cut.
+  EXPECT_GE(whole.size(), 60u - 5 - 4);
+  EXPECT_EQ(1u, whole.count(59));
 }
 
 TEST(EmulatorLoopback, PlaysTheChosenPosesOnly) {

@@ -19,7 +19,12 @@ int main(int argc, char** argv) {
   app.add_option("--radar-frame", options.radar_frame, "tf frame of the radar")->capture_default_str();
   app.add_option("--stamp-tolerance-ms", stamp_tolerance_ms, "frames' stamps may be off the frame period by so much")
       ->capture_default_str();
-  app.add_option("--tf-gap-s", limits.tf.gap_s, "longest time between transforms around a frame")
+  app.add_option("--tf-gap-s", limits.tf.gap_s,
+                 "longest time between transforms around a frame, where the radar stands elsewhere afterwards")
+      ->capture_default_str();
+  app.add_option(
+         "--tf-silence-s", limits.tf_silence_s,
+         "the same where it stands at the same place, and from a recording's first or last transform to a frame")
       ->capture_default_str();
   return runProgram(app, argc, argv, [&] {
     limits.stamp_tolerance_s = stamp_tolerance_ms * 1e-3;

@@ -98,6 +98,23 @@ void readChirps(const Section& section, RawSettings& settings) {
                      {section.integer("cprofileId"), mask}, section.where());
 }
 
+/// The section holds places in the lists of Studio's window, not the values that it sends. Saved files of captures over
+/// LVDS that hold ADC samples only have 1 and 0 (first packet: samples, second: none); no public document says what
+/// the others stand for.
+void readDataPath(const Section& section, RawSettings& settings) {
+  const auto known = [&](const std::string& key, int value, const std::string& meaning) {
+    if (section.integer(key) == value) return;
+    throw InputError(section.where() + ": " + key + " is " + std::to_string(section.integer(key)) + ", known is " +
+                     std::to_string(value) + " (" + meaning +
+                     "): TI does not document what others mean; give the script or the JSON instead, which say it");
+  };
+  known("dataPathCfgPath", 1, "LVDS");
+  known("dataCfgFmt0", 0, "ADC samples only");
+  if (section.has("dataCfgFmt1")) known("dataCfgFmt1", 0, "no second packet");
+  settings.set("interface", 1, section.where());
+  settings.set("packet", 1, section.where());
+}
+
 }  // namespace
 
 void readXmlSettings(const std::string& file, RawSettings& settings) {
@@ -136,6 +153,7 @@ void readXmlSettings(const std::string& file, RawSettings& settings) {
     set(adc, "adc_format", "formatVal");
     set(adc, "iq_swap", "IQSwap");
   }
+  if (const Section path = section("datapath"); path.there()) readDataPath(path, settings);
   if (const Section lanes = section("lvdslane"); lanes.there()) {
     set(lanes, "lane_format", "laneFormat");
     settings.set("lanes", __builtin_popcount(static_cast<unsigned>(lanes.mask("lane", 1, 4, "En"))), lanes.where());

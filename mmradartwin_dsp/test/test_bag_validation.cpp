@@ -172,7 +172,23 @@ TEST(ValidateBag, Transforms) {
 
   scene = Scene();
   scene.keep_tf = [](int i) { return i < 30 || i > 44; };
-  EXPECT_EQ(finding(scene), "15 frame(s) within a gap in tf; 1700000001.5 s, map -> radar_link");
+  EXPECT_EQ(finding(scene),
+            "15 frame(s) within a gap in tf that the radar stood through; 1700000001.5 s, map -> radar_link");
+
+  // Silent for 0.45 s while the radar was put 5 cm further: what tf interpolates there is no place where it was.
+  scene = Scene();
+  scene.keep_tf = [](int i) { return i < 30 || i > 37; };
+  scene.change_tf = [](int i, geometry_msgs::TransformStamped& T) {
+    if (i > 33) T.transform.translation.y = 0.05;
+  };
+  EXPECT_EQ(finding(scene),
+            "8 frame(s) that have no pose, for what tf does there; 1700000001.5 s, map -> radar_link was silent for "
+            "0.45 s, and another one afterwards\n"
+            "1 gap(s) in tf at whose ends the radar stands elsewhere; 1700000001.9 s, map -> radar_link");
+  // Frames that were not taken meanwhile have nothing to lose; whoever reads the bag should know of the gap.
+  scene.keep_cube = [](int i) { return i < 30 || i > 37; };
+  EXPECT_EQ(finding(scene, {"missing in the sequence"}),
+            "1 gap(s) in tf at whose ends the radar stands elsewhere; 1700000001.9 s, map -> radar_link");
 
   scene = Scene();
   scene.keep_tf = [](int i) { return i < 80; };
@@ -183,6 +199,13 @@ TEST(ValidateBag, Transforms) {
     if (i == 45) T.transform.translation.y = 0.5;
   };
   EXPECT_EQ(finding(scene), "2 jump(s) in tf; 1700000002.25 s, map -> radar_link");
+  // A frame between the two transforms of a jump belongs to neither place.
+  scene.change_cube = [](int i, mmradartwin_msgs::AdcCube& cube) {
+    if (i == 45) cube.header.stamp -= ros::Duration(0.02);
+  };
+  EXPECT_EQ(finding(scene, {"off the frame period", "jump(s)"}),
+            "1 frame(s) that have no pose, for what tf does there; 1700000002.23 s, map -> radar_link jumps there by "
+            "0.50 m and 0 deg");
 
   scene = Scene();
   scene.change_tf = [](int i, geometry_msgs::TransformStamped& T) { T.transform.translation.y = 0.05 * i; };
@@ -210,6 +233,12 @@ TEST(ValidateBag, NoBag) {
   EXPECT_FALSE(inputError([] { validateBag("/nowhere/a.bag"); }).empty());
   writeBytes(folder / "a.bag", "no bag");
   EXPECT_TRUE(saysInOneLine(inputError([&] { validateBag(folder / "a.bag"); }), "cannot be read as a bag"));
+  // As a recorder leaves it that could not close it.
+  Scene scene;
+  scene.add = [&](rosbag::Bag& bag) { std::filesystem::copy_file(bag.getFileName(), folder / "cut.bag.active"); };
+  writeBag(folder, scene);
+  EXPECT_TRUE(saysInOneLine(inputError([&] { validateBag(folder / "cut.bag.active"); }),
+                            "rosbag reindex " + (folder / "cut.bag.active")));
 }
 
 TEST(ValidateProgram, ExitStatus) {

@@ -126,7 +126,8 @@ std::string section(const std::string& name, const std::vector<std::pair<std::st
 }
 
 /// A file as mmWave Studio's Save() writes it, in the units of its windows.
-std::string studioXml(const std::string& last_chirp = "0", const std::string& second_tx = "0") {
+std::string studioXml(const std::string& last_chirp = "0", const std::string& second_tx = "0",
+                      const std::string& data_path = "1", const std::string& packet = "0") {
   return "\xEF\xBB\xBF<?xml version=\"1.0\" encoding=\"utf-8\" ?>\n<configuration>\n" +
          section("channel", {{"rx1En", "1"},
                              {"tx0En", "1"},
@@ -137,6 +138,11 @@ std::string studioXml(const std::string& last_chirp = "0", const std::string& se
                              {"rx3En", "1"},
                              {"cascadeMode", "0"}}) +
          section("adc", {{"bitsVal", "2"}, {"formatVal", "1"}, {"IQSwap", "1"}}) +
+         section("datapath", {{"dataPathCfgPath", data_path},
+                              {"dataCfgFmt1", "0"},
+                              {"pkt0VChannelNo", "0"},
+                              {"pkt1VChannelNo", "0"},
+                              {"dataCfgFmt0", packet}}) +
          section("lvdslane", {{"laneFormat", "0"},
                               {"lane1En", "1"},
                               {"lane2En", "1"},
@@ -196,6 +202,9 @@ TEST(ImportSettings, StudioXml) {
   EXPECT_EQ(radar.tx_enable, (std::vector<std::vector<int>>{{0}}));
   EXPECT_EQ(radar.layout, CaptureLayout::kFourLane);
   EXPECT_EQ(radar.iq_order, IqOrder::kQi);
+  for (const std::string& line : importSettings({folder / "a.xml"}, "xwr1443").assumed) {
+    EXPECT_FALSE(contains(line, "ADC samples")) << line;  // the file says it
+  }
   // The card's file may come beside it, and must not contradict it.
   write(folder / "cf.json", R"({"DCA1000Config": {"dataLoggingMode": "raw", "lvdsMode": 2, "dataFormatMode": 3}})");
   EXPECT_TRUE(saysInOneLine(inputError([&] {
@@ -213,6 +222,8 @@ TEST(ImportSettings, StudioXmlKeepsTheLastChirpsOnly) {
   EXPECT_TRUE(saysInOneLine(refusal(studioXml("1")), "chirp 1", "not configured", "a.xml", "set last"));
   EXPECT_TRUE(saysInOneLine(refusal(studioXml("0", "1")), "mask 3"));
   EXPECT_TRUE(saysInOneLine(refusal("<configuration></configuration>"), "neither profile"));
+  EXPECT_TRUE(saysInOneLine(refusal(studioXml("0", "0", "0")), "dataPathCfgPath is 0", "known is 1 (LVDS)", "JSON"));
+  EXPECT_TRUE(saysInOneLine(refusal(studioXml("0", "0", "1", "3")), "dataCfgFmt0 is 3", "ADC samples only"));
   EXPECT_TRUE(saysInOneLine(refusal("<other/>"), "<configuration>"));
   EXPECT_TRUE(saysInOneLine(refusal("<configuration>"), "is no XML"));
 }

@@ -5,13 +5,10 @@
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <gtest/gtest.h>
 #include <ros/ros.h>
-#include <sensor_msgs/Imu.h>
-#include <sensor_msgs/PointCloud2.h>
-#include <sensor_msgs/point_cloud2_iterator.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
 
-#include "depth_camera.h"
+#include "depth_camera_messages.h"
 
 namespace mmradartwin {
 namespace {
@@ -49,26 +46,11 @@ class RoomPoseNodeTest : public ::testing::Test {
   }
 
   sensor_msgs::PointCloud2 message(const Eigen::Isometry3d& T_map_camera) {
-    const auto points = DepthCamera().cloud(rays, scene, T_map_camera, random);
-    sensor_msgs::PointCloud2 msg;
-    msg.header.frame_id = "camera_depth_optical_frame";
-    sensor_msgs::PointCloud2Modifier modifier(msg);
-    modifier.setPointCloud2FieldsByString(1, "xyz");
-    modifier.resize(points.size());
-    sensor_msgs::PointCloud2Iterator<float> x(msg, "x"), y(msg, "y"), z(msg, "z");
-    for (const Eigen::Vector3d& p : points) {
-      // The optical frame sits 1 cm before and 2 cm beside camera_link: x right, y down, z forward.
-      *x = static_cast<float>(-(p.y() - 0.02)), *y = static_cast<float>(-p.z()), *z = static_cast<float>(p.x() - 0.01);
-      ++x, ++y, ++z;
-    }
-    return msg;
+    return cloudMessage(rays, scene, T_map_camera, random);
   }
   void send(sensor_msgs::PointCloud2& msg) {
-    sensor_msgs::Imu imu;
+    sensor_msgs::Imu imu = restingImu(truth);
     imu.header.stamp = ros::Time::now();
-    imu.header.frame_id = "camera_depth_optical_frame";
-    const Eigen::Vector3d up = truth.linear().transpose() * Eigen::Vector3d(0, 0, 9.81);
-    imu.linear_acceleration.x = -up.y(), imu.linear_acceleration.y = -up.z(), imu.linear_acceleration.z = up.x();
     for (int i = 0; i < 3; ++i) imu_out.publish(imu);
     msg.header.stamp = ros::Time::now();
     cloud_out.publish(msg);

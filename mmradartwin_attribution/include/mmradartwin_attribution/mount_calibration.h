@@ -41,7 +41,7 @@ struct MountCalibrationOptions {
   double max_laser_error_m = 0.02;  ///< between a laser's distance and the pose's, a common mount offset apart
 };
 
-/// A value with its 95 % interval. Values that the poses do not fix are held at 0 and say so.
+/// A value with its 95 % interval. Values that the poses do not fix are 0 and say so.
 struct CalibratedValue {
   std::string name, unit;  ///< as in the twin's mechanisms
   double value = 0;
@@ -68,6 +68,7 @@ struct MountCalibration {
   std::vector<CalibratedPose> poses;
   std::vector<PoseProblem> problems;
   std::vector<std::string> notes;  ///< what cannot be known, a line each
+  std::string undetermined;        ///< why yaw or channels are not fixed, and what would fix them; empty where they are
   bool lasers = false;
 };
 
@@ -76,7 +77,8 @@ struct MountCalibration {
 /// absolute phase and level are free. Intervals come from the scatter of the poses (Student's t), with a heading error
 /// and a range error of each pose's own. Throws InputError where fewer than three poses show the target, and where a
 /// laser's distance contradicts its pose (names it). With a twin, poses at which something else hides a wall or shares
-/// its range cell are left out and listed. `progress` is told poses done.
+/// its range cell are left out and listed. Yaw and channels whose intervals are too wide to be of use, as before a rough
+/// wall, are not given: `undetermined` says so. `progress` is told poses done.
 MountCalibration calibrateMount(const Recording& recording, const CalibrationTarget& target,
                                 const std::vector<LaserDistance>& lasers, const MountCalibrationOptions& options = {},
                                 const Twin* twin = nullptr, const std::function<void(int)>& progress = {});

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <map>
 #include <set>
@@ -23,7 +24,7 @@ using Eigen::VectorXd;
 
 constexpr double kDeg = M_PI / 180;
 enum Index { kYaw, kForward, kLeft, kRange, kFirstPhase };
-// Beyond these deviations a value says nothing about a mount.
+// Beyond these deviations, or 95 % intervals of twice as much to each side, a value says nothing about a mount.
 constexpr double kMostYaw_rad = 1 * kDeg, kMostOffset_m = 0.02, kMostPhase_rad = 15 * kDeg;
 // Smaller scatter than this comes of having few poses.
 constexpr double kLeastRange_m = 3e-4, kLeastHeading_rad = 0.02 * kDeg, kLeastChannel = 2e-3;
@@ -40,6 +41,12 @@ struct Observation {
   TargetEcho echo;
   std::optional<double> laser_m;
 };
+
+std::string format(const char* text, double a, double b = 0) {
+  char line[256];
+  std::snprintf(line, sizeof line, text, a, b);
+  return line;
+}
 
 Eigen::Isometry3d placed(const Eigen::Isometry3d& T, double yaw, double forward, double left) {
   return T * Eigen::Translation3d(forward, left, 0) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ());
@@ -381,7 +388,7 @@ MountCalibration calibrateMount(const Recording& recording, const CalibrationTar
     }
   };
   refine();
-  bool forward = true, left = true, range = true;
+  bool forward = true, left = true;
   if (fit.deviation(kForward) > kMostOffset_m || fit.deviation(kRange) > kMostOffset_m) {
     forward = false;
     hold(kForward,
@@ -394,7 +401,6 @@ MountCalibration calibrateMount(const Recording& recording, const CalibrationTar
     hold(kLeft, "left_m is not fixed by these poses and is held at 0: take poses that hold the target off boresight");
     refine();
   }
-  range = fit.deviation(kRange) <= kMostOffset_m;
   if (fit.deviation(kYaw) > kMostYaw_rad || fit.deviation.segment(kFirstPhase, M - 1).maxCoeff() > kMostPhase_rad) {
     result.notes.push_back(
         "a phase that grows evenly over the channels cannot be told from yaw with these poses and "
@@ -407,33 +413,54 @@ MountCalibration calibrateMount(const Recording& recording, const CalibrationTar
 
   const double freedom = std::max(1.0, static_cast<double>(observations.size()) - 3);
   const double t = boost::math::quantile(boost::math::students_t(freedom), 0.975);
-  const auto value = [&](const char* name, const char* unit, int parameter, double factor, bool observable) {
+  const auto fixed = [&](int parameter, double most) { return t * fit.deviation(parameter) <= 2 * most; };
+  const bool yaw = fixed(kYaw, kMostYaw_rad);
+  bool channels = true;
+  for (int k = 1; k < M; ++k) channels = channels && fixed(kFirstPhase + k - 1, kMostPhase_rad);
+  VectorXd used = fit.p;  // what is not fixed is not corrected
+  const auto value = [&](const char* name, const char* unit, int parameter, double factor, bool held, bool observable) {
     CalibratedValue v;
-    v.name = name, v.unit = unit, v.observable = observable;
+    v.name = name, v.unit = unit, v.observable = observable && !held;
     v.value = factor * fit.p(parameter);
     const double half = t * factor * fit.deviation(parameter);
     v.ci95 = {v.value - half, v.value + half};
-    if (!observable) v.note = "not observable with these poses, held at 0";
+    if (v.observable) return v;
+    v.note =
+        held ? "not observable with these poses, held at 0"
+             : "not fixed by these poses, 95 %: " + format("%.3g to %.3g ", v.ci95[0], v.ci95[1]) + unit + "; not used";
+    used(parameter) = v.value = 0;
     return v;
   };
-  result.yaw_deg = value("yaw_deg", "deg", kYaw, 1 / kDeg, fit.deviation(kYaw) <= kMostYaw_rad);
-  result.forward_m = value("forward_m", "m", kForward, 1, forward);
-  result.left_m = value("left_m", "m", kLeft, 1, left);
-  result.range_m = value("range_m", "m", kRange, 1, range);
+  result.yaw_deg = value("yaw_deg", "deg", kYaw, 1 / kDeg, false, yaw);
+  result.forward_m = value("forward_m", "m", kForward, 1, !forward, fixed(kForward, kMostOffset_m));
+  result.left_m = value("left_m", "m", kLeft, 1, !left, fixed(kLeft, kMostOffset_m));
+  result.range_m = value("range_m", "m", kRange, 1, false, fixed(kRange, kMostOffset_m));
   CalibratedValue zero;
   zero.name = "phase_deg", zero.unit = "deg", zero.note = "the reference";
   result.phase_deg.push_back(zero);
   zero.name = "gain_db", zero.unit = "dB";
   result.gain_db.push_back(zero);
   for (int k = 1; k < M; ++k) {
-    result.phase_deg.push_back(value("phase_deg", "deg", kFirstPhase + k - 1, 1 / kDeg, true));
-    result.gain_db.push_back(value("gain_db", "dB", kFirstPhase + M - 1 + k - 1, 20 / std::log(10.0), true));
+    result.phase_deg.push_back(value("phase_deg", "deg", kFirstPhase + k - 1, 1 / kDeg, false, channels));
+    result.gain_db.push_back(value("gain_db", "dB", kFirstPhase + M - 1 + k - 1, 20 / std::log(10.0), false, channels));
+  }
+  if (!yaw || !channels) {
+    const std::string what = yaw ? "channel errors" : channels ? "yaw" : "neither yaw nor channel errors";
+    result.undetermined = target.name + (yaw || channels ? " does not determine " : " determines ") + what +
+                          format(
+                              ": from pose to pose its echo's direction scatters by %.1f deg and its channels by "
+                              "%.0f %%, ",
+                              residuals.scatter.heading_rad / kDeg, 100 * residuals.scatter.channel) +
+                          "and there are " + std::to_string(observations.size()) + " poses of it" +
+                          (target.wall.empty() ? "; take more poses, of a larger or nearer reflector"
+                                               : "; rough walls (concrete, plaster) do that: hold the radar before a "
+                                                 "metal board or a corner reflector, or take many more poses");
   }
   std::size_t next = 0;
   for (CalibratedPose& pose : result.poses) {
     if (!pose.used) continue;
     fillErrors(residuals, before, 0, observations[next], pose);
-    fillErrors(residuals, fit.p, 1, observations[next], pose);
+    fillErrors(residuals, used, 1, observations[next], pose);
     ++next;
   }
   return result;

@@ -17,6 +17,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
+#include "mmradartwin_dsp/stationary_poses.h"
 
 namespace mmradartwin {
 namespace {
@@ -162,9 +163,14 @@ void checkTransforms(const TransformRecord& tf, const BagOptions& options, const
     findings.add("tf does not connect " + wanted, "");
     return;
   }
-  const auto gap_ns = static_cast<std::int64_t>(limits.tf.gap_s * 1e9);
+  const auto silence_ns = static_cast<std::int64_t>(limits.tf_silence_s * 1e9);
   const auto moving = tf.moving(*chain);
   for (const std::int64_t stamp_ns : stamps_ns) {
+    const std::string why_no_pose = tf.whyNotBetween(stamp_ns, options.map_frame, options.radar_frame, limits.tf);
+    if (!why_no_pose.empty()) {
+      findings.add("frame(s) that have no pose, for what tf does there", seconds(stamp_ns) + ", " + why_no_pose);
+      continue;
+    }
     for (const auto& [child, edges] : moving) {
       const auto after =
           std::lower_bound(edges.begin(), edges.end(), stamp_ns,
@@ -174,21 +180,26 @@ void checkTransforms(const TransformRecord& tf, const BagOptions& options, const
       if (before_all || after_all) {
         // The first and last frames of a recording may lie a moment outside of its transforms.
         const std::int64_t nearest_ns = before_all ? edges.front().stamp_ns : edges.back().stamp_ns;
-        if (std::abs(stamp_ns - nearest_ns) <= gap_ns) continue;
+        if (std::abs(stamp_ns - nearest_ns) <= silence_ns) continue;
         findings.add("frame(s) without a transform", seconds(stamp_ns) + ", " + tf.nameOf(child));
         break;
       }
-      if (after->stamp_ns - (after - 1)->stamp_ns > gap_ns) {
-        findings.add("frame(s) within a gap in tf", seconds(stamp_ns) + ", " + tf.nameOf(child));
+      if (after->stamp_ns - (after - 1)->stamp_ns > silence_ns) {
+        findings.add("frame(s) within a gap in tf that the radar stood through",
+                     seconds(stamp_ns) + ", " + tf.nameOf(child));
         break;
       }
     }
   }
   if (session) return;  // its poses follow each other as they were listed, not as a radar moves
+  const auto gap_ns = static_cast<std::int64_t>(limits.tf.gap_s * 1e9);
   for (const auto& [child, edges] : moving) {
     for (std::size_t i = 1; i < edges.size(); ++i) {
+      const std::string at = seconds(edges[i].stamp_ns) + ", " + tf.nameOf(child);
       if (isJump(edges[i - 1], edges[i], limits.tf)) {
-        findings.add("jump(s) in tf", seconds(edges[i].stamp_ns) + ", " + tf.nameOf(child));
+        findings.add("jump(s) in tf", at);
+      } else if (edges[i].stamp_ns - edges[i - 1].stamp_ns > gap_ns && !standsStill(edges[i - 1].T, edges[i].T)) {
+        findings.add("gap(s) in tf at whose ends the radar stands elsewhere", at);
       }
     }
   }

@@ -41,7 +41,7 @@ void SignalChainNode::readParameters(const ros::NodeHandle& private_nh) {
   moved_m_ = parameters.number("moved_m", moved_m_, 1e-4, 1e3);
   moved_rad_ = parameters.number("moved_deg", 1.0, 1e-2, 180) * M_PI / 180;
   pose_timeout_s_ = parameters.number("pose_timeout_s", pose_timeout_s_, 0, 60);
-  tf_limits_.gap_s = parameters.number("tf_gap_s", 0.2, 0, 60);
+  tf_limits_.gap_s = parameters.number("tf_gap_s", tf_limits_.gap_s, 0, 60);
   map_frame_ = parameters.text("map_frame", map_frame_);
   radar_frame_ = parameters.text("radar_frame", radar_frame_);
   const std::string channels = parameters.text("channels", "");

@@ -13,7 +13,7 @@ namespace mmradartwin {
 
 /// Beyond these, two transforms of one edge that follow each other say nothing about what lies between.
 struct TransformLimits {
-  double gap_s = 0.5;
+  double gap_s = 0.2;
   double jump_m = 0.1, jump_m_per_s = 3;  ///< both: a jump is far and fast
   double jump_rad = 0.2, jump_rad_per_s = 6;
 };

@@ -1,0 +1,72 @@
+#!/usr/bin/env python3
+"""Driver and signal chain in one nodelet manager: frames go from one to the other without being copied."""
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+import unittest
+
+from mmradartwin_tests.installed_programs import find_program
+from test_emulated_rig import wait_until
+from test_launch_files import Launched, end
+
+FRAMES = 60
+PLAYER = find_program("mmradartwin_driver", "session_player")
+LAUNCH = """
+<launch>
+  <node name="manager" pkg="nodelet" type="nodelet" args="manager" output="screen" />
+  <node name="driver" pkg="nodelet" type="nodelet" args="load mmradartwin_driver/DriverNodelet manager" output="screen">
+    <param name="radar" value="{session}/radar.yaml" type="str" />
+    <param name="host_ip" value="127.201.9.1" type="str" />
+    <param name="card_ip" value="127.201.9.2" type="str" />
+  </node>
+  <node name="signal_chain" pkg="nodelet" type="nodelet" args="load mmradartwin_dsp/SignalChainNodelet manager" />
+  <node name="listener" pkg="rosbag" type="record" args="--quiet -O {folder}/grids.bag /radar/grid" />
+</launch>
+"""
+
+
+class Nodelets(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(prefix="mmradartwin_nodelets_")
+        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+        self.session = os.path.join(self.folder, "session")
+        subprocess.run([find_program("mmradartwin_tests", "make_session.py"), "--output", self.session, "--seed", "31",
+                        "--locations", "1", "--headings", "1", "--duplicates", "0", "--frames", str(FRAMES)],
+                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=600)
+
+    def test_frames_are_handed_over_and_not_copied(self):
+        file = os.path.join(self.folder, "nodelets.launch")
+        with open(file, "w", encoding="ascii") as out:
+            out.write(LAUNCH.format(session=self.session, folder=self.folder))
+        with Launched(file, package=None) as launched:
+            bus = lambda: launched.bus("/manager")
+            connected = lambda: bus()[1].get("/radar/adc") and bus()[0].get("/radar/grid")
+            self.assertTrue(wait_until(connected, 240), f"{bus()}\n{launched.text()[-3000:]}")
+            log = os.path.join(self.folder, "player.log")
+            with open(log, "w", encoding="utf-8") as said:
+                player = subprocess.Popen([PLAYER, "_session:=" + self.session, "_host_ip:=127.201.9.1",
+                                           "_card_ip:=127.201.9.2"], stdout=said, stderr=subprocess.STDOUT,
+                                          env=dict(launched.environment, ROSCONSOLE_STDOUT_LINE_BUFFERED="1"))
+            self.addCleanup(end, player)
+
+            def text():
+                with open(log, encoding="utf-8") as file:
+                    return file.read()
+
+            self.assertTrue(wait_until(lambda: "has been played" in text() or player.poll() is not None, 240), text())
+            # It was not told to exit, and stays, so that its latched messages do.
+            time.sleep(2)
+            self.assertIsNone(player.poll(), text())
+            sent, received = bus()
+        # Nothing was serialised on the way: the counters of bytes say so, and count what goes to another process.
+        (in_bytes, frames), = received["/radar/adc"]
+        self.assertGreater(frames, FRAMES // 2)
+        self.assertEqual(in_bytes, 0, received)
+        self.assertEqual(sum(sent["/radar/adc"]), 0, sent)
+        self.assertGreater(sum(sent["/radar/grid"]), FRAMES // 2 * 8 * 64 * 16)  # complex128 of every channel's samples
+
+
+if __name__ == "__main__":
+    unittest.main()
