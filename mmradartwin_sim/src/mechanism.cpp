@@ -21,8 +21,11 @@ const std::vector<std::string>& Parameters::texts(const std::string& name) const
   return std::get<std::vector<std::string>>(values_.at(name));
 }
 
+namespace {
+const double kSine = std::sin(20 * M_PI / 180);
+}
+
 bool inFieldOfView(const Eigen::Vector3d& direction_radar) {
-  static const double kSine = std::sin(20 * M_PI / 180);
   return direction_radar.x() > 0 && std::abs(direction_radar.z()) <= kSine * direction_radar.norm();
 }
 
@@ -33,15 +36,15 @@ bool PoseContext::inFieldOfView(const Eigen::Vector3d& direction_radar) const {
 bool SceneChange::moved(int actor) const { return std::find(actors.begin(), actors.end(), actor) != actors.end(); }
 
 bool SceneChange::crosses(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const {
-  const Eigen::Vector3d way = b - a;
+  const Eigen::Vector3d way = b - a, inverse = way.cwiseInverse();
   for (const Eigen::AlignedBox3d& box : bounds) {
     double from = 0, to = 1;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 3 && from <= to; ++i) {
       if (way[i] == 0) {
         if (a[i] < box.min()[i] || a[i] > box.max()[i]) to = -1;
         continue;
       }
-      const double one = (box.min()[i] - a[i]) / way[i], other = (box.max()[i] - a[i]) / way[i];
+      const double one = (box.min()[i] - a[i]) * inverse[i], other = (box.max()[i] - a[i]) * inverse[i];
       from = std::max(from, std::min(one, other));
       to = std::min(to, std::max(one, other));
     }
