@@ -1,9 +1,13 @@
 // Each class of ray that the simulator casts beside a bare Embree loop over the same rays on the same mesh, one thread;
-// a full pose with 50,000 scatter points, weighing it again, and the limit of 300,000 or 1,000,000 bounce rays.
-// MMRADARTWIN_SCENE names another scene.yaml than the shipped office.
+// a full pose with 50,000 scatter points, weighing it again, moving one actor of it, and the limit of 300,000 or
+// 1,000,000 bounce rays. What a pose costs by poses, threads, patches and triangles, and the memory of it all.
+// MMRADARTWIN_SCENE names another scene.yaml than the shipped office, MMRADARTWIN_MOVER the actor that moves in it.
 
 #include <benchmark/benchmark.h>
 #include <embree3/rtcore.h>
+#include <sys/resource.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -12,6 +16,7 @@
 #include <random>
 
 #include "mmradartwin_dsp/paper_radar.h"
+#include "mmradartwin_sim/moving_twin.h"
 #include "mmradartwin_sim/traced_session.h"
 #include "mmradartwin_sim/twin.h"
 #include "mmradartwin_sim/weight_basis.h"
@@ -239,23 +244,28 @@ void bareBounceRays(benchmark::State& state) {
 }
 BENCHMARK(bareBounceRays)->Arg(300000)->Arg(1000000)->Unit(benchmark::kMillisecond);
 
+Twin makeTwin(const std::string& scene, const std::string& mechanisms) {
+  const std::string file = (std::filesystem::temp_directory_path() / "mmradartwin_benchmark_twin.yaml").string();
+  std::ofstream(file) << "mechanisms:\n" << mechanisms;
+  Twin made(loadTwin(file, scene, paperRadar()));
+  std::filesystem::remove(file);
+  return made;
+}
+
+/// Spacing of about so many scatter points in the room.
+std::string diffuse(double points) {
+  const Setting& s = setting();
+  double rough_m2 = 0;
+  for (const Facet& f : s.scene.facets) {
+    if (f.reflects && backscatterAmplitude(s.scene.actors[f.actor].material, 1, 1, 77.93e9) > 0) rough_m2 += f.area_m2;
+  }
+  return "  diffuse: {spacing_m: " + std::to_string(std::max(0.005, std::sqrt(rough_m2 / points))) + "}\n";
+}
+
 /// specular to order 3, corners, edges and about 50,000 scatter points in the room.
 const Twin& fullTwin() {
-  static const Twin twin = [] {
-    const Setting& s = setting();
-    double rough_m2 = 0;
-    for (const Facet& f : s.scene.facets) {
-      if (f.reflects && backscatterAmplitude(s.scene.actors[f.actor].material, 1, 1, 77.93e9) > 0)
-        rough_m2 += f.area_m2;
-    }
-    const double spacing = std::max(0.005, std::sqrt(rough_m2 / 50000));
-    const std::string file = (std::filesystem::temp_directory_path() / "mmradartwin_benchmark_twin.yaml").string();
-    std::ofstream(file) << "mechanisms:\n  specular: {}\n  corner: {}\n  edge_diffraction: {level: 1}\n"
-                        << "  diffuse: {spacing_m: " << spacing << "}\n";
-    Twin made(loadTwin(file, sceneFile(), paperRadar()));
-    std::filesystem::remove(file);
-    return made;
-  }();
+  static const Twin twin =
+      makeTwin(sceneFile(), "  specular: {}\n  corner: {}\n  edge_diffraction: {level: 1}\n" + diffuse(50000));
   return twin;
 }
 
@@ -308,6 +318,124 @@ void fullPoseWeighByGroups(benchmark::State& state) {
   state.counters["groups"] = static_cast<double>(basis.groups().size());
 }
 BENCHMARK(fullPoseWeighByGroups)->Unit(benchmark::kMillisecond);
+
+/// One actor of the full pose goes to and fro by 5 cm while the radar stands.
+void fullPoseOneActorMoved(benchmark::State& state) {
+  const Twin& twin = fullTwin();
+  const char* given = std::getenv("MMRADARTWIN_MOVER");
+  const std::string actor = given ? given : "bin";
+  if (twin.scene().actorIndex(actor) < 0) {
+    state.SkipWithError(("the scene has no actor " + actor + "; set MMRADARTWIN_MOVER").c_str());
+    return;
+  }
+  MovingTwin moving(twin, {actor});
+  const Eigen::Isometry3d rest =
+      twin.scene().actors[static_cast<std::size_t>(twin.scene().actorIndex(actor))].T_map_mesh;
+  moving.simulate(pose(0));
+  int i = 0;
+  std::size_t found = 0;
+  for (auto _ : state) {
+    moving.place(actor, Eigen::Translation3d(0.05 * (++i % 2), 0, 0) * rest);
+    benchmark::DoNotOptimize(moving.simulate(pose(0)).grid.x.data());
+    found += moving.found();
+  }
+  state.counters["records"] = static_cast<double>(moving.simulate(pose(0)).records.size());
+  state.counters["found again"] = static_cast<double>(found) / static_cast<double>(state.iterations());
+}
+BENCHMARK(fullPoseOneActorMoved)->Unit(benchmark::kMillisecond);
+/// The same pose in full, for the comparison.
+void fullPoseSamePose(benchmark::State& state) {
+  const Twin& twin = fullTwin();
+  for (auto _ : state) benchmark::DoNotOptimize(twin.simulate(pose(0)).grid.x.data());
+}
+BENCHMARK(fullPoseSamePose)->Unit(benchmark::kMillisecond);
+
+/// Poses in parallel on so many threads.
+void fullPoses(benchmark::State& state) {
+  const Twin& twin = fullTwin();
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<std::size_t>(state.range(1)));
+  const int poses = static_cast<int>(state.range(0));
+  for (auto _ : state) {
+    tbb::parallel_for(0, poses, [&](int i) { benchmark::DoNotOptimize(twin.simulate(pose(i)).grid.x.data()); });
+  }
+  state.counters["poses/s"] = benchmark::Counter(static_cast<double>(poses) * static_cast<double>(state.iterations()),
+                                                 benchmark::Counter::kIsRate);
+}
+BENCHMARK(fullPoses)
+    ->ArgNames({"poses", "threads"})
+    ->Args({77, 1})
+    ->Args({154, 1})
+    ->Args({154, 2})
+    ->UseRealTime()
+    ->MeasureProcessCPUTime()
+    ->Unit(benchmark::kMillisecond);
+
+void poseByPatches(benchmark::State& state) {
+  const Twin twin = makeTwin(sceneFile(), diffuse(static_cast<double>(state.range(0))));
+  int i = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(twin.simulate(pose(i++)).grid.x.data());
+}
+BENCHMARK(poseByPatches)->Arg(12500)->Arg(25000)->Arg(50000)->Arg(100000)->Unit(benchmark::kMillisecond);
+
+/// A room of 6 x 5 m with a box in it, each of its seven faces in 2 n^2 triangles.
+void poseByTriangles(benchmark::State& state) {
+  const int n = static_cast<int>(state.range(0));
+  std::string folder = (std::filesystem::temp_directory_path() / "mmradartwin_benchmark_XXXXXX").string();
+  if (!mkdtemp(folder.data())) {
+    state.SkipWithError("no temporary folder can be made");
+    return;
+  }
+  {
+    std::ofstream obj(folder + "/room.obj");
+    int first = 1, faces = 0;
+    const auto face = [&](const Eigen::Vector3d& corner, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+      obj << "o face" << faces++ << "\nusemtl Wall\n";
+      for (int i = 0; i <= n; ++i) {
+        for (int j = 0; j <= n; ++j) obj << "v " << (corner + a * i / n + b * j / n).transpose() << "\n";
+      }
+      for (int i = 0; i < n; ++i) {
+        for (int j = 0; j < n; ++j) {
+          const int v = first + i * (n + 1) + j;
+          obj << "f " << v << " " << v + n + 1 << " " << v + n + 2 << "\nf " << v << " " << v + n + 2 << " " << v + 1
+              << "\n";
+        }
+      }
+      first += (n + 1) * (n + 1);
+    };
+    using V = Eigen::Vector3d;
+    face(V(0, 0, 0), V(6, 0, 0), V(0, 0, 3));
+    face(V(0, 5, 0), V(6, 0, 0), V(0, 0, 3));
+    face(V(0, 0, 0), V(0, 5, 0), V(0, 0, 3));
+    face(V(6, 0, 0), V(0, 5, 0), V(0, 0, 3));
+    face(V(0, 0, 0), V(6, 0, 0), V(0, 5, 0));
+    face(V(4, 3, 0), V(1, 0, 0), V(0, 0, 1.5));
+    face(V(4, 3, 0), V(0, 1, 0), V(0, 0, 1.5));
+  }
+  std::ofstream(folder + "/materials.yaml")
+      << "materials: {Wall: {model: dielectric, relative_permittivity: 5.24, scattering_coefficient: 0.3}}\n";
+  std::ofstream(folder + "/scene.yaml") << "meshes: [{file: room.obj}]\nmaterials: materials.yaml\n";
+  const Twin twin = makeTwin(folder + "/scene.yaml",
+                             "  specular: {}\n  corner: {}\n  edge_diffraction: {level: 1}\n"
+                             "  diffuse: {spacing_m: 0.1}\n");
+  std::filesystem::remove_all(folder);
+  int i = 0;
+  for (auto _ : state) {
+    const Eigen::Isometry3d at =
+        Eigen::Translation3d(2, 2.2, 1) * Eigen::AngleAxisd(0.9 * i++, Eigen::Vector3d::UnitZ());
+    benchmark::DoNotOptimize(twin.simulate(at).grid.x.data());
+  }
+  state.counters["triangles"] = 7.0 * 2 * n * n;
+}
+BENCHMARK(poseByTriangles)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
+
+/// The last row: the most memory that the process ever held.
+void peakMemory(benchmark::State& state) {
+  rusage used{};
+  for (auto _ : state) getrusage(RUSAGE_SELF, &used);
+  state.counters["MB"] = static_cast<double>(used.ru_maxrss) / 1e3;
+}
+BENCHMARK(peakMemory)->Iterations(1);
 
 }  // namespace
 

@@ -27,6 +27,17 @@ ImageSearch::ImageSearch(const Scene& scene, bool all_orientations) : scene_(sce
     c.point << f.origin, f.origin + f.size1_m * f.e1, f.origin + f.size1_m * f.e1 + f.size2_m * f.e2,
         f.origin + f.size2_m * f.e2;
     corners_.push_back(c);
+    planes_.push_back({f.normal, f.origin});
+  }
+  if (exhaustiveOrder() < 3) return;
+  const int count = static_cast<int>(reflectors_.size());
+  on_side_.resize(2 * reflectors_.size());
+  for (int a = 0; a < count; ++a) {
+    for (int b = 0; b < count; ++b) {
+      for (int side : {0, 1}) {
+        if (faces(a, side == 1, b)) on_side_[static_cast<std::size_t>(2 * a + side)].push_back(b);
+      }
+    }
   }
 }
 
@@ -105,6 +116,8 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
       in_front[a] = (limits.forward.transpose() * (corners_[a].point.colwise() - p)).maxCoeff() > 0;
     }
   }
+  std::vector<double> from_radar;  // distance of p from each plane
+  for (const Plane& plane : planes_) from_radar.push_back(plane.normal.dot(p - plane.origin));
   // The last facet is tried by where the straight line from p to the image meets its plane, which is cheap.
   const auto meetsLast = [&](int b, const Eigen::Vector3d& image_before) {
     const Facet& f = scene_.facets[reflectors_[b]];
@@ -134,7 +147,10 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
       }
       if (limits.max_order < 3) continue;
       const Eigen::Vector3d image2 = mirror(image1, fb);
-      for (int c = 0; c < count; ++c) {
+      // The way on from b stays on the side that it came from.
+      for (int c : on_side_[static_cast<std::size_t>(2 * b + (db > 0))]) {
+        const Plane& plane = planes_[static_cast<std::size_t>(c)];
+        if (!(from_radar[static_cast<std::size_t>(c)] * plane.normal.dot(image2 - plane.origin) > 0)) continue;
         if (c == b || !in_front[c] || !meetsLast(c, image2)) continue;
         if (solve(p, {fa.id, fb.id, reflectors_[c]}, rays, limits, path)) found.push_back(path);
       }

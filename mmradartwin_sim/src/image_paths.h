@@ -65,6 +65,13 @@ class ImageSearch {
   const Scene& scene_;
   std::vector<int> reflectors_;   // facet ids
   std::vector<Corners> corners_;  // per reflector, of the bounding rectangle
+  struct Plane {
+    Eigen::Vector3d normal, origin;
+  };
+  std::vector<Plane> planes_;  // per reflector
+  // [2 * reflector + side]: reflectors with a part on that side of it, 1 where its normal points. Empty where there are
+  // too many for three bounces.
+  std::vector<std::vector<int>> on_side_;
 };
 
 /// True for facets that are perpendicular within 0.1 deg: the corner's domain.

@@ -1,5 +1,6 @@
 #include "mmradartwin_sim/mechanism.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "mechanisms/builtin.h"
@@ -20,9 +21,49 @@ const std::vector<std::string>& Parameters::texts(const std::string& name) const
   return std::get<std::vector<std::string>>(values_.at(name));
 }
 
-bool PoseContext::inFieldOfView(const Eigen::Vector3d& direction_radar) const {
-  static const double kSine = std::sin(20 * M_PI / 180);
+namespace {
+const double kSine = std::sin(20 * M_PI / 180);
+}
+
+bool inFieldOfView(const Eigen::Vector3d& direction_radar) {
   return direction_radar.x() > 0 && std::abs(direction_radar.z()) <= kSine * direction_radar.norm();
+}
+
+bool PoseContext::inFieldOfView(const Eigen::Vector3d& direction_radar) const {
+  return mmradartwin::inFieldOfView(direction_radar);
+}
+
+bool SceneChange::moved(int actor) const { return std::find(actors.begin(), actors.end(), actor) != actors.end(); }
+
+bool SceneChange::crosses(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const {
+  const Eigen::Vector3d way = b - a, inverse = way.cwiseInverse();
+  for (const Eigen::AlignedBox3d& box : bounds) {
+    double from = 0, to = 1;
+    for (int i = 0; i < 3 && from <= to; ++i) {
+      if (way[i] == 0) {
+        if (a[i] < box.min()[i] || a[i] > box.max()[i]) to = -1;
+        continue;
+      }
+      const double one = (box.min()[i] - a[i]) * inverse[i], other = (box.max()[i] - a[i]) * inverse[i];
+      from = std::max(from, std::min(one, other));
+      to = std::min(to, std::max(one, other));
+    }
+    if (from <= to) return true;
+  }
+  return false;
+}
+
+bool SceneChange::touches(const Eigen::Vector3d& radar, const PathRecord& record) const {
+  for (int actor : record.actors) {
+    if (moved(actor)) return true;
+  }
+  Eigen::Vector3d from = radar;
+  for (const Eigen::Vector3d& v : record.vertices) {
+    if (crosses(from, v)) return true;
+    from = v;
+  }
+  // The way back from a single point is the way there.
+  return record.vertices.size() > 1 && crosses(from, radar);
 }
 
 MechanismRegistry& MechanismRegistry::instance() {

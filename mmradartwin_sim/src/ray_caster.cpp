@@ -13,6 +13,7 @@ namespace mmradartwin {
 struct RayCaster::Embree {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
+  RTCScene still = nullptr;                          // what stands, where other actors may move; else null
   RTCScene veil = nullptr;                           // actors that rays pass, null where there are none
   std::vector<std::vector<Facet>> veil_of;           // [actor], empty for the others
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  // single precision inside, so coordinates stay small
@@ -20,9 +21,18 @@ struct RayCaster::Embree {
   std::vector<std::vector<int>> facet_of_triangle;  // [actor][triangle]
   std::vector<bool> solid;                          // actors that can have an inside
   std::vector<Eigen::AlignedBox3d> bounds;
+  struct Instance {
+    int actor;
+    RTCScene scene;
+    RTCGeometry geometry;        // in the scene above, released with it
+    Eigen::AlignedBox3d bounds;  // on construction
+  };
+  std::vector<Instance> instances;
 
   ~Embree() {
     if (scene) rtcReleaseScene(scene);
+    if (still) rtcReleaseScene(still);
+    for (const Instance& i : instances) rtcReleaseScene(i.scene);
     if (veil) rtcReleaseScene(veil);
     if (device) rtcReleaseDevice(device);
   }
@@ -72,14 +82,30 @@ void attach(RTCDevice device, RTCScene scene, const Actor& actor, const Eigen::V
   rtcReleaseGeometry(geometry);
 }
 
+/// Puts a committed scene into another as an instance that stands where it was made.
+RTCGeometry attachInstance(RTCDevice device, RTCScene to, RTCScene what, unsigned id) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(geometry, what);
+  rtcSetGeometryMask(geometry, static_cast<unsigned>(-1));
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(to, geometry, id);
+  rtcReleaseGeometry(geometry);
+  return geometry;
+}
+
 }  // namespace
 
-RayCaster::RayCaster(const Scene& scene) : embree_(new Embree) {
+RayCaster::RayCaster(const Scene& scene, const std::vector<int>& movable) : embree_(new Embree) {
   Embree& e = *embree_;
   e.device = rtcNewDevice("threads=1,set_affinity=0");
   if (!e.device) throw std::runtime_error("Embree cannot be started");
   e.scene = rtcNewScene(e.device);
   rtcSetSceneBuildQuality(e.scene, RTC_BUILD_QUALITY_HIGH);
+  RTCScene standing = e.scene;
+  if (!movable.empty()) {
+    standing = e.still = rtcNewScene(e.device);
+    rtcSetSceneBuildQuality(e.still, RTC_BUILD_QUALITY_HIGH);
+  }
   Eigen::AlignedBox3d all;
   for (const Actor& actor : scene.actors) {
     for (const auto& v : actor.vertices) all.extend(v);
@@ -97,8 +123,12 @@ RayCaster::RayCaster(const Scene& scene) : embree_(new Embree) {
     // A shell that encloses most of the scene is the room itself: the radar is meant to be inside it.
     e.solid.push_back(actor.present && !actor.bounds.isEmpty() && actor.bounds.sizes().prod() < 0.5 * volume);
     if (!actor.present || actor.triangles.empty()) continue;
-    RTCScene target = e.scene;
-    if (!actor.occludes) {
+    RTCScene target = standing;
+    if (actor.occludes && std::find(movable.begin(), movable.end(), static_cast<int>(a)) != movable.end()) {
+      target = rtcNewScene(e.device);
+      rtcSetSceneBuildQuality(target, RTC_BUILD_QUALITY_HIGH);
+      e.instances.push_back({static_cast<int>(a), target, nullptr, actor.bounds});
+    } else if (!actor.occludes) {
       if (!e.veil) e.veil = rtcNewScene(e.device);
       target = e.veil;
       for (int id : actor.facets) e.veil_of[a].push_back(scene.facets[id]);
@@ -106,14 +136,44 @@ RayCaster::RayCaster(const Scene& scene) : embree_(new Embree) {
     attach(e.device, target, actor, e.center, static_cast<unsigned>(a));
   }
   for (std::size_t i = 0; i < scene.screens.size(); ++i) {
-    attach(e.device, e.scene, scene.screens[i], e.center, static_cast<unsigned>(scene.actors.size() + i));
+    attach(e.device, standing, scene.screens[i], e.center, static_cast<unsigned>(scene.actors.size() + i));
   }
   if (e.veil) rtcCommitScene(e.veil);
+  if (e.still) {
+    rtcCommitScene(e.still);
+    attachInstance(e.device, e.scene, e.still, 0);
+    unsigned id = 1;
+    for (Embree::Instance& i : e.instances) {
+      rtcCommitScene(i.scene);
+      i.geometry = attachInstance(e.device, e.scene, i.scene, id++);
+    }
+  }
   rtcCommitScene(e.scene);
 }
 
 RayCaster::~RayCaster() = default;
 RayCaster::RayCaster(RayCaster&&) noexcept = default;
+
+void RayCaster::place(int actor, const Eigen::Isometry3d& T) {
+  Embree& e = *embree_;
+  const auto found =
+      std::find_if(e.instances.begin(), e.instances.end(), [&](const auto& i) { return i.actor == actor; });
+  if (found == e.instances.end()) {
+    throw std::invalid_argument("RayCaster::place: actor " + std::to_string(actor) + " is not movable");
+  }
+  Eigen::Matrix<float, 3, 4> about_center;
+  about_center.leftCols<3>() = T.linear().cast<float>();
+  about_center.col(3) = (T * e.center - e.center).cast<float>();
+  rtcSetGeometryTransform(found->geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, about_center.data());
+  rtcCommitGeometry(found->geometry);
+  rtcCommitScene(e.scene);
+  Eigen::AlignedBox3d& bounds = e.bounds[static_cast<std::size_t>(actor)];
+  bounds = found->bounds.transformed(T);
+  for (int i = 0; i < 8; ++i) {
+    const auto corner = static_cast<Eigen::AlignedBox3d::CornerType>(i);
+    e.radius_m = std::max(e.radius_m, (bounds.corner(corner) - e.center).norm());
+  }
+}
 
 bool RayCaster::visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const {
   const Eigen::Vector3d d = b - a;

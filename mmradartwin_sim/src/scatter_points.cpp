@@ -27,8 +27,11 @@ std::uint64_t hashText(const std::string& text) {
 /// and cell, so that the points move with the facet and nothing else changes them.
 void addPoints(const Facet& facet, std::uint64_t facet_hash, double spacing_m, const std::string& mechanism,
                std::vector<ScatterPoint>& points) {
-  const int n1 = std::max(1, static_cast<int>(std::lround(facet.size1_m / spacing_m)));
-  const int n2 = std::max(1, static_cast<int>(std::lround(facet.size2_m / spacing_m)));
+  // A size halfway between two numbers of cells rounds up however the room is turned.
+  const auto cells = [spacing_m](double size_m) {
+    return std::max(1, static_cast<int>(std::lround(size_m / spacing_m + 1e-6)));
+  };
+  const int n1 = cells(facet.size1_m), n2 = cells(facet.size2_m);
   if (static_cast<double>(n1) * n2 > 4e6) {
     throw InputError("mechanism " + mechanism + ": key spacing_m: " + std::to_string(spacing_m) +
                      " m gives millions of scatter points on one facet; choose a wider spacing");

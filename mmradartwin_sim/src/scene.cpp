@@ -78,6 +78,8 @@ Scene loadScene(const std::string& scene_yaml, double frequency_hz) {
                          " and " + file + "); rename one of the objects");
       }
       for (auto& v : actor.vertices) v = R * (scale * v) + xyz_m;
+      actor.T_map_mesh.linear() = R;
+      actor.T_map_mesh.translation() = xyz_m;
       scene.actors.push_back(std::move(actor));
     }
   }

@@ -26,8 +26,10 @@ std::string formatPoint(const Eigen::Vector3d& p) {
   return out.str();
 }
 
+}  // namespace
+
 /// Compares with phasors evaluated one by one at three samples: another arithmetic than the recurrence that made x.
-RecordCheck check(const RadarConfig& radar, const std::vector<PathRecord>& records, const ComplexGrid& x) {
+RecordCheck checkRecords(const RadarConfig& radar, const std::vector<PathRecord>& records, const ComplexGrid& x) {
   RecordCheck result;
   const int channels = radar.channels(), samples = radar.samples_per_chirp;
   const std::vector<int> probes = {0, samples / 2, samples - 1};
@@ -57,8 +59,6 @@ RecordCheck check(const RadarConfig& radar, const std::vector<PathRecord>& recor
   return result;
 }
 
-}  // namespace
-
 Twin::Twin(TwinDescription description, std::uint64_t seed) : impl_(new Impl) {
   Impl& m = *impl_;
   m.description = std::move(description);
@@ -83,15 +83,9 @@ Twin Twin::changed(std::vector<NamedParameters> mechanisms) const {
   return Twin(std::move(other));
 }
 
-bool Twin::altersGeometry() const {
-  const Eigen::Isometry3d here = Eigen::Isometry3d::Identity();
-  return impl_->edited || !impl_->modelPose(here).isApprox(here, 0);
-}
+bool Twin::altersGeometry() const { return impl_->edited || impl_->movesRadar(); }
 
-bool Twin::addsScreensAlone() const {
-  const Eigen::Isometry3d here = Eigen::Isometry3d::Identity();
-  return impl_->screens && impl_->modelPose(here).isApprox(here, 0);
-}
+bool Twin::addsScreensAlone() const { return impl_->screens && !impl_->movesRadar(); }
 
 void Twin::removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord>& records) const {
   if (!impl_->screens) return;
@@ -202,13 +196,19 @@ void Twin::prepare(const std::vector<Eigen::Isometry3d>& poses) {
   for (double b : best) impl_->strongest = std::max(impl_->strongest, b);
 }
 
-std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar) const {
-  if (!T_map_radar.matrix().allFinite()) throw InputError("pose is not a number; correct x, y, z and the quaternion");
-  const PoseContext c = impl_->context(T_map_radar);
+void Twin::Impl::refuseUnusablePose(const PoseContext& c) const {
+  if (!c.T_map_radar.matrix().allFinite()) {
+    throw InputError("pose is not a number; correct x, y, z and the quaternion");
+  }
   if (const auto inside = c.rays.insideActor(c.T_map_radar.translation())) {
     throw InputError("pose at " + formatPoint(c.T_map_radar.translation()) + " lies inside actor " +
                      c.scene.actors[*inside].name + "; correct the pose or the scene");
   }
+}
+
+std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar) const {
+  const PoseContext c = impl_->context(T_map_radar);
+  impl_->refuseUnusablePose(c);
   std::vector<PathRecord> records;
   for (const auto& m : impl_->mechanisms) {
     if (!m->needsStrongestAmplitude()) m->addPaths(c, records);
@@ -218,14 +218,18 @@ std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar) const 
 
 std::vector<PathRecord> Twin::Impl::weighted(const PoseContext& c, std::vector<PathRecord> records) const {
   reweight(c, records, 0);
-  if (!needs_strongest) return records;
+  addRelativePaths(c, records);
+  return records;
+}
+
+void Twin::Impl::addRelativePaths(const PoseContext& c, std::vector<PathRecord>& records) const {
+  if (!needs_strongest) return;
   raise(strongest_so_far, strongestOf(c, records));
   const std::size_t echoes = records.size();
   for (const auto& m : mechanisms) {
     if (m->needsStrongestAmplitude()) m->addPaths(c, records);
   }
   reweight(c, records, echoes);
-  return records;
 }
 
 std::vector<PathRecord> Twin::receivedPaths(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
@@ -291,7 +295,7 @@ Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRec
   s.grid.T_map_radar = T_map_radar;
   accumulate(radar, s.records, s.grid.x);
   if (s.records.empty()) s.grid.x = ComplexGrid::Zero(radar.channels(), radar.samples_per_chirp);
-  s.check = check(radar, s.records, s.grid.x);
+  s.check = checkRecords(radar, s.records, s.grid.x);
   s.propagation_only = !impl_->has_tone_gain && !impl_->has_receive && !impl_->has_distort;
   if (impl_->has_tone_gain || impl_->has_distort) {
     s.grid.x.setZero();

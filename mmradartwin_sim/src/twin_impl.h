@@ -10,6 +10,9 @@
 
 namespace mmradartwin {
 
+/// Invariants of records and the grid that accumulate() made of them, by another arithmetic.
+RecordCheck checkRecords(const RadarConfig& radar, const std::vector<PathRecord>& records, const ComplexGrid& x);
+
 struct Twin::Impl {
   TwinDescription description;
   std::uint64_t seed;
@@ -31,6 +34,12 @@ struct Twin::Impl {
 
   const Scene& model() const { return edited ? *edited : scene; }
   const RayCaster& modelRays() const { return edited_rays ? *edited_rays : *rays; }
+
+  /// True where a mechanism moves the radar.
+  bool movesRadar() const {
+    const Eigen::Isometry3d here = Eigen::Isometry3d::Identity();
+    return !modelPose(here).isApprox(here, 0);
+  }
 
   Eigen::Isometry3d modelPose(const Eigen::Isometry3d& T_map_radar) const {
     Eigen::Isometry3d T = T_map_radar;
@@ -71,6 +80,11 @@ struct Twin::Impl {
       for (const auto& m : mechanisms) m->reweight(c, records[i]);
     }
   }
+
+  /// Throws InputError for a pose that is NaN or inside an actor.
+  void refuseUnusablePose(const PoseContext& c) const;
+  /// Adds the paths whose level is relative to the strongest echo to weighted ones.
+  void addRelativePaths(const PoseContext& c, std::vector<PathRecord>& records) const;
 
   /// Paths after all weights, with those whose level is relative to the strongest echo.
   std::vector<PathRecord> weighted(const PoseContext& c, std::vector<PathRecord> records) const;

@@ -27,6 +27,15 @@ TEST(Aperture, IsOneWhereItReachesFarAndAHalfAtAnEdge) {
   EXPECT_NEAR(std::abs(apertureAxis(50, 1e6)), 1 / (std::sqrt(2) * M_PI * 50), 1e-6);
 }
 
+// Loss behind a knife edge at the Fresnel parameter nu, exact: -20 log10 of the half-infinite aperture's factor.
+TEST(Aperture, BehindAKnifeEdgeHasItsTabulatedLoss) {
+  const double rows[][2] = {{0, 6.021},    {0.5, 10.234}, {1, 13.864}, {2, 19.091},
+                            {2.4, 20.618}, {5, 26.936},   {-1, -1.001}};
+  for (const auto& [nu, loss_db] : rows) {
+    EXPECT_NEAR(-20 * std::log10(std::abs(apertureAxis(nu, 1e7))), loss_db, 1e-3) << nu;
+  }
+}
+
 TEST(Aperture, OfAPolygonAgreesWithTheRectanglesClosedForm) {
   const double rows[][4] = {{-1, 1, -1, 1},         {-130, 3, -20, 40}, {0.3, 5, -2, 0.001}, {2, 3, 4, 5},
                             {1e-6, 100, -50, 1e-5}, {0, 2, -1, 1},      {10, 12, -60, 60}};

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <complex>
 
+#include "mmradartwin_dsp/coherent_average.h"
+#include "mmradartwin_dsp/range_angle.h"
 #include "scene_files.h"
 
 namespace mmradartwin {
@@ -56,6 +58,52 @@ TEST_F(ClosedForms, RadarEquation) {
   EXPECT_NEAR(dbsm(s.records[0].amplitude, 5, kLambda77_m), 10 * std::log10(M_PI * 25), 0.1);
 }
 
+// A calibrated target in noise through frames, average and signal chain. With A^2 = lambda^2 sigma/((4 pi)^3 R^4) at
+// the centre of a range bin and straight ahead, and white noise of power s^2 per complex sample, a map of F averaged
+// frames shows SNR = A^2/s^2 F M (sum w)^2/sum w^2.
+TEST_F(ClosedForms, RadarEquationWithNoise) {
+  const RadarConfig radar = paperRadar();
+  const double lambda = radar.wavelength_m(), R = 20 * radar.range_bin_m(), side = 0.05;
+  addWall("plate", "Metal", {R, -side / 2}, {R, side / 2}, -side / 2, side / 2);
+  constexpr int kFrames = 4, kMaps = 60;
+  const double noise_dbfs = -46;
+  Twin twin = makeTwin(writeScene(), "  specular: {max_bounces: 1}\n  noise_floor: {level_dbfs: -46}\n", radar);
+  // Square plate in its near field, sigma = (4 pi/lambda^2) |I|^4.
+  std::complex<double> I = 0;
+  const int n = 20000;
+  for (int i = 0; i < n; ++i) {
+    const double x = side * ((i + 0.5) / n - 0.5);
+    I += std::polar(side / n, -2 * M_PI / lambda * x * x / R);
+  }
+  const double sigma_m2 = 4 * M_PI / (lambda * lambda) * std::pow(std::abs(I), 4);
+  const double amplitude = std::sqrt(lambda * lambda * sigma_m2 / (std::pow(4 * M_PI, 3) * std::pow(R, 4)));
+  const double gain_db = -30 - db(amplitude);  // the plate at -30 dBFS
+  double sum_w = 0, sum_w2 = 0;
+  for (int i = 0; i < radar.samples_per_chirp; ++i) {
+    const double w = 0.5 * (1 - std::cos(2 * M_PI * i / radar.samples_per_chirp));
+    sum_w += w;
+    sum_w2 += w * w;
+  }
+  const double expected_db = -30 - noise_dbfs + 10 * std::log10(kFrames * radar.channels() * sum_w * sum_w / sum_w2);
+  const SignalChain chain(radar);
+  double peak = 0, floor = 0;
+  int cells = 0;
+  for (int map = 0; map < kMaps; ++map) {
+    const Simulation s = twin.simulate(radarPose(0, 0, 0), map * 1000000000LL);
+    CoherentAverage average(radar, 0);
+    for (const AdcCube& cube : twin.simulateFrames(s, {kFrames, gain_db, ""})) average.add(cube);
+    const RangeAngleMap shown = chain.map(average.grid());
+    peak += std::pow(10.0, shown.power_db(20, 32) / 10) / kMaps;
+    for (int r = 40; r < 60; ++r) {
+      for (int a = 0; a < 64; ++a, ++cells) floor += std::pow(10.0, shown.power_db(r, a) / 10);
+    }
+  }
+  floor /= cells;
+  // 60 maps of some 20 by 8 independent cells: 0.04 dB rms.
+  EXPECT_NEAR(10 * std::log10((peak - floor) / floor), expected_db, 0.2);
+  EXPECT_NEAR(10 * std::log10(peak), -30, 0.1) << "a map's level is that of the sample";
+}
+
 // 8 pi a^4/lambda^2 far off (2 D^2/lambda = 2.6 m for a = 5 cm); nearer the Fresnel integral over the aperture
 // a sqrt(2) by a: sigma = (4 pi/lambda^2) |I1 I2|^2, I = sqrt(lambda R) [C(u) - jS(u)].
 TEST_F(ClosedForms, DihedralNearAndFar) {
@@ -104,6 +152,36 @@ TEST_F(ClosedForms, RotatingDihedralFlashesOnItsPlates) {
     EXPECT_NEAR(level(look(dihedral(a, 0.9, 20, "  specular: {}\n  corner: {}\n"))),
                 level(look(dihedral(a, 0.9, -20, "  specular: {}\n  corner: {}\n"))), 1e-9)
         << "left and right alike";
+  }
+}
+
+// The whole curve from -50 to 50 deg, as dihedral_curve writes it: its middle belongs to the fold, its flashes to the
+// plates near +-45 deg, and both sides are alike.
+TEST_F(ClosedForms, RotatingDihedralsCurveHasItsMiddleAndTwoFlashes) {
+  for (double a : {0.05, 0.07, 0.10, 0.15}) {
+    double flash[2] = {0, 0}, flash_at[2] = {0, 0};
+    for (int turn = -50; turn <= 50; turn += 1) {
+      const Simulation s =
+          look(dihedral(a, 0.9, turn, "  specular: {}\n  corner: {}\n  edge_diffraction: {level: 1}\n"));
+      double fold = 0, plates = 0;
+      for (const PathRecord& r : s.records) {
+        if (*r.event == "corner") fold = std::max(fold, r.amplitude);
+        if (*r.event == "specular") plates = std::max(plates, r.amplitude);
+      }
+      if (std::abs(turn) <= 20) {
+        EXPECT_GT(fold, plates) << a << " m at " << turn;
+      }
+      if (std::abs(turn) > 46) {
+        EXPECT_EQ(fold, 0) << a << " m at " << turn << ": the other plate is seen from behind";
+      }
+      if (plates > flash[turn > 0]) {
+        flash[turn > 0] = plates;
+        flash_at[turn > 0] = turn;
+      }
+    }
+    for (int side : {0, 1}) EXPECT_NEAR(std::abs(flash_at[side]), 45, 8) << a;
+    EXPECT_NEAR(flash_at[0], -flash_at[1], 1) << a;
+    EXPECT_NEAR(db(flash[0] / flash[1]), 0, 1e-6) << a;
   }
 }
 

@@ -131,7 +131,7 @@ TEST_F(TwinTest, DoesNotCareWhereTheRoomStands) {
 TEST_F(TwinTest, DoesNotCareHowWallsAreTessellated) {
   addRoom(1);
   writeScene("coarse");
-  addRoom(60);  // 7200 triangles a wall
+  addRoom(100);  // 20,000 triangles a wall
   writeScene("fine");
   const std::string mechanisms = "  specular: {}\n  corner: {}\n";
   Twin coarse = makeTwin(path("coarse.yaml"), mechanisms), fine = makeTwin(path("fine.yaml"), mechanisms);

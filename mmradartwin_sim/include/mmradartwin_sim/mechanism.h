@@ -50,6 +50,22 @@ class Parameters {
   std::map<std::string, Value> values_;
 };
 
+/// Base field of view of emission and arrival: |azimuth| < 90 deg, |elevation| <= 20 deg of a direction in radar_link.
+bool inFieldOfView(const Eigen::Vector3d& direction_radar);
+
+/// Actors that moved while the radar stood, and the space that they left and took: a path that neither meets nor
+/// crosses any of it is as it was.
+struct SceneChange {
+  std::vector<int> actors;                  ///< Scene::actors index
+  std::vector<Eigen::AlignedBox3d> bounds;  ///< map, with a margin; where they were and where they are
+
+  bool moved(int actor) const;
+  /// True where the segment comes into one of the bounds.
+  bool crosses(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const;
+  /// True where a path from the radar and back may be another after the change.
+  bool touches(const Eigen::Vector3d& radar, const PathRecord& record) const;
+};
+
 /// Everything a mechanism may look at for one pose.
 struct PoseContext {
   const RadarConfig& radar;
@@ -57,10 +73,8 @@ struct PoseContext {
   const RayCaster& rays;
   Eigen::Isometry3d T_map_radar;  ///< where the twin's radar is, after all pose() calls
   double frequency_hz;            ///< of the coefficients: the window's centre
-  /// Base field of view of emission and arrival: |azimuth| < 90 deg, |elevation| <= 20 deg of a direction in
-  /// radar_link.
-  bool inFieldOfView(const Eigen::Vector3d& direction_radar) const;
-  double max_range_m;  ///< paths with length/2 beyond are left out
+  bool inFieldOfView(const Eigen::Vector3d& direction_radar) const;  ///< the free function
+  double max_range_m;                                                ///< paths with length/2 beyond are left out
   std::uint64_t seed;  ///< of what is random by nature (phases of scatter points)
   /// Strongest A_p of the session's poses, for levels that are relative to it.
   std::function<double()> strongest_amplitude;
@@ -70,6 +84,8 @@ struct PoseContext {
   /// Zero, and 0 of 1, where no session is known (Twin::setSession).
   double session_s = 0;
   int pose_index = 0, pose_count = 1;
+  /// Where the pose's paths are known but for what a change touches; else null (Mechanism::tracesChanges).
+  const SceneChange* change = nullptr;
 };
 
 /// One chirp of one frame of a pose, for what differs from chirp to chirp (DESIGN section 3: chirps come as
@@ -109,6 +125,11 @@ class Mechanism {
   virtual void editScene(Scene&) const {}  ///< once, on loading
   /// Once, after all editScene(): precomputes what depends on the scene alone. The scene outlives the mechanism.
   virtual void build(const Scene&, const RadarConfig&) {}
+  /// Some actors of build()'s scene stand elsewhere now; ids are the same.
+  virtual void sceneChanged(const Scene& scene, const RadarConfig& radar, const SceneChange&) { build(scene, radar); }
+  /// True where addPaths() adds, with PoseContext::change, those paths alone that SceneChange::touches(). Else all
+  /// paths of the mechanism are found again when an actor moves.
+  virtual bool tracesChanges() const { return false; }
   virtual Eigen::Isometry3d pose(const Eigen::Isometry3d& T_map_radar) const { return T_map_radar; }
   virtual void addPaths(const PoseContext&, std::vector<PathRecord>&) const {}
   virtual void reweight(const PoseContext&, PathRecord&) const {}  ///< every path of every mechanism

@@ -41,8 +41,10 @@ struct Actor {
   std::vector<std::array<int, 3>> triangles;
   std::vector<int> triangle_facet;  ///< facet id per triangle, -1 where it has no area
   std::vector<int> facets;          ///< ids
-  bool present = true;              ///< false where a mechanism took it away: no paths, no occlusion
-  bool occludes = true;             ///< false where rays pass through it; its own faces stay hidden behind each other
+  /// Frame of the mesh file that it came from, as scene.yaml places it: what a moving actor's frame in tf stands for.
+  Eigen::Isometry3d T_map_mesh = Eigen::Isometry3d::Identity();
+  bool present = true;   ///< false where a mechanism took it away: no paths, no occlusion
+  bool occludes = true;  ///< false where rays pass through it; its own faces stay hidden behind each other
   Eigen::AlignedBox3d bounds;
 };
 
@@ -94,9 +96,14 @@ std::vector<Actor> loadMesh(const std::string& file);
 /// Occlusion queries, thread-safe. Embree behind it; no invalid ray reaches it.
 class RayCaster {
  public:
-  explicit RayCaster(const Scene& scene);
+  /// movable: actors that place() may move, each an Embree instance of its own. What stands shares one tree, which is
+  /// as fast as without any.
+  explicit RayCaster(const Scene& scene, const std::vector<int>& movable = {});
   ~RayCaster();
   RayCaster(RayCaster&&) noexcept;
+  /// Moves a movable actor: T_map_map takes where it was on construction to where it is. Not while others cast. Throws
+  /// std::invalid_argument for an actor that is not movable; one that occludes nothing never is.
+  void place(int actor, const Eigen::Isometry3d& T_map_map);
   /// True where the open segment a-b meets nothing, both ends shortened by gap_m.
   bool visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m = 1e-3) const;
   /// visible() from a to many points, each with a gap of its own, one result per point: rays go to Embree in packets,

@@ -20,6 +20,7 @@
 namespace mmradartwin {
 
 class CondensedTrace;
+class MovingTwin;
 
 struct NamedParameters {
   std::string mechanism;
@@ -133,6 +134,7 @@ class Twin {
                    const CondensedTrace* condensed) const;
   void forEachChirp(const Simulation& pose, int frames,
                     const std::function<void(const ChirpContext&, ComplexGrid&)>& visit) const;
+  friend class MovingTwin;
   struct Impl;
   explicit Twin(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;

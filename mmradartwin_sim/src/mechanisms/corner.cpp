@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "../trihedral.h"
 #include "builtin.h"
 
@@ -17,6 +19,21 @@ class Corner : public Mechanism {
     edges_ = findCornerEdges(
         scene, kFacesMeet_m, [](const Facet& f) { return f.reflects; },
         [](const Facet&, const Facet&) { return true; });
+    trihedra_ = findTrihedra(scene, edges_, kFacesMeet_m);
+  }
+
+  void sceneChanged(const Scene& scene, const RadarConfig&, const SceneChange& change) override {
+    const auto moved = [&](int facet) { return change.moved(scene.facets[facet].actor); };
+    edges_.erase(
+        std::remove_if(edges_.begin(), edges_.end(), [&](const CornerEdge& e) { return moved(e.a) || moved(e.b); }),
+        edges_.end());
+    const std::vector<CornerEdge> again = findCornerEdges(
+        scene, kFacesMeet_m, [](const Facet& f) { return f.reflects; },
+        [&](const Facet& a, const Facet& b) { return moved(a.id) || moved(b.id); });
+    edges_.insert(edges_.end(), again.begin(), again.end());
+    std::stable_sort(edges_.begin(), edges_.end(), [](const CornerEdge& a, const CornerEdge& b) {
+      return std::make_pair(a.a, a.b) < std::make_pair(b.a, b.b);
+    });
     trihedra_ = findTrihedra(scene, edges_, kFacesMeet_m);
   }
 

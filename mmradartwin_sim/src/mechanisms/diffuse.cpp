@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "../polarisation.h"
@@ -58,6 +59,20 @@ class Diffuse : public Mechanism {
         makeScatterPoints(scene, spacing_m_, radar.center_frequency_hz(), kName, [](const Facet&) { return true; });
   }
 
+  void sceneChanged(const Scene& scene, const RadarConfig& radar, const SceneChange& change) override {
+    const auto moved = [&](const Facet& f) { return change.moved(f.actor); };
+    points_.erase(std::remove_if(points_.begin(), points_.end(),
+                                 [&](const ScatterPoint& p) { return moved(scene.facets[p.facet]); }),
+                  points_.end());
+    const std::vector<ScatterPoint> again =
+        makeScatterPoints(scene, spacing_m_, radar.center_frequency_hz(), kName, moved);
+    const auto kept = static_cast<std::ptrdiff_t>(points_.size());
+    points_.insert(points_.end(), again.begin(), again.end());
+    std::inplace_merge(points_.begin(), points_.begin() + kept, points_.end(),
+                       [](const ScatterPoint& a, const ScatterPoint& b) { return a.facet < b.facet; });
+  }
+  bool tracesChanges() const override { return true; }
+
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
     const ElementsInMap elements(context);
     const double spreading = context.radar.wavelength_m() / (4 * M_PI);
@@ -75,6 +90,10 @@ class Diffuse : public Mechanism {
       const Eigen::Vector3d direction_radar = to_radar * way / r;
       if (!context.inFieldOfView(direction_radar)) continue;
       const Facet& facet = context.scene.facets[point.facet];
+      if (context.change && !context.change->moved(facet.actor) &&
+          !context.change->crosses(elements.p, point.position)) {
+        continue;
+      }
       const Eigen::Vector3d in = way / r;
       const double cosine = std::min(1.0, std::abs(in.dot(facet.normal)));
       const Material& material = context.scene.actors[facet.actor].material;

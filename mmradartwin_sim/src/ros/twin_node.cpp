@@ -3,6 +3,7 @@
 #include <mmradartwin_msgs/PathRecords.h>
 #include <mmradartwin_msgs/Scene.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "mmradartwin_dsp/input_error.h"
@@ -57,6 +58,7 @@ void TwinNode::readParameters(const ros::NodeHandle& private_nh) {
   if (!channels.empty()) channels_ = loadChannelCorrection(resolvePath(channels, "/"));
   map_frame_ = parameters.text("map_frame", map_frame_);
   radar_frame_ = parameters.text("radar_frame", radar_frame_);
+  actor_frame_prefix_ = parameters.text("actor_frame_prefix", "");
   rate_hz_ = parameters.number("rate_hz", rate_hz_, 0, 1000);
   reuse_m_ = parameters.number("reuse_m", reuse_m_, 0, 1);
   reuse_rad_ = parameters.number("reuse_deg", 0.01, 0, 10) * M_PI / 180;
@@ -119,7 +121,9 @@ std::unique_ptr<Twin> TwinNode::makeTwin(const std::string& twin_file) const {
 }
 
 void TwinNode::use(std::unique_ptr<Twin> twin) {
-  last_.reset();
+  last_ = nullptr;
+  moving_.reset();
+  actors_.clear();
   radar_hash_ = radarHash(twin->radar());
   for (const std::string& note : twin->notes()) ROS_WARN("%s", note.c_str());
   mmradartwin_msgs::Scene msg = toMsg(twin->scene(), twin->description().toYaml());
@@ -133,8 +137,10 @@ void TwinNode::use(std::unique_ptr<Twin> twin) {
 }
 
 void TwinNode::rebuild() {
+  last_ = nullptr;
+  moving_.reset();
+  actors_.clear();
   twin_.reset();
-  last_.reset();
   const std::string twin_file = applied_twin_ ? *applied_twin_ : startingTwin();
   if (!radar_ || (!sceneFile() && twin_file.empty())) return;
   try {
@@ -206,7 +212,7 @@ void TwinNode::onRate(const ros::WallTimerEvent&) {
     const ros::Time stamp = T.header.stamp.isZero() ? ros::Time::now() : T.header.stamp;
     // A pose that nobody renews is shown again once a second, for those who come late.
     const ros::WallTime now = ros::WallTime::now();
-    if (last_ && last_->grid.stamp_ns == toNanoseconds(stamp) && (now - published_at_).toSec() < 1) return;
+    if (last_ && last_ns_ == toNanoseconds(stamp) && (now - published_at_).toSec() < 1) return;
     published_at_ = now;
     simulate(toIsometry(T.transform), toNanoseconds(stamp));
   } catch (const tf2::TransformException& error) {
@@ -215,20 +221,73 @@ void TwinNode::onRate(const ros::WallTimerEvent&) {
   }
 }
 
+bool TwinNode::alike(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const {
+  return (a.translation() - b.translation()).norm() <= reuse_m_ &&
+         Eigen::Quaterniond(a.linear()).angularDistance(Eigen::Quaterniond(b.linear())) <= reuse_rad_;
+}
+
+bool TwinNode::placeActors(std::int64_t stamp_ns) {
+  const auto poseOf = [this, stamp_ns](const std::string& frame) -> std::optional<Eigen::Isometry3d> {
+    // The radar's pose is that of the grid, and the actor's may still be on its way.
+    for (const ros::Time& time : {toRosTime(stamp_ns), ros::Time(0)}) {
+      try {
+        return toIsometry(tf_buffer_.lookupTransform(map_frame_, frame, time).transform);
+      } catch (const tf2::TransformException&) {
+      }
+    }
+    return std::nullopt;
+  };
+  std::vector<std::pair<std::string, Eigen::Isometry3d>> found;
+  for (const Actor& actor : twin_->scene().actors) {
+    const std::string frame = actor_frame_prefix_ + actor.name;
+    if (frame == map_frame_ || frame == radar_frame_ || !tf_buffer_._frameExists(frame)) continue;
+    if (const auto T = poseOf(frame)) found.emplace_back(actor.name, *T);
+  }
+  bool moved = false;
+  for (const auto& [name, T] : found) {
+    auto known =
+        std::find_if(actors_.begin(), actors_.end(), [&name = name](const auto& a) { return a.first == name; });
+    if (known == actors_.end()) {
+      actors_.emplace_back(name, T);
+      moving_.reset();  // one more that moves
+    } else if (!alike(known->second, T)) {
+      known->second = T;
+    } else {
+      continue;
+    }
+    moved = true;
+    if (moving_) moving_->place(name, T);
+  }
+  if (!actors_.empty() && !moving_) {
+    std::vector<std::string> names;
+    for (const auto& a : actors_) names.push_back(a.first);
+    moving_.emplace(*twin_, names);
+    for (const auto& [name, T] : actors_) moving_->place(name, T);
+    ROS_INFO("%zu actors move with tf", names.size());
+  }
+  actor_moves_ += moved;
+  return moved;
+}
+
 void TwinNode::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) {
-  const bool stands =
-      last_ && (last_->T_map_radar.translation() - T_map_radar.translation()).norm() <= reuse_m_ &&
-      Eigen::Quaterniond(last_->T_map_radar.linear()).angularDistance(Eigen::Quaterniond(T_map_radar.linear())) <=
-          reuse_rad_;
-  if (stands) {
+  const bool moved = placeActors(stamp_ns);
+  const bool stands = last_ && alike(last_->T_map_radar, T_map_radar);
+  last_ns_ = stamp_ns;
+  if (stands && !moved) {
     ++reused_;
-    last_->grid.stamp_ns = stamp_ns;
   } else {
     const ros::WallTime begin = ros::WallTime::now();
+    // A radar that all but stands is taken to stand: then only what the actors touch is traced.
+    const Eigen::Isometry3d at = stands ? last_->T_map_radar : T_map_radar;
+    last_ = nullptr;
     try {
-      last_ = twin_->simulate(T_map_radar, stamp_ns);
+      if (moving_) {
+        last_ = &moving_->simulate(at, stamp_ns);
+      } else {
+        still_ = twin_->simulate(at, stamp_ns);
+        last_ = &*still_;
+      }
     } catch (const InputError& error) {
-      last_.reset();
       ++without_pose_;
       problem_ = error.what();
       ROS_WARN_THROTTLE(kWarnEvery_s, "pose at %.6f not simulated: %s", toRosTime(stamp_ns).toSec(), error.what());
@@ -246,6 +305,7 @@ void TwinNode::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp
     paths_publisher_.publish(paths);
   }
   mmradartwin_msgs::ReceiveGrid grid = toMsg(last_->grid, radar_hash_);
+  grid.header.stamp = toRosTime(stamp_ns);
   grid.header.frame_id = radar_frame_;
   grid_publisher_.publish(grid);
 }
@@ -267,6 +327,8 @@ void TwinNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) con
   status.add("grids from records in use", reused_);
   status.add("stamps skipped", skipped_);
   status.add("stamps without a usable pose", without_pose_);
+  status.add("actors that move with tf", actors_.size());
+  status.add("grids with a moved actor", actor_moves_);
   status.add("last simulation [ms]", simulate_ms_);
   if (last_) {
     status.add("records", last_->records.size());

@@ -14,8 +14,10 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "mmradartwin_dsp/temporary_folder.h"
+#include "mmradartwin_sim/moving_twin.h"
 #include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
@@ -25,6 +27,9 @@ namespace mmradartwin {
 /// Simulates at the pose of each measured grid that has one, and at `rate_hz` along tf while no measurement comes.
 /// Records are used again while the radar stands within `reuse_m` and `reuse_deg`. Of grids that come while one is
 /// simulated the newest is taken and the others are counted as skipped. Callbacks must come one at a time.
+///
+/// An actor moves with the tf frame of its name (`actor_frame_prefix` before it), which stands for its mesh file's
+/// frame: in `map_frame`, at the grid's stamp or the latest before it. Without such a frame it stays where it is.
 ///
 /// The scene is that of the parameter `scene`, else of the latched session message, whose files are unpacked into a
 /// temporary folder. twin/apply puts another twin in the place of the one simulated, from the last measured grid on;
@@ -51,9 +56,13 @@ class TwinNode {
   void use(std::unique_ptr<Twin> twin);
   void rebuild();
   void simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns);
+  /// Tells the moving twin where tf has its actors; true where one of them moved.
+  bool placeActors(std::int64_t stamp_ns);
+  bool alike(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const;  ///< within reuse_m and reuse_deg
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
   std::string scene_file_, twin_file_, radar_file_, map_frame_ = "map", radar_frame_ = "radar_link";
+  std::string actor_frame_prefix_;
   double rate_hz_ = 10, reuse_m_ = 1e-4, reuse_rad_ = 0;
   std::uint64_t seed_ = 1;
   std::optional<ChannelCorrection> channels_;
@@ -65,14 +74,18 @@ class TwinNode {
   std::optional<std::string> session_scene_, session_twin_;
   std::optional<std::string> applied_twin_;  ///< file that twin/apply named
   std::unique_ptr<Twin> twin_;
-  std::string problem_;  ///< why there is no twin, or the last pose gave nothing
-  std::optional<Simulation> last_;
+  std::string problem_;               ///< why there is no twin, or the last pose gave nothing
+  std::optional<MovingTwin> moving_;  ///< of twin_, where tf has actors of it
+  std::vector<std::pair<std::string, Eigen::Isometry3d>> actors_;  ///< those, and where they were placed
+  std::optional<Simulation> still_;                                ///< last simulation where no actor moves
+  const Simulation* last_ = nullptr;                               ///< still_, or that of moving_
+  std::int64_t last_ns_ = 0;                                       ///< stamp of the last grid published
 
   /// Where and when the last measured grid was simulated.
   std::optional<std::pair<Eigen::Isometry3d, std::int64_t>> measured_;
   mmradartwin_msgs::ReceiveGrid::ConstPtr pending_;
   ros::WallTime measured_at_, published_at_;
-  std::uint64_t simulated_ = 0, reused_ = 0, skipped_ = 0, without_pose_ = 0;
+  std::uint64_t simulated_ = 0, reused_ = 0, skipped_ = 0, without_pose_ = 0, actor_moves_ = 0;
   double simulate_ms_ = 0;
 
   tf2_ros::Buffer tf_buffer_;
