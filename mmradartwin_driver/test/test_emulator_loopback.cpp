@@ -84,7 +84,7 @@ TEST(EmulatorLoopback, RealCaptureInBothLayoutsBitForBit) {
     EXPECT_EQ(361u, recorded.packets.packets);  // 524288 = 360 * 1456 + 128
     // Late by what the host takes to send and deliver, never early.
     EXPECT_GE(cube.stamp_ns, recorded.first_frame_ns);
-    EXPECT_LT(cube.stamp_ns, recorded.first_frame_ns + 10'000'000);
+    EXPECT_LT(cube.stamp_ns, recorded.first_frame_ns + 40'000'000);  // below the frame period
     samples.push_back(cube.data);
   }
   EXPECT_TRUE(samples[0] == samples[1]);  // the two files hold the same measurement
