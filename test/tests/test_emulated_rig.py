@@ -17,6 +17,7 @@ import rosbag
 import rosgraph
 
 from mmradartwin_tests.installed_programs import find_program
+from made_session import make_session
 from test_launch_files import Launched, end, free_port
 
 POSES, FRAMES, PERIOD_S = 2, 60, 0.05
@@ -95,9 +96,7 @@ class EmulatedRig(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.mkdtemp(prefix="mmradartwin_rig_")
         cls.session = os.path.join(cls.folder, "session")
-        subprocess.run([find_program("mmradartwin_tests", "make_session.py"), "--output", cls.session, "--locations",
-                        str(POSES), "--headings", "1", "--frames", str(FRAMES), "--seed", "31"],
-                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=600)
+        make_session(cls.session, POSES, FRAMES)
 
     @classmethod
     def tearDownClass(cls):

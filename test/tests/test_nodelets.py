@@ -8,6 +8,7 @@ import time
 import unittest
 
 from mmradartwin_tests.installed_programs import find_program
+from made_session import make_session
 from test_emulated_rig import wait_until
 from test_launch_files import Launched, end
 
@@ -32,9 +33,7 @@ class Nodelets(unittest.TestCase):
         self.folder = tempfile.mkdtemp(prefix="mmradartwin_nodelets_")
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
         self.session = os.path.join(self.folder, "session")
-        subprocess.run([find_program("mmradartwin_tests", "make_session.py"), "--output", self.session, "--seed", "31",
-                        "--locations", "1", "--headings", "1", "--duplicates", "0", "--frames", str(FRAMES)],
-                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=600)
+        make_session(self.session, 1, FRAMES, "--duplicates", "0")
 
     def test_frames_are_handed_over_and_not_copied(self):
         file = os.path.join(self.folder, "nodelets.launch")

@@ -13,6 +13,7 @@ import numpy
 import rosbag
 
 from mmradartwin_tests.installed_programs import find_program
+from made_session import make_session
 from test_emulated_rig import Rig, wait_until
 from test_launch_files import Launched
 
@@ -73,9 +74,7 @@ class FullDisk(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
         self.disk = Disk(self, os.path.join(self.folder, "disk"), 48)
         self.session = os.path.join(self.folder, "session")
-        subprocess.run([find_program("mmradartwin_tests", "make_session.py"), "--output", self.session, "--seed", "31",
-                        "--locations", "1", "--headings", "1", "--duplicates", "0", "--frames", str(FRAMES)],
-                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=600)
+        make_session(self.session, 1, FRAMES, "--duplicates", "0")
 
     def test_recording_stops_says_so_goes_on_and_loses_nothing_of_what_it_had(self):
         with Rig(self.folder, self.session, None, "diagnosis:=false") as rig:

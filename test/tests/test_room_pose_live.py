@@ -12,6 +12,7 @@ import numpy
 import rosbag
 
 from mmradartwin_tests.installed_programs import find_program
+from made_session import make_session
 from test_emulated_rig import Rig, wait_until
 from test_launch_files import end
 
@@ -42,9 +43,7 @@ class RoomPoseLive(unittest.TestCase):
         self.folder = tempfile.mkdtemp(prefix="mmradartwin_room_")
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
         self.session = os.path.join(self.folder, "session")
-        subprocess.run([find_program("mmradartwin_tests", "make_session.py"), "--output", self.session, "--seed", "31",
-                        "--locations", "1", "--headings", "1", "--duplicates", "0", "--frames", str(FRAMES)],
-                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=600)
+        make_session(self.session, 1, FRAMES, "--duplicates", "0")
 
     def camera(self, rig):
         camera = subprocess.Popen([CAMERA, os.path.join(self.session, "scene.yaml"), *map(str, PLACE_M), str(YAW),
