@@ -64,6 +64,12 @@ void setContribution(const RadarConfig& radar, std::complex<double> coefficient,
   record.range_bin = rangeBin(radar, record.length_m[0]);
 }
 
+double meanLength_m(const PathRecord& record) {
+  double sum = 0;
+  for (double l : record.length_m) sum += l;
+  return sum / static_cast<double>(record.length_m.size());
+}
+
 void lengthen(const RadarConfig& radar, double extra_m, PathRecord& record) {
   lengthenChannels(radar, std::vector<double>(record.c.size(), extra_m), record);
 }

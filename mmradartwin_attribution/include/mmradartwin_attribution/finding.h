@@ -40,6 +40,8 @@ struct CauseDescription {
 
 /// All binding names of causes.md, in its order, and last `unknown`.
 const std::vector<CauseDescription>& causeDescriptions();
+/// True for a cause of that list (`unknown` is one).
+bool isCatalogued(const std::string& cause);
 /// Throws InputError naming the known causes.
 const CauseDescription& causeDescription(const std::string& cause);
 

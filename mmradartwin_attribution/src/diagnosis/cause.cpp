@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_dsp/input_error.h"
 
@@ -53,6 +55,11 @@ const std::vector<CauseDescription>& causeDescriptions() {
       {"packet_misalignment", kC5, {{"pose", "", kText}}},
       {"unknown", kC5, {}}};
   return causes;
+}
+
+bool isCatalogued(const std::string& cause) {
+  const auto& all = causeDescriptions();
+  return std::any_of(all.begin(), all.end(), [&](const CauseDescription& c) { return c.name == cause; });
 }
 
 const CauseDescription& causeDescription(const std::string& cause) {

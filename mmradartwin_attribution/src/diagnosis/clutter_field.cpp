@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "echo_field.h"
+#include "mmradartwin_sim/mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -13,7 +14,6 @@ namespace {
 constexpr double kGrid_m = 0.2;
 constexpr double kHeights_m[] = {-0.6, 0.0, 0.6};  // about the radar
 constexpr double kNearest_m = 0.3;
-const double kFieldOfView_sine = std::sin(20 * M_PI / 180);  // of elevation, DESIGN section 4
 constexpr double kElsewhere = 0.05;
 constexpr double kReference_m = 3, kAbout_m = 0.5;
 
@@ -40,7 +40,7 @@ void expectClutter(const Scene& scene, ChannelData& data) {
           Eigen::Vector3d p(x, y, pose.pose.T_map_radar.translation().z() + height_m);
           p = T_radar_map * p;
           const double r = p.norm();
-          if (r < kNearest_m || p.x() <= 0 || std::abs(p.z()) > kFieldOfView_sine * r) continue;
+          if (r < kNearest_m || !inFieldOfView(p)) continue;
           const double place = r / radar.range_bin_m(), power = std::pow(r / kReference_m, -4);
           for (int k = 0; k < channels; ++k) {
             steering[static_cast<std::size_t>(k)] = std::polar(1.0, -wave * radar.virtual_element_m(k).y() * p.y() / r);

@@ -84,12 +84,14 @@ std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data) 
       std::vector<int> found = order;
       for (std::size_t i = 0; i < order.size(); ++i) {
         for (std::size_t j = i + 1; j < order.size(); ++j) {
-          std::vector<int> exchanged = order, later = order, earlier = order;
-          std::swap(exchanged[i], exchanged[j]);
+          std::vector<std::vector<int>> orders(j == i + 1 ? 1 : 3, order);  // neighbours: all three are the same
           const auto first = static_cast<std::ptrdiff_t>(i), last = static_cast<std::ptrdiff_t>(j) + 1;
-          std::rotate(later.begin() + first, later.begin() + first + 1, later.begin() + last);
-          std::rotate(earlier.begin() + first, earlier.begin() + last - 1, earlier.begin() + last);
-          for (const std::vector<int>& next : {exchanged, later, earlier}) {
+          std::swap(orders[0][i], orders[0][j]);
+          if (orders.size() == 3) {
+            std::rotate(orders[1].begin() + first, orders[1].begin() + first + 1, orders[1].begin() + last);
+            std::rotate(orders[2].begin() + first, orders[2].begin() + last - 1, orders[2].begin() + last);
+          }
+          for (const std::vector<int>& next : orders) {
             m = permutation(next);
             const double value = likelihood(&m, 0);
             if (value <= best + 1) continue;

@@ -8,6 +8,7 @@
 #include <iomanip>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <sstream>
 
@@ -21,6 +22,7 @@
 #include "held_out_gain.h"
 #include "hypothesis_fit.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "receiver_finding.h"
 #include "session_model.h"
 #include "shared_latents.h"
 
@@ -53,33 +55,6 @@ std::string number(double value, int digits = 3) {
   return out.str();
 }
 
-bool catalogued(const std::string& name) {
-  const auto& all = causeDescriptions();
-  return std::any_of(all.begin(), all.end(), [&](const CauseDescription& c) { return c.name == name; });
-}
-
-Finding findingOf(const FrameFinding& frames) {
-  Finding f;
-  f.cause = frames.cause;
-  f.parameters = frames.parameters;
-  f.candidates = {{f.cause, 1.0}};
-  f.evidence.log_likelihood_gain = frames.log_likelihood_gain;
-  f.evidence.false_alarm_rate = frames.false_alarm_rate;
-  f.where = frames.where;
-  if (f.where.empty()) f.where.emplace_back();
-  for (FindingPlace& place : f.where) {
-    if (place.poses.empty()) place.poses = frames.poses;
-  }
-  f.description = frames.description;
-  if (f.cause == "unknown") return f;
-  NamedParameters m = defaultMechanism(f.cause);
-  for (const FindingParameter& p : f.parameters) {
-    if (m.values.has(p.name)) m.values.set(p.name, p.value);
-  }
-  f.mechanism = m;
-  return f;
-}
-
 class Session {
  public:
   Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options);
@@ -91,8 +66,9 @@ class Session {
     if (options_.on_progress) options_.on_progress({stage, share});
   }
   void checkPlaces() const;
-  void judgeDelivery();
-  void takeBackDelivery();
+  /// Undoes what convention of delivery fits far better than the one stated; its name.
+  std::optional<std::string> judgeDelivery();
+  void takeBackDelivery(const std::string& convention);
   void judgeTone();
   void judgeNoise();
   bool judgeChannels(int round);
@@ -104,7 +80,6 @@ class Session {
   void addMetrics(const HypothesisFit& fit, FindingGain& gain) const;
   FindingGain gainOf(const ChannelData& before_data, const std::vector<NamedParameters>& before,
                      const ChannelData& after_data, const std::vector<NamedParameters>& after);
-  double strongestMeasured() const;
 
   const Recording& recording_;
   Twin& twin_;
@@ -181,68 +156,29 @@ void Session::checkPlaces() const {
   }
 }
 
-double Session::strongestMeasured() const {
-  double strongest = 0;
-  for (const PoseChannels& p : data_.poses) {
-    const Eigen::VectorXd power = p.y.colwise().squaredNorm().transpose() / static_cast<double>(p.y.rows());
-    for (Eigen::Index r = 2; r + 2 < power.size(); ++r) {
-      // A tone's power summed over Hann's lobe is 1.5 times its own, wherever it lies between the bins.
-      if (power[r] >= power[r - 1] && power[r] >= power[r + 1]) {
-        strongest = std::max(strongest, power.segment(r - 2, 5).sum() / 1.5);
-      }
-    }
-  }
-  return std::sqrt(strongest);
-}
-
-void Session::judgeDelivery() {
+std::optional<std::string> Session::judgeDelivery() {
   report("conventions", 0);
   const std::optional<Delivery> delivery = findDelivery(twin_, data_);
-  if (!delivery) return;
+  if (!delivery) return std::nullopt;
   const ChannelData recorded = data_;
   undoDelivery(*delivery, data_);
-  Finding f;
-  f.cause = delivery->mechanism.mechanism;
-  f.mechanism = delivery->mechanism;
-  f.candidates = {{f.cause, 1.0}};
-  std::vector<double> reversed(static_cast<std::size_t>(data_.radar.channels()));
-  std::iota(reversed.rbegin(), reversed.rend(), 0.0);
-  const bool is_reversed = f.cause == "channel_permutation" && f.mechanism->values.numbers("order") == reversed;
-  if (f.cause == "channel_permutation") {
-    f.parameters.push_back({"order", "1", f.mechanism->values.numbers("order"), {}});
-  }
-  if (f.cause == "channel_conjugation" || is_reversed) {
-    f.cause = "channel_conjugation";  // the same data; the convention is the likelier mistake
-    f.mechanism = defaultMechanism(f.cause);
-    f.parameters.clear();
-    f.candidates = {{"channel_conjugation", 0.5}, {"channel_permutation", 0.5}};
-    f.experiment =
-        "look into the order of the receivers' lanes (self-test pattern): data alone cannot tell a reversed order of "
-        "all channels from conjugated channels";
-  }
-  f.evidence.log_likelihood_gain = delivery->gain;
-  f.evidence.false_alarm_rate = std::min(1.0, 50 * std::exp(-delivery->gain));
-  f.evidence.margin = delivery->margin;
+  Finding f = findingOf(*delivery, data_.radar);
   if (data_.locations.size() > 1) f.gain = gainOf(recorded, mechanisms_, data_, mechanisms_);
   extended_.push_back(*f.mechanism);
-  result_.findings.findings.push_back(std::move(f));
+  result_.findings.findings.push_back(f);
+  return f.cause;
 }
 
 /// A convention that lets nothing match is no convention: one of several does best by chance.
-void Session::takeBackDelivery() {
-  for (const char* name : {"iq_conjugation", "channel_conjugation", "channel_permutation"}) {
-    std::vector<Finding>& findings = result_.findings.findings;
-    findings.erase(std::remove_if(findings.begin(), findings.end(), [&](const Finding& f) { return f.cause == name; }),
-                   findings.end());
-    extended_.erase(std::remove_if(extended_.begin(), extended_.end(),
-                                   [&](const NamedParameters& m) {
-                                     const auto& given = twin_.description().mechanisms;
-                                     return m.mechanism == name &&
-                                            std::none_of(given.begin(), given.end(),
-                                                         [&](const auto& g) { return g.mechanism == m.mechanism; });
-                                   }),
-                    extended_.end());
-  }
+void Session::takeBackDelivery(const std::string& convention) {
+  std::vector<Finding>& findings = result_.findings.findings;
+  findings.erase(
+      std::remove_if(findings.begin(), findings.end(), [&](const Finding& f) { return f.cause == convention; }),
+      findings.end());
+  // The last of that name: the twin may have had one before.
+  const auto last = std::find_if(extended_.rbegin(), extended_.rend(),
+                                 [&](const NamedParameters& m) { return m.mechanism == convention; });
+  if (last != extended_.rend()) extended_.erase(std::next(last).base());
 }
 
 void Session::judgeTone() {
@@ -254,71 +190,24 @@ void Session::judgeTone() {
   if (tone.false_alarm_rate > 1e-6 || tone.gain < 30) return;
   const ChannelData recorded = data_;
   subtractTone(tone, data_);
-  const double rms = std::sqrt(tone.channels.squaredNorm() / static_cast<double>(tone.channels.size()));
-  const double level_db = 20 * std::log10(rms / strongestMeasured());
-  const double error_db = 8.686 / std::sqrt(2 * std::max(1.0, tone.gain));
-  Finding f;
-  // A constant has no range at all; leakage travels some centimetres.
-  const bool constant = tone.range_m < std::max(0.01, 3 * tone.range_error_m);
-  f.cause = constant ? "dc_offset" : "tx_rx_leakage";
-  NamedParameters m = defaultMechanism(f.cause);
-  m.values.set("level_db", level_db);
-  if (!constant) {
-    std::vector<double> phase_deg, gain_db;
-    for (Eigen::Index k = 0; k < tone.channels.size(); ++k) {
-      phase_deg.push_back(std::arg(tone.channels[k] / tone.channels[0]) * 180 / M_PI);
-      gain_db.push_back(std::max(-60.0, 20 * std::log10(std::abs(tone.channels[k]) / rms)));
-    }
-    m.values.set("range_m", tone.range_m);
-    m.values.set("phase_deg", phase_deg);
-    m.values.set("gain_db", gain_db);
-    f.parameters.push_back({"range_m",
-                            "m",
-                            tone.range_m,
-                            {{tone.range_m - 1.96 * tone.range_error_m, tone.range_m + 1.96 * tone.range_error_m}}});
-  }
-  f.parameters.push_back({"level_db", "dB", level_db, {{level_db - 1.96 * error_db, level_db + 1.96 * error_db}}});
-  f.mechanism = m;
-  f.candidates = {{f.cause, 1.0}};
-  f.evidence.log_likelihood_gain = tone.gain;
-  f.evidence.false_alarm_rate = tone.false_alarm_rate;
-  f.where.push_back({{{0.0, tone.range_m + 2 * data_.radar.range_bin_m()}}, {}, {}, {}, {}, {}});
+  Finding f = findingOf(tone, data_);
   std::vector<NamedParameters> with = mechanisms_;
-  with.push_back(m);
+  with.push_back(*f.mechanism);
   if (data_.locations.size() > 1) f.gain = gainOf(recorded, mechanisms_, recorded, with);
-  extended_.push_back(m);
+  extended_.push_back(*f.mechanism);
   result_.findings.findings.push_back(std::move(f));
 }
 
 void Session::judgeNoise() {
-  for (const NamedParameters& m : mechanisms_) {
-    if (m.mechanism != "noise_floor") continue;
-    // A sample's noise from that of a cell of the average: Hann's sums over N samples, N/2 and 3N/8.
-    std::vector<double> levels_db;
-    for (const PoseChannels& p : data_.poses) {
-      if (!(p.noise_power > 0)) continue;
-      levels_db.push_back(10 * std::log10(p.noise_power * p.shots * 2.0 / 3 * data_.radar.samples_per_chirp));
-    }
-    if (levels_db.size() < 2) return;
-    const double stated = m.values.number("level_dbfs") + m.values.number("delta_db");
-    const double delta_db = quantile(levels_db, 0.5) - stated;
-    const double scatter = (quantile(levels_db, 0.84) - quantile(levels_db, 0.16)) / 2;
-    const double error = std::max(0.02, scatter / std::sqrt(static_cast<double>(levels_db.size())));
-    if (std::abs(delta_db) < std::max(0.3, 6 * error)) return;
-    Finding f;
-    f.cause = "noise_floor";
-    f.mechanism = m;
-    f.mechanism->values.set("delta_db", m.values.number("delta_db") + delta_db);
-    f.parameters = {{"delta_db", "dB", delta_db, {{delta_db - 1.96 * error, delta_db + 1.96 * error}}}};
-    f.candidates = {{f.cause, 1.0}};
-    f.evidence.log_likelihood_gain = 0.5 * delta_db * delta_db / (error * error);
-    f.evidence.false_alarm_rate = std::min(1.0, std::exp(-f.evidence.log_likelihood_gain));
-    for (NamedParameters& e : extended_) {
-      if (e.mechanism == "noise_floor") e = *f.mechanism;
-    }
-    result_.findings.findings.push_back(std::move(f));
-    return;
+  const auto stated = std::find_if(mechanisms_.begin(), mechanisms_.end(),
+                                   [](const NamedParameters& m) { return m.mechanism == "noise_floor"; });
+  if (stated == mechanisms_.end()) return;
+  std::optional<Finding> f = noiseFloorFinding(data_, *stated);
+  if (!f) return;
+  for (NamedParameters& e : extended_) {
+    if (e.mechanism == "noise_floor") e = *f->mechanism;
   }
+  result_.findings.findings.push_back(std::move(*f));
 }
 
 std::vector<HypothesisFit> Session::fitBest(int round) {
@@ -407,7 +296,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   for (const Screened& s : screened) {
     TriedHypothesis tried{s.hypothesis.label(), s.promised, std::numeric_limits<double>::quiet_NaN(), round};
     // A promise is a quadratic's and often far too small: names get several chances, laws without a name two.
-    const bool law = !catalogued(s.hypothesis.mechanism.mechanism);
+    const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
     std::size_t& fitted = law ? laws_fitted : names_fitted;
     const bool object = s.hypothesis.mechanism.mechanism == "actor_unmodelled";
     const double worth = object                      ? kWorthAFit + std::log(kObjectPlaces)
@@ -433,7 +322,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
 Finding Session::describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const {
   Finding f;
   const NamedParameters m = best.hypothesis.at(best.scaled);
-  const bool named = catalogued(m.mechanism);
+  const bool named = isCatalogued(m.mechanism);
   f.cause = named ? m.mechanism : "unknown";
   f.mechanism = m;
   f.parameters = fittedParameters(best.hypothesis, best.scaled, best.standard_error, f.cause, data_.locations.size());
@@ -445,7 +334,7 @@ Finding Session::describe(const HypothesisFit& best, const std::vector<Hypothesi
     if (behind > kAlike || behind < 0 || !(other.gain > 0)) continue;  // those ahead were refused
     const std::string& name = other.hypothesis.mechanism.mechanism;
     const double weight = std::exp(-behind);
-    const std::string cause = catalogued(name) ? name : "unknown";
+    const std::string cause = isCatalogued(name) ? name : "unknown";
     const auto at = std::find_if(alike.begin(), alike.end(), [&](const auto& a) { return a.first == cause; });
     if (at == alike.end()) {
       alike.emplace_back(cause, weight);
@@ -459,7 +348,7 @@ Finding Session::describe(const HypothesisFit& best, const std::vector<Hypothesi
   for (const HypothesisFit& other : fits) {
     if (other.hypothesis.mechanism.mechanism == m.mechanism) continue;
     const std::string& name = other.hypothesis.mechanism.mechanism;
-    f.evidence.runner_up = catalogued(name) ? name : "unknown";
+    f.evidence.runner_up = isCatalogued(name) ? name : "unknown";
     f.evidence.margin = best.gain - std::max(0.0, other.gain);
     break;
   }
@@ -649,7 +538,7 @@ Diagnosis Session::run() {
     if (!there) extended_.push_back(*finding.mechanism);
     result_.findings.findings.push_back(std::move(finding));
   }
-  judgeDelivery();
+  const std::optional<std::string> convention = judgeDelivery();
   source_->settle(mechanisms_);
   judgeTone();
   judgeNoise();
@@ -670,7 +559,7 @@ Diagnosis Session::run() {
   findings.held_out =
       data_.locations.size() > 1 ? std::to_string(kFolds) + "-fold by location" : "nothing: one location";
   if (result_.nothing_matches) {
-    takeBackDelivery();
+    if (convention) takeBackDelivery(*convention);
     Finding f;
     f.cause = "unknown";
     f.candidates = {{"unknown", 1.0}};

@@ -41,9 +41,7 @@ std::vector<EchoBeam> chooseBeams(const RadarConfig& radar, const std::vector<Pa
   for (const PathRecord* r : strongest) {
     if (beams.size() == kMost || r->amplitude * r->amplitude < kWeakest * std::pow(strongest.front()->amplitude, 2))
       break;
-    double length_m = 0;
-    for (double l : r->length_m) length_m += l / static_cast<double>(r->length_m.size());
-    const double place = 0.5 * length_m / radar.range_bin_m();
+    const double place = 0.5 * meanLength_m(*r) / radar.range_bin_m();
     if (place < first_bin || place > bins - 1) continue;
     EchoBeam beam;
     beam.weights.resize(channels);

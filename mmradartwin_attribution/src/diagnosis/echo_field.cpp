@@ -39,12 +39,6 @@ double pathCosine(const PathRecord& record) {
   return 0.5 * (cosine(record.departure) + cosine(record.arrival));
 }
 
-double meanLength_m(const PathRecord& record) {
-  double sum = 0;
-  for (double l : record.length_m) sum += l;
-  return sum / static_cast<double>(record.length_m.size());
-}
-
 }  // namespace
 
 double hannResponse(double offset) {

@@ -127,11 +127,8 @@ bool Hypothesis::isOneSided() const {
 }
 
 bool Hypothesis::isGeometry() const {
-  const auto& causes = causeDescriptions();
-  const auto cause = std::find_if(causes.begin(), causes.end(),
-                                  [&](const CauseDescription& c) { return c.name == mechanism.mechanism; });
-  return subject.empty() && !coordinates.empty() && coordinates.size() <= 3 && cause != causes.end() &&
-         cause->residual_class == ResidualClass::kShiftedResponse;
+  return subject.empty() && !coordinates.empty() && coordinates.size() <= 3 && isCatalogued(mechanism.mechanism) &&
+         causeDescription(mechanism.mechanism).residual_class == ResidualClass::kShiftedResponse;
 }
 
 std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedParameters>& present) {

@@ -35,6 +35,12 @@ double inflationOf(double gain, const std::vector<double>& by_location) {
   return std::clamp(squares * locations / (locations - 1) / (2 * gain), 1.0, kMaxInflation);
 }
 
+/// An information that can be solved with, also where a direction does nothing.
+Eigen::MatrixXd regularised(Eigen::MatrixXd information) {
+  information.diagonal().array() += 1e-9 * information.diagonal().array().abs() + 1e-12;
+  return information;
+}
+
 /// of[i] is of poses[i], from is of all poses.
 SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, const std::vector<int>& poses,
                              double per) {
@@ -46,6 +52,7 @@ SessionCovariance difference(SessionCovariance of, const SessionCovariance& from
   return of;
 }
 
+/// With no error of this actor's own.
 Nuisance withoutErrors(Nuisance nuisance, int actor) {
   nuisance.actor_range_m[static_cast<std::size_t>(actor)] = 0;
   nuisance.actor_gain[static_cast<std::size_t>(actor)] = 0;
@@ -111,9 +118,8 @@ HypothesisFitter::Effective HypothesisFitter::effective(const Scores& s, int glo
   const Eigen::MatrixXd nuisance = s.information.topLeftCorner(globals, globals);
   const Eigen::MatrixXd projection = nuisance.ldlt().solve(s.information.topRightCorner(globals, n));  // [g][n]
   e.by_location = s.by_location.rightCols(n) - s.by_location.leftCols(globals) * projection;
-  e.information =
-      s.information.bottomRightCorner(n, n) - s.information.topRightCorner(globals, n).transpose() * projection;
-  e.information.diagonal().array() += 1e-9 * e.information.diagonal().array().abs() + 1e-12;
+  e.information = regularised(s.information.bottomRightCorner(n, n) -
+                              s.information.topRightCorner(globals, n).transpose() * projection);
   e.total = s.total.tail(n) - projection.transpose() * s.total.head(globals);
   const double locations = static_cast<double>(e.by_location.rows());
   if (locations > 1 && n > 0) {
@@ -337,9 +343,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   double risen = 0;
   for (int i = 0;; ++i) {
     o.scores = derivatives(o.state, o.scaled);
-    Eigen::MatrixXd information = o.scores.information;
-    information.diagonal().array() += 1e-9 * information.diagonal().array().abs() + 1e-12;
-    const Eigen::VectorXd step = information.ldlt().solve(o.scores.total);
+    const Eigen::VectorXd step = regularised(o.scores.information).ldlt().solve(o.scores.total);
     // On a ridge between a cause and the latents that stood in for it, every step widens the next.
     if (i >= (risen > kRising ? 4 * iterations : iterations) || 0.5 * o.scores.total.dot(step) < kEnough) break;
     bool better = false;
@@ -372,8 +376,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   // through values some millimetres apart does not. The latents follow to first order.
   for (double initial : {0.3, 0.15}) {
     const Optimum from = o;
-    Eigen::MatrixXd information = from.scores.information;
-    information.diagonal().array() += 1e-9 * information.diagonal().array().abs() + 1e-12;
+    const Eigen::MatrixXd information = regularised(from.scores.information);
     const Eigen::LDLT<Eigen::MatrixXd> latents(information.topLeftCorner(globals, globals));
     searchQuadratically(coordinates, from.scaled, initial, [&](const std::vector<double>& next) {
       Eigen::VectorXd step(globals + n);

@@ -19,7 +19,7 @@ struct PathRecord {
   /// |cos| of the angle of incidence that each interaction's coefficient was taken at, -1 where it is no reflection;
   /// empty where none is: what a mechanism of weight needs of the geometry.
   std::vector<double> reflection_cosine;
-  Eigen::Vector3d departure, arrival;     ///< unit vectors in radar_link, both from the radar outwards
+  Eigen::Vector3d departure, arrival;  ///< unit vectors in radar_link, both from the radar outwards
   int bounces = 0;
   int range_bin = 0;                    ///< nearest bin of length/2
   double amplitude = 0;                 ///< A_p, common to the channels
@@ -35,6 +35,9 @@ void accumulate(const RadarConfig& radar, const std::vector<PathRecord>& records
 /// Fills amplitude-derived fields of a record from its lengths and its coefficient: c_k = coefficient *
 /// exp(j 2 pi (f_c tau_k + mu tau_k t_c - mu tau_k^2 / 2)), amplitude = |coefficient|, phase, range_bin.
 void setContribution(const RadarConfig& radar, std::complex<double> coefficient, PathRecord& record);
+
+/// Path length over the virtual elements' mean.
+double meanLength_m(const PathRecord& record);
 
 /// Makes a record's path longer by extra_m at all elements (a constant delay); amplitude and direction stay.
 void lengthen(const RadarConfig& radar, double extra_m, PathRecord& record);

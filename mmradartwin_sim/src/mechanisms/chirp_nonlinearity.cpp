@@ -29,9 +29,7 @@ class ChirpNonlinearity : public Mechanism {
     std::vector<std::complex<double>> ripple(static_cast<std::size_t>(samples));
     for (const PathRecord& path : paths) {
       // The ripple is slow against the spread of delays over the array: one delay for all channels.
-      double length_m = 0;
-      for (double l : path.length_m) length_m += l / static_cast<double>(path.length_m.size());
-      const double tau_s = length_m / kSpeedOfLight_m_per_s;
+      const double tau_s = meanLength_m(path) / kSpeedOfLight_m_per_s;
       for (int n = 0; n < samples; ++n) {
         const double t = radar.sample_time_s(n);
         ripple[static_cast<std::size_t>(n)] = std::polar(1.0, phaseError_rad(t) - phaseError_rad(t - tau_s)) - 1.0;

@@ -120,10 +120,14 @@ std::unique_ptr<Twin> TwinNode::makeTwin(const std::string& twin_file) const {
   return std::make_unique<Twin>(std::move(description), seed_);
 }
 
-void TwinNode::use(std::unique_ptr<Twin> twin) {
+void TwinNode::forgetSimulations() {
   last_ = nullptr;
   moving_.reset();
   actors_.clear();
+}
+
+void TwinNode::use(std::unique_ptr<Twin> twin) {
+  forgetSimulations();
   radar_hash_ = radarHash(twin->radar());
   for (const std::string& note : twin->notes()) ROS_WARN("%s", note.c_str());
   mmradartwin_msgs::Scene msg = toMsg(twin->scene(), twin->description().toYaml());
@@ -137,9 +141,7 @@ void TwinNode::use(std::unique_ptr<Twin> twin) {
 }
 
 void TwinNode::rebuild() {
-  last_ = nullptr;
-  moving_.reset();
-  actors_.clear();
+  forgetSimulations();
   twin_.reset();
   const std::string twin_file = applied_twin_ ? *applied_twin_ : startingTwin();
   if (!radar_ || (!sceneFile() && twin_file.empty())) return;

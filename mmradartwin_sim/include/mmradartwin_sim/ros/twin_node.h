@@ -55,6 +55,7 @@ class TwinNode {
   std::unique_ptr<Twin> makeTwin(const std::string& twin_file) const;
   void use(std::unique_ptr<Twin> twin);
   void rebuild();
+  void forgetSimulations();  ///< those of a twin that goes
   void simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns);
   /// Tells the moving twin where tf has its actors; true where one of them moved.
   bool placeActors(std::int64_t stamp_ns);
