@@ -250,6 +250,25 @@ TEST_F(Propagation, APanelLetsEchoesThroughTwiceWeakened) {
   EXPECT_TRUE(clear.check.ok());
 }
 
+// What a parameter that says so only weighs: traced paths are another value's, too.
+TEST_F(Propagation, ALevelOfTransmissionTracesNothingAnew) {
+  addWall("panel", "Concrete", {2, -0.5}, {2, 0.5});
+  addWall("wall", "Metal", {4, -3}, {4, 3});
+  writeScene();
+  for (const ParameterSpec& p : MechanismRegistry::instance().create("transmission")->parameters()) {
+    EXPECT_EQ(p.name == "one_way_db", p.weighs) << p.name;
+  }
+  const std::string panel = "  specular: {}\n  diffuse: {}\n  transmission: {actor: panel, one_way_db: ";
+  const Twin weak = makeTwin(path("scene.yaml"), panel + "-20}\n", radarAt77GHz());
+  const Twin strong = makeTwin(path("scene.yaml"), panel + "-2}\n", radarAt77GHz());
+  const Eigen::Isometry3d pose = radarPose(0, 0, 0);
+  const Simulation traced = strong.simulate(pose), weighed = strong.weigh(pose, weak.trace(pose));
+  ASSERT_GT(traced.records.size(), 2u);
+  EXPECT_EQ(traced.records.size(), weighed.records.size());
+  EXPECT_TRUE(traced.grid.x == weighed.grid.x);
+  EXPECT_FALSE(traced.grid.x == weak.simulate(pose).grid.x);
+}
+
 // An upright metal cylinder: 2 pi r L^2/lambda far off, the mirror's level with sqrt(r/(r + R)) where it is tall.
 TEST_F(Propagation, SomethingUnmodelledIsACylinder) {
   addWall("wall", "Metal", {9, -3}, {9, 3});

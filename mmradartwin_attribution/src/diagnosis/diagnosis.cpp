@@ -306,15 +306,24 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     if (s.promised > worth && fitted < (law ? kMostLaws : kMostNames)) {
       ++fitted;
       report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
-      HypothesisFit f = fitter_->fit(state_, s.hypothesis, s.starts, 4);
+      fits.push_back(fitter_->fit(state_, s.hypothesis, s.starts, 4));
       source_->settle(mechanisms_);
-      fitter_->judge(f, all.size() + static_cast<std::size_t>(object ? kObjectPlaces : 0));
-      tried.gain = f.gain;
-      fits.push_back(std::move(f));
+      // What latents bring that the fit has found, and the twin as it is had not, is nobody's gain.
+      if (std::optional<ModelState> better = fitter_->improved(state_, fits.back().state.nuisance)) {
+        for (HypothesisFit& fitted : fits) fitted.loseGain(better->log_likelihood - state_.log_likelihood);
+        state_ = std::move(*better);
+      }
       std::stable_sort(fits.begin(), fits.end(),
                        [](const HypothesisFit& a, const HypothesisFit& b) { return a.ranking() > b.ranking(); });
     }
     result_.tried.push_back(tried);
+  }
+  for (HypothesisFit& f : fits) {
+    const bool object = f.hypothesis.mechanism.mechanism == "actor_unmodelled";
+    fitter_->judge(f, all.size() + static_cast<std::size_t>(object ? kObjectPlaces : 0));
+    for (TriedHypothesis& t : result_.tried) {
+      if (t.round == round && t.label == f.hypothesis.label()) t.gain = f.gain;
+    }
   }
   return fits;
 }

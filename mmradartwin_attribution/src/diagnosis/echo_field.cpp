@@ -119,8 +119,9 @@ void EchoCollector::outer(const std::complex<double>* c, double cosine,
   for (int k = 0; k < channels_; ++k) {
     for (int l = 0; l <= k; ++l) {
       // A direction known to angle_error: E exp(j(s_k - s_l)e) of a normal e.
-      const double apart = element_phase_[k] - element_phase_[l];
-      packed[i++] = std::complex<float>(c[k] * std::conj(c[l]) * std::exp(-spread * apart * apart));
+      const double apart = element_phase_[k] - element_phase_[l], x = spread * apart * apart;
+      const double known = x < 0.01 ? 1 - x + 0.5 * x * x : std::exp(-x);  // to single precision
+      packed[i++] = std::complex<float>(c[k] * std::conj(c[l]) * known);
     }
   }
 }
@@ -196,17 +197,15 @@ void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, con
 void EchoCollector::addToBeams(const std::complex<double>* c, double place, double share, double off,
                                BinCovariance* power, BinCovariance* shift, BinCovariance* bend) const {
   std::array<double, kMostBeamBins> w, slope;
+  double all = 0;
+  for (int k = 0; k < channels_; ++k) all += std::norm(c[k]);
   for (std::size_t b = 0; b < beams_.size(); ++b) {
     const EchoBeam& beam = beams_[b];
     const int at = static_cast<int>(b);
     const double middle = place - beam.first_bin;
     if (middle < -kLobe || middle > channels_ - 1 + kLobe) continue;
     std::complex<double> formed = 0;
-    double all = 0;
-    for (int k = 0; k < channels_; ++k) {
-      formed += std::conj(beam.weights[k]) * c[k];
-      all += std::norm(c[k]);
-    }
+    for (int k = 0; k < channels_; ++k) formed += std::conj(beam.weights[k]) * c[k];
     const double level = share * std::norm(formed);
     if (level < share * off * all) continue;
     for (int i = 0; i < channels_; ++i) {

@@ -22,10 +22,23 @@ constexpr double kReceiverSine = 1.0 / 16;  // of sin(azimuth), where weak paths
 // From so many paths of one mechanism on they are a cloud of scatter points.
 constexpr std::size_t kCloud = 300;
 constexpr double kCloud_m = 0.12, kCloudHeight_m = 0.3;
+constexpr std::size_t kMostTraced = 64;  ///< entries of one mechanism and geometry that are kept
+
+/// One line that tells two mechanisms apart that trace different paths.
+std::string tracedKey(const NamedParameters& mechanism) {
+  NamedParameters tracing{mechanism.mechanism, {}};
+  for (const ParameterSpec& s : MechanismRegistry::instance().create(mechanism.mechanism)->parameters()) {
+    const auto value = mechanism.values.all().find(s.name);
+    if (!s.weighs && value != mechanism.values.all().end()) tracing.values.set(s.name, value->second);
+  }
+  TwinDescription description;
+  description.mechanisms = {tracing};
+  return description.toYaml();
+}
 
 std::string keyOf(const std::vector<NamedParameters>& geometry) {
   std::string key;
-  for (const NamedParameters& m : geometry) key += mechanismKey(m) + "|";
+  for (const NamedParameters& m : geometry) key += tracedKey(m) + "|";
   return key;
 }
 
@@ -51,14 +64,17 @@ std::vector<PathRecord> merged(std::vector<PathRecord> records, Cell cell) {
 }
 
 /// Scatter points of a surface, thousands a pose, in cells of the room that are small beside what the radar resolves;
-/// cells of the room, so that a turned or moved radar sees the same ones.
-std::vector<PathRecord> mergedCloud(std::vector<PathRecord> records) {
-  using Key = std::tuple<int, int, int, int>;
-  return merged<Key>(std::move(records), [](const PathRecord& r) -> std::optional<Key> {
+/// cells of the room, so that a turned or moved radar sees the same ones. What the scene as given hides stays apart: it
+/// may be weighed otherwise.
+std::vector<PathRecord> mergedCloud(std::vector<PathRecord> records,
+                                    const std::function<bool(const Eigen::Vector3d&)>& seen) {
+  using Key = std::tuple<int, int, int, int, bool>;
+  return merged<Key>(std::move(records), [&](const PathRecord& r) -> std::optional<Key> {
     if (r.bounces != 1 || r.facets.empty()) return std::nullopt;
-    const Eigen::Vector3d p = r.vertices.front().cwiseQuotient(Eigen::Vector3d(kCloud_m, kCloud_m, kCloudHeight_m));
+    const Eigen::Vector3d& at = r.vertices.front();
+    const Eigen::Vector3d p = at.cwiseQuotient(Eigen::Vector3d(kCloud_m, kCloud_m, kCloudHeight_m));
     return Key{r.facets.front(), static_cast<int>(std::floor(p.x())), static_cast<int>(std::floor(p.y())),
-               static_cast<int>(std::floor(p.z()))};
+               static_cast<int>(std::floor(p.z())), seen(at)};
   });
 }
 
@@ -107,13 +123,6 @@ void addShared(const std::vector<PathRecord>& there, const std::vector<PathRecor
 
 }  // namespace
 
-std::string mechanismKey(const NamedParameters& mechanism) {
-  TwinDescription description;
-  description.mechanisms = {mechanism};
-  const std::string text = description.toYaml();
-  return text.substr(text.find("mechanisms:"));
-}
-
 NamedParameters defaultMechanism(const std::string& name) {
   NamedParameters named{name, {}};
   for (const ParameterSpec& s : MechanismRegistry::instance().create(name)->parameters()) {
@@ -126,7 +135,7 @@ EchoSource::EchoSource(const Twin& base, const ChannelData& data, const PoseAccu
     : base_(base), data_(data), accuracy_(accuracy) {}
 
 EchoSource::Geometry EchoSource::geometryAfter(const NamedParameters& mechanism) {
-  const std::string key = mechanismKey(mechanism);
+  const std::string key = tracedKey(mechanism);
   const auto at = geometry_.find(key);
   if (at != geometry_.end()) return at->second;
   const Twin twin = base_.changed({mechanism});
@@ -149,7 +158,8 @@ std::vector<NamedParameters> EchoSource::geometryOf(const std::vector<NamedParam
 
 const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>& geometry,
                                              const NamedParameters& mechanism, const std::vector<int>& poses) {
-  Entry& entry = cache_[keyOf(geometry) + mechanismKey(mechanism)];
+  Entry& entry = cache_[keyOf(geometry) + tracedKey(mechanism)];
+  entry.used = calls_;
   entry.paths.resize(data_.poses.size());
   entry.known.resize(data_.poses.size(), 0);
   std::vector<int> missing;
@@ -187,11 +197,24 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
                                    });
                                  }),
                   records.end());
-    if (records.size() > kCloud) records = mergedCloud(std::move(records));
+    if (records.size() > kCloud) {
+      const Eigen::Vector3d radar = data_.poses[i].pose.T_map_radar.translation();
+      records = mergedCloud(std::move(records), [&](const Eigen::Vector3d& p) {
+        return geometry.empty() || base_.rays().visible(radar, p, 1e-3);
+      });
+    }
     entry.paths[i] = std::move(records);
     entry.known[i] = 1;
   });
   return entry.paths;
+}
+
+void EchoSource::forgetLongUnused() {
+  ++calls_;
+  while (cache_.size() > kMostTraced) {
+    cache_.erase(std::min_element(cache_.begin(), cache_.end(),
+                                  [](const auto& a, const auto& b) { return a.second.used < b.second.used; }));
+  }
 }
 
 void EchoSource::findGraze(const std::vector<NamedParameters>& mechanisms) {
@@ -238,11 +261,15 @@ void EchoSource::findGraze(const std::vector<NamedParameters>& mechanisms) {
 
 std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& mechanisms,
                                            const std::vector<int>& poses, const std::vector<double>& actor_range_m) {
+  forgetLongUnused();
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
   std::vector<const Traced*> parts;
   for (const NamedParameters& m : mechanisms) parts.push_back(&traced(geometry, m, poses));
   return collect(mechanisms, poses, actor_range_m, [&](std::size_t i) {
     std::vector<PathRecord> all;
+    std::size_t count = 0;
+    for (const Traced* part : parts) count += (*part)[i].size();
+    all.reserve(count);
     for (const Traced* part : parts) all.insert(all.end(), (*part)[i].begin(), (*part)[i].end());
     return all;
   });
@@ -251,6 +278,7 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
 std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters>& mechanisms,
                                                const std::vector<NamedParameters>& from, const std::vector<int>& poses,
                                                const std::vector<double>& actor_range_m) {
+  forgetLongUnused();
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms), geometry_from = geometryOf(from);
   if (keyOf(geometry) == keyOf(geometry_from)) return echoes(mechanisms, poses, actor_range_m);
   std::vector<std::pair<const Traced*, const Traced*>> parts;  // there and here
@@ -275,6 +303,7 @@ std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters
 
 EchoShift EchoSource::shift(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& from,
                             const std::vector<int>& poses, int actors) {
+  forgetLongUnused();
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms), geometry_from = geometryOf(from);
   std::vector<std::pair<const Traced*, const Traced*>> parts;  // there and here
   for (const NamedParameters& f : from) {
@@ -392,7 +421,7 @@ void EchoSource::pointBeams(ChannelData& data, const std::vector<NamedParameters
 void EchoSource::settle(const std::vector<NamedParameters>& mechanisms) {
   const std::string geometry = keyOf(geometryOf(mechanisms));
   std::vector<std::string> wanted;
-  for (const NamedParameters& m : mechanisms) wanted.push_back(geometry + mechanismKey(m));
+  for (const NamedParameters& m : mechanisms) wanted.push_back(geometry + tracedKey(m));
   if (wanted != settled_) findGraze(mechanisms);
   settled_ = wanted;
   for (auto at = cache_.begin(); at != cache_.end();) {

@@ -59,6 +59,8 @@ class EchoSource {
   using Traced = std::vector<std::vector<PathRecord>>;  // by pose; empty where not traced
   const Traced& traced(const std::vector<NamedParameters>& geometry, const NamedParameters& mechanism,
                        const std::vector<int>& poses);
+  /// Keeps memory bounded while one hypothesis' geometry is searched for.
+  void forgetLongUnused();
   std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);
   std::vector<PoseEchoes> collect(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
                                   const std::vector<double>& actor_range_m,
@@ -71,8 +73,10 @@ class EchoSource {
   struct Entry {
     Traced paths;
     std::vector<char> known;  // by pose
+    std::size_t used = 0;     // when, in calls
   };
   std::map<std::string, Entry> cache_;
+  std::size_t calls_ = 0;
   std::vector<PoseEchoes> graze_;  // by pose; nothing but graze
   std::vector<std::string> settled_;
   enum class Geometry { kSame, kMoreScreens, kOther };
@@ -80,8 +84,6 @@ class EchoSource {
   std::map<std::string, Geometry> geometry_;  // by mechanism text
 };
 
-/// One line that tells two mechanisms with different values apart.
-std::string mechanismKey(const NamedParameters& mechanism);
 /// Defaults of every parameter of a mechanism. Throws InputError for an unknown name.
 NamedParameters defaultMechanism(const std::string& name);
 

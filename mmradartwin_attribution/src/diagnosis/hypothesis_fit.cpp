@@ -7,6 +7,7 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <numeric>
 
@@ -20,6 +21,8 @@ constexpr double kRadii[] = {1, 2, 4};         ///< of the scale, about a place 
 constexpr int kDirections = 8;
 constexpr double kEnough = 0.2;  ///< nats: a further step promises less
 constexpr double kRising = 5;    ///< nats of the last step that are worth going on for
+constexpr double kWorthASearch = 25;  ///< nats gained by slopes, before a rough likelihood is searched
+constexpr double kImprovement = 0.5;   ///< nats by which latents have to be better to be taken over
 constexpr double kMaxInflation = 50;
 constexpr Eigen::Index kMostRough = 4;  ///< coordinates for which values without slopes are worth their number
 constexpr double kPrice =
@@ -100,6 +103,11 @@ double HypothesisFit::ranking() const {
   return gain - kPrice * static_cast<double>(std::max<std::size_t>(1, hypothesis.coordinates.size()));
 }
 
+void HypothesisFit::loseGain(double nats) {
+  gain -= nats;
+  held_out_gain -= nats;
+}
+
 /// Scores of the hypothesis' own directions with the nuisance's part taken out.
 struct HypothesisFitter::Effective {
   Eigen::MatrixXd by_location;  // [L][n]
@@ -151,6 +159,16 @@ ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanism
   return s;
 }
 
+std::optional<ModelState> HypothesisFitter::improved(const ModelState& null, const Nuisance& latents) {
+  Nuisance other = latents;
+  const auto echoes = source_.echoes(null.mechanisms, other.actor_range_m);
+  model_.fit(echoes, other, 3);
+  if (model_.logLikelihood(echoes, other) < null.log_likelihood + kImprovement) return std::nullopt;
+  ModelState s = state(null.mechanisms, &other);
+  if (s.log_likelihood < null.log_likelihood + kImprovement) return std::nullopt;
+  return s;
+}
+
 std::vector<std::pair<int, double>> HypothesisFitter::suspects(const ModelState& null) const {
   std::vector<std::pair<int, double>> result;
   const LatentSpread spread = model_.spread();
@@ -167,6 +185,7 @@ double HypothesisFitter::offset(const ModelState& null, const Hypothesis& hypoth
   // Nothing but the IF's images and harmonics has its echoes sent through the receiver one by one, which is not to the
   // last digit what their tones are.
   if (hypothesis.coordinates.size() != 1 || !hypothesis.coordinates[0].logarithmic()) return 0;
+  if (source_.altersGeometry(hypothesis.at({0.0}))) return 0;
   const std::vector<double> there = model_.byPose(
       source_.echoes(with(null.mechanisms, hypothesis.at({0.0})), poses, null.actor_range_m), null.nuisance, poses);
   double sum = 0;
@@ -266,7 +285,8 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
 
 HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                                                      const std::vector<Hypothesis>& parts,
-                                                     const std::vector<std::vector<double>>& starts, int iterations) {
+                                                     const std::vector<std::vector<double>>& starts, int iterations,
+                                                     double worth_a_search) {
   std::vector<Coordinate> coordinates;
   for (const Hypothesis& h : parts) coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
   const int globals = nuisance.globals();
@@ -297,21 +317,27 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   std::fill(placed.actor_range_m.begin(), placed.actor_range_m.end(), 0.0);
   Nuisance bare = placed;
   std::fill(bare.actor_gain.begin(), bare.actor_gain.end(), 0.0);
-  std::vector<Nuisance> others = {without, placed, bare};
+  std::vector<Nuisance> candidates = {nuisance, without, placed, bare};
   for (const Hypothesis& h : parts) {
     const int actor = source_.base().scene().actorIndex(h.subject);
-    if (actor >= 0) others.push_back(withoutErrors(nuisance, actor));
+    if (actor >= 0) candidates.push_back(withoutErrors(nuisance, actor));
   }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Nuisance& a, const Nuisance& b) { return a.actor_range_m < b.actor_range_m; });
   Optimum o;
   const auto consider = [&](const std::vector<double>& scaled) {
-    ModelState s = evaluate(scaled, nuisance);
-    for (const Nuisance& other : others) {
-      ModelState t = evaluate(scaled, other);
-      if (t.log_likelihood > s.log_likelihood) s = std::move(t);
+    ModelState s;
+    for (const Nuisance& candidate : candidates) {
+      if (s.echoes.empty() || s.actor_range_m != candidate.actor_range_m) {
+        s = evaluate(scaled, candidate);
+      } else {  // the same ranges: the same echoes
+        s.nuisance = candidate;
+        s.log_likelihood = model_.logLikelihood(s.echoes, candidate, &s.by_pose);
+      }
+      if (!o.state.echoes.empty() && s.log_likelihood <= o.state.log_likelihood) continue;
+      o.state = s;
+      o.scaled = scaled;
     }
-    if (!o.state.echoes.empty() && s.log_likelihood <= o.state.log_likelihood) return;
-    o.state = std::move(s);
-    o.scaled = scaled;
   };
   for (const std::vector<double>& start : starts) consider(start);
   // A quadratic's promise is far off where a level rises from nothing.
@@ -371,7 +397,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   const bool geometric = std::any_of(parts.begin(), parts.end(), [&](const Hypothesis& h) {
     return source_.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0)));
   });
-  if (!geometric || n == 0 || n > kMostRough) return o;
+  if (!geometric || n == 0 || n > kMostRough || o.state.log_likelihood < worth_a_search) return o;
   // Where paths come and go with every millimetre the likelihood is rough: slopes end at the first bump, a quadratic
   // through values some millimetres apart does not. The latents follow to first order.
   for (double initial : {0.3, 0.15}) {
@@ -414,7 +440,7 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
                                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start) {
   std::vector<double> from;
   for (const std::vector<double>& s : start) from.insert(from.end(), s.begin(), s.end());
-  Optimum o = maximise(base, nuisance, parts, {from}, 3);
+  Optimum o = maximise(base, nuisance, parts, {from}, 3, -std::numeric_limits<double>::infinity());
   const Effective e = effective(o.scores, nuisance.globals());
   const Eigen::MatrixXd robust = robustCovariance(e);
   JointFit fit;
@@ -443,7 +469,8 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
   f.hypothesis = hypothesis;
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());
-  Optimum o = maximise(null.mechanisms, null.nuisance, {hypothesis}, starts, iterations);
+  Optimum o = maximise(null.mechanisms, null.nuisance, {hypothesis}, starts, iterations,
+                       null.log_likelihood + kWorthASearch);
   f.scaled = std::move(o.scaled);
   f.state = std::move(o.state);
   const Scores& scores = o.scores;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,7 @@ struct HypothesisFit {
   std::vector<double> standard_error;  ///< of the values (not scaled), by location
   std::vector<std::vector<double>> fold_scaled;  ///< coordinates without each fold of locations
   double ranking() const;                        ///< gain less a price per coordinate
+  void loseGain(double nats);                    ///< that the state without it has gained since
 };
 
 /// Several hypotheses, fitted together.
@@ -59,6 +61,8 @@ class HypothesisFitter {
   HypothesisFitter(EchoSource& source, const SessionModel& model, int folds);
 
   ModelState state(const std::vector<NamedParameters>& mechanisms, const Nuisance* start);
+  /// The same mechanisms with latents that are better than its own, looked for from latents that a fit has found.
+  std::optional<ModelState> improved(const ModelState& null, const Nuisance& latents);
   /// Actors by how far their echoes' level and range are from where the twin has them, the priors of their errors
   /// included: most suspicious first, with nats (inflation taken off).
   std::vector<std::pair<int, double>> suspects(const ModelState& null) const;
@@ -98,9 +102,10 @@ class HypothesisFitter {
                                     const Nuisance& nuisance, double offset_per_pose);
   Screened screenDirectly(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
   Eigen::MatrixXd robustCovariance(const Effective& effective) const;
+  /// worth_a_search: the log-likelihood by slopes from which on a geometry is searched without them.
   Optimum maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                    const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& starts,
-                   int iterations);
+                   int iterations, double worth_a_search);
 
   EchoSource& source_;
   const SessionModel& model_;

@@ -73,24 +73,60 @@ double groupShift_m(const EchoGroup& group, const Nuisance& nuisance) {
 
 namespace {
 
-/// A whitened Hermitian matrix as M^2 real numbers, so that tr(D~ E~) is a dot product: L^-1 D L^-H.
-void whiten(const Matrix& inverse_lower, Matrix& m, double* v) {
-  mirror(m);
-  // Matrices this small are multiplied faster without the blocks of large ones.
-  const Matrix half = inverse_lower.lazyProduct(m);
-  const Matrix w = half.lazyProduct(inverse_lower.adjoint());
-  for (Eigen::Index k = 0; k < w.rows(); ++k) {
-    *v++ = w(k, k).real();
-    for (Eigen::Index l = 0; l < k; ++l) {
-      *v++ = M_SQRT2 * w(k, l).real();
-      *v++ = M_SQRT2 * w(k, l).imag();
+/// Whitens Hermitian matrices by one cell's covariance L L^H: L^-1 D L^-H, as M^2 real numbers, so that tr(D~ E~) is a
+/// dot product. Triangles alone, real and imaginary parts apart: several times faster than products of such matrices.
+class Whitener {
+ public:
+  explicit Whitener(const Matrix& inverse_lower) : channels_(static_cast<int>(inverse_lower.rows())) {
+    for (int j = 0; j < channels_; ++j) {
+      for (int k = j; k < channels_; ++k) {
+        re_[j][k] = inverse_lower(k, j).real();
+        im_[j][k] = inverse_lower(k, j).imag();
+      }
     }
   }
-}
+  /// Reads the lower triangle of m, whose diagonal is real.
+  void operator()(const Matrix& m, double* v) const {
+    Columns half_re, half_im;  // of L^-1 D, the lower triangle
+    for (int c = 0; c < channels_; ++c) {
+      double *to_re = half_re[c], *to_im = half_im[c];
+      std::fill(to_re + c, to_re + channels_, 0.0);
+      std::fill(to_im + c, to_im + channels_, 0.0);
+      for (int i = 0; i < channels_; ++i) {
+        const double re = i >= c ? m(i, c).real() : m(c, i).real();
+        const double im = i == c ? 0 : i > c ? m(i, c).imag() : -m(c, i).imag();
+        for (int k = std::max(i, c); k < channels_; ++k) {
+          to_re[k] += re_[i][k] * re - im_[i][k] * im;
+          to_im[k] += re_[i][k] * im + im_[i][k] * re;
+        }
+      }
+    }
+    for (int l = 0; l < channels_; ++l) {
+      double sum_re[kMaxChannels] = {}, sum_im[kMaxChannels] = {};
+      for (int j = 0; j <= l; ++j) {
+        const double re = re_[j][l], im = -im_[j][l];
+        for (int k = l; k < channels_; ++k) {
+          sum_re[k] += half_re[j][k] * re - half_im[j][k] * im;
+          sum_im[k] += half_re[j][k] * im + half_im[j][k] * re;
+        }
+      }
+      v[l * l] = sum_re[l];
+      for (int k = l + 1; k < channels_; ++k) {  // row k begins after 1 + 3 + ... = k^2 numbers
+        v[k * k + 1 + 2 * l] = M_SQRT2 * sum_re[k];
+        v[k * k + 2 + 2 * l] = M_SQRT2 * sum_im[k];
+      }
+    }
+  }
+
+ private:
+  using Columns = double[kMaxChannels][kMaxChannels];
+  int channels_;
+  Columns re_, im_;
+};
 
 double traceOf(const double* v, int channels) {
   double sum = 0;
-  for (int k = 0; k < channels; ++k) sum += v[k * k];  // row k begins after 1 + 3 + ... = k^2 numbers
+  for (int k = 0; k < channels; ++k) sum += v[k * k];
   return sum;
 }
 
@@ -343,8 +379,9 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     basis.inverse_lower = inverse;
     basis.active = active;
     basis.whitened.resize(numbers, static_cast<Eigen::Index>(active.size()));
+    const Whitener whiten(inverse);
     for (std::size_t a = 0; a < active.size(); ++a) {
-      whiten(inverse, raw[active[a]], basis.whitened.col(static_cast<Eigen::Index>(a)).data());
+      whiten(raw[active[a]], basis.whitened.col(static_cast<Eigen::Index>(a)).data());
     }
     // Data in the same numbers: w y y^H - I.
     basis.data.resize(numbers);
@@ -413,6 +450,7 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
     Eigen::MatrixXd v(numbers, more);
     Matrix m(channels_, channels_);
     for (const BinBasis& bin : p.bins) {
+      const Whitener whiten(bin.inverse_lower);
       std::vector<int> active;
       Eigen::VectorXd traces(more);
       for (int h = 0; h < more; ++h) {
@@ -422,7 +460,7 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
         if (std::all_of(from, from + size_, [](auto x) { return x == 0.0f; })) continue;
         m.setZero();
         unpack(from, 1, m);
-        whiten(bin.inverse_lower, m, v.col(h).data());
+        whiten(m, v.col(h).data());
         traces[h] = traceOf(v.col(h).data(), channels_);
         active.push_back(h);
       }

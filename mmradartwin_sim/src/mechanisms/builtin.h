@@ -52,6 +52,12 @@ inline ParameterSpec tried(ParameterSpec spec, double neutral, double typical) {
   return spec;
 }
 
+/// Says that traced paths do not depend on the parameter.
+inline ParameterSpec weighing(ParameterSpec spec) {
+  spec.weighs = true;
+  return spec;
+}
+
 inline ParameterSpec textSpec(const char* name, bool required, const char* default_value, const char* meaning) {
   ParameterSpec s;
   s.name = name;

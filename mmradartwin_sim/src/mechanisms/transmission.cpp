@@ -15,7 +15,7 @@ class Transmission : public Mechanism {
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("actor", true, "", "name of the actor"),
-            tried(numberSpec("one_way_db", "dB", -200, 0, "level of one crossing, negative"), -200, -5)};
+            weighing(tried(numberSpec("one_way_db", "dB", -200, 0, "level of one crossing, negative"), -200, -5))};
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
     actor_ = requireActor(scene, kName, values.text("actor"));
