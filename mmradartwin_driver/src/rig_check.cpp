@@ -157,7 +157,7 @@ class Examination {
       const std::string file = (fs::path(options_.devfs) / place).string();
       if (access(file.c_str(), R_OK | W_OK) != 0) {
         tell(Level::kProblem, "usb", "the radar's USB port is there, but this user may not open " + file,
-             "install the udev rule: sudo cp $(rospack find mmradartwin_driver)/udev/99-mmradartwin.rules "
+             "install the udev rule: sudo cp $(rospack find mmradartwin_driver)/udev/70-mmradartwin.rules "
              "/etc/udev/rules.d/; sudo udevadm control --reload; then unplug it and plug it in again");
       } else {
         tell(Level::kFine, "usb", "the radar's USB port 0451:fd03 is " + file);
