@@ -138,7 +138,7 @@ std::string examine(const std::vector<std::string>& wiring, int expected_status)
                                         "--deaf-s",      "0.1",         "--end-with-parent"};
   arguments.insert(arguments.end(), wiring.begin(), wiring.end());
   ChildProcess rig(MMRADARTWIN_EMULATED_RIG, arguments);
-  const auto ready = rig.readLine(20000);
+  const auto ready = rig.readLine(120000);
   EXPECT_TRUE(ready && ready->compare(0, 5, "ready") == 0);
   const std::string command = "MMRADARTWIN_EMULATED_RIG=" + folder.file("rig") + " " MMRADARTWIN_WITH_EMULATED_USB " " +
                               MMRADARTWIN_DOCTOR + " --self-test --buffer-mb 1 --host-ip " + loopbackIp(1) +
