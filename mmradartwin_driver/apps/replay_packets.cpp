@@ -19,7 +19,9 @@ int main(int argc, char** argv) {
   app.add_option("--source-port", options.source_port, "port that they come from")->capture_default_str();
   app.add_option("--recorded-data-port", options.recorded.data, "UDP port of the samples in the file")
       ->capture_default_str();
-  app.add_option("--rate", options.rate, "times the recorded pace")->capture_default_str()->check(CLI::Range(1e-3, 1e3));
+  app.add_option("--rate", options.rate, "times the recorded pace")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-3, 1e3));
   return runProgram(app, argc, argv, [&] {
     std::cerr << replayPackets(input, options) << " packets sent\n";
     return 0;

@@ -50,7 +50,8 @@ Recorded record(const RadarConfig& radar, std::vector<std::string> arguments) {
   }
   assembler.flush();
   control.stopRecord();
-  if (const auto completed = emulator.waitFor("completed")) recorded.own_late_ns = EmulatorProgram::ownLate_ns(*completed);
+  if (const auto completed = emulator.waitFor("completed"))
+    recorded.own_late_ns = EmulatorProgram::ownLate_ns(*completed);
   recorded.frames = assembler.counters();
   recorded.packets = receiver.counters();
   return recorded;

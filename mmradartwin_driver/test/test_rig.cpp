@@ -94,8 +94,9 @@ TEST(Rig, ArmsAnewWhenTheCardThrewSamplesAway) {
   RunningRig running(radar);
   // The count begins anew, and the frames are whole ones of the radar again.
   const auto second_start = [&running] {
-    return std::find_if(running.cubes.begin() + std::min<std::ptrdiff_t>(1, running.cubes.end() - running.cubes.begin()),
-                        running.cubes.end(), [](const AdcCube& cube) { return cube.sequence == 0; });
+    return std::find_if(
+        running.cubes.begin() + std::min<std::ptrdiff_t>(1, running.cubes.end() - running.cubes.begin()),
+        running.cubes.end(), [](const AdcCube& cube) { return cube.sequence == 0; });
   };
   ASSERT_TRUE(waitUntil([&] {
     const std::lock_guard<std::mutex> lock(running.mutex);
