@@ -56,14 +56,18 @@ workspace() {
   ln -sfn ../.. "$ws/src/mmradartwin"
 }
 
+# One compiler per core, two where memory would not do for so many; CMAKE_BUILD_PARALLEL_LEVEL says otherwise.
+jobs() {
+  local jobs=${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}
+  [ "$jobs" -gt 2 ] && [ "$(awk '/MemAvailable/ {print int($2/2e6)}' /proc/meminfo)" -lt "$jobs" ] && jobs=2
+  echo "$jobs"
+}
+
 # build [make arguments]
 build() {
   workspace
   [ -d /usr/lib/ccache ] && export PATH=/usr/lib/ccache:$PATH
-  local jobs
-  jobs=$(nproc)
-  [ "$jobs" -gt 2 ] && [ "$(awk '/MemAvailable/ {print int($2/2e6)}' /proc/meminfo)" -lt "$jobs" ] && jobs=2
-  (cd "$ws" && catkin_make -j"$jobs" -DCMAKE_BUILD_TYPE=Release "$@")
+  (cd "$ws" && catkin_make -j"$(jobs)" -DCMAKE_BUILD_TYPE=Release "$@")
 }
 
 source_workspace() {
@@ -121,10 +125,11 @@ separate_build() {
   workspace
   [ -e "$ws/src/CMakeLists.txt" ] || catkin_init_workspace "$ws/src" >&2
   [ -d /usr/lib/ccache ] && export PATH=/usr/lib/ccache:$PATH
+  export ROS_LANG_DISABLE=genpy:genlisp:geneus:gennodejs  # messages for C++ alone
   cmake -S "$ws/src" -B "$folder/build" -DCATKIN_DEVEL_PREFIX="$folder/devel" -DCMAKE_INSTALL_PREFIX="$folder/install" \
     -DCMAKE_BUILD_TYPE=RelWithDebInfo "$@" >&2
   # shellcheck disable=SC2086
-  cmake --build "$folder/build" -j2 --target $targets >&2
+  cmake --build "$folder/build" -j"$(jobs)" --target $targets >&2
 }
 
 run_fuzz() {
@@ -150,7 +155,8 @@ run_fuzz() {
 }
 
 run_tsan() {
-  local test status=0 tests="test_hand_over test_emulator_loopback test_rig test_dca1000_control test_pcap_recording"
+  local test status=0
+  local tests="test_hand_over test_emulator_loopback test_rig test_radar_watch test_dca1000_control test_pcap_recording"
   separate_build tsan "$tests" "-DCATKIN_WHITELIST_PACKAGES=mmradartwin_msgs;mmradartwin_dsp;mmradartwin_driver" \
     "-DCMAKE_CXX_FLAGS=-fsanitize=thread"
   data_folder

@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
   RigCheckOptions options;
   std::string radar;
   bool no_usb = false;
-  std::size_t buffer_mb = options.buffer_bytes >> 20;
+  double buffer_mb = static_cast<double>(options.buffer_bytes >> 20);
   CLI::App app("Looks at everything between radar and this host. Stop the driver first: both need the same ports.");
   app.add_option("--radar", radar, "radar.yaml: arm the card and look at the first samples too");
   app.add_option("--host-ip", options.host_ip, "this host's address on the card's network")->capture_default_str();
@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.1, 600.0));
   app.add_option("--buffer-mb", buffer_mb, "receive buffer asked of the kernel")
       ->capture_default_str()
-      ->check(CLI::Range(1, 1024));
+      ->check(CLI::Range(0.1, 1024.0));
   app.add_flag(
       "--self-test", options.self_test,
       "configure the radar over USB, and look at ramps and targets that the chip itself makes: order of lanes, of "
@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
   return runProgram(app, argc, argv, [&] {
     if (!radar.empty()) options.radar = loadRadarConfig(radar);
     options.usb = !no_usb;
-    options.buffer_bytes = buffer_mb << 20;
+    options.buffer_bytes = static_cast<std::size_t>(buffer_mb * (1 << 20));
     int problems = 0;
     checkRig(options, [&problems](const CheckResult& result) {
       const char* mark = result.level == CheckResult::Level::kFine   ? " ok "

@@ -25,6 +25,9 @@ EmulatorProgram::EmulatorProgram(CLI::App& app, EmulatedCard::Options& card) : a
   app.add_option("--deaf-s", card.deaf_s, "silence after CONFIG_FPGA")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 60.0));
+  app.add_option("--fpga-version", card.fpga_version,
+                 "answer to READ_FPGA_VERSION: 0x0402 is 2.8, 0x4000 the playback bit")
+      ->capture_default_str();
   app.add_option("--flush-s", card.flush_s, "from the last sample to the short last packet")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 60.0));

@@ -18,6 +18,10 @@ int main(int argc, char** argv) {
   app.add_option("--config-port", config_port, "UDP port of the card's answers")->capture_default_str();
   return runProgram(app, argc, argv, [&] {
     const PcapCapture capture = pcapToCapture(input, loadRadarConfig(radar), output, data_port, config_port);
+    if (capture.before_file > 0) {
+      std::cerr << "note: the file begins within a recording: " << capture.before_file
+                << " frame(s) came before it and are left out\n";
+    }
     for (std::size_t i = 1; i < capture.recordings.size(); ++i) {
       std::cerr << "note: frame " << capture.recordings[i] << " begins another recording: the card was armed anew\n";
     }

@@ -25,7 +25,6 @@ namespace {
 constexpr std::int64_t kPacketCost_ns = 11200;
 constexpr std::int64_t kTick_ns = 8;
 constexpr std::uint16_t kRecordCompletedBit = 0x0100;
-constexpr std::uint16_t kVersion28 = 0x0402;
 
 sockaddr_in endpoint(const std::string& ip, std::uint16_t port) {
   sockaddr_in address{};
@@ -133,7 +132,7 @@ void EmulatedCard::execute(const std::vector<std::uint8_t>& request, const socka
       }
       break;
     case 0x0e:
-      result = kVersion28;
+      result = options_.fpga_version;
       break;
     case 0x05:
       answer(0x05, 0, from);

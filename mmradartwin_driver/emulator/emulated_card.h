@@ -31,7 +31,8 @@ class EmulatedCard {
     std::uint16_t config_port = 4096, data_port = 4098, source_port = 1024;
     int payload_bytes = 1456;
     double flush_s = 2.0;
-    double deaf_s = 0.3;  ///< after CONFIG_FPGA
+    double deaf_s = 0.3;                  ///< after CONFIG_FPGA
+    std::uint16_t fpga_version = 0x0402;  ///< as READ_FPGA_VERSION answers: bits 0-6 major, 7-13 minor, 14 playback
     std::uint64_t seed = 1;
     double loss = 0, duplicate = 0, reorder = 0, truncate = 0;  ///< probability per data packet
     int reorder_depth = 2;                                      ///< so many packets overtake a reordered one, at most

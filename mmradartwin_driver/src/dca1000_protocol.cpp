@@ -99,6 +99,17 @@ FpgaVersion decodeFpgaVersion(std::uint16_t status) {
   return {status & 0x7f, status >> 7 & 0x7f, (status >> 14 & 1) != 0};
 }
 
+std::string describeVersion(const FpgaVersion& version) {
+  return "FPGA " + std::to_string(version.major) + "." + std::to_string(version.minor) +
+         (version.playback ? ", the playback image" : "");
+}
+
+std::string versionAdvice(const FpgaVersion& version) {
+  if (version.playback) return "load TI's record image into the FPGA: this one only plays back";
+  if (version.major == 2 && version.minor >= 7 && version.minor <= 9) return "";
+  return "the driver is made after FPGA 2.7 to 2.9: load one of these if samples look wrong";
+}
+
 std::string describeStatus(std::uint16_t bits) {
   static const std::pair<std::uint16_t, const char*> kNames[] = {
       {kNoLvdsData, "NO_LVDS_DATA"},

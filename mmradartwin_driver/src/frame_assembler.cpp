@@ -157,7 +157,11 @@ void FrameAssembler::acceptSuspects() {
   if (accepted.empty()) return;
   std::stable_sort(accepted.begin(), accepted.end(),
                    [](const Suspect& a, const Suspect& b) { return sequenceAfter(b.sequence, a.sequence); });
-  if (!accepted.front().ahead) {
+  const std::uint64_t first_count = accepted.front().byte_count;
+  std::uint64_t first_offset = first_count;
+  if (accepted.front().ahead) {
+    first_offset = next_byte_ + (first_count - next_byte_) % kCountModulus;
+  } else {
     closeBefore(base_frame_ + slots_.size());
     beginEpoch();
     ++counters_.epochs;
@@ -165,9 +169,10 @@ void FrameAssembler::acceptSuspects() {
   for (const Suspect& packet : accepted) {
     const DataPacket view{packet.sequence, packet.byte_count, packet.payload.data(), packet.payload.size(),
                           packet.stamp_ns};
-    std::uint64_t offset = packet.byte_count;
-    if (packet.ahead) offset = next_byte_ + (packet.byte_count - next_byte_) % kCountModulus;
-    place(view, offset);
+    // Counts that go back among them are late or overlap: they do not lie a whole 48-bit count further on.
+    const std::uint64_t apart = (packet.byte_count - first_count) % kCountModulus;
+    const bool behind = apart > kCountModulus / 2 && kCountModulus - apart <= first_offset;
+    place(view, behind ? first_offset - (kCountModulus - apart) : first_offset + apart);
   }
 }
 

@@ -29,7 +29,10 @@ class CaptureOutput {
     settle(false);
     if (new_recording_) {
       result.recordings.push_back(result.frames);
-      expected_ = 0;
+      // Without its start in the file, nothing says that the frames before the first packet were lost.
+      const bool under_way = result.recordings.size() == 1 && !start_seen_;
+      if (under_way) result.before_file = cube.sequence;
+      expected_ = under_way ? cube.sequence : 0;
       new_recording_ = false;
     }
     const std::uint64_t missing = cube.sequence - std::min<std::uint64_t>(expected_, cube.sequence);
@@ -41,6 +44,7 @@ class CaptureOutput {
     expected_ = cube.sequence + std::uint64_t{1};
     held_ = std::move(cube);
   }
+  void seeStart() { start_seen_ = true; }
   /// What came so far belongs to a recording that has ended.
   void endRecording() {
     settle(true);
@@ -92,7 +96,7 @@ class CaptureOutput {
   std::ofstream out_;
   std::optional<AdcCube> held_;
   std::uint64_t expected_ = 0;
-  bool new_recording_ = true;
+  bool new_recording_ = true, start_seen_ = false;
 };
 
 }  // namespace
@@ -115,6 +119,7 @@ PcapCapture pcapToCapture(const std::string& pcap, const RadarConfig& radar, con
   visitor.data = [&](const DataPacket& packet) { assembler.add(packet); };
   visitor.reply = [&](const Dca1000Reply& reply, std::int64_t) {
     if (reply.code != static_cast<std::uint16_t>(Dca1000Command::kRecordStart)) return;
+    out.seeStart();
     assembler.restart();
   };
   const PcapCounters counters = readPcap(pcap, visitor, {config_port, data_port});

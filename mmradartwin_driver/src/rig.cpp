@@ -133,12 +133,14 @@ void Rig::configure() {
     const std::lock_guard<std::mutex> lock(mutex_);
     state_.version = version;
   }
+  const std::string card = "DCA1000 at " + options_.card_ip, advice = versionAdvice(version);
+  if (version.playback) throw RigError(card + ": " + describeVersion(version) + ": " + advice);
+  if (!advice.empty()) events_(Level::kWarning, card + ": " + describeVersion(version) + ": " + advice);
   control_->resetFpga();
   control_->configureFpga(radar_.layout == CaptureLayout::kTwoLane ? 2 : 4);
   control_->configurePackets(options_.packet_delay_us);
   configured_ = true;
-  events_(Level::kInfo, "DCA1000 at " + options_.card_ip + " configured, FPGA " + std::to_string(version.major) + "." +
-                            std::to_string(version.minor));
+  events_(Level::kInfo, card + " configured, " + describeVersion(version));
 }
 
 void Rig::arm() {

@@ -157,7 +157,7 @@ class Examination {
       const std::string file = (fs::path(options_.devfs) / place).string();
       if (access(file.c_str(), R_OK | W_OK) != 0) {
         tell(Level::kProblem, "usb", "the radar's USB port is there, but this user may not open " + file,
-             "install the udev rule: sudo cp $(rospack find mmradartwin_driver)/udev/99-mmradartwin.rules "
+             "install the udev rule: sudo cp $(rospack find mmradartwin_driver)/udev/70-mmradartwin.rules "
              "/etc/udev/rules.d/; sudo udevadm control --reload; then unplug it and plug it in again");
       } else {
         tell(Level::kFine, "usb", "the radar's USB port 0451:fd03 is " + file);
@@ -203,14 +203,12 @@ class Examination {
       control_->connect();
       tell(Level::kFine, "card", "the DCA1000 answers at " + options_.card_ip);
       const FpgaVersion version = control_->readVersion();
-      const std::string name = "FPGA " + std::to_string(version.major) + "." + std::to_string(version.minor);
-      if (version.playback) {
-        tell(Level::kProblem, "version", name + " is the playback image", "load TI's record image into the FPGA");
-        return false;
-      }
-      const bool known = version.major == 2 && version.minor >= 7 && version.minor <= 9;
-      tell(known ? Level::kFine : Level::kNote, "version", name,
-           known ? "" : "the driver is made after FPGA 2.7 to 2.9: load one of these if samples look wrong");
+      const std::string advice = versionAdvice(version);
+      tell(version.playback ? Level::kProblem
+           : advice.empty() ? Level::kFine
+                            : Level::kNote,
+           "version", describeVersion(version), advice);
+      if (version.playback) return false;
     } catch (const RigError& error) {
       const std::string neighbour = neighbourState();
       tell(Level::kProblem, "card", error.what() + (neighbour.empty() ? "" : " (" + neighbour + ")"),

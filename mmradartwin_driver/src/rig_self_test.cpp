@@ -55,7 +55,7 @@ std::optional<Source> sourceOf(int packets, Word word) {
 }
 
 std::string text(const char* format, double a, double b) {
-  char line[80];
+  char line[160];
   std::snprintf(line, sizeof line, format, a, b);
   return line;
 }

@@ -38,7 +38,7 @@ std::string describeUsbError(int error, const std::string& action) {
     case LIBUSB_ERROR_ACCESS:
       return what +
              "no permission; install the udev rule (sudo cp $(rospack find mmradartwin_driver)/udev/"
-             "99-mmradartwin.rules /etc/udev/rules.d/ && sudo udevadm control --reload && sudo udevadm trigger), be in "
+             "70-mmradartwin.rules /etc/udev/rules.d/ && sudo udevadm control --reload && sudo udevadm trigger), be in "
              "the group plugdev, and plug the cable in again";
     case LIBUSB_ERROR_NO_DEVICE:
     case LIBUSB_ERROR_NOT_FOUND:

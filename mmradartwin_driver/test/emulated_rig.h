@@ -5,9 +5,11 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <optional>
 #include <random>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "../emulator/child_process.h"
@@ -77,6 +79,16 @@ inline void writeSession(const TemporaryFolder& folder, double frame_period_s, c
   writeText(folder.file("poses.csv"), poses);
 }
 
+/// Whether it comes true within a minute: a busy machine may need long for what otherwise takes a moment.
+inline bool waitUntil(const std::function<bool()>& condition) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > until) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return true;
+}
+
 /// The emulator as a program of its own.
 class EmulatorProgram {
  public:
@@ -84,9 +96,9 @@ class EmulatorProgram {
       : process_(MMRADARTWIN_EMULATOR, complete(std::move(arguments), host_ip, card_ip)) {
     waitFor("ready");
   }
-  /// The first line that begins so, or nothing after 10 s.
+  /// The first line that begins so, or nothing after a minute.
   std::optional<std::string> waitFor(const std::string& beginning) {
-    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (std::chrono::steady_clock::now() < until) {
       const auto line = process_.readLine(100);
       if (line && line->compare(0, beginning.size(), beginning) == 0) return line;
@@ -98,6 +110,11 @@ class EmulatorProgram {
     const std::string armed = "armed first_frame_ns=";
     const auto line = waitFor(armed);
     return line ? std::stoll(line->substr(armed.size())) : 0;
+  }
+  /// The most, by its own account after it has "completed", that this machine made a packet late.
+  static std::int64_t ownLate_ns(const std::string& completed) {
+    const std::string key = "own_late_us=";
+    return 1000 * std::stoll(completed.substr(completed.find(key) + key.size()));
   }
   ChildProcess& process() { return process_; }
 

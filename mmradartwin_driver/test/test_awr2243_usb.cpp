@@ -3,8 +3,12 @@
 #include <libusb.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <string>
 
@@ -79,7 +83,7 @@ TEST_F(Awr2243Usb, RecoversFromFaultsOnTheWire) {
   UsbDevice usb;
   FtdiRadarPort port(usb);
   Awr2243Control::Options options;
-  options.answer_timeout = std::chrono::milliseconds(200);
+  options.answer_timeout = std::chrono::milliseconds(2000);
   Awr2243Control control(port, nullptr, options);
   radar_.faults.skip = 5;
   radar_.faults.answer_crc = 1;
@@ -116,10 +120,23 @@ TEST_F(Awr2243Usb, UnpluggedInTheMiddleAndPluggedInAgain) {
 }
 
 TEST(UsbErrors, SayWhatToDo) {
-  EXPECT_NE(describeUsbError(LIBUSB_ERROR_ACCESS, "open").find("99-mmradartwin.rules"), std::string::npos);
+  EXPECT_NE(describeUsbError(LIBUSB_ERROR_ACCESS, "open").find("70-mmradartwin.rules"), std::string::npos);
   EXPECT_NE(describeUsbError(LIBUSB_ERROR_BUSY, "open").find("another program"), std::string::npos);
   EXPECT_NE(describeUsbError(LIBUSB_ERROR_NO_DEVICE, "open").find("J1"), std::string::npos);
   EXPECT_NE(describeUsbError(LIBUSB_ERROR_IO, "open").find("Input/Output"), std::string::npos);
+}
+
+TEST(UdevRule, IsOfTheDeviceThatTheDriverOpens) {
+  const std::filesystem::directory_iterator folder(std::string(MMRADARTWIN_DRIVER_SOURCE) + "/udev");
+  // udev looks at the tag uaccess in 73-seat-late.rules: what sets it must come before.
+  EXPECT_LT(std::stoi(folder->path().filename().string()), 73) << folder->path();
+  std::ifstream file(folder->path());
+  const std::string rule{std::istreambuf_iterator<char>(file), {}};
+  char device[80];
+  std::snprintf(device, sizeof device, "ATTR{idVendor}==\"%04x\", ATTR{idProduct}==\"%04x\"", kRadarUsbVendor,
+                kRadarUsbProduct);
+  EXPECT_NE(rule.find(device), std::string::npos) << rule;
+  EXPECT_NE(rule.find("TAG+=\"uaccess\""), std::string::npos) << rule;
 }
 
 }  // namespace

@@ -58,7 +58,11 @@ TEST(Dca1000Replies, StatusAndVersion) {
   EXPECT_EQ(2, version.major);
   EXPECT_EQ(8, version.minor);
   EXPECT_FALSE(version.playback);
+  EXPECT_EQ("", versionAdvice(version));
+  EXPECT_EQ("FPGA 2.8", describeVersion(version));
   EXPECT_TRUE(decodeFpgaVersion(0x4402).playback);
+  EXPECT_NE(std::string::npos, versionAdvice(decodeFpgaVersion(0x4402)).find("record image"));
+  EXPECT_NE(std::string::npos, versionAdvice(decodeFpgaVersion(0x0102)).find("2.7 to 2.9"));
 }
 
 TEST(Dca1000Replies, RefusesWhatIsNone) {

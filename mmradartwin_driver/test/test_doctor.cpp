@@ -23,7 +23,7 @@ class Doctor : public ::testing::Test {
     options_.host_ip = loopbackIp(1);
     options_.card_ip = loopbackIp(2);
     options_.radar = loadRadarConfig(folder_.file("radar.yaml"));
-    options_.buffer_bytes = 64 << 10;  // what any kernel grants
+    options_.buffer_bytes = 200 << 10;  // what any kernel grants
     options_.sysfs = folder_.file("sys");
     options_.devfs = folder_.file("dev");
     options_.etc = folder_.file("etc");
@@ -208,7 +208,7 @@ TEST(DoctorParts, FirewallRules) {
 TEST(DoctorProgram, ExitStatusSaysWhetherThereIsSomethingToDo) {
   TemporaryFolder folder;
   writeSession(folder, 0.02, {400});
-  const std::string command = std::string(MMRADARTWIN_DOCTOR) + " --no-usb --buffer-mb 1 --host-ip " + loopbackIp(1) +
+  const std::string command = std::string(MMRADARTWIN_DOCTOR) + " --no-usb --buffer-mb 0.2 --host-ip " + loopbackIp(1) +
                               " --card-ip " + loopbackIp(2) + " --radar " + folder.file("radar.yaml") + " >" +
                               folder.file("out");
   EXPECT_EQ(2, WEXITSTATUS(std::system(command.c_str())));

@@ -221,6 +221,34 @@ TEST(FrameAssembler, AStrayDatagramDoesNotThrowTheStreamOff) {
   for (std::size_t f = 0; f < 21; ++f) expectFrame(bench.radar_, bench.collected.cubes[f], 0, f, all(bench.radar_));
 }
 
+// Found by fuzzing: such a packet was placed 2^48 bytes further on.
+TEST(FrameAssembler, ACountThatComesTwiceBeyondAGapShiftsNothing) {
+  RadarConfig radar = paperRadar();
+  radar.samples_per_chirp = 60;  // 1920 bytes per frame: 2^48 is no whole number of frames
+  Bench bench(radar);
+  bench.feed(0, 0, 4);
+  constexpr std::uint64_t kFar = 100000;  // packets, more than the plausible gap
+  bench.feedOne(0, kFar);
+  ArrivingPacket again{kFar + 2, kFar * 1456, std::vector<std::uint8_t>(1456), bench.now_ns};
+  for (std::size_t k = 0; k < 1456; ++k) again.payload[k] = streamByte(0, again.offset + k);
+  bench.assembler.add(again.view());
+  bench.feed(0, kFar + 2, 20);
+  bench.assembler.flush();
+  std::size_t far_frames = 0;
+  for (const AdcCube& cube : bench.collected.cubes) {
+    if (cube.sequence < 4) continue;
+    ++far_frames;
+    std::vector<bool> arrived;
+    for (std::uint64_t byte = cube.sequence * 1920ull; byte < (cube.sequence + 1ull) * 1920; ++byte) {
+      const std::uint64_t packet = byte / 1456;
+      arrived.push_back(packet >= kFar && packet != kFar + 1 && packet < kFar + 22);
+    }
+    expectFrame(radar, cube, 0, cube.sequence, arrived);
+  }
+  EXPECT_EQ((22 * 1456 + 640u + 1919) / 1920, far_frames);  // the first begins 640 bytes before
+  EXPECT_LT(bench.assembler.counters().missing_frames, kFar);
+}
+
 TEST(FrameAssembler, StampIsTheFramesStart) {
   Bench bench(paperRadar());
   // The card's clockwork: frame f starts at f * 50 ms, its chirps are there 18.8 us and 37.6 us later, a packet leaves

@@ -50,10 +50,9 @@ Jitter measure(unsigned seed) {
         [](Rig::Level, const std::string&) {});
     first_ns = emulator.firstFrame_ns();
     EXPECT_NE(first_ns, 0);
-    std::optional<std::string> completed;
-    for (int i = 0; i < 6 && !completed; ++i) completed = emulator.waitFor("completed");
+    const std::optional<std::string> completed = emulator.waitFor("completed");
     EXPECT_TRUE(completed);
-    if (completed) own_late_us = std::stod(completed->substr(completed->find("own_late_us=") + 12));
+    if (completed) own_late_us = 1e-3 * static_cast<double>(EmulatorProgram::ownLate_ns(*completed));
   }
   const auto rms_us = [](const std::vector<double>& errors_us) {
     double sum = 0;

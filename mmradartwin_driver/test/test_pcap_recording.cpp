@@ -1,16 +1,20 @@
 // Packets recorded by the rig, and made a capture of again.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
+#include <map>
+#include <mutex>
 
 #include "emulated_rig.h"
 #include "mmradartwin_driver/pcap_capture.h"
 #include "mmradartwin_driver/pcap_reader.h"
 #include "mmradartwin_driver/pcap_writer.h"
 #include "mmradartwin_driver/rig.h"
+#include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "real_data.h"
 
@@ -148,6 +152,26 @@ TEST(PcapCapture, NamesFramesWithLosses) {
   EXPECT_EQ(1u, capture.recordings.size());
 }
 
+TEST(PcapCapture, BeginsWithTheFileWhereTheRecordingWasUnderWay) {
+  TemporaryFolder folder;
+  writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
+  const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  const std::string random = randomBytes(20 * 2048, 8);
+  const std::vector<std::uint8_t> sent(random.begin(), random.end());
+  // The eighth packet begins 48 bytes before the end of frame 4.
+  recordPackets(folder.file("a.pcap"), sent, {1, 2, 3, 4, 5, 6, 7});
+  const PcapCapture capture = pcapToCapture(folder.file("a.pcap"), radar, folder.file("a.bin"));
+  EXPECT_EQ(4u, capture.before_file);
+  EXPECT_EQ(16u, capture.frames);
+  ASSERT_EQ(1u, capture.flaws.size());
+  EXPECT_EQ(0u, capture.flaws[0].frame);
+  EXPECT_EQ(2000u, capture.flaws[0].lost_bytes);
+  std::vector<std::uint8_t> expected(sent.begin() + 4 * 2048, sent.end());
+  std::fill(expected.begin(), expected.begin() + 2000, std::uint8_t{0});
+  EXPECT_EQ(expected, readBytes(folder.file("a.bin")));
+  EXPECT_NEAR(1.7e18 + 8e5, static_cast<double>(capture.first_stamp_ns), 0.3e9);
+}
+
 TEST(PcapCapture, TakesRecordingsApart) {
   TemporaryFolder folder;
   writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
@@ -188,6 +212,55 @@ TEST(PcapCapture, SaysThatThereAreNoSamples) {
                InputError);
 }
 
+TEST(PacketReplay, ComesThroughTheDriverWithItsLosses) {
+  TemporaryFolder folder;
+  writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
+  const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  const std::string random = randomBytes(20 * 2048, 9);
+  std::vector<std::uint8_t> bytes(random.begin(), random.end());
+  // As above: frames 5 and 6 are gone altogether, 2, 4 and 7 have holes.
+  recordPackets(folder.file("a.pcap"), bytes, {4, 8, 9, 10, 11});
+  std::fill(bytes.begin() + 4368, bytes.begin() + 5824, std::uint8_t{0});
+  std::fill(bytes.begin() + 10192, bytes.begin() + 16016, std::uint8_t{0});
+  const std::map<std::uint64_t, std::uint64_t> lost = {{2, 1456}, {4, 48}, {7, 1680}};
+  std::mutex mutex;
+  std::vector<AdcCube> cubes;
+  RigOptions options;
+  options.host_ip = loopbackIp(1);
+  options.card_ip = loopbackIp(2);
+  options.configure_card = false;
+  const Rig rig(
+      radar, options,
+      [&](AdcCube&& cube) {
+        const std::lock_guard<std::mutex> lock(mutex);
+        cubes.push_back(std::move(cube));
+      },
+      [](Rig::Level, const std::string&) {});
+  ASSERT_TRUE(waitUntil([&] { return rig.state().armings == 1; }));
+  const auto replay = [&](const std::string& file) {
+    return WEXITSTATUS(std::system((std::string(MMRADARTWIN_REPLAY_PACKETS) + " " + folder.file(file) + " --host-ip " +
+                                    options.host_ip + " --card-ip " + options.card_ip + " --rate 0.05 2>/dev/null")
+                                       .c_str()));
+  };
+  EXPECT_EQ(2, replay("none.pcap"));
+  ASSERT_EQ(0, replay("a.pcap"));
+  EXPECT_TRUE(waitUntil([&] {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return cubes.size() == 18;
+  }));
+  const std::lock_guard<std::mutex> lock(mutex);
+  ASSERT_EQ(18u, cubes.size());
+  for (std::size_t i = 0; i < cubes.size(); ++i) {
+    const std::uint64_t frame = cubes[i].sequence;
+    EXPECT_EQ(i < 5 ? i : i + 2, frame);
+    std::vector<std::int16_t> expected;
+    decodeFrame(radar, bytes.data() + frame * 2048, expected);
+    EXPECT_EQ(expected, cubes[i].data) << frame;
+    EXPECT_EQ(lost.count(frame) ? lost.at(frame) : 0, cubes[i].lost_bytes) << frame;
+  }
+  EXPECT_EQ(29u - 5, rig.state().packets.packets);
+}
+
 /// Emulator -> rig -> pcap -> capture.
 void roundTrip(const TemporaryFolder& folder, const std::string& session, const RadarConfig& radar,
                const std::vector<std::uint8_t>& sent, std::size_t frames) {
@@ -202,10 +275,7 @@ void roundTrip(const TemporaryFolder& folder, const std::string& session, const 
     options.record_pcap = folder.file("packets.pcap");
     const Rig rig(
         radar, options, [&](AdcCube&&) { ++cubes; }, [](Rig::Level, const std::string&) {});
-    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    while (cubes < frames && std::chrono::steady_clock::now() < until) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    }
+    EXPECT_TRUE(waitUntil([&] { return cubes >= frames; }));
     ASSERT_TRUE(emulator.waitFor("completed"));
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
   }

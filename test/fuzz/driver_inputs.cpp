@@ -233,10 +233,16 @@ std::vector<HostileInput> hostileInputs() {
   std::string stream, restarts;
   for (std::uint32_t i = 0; i < 12; ++i) stream += record(datagram(i + 1, i * 100, 100), 1);
   for (std::uint32_t i = 0; i < 6; ++i) restarts += record(datagram(i % 3 + 1, i % 3 * 400, 400), i % 3 ? 1 : 60);
+  // Far ahead, and one of the four that confirm it comes with the count of the one before.
+  std::string far_ahead;
+  const std::uint64_t far = std::uint64_t{1} << 40;
+  for (const auto& [sequence, count] : {std::pair{1u, far}, {2u, far + 257}, {3u, far + 257}, {4u, far + 2000}}) {
+    far_ahead += record(datagram(sequence, count, 100 * sequence), 1);
+  }
   const std::string calibration = message(awr2243::kInitCalibration, 20, MmwaveLinkCrc::k32);
   return {
       {"datagram", readDatagram, {datagram(1, 0, 64), std::string("\x5a\xa5\x0a\0\0\1\xaa\xee", 8)}},
-      {"stream", readStream, {stream, restarts, stream + std::string("\0\xff\xff", 3) + restarts}},
+      {"stream", readStream, {stream, restarts, far_ahead, stream + std::string("\0\xff\xff", 3) + restarts}},
       {"pcap", readPackets, {pcap(), pcapng()}},
       {"message", readMessage, {calibration, message(awr2243::kMainVersion, 12, MmwaveLinkCrc::k16)}},
       {"mpsse", readUsb, {usb(calibration), usb(message(awr2243::kMainPowerUpDone, 8, MmwaveLinkCrc::k16))}},

@@ -36,7 +36,7 @@ class DemoLoop(unittest.TestCase):
         script = os.path.join(rospkg.RosPack().get_path("mmradartwin_launch"), "scripts", "demo.sh")
         environment = dict(os.environ, DEMO_LOCATIONS=str(POSES), DEMO_HEADINGS="1", DEMO_FRAMES=str(FRAMES), DEMO_SEED="11")
         environment.pop("DISPLAY", None)
-        cls.demo = subprocess.run([script, cls.out], env=environment, capture_output=True, text=True, timeout=600)
+        cls.demo = subprocess.run([script, cls.out], env=environment, capture_output=True, text=True, timeout=1800)
 
     @classmethod
     def tearDownClass(cls):

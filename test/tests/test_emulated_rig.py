@@ -192,10 +192,13 @@ class EmulatedRig(unittest.TestCase):
         self.assertEqual(counts.get("/radar/config", 0), 1)
 
     def check_diagnostics(self):
-        said = set()
+        said, values = set(), {}
         with rosbag.Bag(self.path("faults.bag")) as bag:
             for _, message, _ in bag.read_messages("/diagnostics"):
                 said |= {(status.name.split(": ")[-1], status.level, status.message) for status in message.status}
+                for status in message.status:
+                    for value in status.values:
+                        values.setdefault((status.name.split(": ")[-1], value.key), set()).add(value.value)
             config = next(message for _, message, _ in bag.read_messages("/radar/config"))
             topics = bag.get_type_and_topic_info().topics
         self.assertGreater(topics["/twin/grid"].message_count, 0)
@@ -212,6 +215,13 @@ class EmulatedRig(unittest.TestCase):
             self.assertTrue(any(task == t and level == v and any(p in m for p in part.split("|")) for t, v, m in said),
                             f"{task} never said \"{part}\" at level {level}: {sorted(said)}")
         self.assertTrue(any(t == "radar device" and v > 0 and "event: " in m for t, v, m in said), sorted(said))
+        self.assertIn("45", values["radar device", "temperature at calibration [deg C]"])  # the emulated chip's
+        self.assertIn("FPGA 2.8", values["capture card", "card version"])
+        self.assertTrue(any(abs(float(v) - 1 / PERIOD_S) < 2 for v in values["radar stream", "frame rate [Hz]"]))
+        self.assertTrue(any(int(v) > 0 for v in values["radar stream", "lost bytes"]))  # the cable was out
+        for task, key in (("radar stream", "packets dropped by this host"), ("capture card", "last card status"),
+                          ("radar pose", "age [s]"), ("radar device", "events")):
+            self.assertIn((task, key), values)
 
     def check_frames(self, runs, played_poses, total):
         """Every whole frame is one of the session's, counted from a start of the radar and stamped with its time."""

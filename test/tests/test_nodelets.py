@@ -14,13 +14,14 @@ from test_launch_files import Launched, end
 
 FRAMES = 60
 PLAYER = find_program("mmradartwin_driver", "session_player")
+NETWORK = f"127.201.{os.getpid() % 250 + 1}."  # of this process alone, beside others that test
 LAUNCH = """
 <launch>
   <node name="manager" pkg="nodelet" type="nodelet" args="manager" output="screen" />
   <node name="driver" pkg="nodelet" type="nodelet" args="load mmradartwin_driver/DriverNodelet manager" output="screen">
     <param name="radar" value="{session}/radar.yaml" type="str" />
-    <param name="host_ip" value="127.201.9.1" type="str" />
-    <param name="card_ip" value="127.201.9.2" type="str" />
+    <param name="host_ip" value="{network}1" type="str" />
+    <param name="card_ip" value="{network}2" type="str" />
   </node>
   <node name="signal_chain" pkg="nodelet" type="nodelet" args="load mmradartwin_dsp/SignalChainNodelet manager" />
   <node name="listener" pkg="rosbag" type="record" args="--quiet -O {folder}/grids.bag /radar/grid" />
@@ -38,15 +39,15 @@ class Nodelets(unittest.TestCase):
     def test_frames_are_handed_over_and_not_copied(self):
         file = os.path.join(self.folder, "nodelets.launch")
         with open(file, "w", encoding="ascii") as out:
-            out.write(LAUNCH.format(session=self.session, folder=self.folder))
+            out.write(LAUNCH.format(session=self.session, folder=self.folder, network=NETWORK))
         with Launched(file, package=None) as launched:
             bus = lambda: launched.bus("/manager")
             connected = lambda: bus()[1].get("/radar/adc") and bus()[0].get("/radar/grid")
             self.assertTrue(wait_until(connected, 240), f"{bus()}\n{launched.text()[-3000:]}")
             log = os.path.join(self.folder, "player.log")
             with open(log, "w", encoding="utf-8") as said:
-                player = subprocess.Popen([PLAYER, "_session:=" + self.session, "_host_ip:=127.201.9.1",
-                                           "_card_ip:=127.201.9.2"], stdout=said, stderr=subprocess.STDOUT,
+                player = subprocess.Popen([PLAYER, "_session:=" + self.session, f"_host_ip:={NETWORK}1",
+                                           f"_card_ip:={NETWORK}2"], stdout=said, stderr=subprocess.STDOUT,
                                           env=dict(launched.environment, ROSCONSOLE_STDOUT_LINE_BUFFERED="1"))
             self.addCleanup(end, player)
 

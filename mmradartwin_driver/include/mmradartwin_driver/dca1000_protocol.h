@@ -54,6 +54,10 @@ struct FpgaVersion {
   bool playback = false;
 };
 FpgaVersion decodeFpgaVersion(std::uint16_t status);
+/// "FPGA 2.8".
+std::string describeVersion(const FpgaVersion& version);
+/// What is to be done about a card with this FPGA; empty for those that this driver was made after, 2.7 to 2.9.
+std::string versionAdvice(const FpgaVersion& version);
 
 /// Bits of kSystemStatus (Developer Guide, table 4).
 enum Dca1000Status : std::uint16_t {

@@ -59,11 +59,11 @@ class RadarWatch {
 
   EventSink events_;
   Awr2243Link::OpenUsb open_usb_;
-  std::mutex link_mutex_;  ///< of link_: one thread at a time
-  Awr2243Link link_;
   mutable std::mutex state_mutex_;
   State state_;
   std::atomic<bool> lost_{false}, returned_{false}, stop_{false};
+  std::mutex link_mutex_;  ///< of link_: one thread at a time
+  Awr2243Link link_;       // behind the state: when it goes, it stops the frames, and that is an event
   std::thread thread_;
 };
 

@@ -47,7 +47,7 @@ bool checkRig(const RigCheckOptions& options, const std::function<void(const Che
 std::string firewallHint(const std::string& nft, const std::string& iptables, const std::string& ufw);
 
 /// Are the first frame's bytes, as captured, what this radar would send? Finds lanes that are all zero although their
-/// receivers are in use, and lanes that all carry the same.
+/// receivers are in use.
 CheckResult checkLanes(const RadarConfig& radar, const std::vector<std::uint8_t>& frame);
 
 /// Did `bytes` of samples come in `elapsed_s` as radar.yaml says?

@@ -193,9 +193,7 @@ void RadarDriver::diagnoseCard(diagnostic_updater::DiagnosticStatusWrapper& stat
   }
   status.add("recordings armed", state.armings);
   status.add("last card status", state.last_status ? describeStatus(*state.last_status) : "none since armed");
-  status.add("FPGA version", state.version
-                                 ? std::to_string(state.version->major) + "." + std::to_string(state.version->minor)
-                                 : "unknown");
+  status.add("card version", state.version ? describeVersion(*state.version) : "unknown");
 }
 
 void RadarDriver::diagnoseDevice(diagnostic_updater::DiagnosticStatusWrapper& status) {
