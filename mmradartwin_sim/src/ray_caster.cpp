@@ -1,4 +1,5 @@
 #include <embree3/rtcore.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -93,11 +94,18 @@ RTCGeometry attachInstance(RTCDevice device, RTCScene to, RTCScene what, unsigne
   return geometry;
 }
 
+/// Builds on the calling thread, so that the tree, and with it the last digit of a hit, is the same every time.
+void commitAlone(RTCScene scene) {
+  const tbb::global_control alone(tbb::global_control::max_allowed_parallelism, 1);
+  rtcCommitScene(scene);
+}
+
 }  // namespace
 
 RayCaster::RayCaster(const Scene& scene, const std::vector<int>& movable) : embree_(new Embree) {
   Embree& e = *embree_;
-  e.device = rtcNewDevice("threads=1,set_affinity=0");
+  // No "threads=1" here: Embree would hold all of TBB to one thread for as long as the device lives.
+  e.device = rtcNewDevice("set_affinity=0");
   if (!e.device) throw std::runtime_error("Embree cannot be started");
   e.scene = rtcNewScene(e.device);
   rtcSetSceneBuildQuality(e.scene, RTC_BUILD_QUALITY_HIGH);
@@ -138,17 +146,17 @@ RayCaster::RayCaster(const Scene& scene, const std::vector<int>& movable) : embr
   for (std::size_t i = 0; i < scene.screens.size(); ++i) {
     attach(e.device, standing, scene.screens[i], e.center, static_cast<unsigned>(scene.actors.size() + i));
   }
-  if (e.veil) rtcCommitScene(e.veil);
+  if (e.veil) commitAlone(e.veil);
   if (e.still) {
-    rtcCommitScene(e.still);
+    commitAlone(e.still);
     attachInstance(e.device, e.scene, e.still, 0);
     unsigned id = 1;
     for (Embree::Instance& i : e.instances) {
-      rtcCommitScene(i.scene);
+      commitAlone(i.scene);
       i.geometry = attachInstance(e.device, e.scene, i.scene, id++);
     }
   }
-  rtcCommitScene(e.scene);
+  commitAlone(e.scene);
 }
 
 RayCaster::~RayCaster() = default;
@@ -166,7 +174,7 @@ void RayCaster::place(int actor, const Eigen::Isometry3d& T) {
   about_center.col(3) = (T * e.center - e.center).cast<float>();
   rtcSetGeometryTransform(found->geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, about_center.data());
   rtcCommitGeometry(found->geometry);
-  rtcCommitScene(e.scene);
+  commitAlone(e.scene);
   Eigen::AlignedBox3d& bounds = e.bounds[static_cast<std::size_t>(actor)];
   bounds = found->bounds.transformed(T);
   for (int i = 0; i < 8; ++i) {

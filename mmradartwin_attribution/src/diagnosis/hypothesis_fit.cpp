@@ -19,10 +19,11 @@ constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what ris
 constexpr double kHopeless = 50;               ///< nats lost there: less of it would not gain either
 constexpr double kRadii[] = {1, 2, 4};         ///< of the scale, about a place where an object may have stood before
 constexpr int kDirections = 8;
-constexpr double kEnough = 0.2;  ///< nats: a further step promises less
-constexpr double kRising = 5;    ///< nats of the last step that are worth going on for
+constexpr double kEnough = 0.2;       ///< nats: a further step promises less
+constexpr double kRising = 5;         ///< nats of the last step that are worth going on for
+constexpr double kClimb = 4;          ///< steps like the last within which a climb has to get somewhere
 constexpr double kWorthASearch = 25;  ///< nats gained by slopes, before a rough likelihood is searched
-constexpr double kImprovement = 0.5;   ///< nats by which latents have to be better to be taken over
+constexpr double kImprovement = 0.5;  ///< nats by which latents have to be better to be taken over
 constexpr double kMaxInflation = 50;
 constexpr Eigen::Index kMostRough = 4;  ///< coordinates for which values without slopes are worth their number
 constexpr double kPrice =
@@ -371,7 +372,9 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
     o.scores = derivatives(o.state, o.scaled);
     const Eigen::VectorXd step = regularised(o.scores.information).ldlt().solve(o.scores.total);
     // On a ridge between a cause and the latents that stood in for it, every step widens the next.
-    if (i >= (risen > kRising ? 4 * iterations : iterations) || 0.5 * o.scores.total.dot(step) < kEnough) break;
+    const double promised = 0.5 * o.scores.total.dot(step);
+    const bool hopeless = i >= 2 && o.state.log_likelihood + kClimb * std::max(risen, promised) < worth_a_search;
+    if (i >= (risen > kRising ? 4 * iterations : iterations) || promised < kEnough || hopeless) break;
     bool better = false;
     for (double share : {1.0, 0.4, 0.1}) {
       std::vector<double> next = o.scaled;
@@ -469,8 +472,8 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
   f.hypothesis = hypothesis;
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());
-  Optimum o = maximise(null.mechanisms, null.nuisance, {hypothesis}, starts, iterations,
-                       null.log_likelihood + kWorthASearch);
+  Optimum o =
+      maximise(null.mechanisms, null.nuisance, {hypothesis}, starts, iterations, null.log_likelihood + kWorthASearch);
   f.scaled = std::move(o.scaled);
   f.state = std::move(o.state);
   const Scores& scores = o.scores;

@@ -104,8 +104,8 @@ class HypothesisFitter {
   Eigen::MatrixXd robustCovariance(const Effective& effective) const;
   /// worth_a_search: the log-likelihood by slopes from which on a geometry is searched without them.
   Optimum maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
-                   const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& starts,
-                   int iterations, double worth_a_search);
+                   const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& starts, int iterations,
+                   double worth_a_search);
 
   EchoSource& source_;
   const SessionModel& model_;
