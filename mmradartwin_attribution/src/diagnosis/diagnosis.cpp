@@ -291,6 +291,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   }
   std::stable_sort(screened.begin(), screened.end(), better);
   family_ = all.size();
+  const auto isObject = [](const Hypothesis& h) { return h.mechanism.mechanism == "actor_unmodelled"; };
   std::vector<HypothesisFit> fits;
   std::size_t names_fitted = 0, laws_fitted = 0;
   for (const Screened& s : screened) {
@@ -298,8 +299,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     // A promise is a quadratic's and often far too small: names get several chances, laws without a name two.
     const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
     std::size_t& fitted = law ? laws_fitted : names_fitted;
-    const bool object = s.hypothesis.mechanism.mechanism == "actor_unmodelled";
-    const double worth = object                      ? kWorthAFit + std::log(kObjectPlaces)
+    const double worth = isObject(s.hypothesis)      ? kWorthAFit + std::log(kObjectPlaces)
                          : law                       ? kWorthALaw
                          : s.hypothesis.isGeometry() ? kWorthAFitOfGeometry
                                                      : kWorthAFit;
@@ -319,8 +319,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     result_.tried.push_back(tried);
   }
   for (HypothesisFit& f : fits) {
-    const bool object = f.hypothesis.mechanism.mechanism == "actor_unmodelled";
-    fitter_->judge(f, all.size() + static_cast<std::size_t>(object ? kObjectPlaces : 0));
+    fitter_->judge(f, all.size() + static_cast<std::size_t>(isObject(f.hypothesis) ? kObjectPlaces : 0));
     for (TriedHypothesis& t : result_.tried) {
       if (t.round == round && t.label == f.hypothesis.label()) t.gain = f.gain;
     }
