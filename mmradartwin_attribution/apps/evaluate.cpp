@@ -22,6 +22,7 @@ struct Arguments {
   RecordingArguments input;
   std::string output, simulated, config;
   int jobs = 0;
+  std::string diffuse_records = "cells";
   bool no_pictures = false, no_bag = false;
 };
 
@@ -39,7 +40,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
     for (const Pose& pose : recording.poses) poses.push_back(pose.T_map_radar);
     twin.prepare(poses);
     twin.setSession(recording.poses);
-    simulated = simulatedByTwin(twin);
+    simulated = simulatedByTwin(twin, diffuseRecordsFrom(arguments.diffuse_records, "--diffuse-records"));
   } else {
     other = arguments.input.open(arguments.simulated);
     simulated = simulatedBySession(other);
@@ -105,6 +106,10 @@ int main(int argc, char** argv) {
   app.add_option("--output", arguments.output, "folder for table, CSV, pictures and report")->required();
   app.add_option("--simulated", arguments.simulated, "take the simulated maps from this session instead of a twin");
   app.add_option("--config", arguments.config, "attribution.yaml (default: the built-in values, as shipped)");
+  app.add_option("--diffuse-records", arguments.diffuse_records,
+                 "records of rough surfaces: summed by cells of a facet, or all points")
+      ->check(CLI::IsMember({"cells", "points"}))
+      ->capture_default_str();
   app.add_option("--jobs", arguments.jobs, "threads (default: one per core)")->check(CLI::Range(1, 1024));
   app.add_flag("--no-pictures", arguments.no_pictures, "leave the per-pose pictures out");
   app.add_flag("--no-bag", arguments.no_bag, "leave results.bag (for rviz) out");

@@ -16,11 +16,12 @@ RangeAngleMap averagedMap(const Recording& recording, const SignalChain& chain, 
   return chain.map(averagePose(recording, pose));
 }
 
-SimulatedBranch simulatedByTwin(const Twin& twin) {
+SimulatedBranch simulatedByTwin(const Twin& twin, DiffuseRecords diffuse_records) {
   auto chain = std::make_shared<SignalChain>(twin.radar());
-  return [&twin, chain](const Pose& pose) {
+  return [&twin, chain, diffuse_records](const Pose& pose) {
     Simulation simulation = twin.simulate(pose.T_map_radar, pose.stamp_ns);
-    return SimulatedPose{chain->map(simulation.grid), std::move(simulation.records)};
+    return SimulatedPose{chain->map(simulation.grid),
+                         exportedRecords(twin.radar(), std::move(simulation.records), diffuse_records)};
   };
 }
 

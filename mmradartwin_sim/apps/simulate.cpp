@@ -25,8 +25,13 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   app.add_option("--seed", options.seed, "of the phases of scatter points")->capture_default_str();
+  std::string diffuse_records = "cells";
+  app.add_option("--diffuse-records", diffuse_records, "in paths/{pose}.csv: summed by cells of a facet, or all points")
+      ->check(CLI::IsMember({"cells", "points"}))
+      ->capture_default_str();
   app.add_option("--jobs", options.jobs, "threads; 0 = all cores")->check(CLI::Range(0, 1024))->capture_default_str();
-  return runProgram(app, argc, argv, [&options, &plugins] {
+  return runProgram(app, argc, argv, [&] {
+    options.diffuse_records = diffuseRecordsFrom(diffuse_records, "--diffuse-records");
     loadMechanismPlugins(plugins, "--plugins");
     std::unique_ptr<ProgressBar> bar;
     std::mutex mutex;

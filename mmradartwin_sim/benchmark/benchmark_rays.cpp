@@ -16,6 +16,7 @@
 #include <random>
 
 #include "mmradartwin_dsp/paper_radar.h"
+#include "mmradartwin_sim/cell_records.h"
 #include "mmradartwin_sim/moving_twin.h"
 #include "mmradartwin_sim/traced_session.h"
 #include "mmradartwin_sim/twin.h"
@@ -296,15 +297,42 @@ void fullPoseWeighAgain(benchmark::State& state) {
 }
 BENCHMARK(fullPoseWeighAgain)->Unit(benchmark::kMillisecond);
 
+/// By a twin of other materials (0: a factor per actor), or of another pattern (1: a factor per direction).
 void fullPoseWeighCondensed(benchmark::State& state) {
-  const Twin& twin = fullTwin();
-  const CondensedTrace traced(twin.radar(), twin.trace(pose(0)));
+  const Twin& base = fullTwin();
+  std::vector<NamedParameters> mechanisms = base.description().mechanisms;
+  NamedParameters more;
+  if (state.range(0) == 0) {
+    more.mechanism = "material_reflectivity";
+    more.values.set("material", base.scene().actors.front().material_tag);
+    more.values.set("actor", std::string());
+    more.values.set("delta_db", -3.0);
+  } else {
+    more.mechanism = "elevation_pattern";
+    more.values.set("cos_exponent", 2.1);
+    more.values.set("angles_deg", std::vector<double>());
+    more.values.set("gain_db", std::vector<double>());
+  }
+  mechanisms.push_back(more);
+  const Twin twin = base.changed(mechanisms);
+  const CondensedTrace traced(base.radar(), base.trace(pose(0)));
   for (auto _ : state) benchmark::DoNotOptimize(twin.weigh(pose(0), traced).grid.x.data());
   state.counters["nodes"] = static_cast<double>(traced.nodes().size());
   state.counters["records"] = static_cast<double>(traced.records().size());
   state.counters["kB"] = static_cast<double>(traced.bytes()) / 1e3;
 }
-BENCHMARK(fullPoseWeighCondensed)->Unit(benchmark::kMicrosecond);
+BENCHMARK(fullPoseWeighCondensed)->ArgName("pattern")->Arg(0)->Arg(1)->Unit(benchmark::kMicrosecond);
+
+/// Records as they are exported, summed per cell of a facet.
+void fullPoseCells(benchmark::State& state) {
+  const Twin& twin = fullTwin();
+  const auto traced = twin.trace(pose(0));
+  std::size_t cells = 0;
+  for (auto _ : state) cells = sumPerCell(twin.radar(), traced).size();
+  state.counters["points"] = static_cast<double>(traced.size());
+  state.counters["cells"] = static_cast<double>(cells);
+}
+BENCHMARK(fullPoseCells)->Unit(benchmark::kMillisecond);
 
 void fullPoseWeighByGroups(benchmark::State& state) {
   const Twin& twin = fullTwin();

@@ -17,28 +17,95 @@ double legGap(const Facet& facet, const Eigen::Vector3d& direction) {
   return std::max(1e-3, 2 * facet.flatness_m / cosine);
 }
 
+/// What a point sees through a rectangle: the pyramid over it, outward normals as rows.
+class Beam {
+ public:
+  Beam(const Eigen::Vector3d& apex, const Eigen::Matrix<double, 3, 4>& window) {
+    const Eigen::Matrix<double, 3, 4> way = window.colwise() - apex;
+    const Eigen::Vector3d middle = way.rowwise().sum();
+    for (int i = 0; i < 4; ++i) {
+      Eigen::Vector3d n = way.col(i).cross(way.col((i + 1) % 4));
+      if (n.dot(middle) > 0) n = -n;
+      sides_.row(i) = n;
+    }
+    limit_ = sides_ * apex + Eigen::Vector4d::Constant(1e-9);
+  }
+  /// False where all of a rectangle lies beyond one side.
+  bool meets(const Eigen::Matrix<double, 3, 4>& corners) const {
+    return ((sides_ * corners).rowwise().minCoeff() - limit_).maxCoeff() <= 0;
+  }
+
+ private:
+  Eigen::Matrix<double, 4, 3> sides_;
+  Eigen::Vector4d limit_;
+};
+
 }  // namespace
 
-ImageSearch::ImageSearch(const Scene& scene, bool all_orientations) : scene_(scene) {
-  for (const Facet& f : scene.facets) {
-    if (!f.present || f.curved >= 0 || !(f.reflects || all_orientations)) continue;
-    reflectors_.push_back(f.id);
-    Corners c;
-    c.point << f.origin, f.origin + f.size1_m * f.e1, f.origin + f.size1_m * f.e1 + f.size2_m * f.e2,
-        f.origin + f.size2_m * f.e2;
-    corners_.push_back(c);
-    planes_.push_back({f.normal, f.origin});
+ImageSearch::ImageSearch(const Scene& scene, bool all_orientations)
+    : scene_(scene), all_orientations_(all_orientations) {
+  build();
+}
+
+void ImageSearch::build() {
+  reflectors_.clear();
+  on_side_.clear();
+  for (const Facet& f : scene_.facets) {
+    if (takesPart(f)) reflectors_.push_back(f.id);
   }
-  if (exhaustiveOrder() < 3) return;
+  corners_.resize(reflectors_.size());
+  mirrors_.resize(reflectors_.size());
+  for (std::size_t i = 0; i < reflectors_.size(); ++i) place(i);
+  if (exhaustiveOrder() >= 3) findSides(std::vector<char>(reflectors_.size(), 1));
+}
+
+bool ImageSearch::takesPart(const Facet& f) const {
+  return f.present && f.curved < 0 && (f.reflects || all_orientations_);
+}
+
+void ImageSearch::place(std::size_t reflector) {
+  const Facet& f = scene_.facets[static_cast<std::size_t>(reflectors_[reflector])];
+  corners_[reflector].point << f.origin, f.origin + f.size1_m * f.e1, f.origin + f.size1_m * f.e1 + f.size2_m * f.e2,
+      f.origin + f.size2_m * f.e2;
+  mirrors_[reflector] = {f.normal,           f.e1,      f.e2,     f.normal.dot(f.origin), f.e1.dot(f.origin),
+                         f.e2.dot(f.origin), f.size1_m, f.size2_m};
+}
+
+void ImageSearch::findSides(const std::vector<char>& marked) {
   const int count = static_cast<int>(reflectors_.size());
-  on_side_.resize(2 * reflectors_.size());
+  const auto n = static_cast<std::size_t>(count);
+  sides_.resize(n * n);
+  on_side_.resize(2 * n);
+  for (auto& list : on_side_) list.clear();
   for (int a = 0; a < count; ++a) {
     for (int b = 0; b < count; ++b) {
-      for (int side : {0, 1}) {
-        if (faces(a, side == 1, b)) on_side_[static_cast<std::size_t>(2 * a + side)].push_back(b);
+      char& known = sides_[static_cast<std::size_t>(a) * n + static_cast<std::size_t>(b)];
+      if (marked[static_cast<std::size_t>(a)] || marked[static_cast<std::size_t>(b)]) {
+        known = static_cast<char>((faces(a, false, b) ? 1 : 0) + (faces(a, true, b) ? 2 : 0));
       }
+      if (known & 1) on_side_[static_cast<std::size_t>(2 * a)].push_back(b);
+      if (known & 2) on_side_[static_cast<std::size_t>(2 * a + 1)].push_back(b);
     }
   }
+}
+
+void ImageSearch::update(const std::vector<int>& actors) {
+  std::vector<char> marked(reflectors_.size(), 0);
+  for (int actor : actors) {
+    for (int id : scene_.actors[static_cast<std::size_t>(actor)].facets) {
+      const auto at = std::lower_bound(reflectors_.begin(), reflectors_.end(), id);
+      const bool known = at != reflectors_.end() && *at == id;
+      if (known != takesPart(scene_.facets[static_cast<std::size_t>(id)])) {
+        build();  // it lies down, or stands up again: other reflectors take part
+        return;
+      }
+      if (!known) continue;
+      const auto i = static_cast<std::size_t>(at - reflectors_.begin());
+      marked[i] = 1;
+      place(i);
+    }
+  }
+  if (exhaustiveOrder() >= 3) findSides(marked);
 }
 
 int ImageSearch::exhaustiveOrder() const {
@@ -51,17 +118,6 @@ bool ImageSearch::faces(int a, bool positive_side, int b) const {
   const Facet& plane = scene_.facets[reflectors_[a]];
   const Eigen::RowVector4d d = plane.normal.transpose() * (corners_[b].point.colwise() - plane.origin);
   return positive_side ? d.maxCoeff() > kOnPlane_m : d.minCoeff() < -kOnPlane_m;
-}
-
-bool ImageSearch::insideBeam(const Eigen::Vector3d& apex, int through, int target) const {
-  const auto& window = corners_[through].point;
-  const Eigen::Vector3d center = 0.25 * (window.col(0) + window.col(1) + window.col(2) + window.col(3)) - apex;
-  for (int i = 0; i < 4; ++i) {
-    Eigen::Vector3d n = (window.col(i) - apex).cross(window.col((i + 1) % 4) - apex);
-    if (n.dot(center) < 0) n = -n;
-    if ((n.transpose() * (corners_[target].point.colwise() - apex)).maxCoeff() < -1e-9) return false;
-  }
-  return true;
 }
 
 bool ImageSearch::solve(const Eigen::Vector3d& p, const std::vector<int>& sequence, const RayCaster& rays,
@@ -116,18 +172,32 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
       in_front[a] = (limits.forward.transpose() * (corners_[a].point.colwise() - p)).maxCoeff() > 0;
     }
   }
-  std::vector<double> from_radar;  // distance of p from each plane
-  for (const Plane& plane : planes_) from_radar.push_back(plane.normal.dot(p - plane.origin));
-  // The last facet is tried by where the straight line from p to the image meets its plane, which is cheap.
-  const auto meetsLast = [&](int b, const Eigen::Vector3d& image_before) {
-    const Facet& f = scene_.facets[reflectors_[b]];
-    const double there = -f.planeDistance(image_before), here = f.planeDistance(p);
-    if (!(here * there < 0)) return false;
-    const Eigen::Vector3d image = image_before + 2 * there * f.normal;
-    const Eigen::Vector3d q = p + here / (here - there) * (image - p) - f.origin;
-    const double x = q.dot(f.e1), y = q.dot(f.e2);
-    return x > -1e-6 && y > -1e-6 && x < f.size1_m + 1e-6 && y < f.size2_m + 1e-6;
+  // Of the point itself: distance from each plane, and place in each rectangle's axes.
+  struct Own {
+    double distance_m, along1_m, along2_m;
   };
+  std::vector<Own> own;
+  for (const Mirror& m : mirrors_) {
+    own.push_back({m.normal.dot(p) - m.offset_m, m.e1.dot(p) - m.first1_m, m.e2.dot(p) - m.first2_m});
+  }
+  // The last facet is tried by where the straight line from p to the image meets its plane, which is cheap. beyond_m:
+  // distance of the image before from the plane.
+  const auto meetsLast = [&](int b, double beyond_m, const Eigen::Vector3d& image_before) {
+    const Mirror& m = mirrors_[static_cast<std::size_t>(b)];
+    const Own& o = own[static_cast<std::size_t>(b)];
+    if (!(o.distance_m * beyond_m > 0)) return false;
+    const double share = o.distance_m / (o.distance_m + beyond_m);
+    const double x = o.along1_m + share * (m.e1.dot(image_before) - m.first1_m - o.along1_m);
+    if (!(x > -1e-6 && x < m.size1_m + 1e-6)) return false;
+    const double y = o.along2_m + share * (m.e2.dot(image_before) - m.first2_m - o.along2_m);
+    return y > -1e-6 && y < m.size2_m + 1e-6;
+  };
+  const auto beyond = [this](int b, const Eigen::Vector3d& image) {
+    const Mirror& m = mirrors_[static_cast<std::size_t>(b)];
+    return m.normal.dot(image) - m.offset_m;
+  };
+  std::vector<int> all;
+  for (int i = 0; on_side_.empty() && i < count; ++i) all.push_back(i);
   for (int a = 0; a < count; ++a) {
     if (!in_front[a]) continue;
     const Facet& fa = scene_.facets[reflectors_[a]];
@@ -136,26 +206,30 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
     if (min_order <= 1 && solve(p, {fa.id}, rays, limits, path)) found.push_back(path);
     if (limits.max_order < 2) continue;
     const Eigen::Vector3d image1 = mirror(p, fa);
-    for (int b = 0; b < count; ++b) {
-      if (b == a || !faces(a, da > 0, b) || !insideBeam(image1, a, b)) continue;
+    const Beam beam(image1, corners_[a].point);
+    for (int b : on_side_.empty() ? all : on_side_[static_cast<std::size_t>(2 * a + (da > 0))]) {
+      // Cheap tests first: few facets pass them where no third bounce follows.
+      const double db = beyond(b, image1);
+      if (b == a || std::abs(db) < kOnPlane_m) continue;
+      const bool last = min_order <= 2 && in_front[b] && meetsLast(b, db, image1);
+      if ((!last && limits.max_order < 3) || (on_side_.empty() && !faces(a, da > 0, b))) continue;
+      if (!beam.meets(corners_[b].point)) continue;
       const Facet& fb = scene_.facets[reflectors_[b]];
-      const double db = fb.planeDistance(image1);
-      if (std::abs(db) < kOnPlane_m) continue;
-      if (min_order <= 2 && in_front[b] && !perpendicular(fa, fb) && meetsLast(b, image1) &&
-          solve(p, {fa.id, fb.id}, rays, limits, path)) {
-        found.push_back(path);
-      }
+      if (last && !perpendicular(fa, fb) && solve(p, {fa.id, fb.id}, rays, limits, path)) found.push_back(path);
       if (limits.max_order < 3) continue;
       const Eigen::Vector3d image2 = mirror(image1, fb);
-      // The way on from b stays on the side that it came from.
-      for (int c : on_side_[static_cast<std::size_t>(2 * b + (db > 0))]) {
-        const Plane& plane = planes_[static_cast<std::size_t>(c)];
-        if (!(from_radar[static_cast<std::size_t>(c)] * plane.normal.dot(image2 - plane.origin) > 0)) continue;
-        if (c == b || !in_front[c] || !meetsLast(c, image2)) continue;
-        if (solve(p, {fa.id, fb.id, reflectors_[c]}, rays, limits, path)) found.push_back(path);
+      // The way on from b stays on the side that it came from. A path runs both ways, so c is searched from a on.
+      const std::vector<int>& thirds = on_side_[static_cast<std::size_t>(2 * b + (db > 0))];
+      for (auto third = std::lower_bound(thirds.begin(), thirds.end(), a); third != thirds.end(); ++third) {
+        const int c = *third;
+        if (!in_front[c] || !meetsLast(c, beyond(c, image2), image2) || c == b) continue;
+        const int fc = reflectors_[c];
+        if (solve(p, {fa.id, fb.id, fc}, rays, limits, path)) found.push_back(path);
+        if (c != a && solve(p, {fc, fb.id, fa.id}, rays, limits, path)) found.push_back(path);
       }
     }
   }
+  std::sort(found.begin(), found.end(), [](const ImagePath& a, const ImagePath& b) { return a.facets < b.facets; });
   // Where the line to an image runs through an edge, several orders of the same facets are one path.
   std::vector<ImagePath> unique;
   for (const ImagePath& f : found) {

@@ -25,6 +25,8 @@ class ImageSearch {
  public:
   /// all_orientations: facets near the horizontal reflect too (the closed form of a box room).
   explicit ImageSearch(const Scene& scene, bool all_orientations = false);
+  /// Some actors of the scene stand elsewhere now: as if made anew.
+  void update(const std::vector<int>& actors);
 
   struct Limits {
     int max_order = 3;
@@ -60,15 +62,25 @@ class ImageSearch {
     Eigen::Matrix<double, 3, 4> point;
   };
   bool faces(int a, bool positive_side, int b) const;  // b has a part on that side of a
-  bool insideBeam(const Eigen::Vector3d& apex, int through, int target) const;
+
+  void build();
+  bool takesPart(const Facet& facet) const;
+  void place(std::size_t reflector);
+  /// Which facets have a part on which side of which others, as far as one of each two is marked.
+  void findSides(const std::vector<char>& marked);
 
   const Scene& scene_;
+  const bool all_orientations_;
   std::vector<int> reflectors_;   // facet ids
   std::vector<Corners> corners_;  // per reflector, of the bounding rectangle
-  struct Plane {
-    Eigen::Vector3d normal, origin;
+  /// A facet as far as the search asks for it again and again, close together in memory: a point q of the plane lies in
+  /// the bounding rectangle where e1.q - first1_m is from 0 to size1_m, and likewise the other.
+  struct Mirror {
+    Eigen::Vector3d normal, e1, e2;
+    double offset_m, first1_m, first2_m, size1_m, size2_m;
   };
-  std::vector<Plane> planes_;  // per reflector
+  std::vector<Mirror> mirrors_;  // per reflector
+  std::vector<char> sides_;      // [a][b]: 1 where b has a part on a's negative side, 2 on its positive one, 3 both
   // [2 * reflector + side]: reflectors with a part on that side of it, 1 where its normal points. Empty where there are
   // too many for three bounces.
   std::vector<std::vector<int>> on_side_;

@@ -33,8 +33,6 @@ bool PoseContext::inFieldOfView(const Eigen::Vector3d& direction_radar) const {
   return mmradartwin::inFieldOfView(direction_radar);
 }
 
-bool SceneChange::moved(int actor) const { return std::find(actors.begin(), actors.end(), actor) != actors.end(); }
-
 bool SceneChange::crosses(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const {
   const Eigen::Vector3d way = b - a, inverse = way.cwiseInverse();
   for (const Eigen::AlignedBox3d& box : bounds) {

@@ -4,6 +4,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "twin_impl.h"
+#include "view_cone.h"
 
 namespace mmradartwin {
 namespace {
@@ -108,6 +109,14 @@ void MovingTwin::trace(const PoseContext& context, const SceneChange* change) {
   records.reserve(before.size());
   found_ = 0;
   std::vector<PathRecord> gone, fresh;
+  const Eigen::Vector3d radar = context.T_map_radar.translation();
+  const ViewCones cones(radar, change ? change->bounds : std::vector<Eigen::AlignedBox3d>());
+  const auto touched = [&](const PathRecord& r) {
+    if (r.vertices.size() == 1 && r.actors.size() == 1 && !cones.mayMeet(r.vertices[0] - radar)) {
+      return change->moved(r.actors[0]);
+    }
+    return change->touches(radar, r);
+  };
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const Mechanism& mechanism = *m.mechanisms[i];
     Part& part = parts_[i];
@@ -118,7 +127,7 @@ void MovingTwin::trace(const PoseContext& context, const SceneChange* change) {
     gone.clear();
     if (partly) {
       for (std::size_t k = part.begin; k < part.end; ++k) {
-        (change->touches(c.T_map_radar.translation(), before[k]) ? gone : records).push_back(std::move(before[k]));
+        (touched(before[k]) ? gone : records).push_back(std::move(before[k]));
       }
     } else {
       part.sum.setZero(context.radar.channels(), context.radar.samples_per_chirp);
@@ -156,10 +165,13 @@ void MovingTwin::sumAll(const PoseContext& context) {
 
 const Simulation& MovingTwin::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) {
   Twin::Impl& m = *twin_->impl_;
-  const bool stands = valid_ && T_map_radar.matrix() == simulation_.T_map_radar.matrix();
+  const bool was_valid = valid_;
   valid_ = false;
   const SceneChange change = placed_ ? moveActors() : SceneChange();
   PoseContext c = m.context(T_map_radar, stamp_ns);
+  const bool stands = was_valid && T_map_radar.matrix() == simulation_.T_map_radar.matrix() &&
+                      c.T_map_radar.matrix() == traced_at_.matrix();
+  traced_at_ = c.T_map_radar;
   c.receiver_gain = [&m, &c](double length_m) { return m.toneGain(c, length_m); };
   simulation_.stamp_ns = stamp_ns;
   simulation_.T_map_radar = T_map_radar;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <limits>
 #include <stdexcept>
@@ -51,13 +52,27 @@ bool castable(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, d
          length < 2 * kFarthest_m;
 }
 
-/// Whole vectors are stored, as Embree loads them: single numbers would have to wait for each other.
-void fill(RTCRay& ray, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double length) {
-  Eigen::Map<Eigen::Vector4f, Eigen::Aligned16>(&ray.org_x) = Eigen::Vector4f(
-      static_cast<float>(origin.x()), static_cast<float>(origin.y()), static_cast<float>(origin.z()), 0.0F);
-  Eigen::Map<Eigen::Vector4f, Eigen::Aligned16>(&ray.dir_x) = Eigen::Vector4f(
-      static_cast<float>(direction.x()), static_cast<float>(direction.y()), static_cast<float>(direction.z()), 0.0F);
-  ray.tfar = static_cast<float>(length);
+/// The same of a ray of this square length.
+bool castable(const Eigen::Vector3d& origin, double square_length) {
+  return origin.squaredNorm() < kFarthest_m * kFarthest_m && square_length < 4 * kFarthest_m * kFarthest_m;
+}
+
+/// Four numbers that the compiler keeps in one register.
+using Float4 = float __attribute__((vector_size(16)));
+
+/// Whole vectors are stored, as Embree loads them: a load of what was stored in parts waits until all of it has left
+/// the processor's store buffer.
+void fill(RTCRay& ray, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double near, double far) {
+  const Float4 from = {static_cast<float>(origin.x()), static_cast<float>(origin.y()), static_cast<float>(origin.z()),
+                       static_cast<float>(near)};
+  const Float4 along = {static_cast<float>(direction.x()), static_cast<float>(direction.y()),
+                        static_cast<float>(direction.z()), 0.0F};
+  static_assert(offsetof(RTCRay, tnear) == offsetof(RTCRay, org_x) + 12 && offsetof(RTCRay, dir_x) % 16 == 0 &&
+                    offsetof(RTCRay, time) == offsetof(RTCRay, dir_x) + 12,
+                "RTCRay holds origin and tnear, direction and time side by side");
+  std::memcpy(&ray.org_x, &from, sizeof from);
+  std::memcpy(&ray.dir_x, &along, sizeof along);
+  ray.tfar = static_cast<float>(far);
   ray.mask = static_cast<unsigned>(-1);  // Debian's Embree has ray masks on
   ray.id = 0;
   ray.flags = 0;
@@ -184,14 +199,15 @@ void RayCaster::place(int actor, const Eigen::Isometry3d& T) {
 }
 
 bool RayCaster::visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const {
-  const Eigen::Vector3d d = b - a;
-  const double length = d.norm();
-  if (length <= 2 * gap_m) return true;
-  const Eigen::Vector3d unit = (1 / length) * d;
-  const Eigen::Vector3d origin = a + gap_m * unit - embree_->center;
-  if (!castable(origin, unit, length - 2 * gap_m)) return false;
+  // Embree wants no unit direction: with the whole way as direction the ray need not wait for a root and a division,
+  // which say only where on it the search begins and ends.
+  const Eigen::Vector3d d = b - a, origin = a - embree_->center;
+  const double square = d.squaredNorm();
+  if (square <= 4 * gap_m * gap_m) return true;
+  if (!castable(origin, square)) return false;
+  const double gap = gap_m / std::sqrt(square);
   RTCRay ray;
-  fill(ray, origin, unit, length - 2 * gap_m);
+  fill(ray, origin, d, gap, 1 - gap);
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcOccluded1(embree_->scene, &context, &ray);
@@ -213,22 +229,22 @@ std::vector<char> RayCaster::visible(const Eigen::Vector3d& a, const std::vector
       valid[i] = 0;
       if (i >= count) continue;
       const Eigen::Vector3d d = points[first + i] - a;
-      const double length = d.norm(), gap = gap_m[first + i], reach = length - 2 * gap;
-      if (reach <= 0) continue;  // nothing has room between them
-      const Eigen::Vector3d unit = (1 / length) * d, origin = from + gap * unit;
-      if (!castable(origin, unit, reach)) {
+      const double square = d.squaredNorm(), gap_here_m = gap_m[first + i];
+      if (square <= 4 * gap_here_m * gap_here_m) continue;  // nothing has room between them
+      if (!castable(from, square)) {
         free[first + i] = 0;
         continue;
       }
+      const double gap = gap_here_m / std::sqrt(square);
       valid[i] = -1;
-      rays.org_x[i] = static_cast<float>(origin.x());
-      rays.org_y[i] = static_cast<float>(origin.y());
-      rays.org_z[i] = static_cast<float>(origin.z());
-      rays.dir_x[i] = static_cast<float>(unit.x());
-      rays.dir_y[i] = static_cast<float>(unit.y());
-      rays.dir_z[i] = static_cast<float>(unit.z());
-      rays.tnear[i] = 0;
-      rays.tfar[i] = static_cast<float>(reach);
+      rays.org_x[i] = static_cast<float>(from.x());
+      rays.org_y[i] = static_cast<float>(from.y());
+      rays.org_z[i] = static_cast<float>(from.z());
+      rays.dir_x[i] = static_cast<float>(d.x());
+      rays.dir_y[i] = static_cast<float>(d.y());
+      rays.dir_z[i] = static_cast<float>(d.z());
+      rays.tnear[i] = static_cast<float>(gap);
+      rays.tfar[i] = static_cast<float>(1 - gap);
       rays.time[i] = 0;
       rays.mask[i] = static_cast<unsigned>(-1);
       rays.id[i] = rays.flags[i] = 0;
@@ -261,7 +277,7 @@ bool RayCaster::passesVeils(const Eigen::Vector3d& a, const Eigen::Vector3d& b, 
     const Eigen::Vector3d origin = a + from * unit - embree_->center;
     if (!castable(origin, unit, length - from)) return true;
     RTCRayHit query;
-    fill(query.ray, origin, unit, length - from);
+    fill(query.ray, origin, unit, 0, length - from);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.primID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -282,14 +298,11 @@ std::optional<RayCaster::Hit> RayCaster::firstHit(const Eigen::Vector3d& origin,
   const Eigen::Vector3d from = origin - embree_->center;
   Eigen::Vector3d unit = direction;
   if (std::abs(square - 1) > 1e-14) unit /= std::sqrt(square);
-  // Beyond the scene there is nothing, and Embree wants finite rays.
-  const double length = std::min(max_m, from.lpNorm<1>() + embree_->radius_m + 1);
+  const double length = std::min(max_m, kFarthest_m);  // Embree wants finite rays
   if (!castable(from, unit, length)) return std::nullopt;
   RTCRayHit query;
-  fill(query.ray, from, unit, length);
+  fill(query.ray, from, unit, 0, length);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  query.hit.primID = RTC_INVALID_GEOMETRY_ID;
-  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcIntersect1(embree_->scene, &context, &query);

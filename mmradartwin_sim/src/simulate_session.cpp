@@ -130,7 +130,8 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
     const Pose& pose = recording.poses[i];
     try {
       Simulation s = twin.simulate(pose.T_map_radar, pose.stamp_ns);
-      writePathsCsv(s.records, twin.scene(), (paths / (pose.name + ".csv")).string());
+      writePathsCsv(exportedRecords(twin.radar(), s.records, options.diffuse_records), twin.scene(),
+                    (paths / (pose.name + ".csv")).string());
       if (twin.hasFrameStage()) {
         twin.visitChirps(s, options.frames, [&levels](const ChirpContext&, const ComplexGrid& x) { levels.add(x); });
       } else {

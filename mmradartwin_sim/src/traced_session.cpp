@@ -9,12 +9,12 @@
 #include <tuple>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "record_group.h"
 
 namespace mmradartwin {
 namespace {
 
-/// What the records of one facet have in common, and where on the grid of directions and lengths a node lies.
-using Group = std::tuple<const std::string*, std::vector<int>, std::vector<int>>;
+/// Where on the grid of directions and lengths a node lies.
 using Place = std::tuple<int, int, int>;  // azimuth, elevation, length
 
 struct Node {
@@ -37,26 +37,16 @@ Eigen::Vector3d direction(int azimuth, int elevation, const CondensedTrace::Opti
 }  // namespace
 
 CondensedTrace::CondensedTrace(const RadarConfig& radar, std::vector<PathRecord> records, const Options& options) {
-  std::map<Group, std::vector<std::size_t>> groups;
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    const PathRecord& r = records[i];
-    if (r.facets.empty() || r.departure != r.arrival) continue;
-    groups[{r.event, r.actors, r.facets}].push_back(i);
-  }
   const int channels = radar.channels(), samples = radar.samples_per_chirp;
   std::vector<char> summed(records.size(), 0);
   std::vector<PathRecord> scaled;
   ComplexGrid x;
-  // Groups in the order of their first records: by name and place in the scene, never by address.
-  std::vector<const std::pair<const Group, std::vector<std::size_t>>*> in_order;
-  for (const auto& group : groups) {
-    if (static_cast<int>(group.second.size()) >= options.fewest_records) in_order.push_back(&group);
-  }
-  std::sort(in_order.begin(), in_order.end(),
-            [](const auto* a, const auto* b) { return a->second.front() < b->second.front(); });
-  for (const auto* group : in_order) {
+  Eigen::ArrayXf sum(2 * channels * samples);
+  for (const std::vector<std::size_t>& group : groupByFacetOrActor(records, options.fewest_records)) {
+    const std::size_t begin = nodes_.size();
+    sum.setZero();
     std::map<Place, Node> nodes;
-    for (std::size_t i : group->second) {
+    for (std::size_t i : group) {
       summed[i] = 1;
       const Eigen::Vector2d at = steps(records[i].departure, options);
       const int a = static_cast<int>(std::floor(at.x())), e = static_cast<int>(std::floor(at.y()));
@@ -70,12 +60,7 @@ CondensedTrace::CondensedTrace(const RadarConfig& radar, std::vector<PathRecord>
     }
     for (const auto& [place, node] : nodes) {
       const PathRecord& first = records[node.members.front().first];
-      PathRecord stand_in;
-      stand_in.event = first.event;
-      stand_in.actors = first.actors;
-      stand_in.facets = first.facets;
-      stand_in.bounces = first.bounces;
-      stand_in.reflection_cosine = first.reflection_cosine;
+      PathRecord stand_in = standIn(first);
       stand_in.departure = stand_in.arrival = direction(std::get<0>(place), std::get<1>(place), options);
       stand_in.length_m.assign(static_cast<std::size_t>(channels), 0);
       stand_in.vertices.assign(first.vertices.size(), Eigen::Vector3d::Zero());
@@ -101,8 +86,12 @@ CondensedTrace::CondensedTrace(const RadarConfig& radar, std::vector<PathRecord>
         for (int n = 0; n < samples; ++n) grids_.push_back(static_cast<float>(x(k, n).real()));
         for (int n = 0; n < samples; ++n) grids_.push_back(static_cast<float>(x(k, n).imag()));
       }
+      sum += Eigen::Map<const Eigen::ArrayXf>(grids_.data() + grids_.size() - sum.size(), sum.size());
+      for (const auto& c : stand_in.c) inverse_.push_back(std::conj(c) / std::norm(c));
       nodes_.push_back(std::move(stand_in));
     }
+    stretches_.push_back({begin, nodes_.size()});
+    sums_.insert(sums_.end(), sum.data(), sum.data() + sum.size());
   }
   grids_.shrink_to_fit();
   for (std::size_t i = 0; i < records.size(); ++i) {
@@ -110,51 +99,76 @@ CondensedTrace::CondensedTrace(const RadarConfig& radar, std::vector<PathRecord>
   }
 }
 
-void CondensedTrace::addNodes(const RadarConfig& radar, const std::vector<PathRecord>& weighed, ComplexGrid& x) const {
-  if (weighed.size() != nodes_.size()) throw std::invalid_argument("CondensedTrace: one weighed stand-in per node");
+void CondensedTrace::addNodes(const RadarConfig& radar, const std::function<void(PathRecord&)>& weigh,
+                              ComplexGrid& x) const {
   const int channels = radar.channels(), samples = radar.samples_per_chirp;
-  const std::size_t grid_size = static_cast<std::size_t>(2 * channels * samples);
+  const auto grid_size = static_cast<std::size_t>(2 * channels * samples);
   if (x.rows() != channels || x.cols() != samples) x = ComplexGrid::Zero(channels, samples);
   const double rate_per_m = 2 * M_PI * radar.slope_hz_per_s / kSpeedOfLight_m_per_s;
+  std::vector<float> sum(grid_size, 0.0F);
+  const auto add = [&](const std::complex<double>& factor, const float* re, int channel) {
+    const float fr = static_cast<float>(factor.real()), fi = static_cast<float>(factor.imag());
+    const float* __restrict from_re = re;
+    const float* __restrict from_im = re + samples;
+    float* __restrict to_re = sum.data() + static_cast<std::size_t>(2 * channel * samples);
+    float* __restrict to_im = to_re + samples;
+    for (int n = 0; n < samples; ++n) {
+      to_re[n] += fr * from_re[n] - fi * from_im[n];
+      to_im[n] += fr * from_im[n] + fi * from_re[n];
+    }
+  };
   // Few enough at a time for sums in single precision.
   constexpr std::size_t kAtOnce = 16;
-  std::vector<float> sum(grid_size);
-  for (std::size_t first = 0; first < nodes_.size(); first += kAtOnce) {
-    std::fill(sum.begin(), sum.end(), 0.0F);
-    for (std::size_t i = first; i < std::min(nodes_.size(), first + kAtOnce); ++i) {
-      const PathRecord &was = nodes_[i], &is = weighed[i];
-      for (int k = 0; k < channels; ++k) {
-        const float* re = grids_.data() + i * grid_size + static_cast<std::size_t>(2 * k * samples);
-        const float* im = re + samples;
-        // As a product: a complex division is a call that guards against overflow.
-        const std::complex<double> factor =
-            is.c[k] == was.c[k] ? 1.0 : is.c[k] * std::conj(was.c[k]) * (1 / std::norm(was.c[k]));
-        const double longer_m = is.length_m[k] - was.length_m[k];
-        if (longer_m != 0) {
-          for (int n = 0; n < samples; ++n) {
-            x(k, n) += factor * std::complex<double>(re[n], im[n]) *
-                       std::polar(1.0, rate_per_m * longer_m * (radar.sample_time_s(n) - radar.window_center_s()));
-          }
-          continue;
-        }
-        const float fr = static_cast<float>(factor.real()), fi = static_cast<float>(factor.imag());
-        float* to_re = sum.data() + 2 * k * samples;
-        float* to_im = to_re + samples;
-        for (int n = 0; n < samples; ++n) {
-          to_re[n] += fr * re[n] - fi * im[n];
-          to_im[n] += fr * im[n] + fi * re[n];
-        }
-      }
-    }
+  std::size_t added = 0;
+  const auto flush = [&] {
     for (int k = 0; k < channels; ++k) {
-      const float* re = sum.data() + 2 * k * samples;
+      const float* re = sum.data() + static_cast<std::size_t>(2 * k * samples);
       for (int n = 0; n < samples; ++n) x(k, n) += std::complex<double>(re[n], re[samples + n]);
     }
+    std::fill(sum.begin(), sum.end(), 0.0F);
+    added = 0;
+  };
+  PathRecord is;  // one for all: its lists keep their memory
+  std::vector<std::complex<double>> factor;
+  for (std::size_t s = 0; s < stretches_.size(); ++s) {
+    const Stretch& stretch = stretches_[s];
+    factor.clear();
+    bool alike = true, as_long = true;
+    for (std::size_t i = stretch.begin; i < stretch.end; ++i) {
+      const PathRecord& was = nodes_[i];
+      is = was;
+      weigh(is);
+      for (std::size_t k = 0; k < is.c.size(); ++k) {
+        factor.push_back(is.c[k] * inverse_[i * is.c.size() + k]);
+        alike = alike && std::norm(factor.back() - factor[k]) <= 1e-15 * std::norm(factor[k]);
+        const double longer_m = is.length_m[k] - was.length_m[k];
+        if (longer_m == 0) continue;
+        as_long = false;
+        const float* re = grids_.data() + i * grid_size + 2 * k * static_cast<std::size_t>(samples);
+        for (int n = 0; n < samples; ++n) {
+          x(static_cast<Eigen::Index>(k), n) +=
+              factor.back() * std::complex<double>(re[n], re[samples + n]) *
+              std::polar(1.0, rate_per_m * longer_m * (radar.sample_time_s(n) - radar.window_center_s()));
+        }
+        factor.back() = 0;  // it is in x already
+      }
+    }
+    const bool as_one = alike && as_long;
+    for (std::size_t i = stretch.begin; i < (as_one ? stretch.begin + 1 : stretch.end); ++i) {
+      const float* grid = as_one ? sums_.data() + s * grid_size : grids_.data() + i * grid_size;
+      for (int k = 0; k < channels; ++k) {
+        add(factor[(i - stretch.begin) * static_cast<std::size_t>(channels) + static_cast<std::size_t>(k)],
+            grid + static_cast<std::size_t>(2 * k * samples), k);
+      }
+      if (++added == kAtOnce) flush();
+    }
   }
+  flush();
 }
 
 std::size_t CondensedTrace::bytes() const {
-  std::size_t sum = grids_.capacity() * sizeof grids_[0];
+  std::size_t sum =
+      (grids_.capacity() + sums_.capacity()) * sizeof grids_[0] + inverse_.capacity() * sizeof inverse_[0];
   for (const auto* list : {&records_, &nodes_}) {
     for (const PathRecord& r : *list) {
       sum += sizeof r + r.c.size() * sizeof r.c[0] + r.length_m.size() * sizeof(double) +
@@ -174,7 +188,7 @@ TracedSession::TracedSession(const Twin& twin, const std::vector<Pose>& poses, c
   std::vector<std::string> failures(poses.size());
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
     try {
-      traces_[i] = CondensedTrace(twin.radar(), twin.trace(poses[i].T_map_radar), options);
+      traces_[i] = CondensedTrace(twin.radar(), twin.trace(poses[i].T_map_radar, poses[i].stamp_ns), options);
       usable_[i] = 1;
     } catch (const InputError& e) {
       failures[i] = e.what();

@@ -26,6 +26,30 @@ std::string formatPoint(const Eigen::Vector3d& p) {
   return out.str();
 }
 
+constexpr double kFollows_s = 0.2;  // poses further apart say nothing about the time between them
+
+/// Along poses that follow each other closely, evenly from one to the next; at others the radar stands.
+Trajectory trajectoryOf(std::vector<Pose> poses) {
+  std::sort(poses.begin(), poses.end(), [](const Pose& a, const Pose& b) { return a.stamp_ns < b.stamp_ns; });
+  return [poses = std::move(poses)](std::int64_t stamp_ns) -> std::optional<Eigen::Isometry3d> {
+    if (poses.empty()) return std::nullopt;
+    const auto after = std::upper_bound(poses.begin(), poses.end(), stamp_ns,
+                                        [](std::int64_t stamp, const Pose& p) { return stamp < p.stamp_ns; });
+    if (after == poses.begin()) return poses.front().T_map_radar;
+    const Pose& before = *std::prev(after);
+    if (after == poses.end()) return before.T_map_radar;
+    const double gap_s = static_cast<double>(after->stamp_ns - before.stamp_ns) * 1e-9;
+    if (gap_s > kFollows_s) return before.T_map_radar;
+    const double share = static_cast<double>(stamp_ns - before.stamp_ns) * 1e-9 / gap_s;
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    T.linear() = Eigen::Quaterniond(before.T_map_radar.linear())
+                     .slerp(share, Eigen::Quaterniond(after->T_map_radar.linear()))
+                     .toRotationMatrix();
+    T.translation() = (1 - share) * before.T_map_radar.translation() + share * after->T_map_radar.translation();
+    return T;
+  };
+}
+
 }  // namespace
 
 /// Compares with phasors evaluated one by one at three samples: another arithmetic than the recurrence that made x.
@@ -79,6 +103,7 @@ Twin Twin::changed(std::vector<NamedParameters> mechanisms) const {
   other->rays = impl_->rays;
   other->strongest = impl_->strongest;
   other->session_ns = impl_->session_ns;
+  other->reported = impl_->reported;
   other->assemble();
   return Twin(std::move(other));
 }
@@ -87,9 +112,10 @@ bool Twin::altersGeometry() const { return impl_->edited || impl_->movesRadar();
 
 bool Twin::addsScreensAlone() const { return impl_->screens && !impl_->movesRadar(); }
 
-void Twin::removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord>& records) const {
+void Twin::removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord>& records,
+                        std::int64_t stamp_ns) const {
   if (!impl_->screens) return;
-  const Eigen::Vector3d radar = impl_->modelPose(T_map_radar).translation();
+  const Eigen::Vector3d radar = impl_->modelPose(T_map_radar, stamp_ns).translation();
   const auto hidden = [&](const PathRecord& r) {
     Eigen::Vector3d from = radar;
     for (const Eigen::Vector3d& v : r.vertices) {
@@ -163,6 +189,7 @@ void Twin::setSession(const std::vector<Pose>& poses) {
   impl_->session_ns.clear();
   for (const Pose& p : poses) impl_->session_ns.push_back(p.stamp_ns);
   std::sort(impl_->session_ns.begin(), impl_->session_ns.end());
+  impl_->reported = trajectoryOf(poses);
   for (const auto& m : impl_->mechanisms) {
     const std::string only = m->onlyPose();
     if (only.empty() || std::any_of(poses.begin(), poses.end(), [&only](const Pose& p) { return p.name == only; })) {
@@ -171,6 +198,8 @@ void Twin::setSession(const std::vector<Pose>& poses) {
     throw InputError(description().file + ": mechanism " + m->name() + ": key pose: the session has no pose " + only);
   }
 }
+
+void Twin::setTrajectory(Trajectory reported) { impl_->reported = std::move(reported); }
 
 std::vector<std::string> Twin::notes() const {
   std::vector<std::string> notes;
@@ -206,8 +235,8 @@ void Twin::Impl::refuseUnusablePose(const PoseContext& c) const {
   }
 }
 
-std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar) const {
-  const PoseContext c = impl_->context(T_map_radar);
+std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) const {
+  const PoseContext c = impl_->context(T_map_radar, stamp_ns);
   impl_->refuseUnusablePose(c);
   std::vector<PathRecord> records;
   for (const auto& m : impl_->mechanisms) {
@@ -302,16 +331,20 @@ Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRec
     impl_->propagate(c, impl_->filtered(c, s.records), s.grid.x);
   }
   if (condensed) {
-    std::vector<PathRecord> nodes = condensed->nodes();
-    impl_->reweight(c, nodes, 0);
-    condensed->addNodes(radar, impl_->filtered(c, std::move(nodes)), s.grid.x);
+    condensed->addNodes(
+        radar,
+        [&](PathRecord& node) {
+          for (const auto& m : impl_->mechanisms) m->reweight(c, node);
+          impl_->filter(c, node);
+        },
+        s.grid.x);
   }
   impl_->receive(c, s.grid.x);
   return s;
 }
 
 Simulation Twin::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) const {
-  return weigh(T_map_radar, trace(T_map_radar), stamp_ns);
+  return weigh(T_map_radar, trace(T_map_radar, stamp_ns), stamp_ns);
 }
 
 }  // namespace mmradartwin

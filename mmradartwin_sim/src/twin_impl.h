@@ -28,6 +28,7 @@ struct Twin::Impl {
   bool has_chirp_paths = false, has_modulation = false, has_chirp_stage = false, has_digitise = false,
        has_transport = false;
   std::vector<std::int64_t> session_ns;  // stamps of the session's poses in order of time
+  Trajectory reported;                   // null where nothing is known
 
   /// Makes the mechanisms of the description and all that follows from them; scene and rays are there.
   void assemble();
@@ -38,11 +39,21 @@ struct Twin::Impl {
   /// True where a mechanism moves the radar.
   bool movesRadar() const {
     const Eigen::Isometry3d here = Eigen::Isometry3d::Identity();
-    return !modelPose(here).isApprox(here, 0);
+    return poseLag_s() != 0 || !modelPose(here, 0).isApprox(here, 0);
+  }
+  double poseLag_s() const {
+    double lag_s = 0;
+    for (const auto& m : mechanisms) lag_s += m->poseLag_s();
+    return lag_s;
   }
 
-  Eigen::Isometry3d modelPose(const Eigen::Isometry3d& T_map_radar) const {
+  Eigen::Isometry3d modelPose(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) const {
     Eigen::Isometry3d T = T_map_radar;
+    if (const double lag_s = poseLag_s(); lag_s != 0 && reported) {
+      // What is true now is reported later.
+      const auto now = reported(stamp_ns), later = reported(stamp_ns + std::llround(lag_s * 1e9));
+      if (now && later) T = T * (now->inverse() * *later);
+    }
     for (const auto& m : mechanisms) T = m->pose(T);
     return T;
   }
@@ -52,7 +63,7 @@ struct Twin::Impl {
     PoseContext c{radar,
                   model(),
                   modelRays(),
-                  modelPose(T_map_radar),
+                  modelPose(T_map_radar, stamp_ns),
                   radar.center_frequency_hz(),
                   radar.max_range_m(),
                   seed,
@@ -92,14 +103,16 @@ struct Twin::Impl {
   /// Paths as the receiver's filters leave them; the same records where there are no filters.
   std::vector<PathRecord> filtered(const PoseContext& c, std::vector<PathRecord> records) const {
     if (!has_tone_gain) return records;
-    for (PathRecord& r : records) {
-      for (std::size_t k = 0; k < r.c.size(); ++k) {
-        for (const auto& m : mechanisms) {
-          if (m->hasToneGain()) r.c[k] *= m->toneGain(c, r.length_m[k]);
-        }
+    for (PathRecord& r : records) filter(c, r);
+    return records;
+  }
+  void filter(const PoseContext& c, PathRecord& r) const {
+    if (!has_tone_gain) return;
+    for (std::size_t k = 0; k < r.c.size(); ++k) {
+      for (const auto& m : mechanisms) {
+        if (m->hasToneGain()) r.c[k] *= m->toneGain(c, r.length_m[k]);
       }
     }
-    return records;
   }
 
   /// Grid of filtered paths before receive().

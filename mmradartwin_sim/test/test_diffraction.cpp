@@ -2,6 +2,7 @@
 
 #include "../src/diffracting_edge.h"
 #include "../src/wedge_diffraction.h"
+#include "closed_form.h"
 #include "scene_files.h"
 
 namespace mmradartwin {
@@ -17,8 +18,9 @@ TEST(Transition, HasItsTabulatedValues) {
   const double rows[][3] = {{.01, .1637, 40.632}, {.1, .4364, 32.494}, {.3, .6335, 25.524},
                             {1, .8422, 16.005},   {3, .9565, 7.967},   {10, .9942, 2.788}};
   for (const auto& row : rows) {
-    EXPECT_NEAR(std::abs(transitionFunction(row[0])), row[1], 1e-4);
-    EXPECT_NEAR(std::arg(transitionFunction(row[0])) / kDegree, row[2], 2e-3);
+    expectForm("4.6 abs F(" + shortText(row[0]) + ")", "1", row[1], std::abs(transitionFunction(row[0])), 1e-4);
+    expectForm("4.6 arg F(" + shortText(row[0]) + ")", "deg", row[2], std::arg(transitionFunction(row[0])) / kDegree,
+               2e-3);
   }
   EXPECT_NEAR(std::abs(transitionFunction(999.9) - transitionFunction(1000.1)), 0, 1e-6) << "the series joins";
 }
@@ -46,8 +48,8 @@ TEST(Wedge, IsSommerfeldsHalfPlane) {
                  ? std::abs(0.5 * (totalField(2, 20, 240 - 1e-4, 60, gamma) + totalField(2, 20, 240 + 1e-4, 60, gamma)))
                  : std::abs(totalField(2, 20, row[0], 60, gamma));
     };
-    EXPECT_NEAR(size(-1), row[1], 2e-6) << row[0];
-    EXPECT_NEAR(size(1), row[2], 2e-6) << row[0];
+    expectForm("4.6 half plane at " + shortText(row[0]) + " deg, soft", "1", row[1], size(-1), 2e-6);
+    expectForm("4.6 half plane at " + shortText(row[0]) + " deg, hard", "1", row[2], size(1), 2e-6);
   }
 }
 
@@ -56,8 +58,8 @@ TEST(Wedge, IsContinuousAtBothShadowBoundaries) {
     for (double gamma : {-1.0, 1.0, -0.4}) {
       for (double boundary : {120.0, 240.0}) {
         const Complex below = totalField(n, 20, boundary - 5e-4, 60, gamma);
-        EXPECT_LT(std::abs(totalField(n, 20, boundary + 5e-4, 60, gamma) - below), 1e-3)
-            << "n " << n << ", gamma " << gamma << ", " << boundary << " deg";
+        expectForm("4.6 step at " + shortText(boundary) + " deg, n " + shortText(n) + ", face " + shortText(gamma), "1",
+                   0, std::abs(totalField(n, 20, boundary + 5e-4, 60, gamma) - below), 1e-3);
       }
     }
   }
@@ -77,8 +79,8 @@ TEST(Wedge, HasTheMonostaticLevelsOfABoxEdge) {
           wedgeCoefficient(1.5, row[0] * kDegree, row[0] * kDegree, R / 2, 1, kWavenumber77, gamma, gamma);
       return 10 * std::log10(4 * M_PI * R * std::norm(D) / 2);
     };
-    EXPECT_NEAR(level(-1), row[1], 0.06);
-    EXPECT_NEAR(level(1), row[2], 0.06);
+    expectForm("4.6 box edge at 2 m, " + shortText(row[0]) + " deg, soft", "dBsm", row[1], level(-1), 0.06);
+    expectForm("4.6 box edge at 2 m, " + shortText(row[0]) + " deg, hard", "dBsm", row[2], level(1), 0.06);
   }
 }
 

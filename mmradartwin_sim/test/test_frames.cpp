@@ -2,6 +2,7 @@
 
 #include <numeric>
 
+#include "closed_form.h"
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_sim/simulate_session.h"
@@ -77,7 +78,10 @@ TEST_F(FramesTest, WalkersTurnFromSlotToSlot) {
     chirps.push_back(x(0, 32) - still.grid.x(c.slot, 32));  // sample 32 is the window's centre
   });
   ASSERT_EQ(chirps.size(), 12u);
-  for (std::size_t i = 1; i < 6; ++i) EXPECT_NEAR(std::arg(chirps[i] / chirps[i - 1]) * 180 / M_PI, 11.096, 0.002);
+  for (std::size_t i = 1; i < 6; ++i) {
+    expectForm("4.9 TDM at 1 m/s, chirp " + std::to_string(i), "deg", 11.096,
+               std::arg(chirps[i] / chirps[i - 1]) * 180 / M_PI, 0.002);
+  }
   // From frame to frame 50 ms: 0.1 m of path.
   const double turns = 2 * 1.0 * 0.05 / kSpeedOfLight_m_per_s * 77e9;
   EXPECT_NEAR(std::remainder(std::arg(chirps[6] / chirps[0]) / (2 * M_PI) - turns, 1.0), 0, 1e-3);
@@ -314,6 +318,103 @@ TEST_F(FramesTest, AreTheSameBitsOnAnyThread) {
   tbb::parallel_for(0, 8, [&](int i) { together[static_cast<std::size_t>(i)] = make(i); });
   for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(alone[i], together[i]);
   EXPECT_NE(alone[0], alone[1]);
+}
+
+// Every cause that reference/causes.md names is a mechanism of that name whose parameters bear the catalogue's names
+// and units, and switching it on changes what a moving radar records.
+TEST_F(FramesTest, EveryCauseCanBeSwitchedOn) {
+  addWall("ahead", "RoughConcrete", {4, -2}, {4, 2}, -1, 1);
+  addWall("left", "Concrete", {4, 2}, {-1, 2}, -1, 1);
+  addWall("right", "Metal", {-1, -2}, {4, -2}, -1, 1);
+  addRectangle("floor", "Concrete", {-2, -3, -0.9}, {8, 0, 0}, {0, 6, 0});
+  addBox("cabinet", "Metal", {2, 0.6, -0.9}, {2.5, 1.2, 0.6});
+  addWall("pane", "Metal", {1.5, -0.5}, {1.5, 0.2}, -1, 1);
+  addWall("screen_left", "Metal", {3, -1.98}, {3, -1.2}, -1, 1);
+  writeScene("causes");
+  struct Cause {
+    const char *name, *values;
+    std::vector<std::pair<std::string, std::string>> parameters;  // name and unit
+  };
+  const std::vector<Cause> causes = {
+      {"tx_rx_leakage", "range_m: 0.06, level_db: 3", {{"range_m", "m"}, {"level_db", "dB"}}},
+      {"range_bias", "range_m: 0.03", {{"range_m", "m"}}},
+      {"range_scale", "scale: 0.01", {{"scale", "1"}}},
+      {"carrier_scale", "scale: 0.012", {{"scale", "1"}}},
+      {"if_highpass", "corner_hz: 700.0e+3", {{"corner_hz", "Hz"}}},
+      {"if_lowpass", "corner_hz: 2.0e+6", {{"corner_hz", "Hz"}}},
+      {"excess_attenuation", "db_per_m: 0.8", {{"db_per_m", "dB/m"}}},
+      {"gain_drift", "db_per_hour: 1000", {{"db_per_hour", "dB/h"}, {"steps_db", "dB"}}},
+      {"iq_imbalance", "image_db: -20", {{"image_db", "dB"}}},
+      {"dc_offset", "level_db: -10", {{"level_db", "dB"}}},
+      {"second_harmonic", "level_db: -15", {{"level_db", "dB"}}},
+      {"adc_saturation", "clipped_fraction: 0.2", {{"clipped_fraction", "1"}}},
+      {"noise_floor", "level_dbfs: -40", {{"level_dbfs", "dB"}, {"delta_db", "dB"}}},
+      {"radar_yaw_offset", "yaw_deg: 2", {{"yaw_deg", "deg"}}},
+      {"radar_position_offset", "forward_m: 0.03, left_m: 0.02", {{"forward_m", "m"}, {"left_m", "m"}}},
+      {"scene_registration", "x_m: 0.05, y_m: 0.02, yaw_deg: 1", {{"x_m", "m"}, {"y_m", "m"}, {"yaw_deg", "deg"}}},
+      {"radar_pitch_offset", "pitch_deg: 4", {{"pitch_deg", "deg"}}},
+      {"pose_time_lag", "lag_s: 0.05", {{"lag_s", "s"}}},
+      {"channel_phase_error", "phase_deg: [0, 9, 8, 7, 6, 5, 4, 3]", {{"phase_deg", "deg"}, {"gain_db", "dB"}}},
+      {"tx_imbalance", "phase_deg: 25, gain_db: -1", {{"phase_deg", "deg"}, {"gain_db", "dB"}}},
+      {"iq_conjugation", "", {}},
+      {"channel_conjugation", "", {}},
+      {"channel_permutation", "order: [1, 0, 2, 3, 4, 5, 6, 7]", {{"order", "1"}}},
+      {"element_pattern", "cos_exponent: 2.1", {{"cos_exponent", "1"}}},
+      {"elevation_pattern", "cos_exponent: 8", {{"cos_exponent", "1"}}},
+      {"material_reflectivity", "material: Metal, delta_db: -6", {{"material", ""}, {"actor", ""}, {"delta_db", "dB"}}},
+      {"surface_roughness", "material: Metal, roughness_rms_m: 0.0002", {{"material", ""}, {"roughness_rms_m", "m"}}},
+      {"diffuse_scattering",
+       "material: Metal, scattering_coefficient: 0.4",
+       {{"material", ""}, {"scattering_coefficient", "1"}}},
+      {"edge_diffraction", "level: 1", {{"level", "1"}}},
+      {"floor_ceiling_multipath", "level: 1", {{"level", "1"}}},
+      {"corner_reflection", "actors: [screen_left, right]", {{"actors", ""}}},
+      {"wall_ghost", "walls: [left]", {{"walls", ""}}},
+      {"transmission", "actor: pane, one_way_db: -3", {{"actor", ""}, {"one_way_db", "dB"}}},
+      {"actor_absent", "actor: cabinet", {{"actor", ""}}},
+      {"actor_unmodelled", "x_m: 1.5, y_m: -1, size_m: 0.2", {{"x_m", "m"}, {"y_m", "m"}, {"size_m", "m"}}},
+      {"actor_moved",
+       "actor: cabinet, dx_m: 0.1, dy_m: 0, dyaw_deg: 0",
+       {{"actor", ""}, {"dx_m", "m"}, {"dy_m", "m"}, {"dyaw_deg", "deg"}}},
+      {"moving_target",
+       "x_m: 1.2, y_m: -1, height_m: 0, speed_m_per_s: 0.5",
+       {{"x_m", "m"}, {"y_m", "m"}, {"speed_m_per_s", "m/s"}}},
+      {"interference", "frame_fraction: 1", {{"frame_fraction", "1"}}},
+      {"phase_drift", "rad_per_frame: 0.3", {{"rad_per_frame", "rad"}}},
+      {"packet_loss", "lost_fraction: 0.6", {{"lost_fraction", "1"}}},
+      {"packet_misalignment", "pose: \"1\"", {{"pose", ""}}}};
+  EXPECT_EQ(causes.size(), 41u);
+  std::vector<Pose> poses(3);
+  for (int i = 0; i < 3; ++i) {
+    poses[i].name = std::to_string(i);
+    poses[i].stamp_ns = 1000000000LL + 100000000LL * i;
+    poses[i].T_map_radar = radarPose(0.02 * i, 0.01, 0, 3.0 * i);
+  }
+  const auto recorded = [&](const std::string& mechanisms) {
+    Twin t = makeTwin(path("causes.yaml"), "  specular: {}\n  diffuse: {spacing_m: 0.2}\n" + mechanisms);
+    t.setSession(poses);
+    const Simulation s = t.simulate(poses[1].T_map_radar, poses[1].stamp_ns);
+    const double clipped_db = t.clippedFraction() > 0 ? 20 : 0;
+    return all(t.simulateFrames(s, {4, 60 + clipped_db, poses[1].name}));
+  };
+  const auto base = recorded("");
+  EXPECT_GT(*std::max_element(base.begin(), base.end()), 1000);
+  for (const Cause& cause : causes) {
+    std::unique_ptr<Mechanism> mechanism;
+    ASSERT_NO_THROW(mechanism = MechanismRegistry::instance().create(cause.name)) << cause.name;
+    for (const auto& [name, unit] : cause.parameters) {
+      const auto specs = mechanism->parameters();
+      const auto spec =
+          std::find_if(specs.begin(), specs.end(), [&name = name](const ParameterSpec& s) { return s.name == name; });
+      ASSERT_NE(spec, specs.end()) << cause.name << " " << name;
+      EXPECT_EQ(spec->unit.substr(0, unit.size()), unit) << cause.name << " " << name;
+      if (spec->kind == ParameterKind::kNumber) {
+        EXPECT_LT(spec->min, spec->max) << cause.name << " " << name;
+      }
+    }
+    const auto with = recorded(std::string("  ") + cause.name + ": {" + cause.values + "}\n");
+    EXPECT_NE(with, base) << cause.name;
+  }
 }
 
 class FrameSessionTest : public FramesTest {

@@ -2,6 +2,7 @@
 #include <set>
 
 #include "../src/image_paths.h"
+#include "closed_form.h"
 #include "scene_files.h"
 
 namespace mmradartwin {
@@ -53,6 +54,15 @@ TEST_F(Paths, AreTheImagesOfABoxRoom) {
     ASSERT_EQ(lengths[order].size(), expected[order].size()) << "order " << order;
     for (std::size_t i = 0; i < expected[order].size(); ++i) EXPECT_NEAR(lengths[order][i], expected[order][i], 1e-9);
   }
+  for (int order = 1; order <= 3; ++order) {
+    double worst = 0;
+    for (std::size_t i = 0; i < expected[order].size(); ++i) {
+      worst = std::max(worst, std::abs(lengths[order][i] - expected[order][i]));
+    }
+    expectForm("4.4 box room, images of order " + std::to_string(order) + " outside edges", "number",
+               static_cast<double>(expected[order].size()), static_cast<double>(lengths[order].size()), 0);
+    expectForm("4.4 their lengths, worst", "m", 0, worst, 1e-9);
+  }
   EXPECT_EQ(lengths[1].size(), 6u);
   EXPECT_EQ(lengths[2].size(), 6u);
   EXPECT_EQ(lengths[3].size(), 30u) << "38 images less the 8 corners";
@@ -60,7 +70,7 @@ TEST_F(Paths, AreTheImagesOfABoxRoom) {
 
 // simulation.md 4.3: exact monostatic 10 cm plate at normal incidence, near field included.
 TEST_F(Paths, OfAPlateHoldItsNearAndFarField) {
-  const double rows[][2] = {{1, 5.61}, {2, 15.96}, {3, 17.77}, {5, 18.68}};
+  const double rows[][2] = {{1, 5.61}, {2, 15.96}, {3, 17.77}, {5, 18.68}, {9.9, 19.06}};
   for (const auto& row : rows) {
     const double R = row[0];
     addWall("plate", "Metal", {R, -0.05}, {R, 0.05}, -0.05, 0.05);
@@ -69,7 +79,16 @@ TEST_F(Paths, OfAPlateHoldItsNearAndFarField) {
     // A^2 = lambda^2 sigma/((4 pi)^3 R^4)
     const double A = s.records[0].amplitude;
     const double sigma = A * A * std::pow(4 * M_PI, 3) * std::pow(R, 4) / (kLambda77_m * kLambda77_m);
-    EXPECT_NEAR(10 * std::log10(sigma), row[1], 0.1) << "at " << R << " m";
+    expectForm("4.3 plate of 10 cm at " + shortText(R) + " m", "dBsm", row[1], 10 * std::log10(sigma), 0.1);
+  }
+  // A wide plate near, a small one far: pi R^2 less its edges, and 4 pi A^2/lambda^2.
+  const double others[][3] = {{1, 5, 17.85}, {0.05, 9.5, 7.14}};
+  for (const auto& [a, R, expected] : others) {
+    addWall("plate", "Metal", {R, -a / 2}, {R, a / 2}, -a / 2, a / 2);
+    const Simulation s = makeTwin(writeScene(), "  specular: {}\n", radarAt77GHz()).simulate(radarPose(0, 0, 0));
+    const double A = s.records.at(0).amplitude;
+    expectForm("4.3 plate of " + shortText(100 * a) + " cm at " + shortText(R) + " m", "dBsm", expected,
+               10 * std::log10(A * A * std::pow(4 * M_PI, 3) * std::pow(R, 4) / (kLambda77_m * kLambda77_m)), 0.1);
   }
 }
 
@@ -111,7 +130,8 @@ TEST_F(Paths, OfAWideWallAreTheImageFormula) {
   const std::complex<double> expected =
       std::conj(fresnel(concrete, 1, 77e9).te) *
       std::polar(1.0, 2 * M_PI * (std::fmod(77e9 * tau, 1.0) - 0.5 * 75e12 * tau * tau));
-  EXPECT_NEAR(std::arg(s.records[0].c[0] / expected), 0, 0.02);
+  expectForm("4.5 phase of a concrete wall's echo against conj(Gamma) exp(j 2 pi f tau)", "deg", 0,
+             std::arg(s.records[0].c[0] / expected) * 180 / M_PI, 1);
 }
 
 TEST_F(Paths, AreExactPerElement) {
@@ -244,7 +264,8 @@ TEST_F(Corners, AreTheImageFormulaOnce) {
   EXPECT_EQ(r.bounces, 2);
   EXPECT_NEAR(r.length_m[0], 8, 1e-9);
   const double gamma = gammaTe(twin.scene(), std::sqrt(0.5), 77e9);
-  EXPECT_NEAR(db(r.amplitude), db(gamma * gamma * kLambda77_m / (4 * M_PI * 8)), 0.3);
+  expectForm("4.4 concrete corner, image formula", "dB", db(gamma * gamma * kLambda77_m / (4 * M_PI * 8)),
+             db(r.amplitude), 0.3);
 }
 
 TEST_F(Corners, HaveOneApertureFromFarEndToFarEnd) {
@@ -310,7 +331,8 @@ TEST_F(DiffuseTest, ReturnsTheIntegralOfItsLaw) {
     }
   }
   expected *= std::pow(kLambda77_m / (4 * M_PI), 2) * 0.36 / M_PI;
-  EXPECT_NEAR(10 * std::log10(power / expected), 0, 0.03);
+  expectForm("4.8 Lambert wall of 6 by 2 m at 3 m, its integral", "dB", 10 * std::log10(expected),
+             10 * std::log10(power), 0.03);
   EXPECT_EQ(s.records.size(), 120u * 40u);
 }
 
@@ -348,6 +370,25 @@ TEST_F(DiffuseTest, HasADirectiveLobe) {
         .amplitude;
   };
   EXPECT_NEAR(db(level("directive") / level("lambertian")), 10 * std::log10(M_PI / 2.4348), 0.02);
+  // F_alpha of simulation.md 4.8 at 0 and 45 deg: straight back the lobe has cos^(2 alpha) where Lambert's has cos.
+  const double rows[][3] = {{1, 4.7124, 4.2523}, {4, 2.4348, 2.1591}, {10, 1.1419, 1.0965}, {30, .4054, .4049}};
+  const double s = std::sqrt(0.5);
+  addWall("patch", "RoughMetal", {3 - 0.01 * s, -0.01 * s}, {3 + 0.01 * s, 0.01 * s}, -0.01, 0.01);
+  const std::string turned = writeScene("turned");
+  const auto turnedLevel = [&](const std::string& lobe) {
+    return makeTwin(turned, "  diffuse: {lobe: " + lobe + "}\n", radarAt77GHz())
+        .simulate(radarPose(0, 0, 0))
+        .records.at(0)
+        .amplitude;
+  };
+  for (const auto& [alpha, straight, slanted] : rows) {
+    const std::string lobe = "directive, alpha: " + shortText(alpha);
+    expectForm("4.8 directive lobe, alpha " + shortText(alpha) + ", 0 deg, over Lambert's", "dB",
+               10 * std::log10(M_PI / straight), db(level(lobe) / level("lambertian")), 0.05);
+    expectForm("4.8 directive lobe, alpha " + shortText(alpha) + ", 45 deg, over Lambert's", "dB",
+               10 * std::log10(M_PI * std::pow(0.5, alpha) / (slanted * s)),
+               db(turnedLevel(lobe) / turnedLevel("lambertian")), 0.1 * std::max(1.0, 0.1 * alpha));
+  }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <complex>
 
+#include "closed_form.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/weight_basis.h"
 #include "scene_files.h"
@@ -25,22 +26,26 @@ TEST(SlabTest, IsTheFilmOfHalfAndQuarterWaves) {
   const Slab half = slab(dielectric(4, 0, kLambda77_m / 4), 1, 77e9),
              quarter = slab(dielectric(4, 0, kLambda77_m / 8), 1, 77e9);
   EXPECT_LT(std::abs(half.reflection.te), 1e-9);
-  EXPECT_NEAR(std::abs(half.transmission.te), 1, 1e-9);
-  EXPECT_NEAR(std::abs(quarter.reflection.te), 0.6, 1e-9);
-  EXPECT_NEAR(std::abs(quarter.transmission.tm), 0.8, 1e-9);
+  expectForm("4.5 slab of half a wave, abs(T)", "1", 1, std::abs(half.transmission.te), 1e-9);
+  expectForm("4.5 slab of a quarter wave, abs(R)", "1", 0.6, std::abs(quarter.reflection.te), 1e-9);
+  expectForm("4.5 slab of a quarter wave, abs(T)", "1", 0.8, std::abs(quarter.transmission.tm), 1e-9);
 }
 
 TEST(SlabTest, KeepsEnergyWithoutLossAndNeverGainsAny) {
+  double worst = 0;
   for (double c : {0.05, 0.2, 0.447213595, 0.7, 1.0}) {
     for (double d : {0.0003, 0.0011, 0.004, 0.0127}) {
       const Slab lossless = slab(dielectric(6.31, 0, d), c, 77e9), lossy = slab(dielectric(6.31, 1.2, d), c, 77e9);
       EXPECT_NEAR(std::norm(lossless.reflection.te) + std::norm(lossless.transmission.te), 1, 1e-9);
       EXPECT_NEAR(std::norm(lossless.reflection.tm) + std::norm(lossless.transmission.tm), 1, 1e-9);
+      worst = std::max(worst, std::abs(std::norm(lossless.reflection.te) + std::norm(lossless.transmission.te) - 1));
       EXPECT_LT(std::norm(lossy.reflection.te) + std::norm(lossy.transmission.te), 1);
       EXPECT_LT(std::norm(lossy.reflection.tm) + std::norm(lossy.transmission.tm), 1);
     }
   }
-  EXPECT_LT(std::abs(slab(dielectric(4, 0, 0.003), std::cos(std::atan(2.0)), 77e9).reflection.tm), 1e-9) << "Brewster";
+  expectForm("4.5 lossless slabs, R^2 + T^2 - 1, worst", "1", 0, worst, 1e-9);
+  expectForm("4.5 slab at Brewster's angle, abs(R_TM)", "1", 0,
+             std::abs(slab(dielectric(4, 0, 0.003), std::cos(std::atan(2.0)), 77e9).reflection.tm), 1e-9);
 }
 
 TEST(SlabTest, IsTheHalfSpaceWhereItIsThickAndLossy) {
@@ -54,12 +59,15 @@ TEST(SlabTest, IsTheHalfSpaceWhereItIsThickAndLossy) {
 // simulation.md 4.5, one way at normal incidence.
 TEST(SlabTest, HasTheLossesOfCommonPanels) {
   const Slab plasterboard = slab(dielectric(2.73, .503, .0125), 1, 77e9);
-  EXPECT_NEAR(std::abs(plasterboard.reflection.te), .2907, 2e-3);
-  EXPECT_NEAR(db(std::abs(plasterboard.transmission.te)), -6.86, 0.05);
+  expectForm("4.5 plasterboard 12.5 mm, abs(R)", "1", .2907, std::abs(plasterboard.reflection.te), 2e-3);
+  expectForm("4.5 plasterboard 12.5 mm, T", "dB", -6.86, db(std::abs(plasterboard.transmission.te)), 0.05);
   EXPECT_NEAR(std::abs(slab(dielectric(6.31, 1.211, .006), 1, 77e9).reflection.te), .4589, 2e-3);
-  EXPECT_NEAR(db(std::abs(slab(dielectric(6.31, 1.211, .006), 1, 77e9).transmission.te)), -6.53, 0.05);
-  EXPECT_NEAR(db(std::abs(slab(dielectric(2.58, .643, .018), 1, 77e9).transmission.te)), -12.24, 0.05);
-  EXPECT_NEAR(db(std::abs(slab(dielectric(1.99, .494, .040), 1, 77e9).transmission.te)), -23.2, 0.1);
+  const auto loss = [](double permittivity, double conductivity, double thickness_m) {
+    return db(std::abs(slab(dielectric(permittivity, conductivity, thickness_m), 1, 77e9).transmission.te));
+  };
+  expectForm("4.5 glass 6 mm, T", "dB", -6.53, loss(6.31, 1.211, .006), 0.05);
+  expectForm("4.5 chipboard 18 mm, T", "dB", -12.24, loss(2.58, .643, .018), 0.05);
+  expectForm("4.5 wood 40 mm, T", "dB", -23.2, loss(1.99, .494, .040), 0.1);
 }
 
 // simulation.md 4.5: |Gamma| at normal incidence of every material of both editions at 77 GHz.
@@ -79,7 +87,8 @@ TEST(ItuMaterials, HaveTheTabulatedReflection) {
     const auto table = loadMaterials(std::string(MMRADARTWIN_CONFIG) + "/materials/" + row.edition + ".yaml");
     ASSERT_EQ(table.count(row.name), 1u) << row.edition << " " << row.name;
     const Material& m = table.at(row.name);
-    EXPECT_NEAR(std::abs(fresnel(m, 1, 77e9).te), row.gamma, 6e-4) << row.edition << " " << row.name;
+    expectForm(std::string("4.5 Gamma of ") + row.name + ", " + row.edition, "1", row.gamma,
+               std::abs(fresnel(m, 1, 77e9).te), 6e-4);
     EXPECT_GT(m.valid_hz_max, 1e9) << row.name;
     EXPECT_TRUE(m.extrapolated || (77e9 >= m.valid_hz_min && 77e9 <= m.valid_hz_max)) << row.name;
   }
@@ -89,7 +98,8 @@ TEST(Roughness, HasAmentsNumbers) {
   const double rows[][3] = {{.05e-3, 0, -.11}, {.1e-3, 0, -.45}, {.2e-3, 0, -1.81}, {.3e-3, 0, -4.07},
                             {.5e-3, 0, -11.3}, {1e-3, 0, -45.2}, {.5e-3, 60, -2.83}};
   for (const auto& row : rows) {
-    EXPECT_NEAR(db(roughnessLoss(row[0], std::cos(row[1] * kDegree), 77e9)), row[2], 0.05) << row[0];
+    expectForm("4.7 roughness of " + shortText(1e3 * row[0]) + " mm at " + shortText(row[1]) + " deg", "dB", row[2],
+               db(roughnessLoss(row[0], std::cos(row[1] * kDegree), 77e9)), 0.05);
   }
 }
 
@@ -319,6 +329,42 @@ TEST_F(Propagation, RoomAndMountStandWhereTheCausesSay) {
   const PathRecord pitched = look("  radar_pitch_offset: {pitch_deg: 4}\n");
   EXPECT_NEAR(std::asin(pitched.departure.z()) / kDegree, 4, 1e-9) << "nose down: things stand higher";
   EXPECT_NEAR(db(look("  excess_attenuation: {db_per_m: 0.8}\n").amplitude / look("").amplitude), -2.4, 1e-9);
+}
+
+// A radar that goes at v and turns at w while its poses are stamped late by L is ahead of them by vL and wL.
+TEST_F(Propagation, PosesThatAreStampedLateShiftAMovingRadar) {
+  addWall("wall", "Metal", {5, -20}, {5, 20}, -5, 5);
+  writeScene();
+  const double speed = 0.5, turn_deg_per_s = 20, lag_s = 0.08;
+  std::vector<Pose> poses;
+  for (int i = 0; i < 21; ++i) {
+    Pose p;
+    p.name = std::to_string(i);
+    p.stamp_ns = i * 100000000LL + (i == 20 ? 3000000000LL : 0);  // the last one comes after a pause
+    p.T_map_radar = radarPose(speed * 0.1 * i, 0.3, 0, turn_deg_per_s * 0.1 * i - 20);
+    poses.push_back(p);
+  }
+  const auto path_at = [&](const std::string& mechanisms, std::size_t i) {
+    Twin twin = makeTwin(path("scene.yaml"), "  specular: {}\n" + mechanisms, radarAt77GHz());
+    twin.setSession(poses);
+    EXPECT_EQ(twin.altersGeometry(), !mechanisms.empty());
+    return twin.simulate(poses[i].T_map_radar, poses[i].stamp_ns).records.at(0);
+  };
+  const auto azimuth_deg = [](const PathRecord& r) { return std::atan2(r.departure.y(), r.departure.x()) / kDegree; };
+  const std::string lag = "  pose_time_lag: {lag_s: 0.08}\n";
+  const PathRecord reported = path_at("", 10), now = path_at(lag, 10);
+  expectForm("range of a wall ahead, 0.5 m/s, poses 80 ms late", "m", 0.5 * reported.length_m[0] - speed * lag_s,
+             0.5 * now.length_m[0], 1e-9);
+  expectForm("its azimuth, 20 deg/s", "deg", azimuth_deg(reported) - turn_deg_per_s * lag_s, azimuth_deg(now), 1e-9);
+  const PathRecord early = path_at("  pose_time_lag: {lag_s: -0.15}\n", 10);
+  EXPECT_NEAR(early.length_m[0], reported.length_m[0] + 2 * speed * 0.15, 1e-9) << "across the pose before";
+  EXPECT_NEAR(path_at(lag, 20).length_m[0], path_at("", 20).length_m[0], 1e-12) << "a standing radar shows nothing";
+  EXPECT_NEAR(path_at(lag, 19).length_m[0], path_at("", 19).length_m[0], 1e-12) << "a pause is no motion";
+  // What a trajectory says goes before the session's poses.
+  Twin twin = makeTwin(path("scene.yaml"), "  specular: {}\n" + lag, radarAt77GHz());
+  twin.setSession(poses);
+  twin.setTrajectory([](std::int64_t stamp_ns) { return radarPose(1e-9 * static_cast<double>(stamp_ns), 0, 0); });
+  EXPECT_NEAR(twin.simulate(radarPose(1, 0, 0), 1000000000).records.at(0).length_m[0], 2 * (4 - lag_s), 1e-9);
 }
 
 TEST_F(Propagation, CarrierScaleStretchesTheSine) {

@@ -37,8 +37,8 @@ class Simulated(unittest.TestCase):
         measurement = Measurement(Settings(output=at("_session"), seed=cls.seed, poses=12 if tier == "exact" else 24,
                                            frames=1, tier=tier, paths_csv=at("_true")))
         measurement.run()
-        run = subprocess.run([PROGRAM, at("_session"), "--output", at("_sim")], capture_output=True, text=True,
-                             check=False)
+        run = subprocess.run([PROGRAM, at("_session"), "--output", at("_sim"), "--diffuse-records", "points"],
+                             capture_output=True, text=True, check=False)
         if run.returncode != 0:
             raise RuntimeError(f"simulate ended with {run.returncode}: {run.stderr}")
         return measurement

@@ -11,6 +11,7 @@
 #include "mmradartwin_attribution/response_region.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_dsp/session.h"
+#include "mmradartwin_sim/cell_records.h"
 #include "mmradartwin_sim/path_record.h"
 #include "mmradartwin_sim/twin.h"
 
@@ -25,8 +26,9 @@ struct SimulatedPose {
 /// used.
 using SimulatedBranch = std::function<SimulatedPose(const Pose&)>;
 
-/// Simulates with a twin. Keeps a reference to it.
-SimulatedBranch simulatedByTwin(const Twin& twin);
+/// Simulates with a twin. Keeps a reference to it. Which records a residual points to depends on `diffuse_records`, the
+/// residuals themselves do not.
+SimulatedBranch simulatedByTwin(const Twin& twin, DiffuseRecords diffuse_records = DiffuseRecords::kPoints);
 /// Takes another session's averaged captures, by pose name. Keeps a reference to it.
 SimulatedBranch simulatedBySession(const Recording& session);
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <complex>
 #include <cstdint>
 #include <functional>
@@ -60,7 +61,7 @@ struct SceneChange {
   std::vector<int> actors;                  ///< Scene::actors index
   std::vector<Eigen::AlignedBox3d> bounds;  ///< map, with a margin; where they were and where they are
 
-  bool moved(int actor) const;
+  bool moved(int actor) const { return std::find(actors.begin(), actors.end(), actor) != actors.end(); }
   /// True where the segment comes into one of the bounds.
   bool crosses(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const;
   /// True where a path from the radar and back may be another after the change.
@@ -132,6 +133,8 @@ class Mechanism {
   /// paths of the mechanism are found again when an actor moves.
   virtual bool tracesChanges() const { return false; }
   virtual Eigen::Isometry3d pose(const Eigen::Isometry3d& T_map_radar) const { return T_map_radar; }
+  /// How much later than the truth poses are stamped, s: acts before all pose(), where the radar moves.
+  virtual double poseLag_s() const { return 0; }
   virtual void addPaths(const PoseContext&, std::vector<PathRecord>&) const {}
   virtual void reweight(const PoseContext&, PathRecord&) const {}  ///< every path of every mechanism
   /// Gain of the receiver on the tone of a path of this length: filters act here, exactly, on the received grid.

@@ -64,6 +64,7 @@ class MovingTwin {
   std::vector<Mover> movers_;
   std::vector<Part> parts_;  ///< one per mechanism, in their order
   Simulation simulation_;
+  Eigen::Isometry3d traced_at_ = Eigen::Isometry3d::Identity();  ///< where mechanisms put the radar then
   std::size_t echoes_ = 0;  ///< records that were traced; those behind them are relative to the strongest
   bool placed_ = false, valid_ = false;
   int updates_ = 0;  ///< since the grid was summed afresh

@@ -7,16 +7,18 @@
 #include <vector>
 
 #include "mmradartwin_dsp/session.h"
+#include "mmradartwin_sim/cell_records.h"
 
 namespace mmradartwin {
 
 struct SimulateOptions {
-  std::string session;     ///< session directory; its captures are not needed
-  std::string output;      ///< session directory to write
-  std::string twin_file;   ///< "" = the session's, or the base
-  int frames = 1;          ///< per pose; alike but for mechanisms of frames
-  std::uint64_t seed = 1;  ///< of the scatter points' phases
-  int jobs = 0;            ///< threads; 0 = all
+  std::string session;                                      ///< session directory; its captures are not needed
+  std::string output;                                       ///< session directory to write
+  std::string twin_file;                                    ///< "" = the session's, or the base
+  int frames = 1;                                           ///< per pose; alike but for mechanisms of frames
+  std::uint64_t seed = 1;                                   ///< of the scatter points' phases
+  int jobs = 0;                                             ///< threads; 0 = all
+  DiffuseRecords diffuse_records = DiffuseRecords::kCells;  ///< in paths/{pose}.csv
 };
 
 struct SimulateResult {

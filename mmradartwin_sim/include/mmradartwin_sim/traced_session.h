@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <complex>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,16 +13,17 @@
 namespace mmradartwin {
 
 /// What one pose's trace is kept as, to be weighed again and again: most records as they are, but the many that come
-/// back from one facet the way they went (scatter points) as grids at nodes of direction. A record counts for the four
-/// nodes around its direction, by bilinear weights that add up to one. So a weight that is the same for all of a
-/// facet's records (material, actor, mechanism, gain, channel) acts exactly, to single precision; one that changes with
-/// direction is interpolated between the nodes; one that changes with length is taken at the node's mean length.
+/// back from one facet the way they went (scatter points; of small facets, from one actor) as grids at nodes of
+/// direction. A record counts for the four nodes around its direction, by bilinear weights that add up to one. So a
+/// weight that is the same for all of a facet's records (material, actor, mechanism, gain, channel) acts exactly, to
+/// single precision; one that changes with direction is interpolated between the nodes; one that changes with length is
+/// taken at the node's mean length.
 class CondensedTrace {
  public:
   struct Options {
     double azimuth_step_deg = 4, elevation_step_deg = 8;  ///< between nodes
     double length_step_m = 2;                             ///< records of one node lie within
-    int fewest_records = 8;                               ///< of a facet, else they stay records
+    int fewest_records = 8;                               ///< of a facet or actor, else they stay records
   };
   CondensedTrace() = default;
   CondensedTrace(const RadarConfig& radar, std::vector<PathRecord> records, const Options& options);
@@ -30,14 +33,20 @@ class CondensedTrace {
   const std::vector<PathRecord>& records() const { return records_; }  ///< those that stayed
   /// One stand-in per node, with the node's direction and mean length, vertex and level: what mechanisms weigh.
   const std::vector<PathRecord>& nodes() const { return nodes_; }
-  /// Adds the nodes' grids to x [M][N] as their weighed stand-ins say: by each channel's change of contribution, and of
-  /// length. Throws std::invalid_argument where their numbers differ.
-  void addNodes(const RadarConfig& radar, const std::vector<PathRecord>& weighed, ComplexGrid& x) const;
+  /// Adds the nodes' grids to x [M][N] as their stand-ins say when they were weighed: by each channel's change of
+  /// contribution, and of length. `weigh` is shown a copy of every stand-in.
+  void addNodes(const RadarConfig& radar, const std::function<void(PathRecord&)>& weigh, ComplexGrid& x) const;
   std::size_t bytes() const;
 
  private:
+  /// Nodes of one facet's records: a weight that all of them share acts on their sum.
+  struct Stretch {
+    std::size_t begin, end;  // in nodes_
+  };
   std::vector<PathRecord> records_, nodes_;
-  std::vector<float> grids_;  // [node][M][re, im][N]
+  std::vector<Stretch> stretches_;
+  std::vector<std::complex<double>> inverse_;  // [node][M]: 1 / c of the stand-in
+  std::vector<float> grids_, sums_;            // [node], [stretch] of [M][re, im][N]
 };
 
 /// A session's poses, traced once. Twins that differ from the tracing one in mechanisms of weight, pattern, channel and

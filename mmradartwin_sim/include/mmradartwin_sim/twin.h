@@ -62,6 +62,9 @@ struct FrameOptions {
   std::string pose_name;  ///< of mechanisms that concern one pose
 };
 
+/// Pose of the radar that is reported for a time; nothing where none is known.
+using Trajectory = std::function<std::optional<Eigen::Isometry3d>(std::int64_t stamp_ns)>;
+
 /// A twin ready to simulate. simulate() is const and may run for several poses at once; its result depends on pose and
 /// description alone, not on threads.
 class Twin {
@@ -86,7 +89,8 @@ class Twin {
   /// scene without them, less what removeHidden() takes.
   bool addsScreensAlone() const;
   /// Takes away the records that a screen stands in the way of. T_map_radar: where they were traced from.
-  void removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord>& records) const;
+  void removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord>& records,
+                    std::int64_t stamp_ns = 0) const;
   /// Tells levels that are relative to the session's strongest echo; without it they refer to the strongest of the
   /// poses simulated so far.
   void setStrongestAmplitude(double amplitude);
@@ -96,7 +100,7 @@ class Twin {
   std::vector<std::string> notes() const;
   /// The two halves of simulate(): all that has to be traced, and what weights, leakage and receiver make of it.
   /// Records traced once may be weighed again by a twin that differs in mechanisms of weight and receiver alone.
-  std::vector<PathRecord> trace(const Eigen::Isometry3d& T_map_radar) const;
+  std::vector<PathRecord> trace(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
   Simulation weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                    std::int64_t stamp_ns = 0) const;
   /// The paths that weigh() makes a grid of: weighted, with leakage, and as the receiver's filters leave them.
@@ -114,8 +118,12 @@ class Twin {
   Simulation simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
 
   /// Names and stamps of the session's poses, for what concerns one of them or changes with time. Without it every pose
-  /// is the first. Throws InputError where a mechanism names a pose that is not among them.
+  /// is the first. Between poses that follow each other within 0.2 s the radar is taken to move evenly, elsewhere to
+  /// stand. Throws InputError where a mechanism names a pose that is not among them.
   void setSession(const std::vector<Pose>& poses);
+  /// Where the radar is reported to be along time, for what stamps that come late do (pose_time_lag); instead of what
+  /// the session's poses say. Called from any thread.
+  void setTrajectory(Trajectory reported);
   /// True where a mechanism acts on frames, chirps or samples; else all frames are the grid's samples.
   bool hasFrameStage() const;
   /// True where simulateFrames() and visitChirps() look at the records; else the grid is all they need.

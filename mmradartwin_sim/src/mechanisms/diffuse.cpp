@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "../polarisation.h"
 #include "../scatter_points.h"
+#include "../view_cone.h"
 #include "builtin.h"
 #include "mmradartwin_dsp/input_error.h"
 
@@ -82,8 +84,12 @@ class Diffuse : public Mechanism {
     std::vector<const ScatterPoint*> lit;
     std::vector<Eigen::Vector3d> position, seen_along;
     std::vector<double> level, gap;
+    std::optional<ViewCones> changed;
+    if (context.change) changed.emplace(elements.p, context.change->bounds);
     for (const ScatterPoint& point : points_) {
       const Eigen::Vector3d way = point.position - elements.p;
+      if (changed && !changed->mayMeet(way) && !context.change->moved(context.scene.facets[point.facet].actor))
+        continue;
       const double r2 = way.squaredNorm();
       if (r2 > max2 || r2 < 1e-6) continue;
       const double r = std::sqrt(r2);
@@ -114,6 +120,7 @@ class Diffuse : public Mechanism {
       gap.push_back(std::max(1e-3, 2 * facet.flatness_m / std::max(0.1, cosine)));
     }
     const std::vector<char> visible = context.rays.visible(elements.p, position, gap);
+    records.reserve(records.size() + static_cast<std::size_t>(std::count(visible.begin(), visible.end(), 1)));
     for (std::size_t i = 0; i < lit.size(); ++i) {
       if (!visible[i]) continue;
       const Facet& facet = context.scene.facets[lit[i]->facet];

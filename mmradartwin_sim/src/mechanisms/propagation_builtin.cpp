@@ -15,6 +15,7 @@ void addPropagationMechanisms(MechanismRegistry& registry) {
   registry.add("empirical_law", makeEmpiricalLaw);
   registry.add("excess_attenuation", makeExcessAttenuation);
   registry.add("floor_ceiling_multipath", makeFloorCeilingMultipath);
+  registry.add("pose_time_lag", makePoseTimeLag);
   registry.add("radar_pitch_offset", makeRadarPitchOffset);
   registry.add("scene_registration", makeSceneRegistration);
   registry.add("surface_roughness", makeSurfaceRoughness);

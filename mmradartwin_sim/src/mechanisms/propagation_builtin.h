@@ -13,6 +13,7 @@ std::unique_ptr<Mechanism> makeEdgeDiffraction();
 std::unique_ptr<Mechanism> makeEmpiricalLaw();
 std::unique_ptr<Mechanism> makeExcessAttenuation();
 std::unique_ptr<Mechanism> makeFloorCeilingMultipath();
+std::unique_ptr<Mechanism> makePoseTimeLag();
 std::unique_ptr<Mechanism> makeRadarPitchOffset();
 std::unique_ptr<Mechanism> makeSceneRegistration();
 std::unique_ptr<Mechanism> makeSurfaceRoughness();

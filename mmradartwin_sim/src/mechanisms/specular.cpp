@@ -40,6 +40,11 @@ class Specular : public Mechanism {
     exhaustive_ = std::min(max_bounces_, search_->exhaustiveOrder());
   }
 
+  void sceneChanged(const Scene&, const RadarConfig&, const SceneChange& change) override {
+    search_->update(change.actors);
+    exhaustive_ = std::min(max_bounces_, search_->exhaustiveOrder());
+  }
+
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes;
     if (exhaustive_ < max_bounces_ && !(max_bounces_ > 3 && exhaustive_ == 3)) {

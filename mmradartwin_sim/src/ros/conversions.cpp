@@ -23,15 +23,16 @@ geometry_msgs::Point pointMsg(const Eigen::Vector3d& v) {
 
 }  // namespace
 
-mmradartwin_msgs::PathRecords toMsg(const Simulation& simulation, const Scene& scene, std::uint64_t radar_hash) {
+mmradartwin_msgs::PathRecords toMsg(const Simulation& simulation, const std::vector<PathRecord>& records,
+                                    const Scene& scene, std::uint64_t radar_hash) {
   mmradartwin_msgs::PathRecords msg;
   msg.header.stamp = toRosTime(simulation.stamp_ns);
   msg.radar_hash = radar_hash;
   msg.T_map_radar = toMsg(simulation.T_map_radar);
   msg.propagation_only = simulation.propagation_only;
-  msg.records.resize(simulation.records.size());
-  for (std::size_t i = 0; i < simulation.records.size(); ++i) {
-    const PathRecord& r = simulation.records[i];
+  msg.records.resize(records.size());
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const PathRecord& r = records[i];
     mmradartwin_msgs::PathRecord& m = msg.records[i];
     m.event = *r.event;
     for (int actor : r.actors) {

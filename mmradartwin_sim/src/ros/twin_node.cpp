@@ -63,6 +63,7 @@ void TwinNode::readParameters(const ros::NodeHandle& private_nh) {
   reuse_m_ = parameters.number("reuse_m", reuse_m_, 0, 1);
   reuse_rad_ = parameters.number("reuse_deg", 0.01, 0, 10) * M_PI / 180;
   seed_ = static_cast<std::uint64_t>(parameters.integer("seed", 1, 0, 2147483647));
+  diffuse_records_ = diffuseRecordsFrom(parameters.text("diffuse_records", "cells"), "parameter diffuse_records");
   parameters.number("diagnostic_period", 1.0, 0.01, 3600);  // read by diagnostic_updater
   parameters.boolean("diagnostic_updater_use_fqn", false);
   parameters.rejectUnknown();
@@ -137,6 +138,7 @@ void TwinNode::use(std::unique_ptr<Twin> twin) {
   ROS_INFO("twin of %s: %zu actors, %zu facets", twin->scene().file.c_str(), twin->scene().actors.size(),
            twin->scene().facets.size());
   twin_ = std::move(twin);
+  twin_->setTrajectory([this](std::int64_t stamp_ns) { return reportedPose(stamp_ns); });
   problem_.clear();
 }
 
@@ -228,6 +230,23 @@ bool TwinNode::alike(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) con
          Eigen::Quaterniond(a.linear()).angularDistance(Eigen::Quaterniond(b.linear())) <= reuse_rad_;
 }
 
+std::optional<Eigen::Isometry3d> TwinNode::reportedPose(std::int64_t stamp_ns) const {
+  const auto at = [this](const ros::Time& time) { return tf_buffer_.lookupTransform(map_frame_, radar_frame_, time); };
+  try {
+    return toIsometry(at(toRosTime(stamp_ns)).transform);
+  } catch (const tf2::TransformException&) {
+  }
+  try {
+    const geometry_msgs::TransformStamped last = at(ros::Time(0));
+    const Eigen::Isometry3d T = toIsometry(last.transform);
+    const std::int64_t last_ns = toNanoseconds(last.header.stamp), beyond_ns = stamp_ns - last_ns;
+    if (last_ns == 0 || beyond_ns <= 0) return std::nullopt;
+    return T * (toIsometry(at(toRosTime(last_ns - beyond_ns)).transform).inverse() * T);
+  } catch (const tf2::TransformException&) {
+    return std::nullopt;
+  }
+}
+
 bool TwinNode::placeActors(std::int64_t stamp_ns) {
   const auto poseOf = [this, stamp_ns](const std::string& frame) -> std::optional<Eigen::Isometry3d> {
     // The radar's pose is that of the grid, and the actor's may still be on its way.
@@ -302,7 +321,8 @@ void TwinNode::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp
       ROS_ERROR_THROTTLE(kWarnEvery_s, "records and grid disagree: amplitudes by %g, grid by %g",
                          last_->check.worst_amplitude_error, last_->check.grid_error);
     }
-    mmradartwin_msgs::PathRecords paths = toMsg(*last_, twin_->scene(), radar_hash_);
+    mmradartwin_msgs::PathRecords paths =
+        toMsg(*last_, exportedRecords(twin_->radar(), last_->records, diffuse_records_), twin_->scene(), radar_hash_);
     paths.header.frame_id = map_frame_;
     paths_publisher_.publish(paths);
   }

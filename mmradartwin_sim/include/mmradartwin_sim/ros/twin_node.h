@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "mmradartwin_dsp/temporary_folder.h"
+#include "mmradartwin_sim/cell_records.h"
 #include "mmradartwin_sim/moving_twin.h"
 #include "mmradartwin_sim/twin.h"
 
@@ -34,7 +35,9 @@ namespace mmradartwin {
 /// The scene is that of the parameter `scene`, else of the latched session message, whose files are unpacked into a
 /// temporary folder. twin/apply puts another twin in the place of the one simulated, from the last measured grid on;
 /// twin/scene says which. It stays until another is applied, or a session with other files comes.
-/// `channels` names what the measured branch is corrected by: a twin with the same channel errors is refused.
+/// `diffuse_records` says whether twin/paths holds scatter points summed by cells of a facet (`cells`) or all
+/// (`points`). `channels` names what the measured branch is corrected by: a twin with the same channel errors is
+/// refused.
 class TwinNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
@@ -57,6 +60,8 @@ class TwinNode {
   void rebuild();
   void forgetSimulations();  ///< those of a twin that goes
   void simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns);
+  /// Where tf has the radar at a stamp; beyond its end, as if it went on as it did as long before.
+  std::optional<Eigen::Isometry3d> reportedPose(std::int64_t stamp_ns) const;
   /// Tells the moving twin where tf has its actors; true where one of them moved.
   bool placeActors(std::int64_t stamp_ns);
   bool alike(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const;  ///< within reuse_m and reuse_deg
@@ -66,6 +71,7 @@ class TwinNode {
   std::string actor_frame_prefix_;
   double rate_hz_ = 10, reuse_m_ = 1e-4, reuse_rad_ = 0;
   std::uint64_t seed_ = 1;
+  DiffuseRecords diffuse_records_ = DiffuseRecords::kCells;
   std::optional<ChannelCorrection> channels_;
 
   std::optional<RadarConfig> radar_;
