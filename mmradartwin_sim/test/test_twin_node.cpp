@@ -4,6 +4,7 @@
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <gtest/gtest.h>
+#include <mmradartwin_msgs/PathRecords.h>
 #include <ros/callback_queue.h>
 #include <tf2_ros/transform_broadcaster.h>
 
@@ -22,6 +23,7 @@ class TwinNodeTest : public SceneFiles {
   void SetUp() override {
     SceneFiles::SetUp();
     addWall("wall", "Metal", {5, -3}, {5, 3});
+    addWall("rough", "RoughConcrete", {1, -2.8}, {5, -2.8});
     addBox("crate", "Metal", V(2, 1, -0.5), V(2.4, 1.6, 0.5));
     scene_ = writeScene();
     write("radar.yaml", toYaml(paperRadar()));
@@ -43,7 +45,11 @@ class TwinNodeTest : public SceneFiles {
             for (const auto& v : s.values) status_[v.key] = v.value;
           }
         });
-    ASSERT_TRUE(waitFor([this] { return grid_out_.getNumSubscribers() > 0 && grid_in_.getNumPublishers() > 0; }));
+    paths_in_ = nh_.subscribe<mmradartwin_msgs::PathRecords>(
+        "twin/paths", 100, [this](const mmradartwin_msgs::PathRecords::ConstPtr& p) { paths_ = p; });
+    ASSERT_TRUE(waitFor([this] {
+      return grid_out_.getNumSubscribers() > 0 && grid_in_.getNumPublishers() > 0 && paths_in_.getNumPublishers() > 0;
+    }));
   }
   void TearDown() override {
     node_.reset();
@@ -93,7 +99,8 @@ class TwinNodeTest : public SceneFiles {
   std::unique_ptr<TwinNode> node_;
   tf2_ros::TransformBroadcaster broadcaster_;
   ros::Publisher grid_out_;
-  ros::Subscriber grid_in_, status_in_;
+  ros::Subscriber grid_in_, status_in_, paths_in_;
+  mmradartwin_msgs::PathRecords::ConstPtr paths_;
   std::vector<mmradartwin_msgs::ReceiveGrid::ConstPtr> grids_;
   std::map<std::string, std::string> status_;
 };
@@ -113,6 +120,24 @@ TEST_F(TwinNodeTest, TakesTheNewestAndCountsTheRest) {
   EXPECT_EQ(counted("poses simulated") + counted("stamps skipped"), sent) << "none is kept for later";
   EXPECT_EQ(counted("poses simulated"), static_cast<int>(grids_.size()));
   for (std::size_t i = 1; i < grids_.size(); ++i) EXPECT_LT(grids_[i - 1]->header.stamp, grids_[i]->header.stamp);
+}
+
+// What goes out is summed by cells, and still the grid.
+TEST_F(TwinNodeTest, PathsAreFewAndAddUpToTheGrid) {
+  send(150, radarPose(0.1, 0, 0, -20));
+  ASSERT_TRUE(waitFor([&] { return !grids_.empty() && paths_ && paths_->header.stamp == ros::Time(150); }));
+  std::vector<PathRecord> records(paths_->records.size());
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const mmradartwin_msgs::PathRecord& m = paths_->records[i];
+    records[i].length_m = m.length_m;
+    for (std::size_t k = 0; k < m.c_re.size(); ++k) records[i].c.emplace_back(m.c_re[k], m.c_im[k]);
+  }
+  ComplexGrid sum;
+  accumulate(paperRadar(), records, sum);
+  EXPECT_LT((sum - lastGrid()).norm(), 1e-6 * sum.norm());
+  const std::size_t points = makeTwin(scene_).simulate(radarPose(0.1, 0, 0, -20)).records.size();
+  EXPECT_GT(points, 200u);
+  EXPECT_LT(records.size(), points / 2);
 }
 
 TEST_F(TwinNodeTest, UsesRecordsAgainWhileTheRadarStands) {
