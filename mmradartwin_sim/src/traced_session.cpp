@@ -108,14 +108,11 @@ void CondensedTrace::addNodes(const RadarConfig& radar, const std::function<void
   std::vector<float> sum(grid_size, 0.0F);
   const auto add = [&](const std::complex<double>& factor, const float* re, int channel) {
     const float fr = static_cast<float>(factor.real()), fi = static_cast<float>(factor.imag());
-    const float* __restrict from_re = re;
-    const float* __restrict from_im = re + samples;
-    float* __restrict to_re = sum.data() + static_cast<std::size_t>(2 * channel * samples);
-    float* __restrict to_im = to_re + samples;
-    for (int n = 0; n < samples; ++n) {
-      to_re[n] += fr * from_re[n] - fi * from_im[n];
-      to_im[n] += fr * from_im[n] + fi * from_re[n];
-    }
+    // As array expressions, which work on four numbers at once.
+    const Eigen::Map<const Eigen::ArrayXf> from_re(re, samples), from_im(re + samples, samples);
+    float* to = sum.data() + static_cast<std::size_t>(2 * channel * samples);
+    Eigen::Map<Eigen::ArrayXf>(to, samples) += fr * from_re - fi * from_im;
+    Eigen::Map<Eigen::ArrayXf>(to + samples, samples) += fr * from_im + fi * from_re;
   };
   // Few enough at a time for sums in single precision.
   constexpr std::size_t kAtOnce = 16;
@@ -156,9 +153,17 @@ void CondensedTrace::addNodes(const RadarConfig& radar, const std::function<void
     const bool as_one = alike && as_long;
     for (std::size_t i = stretch.begin; i < (as_one ? stretch.begin + 1 : stretch.end); ++i) {
       const float* grid = as_one ? sums_.data() + s * grid_size : grids_.data() + i * grid_size;
-      for (int k = 0; k < channels; ++k) {
-        add(factor[(i - stretch.begin) * static_cast<std::size_t>(channels) + static_cast<std::size_t>(k)],
-            grid + static_cast<std::size_t>(2 * k * samples), k);
+      const std::complex<double>* by = factor.data() + (i - stretch.begin) * static_cast<std::size_t>(channels);
+      const auto plain = [by](const std::complex<double>& f) {
+        return std::norm(f - by[0].real()) <= 1e-15 * std::norm(f);
+      };
+      if (std::all_of(by, by + channels, plain)) {
+        // Levels and patterns are one real factor for all channels.
+        const auto size = static_cast<Eigen::Index>(grid_size);
+        Eigen::Map<Eigen::ArrayXf>(sum.data(), size) +=
+            static_cast<float>(by[0].real()) * Eigen::Map<const Eigen::ArrayXf>(grid, size);
+      } else {
+        for (int k = 0; k < channels; ++k) add(by[k], grid + static_cast<std::size_t>(2 * k * samples), k);
       }
       if (++added == kAtOnce) flush();
     }
