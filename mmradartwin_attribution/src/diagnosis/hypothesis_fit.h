@@ -30,6 +30,8 @@ struct HypothesisFit {
   std::vector<double> scaled;  ///< of its coordinates
   ModelState state;
   double gain = 0;                     ///< nats over the state without it
+  double broad_gain = 0;               ///< the same without the place that gains most: a path that one place sees
+                                       ///< and the twin hides by a hair is no cause
   double inflation = 1;                ///< of the scores' variance over places against what the likelihood expects
   double false_alarm_rate = 1;         ///< family-wise: of the best of all hypotheses that were tried
   double held_out_gain = 0;            ///< nats on places that the fit did not see, each fold by one step from the fit
