@@ -572,7 +572,7 @@ bool Session::judgeChannels(int round) {
       const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
       const bool much = finding.cause != "unknown" && explained[1] >= 0 &&
                         (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0 &&
-                        f.broad_gain / f.inflation > (moves ? kMuchOfGeometry : kMuch);
+                        (f.plain || f.broad_gain / f.inflation > (moves ? kMuchOfGeometry : kMuch));
       if (!in_maps && !much) {
         verdict = "the maps gain nothing: " + number(by, 2) + " (" + number(explained[0], 2) + " to " +
                   number(explained[1], 2) + ")";
