@@ -35,8 +35,13 @@ class DiagnosisCancelled : public std::runtime_error {
 struct TriedHypothesis {
   std::string label;
   double promised = 0;  ///< nats by the score test
-  double gain = 0;      ///< nats after the fit, NaN where it was not fitted
+  double gain = 0;      ///< nats after the fit, NaN where it was not fitted, and so what follows
   int round = 0;
+  double broad_gain = 0;        ///< nats without the place that gains most
+  double inflation = 1;         ///< of chance over places, by which that is divided before it is judged
+  double held_out_gain = 0;     ///< nats on places that the fit did not see
+  double false_alarm_rate = 1;  ///< family-wise
+  std::string verdict;          ///< "found", or what speaks against it; "" where none was needed
 };
 
 struct Diagnosis {

@@ -22,6 +22,7 @@
 #include "held_out_gain.h"
 #include "hypothesis_fit.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "profiled_values.h"
 #include "receiver_finding.h"
 #include "session_model.h"
 #include "shared_latents.h"
@@ -43,10 +44,12 @@ constexpr std::size_t kMostLaws = 2;
 constexpr double kWorthAFit = 4;  ///< nats promised
 constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kWorthALaw = 12;
+constexpr double kWorthAnObject = 5;       ///< at the best of all places; clean sessions promise up to 4.7
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
-constexpr double kMuch = 80;               ///< unless it is worth so many nats, inflation taken off;
-constexpr double kMuchOfGeometry = 100;    ///< of what moves echoes, whose likelihood is rough
+constexpr double kMuch = 50;               ///< unless it is worth so many nats, inflation taken off;
+constexpr double kMuchOfGeometry = 60;     ///< of what moves echoes, whose likelihood is rough
 constexpr double kAlike = 5;               ///< nats within which two names are not told apart
+constexpr std::size_t kMostProfiled = 6;   ///< numbers whose errors the likelihood's own fall gives
 constexpr double kObjectPlaces = 500;      ///< places of an 8 by 6 m room that a session resolves, as a family
 
 std::string number(double value, int digits = 3) {
@@ -73,8 +76,12 @@ class Session {
   void judgeNoise();
   bool judgeChannels(int round);
   std::vector<HypothesisFit> fitBest(int round);
+  TriedHypothesis& triedAs(const HypothesisFit& fit, int round);
   Finding describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const;
   void refitTogether();
+  void profileFound();
+  struct Accepted;
+  void takeOver(const Accepted& accepted);
   std::vector<PoseEchoes> heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m);
   FindingGain gainOf(const HypothesisFit& fit);
   void addMetrics(const HypothesisFit& fit, FindingGain& gain) const;
@@ -96,7 +103,7 @@ class Session {
   /// What rounds have found, as it was fitted last; `finding` is its place in result_.findings.
   struct Accepted {
     Hypothesis hypothesis;
-    std::vector<double> scaled;
+    std::vector<double> scaled, standard_error;
     std::size_t finding;
   };
   std::vector<Accepted> accepted_;
@@ -295,11 +302,15 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   std::vector<HypothesisFit> fits;
   std::size_t names_fitted = 0, laws_fitted = 0;
   for (const Screened& s : screened) {
-    TriedHypothesis tried{s.hypothesis.label(), s.promised, std::numeric_limits<double>::quiet_NaN(), round};
+    TriedHypothesis tried;
+    tried.label = s.hypothesis.label();
+    tried.promised = s.promised;
+    tried.gain = std::numeric_limits<double>::quiet_NaN();
+    tried.round = round;
     // A promise is a quadratic's and often far too small: names get several chances, laws without a name two.
     const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
     std::size_t& fitted = law ? laws_fitted : names_fitted;
-    const double worth = isObject(s.hypothesis)      ? kWorthAFit + std::log(kObjectPlaces)
+    const double worth = isObject(s.hypothesis)      ? kWorthAnObject
                          : law                       ? kWorthALaw
                          : s.hypothesis.isGeometry() ? kWorthAFitOfGeometry
                                                      : kWorthAFit;
@@ -320,11 +331,19 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   }
   for (HypothesisFit& f : fits) {
     fitter_->judge(f, all.size() + static_cast<std::size_t>(isObject(f.hypothesis) ? kObjectPlaces : 0));
-    for (TriedHypothesis& t : result_.tried) {
-      if (t.round == round && t.label == f.hypothesis.label()) t.gain = f.gain;
-    }
+    TriedHypothesis& t = triedAs(f, round);
+    t.gain = f.gain;
+    t.broad_gain = f.broad_gain;
+    t.inflation = f.inflation;
+    t.held_out_gain = f.held_out_gain;
+    t.false_alarm_rate = f.false_alarm_rate;
   }
   return fits;
+}
+
+TriedHypothesis& Session::triedAs(const HypothesisFit& fit, int round) {
+  return *std::find_if(result_.tried.begin(), result_.tried.end(),
+                       [&](const TriedHypothesis& t) { return t.round == round && t.label == fit.hypothesis.label(); });
 }
 
 Finding Session::describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const {
@@ -473,12 +492,8 @@ void Session::refitTogether() {
     for (std::size_t i = 0; i < accepted_.size(); ++i) {
       Accepted& a = accepted_[i];
       a.scaled = fit.scaled[i];
-      Finding& f = result_.findings.findings[a.finding];
-      f.mechanism = a.hypothesis.at(a.scaled);
-      f.parameters = fittedParameters(a.hypothesis, a.scaled, fit.standard_error[i], f.cause, data_.locations.size());
-      for (NamedParameters& e : extended_) {
-        if (e.mechanism == f.mechanism->mechanism) e = *f.mechanism;
-      }
+      a.standard_error = fit.standard_error[i];
+      takeOver(a);
       const std::size_t numbers = a.hypothesis.coordinates.size();
       if (numbers == 0) continue;  // there or not: its own round has judged it
       const double rate = fitter_->falseAlarmRate(fit.worth[i], numbers, family_);
@@ -501,35 +516,81 @@ void Session::refitTogether() {
   }
 }
 
+/// Values and intervals of all that rounds have found, on the likelihood that is settled on them.
+void Session::profileFound() {
+  report("errors of what was found", 0);
+  std::vector<Hypothesis> parts;
+  ProfiledValues fit;
+  for (const Accepted& a : accepted_) {
+    parts.push_back(a.hypothesis);
+    fit.scaled.insert(fit.scaled.end(), a.scaled.begin(), a.scaled.end());
+    fit.standard_error.insert(fit.standard_error.end(), a.standard_error.begin(), a.standard_error.end());
+  }
+  if (fit.scaled.empty() || fit.scaled.size() > kMostProfiled) return;
+  fit = profiled(*source_, *model_, mechanisms_, state_.nuisance, accuracy_, parts, fit);
+  std::ptrdiff_t from = 0;
+  for (Accepted& a : accepted_) {
+    const std::ptrdiff_t to = from + static_cast<std::ptrdiff_t>(a.scaled.size());
+    a.scaled.assign(fit.scaled.begin() + from, fit.scaled.begin() + to);
+    a.standard_error.assign(fit.standard_error.begin() + from, fit.standard_error.begin() + to);
+    from = to;
+    takeOver(a);
+  }
+}
+
+/// The values of what was found, wherever they stand.
+void Session::takeOver(const Accepted& a) {
+  Finding& f = result_.findings.findings[a.finding];
+  f.mechanism = a.hypothesis.at(a.scaled);
+  f.parameters = fittedParameters(a.hypothesis, a.scaled, a.standard_error, f.cause, data_.locations.size());
+  for (std::vector<NamedParameters>* list : {&mechanisms_, &extended_}) {
+    for (NamedParameters& m : *list) {
+      if (m.mechanism == f.mechanism->mechanism) m = *f.mechanism;
+    }
+  }
+}
+
 bool Session::judgeChannels(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
   for (const HypothesisFit& f : fits) {
-    if (f.false_alarm_rate > kFalseAlarm || !(f.held_out_gain > 0) || f.ranking() <= 0) continue;
+    std::string& verdict = triedAs(f, round).verdict;
+    verdict = f.ranking() <= 0                   ? "gains less than its numbers cost"
+              : f.false_alarm_rate > kFalseAlarm ? "chance could do as well"
+              : !(f.held_out_gain > 0)           ? "loses on places not fitted"
+                                                 : "";
+    if (!verdict.empty()) continue;
     Finding finding = describe(f, fits);
     if (data_.locations.size() > 1) {
       finding.gain = gainOf(f);
       // Where the likelihood gains little and the maps nothing, it is the likelihood's own shortcomings that were
       // fitted: what a pose's error does at edges looks like a little of many things. Much of it may be real though no
-      // map shows it (an image at -26 dB), unless the maps get worse.
+      // map shows it (an image at -26 dB), unless the maps get plainly worse.
       const auto explained = *finding.gain->explained_power.difference_ci95;
       const double by = finding.gain->explained_power.after - finding.gain->explained_power.before;
       const bool moves =
           f.hypothesis.isGeometry() || (source_->altersGeometry(*finding.mechanism) && !f.scaled.empty());
       const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
-      const bool much = finding.cause != "unknown" && by >= 0 &&
+      const bool much = finding.cause != "unknown" && explained[1] >= 0 &&
                         (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0 &&
-                        f.gain / f.inflation > (moves ? kMuchOfGeometry : kMuch);
-      if (!in_maps && !much) continue;
+                        (f.plain || f.broad_gain / f.inflation > (moves ? kMuchOfGeometry : kMuch));
+      if (!in_maps && !much) {
+        verdict = "the maps gain nothing: " + number(by, 2) + " (" + number(explained[0], 2) + " to " +
+                  number(explained[1], 2) + ")";
+        continue;
+      }
       addMetrics(f, *finding.gain);
     }
+    verdict = "found";
     report("found " + f.hypothesis.label() + ", " + number(f.gain, 4) + " nats", 1);
     const bool unknown = finding.cause == "unknown";
     mechanisms_ = f.state.mechanisms;
     extended_.push_back(*finding.mechanism);
-    accepted_.push_back({f.hypothesis, f.scaled, result_.findings.findings.size()});
+    accepted_.push_back({f.hypothesis, f.scaled, f.standard_error, result_.findings.findings.size()});
     result_.findings.findings.push_back(std::move(finding));
     state_.nuisance = f.state.nuisance;
     if (accepted_.size() > 1) refitTogether();
+    source_->settle(mechanisms_);
+    profileFound();
     source_->settle(mechanisms_);
     const Nuisance nuisance = state_.nuisance;
     state_ = fitter_->state(mechanisms_, &nuisance);

@@ -134,10 +134,17 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
   }
   writeFindings(findings, directory_ + "/findings.json");
   std::ostringstream tried;
-  tried << "round,hypothesis,promised_nats,gain_nats\n";
+  tried << "round,hypothesis,promised_nats,gain_nats,gain_without_best_place_nats,inflation,held_out_nats,false_alarm_"
+           "rate,verdict\n";
   for (const TriedHypothesis& t : diagnosis.tried) {
-    tried << t.round << ",\"" << t.label << "\"," << shown(t.promised, 6) << ","
-          << (std::isnan(t.gain) ? "" : shown(t.gain, 6)) << "\n";
+    tried << t.round << ",\"" << t.label << "\"," << shown(t.promised, 6) << ",";
+    if (std::isnan(t.gain)) {
+      tried << ",,,,,";
+    } else {
+      tried << shown(t.gain, 6) << "," << shown(t.broad_gain, 6) << "," << shown(t.inflation, 4) << ","
+            << shown(t.held_out_gain, 6) << "," << shown(t.false_alarm_rate, 3) << ",";
+    }
+    tried << t.verdict << "\n";
   }
   save(directory_ + "/tried.csv", tried.str());
 
@@ -199,14 +206,14 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
   }
   html << "<h2>Hypotheses</h2><p>Nats that the score test promised, and those that were "
           "fitted.</p><table><tr><th>hypothesis"
-          "</th><th>round</th><th>promised</th><th>gain</th><th></th></tr>";
+          "</th><th>round</th><th>promised</th><th>gain</th><th>what became of it</th><th></th></tr>";
   double most = 1;
   for (const TriedHypothesis& t : diagnosis.tried) most = std::max(most, t.promised);
   int rows = 0;
   for (const TriedHypothesis& t : diagnosis.tried) {
     if (t.promised < 1 || ++rows > 60) continue;
     html << "<tr><td>" << escaped(t.label) << "</td><td>" << t.round + 1 << "</td><td>" << shown(t.promised, 4)
-         << "</td><td>" << shown(t.gain, 4)
+         << "</td><td>" << shown(t.gain, 4) << "</td><td>" << escaped(t.verdict)
          << "</td><td><span class=\"bar\" style=\"width:" << 10 * std::sqrt(std::max(0.0, t.promised) / most)
          << "em\"></span></td></tr>";
   }

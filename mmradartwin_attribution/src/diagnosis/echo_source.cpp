@@ -14,11 +14,12 @@
 namespace mmradartwin {
 namespace {
 
-// Paths below this share of the pose's strongest echo's power are summed by place before a receiver sees them.
-constexpr double kWeakPower = 1e-4;
+// What a receiver mixes into other ranges is made of paths above this share of the pose's strongest echo's power; those
+// below the second are summed by place first.
+constexpr double kMixedPower = 1e-6, kWeakPower = 1e-3;
+constexpr double kReceiverSine = 1.0 / 16;  // of sin(azimuth), where weak paths go through the receiver together
 // A path whose amplitude changes by less than this share within the pose's accuracy does not graze anything.
 constexpr double kSteady = 0.02;
-constexpr double kReceiverSine = 1.0 / 16;  // of sin(azimuth), where weak paths go through the receiver together
 // From so many paths of one mechanism on they are a cloud of scatter points.
 constexpr std::size_t kCloud = 300;
 constexpr double kCloud_m = 0.12, kCloudHeight_m = 0.3;
@@ -78,16 +79,25 @@ std::vector<PathRecord> mergedCloud(std::vector<PathRecord> records,
   });
 }
 
-/// Weak paths by range, direction and actors, for a receiver that they have to go through one by one.
-std::vector<PathRecord> mergedWeak(const RadarConfig& radar, std::vector<PathRecord> records) {
+double strongestPower(const std::vector<PathRecord>& records) {
   double strongest = 0;
   for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude * r.amplitude);
+  return strongest;
+}
+
+/// Weak paths by range, direction and actors, for a receiver that they have to go through one by one.
+std::vector<PathRecord> mergedWeak(const RadarConfig& radar, std::vector<PathRecord> records, double strongest) {
   using Key = std::tuple<std::vector<int>, int, int>;
   return merged<Key>(std::move(records), [&](const PathRecord& r) -> std::optional<Key> {
     if (r.amplitude * r.amplitude > kWeakPower * strongest) return std::nullopt;
     const int direction = static_cast<int>(std::floor(0.5 * (r.departure.y() + r.arrival.y()) / kReceiverSine));
     return Key{r.actors, rangeBin(radar, r.length_m[0]), direction};
   });
+}
+
+/// True where what is received of a path is more than its tone in all channels.
+bool mixesRanges(const Twin& twin, const Pose& pose) {
+  return twin.hasReceiveStage() && !twin.channelMatrix(pose.T_map_radar, pose.stamp_ns);
 }
 
 /// Derivative of a path's samples by its one-way range, per metre, the phase in the window's middle held.
@@ -301,8 +311,8 @@ std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters
   });
 }
 
-EchoShift EchoSource::shift(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& from,
-                            const std::vector<int>& poses, int actors) {
+std::vector<PathShift> EchoSource::pathShifts(const std::vector<NamedParameters>& mechanisms,
+                                              const std::vector<NamedParameters>& from, const std::vector<int>& poses) {
   forgetLongUnused();
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms), geometry_from = geometryOf(from);
   std::vector<std::pair<const Traced*, const Traced*>> parts;  // there and here
@@ -312,13 +322,11 @@ EchoShift EchoSource::shift(const std::vector<NamedParameters>& mechanisms, cons
     }
   }
   const Twin there_twin = base_.changed(mechanisms), here_twin = base_.changed(from);
-  EchoShift shift;
-  shift.range_m.assign(static_cast<std::size_t>(actors), 0.0);
-  std::vector<double> weights(shift.range_m.size(), 1e-30);
-  for (const int pose : poses) {
-    const std::size_t i = static_cast<std::size_t>(pose);
+  const auto azimuth = [](const PathRecord& p) { return std::atan2(p.departure.y(), p.departure.x()); };
+  std::vector<PathShift> shifts;
+  for (std::size_t place = 0; place < poses.size(); ++place) {
+    const std::size_t i = static_cast<std::size_t>(poses[place]);
     const Pose& at = data_.poses[i].pose;
-    double turned = 0, sum = 1e-30;
     for (const auto& [there, here] : parts) {
       std::map<PathKey, std::vector<PathRecord>> pairs;
       for (PathRecord& r : here_twin.receivedPaths(at.T_map_radar, (*here)[i], at.stamp_ns)) {
@@ -326,19 +334,32 @@ EchoShift EchoSource::shift(const std::vector<NamedParameters>& mechanisms, cons
       }
       for (const PathRecord& r : there_twin.receivedPaths(at.T_map_radar, (*there)[i], at.stamp_ns)) {
         const auto same = pairs.find(PathKey{r.event, r.facets});
-        if (same == pairs.end() || same->second.size() > 1 || r.actors.size() != 1 || r.actors[0] < 0) continue;
+        if (same == pairs.end() || same->second.size() > 1) continue;
         const PathRecord& s = same->second.front();
-        const auto azimuth = [](const PathRecord& p) { return std::atan2(p.departure.y(), p.departure.x()); };
-        const std::size_t actor = static_cast<std::size_t>(r.actors[0]);
-        shift.range_m[actor] += r.amplitude * 0.5 * (r.length_m[0] - s.length_m[0]);
-        weights[actor] += r.amplitude;
-        turned += r.amplitude * (azimuth(r) - azimuth(s));
-        sum += r.amplitude;
+        shifts.push_back({place, r.event, r.facets, r.actors, r.amplitude, 0.5 * (r.length_m[0] - s.length_m[0]),
+                          azimuth(r) - azimuth(s)});
       }
     }
-    shift.azimuth_rad.push_back(turned / sum);
+  }
+  return shifts;
+}
+
+EchoShift EchoSource::shift(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& from,
+                            const std::vector<int>& poses, int actors) {
+  EchoShift shift;
+  shift.range_m.assign(static_cast<std::size_t>(actors), 0.0);
+  shift.azimuth_rad.assign(poses.size(), 0.0);
+  std::vector<double> weights(shift.range_m.size(), 1e-30), sums(poses.size(), 1e-30);
+  for (const PathShift& p : pathShifts(mechanisms, from, poses)) {
+    if (p.actors.size() != 1 || p.actors[0] < 0) continue;
+    const std::size_t actor = static_cast<std::size_t>(p.actors[0]);
+    shift.range_m[actor] += p.amplitude * p.range_m;
+    weights[actor] += p.amplitude;
+    shift.azimuth_rad[p.place] += p.amplitude * p.azimuth_rad;
+    sums[p.place] += p.amplitude;
   }
   for (std::size_t a = 0; a < weights.size(); ++a) shift.range_m[a] /= weights[a];
+  for (std::size_t j = 0; j < sums.size(); ++j) shift.azimuth_rad[j] /= sums[j];
   return shift;
 }
 
@@ -351,6 +372,16 @@ std::vector<PoseEchoes> EchoSource::collect(
   const SignalChain chain(radar);
   const int channels = radar.channels();
   const double window = 0.5 * radar.samples_per_chirp;  // Hann's sum
+  // The twin less what mixes ranges in its receiver; nothing where it mixes none.
+  std::optional<Twin> without_mixing;
+  if (!poses.empty() && mixesRanges(twin, data_.poses[static_cast<std::size_t>(poses.front())].pose)) {
+    std::vector<NamedParameters> rest;
+    for (const NamedParameters& m : mechanisms) {
+      if (!mixesRanges(base_.changed({m}), data_.poses[static_cast<std::size_t>(poses.front())].pose))
+        rest.push_back(m);
+    }
+    without_mixing.emplace(base_.changed(rest));
+  }
 
   std::vector<PoseEchoes> result(poses.size());
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
@@ -358,23 +389,31 @@ std::vector<PoseEchoes> EchoSource::collect(
     const Pose& pose = data_.poses[i].pose;
     std::vector<PathRecord> all = paths(i);
     EchoCollector collector(radar, accuracy_.path_angle_rad, data_.poses[i].beams, actor_range_m);
-    std::optional<Eigen::MatrixXcd> matrix;
-    if (twin.hasReceiveStage()) matrix = twin.channelMatrix(pose.T_map_radar, pose.stamp_ns);
-    if (!twin.hasReceiveStage() || matrix) {
-      std::vector<PathRecord> seen = twin.receivedPaths(pose.T_map_radar, std::move(all), pose.stamp_ns);
-      double strongest = 0;
-      for (const PathRecord& r : seen) strongest = std::max(strongest, r.amplitude * r.amplitude);
+    const auto addTones = [&](const Twin& receiver, std::vector<PathRecord> records, double strongest) {
+      std::optional<Eigen::MatrixXcd> matrix;
+      if (receiver.hasReceiveStage()) matrix = receiver.channelMatrix(pose.T_map_radar, pose.stamp_ns);
+      std::vector<PathRecord> seen = receiver.receivedPaths(pose.T_map_radar, std::move(records), pose.stamp_ns);
+      if (strongest == 0) strongest = strongestPower(seen);
       for (PathRecord& r : seen) {
         if (matrix)
           Eigen::Map<Eigen::VectorXcd>(r.c.data(), channels) =
               *matrix * Eigen::Map<Eigen::VectorXcd>(r.c.data(), channels).eval();
         collector.add(r, r.amplitude * r.amplitude / strongest);
       }
+    };
+    if (!without_mixing) {
+      addTones(twin, std::move(all), 0);
     } else {
-      // The receiver mixes ranges: each path is sent through it alone, less what comes without any path.
+      // The receiver mixes ranges: each strong path is sent through it alone, less what comes without any path.
+      const double strongest = strongestPower(all);
+      const auto weak = std::partition(all.begin(), all.end(), [&](const PathRecord& r) {
+        return r.amplitude * r.amplitude > kMixedPower * strongest;
+      });
+      addTones(*without_mixing, {std::make_move_iterator(weak), std::make_move_iterator(all.end())}, strongest);
+      all.erase(weak, all.end());
       const auto spectra = [&](const ComplexGrid& x) -> Eigen::MatrixXcd { return chain.rangeSpectra(x) / window; };
       const ComplexGrid nothing = twin.weigh(pose.T_map_radar, std::vector<PathRecord>(), pose.stamp_ns).grid.x;
-      for (PathRecord& r : mergedWeak(radar, std::move(all))) {
+      for (PathRecord& r : mergedWeak(radar, std::move(all), strongest)) {
         for (int a : r.actors) {
           if (a < 0 || a >= static_cast<int>(actor_range_m.size())) continue;
           for (double& l : r.length_m) l += 2 * actor_range_m[a];

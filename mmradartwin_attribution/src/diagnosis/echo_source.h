@@ -18,7 +18,16 @@ struct PoseAccuracy {
   double path_range_m = 0.005;
 };
 
-/// How far a change of mechanisms moves echoes.
+/// How far a change of mechanisms moves one echo.
+struct PathShift {
+  std::size_t place;  ///< of its pose among the poses named
+  const std::string* event;
+  std::vector<int> facets, actors;
+  double amplitude;
+  double range_m, azimuth_rad;
+};
+
+/// How far it moves echoes on the whole.
 struct EchoShift {
   std::vector<double> range_m;      ///< [actors] one-way, mean over echoes that meet this actor alone, by amplitude
   std::vector<double> azimuth_rad;  ///< [poses named] the same over a pose's echoes
@@ -43,7 +52,9 @@ class EchoSource {
   std::vector<PoseEchoes> echoesNear(const std::vector<NamedParameters>& mechanisms,
                                      const std::vector<NamedParameters>& from, const std::vector<int>& poses,
                                      const std::vector<double>& actor_range_m);
-  /// What `mechanisms` do to the echoes that they share with `from`.
+  /// What `mechanisms` do to the echoes that they share with `from`, those of scatter points left out.
+  std::vector<PathShift> pathShifts(const std::vector<NamedParameters>& mechanisms,
+                                    const std::vector<NamedParameters>& from, const std::vector<int>& poses);
   EchoShift shift(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& from,
                   const std::vector<int>& poses, int actors);
   /// What hypotheses are compared with from now on: paths of other mechanisms are forgotten (memory stays bounded so),

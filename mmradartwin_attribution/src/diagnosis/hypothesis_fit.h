@@ -30,13 +30,17 @@ struct HypothesisFit {
   std::vector<double> scaled;  ///< of its coordinates
   ModelState state;
   double gain = 0;                     ///< nats over the state without it
+  double broad_gain = 0;               ///< the same without the place that gains most: a path that one place sees
+                                       ///< and the twin hides by a hair is no cause
   double inflation = 1;                ///< of the scores' variance over places against what the likelihood expects
-  double false_alarm_rate = 1;         ///< family-wise: of the best of all hypotheses that were tried
+  double false_alarm_rate = 1;         ///< family-wise: of the best of all hypotheses that were tried; at most
+                                       ///< 0.01 where it is plain
   double held_out_gain = 0;            ///< nats on places that the fit did not see, each fold by one step from the fit
   std::vector<double> standard_error;  ///< of the values (not scaled), by location
   std::vector<std::vector<double>> fold_scaled;  ///< coordinates without each fold of locations
-  double ranking() const;                        ///< gain less a price per coordinate
-  void loseGain(double nats);                    ///< that the state without it has gained since
+  bool plain = false;          ///< broad_gain is far beyond what clean sessions bring, whatever the scatter over places
+  double ranking() const;      ///< gain less a price per coordinate
+  void loseGain(double nats);  ///< that the state without it has gained since
 };
 
 /// Several hypotheses, fitted together.

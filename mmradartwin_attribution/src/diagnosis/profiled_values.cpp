@@ -1,0 +1,220 @@
+#include "profiled_values.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <tuple>
+
+namespace mmradartwin {
+namespace {
+
+constexpr int kRefits = 3;  ///< of the latents, at each place
+constexpr int kWidths = 3;  ///< that are tried of a step
+
+/// What a step should cost, in nats, and how narrow it may be.
+struct Fall {
+  double least, wanted, most;
+  double narrowest;  ///< of the scale
+};
+constexpr Fall kSmooth = {1, 3, 15, 1e-6};
+// Beside what paths that come and go within millimetres bring.
+constexpr Fall kRough = {10, 25, 80, 0.1};
+constexpr double kMostAlike = 0.95;  ///< correlation of two values in the likelihood's fall
+
+/// The likelihood at one place, all latents refitted.
+struct Place {
+  double log_likelihood = 0;
+  Eigen::VectorXd by_location;  ///< [locations] with the prior of the headings there
+  Eigen::VectorXd latents;      ///< [2 actors] in standard deviations
+};
+
+// Where paths begin and end tells of places, too, so that ranges and directions do not say all.
+constexpr double kMostBlurred = 10;     ///< times the likelihood's own error
+constexpr double kCarries = 0.1;        ///< of the pose's strongest amplitude: echoes that places are known by
+constexpr double kSmallChange = 0.125;  ///< of the scale, for derivatives
+
+/// Variance of the coordinates as ranges and directions of the strong echoes know them, where actors have range errors
+/// of their own and poses heading errors of their own: those errors are the same in all echoes of one actor or pose,
+/// however many there are.
+Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_coordinate, int actors, int poses,
+                                  const PoseAccuracy& accuracy, const LatentSpread& spread) {
+  const Eigen::Index n = static_cast<Eigen::Index>(by_coordinate.size()), all = n + actors + poses;
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(all, all);
+  information.diagonal().segment(n, actors).setOnes();
+  information.diagonal().tail(poses).setOnes();
+  const double range_m = std::hypot(accuracy.path_range_m, accuracy.position_m);
+  std::vector<double> strongest(static_cast<std::size_t>(poses), 0.0);
+  for (const PathShift& p : by_coordinate.front()) {
+    strongest[p.place] = std::max(strongest[p.place], p.amplitude);
+  }
+  using Key = std::tuple<std::size_t, const std::string*, std::vector<int>>;
+  std::vector<std::map<Key, const PathShift*>> shifts(by_coordinate.size());
+  for (std::size_t j = 0; j < shifts.size(); ++j) {
+    for (const PathShift& p : by_coordinate[j]) shifts[j][{p.place, p.event, p.facets}] = &p;
+  }
+  for (const auto& [key, path] : shifts.front()) {
+    if (path->amplitude < kCarries * strongest[path->place]) continue;
+    Eigen::VectorXd range = Eigen::VectorXd::Zero(all), azimuth = Eigen::VectorXd::Zero(all);
+    bool shared = true;
+    for (Eigen::Index j = 0; j < n && shared; ++j) {
+      const auto& of = shifts[static_cast<std::size_t>(j)];
+      const auto at = of.find(key);
+      shared = at != of.end();
+      if (!shared) break;
+      range[j] = at->second->range_m / kSmallChange / range_m;
+      azimuth[j] = at->second->azimuth_rad / kSmallChange / accuracy.path_angle_rad;
+    }
+    if (!shared) continue;
+    for (int a : path->actors) {
+      if (a >= 0) range[n + a] += spread.actor_range_m / range_m;
+    }
+    azimuth[n + actors + static_cast<Eigen::Index>(path->place)] = accuracy.heading_rad / accuracy.path_angle_rad;
+    information += range * range.transpose() + azimuth * azimuth.transpose();
+  }
+  information.diagonal().head(n).array() += 1e-12;
+  return information.inverse().diagonal().head(n);
+}
+
+/// A step to both sides of the fit along one coordinate.
+struct Step {
+  double width = 0;
+  Place ahead, behind;
+  double curvature = 0;
+};
+
+}  // namespace
+
+ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std::vector<NamedParameters>& mechanisms,
+                        const Nuisance& nuisance, const PoseAccuracy& accuracy, const std::vector<Hypothesis>& parts,
+                        const ProfiledValues& fit) {
+  std::vector<Coordinate> coordinates;
+  bool rough = false;
+  for (const Hypothesis& h : parts) {
+    coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
+    rough = rough || source.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0)));
+  }
+  const std::vector<NamedParameters> base(mechanisms.begin(),
+                                          mechanisms.end() - static_cast<std::ptrdiff_t>(parts.size()));
+  const ChannelData& data = model.data();
+  const LatentSpread spread = model.spread();
+  const Eigen::Index locations = static_cast<Eigen::Index>(data.locations.size());
+  const Eigen::Index n = static_cast<Eigen::Index>(coordinates.size());
+  const auto mechanismsAt = [&](const std::vector<double>& at) {
+    std::vector<NamedParameters> all = base;
+    auto from = at.begin();
+    for (const Hypothesis& h : parts) {
+      const auto to = from + static_cast<std::ptrdiff_t>(h.coordinates.size());
+      all.push_back(h.at({from, to}));
+      from = to;
+    }
+    return all;
+  };
+  const auto look = [&](const std::vector<double>& at) {
+    Nuisance fitted = nuisance;
+    const std::vector<PoseEchoes> echoes = source.echoes(mechanismsAt(at), fitted.actor_range_m);
+    model.fit(echoes, fitted, kRefits);
+    std::vector<double> by_pose;
+    Place place;
+    place.log_likelihood = model.logLikelihood(echoes, fitted, &by_pose);
+    place.by_location = Eigen::VectorXd::Zero(locations);
+    for (std::size_t i = 0; i < by_pose.size(); ++i) {
+      const double heading = fitted.yaw_rad[i] / accuracy.heading_rad;
+      place.by_location[data.poses[i].location] += by_pose[i] - 0.5 * heading * heading;
+    }
+    const Eigen::Index actors = static_cast<Eigen::Index>(fitted.actor_gain.size());
+    place.latents.resize(2 * actors);
+    place.latents << Eigen::Map<const Eigen::VectorXd>(fitted.actor_gain.data(), actors) / spread.actor_gain,
+        Eigen::Map<const Eigen::VectorXd>(fitted.actor_range_m.data(), actors) / spread.actor_range_m;
+    return place;
+  };
+  const auto limits = [&](Eigen::Index j) {
+    const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
+    return std::minmax({c.scaled(c.min), c.scaled(c.max)});
+  };
+  const std::vector<double>& scaled = fit.scaled;
+  const Fall wanted = rough ? kRough : kSmooth;
+  const Place here = look(scaled);
+  std::vector<Step> steps;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const std::size_t k = static_cast<std::size_t>(j);
+    const double slope = std::abs(coordinates[k].slope(scaled[k]));
+    const auto [low, high] = limits(j);
+    const double widest = std::min(scaled[k] - low, high - scaled[k]);
+    Step step;
+    step.width = std::max(wanted.narrowest, 2 * fit.standard_error[k] / slope);
+    for (int i = 1;; ++i) {
+      if (widest > 0) step.width = std::min(step.width, widest);
+      std::vector<double> at = scaled;
+      at[k] = scaled[k] + step.width;
+      step.ahead = look(at);
+      at[k] = scaled[k] - step.width;
+      step.behind = look(at);
+      const double fall = here.log_likelihood - 0.5 * (step.ahead.log_likelihood + step.behind.log_likelihood);
+      step.curvature = 2 * fall / (step.width * step.width);
+      const bool narrower = fall > wanted.most && step.width > wanted.narrowest;
+      if (i == kWidths || (fall >= wanted.least && !narrower)) break;
+      step.width *= std::clamp(std::sqrt(wanted.wanted / std::max(fall, 0.1)), 0.1, 4.0);
+      step.width = std::max(step.width, wanted.narrowest);
+    }
+    step.curvature = std::max(step.curvature, 0.2 / (step.width * step.width));
+    steps.push_back(std::move(step));
+  }
+  Eigen::VectorXd slope(n);
+  Eigen::MatrixXd fall(n, n), scores(locations, n), latents(here.latents.size(), n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Step& a = steps[static_cast<std::size_t>(j)];
+    fall(j, j) = a.curvature;
+    slope[j] = (a.ahead.log_likelihood - a.behind.log_likelihood) / (2 * a.width);
+    scores.col(j) = (a.ahead.by_location - a.behind.by_location) / (2 * a.width);
+    latents.col(j) = (a.ahead.latents - a.behind.latents) / (2 * a.width);
+    for (Eigen::Index k = 0; k < j; ++k) {
+      const Step& b = steps[static_cast<std::size_t>(k)];
+      std::vector<double> at = scaled;
+      at[static_cast<std::size_t>(j)] += a.width;
+      at[static_cast<std::size_t>(k)] += b.width;
+      const double both = look(at).log_likelihood - a.ahead.log_likelihood - b.ahead.log_likelihood;
+      const double most = kMostAlike * std::sqrt(a.curvature * b.curvature);
+      fall(j, k) = fall(k, j) = std::clamp(-(both + here.log_likelihood) / (a.width * b.width), -most, most);
+    }
+  }
+  const Eigen::MatrixXd centred = scores.rowwise() - scores.colwise().mean();
+  const double count = static_cast<double>(locations);
+  // Errors of actors are the same at all places: their priors say how far they reach.
+  const Eigen::MatrixXd scatter =
+      centred.transpose() * centred * (count / std::max(1.0, count - 1)) + latents.transpose() * latents;
+  const Eigen::MatrixXd covariance = fall.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd robust = covariance * scatter * covariance;
+  const Eigen::VectorXd to_top = covariance * slope;
+  std::vector<double> top = scaled;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const std::size_t k = static_cast<std::size_t>(j);
+    const auto [low, high] = limits(j);
+    top[k] = std::clamp(scaled[k] + std::clamp(to_top[j], -steps[k].width, steps[k].width), low, high);
+  }
+  Eigen::VectorXd geometric = Eigen::VectorXd::Zero(n);
+  if (rough) {
+    std::vector<int> everyone(data.poses.size());
+    std::iota(everyone.begin(), everyone.end(), 0);
+    std::vector<std::vector<PathShift>> by_coordinate;
+    for (std::size_t k = 0; k < coordinates.size(); ++k) {
+      std::vector<double> at = scaled;
+      at[k] += kSmallChange;
+      by_coordinate.push_back(source.pathShifts(mechanismsAt(at), mechanisms, everyone));
+    }
+    geometric = geometricVariance(by_coordinate, static_cast<int>(nuisance.actor_gain.size()),
+                                  static_cast<int>(everyone.size()), accuracy, spread);
+  }
+  ProfiledValues result = fit;
+  if (look(top).log_likelihood > here.log_likelihood) result.scaled = top;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const std::size_t k = static_cast<std::size_t>(j);
+    double variance = locations > 2 ? std::max(robust(j, j), covariance(j, j)) : covariance(j, j);
+    variance = std::max(variance, std::min(geometric[j], kMostBlurred * kMostBlurred * variance));
+    result.standard_error[k] = std::sqrt(std::max(0.0, variance)) * std::abs(coordinates[k].slope(result.scaled[k]));
+  }
+  return result;
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include "echo_source.h"
+#include "hypothesis.h"
+#include "session_model.h"
+
+namespace mmradartwin {
+
+/// Coordinates of several hypotheses in a row.
+struct ProfiledValues {
+  std::vector<double> scaled;
+  std::vector<double> standard_error;  ///< of the values (not scaled)
+};
+
+/// Values and their standard errors about a fit, by how far the likelihood with all latents refitted falls to both
+/// sides, and by how much its slope scatters over places. Slopes alone promise far too much where paths come and go
+/// within millimetres: steps are as wide as the likelihood takes to fall by some nats. The values move to the top of
+/// that fall where the likelihood gains by it.
+/// mechanisms: as fitted, the parts last; `fit`: their coordinates, with standard errors that steps begin with. The
+/// source has to be settled on `mechanisms`.
+ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std::vector<NamedParameters>& mechanisms,
+                        const Nuisance& nuisance, const PoseAccuracy& accuracy, const std::vector<Hypothesis>& parts,
+                        const ProfiledValues& fit);
+
+}  // namespace mmradartwin
