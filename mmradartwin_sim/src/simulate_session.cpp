@@ -11,6 +11,7 @@
 #include <mutex>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/mesh_notes.h"
 #include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
@@ -209,6 +210,7 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
   }
   writer.finish();
   result.notes = twin.notes();
+  for (std::string& note : meshNotes(twin.scene())) result.notes.push_back(std::move(note));
   std::ofstream resolved(fs::path(options.output) / "twin.resolved.yaml");
   resolved << "# The twin that made this session, with all its parameters.\n" << twin.description().toYaml();
   if (!resolved) throw std::runtime_error(options.output + "/twin.resolved.yaml: cannot be written");

@@ -2,6 +2,7 @@
 #include <random>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/mesh_notes.h"
 #include "scene_files.h"
 
 namespace mmradartwin {
@@ -176,10 +177,16 @@ TEST_F(SceneTest, TracesOpenAndSelfIntersectingSurfaces) {
               {V(3, -1, -1), V(3, 1, -1), V(3, 1, 1), V(3, -1, 1), V(2, 0, -1), V(4, 0, -1), V(4, 0, 1), V(2, 0, 1)},
               {{0, 1, 2, 3}, {4, 5, 6, 7}});
   addPolygons("open_box", "Concrete", {V(5, 1, 0), V(6, 1, 0), V(6, 2, 0), V(5, 2, 0), V(5, 1, 1), V(6, 1, 1)},
-              {{0, 1, 5, 4}, {0, 1, 2, 3}});
+              {{0, 1, 5, 4}, {0, 1, 2, 3}, {0, 3, 4}});
   addPolygons("folded_back", "Concrete", {V(5, -2, 0), V(6, -2, 0), V(6, -2, 1), V(5, -2, 1)},
               {{0, 1, 2, 3}, {3, 2, 1, 0}});
+  addBox("whole", "Concrete", V(7, -1, 0), V(7.5, -0.5, 1));
   Twin twin = makeTwin(writeScene(), "  specular: {}\n  corner: {}\n  diffuse: {}\n  edge_diffraction: {level: 1}\n");
+  const std::vector<std::string> notes = meshNotes(twin.scene());
+  ASSERT_EQ(notes.size(), 2u);
+  EXPECT_NE(notes[0].find("open_box (5 open edges)"), std::string::npos) << notes[0];
+  EXPECT_NE(notes[1].find("crossed (at 3, "), std::string::npos) << notes[1];
+  for (const std::string& note : notes) EXPECT_EQ(note.find("whole"), std::string::npos) << note;
   for (double y : {-1.5, 0.0, 0.3}) {
     const Simulation s = twin.simulate(radarPose(0, y, 0.2));
     EXPECT_FALSE(s.records.empty());

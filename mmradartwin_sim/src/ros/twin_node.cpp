@@ -11,6 +11,7 @@
 #include "mmradartwin_dsp/ros/strict_parameters.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/session_files.h"
+#include "mmradartwin_sim/mesh_notes.h"
 #include "mmradartwin_sim/plugin.h"
 #include "mmradartwin_sim/ros/conversions.h"
 
@@ -131,6 +132,7 @@ void TwinNode::use(std::unique_ptr<Twin> twin) {
   forgetSimulations();
   radar_hash_ = radarHash(twin->radar());
   for (const std::string& note : twin->notes()) ROS_WARN("%s", note.c_str());
+  for (const std::string& note : meshNotes(twin->scene())) ROS_WARN("%s", note.c_str());
   mmradartwin_msgs::Scene msg = toMsg(twin->scene(), twin->description().toYaml());
   msg.header.frame_id = map_frame_;
   msg.header.stamp = ros::Time::now();

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "mmradartwin_sim/scene.h"
+
+namespace mmradartwin {
+
+/// What is wrong with meshes that are traced all the same, each kind in one sentence for whoever made the scene: bodies
+/// that are open, and surfaces of one actor that cut through each other. Sheets of one or two planes may be open. Rooms
+/// are made of sheets and scans have holes, so that neither is an error.
+std::vector<std::string> meshNotes(const Scene& scene);
+
+}  // namespace mmradartwin
