@@ -104,6 +104,7 @@ class Session {
   struct Accepted {
     Hypothesis hypothesis;
     std::vector<double> scaled, standard_error;
+    bool plain;
     std::size_t finding;
   };
   std::vector<Accepted> accepted_;
@@ -495,7 +496,8 @@ void Session::refitTogether() {
       a.standard_error = fit.standard_error[i];
       takeOver(a);
       const std::size_t numbers = a.hypothesis.coordinates.size();
-      if (numbers == 0) continue;  // there or not: its own round has judged it
+      // There or not, or plain whatever its scatter: its own round has judged it.
+      if (numbers == 0 || a.plain) continue;
       const double rate = fitter_->falseAlarmRate(fit.worth[i], numbers, family_);
       if (rate > weakest_rate) {
         weakest = i;
@@ -585,7 +587,7 @@ bool Session::judgeChannels(int round) {
     const bool unknown = finding.cause == "unknown";
     mechanisms_ = f.state.mechanisms;
     extended_.push_back(*finding.mechanism);
-    accepted_.push_back({f.hypothesis, f.scaled, f.standard_error, result_.findings.findings.size()});
+    accepted_.push_back({f.hypothesis, f.scaled, f.standard_error, f.plain, result_.findings.findings.size()});
     result_.findings.findings.push_back(std::move(finding));
     state_.nuisance = f.state.nuisance;
     if (accepted_.size() > 1) refitTogether();

@@ -34,10 +34,11 @@ struct Place {
 constexpr double kMostBlurred = 10;     ///< times the likelihood's own error
 constexpr double kCarries = 0.1;        ///< of the pose's strongest amplitude: echoes that places are known by
 constexpr double kSmallChange = 0.125;  ///< of the scale, for derivatives
+constexpr double kShows = 1;            ///< information about a typical value from which on ranges know of it
 
 /// Variance of the coordinates as ranges and directions of the strong echoes know them, where actors have range errors
 /// of their own and poses heading errors of their own: those errors are the same in all echoes of one actor or pose,
-/// however many there are.
+/// however many there are. 0 for a coordinate that moves no echo.
 Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_coordinate, int actors, int poses,
                                   const PoseAccuracy& accuracy, const LatentSpread& spread) {
   const Eigen::Index n = static_cast<Eigen::Index>(by_coordinate.size()), all = n + actors + poses;
@@ -73,8 +74,10 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
     azimuth[n + actors + static_cast<Eigen::Index>(path->place)] = accuracy.heading_rad / accuracy.path_angle_rad;
     information += range * range.transpose() + azimuth * azimuth.transpose();
   }
+  const Eigen::ArrayXd own = information.diagonal().head(n).array();
   information.diagonal().head(n).array() += 1e-12;
-  return information.inverse().diagonal().head(n);
+  const Eigen::ArrayXd variance = information.inverse().diagonal().head(n).array();
+  return (own > kShows).select(variance, 0.0);
 }
 
 /// A step to both sides of the fit along one coordinate.
