@@ -55,8 +55,12 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
   for (std::size_t j = 0; j < shifts.size(); ++j) {
     for (const PathShift& p : by_coordinate[j]) shifts[j][{p.place, p.event, p.facets}] = &p;
   }
+  // A pose's own place is as wrong in all its echoes: together they know a range as one of them does.
+  std::vector<double> echoes(strongest.size(), 0.0);
+  const auto carries = [&](const PathShift& p) { return p.amplitude >= kCarries * strongest[p.place]; };
+  for (const auto& [key, path] : shifts.front()) echoes[path->place] += carries(*path);
   for (const auto& [key, path] : shifts.front()) {
-    if (path->amplitude < kCarries * strongest[path->place]) continue;
+    if (!carries(*path)) continue;
     Eigen::VectorXd range = Eigen::VectorXd::Zero(all), azimuth = Eigen::VectorXd::Zero(all);
     bool shared = true;
     for (Eigen::Index j = 0; j < n && shared; ++j) {
@@ -72,7 +76,7 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
       if (a >= 0) range[n + a] += spread.actor_range_m / range_m;
     }
     azimuth[n + actors + static_cast<Eigen::Index>(path->place)] = accuracy.heading_rad / accuracy.path_angle_rad;
-    information += range * range.transpose() + azimuth * azimuth.transpose();
+    information += range * range.transpose() / echoes[path->place] + azimuth * azimuth.transpose();
   }
   const Eigen::ArrayXd own = information.diagonal().head(n).array();
   information.diagonal().head(n).array() += 1e-12;
