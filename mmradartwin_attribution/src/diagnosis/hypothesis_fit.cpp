@@ -248,8 +248,12 @@ Screened HypothesisFitter::screenDirectly(const ModelState& null, const Hypothes
     }
     return gain;
   };
+  const auto reciprocal = [](const Coordinate& c) { return c.reciprocal(); };
   if (hypothesis.coordinates.empty()) {
     tryAt(1);
+  } else if (std::all_of(hypothesis.coordinates.begin(), hypothesis.coordinates.end(), reciprocal)) {
+    // A steep edge far above all tones does nothing: it is looked for among them.
+    for (double scaled : {0.8, 1.0, 1.3}) tryAt(scaled);
   } else {
     const double gain = tryAt(kSome);
     const bool costly = source_.altersGeometry(hypothesis.at(start));
