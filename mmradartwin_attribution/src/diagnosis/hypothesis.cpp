@@ -131,6 +131,17 @@ bool Hypothesis::isGeometry() const {
          causeDescription(mechanism.mechanism).residual_class == ResidualClass::kShiftedResponse;
 }
 
+std::vector<NamedParameters> mechanismsWith(std::vector<NamedParameters> base, const std::vector<Hypothesis>& parts,
+                                            const std::vector<double>& scaled) {
+  auto from = scaled.begin();
+  for (const Hypothesis& h : parts) {
+    const auto to = from + static_cast<std::ptrdiff_t>(h.coordinates.size());
+    base.push_back(h.at({from, to}));
+    from = to;
+  }
+  return base;
+}
+
 std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedParameters>& present) {
   std::vector<Hypothesis> result;
   const MechanismRegistry& registry = MechanismRegistry::instance();

@@ -41,6 +41,10 @@ struct Hypothesis {
   bool isGeometry() const;
 };
 
+/// `base` and behind it the parts, their coordinates in a row.
+std::vector<NamedParameters> mechanismsWith(std::vector<NamedParameters> base, const std::vector<Hypothesis>& parts,
+                                            const std::vector<double>& scaled);
+
 /// Every registered mechanism that says how to try it, once per actor or material where it concerns one, and those that
 /// are there or not. Mechanisms that the twin has already are left out unless they concern another subject.
 std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedParameters>& present);

@@ -300,16 +300,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   for (const Hypothesis& h : parts) coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
   const int globals = nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(coordinates.size());
-  const auto mechanisms = [&](const std::vector<double>& scaled) {
-    std::vector<NamedParameters> all = base;
-    auto from = scaled.begin();
-    for (const Hypothesis& h : parts) {
-      const auto to = from + static_cast<std::ptrdiff_t>(h.coordinates.size());
-      all.push_back(h.at({from, to}));
-      from = to;
-    }
-    return all;
-  };
+  const auto mechanisms = [&](const std::vector<double>& at) { return mechanismsWith(base, parts, at); };
   const auto evaluate = [&](const std::vector<double>& scaled, const Nuisance& with_nuisance) {
     ModelState s;
     s.mechanisms = mechanisms(scaled);

@@ -108,16 +108,7 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
   const LatentSpread spread = model.spread();
   const Eigen::Index locations = static_cast<Eigen::Index>(data.locations.size());
   const Eigen::Index n = static_cast<Eigen::Index>(coordinates.size());
-  const auto mechanismsAt = [&](const std::vector<double>& at) {
-    std::vector<NamedParameters> all = base;
-    auto from = at.begin();
-    for (const Hypothesis& h : parts) {
-      const auto to = from + static_cast<std::ptrdiff_t>(h.coordinates.size());
-      all.push_back(h.at({from, to}));
-      from = to;
-    }
-    return all;
-  };
+  const auto mechanismsAt = [&](const std::vector<double>& at) { return mechanismsWith(base, parts, at); };
   const auto look = [&](const std::vector<double>& at) {
     Nuisance fitted = nuisance;
     const std::vector<PoseEchoes> echoes = source.echoes(mechanismsAt(at), fitted.actor_range_m);
