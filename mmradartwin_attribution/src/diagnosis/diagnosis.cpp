@@ -260,7 +260,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     const bool costly =
         of_actor && suspicious.count(all[i].subject) == 0 && source_->altersGeometry(all[i].at(typical));
     if (costly && !all[i].isOneSided()) continue;
-    const std::vector<int> poses = costly ? spread(kScreenPoses / 2) : some(all[i]);
+    const std::vector<int> poses = costly ? spread(kFewestPoses) : some(all[i]);
     Screened s = look(all[i], poses);
     // What chance promises: half a nat per number on the poses looked at, scaled up like the rest.
     s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());

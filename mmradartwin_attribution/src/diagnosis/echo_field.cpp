@@ -91,17 +91,24 @@ EchoCollector::EchoCollector(const RadarConfig& radar, double angle_error_rad, c
   }
 }
 
-EchoGroup& EchoCollector::group(const std::vector<int>& actors) {
-  for (EchoGroup& g : echoes_.groups) {
-    if (g.actors == actors) return g;
-  }
-  echoes_.groups.emplace_back();
-  EchoGroup& g = echoes_.groups.back();
-  g.actors = actors;
+double EchoCollector::addedRange_m(const std::vector<int>& actors) const {
+  double sum = 0;
   for (int a : actors) {
-    if (a >= 0 && a < static_cast<int>(actor_range_m_.size())) g.added_range_m += actor_range_m_[a];
+    if (a >= 0 && a < static_cast<int>(actor_range_m_.size())) sum += actor_range_m_[a];
   }
-  return g;
+  return sum;
+}
+
+EchoGroup& EchoCollector::group(const std::vector<int>& actors) {
+  for (EchoGroup* g : open_) {
+    if (g->actors == actors) return *g;
+  }
+  auto g = std::make_shared<EchoGroup>();
+  g->actors = actors;
+  g->added_range_m = addedRange_m(actors);
+  open_.push_back(g.get());
+  groups_.push_back(std::move(g));
+  return *open_.back();
 }
 
 void EchoCollector::outer(const std::complex<double>* c, double cosine,
@@ -234,18 +241,17 @@ void EchoCollector::addGraze(const PathRecord& record, double share) {
   const int middle = static_cast<int>(std::lround(place));
   const int low = std::max(0, middle - kLobe), high = std::min(samples_ - 1, middle + kLobe);
   if (low > high) return;
-  cover(echoes_.graze, low, high, size_);
+  cover(graze_, low, high, size_);
   for (int r = low; r <= high; ++r) {
     const double w = kHann.at(r - place).first;
-    accumulate(echoes_.graze, r, share * w * w, packed);
+    accumulate(graze_, r, share * w * w, packed);
   }
-  addToBeams(record.c.data(), place, share, kOffBeam, &echoes_.graze_beams, nullptr, nullptr);
+  addToBeams(record.c.data(), place, share, kOffBeam, &graze_beams_, nullptr, nullptr);
 }
 
 PoseEchoes EchoCollector::take() {
-  PoseEchoes result = std::move(echoes_);
-  echoes_ = {};
-  return result;
+  open_.clear();
+  return {std::exchange(groups_, {}), std::exchange(graze_, {}), std::exchange(graze_beams_, {})};
 }
 
 }  // namespace mmradartwin

@@ -2,6 +2,7 @@
 
 #include <complex>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "channel_data.h"
@@ -25,9 +26,9 @@ struct EchoGroup {
   Fields beams;              ///< bins by beam: |b^H c|^2 W W^T with W over the beam's bins, and so on
 };
 
-/// The expected channels of one pose.
+/// The expected channels of one pose. Groups do not change once collected: states of the fit share them.
 struct PoseEchoes {
-  std::vector<EchoGroup> groups;
+  std::vector<std::shared_ptr<const EchoGroup>> groups;
   BinCovariance graze;  ///< power of paths that come, go or change within the accuracy of the pose
   BinCovariance graze_beams;
 };
@@ -48,6 +49,15 @@ class EchoCollector {
   void add(const PathRecord& record, const Eigen::MatrixXcd& y, const Eigen::MatrixXcd& slope);
   /// Power without an actor, direction or range of its own.
   void addGraze(const PathRecord& record, double share);
+  /// A group that was collected before for this pose, instead of its paths.
+  void add(std::shared_ptr<const EchoGroup> group) { groups_.push_back(std::move(group)); }
+  /// The group of the last path, to which no more is added.
+  std::shared_ptr<const EchoGroup> finishGroup() {
+    open_.clear();
+    return groups_.back();
+  }
+  /// One-way range that the interactions add.
+  double addedRange_m(const std::vector<int>& actors) const;
   PoseEchoes take();
 
  private:
@@ -67,7 +77,9 @@ class EchoCollector {
   std::size_t size_;
   double bin_m_;
   std::vector<double> element_phase_;  ///< 2 pi y_k / lambda of the virtual elements
-  PoseEchoes echoes_;
+  std::vector<std::shared_ptr<const EchoGroup>> groups_;
+  std::vector<EchoGroup*> open_;  ///< of groups_, those that are collected here
+  BinCovariance graze_, graze_beams_;
 };
 
 /// Hann's response at `offset` bins from a tone, 1 at 0: sinc(d)/(1 - d^2), the limit for many samples (error below

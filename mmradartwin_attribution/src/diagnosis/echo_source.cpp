@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <boost/functional/hash.hpp>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -95,11 +96,6 @@ std::vector<PathRecord> mergedWeak(const RadarConfig& radar, std::vector<PathRec
   });
 }
 
-/// True where what is received of a path is more than its tone in all channels.
-bool mixesRanges(const Twin& twin, const Pose& pose) {
-  return twin.hasReceiveStage() && !twin.channelMatrix(pose.T_map_radar, pose.stamp_ns);
-}
-
 /// Derivative of a path's samples by its one-way range, per metre, the phase in the window's middle held.
 ComplexGrid byRange(const RadarConfig& radar, const ComplexGrid& x) {
   const double samples = static_cast<double>(x.cols());
@@ -156,6 +152,16 @@ EchoSource::Geometry EchoSource::geometryAfter(const NamedParameters& mechanism)
 
 bool EchoSource::altersGeometry(const NamedParameters& mechanism) {
   return geometryAfter(mechanism) != Geometry::kSame;
+}
+
+bool EchoSource::mixesRanges(const NamedParameters& mechanism) {
+  const auto [at, fresh] = mixes_ranges_.try_emplace(mechanism.mechanism, false);
+  if (fresh) {
+    const Twin twin = base_.changed({mechanism});
+    const Pose& pose = data_.poses.front().pose;
+    at->second = twin.hasReceiveStage() && !twin.channelMatrix(pose.T_map_radar, pose.stamp_ns);
+  }
+  return at->second;
 }
 
 std::vector<NamedParameters> EchoSource::geometryOf(const std::vector<NamedParameters>& mechanisms) {
@@ -363,25 +369,49 @@ EchoShift EchoSource::shift(const std::vector<NamedParameters>& mechanisms, cons
   return shift;
 }
 
+void EchoSource::addGroups(std::size_t pose, const std::vector<PathRecord>& records, double strongest,
+                           EchoCollector& to) {
+  std::map<std::vector<int>, std::vector<const PathRecord*>> groups;
+  for (const PathRecord& r : records) groups[r.actors].push_back(&r);
+  for (const auto& [actors, members] : groups) {
+    std::size_t signature = 0;
+    const auto sign = [&](double v) { boost::hash_combine(signature, v); };
+    sign(strongest);
+    sign(to.addedRange_m(actors));
+    for (const PathRecord* r : members) {
+      for (double v : r->length_m) sign(v);
+      for (const std::complex<double>& v : r->c) sign(v.real()), sign(v.imag());
+      sign(r->departure.y());
+      sign(r->arrival.y());
+    }
+    std::array<Kept, 2>& kept = kept_[pose][actors];
+    if (kept[1].group && kept[1].signature == signature) std::swap(kept[0], kept[1]);
+    if (!kept[0].group || kept[0].signature != signature) {
+      for (const PathRecord* r : members) to.add(*r, r->amplitude * r->amplitude / strongest);
+      (kept[0].group ? kept[1] : kept[0]) = {signature, to.finishGroup()};
+    } else {
+      to.add(kept[0].group);
+    }
+  }
+}
+
 std::vector<PoseEchoes> EchoSource::collect(
     const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
     const std::vector<double>& actor_range_m,
-    const std::function<std::vector<PathRecord>(std::size_t pose)>& paths) const {
+    const std::function<std::vector<PathRecord>(std::size_t pose)>& paths) {
   const Twin twin = base_.changed(mechanisms);
   const RadarConfig& radar = base_.radar();
   const SignalChain chain(radar);
   const int channels = radar.channels();
   const double window = 0.5 * radar.samples_per_chirp;  // Hann's sum
+  kept_.resize(data_.poses.size());
   // The twin less what mixes ranges in its receiver; nothing where it mixes none.
   std::optional<Twin> without_mixing;
-  if (!poses.empty() && mixesRanges(twin, data_.poses[static_cast<std::size_t>(poses.front())].pose)) {
-    std::vector<NamedParameters> rest;
-    for (const NamedParameters& m : mechanisms) {
-      if (!mixesRanges(base_.changed({m}), data_.poses[static_cast<std::size_t>(poses.front())].pose))
-        rest.push_back(m);
-    }
-    without_mixing.emplace(base_.changed(rest));
+  std::vector<NamedParameters> rest;
+  for (const NamedParameters& m : mechanisms) {
+    if (!mixesRanges(m)) rest.push_back(m);
   }
+  if (rest.size() < mechanisms.size()) without_mixing.emplace(base_.changed(rest));
 
   std::vector<PoseEchoes> result(poses.size());
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
@@ -393,13 +423,12 @@ std::vector<PoseEchoes> EchoSource::collect(
       std::optional<Eigen::MatrixXcd> matrix;
       if (receiver.hasReceiveStage()) matrix = receiver.channelMatrix(pose.T_map_radar, pose.stamp_ns);
       std::vector<PathRecord> seen = receiver.receivedPaths(pose.T_map_radar, std::move(records), pose.stamp_ns);
-      if (strongest == 0) strongest = strongestPower(seen);
       for (PathRecord& r : seen) {
-        if (matrix)
-          Eigen::Map<Eigen::VectorXcd>(r.c.data(), channels) =
-              *matrix * Eigen::Map<Eigen::VectorXcd>(r.c.data(), channels).eval();
-        collector.add(r, r.amplitude * r.amplitude / strongest);
+        if (!matrix) break;
+        Eigen::Map<Eigen::VectorXcd> c(r.c.data(), channels);
+        c = *matrix * c.eval();
       }
+      addGroups(i, seen, strongest > 0 ? strongest : strongestPower(seen), collector);
     };
     if (!without_mixing) {
       addTones(twin, std::move(all), 0);
@@ -455,6 +484,7 @@ void EchoSource::pointBeams(ChannelData& data, const std::vector<NamedParameters
     for (EchoBeam& beam : p.beams) beam.y = formBeam(beam, p.y);
   });
   settled_.clear();  // what grazes is to be found in the beams, too
+  kept_.clear();
 }
 
 void EchoSource::settle(const std::vector<NamedParameters>& mechanisms) {

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -64,6 +66,8 @@ class EchoSource {
   void pointBeams(ChannelData& data, const std::vector<NamedParameters>& mechanisms, int first_bin);
   /// True where the mechanism edits the scene or moves the radar: trying it traces everything again.
   bool altersGeometry(const NamedParameters& mechanism);
+  /// True where its receiver makes of a path more than its tone in all channels (an image, a harmonic).
+  bool mixesRanges(const NamedParameters& mechanism);
   const Twin& base() const { return base_; }
 
  private:
@@ -75,7 +79,10 @@ class EchoSource {
   std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);
   std::vector<PoseEchoes> collect(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
                                   const std::vector<double>& actor_range_m,
-                                  const std::function<std::vector<PathRecord>(std::size_t pose)>& paths) const;
+                                  const std::function<std::vector<PathRecord>(std::size_t pose)>& paths);
+  /// Adds records as their tones, those that meet the same actors together; what is the same as before is not collected
+  /// again.
+  void addGroups(std::size_t pose, const std::vector<PathRecord>& records, double strongest, EchoCollector& to);
   void findGraze(const std::vector<NamedParameters>& mechanisms);
 
   const Twin& base_;
@@ -88,11 +95,18 @@ class EchoSource {
   };
   std::map<std::string, Entry> cache_;
   std::size_t calls_ = 0;
+  struct Kept {
+    std::size_t signature = 0;
+    std::shared_ptr<const EchoGroup> group;
+  };
+  /// [poses] by actors: one that was met again last, and the last one that was new.
+  std::vector<std::map<std::vector<int>, std::array<Kept, 2>>> kept_;
   std::vector<PoseEchoes> graze_;  // by pose; nothing but graze
   std::vector<std::string> settled_;
   enum class Geometry { kSame, kMoreScreens, kOther };
   Geometry geometryAfter(const NamedParameters& mechanism);
   std::map<std::string, Geometry> geometry_;  // by mechanism text
+  std::map<std::string, bool> mixes_ranges_;  // by mechanism name
 };
 
 /// Defaults of every parameter of a mechanism. Throws InputError for an unknown name.

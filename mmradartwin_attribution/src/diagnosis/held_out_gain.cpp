@@ -60,7 +60,8 @@ std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<Po
     for (int bin = 0; bin < samples; ++bin) {
       if (axes.range_m[static_cast<std::size_t>(bin)] <= kMinRange_m) continue;
       s.setZero();
-      for (const EchoGroup& g : echoes[i].groups) {
+      for (const auto& group : echoes[i].groups) {
+      const EchoGroup& g = *group;
         const auto* p = g.bins.power.at(bin, size);
         if (p == nullptr) continue;
         std::size_t j = 0;

@@ -190,7 +190,7 @@ double HypothesisFitter::offset(const ModelState& null, const Hypothesis& hypoth
   // Nothing but the IF's images and harmonics has its echoes sent through the receiver one by one, which is not to the
   // last digit what their tones are.
   if (hypothesis.coordinates.size() != 1 || !hypothesis.coordinates[0].logarithmic()) return 0;
-  if (source_.altersGeometry(hypothesis.at({0.0}))) return 0;
+  if (!source_.mixesRanges(hypothesis.at({0.0}))) return 0;
   const std::vector<double> there = model_.byPose(
       source_.echoes(with(null.mechanisms, hypothesis.at({0.0})), poses, null.actor_range_m), null.nuisance, poses);
   double sum = 0;

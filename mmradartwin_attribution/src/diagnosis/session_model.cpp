@@ -189,7 +189,8 @@ SessionModel::Matrix SessionModel::sigma(const PoseEchoes& echoes, const Nuisanc
   const double gain = std::exp(n.log_gain);
   const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
   Matrix own(channels_, channels_);
-  for (const EchoGroup& g : echoes.groups) {
+  for (const auto& group : echoes.groups) {
+      const EchoGroup& g = *group;
     const EchoGroup::Fields& f = isBeam(cell) ? g.beams : g.bins;
     const auto *power = f.power.at(at, size_), *bend = f.bend.at(at, size_);
     if (power == nullptr && bend == nullptr) continue;
@@ -262,7 +263,8 @@ SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
     result[i].assign(static_cast<std::size_t>(cells(poses[i])) * size_, {});
     Matrix own(channels_, channels_);
-    for (const EchoGroup& g : echoes[i].groups) {
+    for (const auto& group : echoes[i].groups) {
+      const EchoGroup& g = *group;
       const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
       for (const EchoGroup::Fields* f : {&g.bins, &g.beams}) {
         for (int at = f->power.first; at < f->power.first + f->power.bins; ++at) {
@@ -322,7 +324,8 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     for (int k = 0; k < channels_; ++k) log_det += 2 * std::log(llt.matrixLLT()(k, k).real());
     out.log_likelihood += -log_det - (channels_ + kTail) * std::log1p(q / kTail);
 
-    for (const EchoGroup& g : echoes.groups) {
+    for (const auto& group : echoes.groups) {
+      const EchoGroup& g = *group;
       const EchoGroup::Fields& fields = isBeam(cell) ? g.beams : g.bins;
       const auto *power = fields.power.at(at, size_), *shift = fields.shift.at(at, size_),
                  *bend = fields.bend.at(at, size_);
@@ -589,7 +592,8 @@ Nuisance SessionModel::start(const std::vector<PoseEchoes>& echoes) const {
   std::vector<double> ratio, low;
   for (std::size_t i = 0; i < echoes.size(); ++i) {
     double expected = 0;
-    for (const EchoGroup& g : echoes[i].groups) {
+    for (const auto& group : echoes[i].groups) {
+      const EchoGroup& g = *group;
       const BinCovariance& power = g.bins.power;
       for (int bin = std::max(firstBin(), power.first); bin < power.first + power.bins; ++bin) {
         const auto* p = power.at(bin, size_);
