@@ -32,7 +32,7 @@ def parse():
                         help="how many of a row, of each effect where a row has several (default: " +
                         ",".join(f"{row}={n}" for row, n in TRIALS.items()) + ")")
     parser.add_argument("--seed", type=int, default=1, help="of all trials")
-    parser.add_argument("--poses", type=int, default=24, help="per session, up to 154 (full campaign, 22 places)")
+    parser.add_argument("--poses", type=int, default=44, help="per session, up to 154 (full campaign: 22 places)")
     parser.add_argument("--frames", type=int, default=20, help="per pose")
     parser.add_argument("--tier", choices=("office", "clean"), default="office")
     parser.add_argument("--budget", type=float, metavar="MINUTES", help="start no trial that would end later")

@@ -13,6 +13,7 @@ from mmradartwin_tests.effects import UNCATALOGUED
 
 MATERIALS = ("Concrete", "Metal", "Glass", "Wood")
 CORNERS = ("cabinet_north;wall_north", "bookshelf;wall_east")
+PLACES = 22         # of a whole campaign
 DISCRETE = ("iq_conjugation", "channel_conjugation", "channel_permutation")
 
 
@@ -23,7 +24,7 @@ class Trial:
     tier: str
     seed: int
     trial: int
-    poses: int = 24
+    poses: int = 44
     frames: int = 20
 
     def key(self):
@@ -40,8 +41,11 @@ class Trial:
 
     def hours(self):
         """About how long the campaign takes: frames, and pauses of 8 s between poses and of 24 s between places."""
-        places = math.sqrt(self.poses * 22 / 7)
-        return (self.poses * (self.frames * 0.05 + 8.0) + places * 24.0) / 3600
+        return (self.poses * (self.frames * 0.05 + 8.0) + min(PLACES, self.poses) * 24.0) / 3600
+
+    def headings(self):
+        """At a place: as many places as there are come first, since what differs from place to place limits all."""
+        return max(1, self.poses // PLACES)
 
 
 def sign(rng):
@@ -113,7 +117,7 @@ def permutation(rng, trial):
 
 
 def reflectivity(rng, trial):
-    """A material, which several actors have; single actors scatter too much for 24 poses (causes.md, section 6)."""
+    """A material, which several actors have; single actors scatter too much for few poses (causes.md, section 6)."""
     delta_db = float(rng.uniform(-12, -8)) if rng.random() < 0.6 else float(rng.uniform(6, 9))
     return {"material": str(rng.choice(MATERIALS)), "delta_db": delta_db}
 

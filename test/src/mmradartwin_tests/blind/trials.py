@@ -102,6 +102,7 @@ def hide(trial, session):
         return recordings.write_session(trial, session)
     chosen = [effects.make_effect(name, parameters, strength) for name, parameters, strength in draws.draw(trial)]
     measurement = Measurement(Settings(output=session, seed=trial.session_seed(), poses=trial.poses,
+                                       locations=draws.PLACES, headings=trial.headings(),
                                        frames=trial.frames, tier=trial.tier, effects=chosen, jobs=1))
     measurement.run()
     return measurement.truth()["effects"]
