@@ -295,7 +295,7 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
 HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                                                      const std::vector<Hypothesis>& parts,
                                                      const std::vector<std::vector<double>>& starts, int iterations,
-                                                     double worth_a_search) {
+                                                     const ModelState* null) {
   std::vector<Coordinate> coordinates;
   for (const Hypothesis& h : parts) coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
   const int globals = nuisance.globals();
@@ -377,7 +377,9 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
     const Eigen::VectorXd step = regularised(o.scores.information).ldlt().solve(o.scores.total);
     // On a ridge between a cause and the latents that stood in for it, every step widens the next.
     const double promised = 0.5 * o.scores.total.dot(step);
-    const bool hopeless = i >= 2 && o.state.log_likelihood + kClimb * std::max(risen, promised) < worth_a_search;
+    const bool hopeless =
+        null != nullptr && i >= 2 &&
+        o.state.log_likelihood + kClimb * std::max(risen, promised) < null->log_likelihood + kWorthASearch;
     if (i >= (risen > kRising ? 4 * iterations : iterations) || promised < kEnough || hopeless) break;
     bool better = false;
     for (double share : {1.0, 0.4, 0.1}) {
@@ -401,7 +403,8 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
     }
     if (!better) break;
   }
-  if (!geometric || n == 0 || n > kMostRough || o.state.log_likelihood < worth_a_search) return o;
+  if (!geometric || n == 0 || n > kMostRough) return o;
+  if (null != nullptr && broadGain(*null, o.state) < kWorthASearch) return o;
   // Where paths come and go with every millimetre the likelihood is rough: slopes end at the first bump, a quadratic
   // through values some millimetres apart does not. The latents follow to first order.
   for (double initial : {0.3, 0.15}) {
@@ -427,6 +430,20 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   return o;
 }
 
+std::vector<double> HypothesisFitter::gainByLocation(const ModelState& null, const ModelState& state) const {
+  std::vector<double> gain(model_.data().locations.size(), 0.0);
+  for (std::size_t i = 0; i < state.by_pose.size(); ++i) {
+    gain[static_cast<std::size_t>(model_.data().poses[i].location)] += state.by_pose[i] - null.by_pose[i];
+  }
+  return gain;
+}
+
+double HypothesisFitter::broadGain(const ModelState& null, const ModelState& state) const {
+  const double gain = state.log_likelihood - null.log_likelihood;
+  const std::vector<double> at = gainByLocation(null, state);
+  return at.size() > 1 ? gain - std::max(0.0, *std::max_element(at.begin(), at.end())) : gain;
+}
+
 Eigen::MatrixXd HypothesisFitter::robustCovariance(const Effective& e) const {
   const double locations = static_cast<double>(e.by_location.rows());
   const Eigen::MatrixXd covariance = e.information.inverse();
@@ -444,7 +461,7 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
                                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start) {
   std::vector<double> from;
   for (const std::vector<double>& s : start) from.insert(from.end(), s.begin(), s.end());
-  Optimum o = maximise(base, nuisance, parts, {from}, 3, -std::numeric_limits<double>::infinity());
+  Optimum o = maximise(base, nuisance, parts, {from}, 3, nullptr);
   const Effective e = effective(o.scores, nuisance.globals());
   const Eigen::MatrixXd robust = robustCovariance(e);
   JointFit fit;
@@ -473,19 +490,14 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
   f.hypothesis = hypothesis;
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());
-  Optimum o =
-      maximise(null.mechanisms, null.nuisance, {hypothesis}, starts, iterations, null.log_likelihood + kWorthASearch);
+  Optimum o = maximise(null.mechanisms, null.nuisance, {hypothesis}, starts, iterations, &null);
   f.scaled = std::move(o.scaled);
   f.state = std::move(o.state);
   const Scores& scores = o.scores;
-  f.gain = f.state.log_likelihood - null.log_likelihood - offset(null, hypothesis, everyPose(null));
-
-  std::vector<double> gain_at(model_.data().locations.size(), 0.0);
-  for (std::size_t i = 0; i < f.state.by_pose.size(); ++i) {
-    gain_at[static_cast<std::size_t>(model_.data().poses[i].location)] += f.state.by_pose[i] - null.by_pose[i];
-  }
-  f.broad_gain = f.gain;
-  if (gain_at.size() > 1) f.broad_gain -= std::max(0.0, *std::max_element(gain_at.begin(), gain_at.end()));
+  const double without = offset(null, hypothesis, everyPose(null));
+  f.gain = f.state.log_likelihood - null.log_likelihood - without;
+  f.broad_gain = broadGain(null, f.state) - without;
+  const std::vector<double> gain_at = gainByLocation(null, f.state);
 
   // Scatter over places: of the scores at the fit where there is a number, else of the gain itself.
   const double locations = static_cast<double>(gain_at.size());

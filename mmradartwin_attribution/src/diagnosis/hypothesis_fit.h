@@ -106,10 +106,14 @@ class HypothesisFitter {
                                     const Nuisance& nuisance, double offset_per_pose);
   Screened screenDirectly(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
   Eigen::MatrixXd robustCovariance(const Effective& effective) const;
-  /// worth_a_search: the log-likelihood by slopes from which on a geometry is searched without them.
+  /// null: what a geometry has to be well above at more than one place before it is searched without slopes; null
+  /// pointer: it is.
   Optimum maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                    const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& starts, int iterations,
-                   double worth_a_search);
+                   const ModelState* null);
+  std::vector<double> gainByLocation(const ModelState& null, const ModelState& state) const;
+  /// Beyond the null, without the place that gains most.
+  double broadGain(const ModelState& null, const ModelState& state) const;
 
   EchoSource& source_;
   const SessionModel& model_;
