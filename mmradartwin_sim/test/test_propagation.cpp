@@ -220,6 +220,28 @@ TEST_F(Propagation, AGhostComesBackBothWays) {
   EXPECT_NE(errorOf([&] { run("  wall_ghost: {walls: [nowhere]}\n"); }).find("nowhere"), std::string::npos);
 }
 
+TEST_F(Propagation, WhatEnclosesTheRoomIsNoGhostsObject) {
+  const auto addRoom = [&] {
+    addWall("mirror", "Metal", {-8, 4}, {8, 4}, -4, 4);
+    addWall("behind", "RoughMetal", {8, -4}, {8, 4}, -4, 4);
+  };
+  addRoom();
+  writeScene();
+  EXPECT_TRUE(run("  wall_ghost: {walls: [mirror], spacing_m: 1}\n").records.empty());
+  addRoom();
+  addWall("object", "RoughMetal", {4, -1}, {4, -0.5}, -0.5, 0.5);
+  writeScene();
+  const Simulation s = run("  wall_ghost: {walls: [mirror], spacing_m: 1}\n");
+  EXPECT_FALSE(s.records.empty());
+  const Simulation more = run("  wall_ghost: {walls: [mirror], spacing_m: 1, gain_db: 6}\n");
+  ASSERT_EQ(more.records.size(), s.records.size());
+  for (std::size_t i = 0; i < s.records.size(); ++i) {
+    // A scatterer sends more, an edge what its law says.
+    const double more_db = 20 * std::log10(more.records[i].amplitude / s.records[i].amplitude);
+    EXPECT_TRUE(std::abs(more_db - 6) < 1e-9 || std::abs(more_db) < 1e-9) << more_db;
+  }
+}
+
 TEST_F(Propagation, AnEdgesGhostIsItsBistaticUtd) {
   addWall("mirror", "Metal", {-8, 2}, {8, 2}, -9, 9);
   addWall("screen", "Metal", {3, -1}, {4, -2}, -8, 8);

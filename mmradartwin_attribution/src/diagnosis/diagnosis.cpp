@@ -110,6 +110,7 @@ class Session {
   std::vector<Accepted> accepted_;
   std::vector<NamedParameters> before_rounds_;  ///< mechanisms without what rounds have found
   std::size_t family_ = 1;                      ///< hypotheses of a round
+  std::set<std::string> no_use_;                ///< costly ones that gain nothing whatever is found beside them
   Diagnosis result_;
 };
 
@@ -259,9 +260,10 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     // nothing else.
     const bool costly =
         of_actor && suspicious.count(all[i].subject) == 0 && source_->altersGeometry(all[i].at(typical));
-    if (costly && !all[i].isOneSided()) continue;
+    if (costly && (!all[i].isOneSided() || no_use_.count(all[i].label()) > 0)) continue;
     const std::vector<int> poses = costly ? spread(kFewestPoses) : some(all[i]);
     Screened s = look(all[i], poses);
+    if (costly && !(s.promised > 0)) no_use_.insert(all[i].label());
     // What chance promises: half a nat per number on the poses looked at, scaled up like the rest.
     s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
     screened.push_back(std::move(s));
@@ -586,6 +588,7 @@ bool Session::judgeChannels(int round) {
     report("found " + f.hypothesis.label() + ", " + number(f.gain, 4) + " nats", 1);
     const bool unknown = finding.cause == "unknown";
     mechanisms_ = f.state.mechanisms;
+    if (source_->altersGeometry(*finding.mechanism)) no_use_.clear();
     extended_.push_back(*finding.mechanism);
     accepted_.push_back({f.hypothesis, f.scaled, f.standard_error, f.plain, result_.findings.findings.size()});
     result_.findings.findings.push_back(std::move(finding));

@@ -14,7 +14,17 @@ namespace {
 
 const std::string kName = "wall_ghost";
 
-/// Radar - wall - scatterer - radar and its reverse, for the rough surfaces and the exposed edges of all other actors.
+/// True for what encloses the room: a side of the scene is covered by it for the most part.
+bool enclosesRoom(const Scene& scene, const Actor& actor) {
+  Eigen::AlignedBox3d room;
+  for (const Actor& a : scene.actors) room.extend(a.bounds);
+  const Eigen::Vector3d share = (actor.bounds.sizes().array() / room.sizes().array().max(1e-9)).matrix();
+  const double sides[] = {share.y() * share.z(), share.x() * share.z(), share.x() * share.y()};
+  return *std::max_element(std::begin(sides), std::end(sides)) > 0.5;
+}
+
+/// Radar - wall - object - radar and its reverse, for the rough surfaces and the exposed edges of what stands in the
+/// room: not for what encloses it, whose rough faces see each other everywhere.
 /// A patch scatters sideways by its Lambertian law with |Gamma| the geometric mean of both legs' (which is reciprocal
 /// and goes over into the monostatic form), and with the phase that its direct echo has.
 class WallGhost : public Mechanism {
@@ -39,11 +49,15 @@ class WallGhost : public Mechanism {
         if (scene.facets[id].present) mirrors_.push_back(id);
       }
     }
+    std::set<int> objects;
+    for (int a = 0; a < static_cast<int>(scene.actors.size()); ++a) {
+      if (walls_.count(a) == 0 && !enclosesRoom(scene, scene.actors[static_cast<std::size_t>(a)])) objects.insert(a);
+    }
     points_ = makeScatterPoints(scene, spacing_m_, radar.center_frequency_hz(), kName,
-                                [this](const Facet& f) { return walls_.count(f.actor) == 0; });
+                                [&](const Facet& f) { return objects.count(f.actor) > 0; });
     edges_.clear();
     for (const DiffractingEdge& e : findDiffractingEdges(scene)) {
-      if (walls_.count(scene.facets[e.a].actor) == 0) edges_.push_back(e);
+      if (objects.count(scene.facets[e.a].actor) > 0) edges_.push_back(e);
     }
   }
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
@@ -120,7 +134,7 @@ class WallGhost : public Mechanism {
         context.radar.wavelength_m() / (4 * M_PI * r1 * r2) * patch * mirrored(context, elements, wall, b).norm();
     // Both the phase of the wall's reflection and the point's own are unknowable; the point's stands for both.
     addPair(
-        context, elements, wall, b, x, facet.actor, facet.id, std::polar(amplitude, point.phase_rad(context.seed)),
+        context, elements, wall, b, x, facet.actor, facet.id, std::polar(gain_ * amplitude, point.phase_rad(context.seed)),
         [&](const Eigen::Vector3d& t, const Eigen::Vector3d& r) { return (t - x).norm() + (r - x).norm(); }, records);
   }
 
@@ -139,7 +153,9 @@ class WallGhost : public Mechanism {
     const Facet &a = context.scene.facets[edge.a], &other = context.scene.facets[edge.b];
     const double lift = std::max(1e-3, a.flatness_m + other.flatness_m);
     if (!free(context, elements.p, wall, b, x + lift * edge.outward, 0)) return;
-    const std::complex<double> coefficient = context.radar.wavelength_m() / (4 * M_PI) * found->factor;
+    // An edge sends what its law says: a gain is for what a scatterer's law leaves open.
+    const std::complex<double> coefficient =
+        std::min(1.0, gain_) * context.radar.wavelength_m() / (4 * M_PI) * found->factor;
     addPair(
         context, elements, wall, b, x, a.actor, a.id, std::conj(coefficient),
         [&](const Eigen::Vector3d& t, const Eigen::Vector3d& r) {
@@ -177,7 +193,7 @@ class WallGhost : public Mechanism {
     for (PathRecord* record : {&first, &second}) {
       record->event = &kName;
       record->bounces = 2;
-      setContribution(context.radar, gain_ * coefficient, *record);
+      setContribution(context.radar, coefficient, *record);
       records.push_back(std::move(*record));
     }
   }
