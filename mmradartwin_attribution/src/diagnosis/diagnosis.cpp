@@ -46,6 +46,7 @@ constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kWorthALaw = 12;
 constexpr double kWorthAnObject = 5;       ///< at the best of all places; clean sessions promise up to 4.7
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
+constexpr double kMostLost = 0.01;         ///< of the explained power, by what the likelihood plainly gains of;
 constexpr double kMuch = 50;               ///< unless it is worth so many nats, inflation taken off;
 constexpr double kMuchOfGeometry = 60;     ///< of what moves echoes, whose likelihood is rough
 constexpr double kAlike = 5;               ///< nats within which two names are not told apart
@@ -556,6 +557,7 @@ void Session::takeOver(const Accepted& a) {
 
 bool Session::judgeChannels(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
+  bool refused = false;
   for (const HypothesisFit& f : fits) {
     std::string& verdict = triedAs(f, round).verdict;
     verdict = f.ranking() <= 0                   ? "gains less than its numbers cost"
@@ -574,10 +576,13 @@ bool Session::judgeChannels(int round) {
       const bool moves =
           f.hypothesis.isGeometry() || (source_->altersGeometry(*finding.mechanism) && !f.scaled.empty());
       const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
-      const bool much = finding.cause != "unknown" && explained[1] >= 0 &&
-                        (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0 &&
-                        (f.plain || f.broad_gain / f.inflation > (moves ? kMuchOfGeometry : kMuch));
-      if (!in_maps && !much) {
+      const bool in_nats = finding.cause != "unknown" && explained[1] >= 0 &&
+                           f.broad_gain / f.inflation > (moves ? kMuchOfGeometry : kMuch);
+      const bool likelier = (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0;
+      const bool much = likelier && ((f.plain && by > -kMostLost) || in_nats);
+      // What explains the same less well is no name for what a better one was refused for.
+      if (!in_maps && (!much || refused)) {
+        refused = refused || likelier;
         verdict = "the maps gain nothing: " + number(by, 2) + " (" + number(explained[0], 2) + " to " +
                   number(explained[1], 2) + ")";
         continue;

@@ -395,10 +395,9 @@ void EchoSource::addGroups(std::size_t pose, const std::vector<PathRecord>& reco
   }
 }
 
-std::vector<PoseEchoes> EchoSource::collect(
-    const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
-    const std::vector<double>& actor_range_m,
-    const std::function<std::vector<PathRecord>(std::size_t pose)>& paths) {
+std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& mechanisms,
+                                            const std::vector<int>& poses, const std::vector<double>& actor_range_m,
+                                            const std::function<std::vector<PathRecord>(std::size_t pose)>& paths) {
   const Twin twin = base_.changed(mechanisms);
   const RadarConfig& radar = base_.radar();
   const SignalChain chain(radar);

@@ -61,7 +61,7 @@ std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<Po
       if (axes.range_m[static_cast<std::size_t>(bin)] <= kMinRange_m) continue;
       s.setZero();
       for (const auto& group : echoes[i].groups) {
-      const EchoGroup& g = *group;
+        const EchoGroup& g = *group;
         const auto* p = g.bins.power.at(bin, size);
         if (p == nullptr) continue;
         std::size_t j = 0;

@@ -59,6 +59,19 @@ SessionCovariance difference(SessionCovariance of, const SessionCovariance& from
   return of;
 }
 
+/// The same between two sides; both are of the same poses.
+SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, double per) {
+  const float f = static_cast<float>(1 / per);
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    for (std::size_t j = 0; j < of[i].size(); ++j) of[i][j] = (of[i][j] - from[i][j]) * f;
+  }
+  return of;
+}
+
+/// True for what turns phases. The channels of one strong path are a narrow ridge: a secant to one side climbs out of
+/// it with the square of the turn, which hides the slope and makes the information many times too large.
+bool turnsPhases(const Coordinate& c) { return !c.oneSided() && c.unit != "dB"; }
+
 /// With no error of this actor's own.
 Nuisance withoutErrors(Nuisance nuisance, int actor) {
   nuisance.actor_range_m[static_cast<std::size_t>(actor)] = 0;
@@ -268,16 +281,21 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
   std::vector<SessionCovariance> directions;
   for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
     const std::vector<double> nothing(hypothesis.coordinates.size(), 0.0);
-    std::vector<double> at = nothing;
     // What rises from nothing does so with its power: its typical value shows more than the slope at nothing. What
     // shifts or turns does so to first order for small amounts alone.
     const double step = hypothesis.coordinates[j].oneSided() ? 1 : kSmallStep;
-    at[j] = step;
-    const auto echoes =
-        step < 1 ? source_.echoesNear(with(null.mechanisms, hypothesis.at(at)),
-                                      with(null.mechanisms, hypothesis.at(nothing)), poses, null.actor_range_m)
-                 : source_.echoes(with(null.mechanisms, hypothesis.at(at)), poses, null.actor_range_m);
-    directions.push_back(difference(model_.covariance(echoes, null.nuisance, poses), null.covariance, poses, step));
+    const auto covarianceAt = [&](double scaled) {
+      std::vector<double> at = nothing;
+      at[j] = scaled;
+      const auto echoes =
+          step < 1 ? source_.echoesNear(with(null.mechanisms, hypothesis.at(at)),
+                                        with(null.mechanisms, hypothesis.at(nothing)), poses, null.actor_range_m)
+                   : source_.echoes(with(null.mechanisms, hypothesis.at(at)), poses, null.actor_range_m);
+      return model_.covariance(echoes, null.nuisance, poses);
+    };
+    directions.push_back(turnsPhases(hypothesis.coordinates[j])
+                             ? difference(covarianceAt(step), covarianceAt(-step), 2 * step)
+                             : difference(covarianceAt(step), null.covariance, poses, step));
   }
   const Effective e = effective(model_.scores(null.basis, directions, poses), null.nuisance.globals());
   const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
@@ -289,6 +307,15 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
     result.starts.front()[j] = std::clamp(step[static_cast<Eigen::Index>(j)], one_sided ? 0.02 : -8.0, 8.0);
   }
   if (possible) result.promised = whole * 0.5 * e.total.dot(step) / e.inflation;
+  // Slopes are of paths that stay. What a turn of the view lets in and out shows in the likelihood itself.
+  if (hypothesis.isGeometry() && hypothesis.coordinates.size() == 1 && source_.altersGeometry(hypothesis.at({1.0}))) {
+    for (double scaled : {-1.0, 1.0}) {
+      const double promised = valueAt(null, hypothesis, {scaled}, poses, null.nuisance, 0).second;
+      if (promised <= result.promised) continue;
+      result.promised = promised;
+      result.starts.push_back({scaled});
+    }
+  }
   return result;
 }
 
@@ -359,15 +386,17 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
     std::vector<SessionCovariance> directions;
     const SessionCovariance here = model_.covariance(s.echoes, s.nuisance, everyone);
     for (Eigen::Index j = 0; j < n; ++j) {
-      std::vector<double> moved = scaled;
-      const double step = coordinates[static_cast<std::size_t>(j)].logarithmic()
-                              ? kSmallStep * std::max(1e-4, std::abs(scaled[static_cast<std::size_t>(j)]))
-                              : kSmallStep;
-      moved[static_cast<std::size_t>(j)] += step;
-      directions.push_back(
-          difference(model_.covariance(source_.echoesNear(mechanisms(moved), s.mechanisms, everyone, s.actor_range_m),
-                                       s.nuisance, everyone),
-                     here, everyone, step));
+      const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
+      const double step =
+          c.logarithmic() ? kSmallStep * std::max(1e-4, std::abs(scaled[static_cast<std::size_t>(j)])) : kSmallStep;
+      const auto covarianceAt = [&](double by) {
+        std::vector<double> moved = scaled;
+        moved[static_cast<std::size_t>(j)] += by;
+        return model_.covariance(source_.echoesNear(mechanisms(moved), s.mechanisms, everyone, s.actor_range_m),
+                                 s.nuisance, everyone);
+      };
+      directions.push_back(turnsPhases(c) ? difference(covarianceAt(step), covarianceAt(-step), 2 * step)
+                                          : difference(covarianceAt(step), here, everyone, step));
     }
     return model_.scores(model_.basis(s.echoes, s.nuisance), directions, everyone);
   };

@@ -190,7 +190,7 @@ SessionModel::Matrix SessionModel::sigma(const PoseEchoes& echoes, const Nuisanc
   const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
   Matrix own(channels_, channels_);
   for (const auto& group : echoes.groups) {
-      const EchoGroup& g = *group;
+    const EchoGroup& g = *group;
     const EchoGroup::Fields& f = isBeam(cell) ? g.beams : g.bins;
     const auto *power = f.power.at(at, size_), *bend = f.bend.at(at, size_);
     if (power == nullptr && bend == nullptr) continue;

@@ -134,7 +134,8 @@ class WallGhost : public Mechanism {
         context.radar.wavelength_m() / (4 * M_PI * r1 * r2) * patch * mirrored(context, elements, wall, b).norm();
     // Both the phase of the wall's reflection and the point's own are unknowable; the point's stands for both.
     addPair(
-        context, elements, wall, b, x, facet.actor, facet.id, std::polar(gain_ * amplitude, point.phase_rad(context.seed)),
+        context, elements, wall, b, x, facet.actor, facet.id,
+        std::polar(gain_ * amplitude, point.phase_rad(context.seed)),
         [&](const Eigen::Vector3d& t, const Eigen::Vector3d& r) { return (t - x).norm() + (r - x).norm(); }, records);
   }
 
