@@ -2,6 +2,7 @@
 
 #include "closed_form.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/law_variable.h"
 #include "mmradartwin_sim/weight_basis.h"
 #include "scene_files.h"
 
@@ -451,6 +452,15 @@ TEST_F(Propagation, AnEmpiricalLawIsItsTable) {
               1e-9);
   EXPECT_NEAR(db(look("  empirical_law: {variable: heading_deg, at: [0, 30], gain_db: [0, 3]}\n", 10).amplitude / base),
               1, 1e-6);
+  // The plate stands in map's +x: its echo arrives from there however the radar is turned.
+  EXPECT_NEAR(
+      db(look("  empirical_law: {variable: bearing_deg, at: [-10, 10], gain_db: [0, 5]}\n", 20).amplitude / base), 2.5,
+      1e-6);
+  // Half a metre beside the way there.
+  EXPECT_NEAR(
+      db(look("  empirical_law: {variable: passing_m, x_m: 1.5, y_m: 0.5, at: [0, 1], gain_db: [-8, 0]}\n").amplitude /
+         base),
+      -4, 1e-6);
   EXPECT_NEAR(look("  empirical_law: {variable: range_m, at: [0], delay_m: [0.04]}\n").length_m[0], 6.08, 1e-9);
   const PathRecord turned = look("  empirical_law: {variable: range_m, at: [0], angle_deg: [5]}\n", -20);
   EXPECT_NEAR(std::atan2(turned.departure.y(), turned.departure.x()) / kDegree, 25, 1e-9);
@@ -464,6 +474,35 @@ TEST_F(Propagation, AnEmpiricalLawIsItsTable) {
               std::string::npos)
         << bad;
   }
+}
+
+TEST_F(Propagation, LawVariablesReadPathAndSession) {
+  Scene scene;
+  Facet facet;
+  facet.origin = facet.e1 = facet.e2 = Eigen::Vector3d::Zero();
+  facet.normal = Eigen::Vector3d::UnitX();
+  scene.facets = {facet};
+  LawVariable::Where where{scene, Eigen::Isometry3d::Identity(), 90, 0.5};
+  PathRecord record;
+  record.amplitude = 0.05;
+  record.bounces = 1;
+  record.facets = {0};
+  record.vertices = {{2, 2, 0}};
+  record.departure = Eigen::Vector3d(1, 1, 0).normalized();
+  record.arrival = Eigen::Vector3d::UnitX();
+  const auto value = [&](const char* name) { return LawVariable(name).of(where, record); };
+  EXPECT_DOUBLE_EQ(value("time_s").of[0], 90);
+  EXPECT_NEAR(value("amplitude_db").of[0], -20, 1e-12);
+  EXPECT_NEAR(value("incidence_deg").of[0], 45, 1e-9);  // of a scatter point
+  ASSERT_EQ(value("azimuth_deg").count, 2);
+  EXPECT_NEAR(value("azimuth_deg").of[0], 45, 1e-9);
+  EXPECT_NEAR(value("azimuth_deg").of[1], 0, 1e-9);
+  record.reflection_cosine = {0.5};
+  EXPECT_NEAR(value("incidence_deg").of[0], 60, 1e-9);
+  where.strongest_amplitude = 0;
+  EXPECT_EQ(value("amplitude_db").count, 0);  // no session is known
+  EXPECT_NEAR(LawVariable("passing_m", 0, 3).of(where, record).of[0], std::sqrt(4.5), 1e-9);
+  EXPECT_NE(errorOf([] { LawVariable("colour"); }).find("time_s"), std::string::npos);
 }
 
 }  // namespace

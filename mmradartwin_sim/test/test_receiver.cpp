@@ -115,6 +115,13 @@ TEST_F(ReceiverTest, CouplingFeedsNeighbours) {
   EXPECT_NEAR(
       std::abs(x(1, 9) - (base(1, 9) + 0.1 * j * (base(0, 9) + base(2, 9)) - 0.05 * base(3, 9))) / std::abs(base(1, 9)),
       0, 1e-6);
+  const ComplexGrid shares =
+      look("  mutual_coupling: {next_real: 0.2, next_imaginary: -0.1, second_imaginary: 0.05}\n").grid.x;
+  EXPECT_NEAR(std::abs(shares(4, 9) - (base(4, 9) + (0.2 - 0.1 * j) * base(5, 9) + 0.05 * j * base(6, 9))) /
+                  std::abs(base(4, 9)),
+              0, 1e-6);
+  EXPECT_NE(errorOf([&] { look("  mutual_coupling: {level_db: -20, next_real: 0.1}\n"); }).find("not both"),
+            std::string::npos);
 }
 
 TEST_F(ReceiverTest, ImbalanceMakesAnImage) {

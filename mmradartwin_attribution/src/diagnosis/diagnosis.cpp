@@ -21,6 +21,7 @@
 #include "fitted_parameters.h"
 #include "held_out_gain.h"
 #include "hypothesis_fit.h"
+#include "law_screen.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "profiled_values.h"
 #include "receiver_finding.h"
@@ -35,12 +36,13 @@ constexpr double kFalseAlarm = 0.01;  ///< family-wise, per round
 constexpr int kMostFindings = 4;
 constexpr std::size_t kScreenPoses = 44;  ///< a part of the session ranks hypotheses well enough
 constexpr std::size_t kFewestPoses = 12;
+constexpr std::size_t kLawPoses = 66;   ///< whose paths are scored for laws without a name
 constexpr std::size_t kSecondLook = 9;  ///< hypotheses that are looked at on all poses
 constexpr std::size_t kSuspects = 6;    ///< actors whose geometry is tried
 constexpr double kOutOfPlace = 4;       ///< nats of an actor's own errors from which on it is looked for elsewhere
 constexpr std::size_t kMostOutOfPlace = 2;
 constexpr std::size_t kMostNames = 5;  ///< fits of one round
-constexpr std::size_t kMostLaws = 2;
+constexpr std::size_t kMostLaws = 3;
 constexpr double kWorthAFit = 4;  ///< nats promised
 constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kWorthALaw = 12;
@@ -221,9 +223,7 @@ void Session::judgeNoise() {
 }
 
 std::vector<HypothesisFit> Session::fitBest(int round) {
-  std::vector<Hypothesis> all = hypotheses(twin_, mechanisms_);
-  const std::vector<Hypothesis> laws = empiricalHypotheses(data_, mechanisms_);
-  all.insert(all.end(), laws.begin(), laws.end());
+  const std::vector<Hypothesis> all = hypotheses(twin_, mechanisms_);
   const auto suspects = fitter_->suspects(state_);
   std::set<std::string> suspicious;
   for (std::size_t i = 0; i < std::min(kSuspects, suspects.size()); ++i) {
@@ -285,6 +285,8 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     s.promised -= numbers + 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
     source_->settle(mechanisms_);
   }
+  report("laws without a name", 0);
+  for (Screened& s : screenLaws(twin_, *model_, state_, spread(kLawPoses))) screened.push_back(std::move(s));
   for (Screened& s : sharedLatents(*source_, state_, model_->spread(), accuracy_, all, spread(kScreenPoses))) {
     const auto same = std::find_if(screened.begin(), screened.end(), [&](const Screened& other) {
       return other.hypothesis.label() == s.hypothesis.label();
@@ -301,7 +303,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     screened.push_back({objectAt(*place), place->promised, {{0, 0, 1}}});
   }
   std::stable_sort(screened.begin(), screened.end(), better);
-  family_ = all.size();
+  family_ = all.size() + static_cast<std::size_t>(kLawFamily);
   const auto isObject = [](const Hypothesis& h) { return h.mechanism.mechanism == "actor_unmodelled"; };
   std::vector<HypothesisFit> fits;
   std::size_t names_fitted = 0, laws_fitted = 0;
@@ -311,7 +313,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     tried.promised = s.promised;
     tried.gain = std::numeric_limits<double>::quiet_NaN();
     tried.round = round;
-    // A promise is a quadratic's and often far too small: names get several chances, laws without a name two.
+    // A promise is a quadratic's and often far too small: names get several chances, laws without a name three.
     const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
     std::size_t& fitted = law ? laws_fitted : names_fitted;
     const double worth = isObject(s.hypothesis)      ? kWorthAnObject
@@ -334,7 +336,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     result_.tried.push_back(tried);
   }
   for (HypothesisFit& f : fits) {
-    fitter_->judge(f, all.size() + static_cast<std::size_t>(isObject(f.hypothesis) ? kObjectPlaces : 0));
+    fitter_->judge(f, family_ + static_cast<std::size_t>(isObject(f.hypothesis) ? kObjectPlaces : 0));
     TriedHypothesis& t = triedAs(f, round);
     t.gain = f.gain;
     t.broad_gain = f.broad_gain;
@@ -385,7 +387,8 @@ Finding Session::describe(const HypothesisFit& best, const std::vector<Hypothesi
   }
   FindingPlace place;
   if (twin_.scene().actorIndex(best.hypothesis.subject) >= 0) place.actors = {best.hypothesis.subject};
-  if (f.cause == "actor_unmodelled") {
+  const bool of_place = m.mechanism == "empirical_law" && m.values.text("variable") == "passing_m";
+  if (f.cause == "actor_unmodelled" || of_place) {
     place.x_m = m.values.number("x_m");
     place.y_m = m.values.number("y_m");
   }

@@ -6,58 +6,13 @@
 #include <set>
 #include <sstream>
 
-#include "echo_source.h"
-
 namespace mmradartwin {
 namespace {
 
-struct Law {
-  const char* parameter;
-  const char* unit;
-  double typical, limit;
-};
-constexpr Law kLaws[] = {{"gain_db", "dB", 2.0, 200}, {"delay_m", "m", 0.02, 10}, {"angle_deg", "deg", 1.0, 90}};
-
-std::vector<double> nodes(const std::string& variable, const ChannelData& data) {
-  if (variable == "range_m") return {1, 2, 3, 4, 5.5, 7.5};
-  if (variable == "azimuth_deg") return {-60, -40, -20, 0, 20, 40, 60};
-  if (variable == "incidence_deg") return {0, 15, 30, 45, 60, 75};
-  if (variable == "heading_deg") return {-180, -120, -60, 0, 60, 120, 180};
-  double low = 1e9, high = -1e9;  // height_m
-  for (const PoseChannels& p : data.poses) {
-    low = std::min(low, p.pose.T_map_radar.translation().z());
-    high = std::max(high, p.pose.T_map_radar.translation().z());
-  }
-  if (high - low < 0.1) return {};
-  return {low, 0.5 * (low + high), high};
-}
+constexpr const char* kObservables[] = {"gain_db", "delay_m", "angle_deg"};
+constexpr std::size_t kMostInWords = 12;  ///< points of a law; of more, the extremes
 
 }  // namespace
-
-std::vector<Hypothesis> empiricalHypotheses(const ChannelData& data, const std::vector<NamedParameters>& present) {
-  std::vector<Hypothesis> result;
-  for (const NamedParameters& m : present) {
-    if (m.mechanism == "empirical_law") return result;  // twin.yaml knows it once
-  }
-  for (const char* variable : {"range_m", "azimuth_deg", "incidence_deg", "height_m", "heading_deg"}) {
-    const std::vector<double> at = nodes(variable, data);
-    if (at.empty()) continue;
-    for (const Law& law : kLaws) {
-      Hypothesis h;
-      h.mechanism = defaultMechanism("empirical_law");
-      h.mechanism.values.set("variable", std::string(variable));
-      h.mechanism.values.set("at", at);
-      h.mechanism.values.set(law.parameter, std::vector<double>(at.size(), 0.0));
-      h.subject = std::string(law.parameter) + " over " + variable;
-      const bool gauge = std::string(law.parameter) == "gain_db";  // the session's gain is free already
-      for (std::size_t i = gauge ? 1 : 0; i < at.size(); ++i) {
-        h.coordinates.push_back({law.parameter, law.unit, static_cast<int>(i), 0, law.typical, -law.limit, law.limit});
-      }
-      result.push_back(std::move(h));
-    }
-  }
-  return result;
-}
 
 std::string describeLaw(const Hypothesis& hypothesis, const NamedParameters& fitted) {
   std::ostringstream out;
@@ -71,10 +26,20 @@ std::string describeLaw(const Hypothesis& hypothesis, const NamedParameters& fit
   }
   const std::string variable = fitted.values.text("variable");
   const std::vector<double>& at = fitted.values.numbers("at");
-  for (const Law& law : kLaws) {
-    const std::vector<double>& values = fitted.values.numbers(law.parameter);
+  for (const char* observable : kObservables) {
+    const std::vector<double>& values = fitted.values.numbers(observable);
     if (values.empty()) continue;
-    out << law.parameter << " of the echoes over " << variable << ":";
+    out << observable << " of the echoes over " << variable;
+    if (variable == "passing_m") {
+      out << " from x_m " << fitted.values.number("x_m") << ", y_m " << fitted.values.number("y_m");
+    }
+    if (values.size() > kMostInWords) {
+      const auto [low, high] = std::minmax_element(values.begin(), values.end());
+      out << ": from " << *low << " at " << at[static_cast<std::size_t>(low - values.begin())] << " to " << *high
+          << " at " << at[static_cast<std::size_t>(high - values.begin())];
+      continue;
+    }
+    out << ":";
     for (std::size_t i = 0; i < values.size(); ++i) out << (i ? ", " : " ") << values[i] << " at " << at[i];
   }
   return out.str();

@@ -13,6 +13,8 @@ namespace {
 
 // Pairs of actors are tried as a corner where their bounds come this near.
 constexpr double kNear_m = 0.1;
+// Steps of a gain over a session are tried up to this number.
+constexpr int kMostSteps = 3;
 // A face has to be this large to mirror a room.
 constexpr double kMirrorArea_m2 = 0.5;
 
@@ -85,6 +87,22 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
   if (!material && !actor && spec("walls") == specs.end() && spec("actors") == specs.end()) out.push_back(bare);
 }
 
+/// A gain may change at once instead of at a rate: lists of steps, whose length says where they are.
+void addSteps(const Hypothesis& bare, const std::vector<ParameterSpec>& specs, std::vector<Hypothesis>& out) {
+  const auto spec =
+      std::find_if(specs.begin(), specs.end(), [](const ParameterSpec& s) { return s.name == "steps_db"; });
+  if (spec == specs.end()) return;
+  for (int steps = 1; steps <= kMostSteps; ++steps) {
+    Hypothesis h = bare;
+    h.coordinates.clear();
+    h.mechanism.values.set(spec->name, std::vector<double>(static_cast<std::size_t>(steps), 0.0));
+    for (int k = 0; k < steps; ++k)
+      h.coordinates.push_back({spec->name, spec->unit, k, 0, 1, spec->min, spec->max, {}});
+    h.subject = std::to_string(steps) + (steps > 1 ? " steps" : " step");
+    out.push_back(std::move(h));
+  }
+}
+
 }  // namespace
 
 double Coordinate::value(double scaled) const {
@@ -109,7 +127,11 @@ NamedParameters Hypothesis::at(const std::vector<double>& scaled) const {
   NamedParameters m = mechanism;
   for (std::size_t i = 0; i < coordinates.size(); ++i) {
     const Coordinate& c = coordinates[i];
-    if (c.element < 0) {
+    if (!c.shape.empty()) {
+      std::vector<double> list = m.values.numbers(c.parameter);
+      for (std::size_t k = 0; k < list.size(); ++k) list[k] += c.value(scaled[i]) * c.shape[k];
+      m.values.set(c.parameter, std::move(list));
+    } else if (c.element < 0) {
       m.values.set(c.parameter, c.value(scaled[i]));
     } else {
       std::vector<double> list = m.values.numbers(c.parameter);
@@ -156,7 +178,7 @@ std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedPara
     bare.mechanism = defaultMechanism(name);
     for (const ParameterSpec& s : specs) {
       if (std::isnan(s.neutral)) continue;
-      Coordinate c{s.name, s.unit, -1, s.neutral, s.typical, s.min, s.max};
+      Coordinate c{s.name, s.unit, -1, s.neutral, s.typical, s.min, s.max, {}};
       if (s.kind == ParameterKind::kNumber) {
         bare.mechanism.values.set(s.name, s.neutral);
         bare.coordinates.push_back(c);
@@ -170,6 +192,7 @@ std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedPara
     }
     std::vector<Hypothesis> all;
     addSubjects(twin, bare, specs, all);
+    addSteps(bare, specs, all);
     for (Hypothesis& h : all) {
       try {  // what the scene or the radar does not allow is no hypothesis
         twin.changed({h.at(std::vector<double>(h.coordinates.size(), 1.0))});

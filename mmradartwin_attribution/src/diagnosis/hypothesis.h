@@ -14,6 +14,7 @@ struct Coordinate {
   std::string parameter, unit;
   int element = -1;  ///< of a list, -1 for a plain number
   double neutral = 0, typical = 1, min = 0, max = 0;
+  std::vector<double> shape = {};  ///< of a list: adds value() times this to all of it, neutral being 0; else empty
 
   /// True for levels in dB whose neutral value stands for nothing at all: then the scale is one of power.
   bool logarithmic() const { return unit == "dB" && neutral <= -60; }
@@ -32,6 +33,7 @@ struct Hypothesis {
   NamedParameters mechanism;            ///< texts set, numbers at their neutral values
   std::vector<Coordinate> coordinates;  ///< empty: it is there or not
   std::string subject;                  ///< actor or material it is about, "" for none
+  int searched = 0;                     ///< further numbers (edges, a period) that were looked for, not fitted
 
   NamedParameters at(const std::vector<double>& scaled) const;
   std::string label() const;

@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/law_variable.h"
 #include "propagation_builtin.h"
 
 namespace mmradartwin {
@@ -17,26 +19,23 @@ class EmpiricalLaw : public Mechanism {
   std::vector<ParameterSpec> parameters() const override {
     ParameterSpec at = optionalNumbersSpec("at", "of the variable", -1e6, 1e6, "where the law is given, ascending");
     at.required = true;
-    return {
-        textSpec("variable", true, "",
-                 "range_m (half the path), azimuth_deg (mean of departure and arrival), incidence_deg (of the first "
-                 "specular reflection; other paths stay as they are), height_m (of the radar in map) or heading_deg "
-                 "(of the radar in map, -180 to 180)"),
+    std::vector<ParameterSpec> all = {
+        textSpec("variable", true, "", LawVariable::meaning().c_str()),
         at,
         optionalNumbersSpec("gain_db", "dB", -200, 200, "of the echo, per point"),
         optionalNumbersSpec("delay_m", "m", -10, 10, "added to the one-way range, per point"),
         optionalNumbersSpec("angle_deg", "deg", -90, 90, "added to azimuths of departure and arrival, per point"),
+        numberSpec("x_m", "m", -1e4, 1e4, 0, "place in map that passing_m is about"),
+        numberSpec("y_m", "m", -1e4, 1e4, 0, "place in map that passing_m is about"),
         textSpec("actor", false, "", "only paths that meet this actor"),
         textSpec("material", false, "", "only paths that meet this material"),
         textSpec("event", false, "", "only paths of this mechanism")};
+    for (ParameterSpec& s : all) s = weighing(s);
+    return all;
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
-    variable_ = values.text("variable");
-    const std::vector<std::string> known = {"range_m", "azimuth_deg", "incidence_deg", "height_m", "heading_deg"};
-    if (std::find(known.begin(), known.end(), variable_) == known.end()) {
-      throw InputError("mechanism empirical_law: key variable: '" + variable_ +
-                       "' is unknown; allowed: range_m, azimuth_deg, incidence_deg, height_m, heading_deg");
-    }
+    variable_.emplace(values.text("variable"), values.number("x_m"), values.number("y_m"));
+    by_amplitude_ = values.text("variable") == "amplitude_db";
     at_ = values.numbers("at");
     if (at_.empty() || std::adjacent_find(at_.begin(), at_.end(), std::greater_equal<double>()) != at_.end()) {
       throw InputError("mechanism empirical_law: key at: needs one ascending number or more");
@@ -64,12 +63,15 @@ class EmpiricalLaw : public Mechanism {
         std::none_of(record.actors.begin(), record.actors.end(), [this](int a) { return affected_[a]; })) {
       return;
     }
-    double x = 0;
-    if (!variable(context, record, x)) return;
+    const LawVariable::Values x = variable_->of(
+        {context.scene, context.T_map_radar, context.session_s, by_amplitude_ ? context.strongest_amplitude() : 0},
+        record);
+    if (x.count == 0) return;
     if (!gain_db_.empty()) scaleRecord(std::pow(10.0, look(gain_db_, x) / 20), record);
     if (!angle_deg_.empty()) turn(context.radar, look(angle_deg_, x) * M_PI / 180, record);
     if (!delay_m_.empty()) lengthen(context.radar, 2 * look(delay_m_, x), record);
   }
+  bool needsStrongestAmplitude() const override { return by_amplitude_; }
 
  private:
   std::vector<double> column(const Parameters& values, const char* key) const {
@@ -89,25 +91,10 @@ class EmpiricalLaw : public Mechanism {
     return law[i - 1] + share * (law[i] - law[i - 1]);
   }
 
-  bool variable(const PoseContext& context, const PathRecord& record, double& x) const {
-    constexpr double kDegrees = 180 / M_PI;
-    if (variable_ == "range_m") {
-      x = 0.5 * record.length_m[0];
-    } else if (variable_ == "azimuth_deg") {
-      x = 0.5 * kDegrees *
-          (std::atan2(record.departure.y(), record.departure.x()) + std::atan2(record.arrival.y(), record.arrival.x()));
-    } else if (variable_ == "incidence_deg") {
-      const auto first = std::find_if(record.reflection_cosine.begin(), record.reflection_cosine.end(),
-                                      [](double c) { return c >= 0; });
-      if (first == record.reflection_cosine.end()) return false;
-      x = kDegrees * std::acos(std::min(1.0, *first));
-    } else if (variable_ == "height_m") {
-      x = context.T_map_radar.translation().z();
-    } else {
-      const Eigen::Vector3d boresight = context.T_map_radar.linear().col(0);
-      x = kDegrees * std::atan2(boresight.y(), boresight.x());
-    }
-    return true;
+  double look(const std::vector<double>& law, const LawVariable::Values& x) const {
+    double sum = 0;
+    for (int i = 0; i < x.count; ++i) sum += look(law, x.of[static_cast<std::size_t>(i)]);
+    return sum / x.count;
   }
 
   /// Turns both directions about the radar's z; the ways of the elements change as those of a plane wave do.
@@ -125,7 +112,9 @@ class EmpiricalLaw : public Mechanism {
     record.arrival = arrival;
   }
 
-  std::string variable_, event_;
+  std::optional<LawVariable> variable_;
+  bool by_amplitude_ = false;
+  std::string event_;
   std::vector<double> at_, gain_db_, delay_m_, angle_deg_;
   std::vector<bool> affected_;
 };
