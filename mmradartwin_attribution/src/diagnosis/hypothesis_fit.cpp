@@ -30,7 +30,7 @@ constexpr double kMaxInflation = 50;
 constexpr double kPlain = 5, kPlainFalseAlarm = 0.01;
 constexpr Eigen::Index kMostRough = 4;  ///< coordinates for which values without slopes are worth their number
 constexpr double kPrice =
-    5;  ///< nats per coordinate, some inflation included: fewer numbers win where all explain alike
+    5;  ///< nats per number, some inflation included: fewer numbers win where all explain alike
 
 /// Of a gain that scatters over places more than one by chance would: of G nats, sqrt(2 G).
 double inflationOf(double gain, const std::vector<double>& by_location) {
@@ -116,8 +116,12 @@ void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector
 
 }  // namespace
 
+std::size_t HypothesisFit::numbers() const {
+  return std::max<std::size_t>(1, hypothesis.coordinates.size()) + static_cast<std::size_t>(hypothesis.searched);
+}
+
 double HypothesisFit::ranking() const {
-  return gain - kPrice * static_cast<double>(std::max<std::size_t>(1, hypothesis.coordinates.size()));
+  return gain - kPrice * static_cast<double>(numbers());
 }
 
 void HypothesisFit::loseGain(double nats) {
@@ -563,7 +567,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
 }
 
 void HypothesisFitter::judge(HypothesisFit& f, std::size_t family) const {
-  f.false_alarm_rate = falseAlarmRate(f.broad_gain / f.inflation, f.hypothesis.coordinates.size(), family);
+  f.false_alarm_rate = falseAlarmRate(f.broad_gain / f.inflation, f.numbers(), family);
   f.plain = f.broad_gain > kPlain * static_cast<double>(model_.data().poses.size());
   if (f.plain) f.false_alarm_rate = std::min(f.false_alarm_rate, kPlainFalseAlarm);
 }

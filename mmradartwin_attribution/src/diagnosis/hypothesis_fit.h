@@ -38,9 +38,10 @@ struct HypothesisFit {
   double held_out_gain = 0;            ///< nats on places that the fit did not see, each fold by one step from the fit
   std::vector<double> standard_error;  ///< of the values (not scaled), by location
   std::vector<std::vector<double>> fold_scaled;  ///< coordinates without each fold of locations
-  bool plain = false;          ///< broad_gain is far beyond what clean sessions bring, whatever the scatter over places
-  double ranking() const;      ///< gain less a price per coordinate
-  void loseGain(double nats);  ///< that the state without it has gained since
+  bool plain = false;  ///< broad_gain is far beyond what clean sessions bring, whatever the scatter over places
+  std::size_t numbers() const;  ///< fitted or searched for, at least one
+  double ranking() const;       ///< gain less a price per number
+  void loseGain(double nats);   ///< that the state without it has gained since
 };
 
 /// Several hypotheses, fitted together.
