@@ -11,6 +11,8 @@
 #include <memory>
 #include <numeric>
 
+#include "mmradartwin_attribution/finding.h"
+
 namespace mmradartwin {
 namespace {
 
@@ -29,8 +31,10 @@ constexpr double kMaxInflation = 50;
 // few places the scatter of a rough likelihood's slopes hides gains ten times that.
 constexpr double kPlain = 5, kPlainFalseAlarm = 0.01;
 constexpr Eigen::Index kMostRough = 4;  ///< coordinates for which values without slopes are worth their number
-constexpr double kPrice =
-    5;  ///< nats per number, some inflation included: fewer numbers win where all explain alike
+constexpr double kPrice = 5;  ///< nats per number, some inflation included: fewer numbers win where all explain alike
+
+// A law bends to all that a name leaves over, too: it takes the name's place where it explains half as much again.
+constexpr double kLawShare = 2.0 / 3;
 
 /// Of a gain that scatters over places more than one by chance would: of G nats, sqrt(2 G).
 double inflationOf(double gain, const std::vector<double>& by_location) {
@@ -121,7 +125,8 @@ std::size_t HypothesisFit::numbers() const {
 }
 
 double HypothesisFit::ranking() const {
-  return gain - kPrice * static_cast<double>(numbers());
+  const bool named = isCatalogued(hypothesis.mechanism.mechanism);
+  return (named ? gain : kLawShare * gain) - kPrice * static_cast<double>(numbers());
 }
 
 void HypothesisFit::loseGain(double nats) {

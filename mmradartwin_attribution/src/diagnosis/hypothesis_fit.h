@@ -40,7 +40,7 @@ struct HypothesisFit {
   std::vector<std::vector<double>> fold_scaled;  ///< coordinates without each fold of locations
   bool plain = false;  ///< broad_gain is far beyond what clean sessions bring, whatever the scatter over places
   std::size_t numbers() const;  ///< fitted or searched for, at least one
-  double ranking() const;       ///< gain less a price per number
+  double ranking() const;       ///< gain less a price per number; of a law without a name, part of it
   void loseGain(double nats);   ///< that the state without it has gained since
 };
 
