@@ -347,7 +347,7 @@ std::optional<Screened> LawScreen::best(int kind, const std::string& variable) c
     if (worth <= best) return;
     best = worth;
     result.hypothesis = make();
-    result.hypothesis.searched = searched;
+    result.hypothesis.searched = searched + 1;  // and the variable
     result.promised = p.raw / p.inflation - 0.5 * (numbers + searched);
     result.starts = {{}};
     for (std::size_t k = 0; k < result.hypothesis.coordinates.size(); ++k) {
@@ -489,7 +489,7 @@ std::optional<Screened> LawScreen::bestPlace() const {
   result.hypothesis.mechanism.values.set("x_m", best.x_m);
   result.hypothesis.mechanism.values.set("y_m", best.y_m);
   result.hypothesis.coordinates = {{o.parameter, o.unit, 0, 0, o.typical, -o.limit, o.limit}};
-  result.hypothesis.searched = 3;
+  result.hypothesis.searched = 4;  // place, radius and the variable
   result.promised = nats - 0.5 * 4;
   result.starts = {{std::clamp(best.promise.value[0] / o.typical, -8.0, 8.0)}};
   return result;
