@@ -27,7 +27,8 @@ def diagnose(session, output):
 
 @unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
 class HiddenEffects(unittest.TestCase):
-    """24 poses at some nine places, 20 frames each: the smallest campaign that tells laws over angle from materials.
+    """24 poses at nine places (17, with two headings at most), 20 frames each: the smallest campaign that tells laws over
+    angle from materials.
 
     MMRADARTWIN_DIAGNOSIS_SEED gives other sessions than the usual ones.
     """
@@ -39,17 +40,17 @@ class HiddenEffects(unittest.TestCase):
     def at(self, name):
         return os.path.join(self.folder.name, name)
 
-    def measured(self, seed, hidden):
+    def measured(self, seed, hidden, headings=7, strength=None):
         """Writes a session with these effects; the truth stays outside of it."""
-        chosen = [effects.make_effect(name, values, None) for name, values in hidden.items()]
-        Measurement(Settings(output=self.at("session"), seed=seed, poses=24, frames=20, effects=chosen,
-                             truth=self.at("truth.json"))).run()
+        chosen = [effects.make_effect(name, values, strength) for name, values in hidden.items()]
+        Measurement(Settings(output=self.at("session"), seed=seed, poses=24, headings=headings, frames=20,
+                             effects=chosen, truth=self.at("truth.json"))).run()
         with open(self.at("truth.json"), encoding="utf-8") as text:
             return json.load(text)["effects"]
 
-    def found(self, seed, hidden):
+    def found(self, seed, hidden, headings=7):
         """First finding of a session that hides the effects, and their true parameters."""
-        truth = self.measured(seed, hidden)
+        truth = self.measured(seed, hidden, headings)
         status, findings, errors = diagnose(self.at("session"), self.at("out"))
         self.assertEqual(status, 0, msg=errors)
         self.assertEqual(findings["verdict"], "named", msg=f"seed {seed}: {findings}")
@@ -87,6 +88,26 @@ class HiddenEffects(unittest.TestCase):
             low, high = first["parameters"][name]["ci95"]
             self.assertGreater(high - low, 0.004, msg=f"seed {seed}: {name}")
             self.assertLess(high - low, 0.1, msg=f"seed {seed}: {name}")
+
+    def test_a_law_without_a_name_is_unknown_and_its_variable_is_found(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "36"))
+        self.measured(seed, {"range_ripple": {}}, headings=2, strength=1.3)
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual(findings["verdict"], "unknown", msg=f"seed {seed}: {findings}")
+        first = findings["findings"][0]
+        self.assertEqual(first["cause"], "unknown")
+        law = first["mechanism"]["empirical_law"]
+        self.assertEqual(law["variable"], "range_m", msg=f"seed {seed}")
+        swing_db = max(law["gain_db"]) - min(law["gain_db"])
+        self.assertTrue(4 < swing_db < 12, msg=f"seed {seed}: {swing_db} dB of 7.8")
+        self.assertGreater(first["gain"]["explained_power"]["difference_ci95"][0], 0, msg=f"seed {seed}")
+
+    def test_a_step_of_the_gain_is_a_drift(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "37"))
+        _, first, _ = self.found(seed, {"gain_drift": {"steps_db": [-4.0]}}, headings=2)
+        steps_db = first["parameters"]["steps_db"]["value"]
+        self.assertAlmostEqual(sum(steps_db), -4.0, delta=2.0, msg=f"seed {seed}: {steps_db}")
 
     def test_nothing_hidden_is_none(self):
         # One seed, so that the one false alarm in a hundred that the threshold allows does not stop everybody's work;
