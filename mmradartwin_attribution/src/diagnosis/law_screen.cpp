@@ -436,6 +436,7 @@ std::optional<Screened> LawScreen::best(int kind, const std::string& variable) c
 }
 
 std::optional<Screened> LawScreen::bestPlace() const {
+  if (location_.empty()) return std::nullopt;
   Eigen::AlignedBox3d bounds;
   for (const Actor& a : base_.scene().actors) bounds.extend(a.bounds);
   const Observable& o = kObservables[0];
