@@ -7,6 +7,7 @@
 #include <tf2_ros/transform_broadcaster.h>
 
 #include <cmath>
+#include <stdexcept>
 
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/ros/conversions.h"
@@ -24,8 +25,8 @@ class Inbox {
       : subscriber_(nh.subscribe<Message>(topic, 100,
                                           [this](const typename Message::ConstPtr& m) { messages.push_back(m); })) {}
   /// Waits until `count` messages are there, a minute at most: a loaded machine is slow, not wrong.
-  bool wait(std::size_t count) {
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kPatience_s);
+  bool wait(std::size_t count, double patience_s = kPatience_s) {
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(patience_s);
     while (messages.size() < count && ros::WallTime::now() < end) {
       ros::spinOnce();
       ros::WallDuration(0.005).sleep();
@@ -64,6 +65,26 @@ class SignalChainNodeTest : public ::testing::Test {
       ros::WallDuration(0.01).sleep();
     }
     ros::WallDuration(0.3).sleep();  // the latched configuration is on its way
+    for (int probe = 0; grids_.messages.empty() || maps_.messages.empty(); ++probe) {
+      if (ros::WallTime::now() > end) throw std::runtime_error("the signal chain does not answer");
+      sendProbe(probe);
+      grids_.wait(1, 1.0) && maps_.wait(1, 1.0);
+      if (probe > 0) ros::WallDuration(4).sleep();  // longer than a frame waits for its pose
+    }
+    ros::spinOnce();
+    grids_.messages.clear();
+    maps_.messages.clear();
+  }
+
+  /// A frame of half an hour before and elsewhere, whose grid says that frames and answers find their way: a subscriber
+  /// knows of its publisher before that one has begun to send to it.
+  void sendProbe(int probe) {
+    const ros::Time at = start_ - ros::Duration(1800) + ros::Duration(probe);
+    sendPose(at - ros::Duration(0.02), -50);
+    sendPose(at + ros::Duration(0.02), -50);
+    AdcCube cube = frame(0);
+    cube.stamp_ns = toNanoseconds(at);
+    cubes_.publish(toMsg(cube, hash_));
   }
 
   void sendPose(const ros::Time& stamp, double x, double yaw_deg = 0) {
