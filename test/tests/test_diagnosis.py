@@ -27,8 +27,8 @@ def diagnose(session, output):
 
 @unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
 class HiddenEffects(unittest.TestCase):
-    """24 poses at nine places (17, with two headings at most), 20 frames each: the smallest campaign that tells laws over
-    angle from materials.
+    """24 poses at nine places, or 17 with two headings at most, 20 frames each: the smallest campaign that tells laws
+    over angle from materials.
 
     MMRADARTWIN_DIAGNOSIS_SEED gives other sessions than the usual ones.
     """

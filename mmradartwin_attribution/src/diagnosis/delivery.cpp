@@ -10,7 +10,7 @@ namespace mmradartwin {
 namespace {
 
 constexpr std::size_t kPoses = 8;  ///< a delivery shows in every pose; so many decide by hundreds of nats
-constexpr double kPerPose = 2;      ///< nats per pose below which nothing is claimed
+constexpr double kPerPose = 2;     ///< nats per pose below which nothing is claimed
 constexpr int kIterations = 3;
 
 /// What the mechanism of that name does to a grid; each conjugation is its own inverse.
