@@ -89,6 +89,7 @@ void Twin::forEachChirp(const Simulation& pose, int frames,
           }
           if (!moving.empty()) {
             m.reweight(c, moving, 0);
+            m.addReplicas(c, moving);
             moving = m.filtered(c, std::move(moving));
             moving_delayed.setZero(radar.channels(), samples);
             m.propagate(c, moving, moving_delayed);

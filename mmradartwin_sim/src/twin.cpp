@@ -163,6 +163,7 @@ void Twin::Impl::assemble() {
       mechanism->build(m.model(), radar);
       m.has_tone_gain = m.has_tone_gain || mechanism->hasToneGain();
       m.has_receive = m.has_receive || mechanism->hasReceiveStage();
+      m.has_replicas = m.has_replicas || mechanism->hasReplicas();
       m.has_distort = m.has_distort || mechanism->hasDistortStage();
       m.has_chirp_paths = m.has_chirp_paths || mechanism->hasChirpPaths();
       m.has_modulation = m.has_modulation || mechanism->hasModulation();
@@ -252,13 +253,15 @@ std::vector<PathRecord> Twin::Impl::weighted(const PoseContext& c, std::vector<P
 }
 
 void Twin::Impl::addRelativePaths(const PoseContext& c, std::vector<PathRecord>& records) const {
-  if (!needs_strongest) return;
-  raise(strongest_so_far, strongestOf(c, records));
-  const std::size_t echoes = records.size();
-  for (const auto& m : mechanisms) {
-    if (m->needsStrongestAmplitude()) m->addPaths(c, records);
+  if (needs_strongest) {
+    raise(strongest_so_far, strongestOf(c, records));
+    const std::size_t echoes = records.size();
+    for (const auto& m : mechanisms) {
+      if (m->needsStrongestAmplitude()) m->addPaths(c, records);
+    }
+    reweight(c, records, echoes);
   }
-  reweight(c, records, echoes);
+  addReplicas(c, records);
 }
 
 std::vector<PathRecord> Twin::receivedPaths(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
@@ -331,13 +334,27 @@ Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRec
     impl_->propagate(c, impl_->filtered(c, s.records), s.grid.x);
   }
   if (condensed) {
+    const auto weighNode = [&](PathRecord& node) {
+      for (const auto& m : impl_->mechanisms) m->reweight(c, node);
+    };
     condensed->addNodes(
         radar,
         [&](PathRecord& node) {
-          for (const auto& m : impl_->mechanisms) m->reweight(c, node);
+          weighNode(node);
           impl_->filter(c, node);
         },
         s.grid.x);
+    for (const auto& m : impl_->mechanisms) {
+      if (!m->hasReplicas()) continue;
+      condensed->addNodes(
+          radar,
+          [&](PathRecord& node) {
+            weighNode(node);
+            if (!m->replicate(c, node)) scaleRecord(0, node);
+            impl_->filter(c, node);
+          },
+          s.grid.x);
+    }
   }
   impl_->receive(c, s.grid.x);
   return s;

@@ -24,7 +24,8 @@ struct Twin::Impl {
   std::vector<std::unique_ptr<Mechanism>> mechanisms;  // by rank
   double strongest = -1;                               // of the session, where it is known
   mutable std::atomic<double> strongest_so_far{0};
-  bool has_tone_gain = false, has_receive = false, has_distort = false, needs_strongest = false;
+  bool has_tone_gain = false, has_receive = false, has_distort = false, has_replicas = false,
+       needs_strongest = false;
   bool has_chirp_paths = false, has_modulation = false, has_chirp_stage = false, has_digitise = false,
        has_transport = false;
   std::vector<std::int64_t> session_ns;  // stamps of the session's poses in order of time
@@ -92,9 +93,21 @@ struct Twin::Impl {
     }
   }
 
+  /// Adds to weighted paths what they bring along (Mechanism::replicate).
+  void addReplicas(const PoseContext& c, std::vector<PathRecord>& records) const {
+    if (!has_replicas) return;
+    const std::size_t echoes = records.size();
+    for (const auto& m : mechanisms) {
+      for (std::size_t i = 0; m->hasReplicas() && i < echoes; ++i) {
+        PathRecord replica = records[i];
+        if (m->replicate(c, replica)) records.push_back(std::move(replica));
+      }
+    }
+  }
+
   /// Throws InputError for a pose that is NaN or inside an actor.
   void refuseUnusablePose(const PoseContext& c) const;
-  /// Adds the paths whose level is relative to the strongest echo to weighted ones.
+  /// Adds to weighted paths those whose level is relative to the strongest echo, and replicas of all.
   void addRelativePaths(const PoseContext& c, std::vector<PathRecord>& records) const;
 
   /// Paths after all weights, with those whose level is relative to the strongest echo.

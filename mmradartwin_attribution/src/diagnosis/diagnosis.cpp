@@ -25,6 +25,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "profiled_values.h"
 #include "receiver_finding.h"
+#include "replica_screen.h"
 #include "session_model.h"
 #include "shared_latents.h"
 
@@ -287,6 +288,9 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   }
   report("laws without a name", 0);
   for (Screened& s : screenLaws(twin_, *model_, state_, spread(kLawPoses))) screened.push_back(std::move(s));
+  for (const Screened& s : screenReplicas(twin_, *model_, state_, spread(kLawPoses))) {
+    if (s.promised > kWorthALaw) screened.push_back(look(s.hypothesis, spread(kScreenPoses)));
+  }
   for (Screened& s : sharedLatents(*source_, state_, model_->spread(), accuracy_, all, spread(kScreenPoses))) {
     const auto same = std::find_if(screened.begin(), screened.end(), [&](const Screened& other) {
       return other.hypothesis.label() == s.hypothesis.label();
@@ -654,6 +658,7 @@ Diagnosis Session::run() {
     for (int round = 0; round < kMostFindings; ++round) {
       if (!judgeChannels(round)) break;
     }
+    addUnexplained(examiner_, findings.findings);
   }
   result_.extended = twin_.description();
   result_.extended.mechanisms = extended_;
@@ -676,6 +681,7 @@ Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& o
     result.findings.findings.push_back(findingOf(f));
     result.extended.mechanisms.push_back(*result.findings.findings.back().mechanism);
   }
+  addUnexplained(examiner, result.findings.findings);
   result.findings.poses = static_cast<int>(data.poses.size());
   result.findings.locations = static_cast<int>(data.locations.size());
   result.findings.held_out = "nothing: without a scene only frames are judged";

@@ -162,39 +162,61 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotResid
     int bin;
     double power;
   };
-  std::vector<Cell> cells;
-  double total = 0;
-  for (int b = 0; b < s.bins; ++b) {
-    const Eigen::Map<const Eigen::VectorXcf> still(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
-    double scatter = 0;
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
-      scatter += Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm();
-    }
-    // A cell that varies by more than a tenth of itself does not tell what is common.
-    if (still.squaredNorm() > 10 * scatter / freedom) cells.push_back({b, still.squaredNorm()});
-    if (!cells.empty() && cells.back().bin == b) total += cells.back().power;
-  }
-  if (cells.empty()) return;
-  const auto weightedMedian = [&](std::vector<std::pair<double, double>>& values) {
-    std::sort(values.begin(), values.end());
-    double sum = 0;
-    for (const auto& [value, weight] : values) {
-      sum += weight;
-      if (2 * sum >= total) return value;
-    }
-    return values.back().first;
+  const auto still = [&](int b) {
+    return Eigen::Map<const Eigen::VectorXcf>(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
   };
-  std::vector<std::pair<double, double>> re(cells.size()), im(cells.size());
-  for (std::size_t i = 0; i < s.shot.size(); ++i) {
-    for (std::size_t c = 0; c < cells.size(); ++c) {
-      const int b = cells[c].bin;
-      const Eigen::Map<const Eigen::VectorXcf> still(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
-      const Eigen::Map<const Eigen::VectorXcf> e(s.at(i, b), s.channels);
-      const std::complex<double> share = std::complex<double>(still.dot(e)) / cells[c].power;
-      re[c] = {share.real(), cells[c].power};
-      im[c] = {share.imag(), cells[c].power};
+  const auto varied = [&](std::size_t i, int b) {
+    return Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels);
+  };
+  const auto beyondOne = [&](const std::vector<Cell>& cells) {
+    double total = 0;
+    for (const Cell& cell : cells) total += cell.power;
+    const auto weightedMedian = [total](std::vector<std::pair<double, double>>& values) {
+      std::sort(values.begin(), values.end());
+      double sum = 0;
+      for (const auto& [value, weight] : values) {
+        sum += weight;
+        if (2 * sum >= total) return value;
+      }
+      return values.empty() ? 0 : values.back().first;
+    };
+    std::vector<std::complex<double>> beyond;
+    std::vector<std::pair<double, double>> re(cells.size()), im(cells.size());
+    for (std::size_t i = 0; i < s.shot.size(); ++i) {
+      for (std::size_t c = 0; c < cells.size(); ++c) {
+        const std::complex<double> share =
+            std::complex<double>(still(cells[c].bin).dot(varied(i, cells[c].bin))) / cells[c].power;
+        re[c] = {share.real(), cells[c].power};
+        im[c] = {share.imag(), cells[c].power};
+      }
+      beyond.emplace_back(weightedMedian(re), weightedMedian(im));
     }
-    const std::complex<double> beyond(weightedMedian(re), weightedMedian(im));
+    return beyond;
+  };
+  // A cell that varies by more than a tenth of itself, beyond what is taken to be common, does not tell what is common.
+  const auto steady = [&](const std::vector<std::complex<double>>& beyond) {
+    std::vector<Cell> cells;
+    for (int b = 0; b < s.bins; ++b) {
+      double scatter = 0;
+      for (std::size_t i = 0; i < s.shot.size(); ++i) {
+        scatter += (varied(i, b) - Complex(beyond[i]) * still(b)).squaredNorm();
+      }
+      const double power = still(b).squaredNorm();
+      if (power > 10 * scatter / freedom) cells.push_back({b, power});
+    }
+    return cells;
+  };
+  std::vector<Cell> cells = steady(std::vector<std::complex<double>>(s.shot.size(), 0.0)), all;
+  // A gain that itself changes by more than that lets no cell be steady but beside it.
+  for (int b = 0; b < s.bins; ++b) {
+    if (still(b).squaredNorm() > 0) all.push_back({b, still(b).squaredNorm()});
+  }
+  std::vector<Cell> beside = steady(beyondOne(all));
+  if (beside.size() > cells.size()) cells = std::move(beside);
+  if (cells.empty()) return;
+  const std::vector<std::complex<double>> common = beyondOne(cells);
+  for (std::size_t i = 0; i < s.shot.size(); ++i) {
+    const std::complex<double> beyond = common[i];
     s.gain[i] = 1.0 + beyond;
     result.frame_level[static_cast<std::size_t>(s.shot[i] / s.per_frame)] = std::abs(s.gain[i]);
     Complex* e = s.at(i, 0);

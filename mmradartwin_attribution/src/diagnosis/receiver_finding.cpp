@@ -49,6 +49,16 @@ Finding findingOf(const FrameFinding& frames) {
   return f;
 }
 
+void addUnexplained(const FrameExaminer& frames, std::vector<Finding>& findings) {
+  for (const FrameFinding& f : frames.unexplained()) {
+    if (findings.empty() || findings.back().cause != "unknown") {
+      findings.push_back(findingOf(f));
+    } else {
+      findings.back().description = findings.back().description.value_or("") + "; besides: " + f.description;
+    }
+  }
+}
+
 Finding findingOf(const Delivery& delivery, const RadarConfig& radar) {
   Finding f;
   f.cause = delivery.mechanism.mechanism;

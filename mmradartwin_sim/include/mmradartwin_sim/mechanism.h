@@ -137,6 +137,9 @@ class Mechanism {
   virtual double poseLag_s() const { return 0; }
   virtual void addPaths(const PoseContext&, std::vector<PathRecord>&) const {}
   virtual void reweight(const PoseContext&, PathRecord&) const {}  ///< every path of every mechanism
+  /// Turns a path, as all weights leave it, into the further one that it brings along; false where it brings none.
+  virtual bool replicate(const PoseContext&, PathRecord&) const { return false; }
+  virtual bool hasReplicas() const { return false; }
   /// Gain of the receiver on the tone of a path of this length: filters act here, exactly, on the received grid.
   virtual std::complex<double> toneGain(const PoseContext&, double /*length_m*/) const { return 1.0; }
   virtual bool hasToneGain() const { return false; }

@@ -1,0 +1,128 @@
+#include "replica_screen.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kLeastPower = 1e-4;    ///< of the pose's strongest echo's, of those whose replicas are looked for
+constexpr double kNearest_bins = 1.75;  ///< from an echo: nearer ones are its own main lobe
+constexpr double kFarthest_m = 3;
+constexpr double kStep_bins = 0.125;
+constexpr double kTypical_db = -15;
+
+
+}  // namespace
+
+std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model, const ModelState& null,
+                                     const std::vector<int>& poses) {
+  for (const NamedParameters& m : null.mechanisms) {
+    if (m.mechanism == "echo_replica") return {};  // twin.yaml knows it once
+  }
+  const ChannelData& data = model.data();
+  const RadarConfig& radar = base.radar();
+  const int channels = radar.channels(), samples = radar.samples_per_chirp;
+  const double bin_m = radar.range_bin_m(), gain = std::exp(null.nuisance.log_gain);
+  std::vector<double> distances_m;
+  for (double d = kNearest_bins * bin_m; d <= kFarthest_m; d += kStep_bins * bin_m) {
+    distances_m.push_back(-d);
+    distances_m.push_back(d);
+  }
+  const std::size_t targets = 1 + base.scene().actors.size();  // all, and each actor's
+  const auto locations = static_cast<Eigen::Index>(data.locations.size());
+  const Twin twin = base.changed(null.mechanisms);
+
+  using PerPose = std::vector<std::pair<double, double>>;  // [targets][distances] score and information
+  std::vector<PerPose> sums(poses.size());
+  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
+    PerPose& sum = sums[j];
+    sum.assign(targets * distances_m.size(), {0, 0});
+    const auto pose = static_cast<std::size_t>(poses[j]);
+    const PoseChannels& p = data.poses[pose];
+    const Eigen::Isometry3d& T = p.pose.T_map_radar;
+    const std::vector<PathRecord> records = twin.receivedPaths(T, twin.trace(T, p.pose.stamp_ns), p.pose.stamp_ns);
+    std::vector<SessionModel::Whitened> cells;
+    for (int bin = 0; bin < samples; ++bin) {
+      cells.push_back(model.whitened(null.echoes[pose], null.nuisance, poses[j], std::max(bin, model.firstBin())));
+    }
+    double strongest = 0;
+    for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude);
+    Eigen::VectorXd score(samples), noise(samples);
+    for (const PathRecord& r : records) {
+      if (r.bounces == 0 || r.amplitude * r.amplitude < kLeastPower * strongest * strongest) continue;
+      double own = gain;
+      for (int a : r.actors) own *= a < 0 ? 1 : std::exp(null.nuisance.actor_gain[static_cast<std::size_t>(a)]);
+      const Eigen::Map<const Eigen::VectorXcd> c(r.c.data(), channels);
+      for (int bin = 0; bin < samples; ++bin) {
+        const SessionModel::Whitened& cell = cells[static_cast<std::size_t>(bin)];
+        noise[bin] = c.dot(cell.inverse * c).real();
+        score[bin] = cell.weight * std::norm(c.dot(cell.solved)) - noise[bin];
+      }
+      for (std::size_t d = 0; d < distances_m.size(); ++d) {
+        const double place = (0.5 * meanLength_m(r) + distances_m[d]) / bin_m;
+        const int first = std::max(model.firstBin(), static_cast<int>(std::ceil(place - 1)));
+        const int last = std::min(samples - 1, static_cast<int>(std::floor(place + 1)));
+        for (int bin = first; bin <= last; ++bin) {
+          const double w = hannResponse(bin - place), power = own * w * w;
+          const auto add = [&](std::size_t target) {
+            auto& [s, information] = sum[target * distances_m.size() + d];
+            s += power * score[bin];
+            information += power * noise[bin] * power * noise[bin];
+          };
+          add(0);
+          for (std::size_t i = 0; i < r.actors.size(); ++i) {
+            const bool again = std::find(r.actors.begin(), r.actors.begin() + static_cast<std::ptrdiff_t>(i),
+                                         r.actors[i]) != r.actors.begin() + static_cast<std::ptrdiff_t>(i);
+            if (r.actors[i] >= 0 && !again) add(1 + static_cast<std::size_t>(r.actors[i]));
+          }
+        }
+      }
+    }
+  });
+
+  const double whole = static_cast<double>(data.poses.size()) / static_cast<double>(std::max<std::size_t>(1, poses.size()));
+  const double places = static_cast<double>(locations) / std::max(1.0, static_cast<double>(locations) - 1);
+  const auto bestOf = [&](std::size_t first, std::size_t last) {
+    std::optional<Screened> best;
+    for (std::size_t target = first; target < last; ++target) {
+      for (std::size_t d = 0; d < distances_m.size(); ++d) {
+        Eigen::VectorXd score = Eigen::VectorXd::Zero(locations), information = score;
+        for (std::size_t j = 0; j < poses.size(); ++j) {
+          const auto& [s, i] = sums[j][target * distances_m.size() + d];
+          const int location = data.poses[static_cast<std::size_t>(poses[j])].location;
+          score[location] += model.weight() * s;
+          information[location] += model.weight() * i;
+        }
+        const double total = score.sum(), all = information.sum();
+        if (!(total > 0) || !(all > 0)) continue;
+        // How far places scatter about one level.
+        const double power = total / all;
+        const double inflation = std::max(1.0, (score - power * information).squaredNorm() / all * places);
+        const double promised = whole * 0.5 * total * power / inflation;
+        if (best && promised <= best->promised) continue;
+        Screened s;
+        s.hypothesis.mechanism = defaultMechanism("echo_replica");
+        if (target > 0) {
+          s.hypothesis.subject = base.scene().actors[target - 1].name;
+          s.hypothesis.mechanism.values.set("actor", s.hypothesis.subject);
+        }
+        s.hypothesis.mechanism.values.set("behind_m", distances_m[d]);
+        s.hypothesis.coordinates = {{"level_db", "dB", -1, -200, kTypical_db, -60, 10}};
+        s.hypothesis.searched = target > 0 ? 2 : 1;  // the distance, and whose
+        s.promised = promised;
+        best = std::move(s);
+      }
+    }
+    return best;
+  };
+  std::vector<Screened> result;
+  if (auto of_all = bestOf(0, 1)) result.push_back(std::move(*of_all));
+  if (auto of_one = bestOf(1, targets)) result.push_back(std::move(*of_one));
+  return result;
+}
+
+}  // namespace mmradartwin
