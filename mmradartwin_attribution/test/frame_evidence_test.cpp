@@ -257,14 +257,28 @@ TEST_F(FrameEvidenceTest, WalkerIsPutIntoTheMap) {
   EXPECT_GE(found[0].poses.size(), 4u);
 }
 
-TEST_F(FrameEvidenceTest, ToneOfTheRadarIsNoWalker) {
-  const FrameExaminer examiner = examine(12000, [&](const Pose&, int, ComplexGrid& x) {
-    const double phase = std::uniform_real_distribution<double>(0, 2 * M_PI)(random_);
-    for (int n = 0; n < radar_.samples_per_chirp; ++n) x.col(n).array() += std::polar(300.0, phase + 2.9 * n);
-  });
-  EXPECT_TRUE(causes(examiner.findings()).empty());
-  ASSERT_EQ(examiner.unexplained().size(), 1u);
-  EXPECT_EQ(examiner.unexplained()[0].poses.size(), poses_.size());
+TEST_F(FrameEvidenceTest, ToneOfTheRadarIsNoWalkerAndNoSlip) {
+  // A strong one turns all samples from frame to frame, which packets in another order may look like.
+  for (double level : {300.0, 9000.0}) {
+    const FrameExaminer examiner = examine(12000, [&](const Pose&, int, ComplexGrid& x) {
+      const double phase = std::uniform_real_distribution<double>(0, 2 * M_PI)(random_);
+      for (int n = 0; n < radar_.samples_per_chirp; ++n) x.col(n).array() += std::polar(level, phase + 2.9 * n);
+    });
+    EXPECT_TRUE(causes(examiner.findings()).empty()) << level << ": " << causes(examiner.findings())[0];
+    ASSERT_EQ(examiner.unexplained().size(), 1u) << level;
+    EXPECT_EQ(examiner.unexplained()[0].poses.size(), poses_.size());
+  }
+}
+
+TEST_F(FrameEvidenceTest, GainThatSettlesIsSaidWhateverItsSize) {
+  for (double loss_db : {0.5, 13.0}) {
+    const FrameExaminer examiner = examine(
+        12000, [&](const Pose&, int f, ComplexGrid& x) { x *= std::pow(10.0, -loss_db * std::exp(-f / 8.0) / 20); });
+    EXPECT_TRUE(causes(examiner.findings()).empty()) << loss_db << ": " << causes(examiner.findings())[0];
+    ASSERT_EQ(examiner.unexplained().size(), 1u) << loss_db;
+    EXPECT_NE(examiner.unexplained()[0].description.find("lowest in frame 0"), std::string::npos)
+        << examiner.unexplained()[0].description;
+  }
 }
 
 TEST(FrameEvidenceOfRecordings, TwoPeopleWalkInOpposite) {

@@ -95,7 +95,9 @@ TEST_F(MovingTwinTest, IsTheTwinOfTheSceneInWhichActorsStandThere) {
                     "  material_reflectivity: {material: RoughMetal, delta_db: -3}\n"
                     "  element_pattern: {cos_exponent: 2}\n  tx_imbalance: {phase_deg: 20}\n"),
         std::string("  second_harmonic: {level_db: -30}\n  transmission: {actor: crate, one_way_db: -3}\n"
-                    "  wall_ghost: {walls: [east]}\n")}) {
+                    "  wall_ghost: {walls: [east]}\n"),
+        std::string(
+            "  echo_replica: {behind_m: 0.4, level_db: -8, actor: crate}\n  if_highpass: {corner_hz: 500.0e+3}\n")}) {
     const auto at = [&](const Step& s) {
       Twin twin = makeTwin(scene(s.crate, s.crate_deg, s.door, s.door_deg), kBase + more);
       twin.setStrongestAmplitude(1e-3);

@@ -124,6 +124,41 @@ TEST_F(ReceiverTest, CouplingFeedsNeighbours) {
             std::string::npos);
 }
 
+TEST_F(ReceiverTest, AReplicaFollowsEveryEchoOrOneActors) {
+  addPlate();
+  addPlate(5, -20);
+  writeScene();
+  const Simulation base = look("");
+  ASSERT_EQ(base.records.size(), 2u);
+  const Simulation s = look("  echo_replica: {behind_m: 0.7, level_db: -9}\n");
+  ASSERT_EQ(s.records.size(), 4u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const PathRecord &echo = s.records[i], &replica = s.records[2 + i];
+    EXPECT_EQ(*replica.event, "echo_replica");
+    EXPECT_EQ(replica.actors, echo.actors);
+    EXPECT_NEAR(db(replica.amplitude / echo.amplitude), -9, 1e-9);
+    for (std::size_t k = 0; k < echo.length_m.size(); ++k) {
+      EXPECT_NEAR(replica.length_m[k] - echo.length_m[k], 1.4, 1e-12);
+      // The way of a wave that is 1.4 m longer, at the window's centre (DESIGN section 3).
+      const double tau = replica.length_m[k] / kSpeedOfLight_m_per_s, was = echo.length_m[k] / kSpeedOfLight_m_per_s;
+      const RadarConfig radar = paperRadar();
+      const double turns =
+          radar.center_frequency_hz() * (tau - was) - 0.5 * radar.slope_hz_per_s * (tau * tau - was * was);
+      EXPECT_NEAR(std::abs(replica.c[k] / echo.c[k] / std::polar(std::pow(10, -0.45), 2 * M_PI * turns) - 1.0), 0,
+                  1e-6);
+    }
+  }
+  EXPECT_TRUE(s.check.ok());
+  const Simulation one = look("  echo_replica: {behind_m: -0.7, level_db: -9, actor: plate1}\n");
+  ASSERT_EQ(one.records.size(), 3u);
+  EXPECT_EQ(one.records[2].actors, one.records[1].actors);
+  EXPECT_NEAR(one.records[2].length_m[0] - one.records[1].length_m[0], -1.4, 1e-12);
+  EXPECT_EQ(look("  echo_replica: {behind_m: -4, level_db: -9}\n").records.size(), 3u)
+      << "one would be behind the radar";
+  EXPECT_NE(errorOf([&] { look("  echo_replica: {behind_m: 1, level_db: -9, actor: nobody}\n"); }).find("plate0"),
+            std::string::npos);
+}
+
 TEST_F(ReceiverTest, ImbalanceMakesAnImage) {
   addPlate();
   writeScene();

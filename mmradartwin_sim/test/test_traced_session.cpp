@@ -61,9 +61,12 @@ TEST_F(TracedSessionTest, WeighsMaterialsChannelsAndGainAsIfTracedAgain) {
         "  material_reflectivity: {actor: west, delta_db: 4}\n",
         "  surface_roughness: {material: RoughMetal, roughness_rms_m: 0.0002}\n",
         "  channel_phase_error: {phase_deg: [0, 10, 20, 30, 40, 50, 60, 70]}\n  gain_drift: {db_per_hour: 30}\n",
-        "  tx_rx_leakage: {range_m: 0.6, level_db: -3}\n", "  range_bias: {range_m: 0.05}\n"}) {
-    // A bias turns phases with a term in delay times bias, which differs within a node by some 1e-5 rad.
-    EXPECT_LT(worst(session, mechanisms), std::string(mechanisms).find("bias") == std::string::npos ? 1e-6 : 1e-4)
+        "  tx_rx_leakage: {range_m: 0.6, level_db: -3}\n", "  range_bias: {range_m: 0.05}\n",
+        "  echo_replica: {behind_m: 0.1, level_db: -6}\n",
+        "  echo_replica: {behind_m: 0.1, level_db: -6, actor: west}\n"}) {
+    // What lengthens a path turns its phase with a term in delay times length, which differs within a node by some
+    // 1e-5 rad.
+    EXPECT_LT(worst(session, mechanisms), std::string(mechanisms).find("_m: 0.") == std::string::npos ? 1e-6 : 1e-4)
         << mechanisms;
   }
 }

@@ -103,6 +103,24 @@ class HiddenEffects(unittest.TestCase):
         self.assertTrue(4 < swing_db < 12, msg=f"seed {seed}: {swing_db} dB of 7.8")
         self.assertGreater(first["gain"]["explained_power"]["difference_ci95"][0], 0, msg=f"seed {seed}")
 
+    def test_a_replica_behind_every_echo_is_unknown_and_its_distance_is_found(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "38"))
+        self.measured(seed, {"trailing_echo": {"delay_m": 0.7}}, headings=2, strength=1.3)
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["unknown"], msg=f"seed {seed}")
+        first = findings["findings"][0]
+        self.assertAlmostEqual(first["mechanism"]["echo_replica"]["behind_m"], 0.7, delta=0.05, msg=f"seed {seed}")
+        self.assertGreater(first["gain"]["explained_power"]["difference_ci95"][0], 0, msg=f"seed {seed}")
+
+    def test_a_gain_that_settles_within_a_pose_is_unknown(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "39"))
+        self.measured(seed, {"slow_start": {}}, headings=2)
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["unknown"], msg=f"seed {seed}")
+        self.assertIn("level of frames", findings["findings"][0]["description"])
+
     def test_a_step_of_the_gain_is_a_drift(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "37"))
         _, first, _ = self.found(seed, {"gain_drift": {"steps_db": [-4.0]}}, headings=2)

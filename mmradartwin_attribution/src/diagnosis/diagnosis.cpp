@@ -288,8 +288,9 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   }
   report("laws without a name", 0);
   for (Screened& s : screenLaws(twin_, *model_, state_, spread(kLawPoses))) screened.push_back(std::move(s));
-  for (const Screened& s : screenReplicas(twin_, *model_, state_, spread(kLawPoses))) {
-    if (s.promised > kWorthALaw) screened.push_back(look(s.hypothesis, spread(kScreenPoses)));
+  const auto lookAtSome = [&](const Hypothesis& h) { return look(h, spread(kScreenPoses)); };
+  for (Screened& s : screenReplicas(twin_, *model_, state_, spread(kLawPoses), kWorthALaw, lookAtSome)) {
+    screened.push_back(std::move(s));
   }
   for (Screened& s : sharedLatents(*source_, state_, model_->spread(), accuracy_, all, spread(kScreenPoses))) {
     const auto same = std::find_if(screened.begin(), screened.end(), [&](const Screened& other) {
@@ -667,29 +668,6 @@ Diagnosis Session::run() {
 }
 
 }  // namespace
-
-Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& options) {
-  FrameExaminer examiner(recording.radar);
-  const ChannelData data = readChannels(recording, examiner, [&](std::size_t done, std::size_t all) {
-    if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
-    if (options.on_progress) {
-      options.on_progress({"reading captures", static_cast<double>(done) / static_cast<double>(all)});
-    }
-  });
-  Diagnosis result;
-  for (const FrameFinding& f : examiner.findings()) {
-    result.findings.findings.push_back(findingOf(f));
-    result.extended.mechanisms.push_back(*result.findings.findings.back().mechanism);
-  }
-  addUnexplained(examiner, result.findings.findings);
-  result.findings.poses = static_cast<int>(data.poses.size());
-  result.findings.locations = static_cast<int>(data.locations.size());
-  result.findings.held_out = "nothing: without a scene only frames are judged";
-  result.has_twin = false;
-  result.extended.radar = recording.radar;
-  result.problems = data.problems;
-  return result;
-}
 
 Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOptions& options) {
   std::unique_ptr<tbb::global_control> limit;

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "echo_source.h"
+#include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/ledger.h"
 
 namespace mmradartwin {
@@ -140,6 +141,29 @@ std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedPar
   f.evidence.log_likelihood_gain = 0.5 * delta_db * delta_db / (error * error);
   f.evidence.false_alarm_rate = std::min(1.0, std::exp(-f.evidence.log_likelihood_gain));
   return f;
+}
+
+Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& options) {
+  FrameExaminer examiner(recording.radar);
+  const ChannelData data = readChannels(recording, examiner, [&](std::size_t done, std::size_t all) {
+    if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
+    if (options.on_progress) {
+      options.on_progress({"reading captures", static_cast<double>(done) / static_cast<double>(all)});
+    }
+  });
+  Diagnosis result;
+  for (const FrameFinding& f : examiner.findings()) {
+    result.findings.findings.push_back(findingOf(f));
+    result.extended.mechanisms.push_back(*result.findings.findings.back().mechanism);
+  }
+  addUnexplained(examiner, result.findings.findings);
+  result.findings.poses = static_cast<int>(data.poses.size());
+  result.findings.locations = static_cast<int>(data.locations.size());
+  result.findings.held_out = "nothing: without a scene only frames are judged";
+  result.has_twin = false;
+  result.extended.radar = recording.radar;
+  result.problems = data.problems;
+  return result;
 }
 
 }  // namespace mmradartwin

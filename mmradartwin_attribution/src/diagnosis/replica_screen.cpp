@@ -14,12 +14,14 @@ constexpr double kNearest_bins = 1.75;  ///< from an echo: nearer ones are its o
 constexpr double kFarthest_m = 3;
 constexpr double kStep_bins = 0.125;
 constexpr double kTypical_db = -15;
-
+constexpr std::ptrdiff_t kApart_steps = 8;  ///< between distances that are looked at
+constexpr std::size_t kLooks = 4;
 
 }  // namespace
 
 std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model, const ModelState& null,
-                                     const std::vector<int>& poses) {
+                                     const std::vector<int>& poses, double least,
+                                     const std::function<Screened(const Hypothesis&)>& look) {
   for (const NamedParameters& m : null.mechanisms) {
     if (m.mechanism == "echo_replica") return {};  // twin.yaml knows it once
   }
@@ -29,11 +31,12 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
   const double bin_m = radar.range_bin_m(), gain = std::exp(null.nuisance.log_gain);
   std::vector<double> distances_m;
   for (double d = kNearest_bins * bin_m; d <= kFarthest_m; d += kStep_bins * bin_m) {
-    distances_m.push_back(-d);
+    distances_m.insert(distances_m.begin(), -d);
     distances_m.push_back(d);
   }
   const std::size_t targets = 1 + base.scene().actors.size();  // all, and each actor's
   const auto locations = static_cast<Eigen::Index>(data.locations.size());
+  const double places = static_cast<double>(locations) / std::max(1.0, static_cast<double>(locations) - 1);
   const Twin twin = base.changed(null.mechanisms);
 
   using PerPose = std::vector<std::pair<double, double>>;  // [targets][distances] score and information
@@ -84,44 +87,75 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
     }
   });
 
-  const double whole = static_cast<double>(data.poses.size()) / static_cast<double>(std::max<std::size_t>(1, poses.size()));
-  const double places = static_cast<double>(locations) / std::max(1.0, static_cast<double>(locations) - 1);
-  const auto bestOf = [&](std::size_t first, std::size_t last) {
-    std::optional<Screened> best;
-    for (std::size_t target = first; target < last; ++target) {
-      for (std::size_t d = 0; d < distances_m.size(); ++d) {
-        Eigen::VectorXd score = Eigen::VectorXd::Zero(locations), information = score;
-        for (std::size_t j = 0; j < poses.size(); ++j) {
-          const auto& [s, i] = sums[j][target * distances_m.size() + d];
-          const int location = data.poses[static_cast<std::size_t>(poses[j])].location;
-          score[location] += model.weight() * s;
-          information[location] += model.weight() * i;
-        }
-        const double total = score.sum(), all = information.sum();
-        if (!(total > 0) || !(all > 0)) continue;
-        // How far places scatter about one level.
-        const double power = total / all;
-        const double inflation = std::max(1.0, (score - power * information).squaredNorm() / all * places);
-        const double promised = whole * 0.5 * total * power / inflation;
-        if (best && promised <= best->promised) continue;
-        Screened s;
-        s.hypothesis.mechanism = defaultMechanism("echo_replica");
-        if (target > 0) {
-          s.hypothesis.subject = base.scene().actors[target - 1].name;
-          s.hypothesis.mechanism.values.set("actor", s.hypothesis.subject);
-        }
-        s.hypothesis.mechanism.values.set("behind_m", distances_m[d]);
-        s.hypothesis.coordinates = {{"level_db", "dB", -1, -200, kTypical_db, -60, 10}};
-        s.hypothesis.searched = target > 0 ? 2 : 1;  // the distance, and whose
-        s.promised = promised;
-        best = std::move(s);
+  const auto made = [&](std::size_t target, double behind_m) {
+    Hypothesis h;
+    h.mechanism = defaultMechanism("echo_replica");
+    if (target > 0) {
+      h.subject = base.scene().actors[target - 1].name;
+      h.mechanism.values.set("actor", h.subject);
+    }
+    h.mechanism.values.set("behind_m", behind_m);
+    h.coordinates = {{"level_db", "dB", -1, -200, kTypical_db, -60, 10}};
+    h.searched = target > 0 ? 1 : 0;  // whose
+    return h;
+  };
+  struct Peak {
+    std::size_t target;
+    double behind_m, promised;
+  };
+  const auto peaksOf = [&](std::size_t target) {
+    std::vector<double> promised(distances_m.size(), 0);
+    for (std::size_t d = 0; d < distances_m.size(); ++d) {
+      Eigen::VectorXd score = Eigen::VectorXd::Zero(locations), information = score;
+      for (std::size_t j = 0; j < poses.size(); ++j) {
+        const auto& [s, i] = sums[j][target * distances_m.size() + d];
+        const int location = data.poses[static_cast<std::size_t>(poses[j])].location;
+        score[location] += model.weight() * s;
+        information[location] += model.weight() * i;
+      }
+      const double total = score.sum(), all = information.sum();
+      if (!(total > 0) || !(all > 0)) continue;
+      // How far places scatter about one level.
+      const double scatter = (score - total / all * information).squaredNorm() / all;
+      promised[d] = 0.5 * total * total / all / std::max(1.0, scatter * places);
+    }
+    std::vector<Peak> peaks;
+    const auto count = static_cast<std::ptrdiff_t>(distances_m.size());
+    for (std::ptrdiff_t d = 0; d < count; ++d) {
+      const auto around = promised.begin() + d;
+      const auto low = promised.begin() + std::max<std::ptrdiff_t>(0, d - kApart_steps);
+      const auto high = promised.begin() + std::min(count, d + kApart_steps + 1);
+      if (*around > least && around == std::max_element(low, high)) {
+        peaks.push_back({target, distances_m[static_cast<std::size_t>(d)], *around});
       }
     }
+    return peaks;
+  };
+  // A quadratic about nothing says little of the level and not all of the distance: the likelihood is asked itself.
+  const auto bestOf = [&](std::vector<Peak> peaks) -> std::optional<Screened> {
+    std::sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) { return a.promised > b.promised; });
+    if (peaks.size() > kLooks) peaks.resize(kLooks);
+    std::optional<Screened> best;
+    double behind_m = 0;
+    for (const Peak& p : peaks) {
+      Screened s = look(made(p.target, p.behind_m));
+      if (best && s.promised <= best->promised) continue;
+      best = std::move(s);
+      behind_m = p.behind_m;
+    }
+    if (!best) return best;
+    // From here on the distance is a number to be fitted.
+    best->hypothesis.coordinates.push_back({"behind_m", "m", -1, behind_m, behind_m + 0.5 * bin_m, -50, 50});
+    for (std::vector<double>& start : best->starts) start.push_back(0);
     return best;
   };
   std::vector<Screened> result;
-  if (auto of_all = bestOf(0, 1)) result.push_back(std::move(*of_all));
-  if (auto of_one = bestOf(1, targets)) result.push_back(std::move(*of_one));
+  if (auto of_all = bestOf(peaksOf(0))) result.push_back(std::move(*of_all));
+  std::vector<Peak> peaks;
+  for (std::size_t target = 1; target < targets; ++target) {
+    for (const Peak& p : peaksOf(target)) peaks.push_back(p);
+  }
+  if (auto of_one = bestOf(std::move(peaks))) result.push_back(std::move(*of_one));
   return result;
 }
 

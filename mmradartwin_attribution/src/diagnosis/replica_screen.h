@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "hypothesis_fit.h"
@@ -7,11 +8,11 @@
 
 namespace mmradartwin {
 
-/// Replicas of echoes at one distance behind or before them (echo_replica) that the session promises, best first: the
-/// best of all echoes, and the best of those that meet one actor. Distances are scanned; at each, scores are summed of
-/// power that stands where replicas of the expected echoes would, from where they would come. What they promise is a
-/// quadratic's, of the best of hundreds: it wants a look at the likelihood itself.
+/// Replicas of echoes at one distance behind or before them (echo_replica): the best of all echoes, and the best of
+/// those that meet one actor. Distances are scanned by scores of power that stands where replicas of the expected
+/// echoes would, from where they would come; those that promise more than `least` nats are judged by `look`.
 std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model, const ModelState& null,
-                                     const std::vector<int>& poses);
+                                     const std::vector<int>& poses, double least,
+                                     const std::function<Screened(const Hypothesis&)>& look);
 
 }  // namespace mmradartwin
