@@ -11,33 +11,35 @@ namespace {
 constexpr double kGrid_m = 0.1;
 constexpr double kNearest_m = 0.4;
 constexpr double kWidest_sine = 0.95;
+constexpr double kSizes_m[] = {0.04, 0.15, 0.5};  // diameters that are tried
+constexpr int kSizes = 3;
+constexpr double kApart_m = 0.5;
+constexpr std::size_t kMostPlaces = 4;
+constexpr double kNearby_m = 0.6, kLargest_m = 2.5;  // of an actor that may have been moved to a place
 
 }  // namespace
 
-std::optional<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& model, const ModelState& null) {
+std::vector<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& model, const ModelState& null) {
   const ChannelData& data = model.data();
   const RadarConfig& radar = data.radar;
   const int channels = radar.channels(), samples = radar.samples_per_chirp;
   // All that the test needs of a bin.
   std::vector<std::vector<SessionModel::Whitened>> cells(data.poses.size());
   tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t i) {
-    for (int bin = 0; bin < samples; ++bin) {
-      cells[i].push_back(
-          model.whitened(null.echoes[i], null.nuisance, static_cast<int>(i), std::max(bin, model.firstBin())));
-    }
+    cells[i] = model.whitened(null.echoes[i], null.nuisance, static_cast<int>(i));
   });
   Eigen::AlignedBox3d bounds;
   for (const Actor& a : twin.scene().actors) bounds.extend(a.bounds);
   const int nx = static_cast<int>(bounds.sizes().x() / kGrid_m), ny = static_cast<int>(bounds.sizes().y() / kGrid_m);
-  if (nx < 1 || ny < 1 || static_cast<double>(nx) * ny > 1e6) return std::nullopt;
+  if (nx < 1 || ny < 1 || static_cast<double>(nx) * ny > 1e6) return {};
   std::vector<ProjectedPlace> places(static_cast<std::size_t>(nx) * ny);
   const double wave = 2 * M_PI / radar.wavelength_m(), gain = std::exp(null.nuisance.log_gain);
   tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t j) {
     ProjectedPlace& place = places[j];
     place.x_m = bounds.min().x() + kGrid_m * (static_cast<double>(j % static_cast<std::size_t>(nx)) + 0.5);
     place.y_m = bounds.min().y() + kGrid_m * (static_cast<double>(j / static_cast<std::size_t>(nx)) + 0.5);
-    Eigen::VectorXd score = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.locations.size()));
-    double information = 0;
+    // [locations][sizes] nats
+    Eigen::ArrayXXd gained = Eigen::ArrayXXd::Zero(static_cast<Eigen::Index>(data.locations.size()), kSizes);
     Eigen::VectorXcd v(channels);
     for (std::size_t i = 0; i < data.poses.size(); ++i) {
       const Eigen::Isometry3d& T = data.poses[i].pose.T_map_radar;
@@ -51,34 +53,66 @@ std::optional<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& 
       for (int k = 0; k < channels; ++k) v[k] = std::polar(1.0, -wave * radar.virtual_element_m(k).y() * way.y() / r);
       const SessionModel::Whitened& cell = cells[i][static_cast<std::size_t>(bin)];
       const double w = hannResponse(bin - r / radar.range_bin_m());
-      // Of a cylinder of 1 m radius: (lambda/(8 pi r))^2 / (1 + r).
+      // Of a metal cylinder: (lambda/(8 pi r))^2 a/(a + r).
       const double level = radar.wavelength_m() / (8 * M_PI * r);
-      const double power = gain * w * w * level * level / (1 + r);
-      const double noise = v.dot(cell.inverse * v).real();
-      score[data.poses[i].location] += power * (cell.weight * std::norm(v.dot(cell.solved)) - noise);
-      information += power * noise * power * noise;
+      const double noise = v.dot(cell.inverse * v).real(), found = std::norm(v.dot(cell.solved));
+      for (int k = 0; k < kSizes; ++k) {
+        const double radius_m = 0.5 * kSizes_m[k];
+        const double power = gain * w * w * level * level * radius_m / (radius_m + r);
+        gained(data.poses[i].location, k) += model.gainOfPoint(cell, power, noise, found);
+      }
     }
-    score *= model.weight();
-    information *= model.weight();
-    const double total = score.sum();
-    if (!(total > 0) || !(information > 0)) return;
-    const double variance = std::max(information, score.squaredNorm());
-    place.promised = 0.5 * total * total / variance;
-    place.size_m = 2 * std::clamp(total / information, 1e-3, 0.5);
+    for (int k = 0; k < kSizes; ++k) {
+      // What one place sees alone is no object.
+      const double all = gained.col(k).sum(), broad = all - std::max(0.0, gained.col(k).maxCoeff());
+      if (broad <= place.promised) continue;
+      place.promised = broad;
+      place.size_m = kSizes_m[k];
+    }
   });
-  const auto best = std::max_element(places.begin(), places.end(),
-                                     [](const auto& a, const auto& b) { return a.promised < b.promised; });
-  if (!(best->promised > 0)) return std::nullopt;
-  return *best;
+  std::stable_sort(places.begin(), places.end(),
+                   [](const ProjectedPlace& a, const ProjectedPlace& b) { return a.promised > b.promised; });
+  std::vector<ProjectedPlace> best;
+  for (const ProjectedPlace& p : places) {
+    if (best.size() == kMostPlaces || !(p.promised > 0)) break;
+    const bool taken = std::any_of(best.begin(), best.end(), [&](const ProjectedPlace& other) {
+      return std::hypot(p.x_m - other.x_m, p.y_m - other.y_m) < kApart_m;
+    });
+    if (!taken) best.push_back(p);
+  }
+  return best;
 }
 
 Hypothesis objectAt(const ProjectedPlace& place) {
   Hypothesis h;
   h.mechanism = defaultMechanism("actor_unmodelled");
-  h.coordinates = {{"x_m", "m", -1, place.x_m, place.x_m + 0.1, -1000, 1000},
-                   {"y_m", "m", -1, place.y_m, place.y_m + 0.1, -1000, 1000},
-                   {"size_m", "m", -1, 0, std::max(0.02, place.size_m), 0.002, 5}};
+  h.mechanism.values.set("x_m", place.x_m);
+  h.mechanism.values.set("y_m", place.y_m);
+  h.coordinates = {{"size_m", "m", -1, 0, std::max(0.02, place.size_m), 0.002, 5}};
   return h;
+}
+
+void freePlace(Screened& object) {
+  Hypothesis& h = object.hypothesis;
+  for (const char* key : {"y_m", "x_m"}) {
+    const double at_m = h.mechanism.values.number(key);
+    h.coordinates.insert(h.coordinates.begin(), {key, "m", -1, at_m, at_m + 0.1, -1000, 1000});
+    for (std::vector<double>& start : object.starts) start.insert(start.begin(), 0.0);
+  }
+}
+
+int nearestObject(const Scene& scene, double x_m, double y_m) {
+  int nearest = -1;
+  double least_m = kNearby_m;
+  for (std::size_t a = 0; a < scene.actors.size(); ++a) {
+    const Actor& actor = scene.actors[a];
+    const Eigen::AlignedBox2d plan(actor.bounds.min().head<2>(), actor.bounds.max().head<2>());
+    const double apart_m = plan.exteriorDistance(Eigen::Vector2d(x_m, y_m));
+    if (!actor.present || plan.diagonal().norm() > kLargest_m || apart_m >= least_m) continue;
+    least_m = apart_m;
+    nearest = static_cast<int>(a);
+  }
+  return nearest;
 }
 
 }  // namespace mmradartwin

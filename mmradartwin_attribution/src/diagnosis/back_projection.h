@@ -1,6 +1,6 @@
 #pragma once
 
-#include <optional>
+#include <vector>
 
 #include "hypothesis.h"
 #include "hypothesis_fit.h"
@@ -10,13 +10,20 @@ namespace mmradartwin {
 /// A place in the room whose echo the model lacks.
 struct ProjectedPlace {
   double x_m = 0, y_m = 0;  ///< map
-  double promised = 0;      ///< nats by the score test, inflation taken off
-  double size_m = 0;        ///< diameter of an upright metal cylinder of that level
+  double promised = 0;      ///< nats that a point there explains, less those of the place that sees it best
+  double size_m = 0;        ///< diameter of an upright metal cylinder of that level, of a few
 };
 
-/// Score test of one more point scatterer at every place of a grid over the scene, all poses together; the best place.
-std::optional<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& model, const ModelState& null);
-/// The hypothesis of an object there, its start on the coordinates' scale being 0, 0 and 1.
+/// One more point scatterer at every place of a grid over the scene, all poses together and nothing refitted; the best
+/// places that lie apart, best first.
+std::vector<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& model, const ModelState& null);
+/// The hypothesis of an object at that very place, its size free.
 Hypothesis objectAt(const ProjectedPlace& place);
+/// Lets the place of objectAt() be fitted, too, from where it is.
+void freePlace(Screened& object);
+
+/// Of the actors that can be moved at all, by their size, the index of the one that stands nearest to a place; -1 where
+/// none stands near.
+int nearestObject(const Scene& scene, double x_m, double y_m);
 
 }  // namespace mmradartwin

@@ -47,7 +47,7 @@ constexpr std::size_t kMostLaws = 3;
 constexpr double kWorthAFit = 4;  ///< nats promised
 constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kWorthALaw = 12;
-constexpr double kWorthAnObject = 5;       ///< at the best of all places; clean sessions promise up to 4.7
+constexpr double kWorthAnObject = 3;       ///< at the best of all places
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
 constexpr double kMostLost = 0.01;         ///< of the explained power, by what the likelihood plainly gains of;
 constexpr double kMuch = 50;               ///< unless it is worth so many nats, inflation taken off;
@@ -251,6 +251,20 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
                ? fitter_->screenAround(state_, h, actor, poses)
                : fitter_->screen(state_, h, poses);
   };
+  std::optional<Screened> object;
+  for (const ProjectedPlace& place : projectBack(twin_, *model_, state_)) {
+    Screened s = look(objectAt(place), spread(kScreenPoses));
+    if (!object || s.promised > object->promised) object = std::move(s);
+  }
+  source_->settle(mechanisms_);
+  if (object && object->promised > kWorthAnObject) {
+    // It may be one of the scene's that stands elsewhere.
+    const NamedParameters& m = object->hypothesis.mechanism;
+    if (const int actor = nearestObject(twin_.scene(), m.values.number("x_m"), m.values.number("y_m")); actor >= 0) {
+      suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(actor)].name);
+      out_of_place.insert(actor);
+    }
+  }
   const auto better = [](const Screened& a, const Screened& b) { return a.promised > b.promised; };
   std::vector<Screened> screened;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -304,8 +318,9 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     }
   }
   source_->settle(mechanisms_);
-  if (const auto place = projectBack(twin_, *model_, state_)) {
-    screened.push_back({objectAt(*place), place->promised, {{0, 0, 1}}});
+  if (object) {
+    freePlace(*object);
+    screened.push_back(std::move(*object));
   }
   std::stable_sort(screened.begin(), screened.end(), better);
   family_ = all.size() + static_cast<std::size_t>(kLawFamily);

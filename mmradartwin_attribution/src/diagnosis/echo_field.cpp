@@ -12,8 +12,8 @@ constexpr int kLobe = 2;   ///< bins to either side that a weak path reaches
 constexpr int kSkirt = 6;  ///< and a strong one
 constexpr int kFarSkirt =
     32;  ///< and the strongest: at -60 to -100 dB, but where no clutter stands that is above the noise
-// Where a path passes from one of these to the next, its likelihood jumps: at -30 dB that was worth 100 nats, and looked
-// like a law over range.
+// Where a path passes from one of these to the next, its likelihood jumps: at -30 dB that was worth 100 nats, and
+// looked like a law over range.
 constexpr double kWeak = 1e-6, kStrong = 0.01;  ///< of the pose's strongest path's power
 constexpr std::size_t kMostBeamBins = 16;
 constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;  ///< of a path's power: a beam that takes less does not see it

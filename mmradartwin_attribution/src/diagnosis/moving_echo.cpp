@@ -165,9 +165,7 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotResid
   const auto still = [&](int b) {
     return Eigen::Map<const Eigen::VectorXcf>(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
   };
-  const auto varied = [&](std::size_t i, int b) {
-    return Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels);
-  };
+  const auto varied = [&](std::size_t i, int b) { return Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels); };
   const auto beyondOne = [&](const std::vector<Cell>& cells) {
     double total = 0;
     for (const Cell& cell : cells) total += cell.power;

@@ -187,8 +187,8 @@ std::optional<Slip> findSlip(const Payload& p) {
   const double usual = sorted[sorted.size() / 2];
   // The last packet before the frame's end may be all that jumps: a tenth of the power is below any slip's.
   const double least = 0.1 * power;
-  // Where frames change by as much all the time nothing stands that could slip: of a tone that turns from frame to frame
-  // some other order of samples explains any change.
+  // Where frames change by as much all the time nothing stands that could slip: of a tone that turns from frame to
+  // frame some other order of samples explains any change.
   if (p.frames > 3 && usual > least) return std::nullopt;
   std::vector<int> jumps;
   for (int f = 1; f < p.frames; ++f) {

@@ -48,10 +48,7 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
     const PoseChannels& p = data.poses[pose];
     const Eigen::Isometry3d& T = p.pose.T_map_radar;
     const std::vector<PathRecord> records = twin.receivedPaths(T, twin.trace(T, p.pose.stamp_ns), p.pose.stamp_ns);
-    std::vector<SessionModel::Whitened> cells;
-    for (int bin = 0; bin < samples; ++bin) {
-      cells.push_back(model.whitened(null.echoes[pose], null.nuisance, poses[j], std::max(bin, model.firstBin())));
-    }
+    const std::vector<SessionModel::Whitened> cells = model.whitened(null.echoes[pose], null.nuisance, poses[j]);
     double strongest = 0;
     for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude);
     Eigen::VectorXd score(samples), noise(samples);

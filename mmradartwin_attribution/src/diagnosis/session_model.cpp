@@ -632,4 +632,18 @@ SessionModel::Whitened SessionModel::whitened(const PoseEchoes& echoes, const Nu
   return w;
 }
 
+std::vector<SessionModel::Whitened> SessionModel::whitened(const PoseEchoes& echoes, const Nuisance& n,
+                                                           int pose) const {
+  std::vector<Whitened> cells;
+  for (int bin = 0; bin < samples_; ++bin) cells.push_back(whitened(echoes, n, pose, std::max(bin, firstBin())));
+  return cells;
+}
+
+double SessionModel::gainOfPoint(const Whitened& cell, double power, double noise, double found) const {
+  // Sigma + power v v^H, by the determinant lemma and Sherman and Morrison.
+  const double more = 1 + power * noise, q = (channels_ + kTail) / cell.weight - kTail;
+  const double after = std::max(0.0, q - power * found / more);
+  return weight() * (-std::log(more) + (channels_ + kTail) * (std::log1p(q / kTail) - std::log1p(after / kTail)));
+}
+
 }  // namespace mmradartwin

@@ -108,6 +108,11 @@ class SessionModel {
     double weight;             ///< of the tail
   };
   Whitened whitened(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, int bin) const;
+  /// Of all bins, those before firstBin() as that one.
+  std::vector<Whitened> whitened(const PoseEchoes& echoes, const Nuisance& nuisance, int pose) const;
+  /// Nats that a cell gains by a point of this power and channel vector v; noise: v^H Sigma^-1 v, found: |v^H Sigma^-1
+  /// y|^2.
+  double gainOfPoint(const Whitened& cell, double power, double noise, double found) const;
 
   const ChannelData& data() const { return data_; }
   const LatentSpread& spread() const { return spread_; }
