@@ -52,7 +52,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
     ProgressLine line;
     options.on_progress = [&line](const DiagnosisProgress& progress) { line.show(progress); };
     if (!scene && twin_file.empty()) {
-      std::cerr << "the recording names no scene: only its frames are judged\n";
+      std::cerr << "the recording names no scene: only its frames and channels are judged\n";
       diagnosis = diagnoseReceiver(recording, options);
     } else {
       Twin twin(arguments.input.loadTwinOf(recording));

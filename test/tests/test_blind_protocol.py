@@ -582,6 +582,10 @@ class RealRecording(InFolder):
         self.assertEqual(recordings.beyond([place(2.9, 12), third, place(2.95, -6)], untouched), [third])
         self.assertEqual(recordings.beyond([finding("packet_loss")], untouched), [finding("packet_loss")])
         self.assertEqual(recordings.beyond([], untouched), [])
+        leaks = lambda level, half: finding("tx_rx_leakage", level_db=number(level, level - half, level + half))
+        self.assertEqual(recordings.beyond([leaks(0.3, 0.2)], [leaks(0.0, 1.0)]), [])
+        (sum_of_both,) = recordings.beyond([leaks(5.0, 0.5)], [leaks(0.0, 1.0)])
+        self.assertEqual(sum_of_both["parameters"], {"level_db": number(5.0)})
 
 
 if __name__ == "__main__":

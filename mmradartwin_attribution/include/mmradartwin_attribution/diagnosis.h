@@ -59,7 +59,7 @@ struct Diagnosis {
 /// that cannot be judged at all, DiagnosisCancelled.
 Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOptions& options);
 
-/// The same without a scene: then only frames can be judged, and the extended twin is none.
+/// The same without a scene: then only frames and channels can be judged, and the extended twin is none.
 Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& options);
 
 }  // namespace mmradartwin

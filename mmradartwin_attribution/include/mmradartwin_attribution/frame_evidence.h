@@ -25,6 +25,14 @@ struct FrameFinding {
   std::string description;  ///< in words and numbers
 };
 
+/// Channels of an echo that moves, by range and Doppler, of a radar with many loops per frame.
+struct MovingCell {
+  int bin = 0;                ///< of range
+  double turn_rad = 0;        ///< from one transmitter's slot to the next
+  double power = 0;           ///< over the noise
+  Eigen::VectorXcd channels;  ///< [M] as delivered, of any common level
+};
+
 /// What the frames of one pose come to once damaged samples are left out.
 struct PoseFrames {
   std::string pose;
@@ -35,6 +43,7 @@ struct PoseFrames {
   /// leaves at least 1/6. The mean carries this over `shots`.
   std::vector<double> noise_variance;
   int shots = 0;  ///< whole ones, of frames x loops
+  std::vector<MovingCell> moving;
 };
 
 /// One streaming pass over a session's captures, pose after pose; keeps statistics, no samples. It needs no scene: raw

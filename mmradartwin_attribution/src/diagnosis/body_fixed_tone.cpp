@@ -3,17 +3,21 @@
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
+#include <limits>
 #include <vector>
 
+#include "channel_errors.h"
 #include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin {
 namespace {
 
-constexpr int kBins = 4;        ///< leakage lies at some centimetres, its lobe reaches two bins further
-constexpr double kTail = 4;     ///< degrees of freedom of the complex t, as in SessionModel
-constexpr double kShare = 0.5;  ///< of a bin: neighbours overlap through the window
-constexpr int kRounds = 6;      ///< of re-weighting
+constexpr double kReach_m = 0.15;     ///< where leakage lies at most (causes.md, A1)
+constexpr double kReach_bins = 1.5;   ///< but so many bins at least
+constexpr double kTail = 4;           ///< degrees of freedom of the complex t, as in SessionModel
+constexpr double kShare = 0.5;        ///< of a bin: neighbours overlap through the window
+constexpr int kRounds = 6;            ///< of re-weighting
+constexpr double kEchoErrors = 0.03;  ///< of an echo's power, by errors of channels
 
 ComplexGrid unitTone(const RadarConfig& radar, double range_m) {
   ComplexGrid x(1, radar.samples_per_chirp);
@@ -24,81 +28,160 @@ ComplexGrid unitTone(const RadarConfig& radar, double range_m) {
   return x;
 }
 
+/// The first bins of all poses, and the last ones before them where a tone may lie behind the radar.
+class FirstBins {
+ public:
+  FirstBins(const ChannelData& data, bool behind) : data_(data), chain_(data.radar) {
+    reach_m_ = std::max(kReach_m, kReach_bins * data.radar.range_bin_m());
+    // The window's lobe reaches two bins further.
+    const int last = std::max(4, static_cast<int>(std::ceil(reach_m_ / data.radar.range_bin_m())) + 2) - 1;
+    const int samples = data.radar.samples_per_chirp;
+    if (2 * last + 1 >= samples) return;
+    for (int r = behind ? -last : 0; r <= last; ++r) bins_.push_back((r + samples) % samples);
+  }
+  const std::vector<int>& bins() const { return bins_; }
+  double reach_m() const { return reach_m_; }
+  Eigen::Index channels() const { return data_.poses.front().y.rows(); }
+  std::size_t poses() const { return data_.poses.size(); }
+  auto at(std::size_t pose, std::size_t bin) const { return data_.poses[pose].y.col(bins_[bin]); }
+
+  /// What a tone of amplitude 1 gives in each bin.
+  Eigen::VectorXcd kernel(double range_m) const {
+    // The chain takes all channels; the tone is the same on each.
+    const ComplexGrid x = unitTone(data_.radar, range_m).replicate(data_.radar.channels(), 1);
+    const ComplexGrid spectra = chain_.rangeSpectra(x);
+    Eigen::VectorXcd kernel(static_cast<Eigen::Index>(bins_.size()));
+    for (std::size_t i = 0; i < bins_.size(); ++i) kernel[static_cast<Eigen::Index>(i)] = spectra(0, bins_[i]);
+    return kernel / (0.5 * data_.radar.samples_per_chirp);
+  }
+
+ private:
+  const ChannelData& data_;
+  SignalChain chain_;
+  double reach_m_ = 0;
+  std::vector<int> bins_;
+};
+
 struct ToneFit {
   Eigen::VectorXcd channels;
   double log_likelihood = 0;
 };
 
 /// Vector over channels (zero where `with` is false) and scale of each bin, by expectation-maximisation of the t.
-ToneFit fitTone(const ChannelData& data, const Eigen::VectorXcd& kernel, bool with) {
-  const Eigen::Index channels = data.poses.front().y.rows();
-  ToneFit fit{Eigen::VectorXcd::Zero(channels), 0};
-  Eigen::VectorXd scale = Eigen::VectorXd::Ones(kBins);
-  for (int r = 0; r < kBins; ++r) {
+ToneFit fitTone(const FirstBins& data, const Eigen::VectorXcd& kernel, bool with) {
+  const std::size_t bins = data.bins().size(), poses = data.poses();
+  const double m = static_cast<double>(data.channels());
+  ToneFit fit{Eigen::VectorXcd::Zero(data.channels()), 0};
+  Eigen::VectorXd scale = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(bins));
+  for (std::size_t r = 0; r < bins; ++r) {
     std::vector<double> power;
-    for (const PoseChannels& p : data.poses) power.push_back(p.y.col(r).squaredNorm() / static_cast<double>(channels));
+    for (std::size_t p = 0; p < poses; ++p) power.push_back(data.at(p, r).squaredNorm() / m);
     std::nth_element(power.begin(), power.begin() + static_cast<std::ptrdiff_t>(power.size() / 2), power.end());
-    scale[r] = std::max(power[power.size() / 2], 1e-30);
+    scale[static_cast<Eigen::Index>(r)] = std::max(power[power.size() / 2], 1e-30);
   }
-  const double m = static_cast<double>(channels);
+  const auto residual = [&](std::size_t p, std::size_t r) -> Eigen::VectorXcd {
+    return data.at(p, r) - kernel[static_cast<Eigen::Index>(r)] * fit.channels;
+  };
   for (int round = 0; round < kRounds; ++round) {
-    Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(channels);
+    Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(data.channels());
     double total = 0;
-    Eigen::VectorXd spread = Eigen::VectorXd::Zero(kBins);
-    for (const PoseChannels& p : data.poses) {
-      for (int r = 0; r < kBins; ++r) {
-        const Eigen::VectorXcd e = p.y.col(r) - kernel[r] * fit.channels;
-        const double w = (m + kTail) / (kTail + e.squaredNorm() / scale[r]);
-        sum += w / scale[r] * std::conj(kernel[r]) * p.y.col(r);
-        total += w / scale[r] * std::norm(kernel[r]);
-        spread[r] += w * e.squaredNorm();
+    Eigen::VectorXd spread = Eigen::VectorXd::Zero(scale.size());
+    for (std::size_t p = 0; p < poses; ++p) {
+      for (std::size_t r = 0; r < bins; ++r) {
+        const auto i = static_cast<Eigen::Index>(r);
+        const double e2 = residual(p, r).squaredNorm();
+        const double w = (m + kTail) / (kTail + e2 / scale[i]);
+        sum += w / scale[i] * std::conj(kernel[i]) * data.at(p, r);
+        total += w / scale[i] * std::norm(kernel[i]);
+        spread[i] += w * e2;
       }
     }
-    for (int r = 0; r < kBins; ++r)
-      scale[r] = std::max(spread[r] / (m * static_cast<double>(data.poses.size())), 1e-30);
+    scale = (spread / (m * static_cast<double>(poses))).cwiseMax(1e-30);
     if (with) fit.channels = sum / total;
   }
-  for (const PoseChannels& p : data.poses) {
-    for (int r = 0; r < kBins; ++r) {
-      const double q = (p.y.col(r) - kernel[r] * fit.channels).squaredNorm() / scale[r];
-      fit.log_likelihood += kShare * (-m * std::log(scale[r]) - (m + kTail) * std::log1p(q / kTail));
+  for (std::size_t p = 0; p < poses; ++p) {
+    for (std::size_t r = 0; r < bins; ++r) {
+      const double s = scale[static_cast<Eigen::Index>(r)];
+      fit.log_likelihood +=
+          kShare * (-m * std::log(s) - (m + kTail) * std::log1p(residual(p, r).squaredNorm() / s / kTail));
     }
   }
   return fit;
 }
 
+/// The same of the only pose, where a bin's scale cannot be told from what stands in it: least squares over all bins.
+ToneFit fitOnlyPose(const FirstBins& data, const Eigen::VectorXcd& kernel) {
+  ToneFit fit{Eigen::VectorXcd::Zero(data.channels()), 0};
+  double all = 0;
+  for (std::size_t r = 0; r < data.bins().size(); ++r) {
+    fit.channels += std::conj(kernel[static_cast<Eigen::Index>(r)]) * data.at(0, r);
+    all += data.at(0, r).squaredNorm();
+  }
+  const double norm = kernel.squaredNorm();
+  fit.channels /= norm;
+  const double cells = static_cast<double>(data.channels()) * static_cast<double>(data.bins().size());
+  fit.log_likelihood = -kShare * cells * std::log(std::max(1e-9 * all, all - norm * fit.channels.squaredNorm()));
+  return fit;
+}
+
 }  // namespace
 
-BodyFixedTone findBodyFixedTone(const ChannelData& data) {
+BodyFixedTone findBodyFixedTone(const ChannelData& data, bool behind) {
   BodyFixedTone best;
   best.channels = Eigen::VectorXcd::Zero(data.radar.channels());
-  if (data.poses.size() < 2 || data.radar.samples_per_chirp <= kBins) return best;
-  const SignalChain chain(data.radar);
-  const auto kernelAt = [&](double range_m) -> Eigen::VectorXcd {
-    // The chain takes all channels; the tone is the same on each.
-    const ComplexGrid x = unitTone(data.radar, range_m).replicate(data.radar.channels(), 1);
-    return chain.rangeSpectra(x).row(0).head(kBins).transpose() / (0.5 * data.radar.samples_per_chirp);
-  };
-  const double without = fitTone(data, Eigen::VectorXcd::Zero(kBins), false).log_likelihood;
+  const FirstBins first(data, behind);
+  if (first.bins().empty()) return best;
+  const bool only = data.poses.size() == 1;
   const double step_m = 0.02 * data.radar.range_bin_m();
+  const int steps = static_cast<int>(first.reach_m() / step_m);
   std::vector<double> curve;
-  for (double range_m = 0; range_m < 1.5 * data.radar.range_bin_m(); range_m += step_m) {
-    const ToneFit fit = fitTone(data, kernelAt(range_m), true);
+  double highest = -std::numeric_limits<double>::infinity();
+  int at = 0;
+  for (int i = behind ? -steps : 0; i <= steps; ++i) {
+    const ToneFit fit =
+        only ? fitOnlyPose(first, first.kernel(i * step_m)) : fitTone(first, first.kernel(i * step_m), true);
     curve.push_back(fit.log_likelihood);
-    if (curve.size() > 1 && fit.log_likelihood - without <= best.gain) continue;
-    best.gain = fit.log_likelihood - without;
-    best.range_m = range_m;
+    if (fit.log_likelihood <= highest) continue;
+    highest = fit.log_likelihood;
+    at = static_cast<int>(curve.size()) - 1;
+    best.range_m = i * step_m;
     best.channels = fit.channels;
   }
-  const std::size_t at = static_cast<std::size_t>(std::lround(best.range_m / step_m));
-  if (at > 0 && at + 1 < curve.size()) {
-    const double bend = (curve[at - 1] + curve[at + 1] - 2 * curve[at]) / (step_m * step_m);
-    const double slope = (curve[at + 1] - curve[at - 1]) / (2 * step_m);
+  best.array_share = arrayShare(data.radar, best.channels);
+  const Eigen::VectorXcd kernel = first.kernel(best.range_m);
+  if (only) {
+    // Channels are off by some 10 degrees and 1 dB: so much of an echo's power is no array response, and not more.
+    const double beyond = (1 - best.array_share) / kEchoErrors;
+    double all = 0, strongest = 0;
+    for (std::size_t r = 0; r < first.bins().size(); ++r) all += first.at(0, r).squaredNorm();
+    for (Eigen::Index r = 0; r < data.poses[0].y.cols(); ++r) {
+      strongest = std::max(strongest, data.poses[0].y.col(r).squaredNorm());
+    }
+    const double own = best.channels.squaredNorm();
+    const double noise = static_cast<double>(data.radar.channels()) * data.poses[0].noise_power;
+    if (beyond <= 1 || kernel.squaredNorm() * own < 0.5 * all || own < 100 * noise || own < 0.01 * strongest) {
+      return best;
+    }
+    best.gain = (static_cast<double>(data.radar.channels()) - 2) * (beyond - 1 - std::log(beyond));
+    best.false_alarm_rate = std::exp(-best.gain);
+  } else {
+    best.gain = highest - fitTone(first, Eigen::VectorXcd::Zero(kernel.size()), false).log_likelihood;
+  }
+  if (behind) {
+    // A constant lies at no range; within a quarter of a bin of that it is neither before nor behind.
+    const auto split = curve.begin() + std::max(1, steps - 12);
+    best.behind = *std::max_element(curve.begin(), split) - *std::max_element(split, curve.end());
+  }
+  if (at > 0 && at + 1 < static_cast<int>(curve.size())) {
+    const double before = curve[static_cast<std::size_t>(at) - 1], after = curve[static_cast<std::size_t>(at) + 1];
+    const double bend = (before + after - 2 * highest) / (step_m * step_m);
+    const double slope = (after - before) / (2 * step_m);
     if (bend < 0) {
       best.range_error_m = 1 / std::sqrt(-bend);
       best.range_m += std::clamp(-slope / bend, -step_m, step_m);
     }
   }
+  if (only) return best;
   const double numbers = 2.0 * data.radar.channels() + 1;
   const double others =
       std::max(1.0, 2.0 * kShare * data.radar.channels() * static_cast<double>(data.poses.size()) - numbers);
@@ -107,6 +190,8 @@ BodyFixedTone findBodyFixedTone(const ChannelData& data) {
       boost::math::cdf(boost::math::complement(distribution, 2 * std::max(0.0, best.gain) / numbers));
   return best;
 }
+
+bool isPlain(const BodyFixedTone& tone) { return tone.false_alarm_rate <= 1e-6 && tone.gain >= 30; }
 
 void subtractTone(const BodyFixedTone& tone, ChannelData& data) {
   const SignalChain chain(data.radar);

@@ -19,8 +19,8 @@ void transformGrid(const SignalChain& chain, PoseChannels& pose) {
   pose.y = chain.rangeSpectra(pose.grid.x) / (window * pose.grid.full_scale);
 }
 
-ChannelData readChannels(const Recording& recording, FrameExaminer& examiner,
-                         const std::function<void(std::size_t done, std::size_t all)>& on_progress) {
+ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, const ReadingProgress& on_progress,
+                         const std::function<void(AdcCube&)>& repair) {
   ChannelData data;
   data.radar = recording.radar;
   data.problems = recording.problems;
@@ -33,7 +33,10 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner,
   for (const Pose& pose : recording.poses) {
     try {
       std::vector<AdcCube> frames;
-      recording.forEachFrame(pose, [&](const AdcCube& cube) { frames.push_back(cube); });
+      recording.forEachFrame(pose, [&](const AdcCube& cube) {
+        frames.push_back(cube);
+        if (repair) repair(frames.back());
+      });
       if (frames.empty()) throw InputError("its capture holds no frame; record it again");
       const bool silent = std::all_of(frames.begin(), frames.end(), [](const AdcCube& cube) {
         return std::all_of(cube.data.begin(), cube.data.end(), [](std::int16_t v) { return v == 0; });
@@ -44,10 +47,16 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner,
       PoseChannels channels;
       channels.pose = pose;
       channels.grid = seen.mean;
+      channels.moving = seen.moving;
       std::vector<double> noise = seen.noise_variance;
       if (recording.channels) {
         correctChannels(*recording.channels, channels.grid.x);
-        for (std::size_t k = 0; k < noise.size(); ++k) noise[k] /= std::norm(recording.channels->error(k));
+        for (std::size_t k = 0; k < noise.size(); ++k) {
+          noise[k] /= std::norm(recording.channels->error(k));
+          for (MovingCell& cell : channels.moving) {
+            cell.channels[static_cast<Eigen::Index>(k)] /= recording.channels->error(k);
+          }
+        }
       }
       channels.noise_power = per_sample * sum(noise) / static_cast<double>(noise.size()) / std::max(1, seen.shots);
       channels.shots = std::max(1, seen.shots);

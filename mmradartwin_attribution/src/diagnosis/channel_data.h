@@ -24,6 +24,7 @@ struct PoseChannels {
   std::vector<EchoBeam> beams;
   BinCovariance clutter;   ///< of all bins: see clutter_field.h
   double noise_power = 0;  ///< thermal power in a cell of y, from the scatter of the frames
+  std::vector<MovingCell> moving;
 };
 
 struct ChannelData {
@@ -35,8 +36,10 @@ struct ChannelData {
 
 /// Reads all captures once, frames through the examiner, whose repaired averages are taken. Throws InputError where no
 /// pose is left.
-ChannelData readChannels(const Recording& recording, FrameExaminer& examiner,
-                         const std::function<void(std::size_t done, std::size_t all)>& on_progress);
+using ReadingProgress = std::function<void(std::size_t done, std::size_t all)>;
+/// `repair`: of each frame before anything looks at it.
+ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, const ReadingProgress& on_progress,
+                         const std::function<void(AdcCube&)>& repair = {});
 
 class SignalChain;
 /// Fills y of a pose from its grid (again, after the grid was changed).

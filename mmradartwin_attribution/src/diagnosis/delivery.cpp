@@ -1,8 +1,11 @@
 #include "delivery.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <numeric>
 
+#include "body_fixed_tone.h"
+#include "channel_errors.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "session_model.h"
 
@@ -12,6 +15,7 @@ namespace {
 constexpr std::size_t kPoses = 8;  ///< a delivery shows in every pose; so many decide by hundreds of nats
 constexpr double kPerPose = 2;     ///< nats per pose below which nothing is claimed
 constexpr int kIterations = 3;
+constexpr double kPlainlyBehind = 12;  ///< nats
 
 /// What the mechanism of that name does to a grid; each conjugation is its own inverse.
 ComplexGrid delivered(const ComplexGrid& x, const NamedParameters& mechanism) {
@@ -29,6 +33,22 @@ ComplexGrid delivered(const ComplexGrid& x, const NamedParameters& mechanism) {
   return y;
 }
 
+void undo(const NamedParameters& mechanism, const RadarConfig& radar, MovingCell& cell) {
+  const Eigen::VectorXcd before = cell.channels;
+  if (mechanism.mechanism == "iq_conjugation") {
+    cell.channels = before.conjugate();
+    cell.bin = (radar.samples_per_chirp - cell.bin) % radar.samples_per_chirp;
+    cell.turn_rad = -cell.turn_rad;
+  } else if (mechanism.mechanism == "channel_conjugation") {
+    cell.channels = before.reverse();  // the same but for a phase of all
+  } else {
+    const std::vector<double>& order = mechanism.values.numbers("order");
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      cell.channels[static_cast<Eigen::Index>(order[i])] = before[static_cast<Eigen::Index>(i)];
+    }
+  }
+}
+
 NamedParameters permutation(const std::vector<int>& order) {
   NamedParameters m = defaultMechanism("channel_permutation");
   m.values.set("order", std::vector<double>(order.begin(), order.end()));
@@ -42,7 +62,53 @@ void undoDelivery(const Delivery& delivery, ChannelData& data) {
   for (PoseChannels& p : data.poses) {
     p.grid.x = delivered(p.grid.x, delivery.mechanism);
     transformGrid(chain, p);
+    for (MovingCell& cell : p.moving) undo(delivery.mechanism, data.radar, cell);
   }
+}
+
+void undoDelivery(const Delivery& delivery, const RadarConfig& radar, AdcCube& frame) {
+  const auto negative = [](std::int16_t v) { return static_cast<std::int16_t>(v == INT16_MIN ? INT16_MAX : -v); };
+  if (delivery.mechanism.mechanism == "iq_conjugation") {
+    for (std::size_t i = 1; i < frame.data.size(); i += 2) frame.data[i] = negative(frame.data[i]);
+    return;
+  }
+  const int receivers = radar.receivers(), slots = radar.slots(), channels = radar.channels();
+  std::vector<int> order(static_cast<std::size_t>(channels));
+  std::iota(order.rbegin(), order.rend(), 0);
+  if (delivery.mechanism.mechanism == "channel_permutation") {
+    const std::vector<double>& places = delivery.mechanism.values.numbers("order");
+    std::transform(places.begin(), places.end(), order.begin(), [](double k) { return static_cast<int>(k); });
+  }
+  const AdcCube before = frame;
+  const auto at = [&](int loop, int channel, int sample) {
+    const int chirp = loop * slots + channel / receivers;
+    return 2 * static_cast<std::size_t>((chirp * frame.samples + sample) * receivers + channel % receivers);
+  };
+  for (int loop = 0; loop < frame.chirps / slots; ++loop) {
+    for (int i = 0; i < channels; ++i) {
+      const int k = order[static_cast<std::size_t>(i)];
+      for (int n = 0; n < frame.samples; ++n) {
+        for (std::size_t part : {0u, 1u}) frame.data[at(loop, k, n) + part] = before.data[at(loop, i, n) + part];
+      }
+      frame.chirp_valid[static_cast<std::size_t>(loop * slots + k / receivers)] =
+          before.chirp_valid[static_cast<std::size_t>(loop * slots + i / receivers)];
+    }
+  }
+}
+
+std::vector<Delivery> findDeliveryByEchoes(const ChannelData& data) {
+  std::vector<Delivery> all;
+  ChannelData undone = data;
+  // What leaks from transmitters into receivers lies some centimetres before the radar, not behind it.
+  const BodyFixedTone tone = findBodyFixedTone(undone, true);
+  if (isPlain(tone) && tone.behind > kPlainlyBehind) {
+    all.push_back({defaultMechanism("iq_conjugation"), tone.behind, std::nullopt});
+    undoDelivery(all.back(), undone);
+  }
+  if (const std::optional<ChannelOrder> order = findChannelOrder(undone)) {
+    all.push_back({permutation(order->order), order->gain, order->margin});
+  }
+  return all;
 }
 
 std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data) {

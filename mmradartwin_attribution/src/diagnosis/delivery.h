@@ -17,7 +17,11 @@ struct Delivery {
 
 /// Tries all deliveries on a part of the session; nothing where the data fit best as they are.
 std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data);
+/// What leakage and echoes say without a scene, in the order in which it is to be undone.
+std::vector<Delivery> findDeliveryByEchoes(const ChannelData& data);
 /// Undoes it in all poses.
 void undoDelivery(const Delivery& delivery, ChannelData& data);
+/// Undoes it in a frame; a conjugation of channels as the reversed order.
+void undoDelivery(const Delivery& delivery, const RadarConfig& radar, AdcCube& frame);
 
 }  // namespace mmradartwin

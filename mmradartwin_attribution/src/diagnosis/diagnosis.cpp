@@ -20,6 +20,7 @@
 #include "empirical_hypothesis.h"
 #include "fitted_parameters.h"
 #include "held_out_gain.h"
+#include "hypothesis_finding.h"
 #include "hypothesis_fit.h"
 #include "law_screen.h"
 #include "mmradartwin_dsp/input_error.h"
@@ -35,7 +36,8 @@ namespace {
 constexpr int kFolds = 5;
 constexpr double kFalseAlarm = 0.01;  ///< family-wise, per round
 constexpr int kMostFindings = 4;
-constexpr std::size_t kScreenPoses = 44;  ///< a part of the session ranks hypotheses well enough
+constexpr std::size_t kFewestForLaws = 3;  ///< poses: of fewer only frames and channels are judged
+constexpr std::size_t kScreenPoses = 44;   ///< a part of the session ranks hypotheses well enough
 constexpr std::size_t kFewestPoses = 12;
 constexpr std::size_t kLawPoses = 66;   ///< whose paths are scored for laws without a name
 constexpr std::size_t kSecondLook = 9;  ///< hypotheses that are looked at on all poses
@@ -52,7 +54,6 @@ constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less
 constexpr double kMostLost = 0.01;         ///< of the explained power, by what the likelihood plainly gains of;
 constexpr double kMuch = 50;               ///< unless it is worth so many nats, inflation taken off;
 constexpr double kMuchOfGeometry = 60;     ///< of what moves echoes, whose likelihood is rough
-constexpr double kAlike = 5;               ///< nats within which two names are not told apart
 constexpr std::size_t kMostProfiled = 6;   ///< numbers whose errors the likelihood's own fall gives
 constexpr double kObjectPlaces = 500;      ///< places of an 8 by 6 m room that a session resolves, as a family
 
@@ -81,7 +82,6 @@ class Session {
   bool judgeChannels(int round);
   std::vector<HypothesisFit> fitBest(int round);
   TriedHypothesis& triedAs(const HypothesisFit& fit, int round);
-  Finding describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const;
   void refitTogether();
   void profileFound();
   struct Accepted;
@@ -95,8 +95,9 @@ class Session {
   const Recording& recording_;
   Twin& twin_;
   const DiagnosisOptions& options_;
-  FrameExaminer examiner_;
-  ChannelData data_;
+  const bool few_;  ///< poses: too few for laws over them
+  ReceivedSession received_;
+  ChannelData& data_;
   PoseAccuracy accuracy_;
   std::unique_ptr<EchoSource> source_;
   std::unique_ptr<SessionModel> model_;
@@ -119,10 +120,15 @@ class Session {
 };
 
 Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options)
-    : recording_(recording), twin_(twin), options_(options), examiner_(recording.radar) {
-  data_ = readChannels(recording, examiner_, [&](std::size_t done, std::size_t all) {
-    report("reading captures", static_cast<double>(done) / static_cast<double>(all));
-  });
+    : recording_(recording),
+      twin_(twin),
+      options_(options),
+      few_(recording.poses.size() < kFewestForLaws),
+      received_(receiveSession(recording, few_,
+                               [&](std::size_t done, std::size_t all) {
+                                 report("reading captures", static_cast<double>(done) / static_cast<double>(all));
+                               })),
+      data_(received_.data) {
   twin_.setSession(recording.poses);
   if (data_.radar.channels() > kMaxChannels) {
     throw InputError(recording.radar_file + ": has " + std::to_string(data_.radar.channels()) +
@@ -200,7 +206,7 @@ void Session::judgeTone() {
     if (m.mechanism == "tx_rx_leakage" || m.mechanism == "dc_offset") return;  // the twin has it already
   }
   const BodyFixedTone tone = findBodyFixedTone(data_);
-  if (tone.false_alarm_rate > 1e-6 || tone.gain < 30) return;
+  if (!isPlain(tone)) return;
   const ChannelData recorded = data_;
   subtractTone(tone, data_);
   Finding f = findingOf(tone, data_);
@@ -251,9 +257,11 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
                ? fitter_->screenAround(state_, h, actor, poses)
                : fitter_->screen(state_, h, poses);
   };
+  const auto lookAtSome = [&](const Hypothesis& h) { return look(h, spread(kScreenPoses)); };
   std::optional<Screened> object;
+  report("objects that the twin lacks", 0);
   for (const ProjectedPlace& place : projectBack(twin_, *model_, state_)) {
-    Screened s = look(objectAt(place), spread(kScreenPoses));
+    Screened s = lookAtSome(objectAt(place));
     if (!object || s.promised > object->promised) object = std::move(s);
   }
   source_->settle(mechanisms_);
@@ -302,7 +310,6 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   }
   report("laws without a name", 0);
   for (Screened& s : screenLaws(twin_, *model_, state_, spread(kLawPoses))) screened.push_back(std::move(s));
-  const auto lookAtSome = [&](const Hypothesis& h) { return look(h, spread(kScreenPoses)); };
   for (Screened& s : screenReplicas(twin_, *model_, state_, spread(kLawPoses), kWorthALaw, lookAtSome)) {
     screened.push_back(std::move(s));
   }
@@ -370,62 +377,6 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
 TriedHypothesis& Session::triedAs(const HypothesisFit& fit, int round) {
   return *std::find_if(result_.tried.begin(), result_.tried.end(),
                        [&](const TriedHypothesis& t) { return t.round == round && t.label == fit.hypothesis.label(); });
-}
-
-Finding Session::describe(const HypothesisFit& best, const std::vector<HypothesisFit>& fits) const {
-  Finding f;
-  const NamedParameters m = best.hypothesis.at(best.scaled);
-  const bool named = isCatalogued(m.mechanism);
-  f.cause = named ? m.mechanism : "unknown";
-  f.mechanism = m;
-  f.parameters = fittedParameters(best.hypothesis, best.scaled, best.standard_error, f.cause, data_.locations.size());
-  // Names that explain nearly as much, by their share of probability.
-  double sum = 0;
-  std::vector<std::pair<std::string, double>> alike;
-  for (const HypothesisFit& other : fits) {
-    const double behind = (best.ranking() - other.ranking()) / best.inflation;
-    if (behind > kAlike || behind < 0 || !(other.gain > 0)) continue;  // those ahead were refused
-    const std::string& name = other.hypothesis.mechanism.mechanism;
-    const double weight = std::exp(-behind);
-    const std::string cause = isCatalogued(name) ? name : "unknown";
-    const auto at = std::find_if(alike.begin(), alike.end(), [&](const auto& a) { return a.first == cause; });
-    if (at == alike.end()) {
-      alike.emplace_back(cause, weight);
-      sum += weight;
-    }
-  }
-  for (const auto& [cause, weight] : alike) f.candidates.push_back({cause, weight / sum});
-  if (f.candidates.size() > 1) f.experiment = experimentFor(f.candidates);
-  f.evidence.log_likelihood_gain = best.gain;
-  f.evidence.false_alarm_rate = best.false_alarm_rate;
-  for (const HypothesisFit& other : fits) {
-    if (other.hypothesis.mechanism.mechanism == m.mechanism) continue;
-    const std::string& name = other.hypothesis.mechanism.mechanism;
-    f.evidence.runner_up = isCatalogued(name) ? name : "unknown";
-    f.evidence.margin = best.gain - std::max(0.0, other.gain);
-    break;
-  }
-  FindingPlace place;
-  if (twin_.scene().actorIndex(best.hypothesis.subject) >= 0) place.actors = {best.hypothesis.subject};
-  const bool of_place = m.mechanism == "empirical_law" && m.values.text("variable") == "passing_m";
-  if (f.cause == "actor_unmodelled" || of_place) {
-    place.x_m = m.values.number("x_m");
-    place.y_m = m.values.number("y_m");
-  }
-  std::vector<std::pair<double, std::string>> poses;
-  for (std::size_t i = 0; i < state_.by_pose.size(); ++i) {
-    poses.emplace_back(best.state.by_pose[i] - state_.by_pose[i], data_.poses[i].pose.name);
-  }
-  std::stable_sort(poses.begin(), poses.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-  for (std::size_t i = 0; i < std::min<std::size_t>(10, poses.size()) && poses[i].first > 1; ++i) {
-    place.poses.push_back(poses[i].second);
-  }
-  f.where.push_back(std::move(place));
-  if (!named) {
-    f.description = "no cause of the catalogue explains this; what it looks like: " + describeLaw(best.hypothesis, m) +
-                    "; " + number(best.gain, 4) + " nats over " + std::to_string(data_.poses.size()) + " poses";
-  }
-  return f;
 }
 
 std::vector<PoseEchoes> Session::heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m) {
@@ -554,7 +505,15 @@ void Session::profileFound() {
     fit.scaled.insert(fit.scaled.end(), a.scaled.begin(), a.scaled.end());
     fit.standard_error.insert(fit.standard_error.end(), a.standard_error.begin(), a.standard_error.end());
   }
-  if (fit.scaled.empty() || fit.scaled.size() > kMostProfiled) return;
+  if (fit.scaled.empty()) return;
+  if (fit.scaled.size() > kMostProfiled) {
+    for (Accepted& a : accepted_) {
+      if (a.hypothesis.mechanism.mechanism != "channel_phase_error") continue;
+      widenGains(data_, a.hypothesis, a.standard_error);
+      takeOver(a);
+    }
+    return;
+  }
   fit = profiled(*source_, *model_, mechanisms_, state_.nuisance, accuracy_, parts, fit);
   std::ptrdiff_t from = 0;
   for (Accepted& a : accepted_) {
@@ -588,7 +547,7 @@ bool Session::judgeChannels(int round) {
               : !(f.held_out_gain > 0)           ? "loses on places not fitted"
                                                  : "";
     if (!verdict.empty()) continue;
-    Finding finding = describe(f, fits);
+    Finding finding = findingOf(f, fits, state_, twin_.scene(), data_);
     if (data_.locations.size() > 1) {
       finding.gain = gainOf(f);
       // Where the likelihood gains little and the maps nothing, it is the likelihood's own shortcomings that were
@@ -633,17 +592,21 @@ bool Session::judgeChannels(int round) {
 }
 
 Diagnosis Session::run() {
-  for (const FrameFinding& f : examiner_.findings()) {
-    Finding finding = findingOf(f);
+  const auto add = [&](Finding finding) {
     const bool there = std::any_of(extended_.begin(), extended_.end(),
                                    [&](const NamedParameters& m) { return m.mechanism == finding.cause; });
     if (!there) extended_.push_back(*finding.mechanism);
     result_.findings.findings.push_back(std::move(finding));
-  }
-  const std::optional<std::string> convention = judgeDelivery();
+  };
+  for (const FrameFinding& f : received_.frames) add(findingOf(f));
+  for (const Delivery& d : received_.deliveries) add(findingOf(d, data_.radar));
+  const std::optional<std::string> convention = few_ ? std::nullopt : judgeDelivery();
   source_->settle(mechanisms_);
   judgeTone();
   judgeNoise();
+  if (few_) {
+    if (const std::optional<ChannelErrors> errors = findChannelErrors(data_)) add(findingOf(*errors));
+  }
   report("fitting the twin as it is", 0);
   source_->pointBeams(data_, mechanisms_, model_->firstBin());
   source_->settle(mechanisms_);
@@ -658,8 +621,9 @@ Diagnosis Session::run() {
   Findings& findings = result_.findings;
   findings.poses = static_cast<int>(data_.poses.size());
   findings.locations = static_cast<int>(data_.locations.size());
-  findings.held_out =
-      data_.locations.size() > 1 ? std::to_string(kFolds) + "-fold by location" : "nothing: one location";
+  findings.held_out = few_ ? "nothing: of fewer than 3 poses only frames and channels are judged"
+                      : data_.locations.size() > 1 ? std::to_string(kFolds) + "-fold by location"
+                                                   : "nothing: one location";
   if (result_.nothing_matches) {
     if (convention) takeBackDelivery(*convention);
     Finding f;
@@ -671,10 +635,10 @@ Diagnosis Session::run() {
     findings.findings.push_back(std::move(f));
   } else {
     before_rounds_ = mechanisms_;
-    for (int round = 0; round < kMostFindings; ++round) {
+    for (int round = 0; round < (few_ ? 0 : kMostFindings); ++round) {
       if (!judgeChannels(round)) break;
     }
-    addUnexplained(examiner_, findings.findings);
+    addUnexplained(received_.unexplained, findings.findings);
   }
   result_.extended = twin_.description();
   result_.extended.mechanisms = extended_;

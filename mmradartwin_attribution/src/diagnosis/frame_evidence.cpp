@@ -4,6 +4,7 @@
 #include <boost/math/distributions/beta.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <cstdint>
 #include <set>
 #include <sstream>
 
@@ -141,6 +142,7 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   }
   result.noise_variance = std::move(residuals.noise_variance);
   result.shots = residuals.shots;
+  result.moving = std::move(residuals.cells);
   s.poses.push_back(std::move(result));
   s.motion.push_back({pose, stack.frames, std::move(residuals.evidence), std::move(residuals.echoes)});
   s.judged.push_back(std::move(judged));
@@ -203,6 +205,8 @@ FrameFinding FrameExaminer::State::saturation() const {
     f.poses.push_back(p.pose);
   }
   f.log_likelihood_gain = pileUp({0, at_code, next_codes});
+  // That the outermost code is the last one of 16 bits happens by chance once in a thousand sessions at most.
+  if (f.log_likelihood_gain > 0 && (high == INT16_MAX || low == INT16_MIN)) f.log_likelihood_gain += std::log(1e3);
   f.false_alarm_rate = std::exp(-f.log_likelihood_gain);
   if (f.false_alarm_rate > kFalseAlarm || counted == 0) {
     f.log_likelihood_gain = 0;

@@ -15,6 +15,8 @@ using Complex = std::complex<float>;
 constexpr int kLeastLoops = 16;
 // Of a frame's moving echoes the strongest are kept.
 constexpr std::size_t kEchoesPerFrame = 3;
+constexpr double kLimb_m = 0.75;
+constexpr double kLeastOfStrongest = 0.03;  ///< power of the moving cells that are told of
 
 template <typename T>
 T medianOf(std::vector<T> values) {
@@ -423,6 +425,7 @@ void ShotExaminer::readDopplerEchoes(const Spectra& s, ShotResiduals& result) co
       double weight, sum_range, sum_azimuth, sum_speed;
     };
     std::vector<Peak> peaks;
+    std::vector<MovingCell> cells;
     for (int b = 1; b + 1 < s.bins; ++b) {
       for (int d = 0; d < loops; ++d) {
         const int turns = d < (loops + 1) / 2 ? d : d - loops;
@@ -433,8 +436,17 @@ void ShotExaminer::readDopplerEchoes(const Spectra& s, ShotResiduals& result) co
           for (int j = -1; j <= 1; ++j) highest &= power(b, d) >= power(b + i, (d + j + loops) % loops);
         }
         if (!highest) continue;
-        // Later slots see a mover further on its way.
         Eigen::VectorXcf v = cell(b, d);
+        MovingCell moving;
+        moving.bin = b;
+        moving.turn_rad = 2 * M_PI * turns / (loops * radar_.slots());
+        moving.power = power(b, d) / static_cast<double>(s.channels);
+        moving.channels = v.cast<std::complex<double>>();
+        for (int k = 0; k < s.channels; ++k) {
+          moving.channels[k] *= std::sqrt(result.noise_variance[static_cast<std::size_t>(k)]);
+        }
+        cells.push_back(std::move(moving));
+        // Later slots see a mover further on its way.
         for (int k = 0; k < s.channels; ++k) {
           const int slot = k / radar_.receivers();
           v[k] *= Complex(std::polar(1.0, -2 * M_PI * turns * slot / (loops * radar_.slots())));
@@ -457,13 +469,20 @@ void ShotExaminer::readDopplerEchoes(const Spectra& s, ShotResiduals& result) co
         peaks.push_back(p);
       }
     }
+    // Samples that were lost in some channels alone give a strong mover sidelobes in those.
+    double strongest = 0;
+    for (const MovingCell& c : cells) strongest = std::max(strongest, c.power);
+    for (MovingCell& c : cells) {
+      if (c.power > kLeastOfStrongest * strongest) result.cells.push_back(std::move(c));
+    }
     std::sort(peaks.begin(), peaks.end(), [](const auto& p, const auto& q) { return p.echo.snr > q.echo.snr; });
     std::vector<Peak> bodies;
     for (const Peak& p : peaks) {
       bool part = false, ghost = false;
       for (Peak& body : bodies) {
-        // Arms and legs move with the body, within a metre of it and to the same side.
-        if (std::abs(p.echo.range_m - body.echo.range_m) < 1 && p.echo.radial_m_per_s * body.echo.radial_m_per_s > 0) {
+        // Arms and legs move with the body, near it and to the same side.
+        if (std::abs(p.echo.range_m - body.echo.range_m) < kLimb_m &&
+            p.echo.radial_m_per_s * body.echo.radial_m_per_s > 0) {
           body.weight += p.echo.snr;
           body.sum_range += p.echo.snr * p.echo.range_m;
           body.sum_azimuth += p.echo.snr * p.echo.azimuth_rad;

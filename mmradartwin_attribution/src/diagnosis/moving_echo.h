@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "frame_stack.h"
+#include "mmradartwin_attribution/frame_evidence.h"
 #include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin {
@@ -24,6 +25,7 @@ struct ShotResiduals {
   /// Nats by which cell [range][azimuth] varies more than noise does.
   Eigen::ArrayXXf evidence;
   std::vector<MovingEcho> echoes;
+  std::vector<MovingCell> cells;
   /// Turn per frame that the cells agree on beyond the turn taken out before, and its variance; infinite where no cell
   /// stands out of the noise.
   double turn_rad_per_frame = 0, turn_variance = 0;

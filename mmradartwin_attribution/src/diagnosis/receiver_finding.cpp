@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <numeric>
+#include <sstream>
 
 #include "echo_source.h"
 #include "mmradartwin_attribution/diagnosis.h"
@@ -28,6 +30,28 @@ double strongestMeasured(const ChannelData& data) {
 
 }  // namespace
 
+ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const ReadingProgress& on_progress) {
+  ReceivedSession session;
+  FrameExaminer examiner(recording.radar);
+  session.data = readChannels(recording, examiner, on_progress);
+  session.frames = examiner.findings();
+  session.unexplained = examiner.unexplained();
+  if (by_echoes) session.deliveries = findDeliveryByEchoes(session.data);
+  if (session.deliveries.empty()) return session;
+  // Bytes are judged as they came, what moves where it is.
+  FrameExaminer repaired(recording.radar);
+  session.data = readChannels(recording, repaired, on_progress, [&](AdcCube& frame) {
+    for (const Delivery& d : session.deliveries) undoDelivery(d, recording.radar, frame);
+  });
+  const auto moves = [](const FrameFinding& f) { return f.cause == "moving_target"; };
+  std::vector<FrameFinding>& frames = session.frames;
+  frames.erase(std::remove_if(frames.begin(), frames.end(), moves), frames.end());
+  for (FrameFinding& f : repaired.findings()) {
+    if (moves(f)) frames.push_back(std::move(f));
+  }
+  return session;
+}
+
 Finding findingOf(const FrameFinding& frames) {
   Finding f;
   f.cause = frames.cause;
@@ -50,8 +74,8 @@ Finding findingOf(const FrameFinding& frames) {
   return f;
 }
 
-void addUnexplained(const FrameExaminer& frames, std::vector<Finding>& findings) {
-  for (const FrameFinding& f : frames.unexplained()) {
+void addUnexplained(const std::vector<FrameFinding>& frames, std::vector<Finding>& findings) {
+  for (const FrameFinding& f : frames) {
     if (findings.empty() || findings.back().cause != "unknown") {
       findings.push_back(findingOf(f));
     } else {
@@ -113,9 +137,60 @@ Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest) {
   f.parameters.push_back({"level_db", "dB", level_db, {{level_db - 1.96 * error_db, level_db + 1.96 * error_db}}});
   f.mechanism = m;
   f.candidates = {{f.cause, 1.0}};
+  std::ostringstream text;
+  text << std::setprecision(3) << "a tone of the radar's own, "
+       << (rest.poses.size() > 1 ? "the same at all poses" : "") << (rest.poses.size() > 1 ? ", " : "")
+       << "and no array response: the direction that fits best has " << 100 * tone.array_share << " % of its power";
+  f.description = text.str();
   f.evidence.log_likelihood_gain = tone.gain;
   f.evidence.false_alarm_rate = tone.false_alarm_rate;
   f.where.push_back({{{0.0, tone.range_m + 2 * rest.radar.range_bin_m()}}, {}, {}, {}, {}, {}});
+  return f;
+}
+
+Finding findingOf(const ChannelErrors& errors) {
+  Finding f;
+  const auto list = [](const char* name, const char* unit, const Eigen::VectorXd& values,
+                       const Eigen::VectorXd& error) {
+    FindingParameter p{name, unit, std::vector<double>(values.data(), values.data() + values.size()), {}};
+    for (Eigen::Index k = 0; k < values.size(); ++k) {
+      p.ci95.push_back({values[k] - 1.96 * error[k], values[k] + 1.96 * error[k]});
+    }
+    return p;
+  };
+  constexpr double kDegree = M_PI / 180;
+  const Eigen::VectorXd phase_deg = errors.phase_rad / kDegree, error_deg = errors.phase_error_rad / kDegree;
+  std::ostringstream text;
+  text << std::setprecision(2) << std::fixed << "read from " << errors.echoes << " echoes, each from one direction: ";
+  if (errors.tie == ChannelTie::kTransmitters) {
+    f.cause = "tx_imbalance";
+    const Eigen::Index last = phase_deg.size() - 1;
+    const auto number = [&](const char* name, const char* unit, double value, double error) {
+      f.parameters.push_back({name, unit, value, {{value - 1.96 * error, value + 1.96 * error}}});
+    };
+    number("phase_deg", "deg", phase_deg[last], error_deg[last]);
+    number("gain_db", "dB", errors.gain_db[last], errors.gain_error_db[last]);
+    text << "transmitters differ, receivers do not";
+  } else {
+    f.cause = "channel_phase_error";
+    f.parameters = {list("phase_deg", "deg", phase_deg, error_deg),
+                    list("gain_db", "dB", errors.gain_db, errors.gain_error_db)};
+    if (errors.tie == ChannelTie::kReceivers) {
+      text << "each receiver's error is the same under all transmitters, within " << errors.apart_rad / kDegree
+           << " deg where every channel is left free";
+    } else {
+      text << "receivers' errors differ between transmitters";
+    }
+    text << "; a slope over the array is taken as a turn of the radar, which no echo tells from it";
+  }
+  f.description = text.str();
+  NamedParameters m = defaultMechanism(f.cause);
+  for (const FindingParameter& p : f.parameters) m.values.set(p.name, p.value);
+  f.mechanism = m;
+  f.candidates = {{f.cause, 1.0}};
+  f.evidence.log_likelihood_gain = errors.gain;
+  f.evidence.false_alarm_rate = std::min(1.0, std::exp(-errors.held_out_gain));
+  f.where.emplace_back();
   return f;
 }
 
@@ -144,22 +219,29 @@ std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedPar
 }
 
 Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& options) {
-  FrameExaminer examiner(recording.radar);
-  const ChannelData data = readChannels(recording, examiner, [&](std::size_t done, std::size_t all) {
+  ReceivedSession session = receiveSession(recording, true, [&](std::size_t done, std::size_t all) {
     if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
     if (options.on_progress) {
       options.on_progress({"reading captures", static_cast<double>(done) / static_cast<double>(all)});
     }
   });
+  ChannelData& data = session.data;
   Diagnosis result;
-  for (const FrameFinding& f : examiner.findings()) {
-    result.findings.findings.push_back(findingOf(f));
-    result.extended.mechanisms.push_back(*result.findings.findings.back().mechanism);
+  const auto add = [&](Finding finding) {
+    result.extended.mechanisms.push_back(*finding.mechanism);
+    result.findings.findings.push_back(std::move(finding));
+  };
+  for (const FrameFinding& f : session.frames) add(findingOf(f));
+  for (const Delivery& d : session.deliveries) add(findingOf(d, data.radar));
+  if (const BodyFixedTone tone = findBodyFixedTone(data); isPlain(tone)) {
+    subtractTone(tone, data);
+    add(findingOf(tone, data));
   }
-  addUnexplained(examiner, result.findings.findings);
+  if (const std::optional<ChannelErrors> errors = findChannelErrors(data)) add(findingOf(*errors));
+  addUnexplained(session.unexplained, result.findings.findings);
   result.findings.poses = static_cast<int>(data.poses.size());
   result.findings.locations = static_cast<int>(data.locations.size());
-  result.findings.held_out = "nothing: without a scene only frames are judged";
+  result.findings.held_out = "nothing: without a scene only frames and channels are judged";
   result.has_twin = false;
   result.extended.radar = recording.radar;
   result.problems = data.problems;

@@ -4,6 +4,7 @@
 
 #include "body_fixed_tone.h"
 #include "channel_data.h"
+#include "channel_errors.h"
 #include "delivery.h"
 #include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_attribution/frame_evidence.h"
@@ -12,12 +13,23 @@ namespace mmradartwin {
 
 // What is wrong with frames and the receiver, as findings; their gain on held-out places is left open.
 
+/// A recording that was read, and how it was delivered as far as leakage and echoes tell that without a scene: then
+/// data are as they ought to have been.
+struct ReceivedSession {
+  ChannelData data;
+  std::vector<FrameFinding> frames, unexplained;
+  std::vector<Delivery> deliveries;
+};
+/// `by_echoes`: looks how it was delivered. Throws InputError where no pose is left.
+ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const ReadingProgress& on_progress);
+
 Finding findingOf(const FrameFinding& frames);
 /// What frames show and no cause explains, as the `unknown` that stands last.
-void addUnexplained(const FrameExaminer& frames, std::vector<Finding>& findings);
+void addUnexplained(const std::vector<FrameFinding>& frames, std::vector<Finding>& findings);
 Finding findingOf(const Delivery& delivery, const RadarConfig& radar);
 /// rest: the data without the tone, whose strongest echo levels refer to.
 Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest);
+Finding findingOf(const ChannelErrors& errors);
 /// Where the noise departs from the level that the twin's noise_floor states.
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated);
 

@@ -174,11 +174,36 @@ def apart(a, b):
     return 0.0 if a is None or b is None else abs(a[0] - b[0]) + abs(a[1] - b[1]) / 20
 
 
+def intervals(finding):
+    """[(value, low, high)] of all numbers of a finding that have an interval."""
+    told = []
+    for parameter in finding["parameters"].values():
+        value, bounds = parameter["value"], parameter.get("ci95")
+        if bounds is not None and not isinstance(value, str):
+            told += [(v, *b) for v, b in (zip(value, bounds) if isinstance(value, list) else [(value, bounds)])]
+    return told
+
+
+def differ(a, b):
+    """Whether a number of one finding lies outside the other's interval, and the other way round."""
+    return any(not (other_low <= value <= other_high or low <= other <= high)
+               for (value, low, high), (other, other_low, other_high) in zip(intervals(a), intervals(b)))
+
+
 def beyond(findings, untouched):
-    """Findings that the untouched recording does not give too; each of those explains one of the same cause."""
+    """Findings that the untouched recording does not give too; each of those explains one of the same cause.
+
+    What has a size and no place (leakage, errors of channels) adds up with what the recording has of it: where it is
+    another size, it is a finding, and its intervals, which are those of the sum, are left out.
+    """
     left = list(findings)
     for known in untouched:
         same = [f for f in left if f["cause"] == known["cause"]]
-        if same:
-            left.remove(min(same, key=lambda f: apart(f, known)))
+        if not same:
+            continue
+        nearest = min(same, key=lambda f: apart(f, known))
+        left.remove(nearest)
+        if middle(nearest) is None and differ(nearest, known):
+            parameters = {name: {k: v for k, v in p.items() if k != "ci95"} for name, p in nearest["parameters"].items()}
+            left.append({**nearest, "parameters": parameters})
     return left

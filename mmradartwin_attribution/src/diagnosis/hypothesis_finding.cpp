@@ -1,0 +1,81 @@
+#include "hypothesis_finding.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <sstream>
+
+#include "empirical_hypothesis.h"
+#include "fitted_parameters.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kAlike = 5;  ///< nats within which two names are not told apart
+
+std::string number(double value, int digits) {
+  std::ostringstream out;
+  out << std::setprecision(digits) << value;
+  return out.str();
+}
+
+}  // namespace
+
+Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
+                  const Scene& scene, const ChannelData& data) {
+  Finding f;
+  const NamedParameters m = best.hypothesis.at(best.scaled);
+  const bool named = isCatalogued(m.mechanism);
+  f.cause = named ? m.mechanism : "unknown";
+  f.mechanism = m;
+  f.parameters = fittedParameters(best.hypothesis, best.scaled, best.standard_error, f.cause, data.locations.size());
+  // Names that explain nearly as much, by their share of probability.
+  double sum = 0;
+  std::vector<std::pair<std::string, double>> alike;
+  for (const HypothesisFit& other : fits) {
+    const double behind = (best.ranking() - other.ranking()) / best.inflation;
+    if (behind > kAlike || behind < 0 || !(other.gain > 0)) continue;  // those ahead were refused
+    const std::string& name = other.hypothesis.mechanism.mechanism;
+    const double weight = std::exp(-behind);
+    const std::string cause = isCatalogued(name) ? name : "unknown";
+    const auto at = std::find_if(alike.begin(), alike.end(), [&](const auto& a) { return a.first == cause; });
+    if (at == alike.end()) {
+      alike.emplace_back(cause, weight);
+      sum += weight;
+    }
+  }
+  for (const auto& [cause, weight] : alike) f.candidates.push_back({cause, weight / sum});
+  if (f.candidates.size() > 1) f.experiment = experimentFor(f.candidates);
+  f.evidence.log_likelihood_gain = best.gain;
+  f.evidence.false_alarm_rate = best.false_alarm_rate;
+  for (const HypothesisFit& other : fits) {
+    if (other.hypothesis.mechanism.mechanism == m.mechanism) continue;
+    const std::string& name = other.hypothesis.mechanism.mechanism;
+    f.evidence.runner_up = isCatalogued(name) ? name : "unknown";
+    f.evidence.margin = best.gain - std::max(0.0, other.gain);
+    break;
+  }
+  FindingPlace place;
+  if (scene.actorIndex(best.hypothesis.subject) >= 0) place.actors = {best.hypothesis.subject};
+  const bool of_place = m.mechanism == "empirical_law" && m.values.text("variable") == "passing_m";
+  if (f.cause == "actor_unmodelled" || of_place) {
+    place.x_m = m.values.number("x_m");
+    place.y_m = m.values.number("y_m");
+  }
+  std::vector<std::pair<double, std::string>> poses;
+  for (std::size_t i = 0; i < before.by_pose.size(); ++i) {
+    poses.emplace_back(best.state.by_pose[i] - before.by_pose[i], data.poses[i].pose.name);
+  }
+  std::stable_sort(poses.begin(), poses.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  for (std::size_t i = 0; i < std::min<std::size_t>(10, poses.size()) && poses[i].first > 1; ++i) {
+    place.poses.push_back(poses[i].second);
+  }
+  f.where.push_back(std::move(place));
+  if (!named) {
+    f.description = "no cause of the catalogue explains this; what it looks like: " + describeLaw(best.hypothesis, m) +
+                    "; " + number(best.gain, 4) + " nats over " + std::to_string(data.poses.size()) + " poses";
+  }
+  return f;
+}
+
+}  // namespace mmradartwin
