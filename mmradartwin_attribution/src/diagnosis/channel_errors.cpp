@@ -210,6 +210,10 @@ std::vector<std::vector<int>> orders(const RadarConfig& radar) {
 
 }  // namespace
 
+double student95(double freedom) {
+  return boost::math::quantile(boost::math::students_t_distribution<double>(freedom), 0.975);
+}
+
 std::optional<ChannelOrder> findChannelOrder(const ChannelData& data) {
   EchoFit fit(data);
   if (!fit.enough() || data.radar.channels() < 4) return std::nullopt;
@@ -264,6 +268,7 @@ std::optional<ChannelErrors> findChannelErrors(const ChannelData& data) {
   errors.gain = best.gain;
   errors.held_out_gain = best.held_out;
   errors.echoes = fit.echoes();
+  errors.groups = static_cast<int>(fit.groups().size());
   errors.phase_rad = fit.phases(best.factors, best.tie);
   errors.gain_db = 20 * best.factors.cwiseAbs().array().log10();
   // Jackknife over groups.
@@ -278,9 +283,8 @@ std::optional<ChannelErrors> findChannelErrors(const ChannelData& data) {
     const Eigen::ArrayXd centred = place.array() - place.mean();
     const double freedom = std::max(1.0, static_cast<double>(place.size()) - 2);
     const double rms = std::sqrt((errors.phase_rad.array() - errors.phase_rad.mean()).square().sum() / freedom);
-    // Of a size known from so few, a slope's error is Student's: as wide as a normal one is at 95 %.
-    const double wide =
-        boost::math::quantile(boost::math::students_t_distribution<double>(freedom), 0.975) / 1.96 * rms;
+    // Of a size known from so few, a slope's error is Student's: as wide as that of the groups' at 95 %.
+    const double wide = rms * student95(freedom) / student95(groups - 1);
     phase2 += ((place.array() - place[0]) * wide).square() / centred.square().sum() * groups / (groups - 1);
   }
   errors.phase_error_rad = (phase2 * (groups - 1) / groups).sqrt();

@@ -21,10 +21,10 @@ struct ChannelErrors {
   /// Standard errors; a phase's has the slope that errors of this size would have by chance.
   Eigen::VectorXd phase_error_rad, gain_error_db;
   ChannelTie tie = ChannelTie::kFree;
-  double apart_rad = 0;      ///< largest difference of a receiver's phase between transmitters where nothing is tied
-  double gain = 0;           ///< nats over no errors
-  double held_out_gain = 0;  ///< of echoes at ranges (or places) that the fit did not see
-  int echoes = 0;
+  double apart_rad = 0;        ///< largest difference of a receiver's phase between transmitters where nothing is tied
+  double gain = 0;             ///< nats over no errors
+  double held_out_gain = 0;    ///< of echoes at ranges (or places) that the fit did not see
+  int echoes = 0, groups = 0;  ///< and groups of them, which the standard errors are from
 };
 
 /// Order of channels that fits the echoes best; order[i] is the true channel that stands in place i.
@@ -33,6 +33,9 @@ struct ChannelOrder {
   double gain = 0;    ///< nats over the order as it is
   double margin = 0;  ///< over the next best
 };
+
+/// 97.5 % quantile of Student's t.
+double student95(double freedom);
 
 /// Nothing where too few echoes stand out of the noise or the order as it is fits as well. Of two orders that mirror
 /// each other only what moves tells which: transmitters take turns, and a mirrored array would see it move backwards.

@@ -150,11 +150,12 @@ Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest) {
 
 Finding findingOf(const ChannelErrors& errors) {
   Finding f;
-  const auto list = [](const char* name, const char* unit, const Eigen::VectorXd& values,
-                       const Eigen::VectorXd& error) {
+  const double wide = student95(errors.groups - 1);
+  const auto list = [wide](const char* name, const char* unit, const Eigen::VectorXd& values,
+                           const Eigen::VectorXd& error) {
     FindingParameter p{name, unit, std::vector<double>(values.data(), values.data() + values.size()), {}};
     for (Eigen::Index k = 0; k < values.size(); ++k) {
-      p.ci95.push_back({values[k] - 1.96 * error[k], values[k] + 1.96 * error[k]});
+      p.ci95.push_back({values[k] - wide * error[k], values[k] + wide * error[k]});
     }
     return p;
   };
@@ -166,7 +167,7 @@ Finding findingOf(const ChannelErrors& errors) {
     f.cause = "tx_imbalance";
     const Eigen::Index last = phase_deg.size() - 1;
     const auto number = [&](const char* name, const char* unit, double value, double error) {
-      f.parameters.push_back({name, unit, value, {{value - 1.96 * error, value + 1.96 * error}}});
+      f.parameters.push_back({name, unit, value, {{value - wide * error, value + wide * error}}});
     };
     number("phase_deg", "deg", phase_deg[last], error_deg[last]);
     number("gain_db", "dB", errors.gain_db[last], errors.gain_error_db[last]);
