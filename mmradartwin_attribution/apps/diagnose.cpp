@@ -17,7 +17,7 @@ using namespace mmradartwin;
 struct Arguments {
   RecordingArguments input;
   std::string output, config;
-  int jobs = 0;
+  int jobs = 0, findings = DiagnosisOptions().most_findings;
 };
 
 /// One line on stderr that changes, gone when this goes.
@@ -46,6 +46,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   const DiagnosisReport report(arguments.output);
   DiagnosisOptions options;
   options.jobs = arguments.jobs;
+  options.most_findings = arguments.findings;
   if (!arguments.config.empty()) options.config = loadAttributionConfig(arguments.config);
   Diagnosis diagnosis;
   {
@@ -81,6 +82,9 @@ int main(int argc, char** argv) {
   app.add_option("--output", arguments.output, "folder for findings.json, report and extended twin")->required();
   app.add_option("--config", arguments.config, "attribution.yaml of the paper's metrics (default: as shipped)");
   app.add_option("--jobs", arguments.jobs, "threads (default: one per core)")->check(CLI::Range(1, 1024));
+  app.add_option("--findings", arguments.findings,
+                 "most causes to look for among echoes (default 4; 0: how much of the measured power the twin explains)")
+      ->check(CLI::Range(0, 16));
   const std::vector<std::string> command(argv, argv + argc);
   return runProgram(app, argc, argv, [&] { return run(arguments, command); });
 }

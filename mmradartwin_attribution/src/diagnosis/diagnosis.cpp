@@ -35,7 +35,6 @@ namespace {
 
 constexpr int kFolds = 5;
 constexpr double kFalseAlarm = 0.01;  ///< family-wise, per round
-constexpr int kMostFindings = 4;
 constexpr std::size_t kFewestForLaws = 3;  ///< poses: of fewer only frames and channels are judged
 constexpr std::size_t kScreenPoses = 44;   ///< a part of the session ranks hypotheses well enough
 constexpr std::size_t kFewestPoses = 12;
@@ -635,7 +634,7 @@ Diagnosis Session::run() {
     findings.findings.push_back(std::move(f));
   } else {
     before_rounds_ = mechanisms_;
-    for (int round = 0; round < (few_ ? 0 : kMostFindings); ++round) {
+    for (int round = 0; round < (few_ ? 0 : options_.most_findings); ++round) {
       if (!judgeChannels(round)) break;
     }
     addUnexplained(received_.unexplained, findings.findings);

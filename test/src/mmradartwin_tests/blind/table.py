@@ -52,6 +52,8 @@ class Scores:
         sizes = self.each("single", "group_size")
         covered = [c[1] for c in self.coverage()]
         gains = self.each("clean", "gain")
+        ratios = [s["gain"] / record["true_gain"] for record, _, s in self.rows["single"]
+                  if (record.get("true_gain") or 0) >= LEAST_TRUE_GAIN and s["gain"] is not None]
         rows = [
             ("false alarms on clean sessions", "≤ 1 %", *share(self.each("clean", "alarm", answered=True))),
             ("single effects: right name first", "≥ 92 %", *share(self.each("single", "first"))),
@@ -70,6 +72,8 @@ class Scores:
             ("outside the catalogue: place within 0.3 m", "all", *share(self.each("outside", "place"))),
             ("decoys: material blamed", "≤ 2 %", *share(self.each("decoy", "material_blamed", answered=True))),
             ("95 % intervals that hold the truth, right names only", "93 to 97 %", *share(covered)),
+            ("held-out gain over that of the true model, median and mean, where that is 0.01 or more", "≥ 0.90",
+             f"{statistics.median(ratios):.2f}, {statistics.mean(ratios):.2f}" if ratios else "not run", len(ratios)),
             ("clean sessions: held-out gain of what was claimed negative", "never", *share([g < 0 for g in gains])),
             ("put into a real recording: named", "", *share([n[0] for n in self.each("recording", "named")])),
             ("put into a real recording: something else claimed", "", *share(self.each("recording", "wrong"))),
@@ -119,6 +123,7 @@ def markdown(head, rows):
     return "\n".join(lines + ["| " + " | ".join(str(c) for c in row) + " |" for row in rows])
 
 
+LEAST_TRUE_GAIN = 0.01   # of explained power: less is lost in the figures' rounding
 COLORS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#bcbd22", "#17becf")
 SIDE = 400    # of the plot's square, pixels
 

@@ -1,16 +1,23 @@
 """Runs one blind trial: hide, seal, diagnose, open, keep what came out. And keeps results, so that none runs twice."""
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
 import tempfile
 import time
 
+import yaml
+
 from mmradartwin_tests import effects
 from mmradartwin_tests.blind import draws, recordings
 from mmradartwin_tests.session import Measurement, Settings
 
+# What frames and converters do no map expects; of leakage and gains over time the truth tells a part.
+UNTOLD = ("tx_rx_leakage", "dc_offset", "gain_drift", "adc_saturation", "noise_floor", "moving_target", "interference",
+          "phase_drift", "packet_loss", "packet_misalignment", "iq_conjugation", "channel_conjugation",
+          "channel_permutation")
 KEPT = ("cause", "parameters", "candidates", "evidence", "mechanism", "where", "description")
 
 
@@ -96,6 +103,30 @@ def answer(program, session, folder, limit_s, jobs):
     return record
 
 
+def explained_power(program, session, twin, folder, limit_s, jobs):
+    """Share of the measured power that a twin explains, as diagnose says it; None where it has no answer."""
+    output, log = os.path.join(folder, "explained"), os.path.join(folder, "explained.log")
+    shutil.rmtree(output, ignore_errors=True)
+    command = [program, session, "--twin", twin, "--findings", "0", "--output", output, "--jobs", str(jobs)]
+    status, *_ = run_measured(command, limit_s, log)
+    with open(log, encoding="utf-8", errors="replace") as text:
+        said = re.search(r"the twin as given explains ([0-9.]+)", text.read())
+    return float(said.group(1)) if status == 0 and said else None
+
+
+def true_gain(program, session, truth, folder, limit_s, jobs):
+    """What the effect that is hidden adds to the explained power of the session's twin, None where the twin cannot be
+    told all of it: causes are mechanisms of the same name and parameters."""
+    power = []
+    for mechanisms in ({}, {truth["cause"]: truth["parameters"]}):
+        twin = os.path.join(session, "told.yaml")
+        with open(twin, "w", encoding="ascii") as out:
+            yaml.safe_dump({"mechanisms": {"specular": {"max_bounces": 3}, "corner": {}, "diffuse": {}, **mechanisms}}, out)
+        power.append(explained_power(program, session, twin, folder, limit_s, jobs))
+        os.remove(twin)
+    return None if None in power else round(power[1] - power[0], 6)
+
+
 def hide(trial, session):
     """Writes the session of a trial; returns its truths."""
     if trial.row == "recording":
@@ -117,6 +148,8 @@ def run_trial(trial, ledger, program, limit_s=600.0, jobs=1):
         ledger.seal(trial.key(), {"key": trial.key(), "effects": truths})
         made_s = time.monotonic() - start
         record = answer(program, session, folder, limit_s, jobs)
+        if trial.row == "single" and record["findings"] and truths[0]["cause"] not in UNTOLD:
+            record["true_gain"] = true_gain(program, session, truths[0], folder, limit_s, jobs)
         if trial.row == "recording":
             plain = os.path.join(folder, "plain")
             recordings.write_untouched(plain)
