@@ -228,8 +228,10 @@ TEST_F(FrameEvidenceTest, MissingPackets) {
 
 TEST_F(FrameEvidenceTest, Bursts) {
   std::vector<int> hit(1, 0);
-  const auto found = examine(12000, burst(hit)).findings();
+  const FrameExaminer examiner = examine(12000, burst(hit));
+  const auto found = examiner.findings();
   ASSERT_EQ(causes(found), (std::vector<std::string>{"interference"}));
+  EXPECT_TRUE(examiner.unexplained().empty()) << examiner.unexplained()[0].description;
   EXPECT_NEAR(value(found[0], "frame_fraction") * kFrames * 6, hit[0], 1.5);
 }
 

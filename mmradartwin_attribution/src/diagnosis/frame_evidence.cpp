@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "frame_stack.h"
+#include "mmradartwin_attribution/ledger.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "moving_echo.h"
 #include "payload_defects.h"
@@ -304,28 +305,29 @@ FrameFinding FrameExaminer::State::frameGain() const {
   f.cause = "unknown";
   std::size_t frames = 0;
   for (const PoseJudgement& p : judged) frames = std::max(frames, p.frame_gain_db.size());
-  // The mean over poses of each frame's level against the pose's other frames; it changes where it differs between
-  // frames by far more than its error over poses.
+  // The median over poses of each frame's level against the pose's other frames, which bursts at some poses do not
+  // move; it changes where it differs between frames by far more than its error over poses.
   double chi2 = 0, lowest = 0, highest = 0;
   std::size_t lowest_at = 0, highest_at = 0, counted = 0;
   for (std::size_t i = 0; i < frames; ++i) {
-    double sum = 0, squares = 0, n = 0;
+    std::vector<double> levels, apart;
     for (const PoseJudgement& p : judged) {
-      if (i >= p.frame_gain_db.size() || p.frame_gain_db.size() < 3) continue;
-      sum += p.frame_gain_db[i];
-      squares += p.frame_gain_db[i] * p.frame_gain_db[i];
-      ++n;
+      if (i < p.frame_gain_db.size() && p.frame_gain_db.size() >= 3) levels.push_back(p.frame_gain_db[i]);
     }
-    if (n < 3) continue;
-    const double mean = sum / n, variance = std::max((squares - n * mean * mean) / (n - 1), 1e-8) / n;
-    chi2 += mean * mean / variance;
+    if (levels.size() < 3) continue;
+    const double middle = quantile(levels, 0.5);
+    for (double level : levels) apart.push_back(std::abs(level - middle));
+    // Of normal errors: the deviation is 1.48 times the median of sizes, the median's own 1.25 times the mean's.
+    const double error =
+        1.25 * std::max(1.48 * quantile(apart, 0.5), 1e-4) / std::sqrt(static_cast<double>(levels.size()));
+    chi2 += std::pow(middle / error, 2);
     ++counted;
-    if (mean < lowest) {
-      lowest = mean;
+    if (middle < lowest) {
+      lowest = middle;
       lowest_at = i;
     }
-    if (mean > highest) {
-      highest = mean;
+    if (middle > highest) {
+      highest = middle;
       highest_at = i;
     }
   }

@@ -4,6 +4,7 @@
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <unsupported/Eigen/FFT>
 
 namespace mmradartwin {
@@ -119,8 +120,7 @@ ShotExaminer::Spectra ShotExaminer::spectra(const FrameStack& stack, const std::
 double ShotExaminer::commonTurn(const FrameStack& stack) const {
   if (stack.frames < 3) return 0;
   const auto bins = static_cast<std::size_t>(stack.samples);
-  std::vector<std::complex<double>> turned(bins, 0);
-  std::vector<double> power(bins, 0);
+  std::vector<std::vector<std::complex<double>>> steps(bins);  ///< of size 1
   std::vector<Complex> in(bins), before(bins), now(bins);
   // One receiver of each slot tells enough about what is strong.
   for (int k = 0; k < stack.channels(); k += stack.receivers) {
@@ -135,23 +135,26 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
       if (last == f - 1) {
         for (std::size_t b = 0; b < bins; ++b) {
           const std::complex<double> z(now[b] * std::conj(before[b]));
-          turned[b] += z;
-          power[b] += std::abs(z);
+          if (std::abs(z) > 0) steps[b].push_back(z / std::abs(z));
         }
       }
       last = f;
     }
   }
-  std::vector<double> angles;
-  std::complex<double> center = 0;
-  for (std::size_t b = 0; b < bins; ++b) {
-    if (power[b] > 0 && std::abs(turned[b]) > 0.9 * power[b]) center += turned[b] / power[b];
+  // The median of angles about a middle: what bursts do to two steps each counts for no more than that.
+  const auto middle = [](const std::vector<std::complex<double>>& turns) {
+    const std::complex<double> sum = std::accumulate(turns.begin(), turns.end(), std::complex<double>(0));
+    std::vector<double> angles;
+    for (const auto& z : turns) angles.push_back(std::arg(z * std::conj(sum)));
+    return std::arg(sum) + medianOf(angles);
+  };
+  std::vector<std::complex<double>> turns;
+  for (const auto& of_bin : steps) {
+    // Half of the steps may be turned anyhow; noise's add up to a sixth of 40.
+    const std::complex<double> sum = std::accumulate(of_bin.begin(), of_bin.end(), std::complex<double>(0));
+    if (std::abs(sum) > 0.5 * static_cast<double>(of_bin.size())) turns.push_back(std::polar(1.0, middle(of_bin)));
   }
-  if (center == 0.0) return 0;
-  for (std::size_t b = 0; b < bins; ++b) {
-    if (power[b] > 0 && std::abs(turned[b]) > 0.9 * power[b]) angles.push_back(std::arg(turned[b] * std::conj(center)));
-  }
-  return std::arg(center) + medianOf(angles);
+  return turns.empty() ? 0 : middle(turns);
 }
 
 void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotResiduals& result) const {
