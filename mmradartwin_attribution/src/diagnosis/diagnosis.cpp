@@ -349,10 +349,11 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     // A promise is a quadratic's and often far too small: names get several chances, laws without a name three.
     const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
     std::size_t& fitted = law ? laws_fitted : names_fitted;
-    const double worth = isObject(s.hypothesis)      ? kWorthAnObject
-                         : law                       ? kWorthALaw
-                         : s.hypothesis.isGeometry() ? kWorthAFitOfGeometry
-                                                     : kWorthAFit;
+    const bool moved = s.hypothesis.mechanism.mechanism == "actor_moved";
+    const double worth = isObject(s.hypothesis)               ? kWorthAnObject
+                         : law                                ? kWorthALaw
+                         : s.hypothesis.isGeometry() || moved ? kWorthAFitOfGeometry
+                                                              : kWorthAFit;
     if (s.promised > worth && fitted < (law ? kMostLaws : kMostNames)) {
       ++fitted;
       report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
