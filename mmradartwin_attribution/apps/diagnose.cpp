@@ -82,8 +82,9 @@ int main(int argc, char** argv) {
   app.add_option("--output", arguments.output, "folder for findings.json, report and extended twin")->required();
   app.add_option("--config", arguments.config, "attribution.yaml of the paper's metrics (default: as shipped)");
   app.add_option("--jobs", arguments.jobs, "threads (default: one per core)")->check(CLI::Range(1, 1024));
-  app.add_option("--findings", arguments.findings,
-                 "most causes to look for among echoes (default 4; 0: how much of the measured power the twin explains)")
+  app.add_option(
+         "--findings", arguments.findings,
+         "most causes to look for among echoes (default 4; 0: how much of the measured power the twin explains)")
       ->check(CLI::Range(0, 16));
   const std::vector<std::string> command(argv, argv + argc);
   return runProgram(app, argc, argv, [&] { return run(arguments, command); });

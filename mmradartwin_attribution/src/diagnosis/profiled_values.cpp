@@ -191,19 +191,16 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
     const auto [low, high] = limits(j);
     top[k] = std::clamp(scaled[k] + std::clamp(to_top[j], -steps[k].width, steps[k].width), low, high);
   }
-  Eigen::VectorXd geometric = Eigen::VectorXd::Zero(n);
-  if (rough) {
-    std::vector<int> everyone(data.poses.size());
-    std::iota(everyone.begin(), everyone.end(), 0);
-    std::vector<std::vector<PathShift>> by_coordinate;
-    for (std::size_t k = 0; k < coordinates.size(); ++k) {
-      std::vector<double> at = scaled;
-      at[k] += kSmallChange;
-      by_coordinate.push_back(source.pathShifts(mechanismsAt(at), mechanisms, everyone));
-    }
-    geometric = geometricVariance(by_coordinate, static_cast<int>(nuisance.actor_gain.size()),
-                                  static_cast<int>(everyone.size()), accuracy, spread);
+  std::vector<int> everyone(data.poses.size());
+  std::iota(everyone.begin(), everyone.end(), 0);
+  std::vector<std::vector<PathShift>> by_coordinate;
+  for (std::size_t k = 0; k < coordinates.size(); ++k) {
+    std::vector<double> at = scaled;
+    at[k] += kSmallChange;
+    by_coordinate.push_back(source.pathShifts(mechanismsAt(at), mechanisms, everyone));
   }
+  const Eigen::VectorXd geometric = geometricVariance(by_coordinate, static_cast<int>(nuisance.actor_gain.size()),
+                                                      static_cast<int>(everyone.size()), accuracy, spread);
   ProfiledValues result = fit;
   if (look(top).log_likelihood > here.log_likelihood) result.scaled = top;
   for (Eigen::Index j = 0; j < n; ++j) {
