@@ -236,8 +236,10 @@ void Twin::Impl::refuseUnusablePose(const PoseContext& c) const {
   }
 }
 
-std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) const {
-  const PoseContext c = impl_->context(T_map_radar, stamp_ns);
+std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns,
+                                    const CloudCells* cloud) const {
+  PoseContext c = impl_->context(T_map_radar, stamp_ns);
+  c.cloud = cloud;
   impl_->refuseUnusablePose(c);
   std::vector<PathRecord> records;
   for (const auto& m : impl_->mechanisms) {

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <map>
 #include <set>
+#include <tuple>
 
 #include "../src/image_paths.h"
 #include "closed_form.h"
@@ -334,6 +336,29 @@ TEST_F(DiffuseTest, ReturnsTheIntegralOfItsLaw) {
   expectForm("4.8 Lambert wall of 6 by 2 m at 3 m, its integral", "dB", 10 * std::log10(expected),
              10 * std::log10(power), 0.03);
   EXPECT_EQ(s.records.size(), 120u * 40u);
+}
+
+TEST_F(DiffuseTest, SumsThePowerOfCells) {
+  addWall("wall", "RoughMetal", {3.1, -3}, {3.1, 3}, -1, 1);
+  Twin twin = makeTwin(writeScene(), "  diffuse: {spacing_m: 0.05}\n", radarAt77GHz());
+  const Eigen::Isometry3d T = radarPose(0, 0, 0);
+  const auto left = [](const V& p) { return p.y() > 0.11; };
+  const CloudCells cells{V(0.25, 0.25, 0.5), left};
+  using Cell = std::tuple<int, int, bool>;  // the wall is one cell deep
+  const auto powers = [&](const std::vector<PathRecord>& records) {
+    std::map<Cell, double> sum;
+    for (const PathRecord& r : records) {
+      const V& p = r.vertices[0];
+      sum[{static_cast<int>(std::floor(p.y() / 0.25)), static_cast<int>(std::floor(p.z() / 0.5)), left(p)}] +=
+          r.amplitude * r.amplitude;
+    }
+    return sum;
+  };
+  const std::vector<PathRecord> summed = twin.trace(T, 0, &cells);
+  const std::map<Cell, double> expected = powers(twin.trace(T)), found = powers(summed);
+  ASSERT_EQ(expected.size(), 25u * 4u) << "24 columns, one of them parted, by 4 rows";
+  EXPECT_EQ(summed.size(), expected.size()) << "one path a cell";
+  for (const auto& [cell, power] : expected) EXPECT_NEAR(found.at(cell), power, 1e-9 * power);
 }
 
 TEST_F(DiffuseTest, KeepsItsPhasesAtItsPoints) {

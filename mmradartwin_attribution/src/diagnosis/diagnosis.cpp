@@ -360,7 +360,9 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
                          : law                                ? kWorthALaw
                          : s.hypothesis.isGeometry() || moved ? kWorthAFitOfGeometry
                                                               : kWorthAFit;
-    if (s.promised > worth && fitted < (law ? kMostLaws : kMostNames)) {
+    // Where an actor went is known by the fit alone: what little the quadratic promises does not rank it.
+    const std::size_t most = law ? kMostLaws : moved ? kMostNames + kMostOutOfPlace : kMostNames;
+    if (s.promised > worth && fitted < most) {
       ++fitted;
       report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
       fits.push_back(fitter_->fit(state_, s.hypothesis, s.starts, 4));

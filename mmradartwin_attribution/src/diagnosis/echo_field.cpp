@@ -37,7 +37,9 @@ void accumulate(BinCovariance& field, int bin, double factor, const std::vector<
 }
 
 double pathCosine(const PathRecord& record) {
-  const auto cosine = [](const Eigen::Vector3d& d) { return std::hypot(d.x(), d.z()) * (d.x() < 0 ? -1 : 1); };
+  const auto cosine = [](const Eigen::Vector3d& d) {
+    return std::sqrt(d.x() * d.x() + d.z() * d.z()) * (d.x() < 0 ? -1 : 1);
+  };
   return 0.5 * (cosine(record.departure) + cosine(record.arrival));
 }
 

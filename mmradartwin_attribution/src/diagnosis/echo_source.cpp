@@ -21,8 +21,8 @@ constexpr double kMixedPower = 1e-6, kWeakPower = 1e-3;
 constexpr double kReceiverSine = 1.0 / 16;  // of sin(azimuth), where weak paths go through the receiver together
 // A path whose amplitude changes by less than this share within the pose's accuracy does not graze anything.
 constexpr double kSteady = 0.02;
-// From so many paths of one mechanism on they are a cloud of scatter points.
-constexpr std::size_t kCloud = 300;
+// Scatter points in cells that are small beside what the radar resolves; cells of the room, so that a turned or moved
+// radar sees the same ones.
 constexpr double kCloud_m = 0.12, kCloudHeight_m = 0.3;
 constexpr std::size_t kMostTraced = 64;  ///< entries of one mechanism and geometry that are kept
 
@@ -63,21 +63,6 @@ std::vector<PathRecord> merged(std::vector<PathRecord> records, Cell cell) {
     if (r.amplitude > 0) scaleRecord(std::sqrt(sum.second) / r.amplitude, r);
   }
   return result;
-}
-
-/// Scatter points of a surface, thousands a pose, in cells of the room that are small beside what the radar resolves;
-/// cells of the room, so that a turned or moved radar sees the same ones. What the scene as given hides stays apart: it
-/// may be weighed otherwise.
-std::vector<PathRecord> mergedCloud(std::vector<PathRecord> records,
-                                    const std::function<bool(const Eigen::Vector3d&)>& seen) {
-  using Key = std::tuple<int, int, int, int, bool>;
-  return merged<Key>(std::move(records), [&](const PathRecord& r) -> std::optional<Key> {
-    if (r.bounces != 1 || r.facets.empty()) return std::nullopt;
-    const Eigen::Vector3d& at = r.vertices.front();
-    const Eigen::Vector3d p = at.cwiseQuotient(Eigen::Vector3d(kCloud_m, kCloud_m, kCloudHeight_m));
-    return Key{r.facets.front(), static_cast<int>(std::floor(p.x())), static_cast<int>(std::floor(p.y())),
-               static_cast<int>(std::floor(p.z())), seen(at)};
-  });
 }
 
 double strongestPower(const std::vector<PathRecord>& records) {
@@ -204,7 +189,13 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
   const Twin twin = base_.changed(all);
   tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t j) {
     const std::size_t i = static_cast<std::size_t>(missing[j]);
-    std::vector<PathRecord> records = twin.trace(data_.poses[i].pose.T_map_radar);
+    const Eigen::Isometry3d& T = data_.poses[i].pose.T_map_radar;
+    CloudCells cells{{kCloud_m, kCloud_m, kCloudHeight_m}, {}};
+    // What the scene as given hides stays apart: it may be weighed otherwise.
+    if (!geometry.empty()) {
+      cells.side = [&](const Eigen::Vector3d& p) { return base_.rays().visible(T.translation(), p, 1e-3); };
+    }
+    std::vector<PathRecord> records = twin.trace(T, 0, &cells);
     // Paths of the geometry's own mechanisms (an unmodelled actor's echo) are theirs, not this one's.
     records.erase(std::remove_if(records.begin(), records.end(),
                                  [&](const PathRecord& r) {
@@ -213,12 +204,6 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
                                    });
                                  }),
                   records.end());
-    if (records.size() > kCloud) {
-      const Eigen::Vector3d radar = data_.poses[i].pose.T_map_radar.translation();
-      records = mergedCloud(std::move(records), [&](const Eigen::Vector3d& p) {
-        return geometry.empty() || base_.rays().visible(radar, p, 1e-3);
-      });
-    }
     entry.paths[i] = std::move(records);
     entry.known[i] = 1;
   });
@@ -281,13 +266,13 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
   std::vector<const Traced*> parts;
   for (const NamedParameters& m : mechanisms) parts.push_back(&traced(geometry, m, poses));
-  return collect(mechanisms, poses, actor_range_m, [&](std::size_t i) {
-    std::vector<PathRecord> all;
-    std::size_t count = 0;
+  return collect(mechanisms, poses, actor_range_m, [&](std::size_t i, std::vector<PathRecord>& all) {
+    std::size_t count = 0, to = 0;
     for (const Traced* part : parts) count += (*part)[i].size();
-    all.reserve(count);
-    for (const Traced* part : parts) all.insert(all.end(), (*part)[i].begin(), (*part)[i].end());
-    return all;
+    all.resize(count);
+    for (const Traced* part : parts) {
+      for (const PathRecord& r : (*part)[i]) all[to++] = r;
+    }
   });
 }
 
@@ -304,8 +289,8 @@ std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters
     parts.emplace_back(&traced(geometry, m, poses),
                        same == from.end() ? nullptr : &traced(geometry_from, *same, poses));
   }
-  return collect(mechanisms, poses, actor_range_m, [&](std::size_t i) {
-    std::vector<PathRecord> all;
+  return collect(mechanisms, poses, actor_range_m, [&](std::size_t i, std::vector<PathRecord>& all) {
+    all.clear();
     for (const auto& [there, here] : parts) {
       if (here == nullptr) {
         all.insert(all.end(), (*there)[i].begin(), (*there)[i].end());
@@ -313,7 +298,6 @@ std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters
         addShared((*there)[i], (*here)[i], all);
       }
     }
-    return all;
   });
 }
 
@@ -397,7 +381,7 @@ void EchoSource::addGroups(std::size_t pose, const std::vector<PathRecord>& reco
 
 std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& mechanisms,
                                             const std::vector<int>& poses, const std::vector<double>& actor_range_m,
-                                            const std::function<std::vector<PathRecord>(std::size_t pose)>& paths) {
+                                            const Paths& paths) {
   const Twin twin = base_.changed(mechanisms);
   const RadarConfig& radar = base_.radar();
   const SignalChain chain(radar);
@@ -416,29 +400,32 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
     const std::size_t i = static_cast<std::size_t>(poses[j]);
     const Pose& pose = data_.poses[i].pose;
-    std::vector<PathRecord> all = paths(i);
+    // Kept from pose to pose: most of the time went into the small vectors of records that were made and thrown away.
+    thread_local std::vector<PathRecord> all;
+    paths(i, all);
     EchoCollector collector(radar, accuracy_.path_angle_rad, data_.poses[i].beams, actor_range_m);
-    const auto addTones = [&](const Twin& receiver, std::vector<PathRecord> records, double strongest) {
+    const auto addTones = [&](const Twin& receiver, std::vector<PathRecord>& records, double strongest) {
       std::optional<Eigen::MatrixXcd> matrix;
       if (receiver.hasReceiveStage()) matrix = receiver.channelMatrix(pose.T_map_radar, pose.stamp_ns);
-      std::vector<PathRecord> seen = receiver.receivedPaths(pose.T_map_radar, std::move(records), pose.stamp_ns);
-      for (PathRecord& r : seen) {
+      records = receiver.receivedPaths(pose.T_map_radar, std::move(records), pose.stamp_ns);
+      for (PathRecord& r : records) {
         if (!matrix) break;
         Eigen::Map<Eigen::VectorXcd> c(r.c.data(), channels);
         c = *matrix * c.eval();
       }
-      addGroups(i, seen, strongest > 0 ? strongest : strongestPower(seen), collector);
+      addGroups(i, records, strongest > 0 ? strongest : strongestPower(records), collector);
     };
     if (!without_mixing) {
-      addTones(twin, std::move(all), 0);
+      addTones(twin, all, 0);
     } else {
       // The receiver mixes ranges: each strong path is sent through it alone, less what comes without any path.
       const double strongest = strongestPower(all);
       const auto weak = std::partition(all.begin(), all.end(), [&](const PathRecord& r) {
         return r.amplitude * r.amplitude > kMixedPower * strongest;
       });
-      addTones(*without_mixing, {std::make_move_iterator(weak), std::make_move_iterator(all.end())}, strongest);
+      std::vector<PathRecord> tones(std::make_move_iterator(weak), std::make_move_iterator(all.end()));
       all.erase(weak, all.end());
+      addTones(*without_mixing, tones, strongest);
       const auto spectra = [&](const ComplexGrid& x) -> Eigen::MatrixXcd { return chain.rangeSpectra(x) / window; };
       const ComplexGrid nothing = twin.weigh(pose.T_map_radar, std::vector<PathRecord>(), pose.stamp_ns).grid.x;
       for (PathRecord& r : mergedWeak(radar, std::move(all), strongest)) {

@@ -77,9 +77,9 @@ class EchoSource {
   /// Keeps memory bounded while one hypothesis' geometry is searched for.
   void forgetLongUnused();
   std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);
+  using Paths = std::function<void(std::size_t pose, std::vector<PathRecord>& to)>;
   std::vector<PoseEchoes> collect(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
-                                  const std::vector<double>& actor_range_m,
-                                  const std::function<std::vector<PathRecord>(std::size_t pose)>& paths);
+                                  const std::vector<double>& actor_range_m, const Paths& paths);
   /// Adds records as their tones, those that meet the same actors together; what is the same as before is not collected
   /// again.
   void addGroups(std::size_t pose, const std::vector<PathRecord>& records, double strongest, EchoCollector& to);

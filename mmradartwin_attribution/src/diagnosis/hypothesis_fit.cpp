@@ -223,7 +223,13 @@ double HypothesisFitter::offset(const ModelState& null, const Hypothesis& hypoth
 std::pair<double, double> HypothesisFitter::valueAt(const ModelState& null, const Hypothesis& hypothesis,
                                                     const std::vector<double>& scaled, const std::vector<int>& poses,
                                                     const Nuisance& nuisance, double offset_per_pose) {
-  const auto echoes = source_.echoes(with(null.mechanisms, hypothesis.at(scaled)), poses, nuisance.actor_range_m);
+  // About the same ranges as the null's, so that a hypothesis that does nothing gains nothing; but for an actor whose
+  // own error was changed.
+  std::vector<double> about_m = null.actor_range_m;
+  for (std::size_t a = 0; a < about_m.size(); ++a) {
+    if (nuisance.actor_range_m[a] != null.nuisance.actor_range_m[a]) about_m[a] = nuisance.actor_range_m[a];
+  }
+  const auto echoes = source_.echoes(with(null.mechanisms, hypothesis.at(scaled)), poses, about_m);
   const std::vector<double> there = model_.byPose(echoes, nuisance, poses);
   std::vector<double> by_location(model_.data().locations.size(), 0.0);
   double gain = 0;

@@ -37,20 +37,28 @@ void mirror(Matrix& m) {
   }
 }
 
-/// Turns a lower triangle by phases: a heading's error moves a group's mean direction, and phases alone keep the matrix
+/// Turns lower triangles by phases: a heading's error moves a group's mean direction, and phases alone keep the matrix
 /// definite. `power` and `cosine` are the group's fields of the bin.
-void turnBy(double yaw_rad, const std::vector<double>& element_phase, const std::complex<float>* power,
-            const std::complex<float>* cosine, Matrix& m) {
-  if (yaw_rad == 0 || power == nullptr || cosine == nullptr || !(power[0].real() > 0)) return;
-  const double turn = yaw_rad * cosine[0].real() / power[0].real();
-  Vector phase(m.rows());
-  for (Eigen::Index k = 0; k < m.rows(); ++k) {
-    phase[k] = std::polar(1.0, element_phase[static_cast<std::size_t>(k)] * turn);
+class Turn {
+ public:
+  Turn(double yaw_rad, const std::vector<double>& element_phase, const std::complex<float>* power,
+       const std::complex<float>* cosine) {
+    if (yaw_rad == 0 || power == nullptr || cosine == nullptr || !(power[0].real() > 0)) return;
+    const double turn = yaw_rad * cosine[0].real() / power[0].real();
+    phase_.resize(static_cast<Eigen::Index>(element_phase.size()));
+    for (Eigen::Index k = 0; k < phase_.size(); ++k) {
+      phase_[k] = std::polar(1.0, element_phase[static_cast<std::size_t>(k)] * turn);
+    }
   }
-  for (Eigen::Index k = 0; k < m.rows(); ++k) {
-    for (Eigen::Index l = 0; l < k; ++l) m(k, l) *= phase[k] * std::conj(phase[l]);
+  void operator()(Matrix& m) const {
+    for (Eigen::Index k = 0; k < phase_.size(); ++k) {
+      for (Eigen::Index l = 0; l < k; ++l) m(k, l) *= phase_[k] * std::conj(phase_[l]);
+    }
   }
-}
+
+ private:
+  Vector phase_;  // none where nothing turns
+};
 
 double groupGain(const EchoGroup& group, const Nuisance& nuisance) {
   double sum = 0;
@@ -201,7 +209,7 @@ SessionModel::Matrix SessionModel::sigma(const PoseEchoes& echoes, const Nuisanc
       if (const auto* p = f.shift.at(at, size_)) unpack(p, u * shift, own);
     }
     if (bend != nullptr) unpack(bend, u * (shift * shift + range_variance), own);
-    turnBy(n.yaw_rad[pose], element_phase_, power, f.cosine.at(at, size_), own);
+    Turn(n.yaw_rad[pose], element_phase_, power, f.cosine.at(at, size_))(own);
     s.triangularView<Eigen::Lower>() += own;
   }
   const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
@@ -275,7 +283,7 @@ SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes
             if (const auto* p = f->shift.at(at, size_)) unpack(p, u * shift, own);
             if (const auto* p = f->bend.at(at, size_)) unpack(p, u * shift * shift, own);
           }
-          turnBy(n.yaw_rad[poses[i]], element_phase_, power, f->cosine.at(at, size_), own);
+          Turn(n.yaw_rad[poses[i]], element_phase_, power, f->cosine.at(at, size_))(own);
           const int cell = f == &g.beams ? samples_ + at : at;
           std::complex<float>* to = result[i].data() + static_cast<std::size_t>(cell) * size_;
           for (int k = 0; k < channels_; ++k) {
@@ -332,8 +340,9 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
       if (power == nullptr && bend == nullptr) continue;
       const auto* cosine = fields.cosine.at(at, size_);
       const double f = gain * groupGain(g, n), moved = groupShift_m(g, n);
+      const Turn turn(n.yaw_rad[pose], element_phase_, power, cosine);
       const auto add = [&](int direction) {
-        turnBy(n.yaw_rad[pose], element_phase_, power, cosine, own);
+        turn(own);
         touch(direction).triangularView<Eigen::Lower>() += own;
       };
       for (int a : g.actors) {

@@ -68,6 +68,13 @@ struct SceneChange {
   bool touches(const Eigen::Vector3d& radar, const PathRecord& record) const;
 };
 
+/// Cells of the room within which scatter points of one facet are one path with their power, at the place and with the
+/// phase of the first of them: thousands of points become hundreds where the phases between them say nothing.
+struct CloudCells {
+  Eigen::Vector3d size_m;
+  std::function<bool(const Eigen::Vector3d& point)> side;  ///< points that it tells apart share no cell; may be null
+};
+
 /// Everything a mechanism may look at for one pose.
 struct PoseContext {
   const RadarConfig& radar;
@@ -88,6 +95,7 @@ struct PoseContext {
   int pose_index = 0, pose_count = 1;
   /// Where the pose's paths are known but for what a change touches; else null (Mechanism::tracesChanges).
   const SceneChange* change = nullptr;
+  const CloudCells* cloud = nullptr;  ///< null: every scatter point is a path
 };
 
 /// One chirp of one frame of a pose, for what differs from chirp to chirp (DESIGN section 3: chirps come as

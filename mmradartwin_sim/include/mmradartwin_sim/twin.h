@@ -100,7 +100,9 @@ class Twin {
   std::vector<std::string> notes() const;
   /// The two halves of simulate(): all that has to be traced, and what weights, leakage and receiver make of it.
   /// Records traced once may be weighed again by a twin that differs in mechanisms of weight and receiver alone.
-  std::vector<PathRecord> trace(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
+  /// cloud: cells within which scatter points are summed; not kept.
+  std::vector<PathRecord> trace(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0,
+                                const CloudCells* cloud = nullptr) const;
   Simulation weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                    std::int64_t stamp_ns = 0) const;
   /// The paths that weigh() makes a grid of: weighted, with leakage, and as the receiver's filters leave them.

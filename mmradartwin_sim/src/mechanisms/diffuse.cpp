@@ -1,6 +1,9 @@
 #include <algorithm>
+#include <boost/functional/hash.hpp>
 #include <cmath>
 #include <optional>
+#include <tuple>
+#include <unordered_map>
 
 #include "../polarisation.h"
 #include "../scatter_points.h"
@@ -119,7 +122,8 @@ class Diffuse : public Mechanism {
       level.push_back(amplitude);
       gap.push_back(std::max(1e-3, 2 * facet.flatness_m / std::max(0.1, cosine)));
     }
-    const std::vector<char> visible = context.rays.visible(elements.p, position, gap);
+    std::vector<char> visible = context.rays.visible(elements.p, position, gap);
+    if (context.cloud) sumCells(*context.cloud, lit, visible, level);
     records.reserve(records.size() + static_cast<std::size_t>(std::count(visible.begin(), visible.end(), 1)));
     for (std::size_t i = 0; i < lit.size(); ++i) {
       if (!visible[i]) continue;
@@ -138,6 +142,22 @@ class Diffuse : public Mechanism {
   }
 
  private:
+  /// Leaves the first point of each cell, with the level of all.
+  static void sumCells(const CloudCells& cells, const std::vector<const ScatterPoint*>& points,
+                       std::vector<char>& visible, std::vector<double>& level) {
+    using Key = std::tuple<int, int, int, int, bool>;
+    std::unordered_map<Key, std::size_t, boost::hash<Key>> first;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!visible[i]) continue;
+      const Eigen::Array3i at = (points[i]->position.array() / cells.size_m.array()).floor().cast<int>();
+      const bool side = cells.side && cells.side(points[i]->position);
+      const auto [cell, fresh] = first.try_emplace(Key{points[i]->facet, at.x(), at.y(), at.z(), side}, i);
+      if (fresh) continue;
+      level[cell->second] = std::hypot(level[cell->second], level[i]);
+      visible[i] = 0;
+    }
+  }
+
   double spacing_m_ = 0.1;
   bool directive_ = false;
   int alpha_ = 4;

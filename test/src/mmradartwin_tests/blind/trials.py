@@ -118,7 +118,8 @@ def true_gain(program, session, truth, folder, limit_s, jobs):
     """What the effect that is hidden adds to the explained power of the session's twin, None where the twin cannot be
     told all of it: causes are mechanisms of the same name and parameters."""
     power = []
-    for mechanisms in ({}, {truth["cause"]: truth["parameters"]}):
+    parameters = json.loads(json.dumps(truth["parameters"]))   # YAML knows no numbers of numpy
+    for mechanisms in ({}, {truth["cause"]: parameters}):
         twin = os.path.join(session, "told.yaml")
         with open(twin, "w", encoding="ascii") as out:
             yaml.safe_dump({"mechanisms": {"specular": {"max_bounces": 3}, "corner": {}, "diffuse": {}, **mechanisms}}, out)
