@@ -19,9 +19,18 @@ constexpr double kTail = 4;  ///< degrees of freedom of the complex t
 // of its power.
 constexpr double kBeamShare = 3e-6;
 
-constexpr double kEnough = 0.1;  ///< nats: what a further step would bring is not worth it
+constexpr double kMostShape = 8;  ///< of the logarithm of clutter's power
+constexpr double kEnough = 0.1;   ///< nats: what a further step would bring is not worth it
 
-enum Global { kGain, kFloor, kSlope, kRelative, kGraze, kRange, kActors };
+enum Global {
+  kGain,
+  kFloor,
+  kRelative,
+  kGraze,
+  kRange,
+  kShape,
+  kActors = kShape + std::tuple_size_v<decltype(Nuisance::floor_shape)>
+};
 
 void unpack(const std::complex<float>* packed, double factor, Matrix& to) {
   std::size_t i = 0;
@@ -157,9 +166,10 @@ SessionModel::SessionModel(const ChannelData& data, int actors, const PoseAccura
 void SessionModel::addClutter(const Nuisance& n, int pose, int cell, double factor, Matrix& to) const {
   const PoseChannels& p = data_.poses[pose];
   const int bin = binOf(pose, cell);
-  const double range_m = std::max(0.3, bin * data_.radar.range_bin_m());
   const auto* packed = p.clutter.at(bin, size_);
-  const double level = factor * std::exp(n.log_floor + n.floor_slope * std::log(range_m / 3));
+  const auto [at, share] = shapeAt(bin);
+  const auto* shape = &n.floor_shape[static_cast<std::size_t>(at)];
+  const double level = factor * std::exp(n.log_floor + (1 - share) * shape[0] + share * shape[1]);
   if (!isBeam(cell)) {
     unpack(packed, level, to);
     return;
@@ -169,6 +179,14 @@ void SessionModel::addClutter(const Nuisance& n, int pose, int cell, double fact
   mirror(clutter);
   const EchoBeam& beam = p.beams[static_cast<std::size_t>(cell - samples_)];
   addApart(cell, beam.weights.dot(clutter * beam.weights).real(), to);
+}
+
+std::pair<int, double> SessionModel::shapeAt(int bin) const {
+  const int most = static_cast<int>(Nuisance().floor_shape.size()) - 1;
+  const double first = firstBin(),
+               along = std::log(std::max<double>(bin, first) / first) / std::log((samples_ - 1) / first);
+  const int at = std::clamp(static_cast<int>(most * along), 0, most - 1);
+  return {at, most * along - at};
 }
 
 int SessionModel::binOf(int pose, int cell) const {
@@ -375,9 +393,10 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     }
     const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
     if (const auto* p = graze.at(at, size_)) unpack(p, gain * std::exp(n.log_graze), touch(kGraze));
-    const double range_m = std::max(0.3, binOf(pose, cell) * data_.radar.range_bin_m());
     addClutter(n, pose, cell, 1, touch(kFloor));
-    addClutter(n, pose, cell, std::log(range_m / 3), touch(kSlope));
+    const auto [shape_at, shape_share] = shapeAt(binOf(pose, cell));
+    addClutter(n, pose, cell, 1 - shape_share, touch(kShape + shape_at));
+    addClutter(n, pose, cell, shape_share, touch(kShape + shape_at + 1));
     Matrix& level = touch(kGain);
     level = s;
     level.triangularView<Eigen::Lower>() -= raw[kFloor];
@@ -534,8 +553,10 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
   s.total[kGraze] -= rough * (n.log_graze - usual.log_graze);
   s.information(kRange, kRange) += rough;
   s.total[kRange] -= rough * (n.log_range - usual.log_range);
-  s.information(kSlope, kSlope) += 1;
-  s.total[kSlope] -= n.floor_slope - usual.floor_slope;
+  for (int j = 0; j < static_cast<int>(n.floor_shape.size()); ++j) {
+    s.information(kShape + j, kShape + j) += rough;
+    s.total[kShape + j] -= rough * n.floor_shape[static_cast<std::size_t>(j)];
+  }
   s.log_likelihood += prior(n);
   return s;
 }
@@ -546,7 +567,10 @@ Nuisance SessionModel::stepped(const Nuisance& from, const Eigen::VectorXd& g, c
   const auto held = [share](double step, double limit) { return std::clamp(share * step, -limit, limit); };
   n.log_gain += held(g[kGain], 2);
   n.log_floor += held(g[kFloor], 2);
-  n.floor_slope = std::clamp(n.floor_slope + held(g[kSlope], 1), -4.0, 4.0);
+  for (int j = 0; j < static_cast<int>(n.floor_shape.size()); ++j) {
+    double& coefficient = n.floor_shape[static_cast<std::size_t>(j)];
+    coefficient = std::clamp(coefficient + held(g[kShape + j], 1), -kMostShape, kMostShape);
+  }
   // Below -11.5 single precision would no longer keep every matrix definite.
   n.log_relative = std::clamp(n.log_relative + held(g[kRelative], 2), -11.5, -2.0);
   n.log_graze = std::clamp(n.log_graze + held(g[kGraze], 2), -6.0, 6.0);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <complex>
 #include <vector>
 
@@ -12,17 +13,17 @@ namespace mmradartwin {
 
 /// What no cause is: fitted in every hypothesis alike. Powers as natural logarithms.
 struct Nuisance {
-  double log_gain = 0;                ///< of measured power over the twin's
-  double log_floor = 0;               ///< clutter's power in a cell at 3 m
-  double floor_slope = 0;             ///< exponent over range by which that departs from PoseChannels::clutter
-  double log_relative = -8;           ///< what differs from channel to channel of an echo, of its power
-  double log_graze = 0;               ///< factor of PoseEchoes::graze
-  double log_range = 0;               ///< factor of the variance of a path's own range
-  std::vector<double> actor_gain;     ///< [actors] natural logarithm of power, per interaction
-  std::vector<double> actor_range_m;  ///< [actors] added one-way range, shared by the interactions of a path
-  std::vector<double> yaw_rad;        ///< [poses] error of the heading
+  double log_gain = 0;                  ///< of measured power over the twin's
+  double log_floor = 0;                 ///< clutter's power in a cell over PoseChannels::clutter
+  std::array<double, 6> floor_shape{};  ///< departs from that at ranges, even in their logarithm; linear between
+  double log_relative = -8;             ///< what differs from channel to channel of an echo, of its power
+  double log_graze = 0;                 ///< factor of PoseEchoes::graze
+  double log_range = 0;                 ///< factor of the variance of a path's own range
+  std::vector<double> actor_gain;       ///< [actors] natural logarithm of power, per interaction
+  std::vector<double> actor_range_m;    ///< [actors] added one-way range, shared by the interactions of a path
+  std::vector<double> yaw_rad;          ///< [poses] error of the heading
 
-  int globals() const { return 6 + static_cast<int>(actor_gain.size() + actor_range_m.size()); }
+  int globals() const { return 5 + static_cast<int>(floor_shape.size() + actor_gain.size() + actor_range_m.size()); }
 };
 
 /// Standard deviations that the latent errors are given.
@@ -123,6 +124,8 @@ class SessionModel {
   int cells(int pose) const { return samples_ + static_cast<int>(data_.poses[pose].beams.size()); }
   bool isBeam(int cell) const { return cell >= samples_; }
   int binOf(int pose, int cell) const;
+  /// Two neighbours of floor_shape that hold for a bin: the first one's index and the second one's share.
+  std::pair<int, double> shapeAt(int bin) const;
   Eigen::VectorXcd dataOf(int pose, int cell) const;
   /// Adds power that no two channels share, and that a beam's bins share as their window has it.
   void addApart(int cell, double power, Matrix& to) const;
