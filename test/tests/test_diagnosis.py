@@ -76,8 +76,11 @@ class HiddenEffects(unittest.TestCase):
         _, first, truth = self.found(seed, {"tx_rx_leakage": {}})
         self.assertAlmostEqual(first["parameters"]["range_m"]["value"], truth["range_m"], delta=0.02,
                                msg=f"seed {seed}")
-        self.assertAlmostEqual(first["parameters"]["level_db"]["value"], truth["level_db"], delta=2.5,
-                               msg=f"seed {seed}")
+        # Over the strongest echo, whose own level is known to an actor's error: the interval says so.
+        level = first["parameters"]["level_db"]
+        self.assertAlmostEqual(level["value"], truth["level_db"], delta=1.2, msg=f"seed {seed}")
+        self.assertLess(level["ci95"][0], truth["level_db"], msg=f"seed {seed}")
+        self.assertGreater(level["ci95"][1], truth["level_db"], msg=f"seed {seed}")
 
     def test_a_scene_is_found_and_its_intervals_know_what_actors_and_headings_hide(self):
         # Range errors of 2 cm an actor and heading errors of 0.3 deg a pose: nobody knows its place to a millimetre.

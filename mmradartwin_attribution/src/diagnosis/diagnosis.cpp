@@ -632,6 +632,13 @@ Diagnosis Session::run() {
   source_->pointBeams(data_, mechanisms_, model_->firstBin());
   source_->settle(mechanisms_);
   state_ = fitter_->state(mechanisms_, nullptr);
+  for (Finding& f : result_.findings.findings) {
+    if (f.cause != "tx_rx_leakage" && f.cause != "dc_offset") continue;
+    referToStrongestEcho(twin_, *model_, state_, f);
+    std::replace_if(
+        extended_.begin(), extended_.end(), [&](const NamedParameters& m) { return m.mechanism == f.cause; },
+        *f.mechanism);
+  }
   std::vector<PoseEchoes> elsewhere = source_->echoes(mechanisms_);
   result_.explained_power = explainedPower(cellPowers(data_, elsewhere));
   // The same expectations, each at another pose's place: what chance explains.

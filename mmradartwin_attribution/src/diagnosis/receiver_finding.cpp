@@ -7,11 +7,14 @@
 #include <sstream>
 
 #include "echo_source.h"
+#include "hypothesis_fit.h"
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/ledger.h"
 
 namespace mmradartwin {
 namespace {
+
+constexpr double kDbPerNeper = 8.685889638065035;
 
 /// Amplitude of the strongest tone of all poses.
 double strongestMeasured(const ChannelData& data) {
@@ -193,6 +196,44 @@ Finding findingOf(const ChannelErrors& errors) {
   f.evidence.false_alarm_rate = std::min(1.0, std::exp(-errors.held_out_gain));
   f.where.emplace_back();
   return f;
+}
+
+void referToStrongestEcho(const Twin& twin, const SessionModel& model, const ModelState& state, Finding& f) {
+  const auto level = std::find_if(f.parameters.begin(), f.parameters.end(),
+                                  [](const FindingParameter& p) { return p.name == "level_db"; });
+  if (level == f.parameters.end()) return;
+  const ChannelData& data = model.data();
+  const Twin simulated = twin.changed(state.mechanisms);
+  double strongest = 0;  // power
+  std::vector<int> actors, everyone;
+  for (std::size_t i = 0; i < data.poses.size(); ++i) {
+    const Pose& pose = data.poses[i].pose;
+    everyone.push_back(static_cast<int>(i));
+    for (const PathRecord& r :
+         simulated.receivedPaths(pose.T_map_radar, simulated.trace(pose.T_map_radar), pose.stamp_ns)) {
+      double power = 0, log_gain = state.nuisance.log_gain;
+      for (const std::complex<double>& c : r.c) power += std::norm(c) / static_cast<double>(r.c.size());
+      for (int a : r.actors) log_gain += a < 0 ? 0 : state.nuisance.actor_gain[static_cast<std::size_t>(a)];
+      power *= std::exp(log_gain);
+      if (power <= strongest) continue;
+      strongest = power;
+      actors = r.actors;
+    }
+  }
+  if (!(strongest > 0)) return;
+  const Scores scores = model.scores(state.basis, {}, everyone);
+  Eigen::VectorXd direction = Eigen::VectorXd::Zero(scores.total.size());
+  direction[0] = 1;
+  for (int a : actors) {
+    if (a >= 0) direction[model.gainOf(a)] += 1;
+  }
+  const double error_db = 0.5 * kDbPerNeper * std::sqrt(direction.dot(scores.information.ldlt().solve(direction)));
+  const double was_db = std::get<double>(level->value), half_db = level->ci95[0][1] - was_db;
+  const double level_db = was_db + kDbPerNeper * std::log(strongestMeasured(data) / std::sqrt(strongest));
+  const double both_db = std::hypot(half_db, 1.96 * error_db);
+  level->value = level_db;
+  level->ci95 = {{level_db - both_db, level_db + both_db}};
+  f.mechanism->values.set("level_db", level_db);
 }
 
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated) {

@@ -6,6 +6,7 @@
 #include "channel_data.h"
 #include "channel_errors.h"
 #include "delivery.h"
+#include "hypothesis_fit.h"
 #include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_attribution/frame_evidence.h"
 
@@ -29,6 +30,9 @@ void addUnexplained(const std::vector<FrameFinding>& frames, std::vector<Finding
 Finding findingOf(const Delivery& delivery, const RadarConfig& radar);
 /// rest: the data without the tone, whose strongest echo levels refer to.
 Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest);
+/// The same where a twin tells how strong the strongest echo is: in the data it may stand in one cell with others, and
+/// how well its gain is known widens the interval. Does nothing to a finding without a level.
+void referToStrongestEcho(const Twin& twin, const SessionModel& model, const ModelState& state, Finding& f);
 Finding findingOf(const ChannelErrors& errors);
 /// Where the noise departs from the level that the twin's noise_floor states.
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated);
