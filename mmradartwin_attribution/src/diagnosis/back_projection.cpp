@@ -13,6 +13,7 @@ constexpr double kNearest_m = 0.4;
 constexpr double kWidest_sine = 0.95;
 constexpr double kSizes_m[] = {0.04, 0.15, 0.5};  // diameters that are tried
 constexpr int kSizes = 3;
+constexpr double kWide_m[] = {0.12, 0.25};  // radii of something wide
 constexpr double kApart_m = 0.5;
 constexpr std::size_t kMostPlaces = 4;
 constexpr double kNearby_m = 0.6, kLargest_m = 2.5;  // of an actor that may have been moved to a place
@@ -92,12 +93,22 @@ Hypothesis objectAt(const ProjectedPlace& place) {
   return h;
 }
 
-void freePlace(Screened& object) {
+void freePlace(const ChannelData& data, Screened& object) {
   Hypothesis& h = object.hypothesis;
+  const Eigen::Vector2d place(h.mechanism.values.number("x_m"), h.mechanism.values.number("y_m"));
   for (const char* key : {"y_m", "x_m"}) {
     const double at_m = h.mechanism.values.number(key);
     h.coordinates.insert(h.coordinates.begin(), {key, "m", -1, at_m, at_m + 0.1, -1000, 1000});
     for (std::vector<double>& start : object.starts) start.insert(start.begin(), 0.0);
+  }
+  // What echoes is the side that faces the radar: of something wide the axis stands behind it.
+  Eigen::Vector2d radar = Eigen::Vector2d::Zero();
+  for (const PoseChannels& p : data.poses) radar += p.pose.T_map_radar.translation().head<2>();
+  const Eigen::Vector2d away = (place - radar / static_cast<double>(data.poses.size())).normalized();
+  for (double radius_m : kWide_m) {
+    const Eigen::Vector2d axis = place + radius_m * away;
+    object.starts.push_back(
+        {h.coordinates[0].scaled(axis.x()), h.coordinates[1].scaled(axis.y()), h.coordinates[2].scaled(2 * radius_m)});
   }
 }
 

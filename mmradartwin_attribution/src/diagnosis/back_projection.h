@@ -19,8 +19,8 @@ struct ProjectedPlace {
 std::vector<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& model, const ModelState& null);
 /// The hypothesis of an object at that very place, its size free.
 Hypothesis objectAt(const ProjectedPlace& place);
-/// Lets the place of objectAt() be fitted, too, from where it is.
-void freePlace(Screened& object);
+/// Lets the place of objectAt() be fitted, too, from where it is and from behind it, as seen from where the radar was.
+void freePlace(const ChannelData& data, Screened& object);
 
 /// Of the actors that can be moved at all, by their size, the index of the one that stands nearest to a place; -1 where
 /// none stands near.

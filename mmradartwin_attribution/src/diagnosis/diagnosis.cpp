@@ -338,7 +338,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   }
   source_->settle(mechanisms_);
   if (object) {
-    freePlace(*object);
+    freePlace(data_, *object);
     screened.push_back(std::move(*object));
   }
   std::stable_sort(screened.begin(), screened.end(), better);
@@ -369,8 +369,17 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
       source_->settle(mechanisms_);
       // What latents bring that the fit has found, and the twin as it is had not, is nobody's gain.
       if (std::optional<ModelState> better = fitter_->improved(state_, fits.back().state.nuisance)) {
-        for (HypothesisFit& fitted : fits) fitted.loseGain(better->log_likelihood - state_.log_likelihood);
+        const double nats = better->log_likelihood - state_.log_likelihood;
         state_ = std::move(*better);
+        // Where that is much, it is one place's, and what the others gain beside it is seen by fits from there alone.
+        for (HypothesisFit& earlier : fits) {
+          if (nats > kWorthAFit) {
+            earlier = fitter_->fit(state_, earlier.hypothesis, {earlier.scaled}, 4);
+            source_->settle(mechanisms_);
+          } else {
+            earlier.loseGain(nats);
+          }
+        }
       }
       std::stable_sort(fits.begin(), fits.end(),
                        [](const HypothesisFit& a, const HypothesisFit& b) { return a.ranking() > b.ranking(); });
@@ -562,13 +571,14 @@ void Session::takeOver(const Accepted& a) {
 
 bool Session::judgeChannels(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
+  believeAbsences(fits);
   bool refused = false;
   for (const HypothesisFit& f : fits) {
     std::string& verdict = triedAs(f, round).verdict;
     verdict = f.ranking() <= 0                       ? "gains less than its numbers cost"
               : f.false_alarm_rate > kFalseAlarm     ? "chance could do as well"
               : !(f.held_out_gain > 0)               ? "loses on places not fitted"
-              : isClutter(f.hypothesis.at(f.scaled)) ? "no larger than clutter is"
+              : isClutter(f.hypothesis.at(f.scaled)) ? "no larger than clutter is: " + sizeAndPlace(f)
                                                      : "";
     if (!verdict.empty()) continue;
     Finding finding = findingOf(f, fits, state_, twin_.scene(), data_);

@@ -78,4 +78,22 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   return f;
 }
 
+std::string sizeAndPlace(const HypothesisFit& object) {
+  const Parameters values = object.hypothesis.at(object.scaled).values;
+  return number(values.number("size_m"), 3) + " m at (" + number(values.number("x_m"), 3) + ", " +
+         number(values.number("y_m"), 3) + ")";
+}
+
+void believeAbsences(std::vector<HypothesisFit>& fits) {
+  for (HypothesisFit& gone : fits) {
+    if (gone.hypothesis.mechanism.mechanism != "actor_absent") continue;
+    for (const HypothesisFit& moved : fits) {
+      if (moved.hypothesis.mechanism.mechanism == "actor_moved" &&
+          moved.hypothesis.subject == gone.hypothesis.subject && gone.ranking() >= moved.ranking()) {
+        gone.false_alarm_rate = std::min(gone.false_alarm_rate, moved.false_alarm_rate);
+      }
+    }
+  }
+}
+
 }  // namespace mmradartwin

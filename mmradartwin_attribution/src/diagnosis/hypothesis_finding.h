@@ -14,4 +14,11 @@ namespace mmradartwin {
 Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
                   const Scene& scene, const ChannelData& data);
 
+/// Of an actor_unmodelled, for people.
+std::string sizeAndPlace(const HypothesisFit& object);
+
+/// An actor that is gone explains as much as the same one moved away, without a number: that something is wrong with it
+/// is then as sure.
+void believeAbsences(std::vector<HypothesisFit>& fits);
+
 }  // namespace mmradartwin
