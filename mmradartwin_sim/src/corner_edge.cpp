@@ -112,7 +112,7 @@ std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
 }
 
 void addCornerPath(const PoseContext& context, const ElementsInMap& elements, const CornerEdge& edge,
-                   const std::string& event, double level, std::vector<PathRecord>& records) {
+                   const std::string& event, double level, std::vector<PathRecord>& records, CornerAperture aperture) {
   const Eigen::Vector3d to_radar = elements.p - edge.origin;
   // Concave as seen from here: the radar stands between the two faces.
   const double x = to_radar.dot(edge.into_a), y = to_radar.dot(edge.into_b);
@@ -133,7 +133,8 @@ void addCornerPath(const PoseContext& context, const ElementsInMap& elements, co
 
   // Across the ray the faces end at -reach_a sin and +reach_b sin of their angles to it, first order in s = 2R.
   const double unit = 2 / std::sqrt(wavelength * R);
-  const double across_a = edge.reach_a_m * y / R, across_b = edge.reach_b_m * x / R;
+  double across_a = edge.reach_a_m * y / R, across_b = edge.reach_b_m * x / R;
+  if (aperture == CornerAperture::kNarrowerFace) across_a = across_b = std::min(across_a, across_b);
   const std::complex<double> factor =
       apertureAxis(-across_a * unit, across_b * unit) * apertureAxis(-foot_at * unit, (edge.length_m - foot_at) * unit);
   if (std::abs(factor) < kSmallestFactor) return;

@@ -26,9 +26,16 @@ std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
                                         const std::function<bool(const Facet&)>& takes_part,
                                         const std::function<bool(const Facet&, const Facet&)>& pair);
 
-/// The retro path of one edge as seen from one pose (DESIGN section 4, `corner`), where there is one; `event` lives as
-/// long as the record, `level` is a factor of amplitude.
+/// What of two faces across the ray makes up a corner's aperture.
+enum class CornerAperture {
+  kBothFaces,     ///< from the far end of the one to the far end of the other (DESIGN section 4, `corner`)
+  kNarrowerFace,  ///< as far to both sides as the narrower reaches: what meets one face leaves as far on the other
+};
+
+/// The retro path of one edge as seen from one pose, where there is one; `event` lives as long as the record, `level`
+/// is a factor of amplitude.
 void addCornerPath(const PoseContext& context, const ElementsInMap& elements, const CornerEdge& edge,
-                   const std::string& event, double level, std::vector<PathRecord>& records);
+                   const std::string& event, double level, std::vector<PathRecord>& records,
+                   CornerAperture aperture = CornerAperture::kBothFaces);
 
 }  // namespace mmradartwin

@@ -15,7 +15,6 @@ namespace {
 constexpr double kSmallestFold_rad = 20 * M_PI / 180;
 constexpr double kTouch_m = 0.003;  // another facet this near covers the edge
 constexpr double kShortest_m = 0.02;
-constexpr double kInset_m = 0.01;
 constexpr double kSmallestFactor = 0.01;
 
 /// A triangle's side that lies between two facets or bounds one.
@@ -217,19 +216,15 @@ std::optional<EdgeReturn> diffract(const PoseContext& context, const Diffracting
   if (phi_in >= edge.n * M_PI || phi >= edge.n * M_PI) return std::nullopt;
 
   const double at = (rho_s * o.z() + rho_o * s.z()) / (rho_s + rho_o);
+  if (at < 0 || at > edge.length_m) return std::nullopt;
   EdgeReturn result;
-  result.inside = at >= 0 && at <= edge.length_m;
   const double s1 = std::hypot(rho_s, at - s.z()), s2 = std::hypot(rho_o, at - o.z());
   const double sin_beta = rho_s / s1, wavelength = context.radar.wavelength_m();
   const double unit = sin_beta * std::sqrt(2 * (s1 + s2) / (wavelength * s1 * s2));
   const std::complex<double> ends = apertureAxis(-at * unit, (edge.length_m - at) * unit);
   if (std::abs(ends) < kSmallestFactor) return std::nullopt;
-  const double inset = std::min(kInset_m, 0.5 * edge.length_m);
-  const double taken = result.inside ? at : (at < 0 ? inset : edge.length_m - inset);
-  result.point = edge.origin + taken * edge.along;
-
-  const Eigen::Vector3d stationary = edge.origin + at * edge.along;
-  const Eigen::Vector3d in = (stationary - source) / s1, out = (observer - stationary) / s2;
+  result.point = edge.origin + at * edge.along;
+  const Eigen::Vector3d in = (result.point - source) / s1, out = (observer - result.point) / s2;
   const auto turn = [&edge](double f) -> Eigen::Vector3d {
     return std::cos(f) * edge.side - std::sin(f) * edge.into_a;
   };
@@ -243,7 +238,7 @@ std::optional<EdgeReturn> diffract(const PoseContext& context, const Diffracting
   const double k = 2 * M_PI / wavelength, L = s1 * s2 / (s1 + s2) * sin_beta * sin_beta;
   const std::complex<double> soft = wedgeCoefficient(edge.n, phi, phi_in, L, sin_beta, k, gamma_0.te, gamma_n.te);
   const std::complex<double> hard = wedgeCoefficient(edge.n, phi, phi_in, L, sin_beta, k, gamma_0.tm, gamma_n.tm);
-  const ComplexVector field = incident(stationary);
+  const ComplexVector field = incident(result.point);
   const Eigen::Vector3d receive = verticalField(up, -out);
   const auto dot = [](const ComplexVector& f, const Eigen::Vector3d& v) {
     return f.x() * v.x() + f.y() * v.y() + f.z() * v.z();

@@ -31,15 +31,14 @@ std::vector<DiffractingEdge> findDiffractingEdges(const Scene& scene);
 /// How one edge returns a field from source to observer.
 struct EdgeReturn {
   Eigen::Vector3d point;        ///< on the edge
-  bool inside;                  ///< the stationary point lies on the edge itself; else it is 1 cm inside the nearer end
   std::complex<double> factor;  ///< times lambda/(4 pi): the path's coefficient, exp(-jkL) convention
 };
 
 /// UTD return of an edge: diffraction point, spreading 1/sqrt(s s' (s + s')), polarisation, Fresnel aperture of the
 /// edge's length; the faces reflect as slabs where their thickness is known, else as half spaces. None where source or
-/// observer are not in the wedge's exterior, or where the aperture factor falls below 0.01 or the point lies beside
-/// the edge by more than that. incident: field at the edge of a unit source; receive: field vector of the receiving
-/// antenna, functions of the diffraction point.
+/// observer are not in the wedge's exterior, or where the diffraction point lies beyond the edge's ends (Keller's law:
+/// what vertices send is not UTD's edge). incident: field at the edge of a unit source; receive: field vector of the
+/// receiving antenna, functions of the diffraction point.
 std::optional<EdgeReturn> diffract(const PoseContext& context, const DiffractingEdge& edge,
                                    const Eigen::Vector3d& source, const Eigen::Vector3d& observer,
                                    const std::function<ComplexVector(const Eigen::Vector3d& point)>& incident,

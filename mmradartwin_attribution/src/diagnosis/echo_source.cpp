@@ -38,10 +38,21 @@ std::string tracedKey(const NamedParameters& mechanism) {
   return description.toYaml();
 }
 
-std::string keyOf(const std::vector<NamedParameters>& geometry) {
+std::string keyOf(const std::vector<NamedParameters>& mechanisms) {
   std::string key;
-  for (const NamedParameters& m : geometry) key += tracedKey(m) + "|";
+  for (const NamedParameters& m : mechanisms) key += tracedKey(m) + "|";
   return key;
+}
+
+/// Those of the list that one of its mechanisms looks at when it is traced.
+std::vector<NamedParameters> lookedAt(const NamedParameters& mechanism, const std::vector<NamedParameters>& list) {
+  std::vector<NamedParameters> beside;
+  for (const std::string& name : MechanismRegistry::instance().create(mechanism.mechanism)->looksAtPathsOf()) {
+    for (const NamedParameters& m : list) {
+      if (m.mechanism == name) beside.push_back(m);
+    }
+  }
+  return beside;
 }
 
 /// Paths of one cell become one with their power; those for which cell() gives nothing stay.
@@ -158,8 +169,11 @@ std::vector<NamedParameters> EchoSource::geometryOf(const std::vector<NamedParam
 }
 
 const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>& geometry,
-                                             const NamedParameters& mechanism, const std::vector<int>& poses) {
-  Entry& entry = cache_[keyOf(geometry) + tracedKey(mechanism)];
+                                             const NamedParameters& mechanism,
+                                             const std::vector<NamedParameters>& mechanisms,
+                                             const std::vector<int>& poses) {
+  const std::vector<NamedParameters> beside = lookedAt(mechanism, mechanisms);
+  Entry& entry = cache_[keyOf(geometry) + keyOf(beside) + tracedKey(mechanism)];
   entry.used = calls_;
   entry.paths.resize(data_.poses.size());
   entry.known.resize(data_.poses.size(), 0);
@@ -171,7 +185,7 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
   if (!geometry.empty() && geometry.back().mechanism != mechanism.mechanism &&
       geometryAfter(geometry.back()) == Geometry::kMoreScreens) {
     // What only hides needs no new trace: paths without it, less those that it stands in the way of.
-    const Traced& open = traced({geometry.begin(), geometry.end() - 1}, mechanism, missing);
+    const Traced& open = traced({geometry.begin(), geometry.end() - 1}, mechanism, mechanisms, missing);
     const Twin twin = base_.changed(geometry);
     tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t j) {
       const std::size_t i = static_cast<std::size_t>(missing[j]);
@@ -181,10 +195,11 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
     });
     return entry.paths;
   }
-  std::vector<NamedParameters> all;
+  std::vector<NamedParameters> others = beside;
   for (const NamedParameters& m : geometry) {
-    if (m.mechanism != mechanism.mechanism) all.push_back(m);
+    if (m.mechanism != mechanism.mechanism) others.push_back(m);
   }
+  std::vector<NamedParameters> all = others;
   all.push_back(mechanism);
   const Twin twin = base_.changed(all);
   tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t j) {
@@ -196,11 +211,11 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
       cells.side = [&](const Eigen::Vector3d& p) { return base_.rays().visible(T.translation(), p, 1e-3); };
     }
     std::vector<PathRecord> records = twin.trace(T, 0, &cells);
-    // Paths of the geometry's own mechanisms (an unmodelled actor's echo) are theirs, not this one's.
+    // Paths of the other mechanisms (an unmodelled actor's echo) are theirs, not this one's.
     records.erase(std::remove_if(records.begin(), records.end(),
                                  [&](const PathRecord& r) {
-                                   return std::any_of(geometry.begin(), geometry.end(), [&](const NamedParameters& g) {
-                                     return g.mechanism == *r.event && g.mechanism != mechanism.mechanism;
+                                   return std::any_of(others.begin(), others.end(), [&](const NamedParameters& o) {
+                                     return o.mechanism == *r.event;
                                    });
                                  }),
                   records.end());
@@ -265,7 +280,7 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
   forgetLongUnused();
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
   std::vector<const Traced*> parts;
-  for (const NamedParameters& m : mechanisms) parts.push_back(&traced(geometry, m, poses));
+  for (const NamedParameters& m : mechanisms) parts.push_back(&traced(geometry, m, mechanisms, poses));
   return collect(mechanisms, poses, actor_range_m, [&](std::size_t i, std::vector<PathRecord>& all) {
     std::size_t count = 0, to = 0;
     for (const Traced* part : parts) count += (*part)[i].size();
@@ -286,8 +301,8 @@ std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters
   for (const NamedParameters& m : mechanisms) {
     const auto same =
         std::find_if(from.begin(), from.end(), [&](const NamedParameters& f) { return f.mechanism == m.mechanism; });
-    parts.emplace_back(&traced(geometry, m, poses),
-                       same == from.end() ? nullptr : &traced(geometry_from, *same, poses));
+    parts.emplace_back(&traced(geometry, m, mechanisms, poses),
+                       same == from.end() ? nullptr : &traced(geometry_from, *same, from, poses));
   }
   return collect(mechanisms, poses, actor_range_m, [&](std::size_t i, std::vector<PathRecord>& all) {
     all.clear();
@@ -308,7 +323,8 @@ std::vector<PathShift> EchoSource::pathShifts(const std::vector<NamedParameters>
   std::vector<std::pair<const Traced*, const Traced*>> parts;  // there and here
   for (const NamedParameters& f : from) {
     for (const NamedParameters& m : mechanisms) {
-      if (m.mechanism == f.mechanism) parts.emplace_back(&traced(geometry, m, poses), &traced(geometry_from, f, poses));
+      if (m.mechanism != f.mechanism) continue;
+      parts.emplace_back(&traced(geometry, m, mechanisms, poses), &traced(geometry_from, f, from, poses));
     }
   }
   const Twin there_twin = base_.changed(mechanisms), here_twin = base_.changed(from);
@@ -476,7 +492,8 @@ void EchoSource::pointBeams(ChannelData& data, const std::vector<NamedParameters
 void EchoSource::settle(const std::vector<NamedParameters>& mechanisms) {
   const std::string geometry = keyOf(geometryOf(mechanisms));
   std::vector<std::string> wanted;
-  for (const NamedParameters& m : mechanisms) wanted.push_back(geometry + tracedKey(m));
+  for (const NamedParameters& m : mechanisms)
+    wanted.push_back(geometry + keyOf(lookedAt(m, mechanisms)) + tracedKey(m));
   if (wanted != settled_) findGraze(mechanisms);
   settled_ = wanted;
   for (auto at = cache_.begin(); at != cache_.end();) {

@@ -72,8 +72,9 @@ class EchoSource {
 
  private:
   using Traced = std::vector<std::vector<PathRecord>>;  // by pose; empty where not traced
+  /// Paths of one of the mechanisms.
   const Traced& traced(const std::vector<NamedParameters>& geometry, const NamedParameters& mechanism,
-                       const std::vector<int>& poses);
+                       const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
   /// Keeps memory bounded while one hypothesis' geometry is searched for.
   void forgetLongUnused();
   std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);

@@ -130,6 +130,8 @@ class Mechanism {
   virtual std::vector<std::string> notes() const { return {}; }
   /// Where the order of two mechanisms in one stage matters, the lower rank acts first; the file's order never matters.
   virtual int rank() const { return 0; }
+  /// Mechanisms whose records addPaths() looks at: where a mechanism is traced alone, it is traced beside these.
+  virtual std::vector<std::string> looksAtPathsOf() const { return {}; }
 
   // Stages, in the order in which a simulation runs them.
   virtual void editScene(Scene&) const {}  ///< once, on loading

@@ -26,6 +26,7 @@ class CornerReflection : public Mechanism {
     gap_m_ = std::max(kFacesMeet_m, values.number("gap_m"));
   }
   int rank() const override { return 1; }  // after corner, whose records tell what is there already
+  std::vector<std::string> looksAtPathsOf() const override { return {"corner"}; }
   void build(const Scene& scene, const RadarConfig&) override {
     const bool one = named_.size() == 1;
     edges_ = findCornerEdges(

@@ -22,6 +22,7 @@ class EdgeDiffraction : public Mechanism {
     level_ = values.number("level");
   }
   int rank() const override { return 1; }  // after specular, whose records tell which edges are held
+  std::vector<std::string> looksAtPathsOf() const override { return {"specular"}; }
   void build(const Scene& scene, const RadarConfig&) override { edges_ = findDiffractingEdges(scene); }
 
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
@@ -63,12 +64,8 @@ class EdgeDiffraction : public Mechanism {
     record.vertices = {found->point};
     record.departure = record.arrival = direction_radar;
     record.bounces = 1;
-    if (found->inside) {
-      for (const auto& t : elements.tx) {
-        for (const auto& r : elements.rx) record.length_m.push_back(lengthOverEdge(edge, t, r));
-      }
-    } else {
-      record.length_m = elements.lengthsVia(found->point);
+    for (const auto& t : elements.tx) {
+      for (const auto& r : elements.rx) record.length_m.push_back(lengthOverEdge(edge, t, r));
     }
     setContribution(context.radar, std::conj(coefficient), record);
     records.push_back(std::move(record));

@@ -39,7 +39,10 @@ class FloorCeilingMultipath : public Mechanism {
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
     if (level_ <= 0) return;
     const ElementsInMap elements(context);
-    for (const CornerEdge& edge : corners_) addCornerPath(context, elements, edge, kName, level_, records);
+    // A wall over a picture's upper side is no corner as high as the wall.
+    for (const CornerEdge& edge : corners_) {
+      addCornerPath(context, elements, edge, kName, level_, records, CornerAperture::kNarrowerFace);
+    }
     if (order_ < 2) return;
     ImageSearch::Limits limits;
     limits.max_order = order_;

@@ -159,10 +159,7 @@ class WallGhost : public Mechanism {
         std::min(1.0, gain_) * context.radar.wavelength_m() / (4 * M_PI) * found->factor;
     addPair(
         context, elements, wall, b, x, a.actor, a.id, std::conj(coefficient),
-        [&](const Eigen::Vector3d& t, const Eigen::Vector3d& r) {
-          return found->inside ? lengthOverEdge(edge, t, r) : (t - x).norm() + (r - x).norm();
-        },
-        records);
+        [&](const Eigen::Vector3d& t, const Eigen::Vector3d& r) { return lengthOverEdge(edge, t, r); }, records);
   }
 
   /// The path over the wall first and its reverse; length(t, r) is the way from t to r over the scatterer.

@@ -1,0 +1,80 @@
+#include "../src/diagnosis/echo_source.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "mmradartwin_dsp/paper_radar.h"
+
+namespace mmradartwin {
+namespace {
+
+/// A metal cabinet with its front in the plane x = 3 m, 1 m wide.
+class CabinetScene : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (std::filesystem::temp_directory_path() / "mmradartwin_test_XXXXXX").string();
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+    std::ofstream(folder_ + "/materials.yaml") << "materials:\n  Metal: {model: conductor}\n";
+    std::ofstream(folder_ + "/scene.yaml") << "meshes: [{file: cabinet.obj}]\nmaterials: materials.yaml\n";
+    std::ofstream obj(folder_ + "/cabinet.obj");
+    obj << "o cabinet\nusemtl Metal\n";
+    for (const char* z : {"-2", "2"}) {
+      for (const char* xy : {"3 -0.5 ", "4 -0.5 ", "4 0.5 ", "3 0.5 "}) obj << "v " << xy << z << "\n";
+    }
+    obj << "f 1 2 3 4\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string folder_;
+};
+
+/// Of all channels and bins.
+double power(const PoseEchoes& echoes, int channels) {
+  double sum = 0;
+  for (const auto& group : echoes.groups) {
+    const BinCovariance& cells = group->bins.power;
+    const std::size_t size = static_cast<std::size_t>(channels * (channels + 1) / 2);
+    for (int b = cells.first; b < cells.first + cells.bins; ++b) {
+      for (int k = 0; k < channels; ++k) sum += cells.at(b, size)[k * (k + 3) / 2].real();
+    }
+  }
+  return sum;
+}
+
+// Paths are traced one mechanism at a time, but an edge that a specular return holds is no path of the whole twin.
+TEST_F(CabinetScene, ExpectsOfEdgesWhatTheWholeTwinHas) {
+  ChannelData data;
+  data.radar = paperRadar();
+  const auto addPose = [&](double x, double y, double yaw_rad) {
+    PoseChannels p;
+    p.pose.T_map_radar = Eigen::Translation3d(x, y, 0) * Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ());
+    data.poses.push_back(p);
+  };
+  addPose(1, 0, 0);               // the front is square on and holds both of its edges
+  addPose(1, -2.5, 0.25 * M_PI);  // no face is
+  const Twin twin(loadTwin("", folder_ + "/scene.yaml", data.radar));
+  EchoSource source(twin, data, PoseAccuracy());
+  const NamedParameters specular = defaultMechanism("specular"), edges = defaultMechanism("edge_diffraction");
+  const std::vector<PoseEchoes> without = source.echoes({specular}), with = source.echoes({specular, edges});
+  const Twin whole = twin.changed({specular, edges});
+  const auto tracedPower = [&](std::size_t pose, const std::string& event) {
+    double sum = 0;
+    for (const PathRecord& r : whole.trace(data.poses[pose].pose.T_map_radar)) {
+      if (*r.event == event) sum += r.amplitude * r.amplitude;
+    }
+    return sum;
+  };
+  const auto addedPower = [&](std::size_t pose) { return power(with[pose], 8) - power(without[pose], 8); };
+  // The window's power in a cell is the same for all paths.
+  const double cell = power(without[0], 8) / tracedPower(0, "specular");
+  EXPECT_EQ(tracedPower(0, "edge_diffraction"), 0);
+  EXPECT_NEAR(addedPower(0) / power(without[0], 8), 0, 1e-6);
+  ASSERT_GT(tracedPower(1, "edge_diffraction"), 0);
+  EXPECT_NEAR(addedPower(1) / (cell * tracedPower(1, "edge_diffraction")), 1, 0.02);
+}
+
+}  // namespace
+}  // namespace mmradartwin
