@@ -342,7 +342,13 @@ class Propagation(WithBaseline):
     def test_floor_paths_depend_on_height(self):
         found = list(self.added("floor_ceiling_multipath"))
         self.assertGreater(len(found), 5)
+        third = [(m, p) for m, _, p, _ in found if len(p.facets) == 3]
+        self.assertTrue(third)
+        for measurement, path in third:
+            self.assertFalse(measurement.room.reflects[list(path.facets)].all())
         for measurement, station, path, _ in found:
+            if len(path.facets) > 2:
+                continue
             height = station.true.position[2]
             rise = height if path.vertices[0][2] < 1 else office.HEIGHT_M - height
             ground = np.hypot(*(path.vertices[0] - station.true.position)[:2])

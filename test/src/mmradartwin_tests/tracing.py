@@ -166,7 +166,7 @@ class Tracer:
         """All paths of the mechanisms specular and corner from one pose."""
         paths = self._first_order(pose) + self.corner_paths(pose, self.corners)
         for order in range(2, self.max_order + 1):
-            paths += self._higher_order(pose, order)
+            paths += self.images(pose, order)
         limit = 2 * self.radar.max_range_m
         return [p for p in paths if p.length_m <= limit]
 
@@ -284,7 +284,8 @@ class Tracer:
         row, k = np.nonzero(last)
         return np.concatenate([pairs[row], k[:, None]], axis=1)
 
-    def _higher_order(self, pose, order):
+    def images(self, pose, order):
+        """Paths over the images of second or third order, those of corners left out."""
         room, p, wavelength = self.room, pose.position, self.radar.wavelength_m
         if order > 3:
             raise ValueError("images are searched up to order 3")

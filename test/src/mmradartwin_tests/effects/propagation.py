@@ -1,4 +1,5 @@
 """Effects of propagation that the base model leaves out."""
+import copy
 import math
 
 import numpy as np
@@ -7,7 +8,7 @@ from mmradartwin_tests.coefficients import aperture_axis, fresnel
 from mmradartwin_tests.diffraction import wedge
 from mmradartwin_tests.effects.effect import Effect, effect
 from mmradartwin_tests.geometry import Room
-from mmradartwin_tests.tracing import Corner, Path
+from mmradartwin_tests.tracing import Corner, Path, Tracer
 
 
 def vertical_edges(room):
@@ -92,7 +93,8 @@ class EdgeDiffraction(Effect):
 
 @effect
 class FloorCeilingMultipath(Effect):
-    """Retro paths of upright faces that stand on the floor or reach to the ceiling (within 2.5 cm)."""
+    """Retro paths of upright faces that stand on the floor or reach to the ceiling (within 2.5 cm), and images of third
+    order with a level face among them."""
     name, main, rank = "floor_ceiling_multipath", "level", 0
     defaults = {"level": 1.0}
     REACH_M = 0.025
@@ -121,7 +123,14 @@ class FloorCeilingMultipath(Effect):
     def echoes(self, measurement, station, echoes):
         if not hasattr(self, "found"):
             self.found = self.corners(measurement.room)
+            room = copy.copy(measurement.room)
+            room.reflects = np.ones_like(room.reflects)
+            self.all_faces = Tracer(room, measurement.radar)
         paths = measurement.tracer.corner_paths(station.true, self.found, self.name)
+        for path in self.all_faces.images(station.true, 3):
+            if not measurement.room.reflects[list(path.facets)].all():
+                path.event = self.name
+                paths.append(path)
         paths = [p for p in paths if p.length_m <= 2 * measurement.radar.max_range_m]
         for path in paths:
             path.coefficient *= self.p["level"]
