@@ -124,6 +124,20 @@ class HiddenEffects(unittest.TestCase):
         self.assertEqual([f["cause"] for f in findings["findings"]], ["unknown"], msg=f"seed {seed}")
         self.assertIn("level of frames", findings["findings"][0]["description"])
 
+    def test_edges_have_the_level_that_they_were_given(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "77"))
+        _, first, truth = self.found(seed, {"edge_diffraction": {"level": 1.9}}, headings=2)
+        level = first["parameters"]["level"]
+        self.assertAlmostEqual(level["value"], truth["level"], delta=0.45, msg=f"seed {seed}: {level}")
+
+    def test_someone_who_walks_to_and_fro_leaves_no_object(self):
+        # Whole walks last 1.5 s: within a pose of one second he turns once or twice.
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "81"))
+        findings, first, truth = self.found(seed, {"moving_target": {"speed_m_per_s": 0.8}}, headings=2)
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["moving_target"], msg=f"seed {seed}")
+        for name, delta in (("x_m", 0.2), ("y_m", 0.2), ("speed_m_per_s", 0.12)):
+            self.assertAlmostEqual(first["parameters"][name]["value"], truth[name], delta=delta, msg=f"seed {seed}")
+
     def test_a_step_of_the_gain_is_a_drift(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "37"))
         _, first, _ = self.found(seed, {"gain_drift": {"steps_db": [-4.0]}}, headings=2)

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -59,19 +58,7 @@ constexpr double kMuchOfTraces = 45;   ///< what moves echoes in the room, whose
 constexpr double kMuchOfObject = 95;   ///< an object, which has the whole room to choose from;
 constexpr double kMuchPerPose = 0.4, kMuchOfSubjectPerPose = 1;  ///< or so many a pose: a twin's own errors add up
 constexpr std::size_t kMostProfiled = 6;  ///< numbers whose errors the likelihood's own fall gives
-constexpr double kLeastSize_m = 0.02;     ///< of an object
 constexpr double kObjectPlaces = 500;     ///< places of an 8 by 6 m room that a session resolves, as a family
-
-/// An object so small that any room is full of its like, and the likelihood knows that.
-bool isClutter(const NamedParameters& m) {
-  return m.mechanism == "actor_unmodelled" && m.values.number("size_m") < kLeastSize_m;
-}
-
-std::string number(double value, int digits = 3) {
-  std::ostringstream out;
-  out << std::setprecision(digits) << value;
-  return out.str();
-}
 
 class Session {
  public:
@@ -575,11 +562,10 @@ bool Session::judgeChannels(int round) {
   bool refused = false;
   for (const HypothesisFit& f : fits) {
     std::string& verdict = triedAs(f, round).verdict;
-    verdict = f.ranking() <= 0                       ? "gains less than its numbers cost"
-              : f.false_alarm_rate > kFalseAlarm     ? "chance could do as well"
-              : !(f.held_out_gain > 0)               ? "loses on places not fitted"
-              : isClutter(f.hypothesis.at(f.scaled)) ? "no larger than clutter is: " + sizeAndPlace(f)
-                                                     : "";
+    verdict = f.ranking() <= 0                   ? "gains less than its numbers cost"
+              : f.false_alarm_rate > kFalseAlarm ? "chance could do as well"
+              : !(f.held_out_gain > 0)           ? "loses on places not fitted"
+                                                 : noObjectBecause(f, received_.frames);
     if (!verdict.empty()) continue;
     Finding finding = findingOf(f, fits, state_, twin_.scene(), data_);
     if (data_.locations.size() > 1) {

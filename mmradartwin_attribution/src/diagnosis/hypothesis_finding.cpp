@@ -12,14 +12,17 @@ namespace mmradartwin {
 namespace {
 
 constexpr double kAlike = 5;  ///< nats within which two names are not told apart
+constexpr double kLeastSize_m =
+    0.02;  ///< of an object: any room is full of smaller ones, and the likelihood knows that
+constexpr double kPerson_m = 0.3, kWalk_m = 0.6;  ///< size, and how far from the middle of a walk
+
+}  // namespace
 
 std::string number(double value, int digits) {
   std::ostringstream out;
   out << std::setprecision(digits) << value;
   return out.str();
 }
-
-}  // namespace
 
 Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
                   const Scene& scene, const ChannelData& data) {
@@ -78,10 +81,21 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   return f;
 }
 
-std::string sizeAndPlace(const HypothesisFit& object) {
+std::string noObjectBecause(const HypothesisFit& object, const std::vector<FrameFinding>& walkers) {
+  if (object.hypothesis.mechanism.mechanism != "actor_unmodelled") return "";
   const Parameters values = object.hypothesis.at(object.scaled).values;
-  return number(values.number("size_m"), 3) + " m at (" + number(values.number("x_m"), 3) + ", " +
-         number(values.number("y_m"), 3) + ")";
+  const double size_m = values.number("size_m"), x_m = values.number("x_m"), y_m = values.number("y_m");
+  const std::string which = ": " + number(size_m) + " m at (" + number(x_m) + ", " + number(y_m) + ")";
+  if (size_m < kLeastSize_m) return "no larger than clutter is" + which;
+  for (const FrameFinding& f : walkers) {
+    if (f.cause != "moving_target" || size_m > kPerson_m) continue;
+    for (const FindingPlace& place : f.where) {
+      if (place.x_m && place.y_m && std::hypot(*place.x_m - x_m, *place.y_m - y_m) < kWalk_m) {
+        return "what is left of someone who walks there" + which;
+      }
+    }
+  }
+  return "";
 }
 
 void believeAbsences(std::vector<HypothesisFit>& fits) {

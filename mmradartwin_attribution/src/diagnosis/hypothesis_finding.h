@@ -14,8 +14,12 @@ namespace mmradartwin {
 Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
                   const Scene& scene, const ChannelData& data);
 
-/// Of an actor_unmodelled, for people.
-std::string sizeAndPlace(const HypothesisFit& object);
+/// Why an actor_unmodelled is none, "" where it is one and for every other hypothesis: too small, or where one of the
+/// `walkers` (other causes are passed over) walks, whose echo does not average out over a pose's frames.
+std::string noObjectBecause(const HypothesisFit& object, const std::vector<FrameFinding>& walkers);
+
+/// To so many digits.
+std::string number(double value, int digits = 3);
 
 /// An actor that is gone explains as much as the same one moved away, without a number: that something is wrong with it
 /// is then as sure.

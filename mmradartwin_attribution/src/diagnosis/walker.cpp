@@ -344,11 +344,18 @@ class Search {
     double value = 0, low = 0, high = 0;
   };
 
-  /// Speed^2 from how the mean square of the way between two frames grows with the square of the time between them; the
-  /// error of a single place is a constant in that. Along the line of sight alone where several directions of view
-  /// together tell the speed: v^2 cos^2(heading - bearing) has the mean v^2/2.
-  double speed2(const std::vector<const Track*>& tracks) const {
-    constexpr int kLags = 4;
+  /// Speed^2 of bodies that turn back every straight_s: the mean square of the way between two frames is
+  /// v^2 t^2 (1 - 2/3 t / straight_s) for a time t between them, for the share t / straight_s of ways has a turn in it
+  /// and is a third of v^2 t^2 in the mean; the error of a single place adds a constant. Along the line of sight alone
+  /// where several directions of view together tell the speed: v^2 cos^2(heading - bearing) has the mean v^2/2.
+  /// misfit: of the mean over tracks along the line of sight, by which one straight_s is better than another.
+  double speed2(const std::vector<const Track*>& tracks, double straight_s, double& misfit) const {
+    constexpr int kLags = 8;
+    double counts[kLags] = {}, means[kLags] = {}, grows[kLags];
+    for (int lag = 0; lag < kLags; ++lag) {
+      const double time_s = (lag + 1) * radar_.frame_period_s;
+      grows[lag] = time_s * time_s * (1 - 2.0 / 3 * std::min(time_s, straight_s) / straight_s);
+    }
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
     double all_weight = 0, all_slope = 0;
@@ -368,7 +375,9 @@ class Search {
       double w = 0, mx = 0, mr = 0, mw = 0, xx = 0, xr = 0, xw = 0;
       for (int lag = 0; lag < kLags; ++lag) {
         if (count[lag] == 0) continue;
-        const double x = std::pow((lag + 1) * radar_.frame_period_s, 2);
+        const double x = grows[lag];
+        counts[lag] += count[lag];
+        means[lag] += radial[lag];
         w += count[lag];
         mx += count[lag] * x;
         mr += radial[lag];
@@ -388,7 +397,17 @@ class Search {
       all_slope += w * slope_whole;
       ++used;
     }
+    misfit = 0;
     if (used == 0) return 0;
+    Eigen::Matrix<double, kLags, 2> basis;
+    Eigen::Matrix<double, kLags, 1> weight, mean;
+    for (int lag = 0; lag < kLags; ++lag) {
+      weight[lag] = std::sqrt(counts[lag]);
+      mean[lag] = counts[lag] > 0 ? weight[lag] * means[lag] / counts[lag] : 0;
+      basis.row(lag) = weight[lag] * Eigen::RowVector2d(1, grows[lag]);
+    }
+    const Eigen::Vector2d line = basis.colPivHouseholderQr().solve(mean);
+    misfit = (mean - basis * line).squaredNorm();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(normal);
     if (used >= 5 && eigen.eigenvalues()[0] > 0.05 * eigen.eigenvalues()[2]) {
       return std::max(0.0, 2 * normal.ldlt().solve(right)[0]);
@@ -396,17 +415,29 @@ class Search {
     return std::max(0.0, all_slope / all_weight);
   }
 
+  /// With the way between two turns that leaves the least misfit.
+  double speedOf(const std::vector<const Track*>& tracks) const {
+    double least = std::numeric_limits<double>::infinity(), best = 0;
+    for (double straight_s : {100.0, 2.0, 1.4, 1.0, 0.8, 0.65, 0.5}) {
+      double misfit = 0;
+      const double v2 = speed2(tracks, straight_s, misfit);
+      if (misfit < least) best = std::sqrt(v2);
+      least = std::min(least, misfit);
+    }
+    return best;
+  }
+
   Speed speed(const std::vector<Track>& tracks) const {
     std::vector<const Track*> all;
     for (const Track& t : tracks) all.push_back(&t);
     Speed s;
-    s.value = std::sqrt(speed2(all));
+    s.value = speedOf(all);
     // Jackknife over poses; a lone one is known to a factor of two.
     double variance = 0;
     for (std::size_t i = 0; all.size() > 2 && i < all.size(); ++i) {
       std::vector<const Track*> rest = all;
       rest.erase(rest.begin() + static_cast<long>(i));
-      variance += std::pow(std::sqrt(speed2(rest)) - s.value, 2);
+      variance += std::pow(speedOf(rest) - s.value, 2);
     }
     const double half = all.size() > 2 ? 1.96 * std::sqrt(variance * (all.size() - 1.0) / all.size()) : s.value;
     s.low = std::max(0.0, s.value - half);
