@@ -11,8 +11,8 @@ namespace {
 constexpr double kGrid_m = 0.1;
 constexpr double kNearest_m = 0.4;
 constexpr double kWidest_sine = 0.95;
-constexpr double kSizes_m[] = {0.04, 0.15, 0.5};  // diameters that are tried
-constexpr int kSizes = 3;
+constexpr double kSizes_m[] = {0.04, 0.15, 0.3, 0.5};  // diameters that are tried
+constexpr int kSizes = 4;
 constexpr double kWide_m[] = {0.12, 0.25};  // radii of something wide
 constexpr double kApart_m = 0.5;
 constexpr std::size_t kMostPlaces = 4;
@@ -48,19 +48,20 @@ std::vector<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& mo
       const Eigen::Vector3d way = T.inverse() * point;
       const double r = way.norm();
       if (r < kNearest_m || way.x() <= 0 || std::abs(way.y()) > kWidest_sine * r) continue;
-      const int bin = static_cast<int>(std::lround(r / radar.range_bin_m()));
-      if (bin < model.firstBin() || bin >= samples) continue;
-      if (!twin.rays().visible(T.translation(), point)) continue;
       for (int k = 0; k < channels; ++k) v[k] = std::polar(1.0, -wave * radar.virtual_element_m(k).y() * way.y() / r);
-      const SessionModel::Whitened& cell = cells[i][static_cast<std::size_t>(bin)];
-      const double w = hannResponse(bin - r / radar.range_bin_m());
-      // Of a metal cylinder: (lambda/(8 pi r))^2 a/(a + r).
-      const double level = radar.wavelength_m() / (8 * M_PI * r);
-      const double noise = v.dot(cell.inverse * v).real(), found = std::norm(v.dot(cell.solved));
       for (int k = 0; k < kSizes; ++k) {
-        const double radius_m = 0.5 * kSizes_m[k];
-        const double power = gain * w * w * level * level * radius_m / (radius_m + r);
-        gained(data.poses[i].location, k) += model.gainOfPoint(cell, power, noise, found);
+        // The line of a cylinder that faces the radar echoes.
+        const double radius_m = 0.5 * kSizes_m[k], near_m = r - radius_m;
+        const int bin = static_cast<int>(std::lround(near_m / radar.range_bin_m()));
+        if (near_m < kNearest_m || bin < model.firstBin() || bin >= samples) continue;
+        if (!twin.rays().visible(T.translation(), T.translation() + near_m / r * (point - T.translation()))) continue;
+        const SessionModel::Whitened& cell = cells[i][static_cast<std::size_t>(bin)];
+        const double w = hannResponse(bin - near_m / radar.range_bin_m());
+        // Of a metal cylinder: (lambda/(8 pi r))^2 a/(a + r).
+        const double level = radar.wavelength_m() / (8 * M_PI * near_m);
+        const double power = gain * w * w * level * level * radius_m / (radius_m + near_m);
+        gained(data.poses[i].location, k) +=
+            model.gainOfPoint(cell, power, v.dot(cell.inverse * v).real(), std::norm(v.dot(cell.solved)));
       }
     }
     for (int k = 0; k < kSizes; ++k) {

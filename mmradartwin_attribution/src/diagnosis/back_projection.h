@@ -9,12 +9,12 @@ namespace mmradartwin {
 
 /// A place in the room whose echo the model lacks.
 struct ProjectedPlace {
-  double x_m = 0, y_m = 0;  ///< map
-  double promised = 0;      ///< nats that a point there explains, less those of the place that sees it best
+  double x_m = 0, y_m = 0;  ///< map, its axis
+  double promised = 0;      ///< nats that it explains, less those of the place that sees it best
   double size_m = 0;        ///< diameter of an upright metal cylinder of that level, of a few
 };
 
-/// One more point scatterer at every place of a grid over the scene, all poses together and nothing refitted; the best
+/// One more upright cylinder at every place of a grid over the scene, all poses together and nothing refitted; the best
 /// places that lie apart, best first.
 std::vector<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& model, const ModelState& null);
 /// The hypothesis of an object at that very place, its size free.
