@@ -273,33 +273,41 @@ std::vector<std::vector<int>> growRegions(const ActorMesh& mesh, const FacetTole
   return regions;
 }
 
+/// Facets of one actor, behind those that are there.
+void buildFacets(Scene& scene, int index) {
+  Actor& actor = scene.actors[static_cast<std::size_t>(index)];
+  actor.facets.clear();
+  actor.bounds.setEmpty();
+  for (const auto& p : actor.vertices) actor.bounds.extend(p);
+  actor.triangle_facet.assign(actor.triangles.size(), -1);
+  const ActorMesh mesh = prepare(actor);
+  for (const std::vector<int>& members : growRegions(mesh, scene.tolerance)) {
+    Facet facet = makeFacet(mesh, members);
+    if (facet.loops.empty()) continue;
+    facet.actor = index;
+    facet.id = static_cast<int>(scene.facets.size());
+    facet.present = actor.present;
+    for (int t : members) actor.triangle_facet[t] = facet.id;
+    actor.facets.push_back(facet.id);
+    scene.facets.push_back(std::move(facet));
+  }
+  if (actor.facets.empty()) {
+    throw InputError(scene.file + ": actor " + actor.name + " has no triangle with an area; remove or repair it");
+  }
+  findCurvedSurfaces(scene, index, mesh.weld);
+}
+
 }  // namespace
 
 void rebuildFacets(Scene& scene) {
   scene.facets.clear();
   scene.curved.clear();
-  for (std::size_t a = 0; a < scene.actors.size(); ++a) {
-    Actor& actor = scene.actors[a];
-    actor.facets.clear();
-    actor.bounds.setEmpty();
-    for (const auto& p : actor.vertices) actor.bounds.extend(p);
-    actor.triangle_facet.assign(actor.triangles.size(), -1);
-    const ActorMesh mesh = prepare(actor);
-    for (const std::vector<int>& members : growRegions(mesh, scene.tolerance)) {
-      Facet facet = makeFacet(mesh, members);
-      if (facet.loops.empty()) continue;
-      facet.actor = static_cast<int>(a);
-      facet.id = static_cast<int>(scene.facets.size());
-      facet.present = actor.present;
-      for (int t : members) actor.triangle_facet[t] = facet.id;
-      actor.facets.push_back(facet.id);
-      scene.facets.push_back(std::move(facet));
-    }
-    if (actor.facets.empty()) {
-      throw InputError(scene.file + ": actor " + actor.name + " has no triangle with an area; remove or repair it");
-    }
-    findCurvedSurfaces(scene, static_cast<int>(a), mesh.weld);
-  }
+  for (std::size_t a = 0; a < scene.actors.size(); ++a) buildFacets(scene, static_cast<int>(a));
+}
+
+void addActor(Scene& scene, Actor actor) {
+  scene.actors.push_back(std::move(actor));
+  buildFacets(scene, static_cast<int>(scene.actors.size()) - 1);
 }
 
 void moveActor(Scene& scene, int index, const Eigen::Isometry3d& T) {

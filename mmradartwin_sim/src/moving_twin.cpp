@@ -133,7 +133,7 @@ void MovingTwin::trace(const PoseContext& context, const SceneChange* change) {
       part.sum.setZero(context.radar.channels(), context.radar.samples_per_chirp);
     }
     const std::size_t kept = records.size();
-    if (!mechanism.needsStrongestAmplitude()) mechanism.addPaths(c, records);
+    if (!mechanism.needsStrongestAmplitude()) m.addPaths(mechanism, c, records);
     m.reweight(c, records, kept);
     found_ += records.size() - kept;
     part.begin = begin;

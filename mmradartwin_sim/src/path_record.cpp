@@ -106,9 +106,9 @@ void writePathsCsv(const std::vector<PathRecord>& records, const Scene& scene, c
         << degrees(std::atan2(r.arrival.y(), r.arrival.x())) << ','
         << degrees(std::asin(std::min(1.0, std::max(-1.0, r.arrival.z())))) << ',' << 20 * std::log10(r.amplitude)
         << ',' << std::setprecision(6) << r.phase_rad << ',' << r.bounces << ',' << *r.event << ',';
-    for (std::size_t i = 0; i < r.actors.size(); ++i) out << (i ? ";" : "") << scene.actors[r.actors[i]].name;
+    for (std::size_t i = 0; i < r.actors.size(); ++i) out << (i ? ";" : "") << scene.actorOf(r.actors[i]).name;
     out << ',';
-    for (std::size_t i = 0; i < r.actors.size(); ++i) out << (i ? ";" : "") << scene.actors[r.actors[i]].material_tag;
+    for (std::size_t i = 0; i < r.actors.size(); ++i) out << (i ? ";" : "") << scene.actorOf(r.actors[i]).material_tag;
     out << '\n';
   }
   out.close();

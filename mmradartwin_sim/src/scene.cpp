@@ -41,6 +41,15 @@ int Scene::actorIndex(const std::string& name) const {
   return -1;
 }
 
+const Actor& Scene::actorOf(int index) const {
+  static const Actor* unmodelled = [] {
+    Actor* actor = new Actor;
+    actor->name = "actor_unmodelled";
+    return actor;
+  }();
+  return index < 0 ? *unmodelled : actors.at(static_cast<std::size_t>(index));
+}
+
 Scene loadScene(const std::string& scene_yaml, double frequency_hz) {
   YamlMap yaml = YamlMap::load(scene_yaml);
   Scene scene;

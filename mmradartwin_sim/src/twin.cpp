@@ -243,7 +243,7 @@ std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar, std::i
   impl_->refuseUnusablePose(c);
   std::vector<PathRecord> records;
   for (const auto& m : impl_->mechanisms) {
-    if (!m->needsStrongestAmplitude()) m->addPaths(c, records);
+    if (!m->needsStrongestAmplitude()) impl_->addPaths(*m, c, records);
   }
   return records;
 }
@@ -259,7 +259,7 @@ void Twin::Impl::addRelativePaths(const PoseContext& c, std::vector<PathRecord>&
     raise(strongest_so_far, strongestOf(c, records));
     const std::size_t echoes = records.size();
     for (const auto& m : mechanisms) {
-      if (m->needsStrongestAmplitude()) m->addPaths(c, records);
+      if (m->needsStrongestAmplitude()) addPaths(*m, c, records);
     }
     reweight(c, records, echoes);
   }

@@ -34,6 +34,16 @@ struct Twin::Impl {
   /// Makes the mechanisms of the description and all that follows from them; scene and rays are there.
   void assemble();
 
+  /// The mechanism's paths. What it meets that a mechanism put into the room has no index that others know: it is -1.
+  void addPaths(const Mechanism& mechanism, const PoseContext& c, std::vector<PathRecord>& records) const {
+    const std::size_t known = records.size();
+    mechanism.addPaths(c, records);
+    if (model().actors.size() == scene.actors.size()) return;
+    for (std::size_t i = known; i < records.size(); ++i) {
+      for (int& actor : records[i].actors) actor = actor < static_cast<int>(scene.actors.size()) ? actor : -1;
+    }
+  }
+
   const Scene& model() const { return edited ? *edited : scene; }
   const RayCaster& modelRays() const { return edited_rays ? *edited_rays : *rays; }
 

@@ -322,6 +322,52 @@ TEST_F(Propagation, SomethingUnmodelledIsACylinder) {
   EXPECT_EQ(of(run("  specular: {}\n  actor_unmodelled: {x_m: 3, y_m: 2, size_m: 0.1}\n"), "specular").size(), 1u);
 }
 
+// A box that a mechanism puts into the room does what the same box as an actor of the scene does, path by path.
+TEST_F(Propagation, ABoxUnmodelledIsLikeOneInTheScene) {
+  addWall("wall", "Metal", {4, -3}, {4, 3}, -2, 2);
+  addWall("side", "Metal", {0.5, 2.5}, {6, 2.5}, -2, 2);
+  writeScene();
+  const std::string base = "  specular: {max_bounces: 2}\n  corner: {}\n  edge_diffraction: {level: 1}\n";
+  const std::size_t without = run(base).records.size();
+  const std::string box = "  actor_unmodelled: {shape: box, size_m: 0.4, bottom_m: -1, height_m: 2, ";
+  const std::string square = box + "x_m: 2.2, y_m: 0.05, yaw_deg: 0}\n";
+  const std::vector<PathRecord> put = run(base + square).records;
+  // Facing: its face 2 m off, at the level of its image; nothing of the wall behind it.
+  const auto facing = std::find_if(put.begin(), put.end(), [](const PathRecord& r) {
+    return *r.event == "specular" && std::abs(r.length_m[0] - 4) < 1e-3;
+  });
+  ASSERT_NE(facing, put.end());
+  EXPECT_EQ(facing->actors, std::vector<int>{-1});
+  EXPECT_TRUE(std::none_of(put.begin(), put.end(), [](const PathRecord& r) {
+    return *r.event == "specular" && std::abs(r.length_m[0] - 8) < 1e-3;
+  }));
+  // Turned, it sends its echo elsewhere: less than a hundredth of its power is left.
+  for (const PathRecord& r : run("  specular: {max_bounces: 1}\n" + box + "x_m: 2.2, y_m: 0, yaw_deg: 30}\n").records) {
+    EXPECT_TRUE(r.length_m[0] > 4.5 || r.amplitude < 0.1 * facing->amplitude) << r.length_m[0];
+  }
+  EXPECT_THROW(run(base + "  actor_unmodelled: {shape: ball, x_m: 2, y_m: 0, size_m: 0.4}\n"), InputError);
+
+  addWall("wall", "Metal", {4, -3}, {4, 3}, -2, 2);
+  addWall("side", "Metal", {0.5, 2.5}, {6, 2.5}, -2, 2);
+  addBox("box", "Metal", V(2.0, -0.15, -1), V(2.4, 0.25, 1));
+  writeScene();
+  const std::vector<PathRecord> there = run(base).records;
+  ASSERT_EQ(put.size(), there.size());
+  EXPECT_NE(put.size(), without);
+  const auto sorted = [](std::vector<PathRecord> records) {
+    std::sort(records.begin(), records.end(), [](const PathRecord& a, const PathRecord& b) {
+      return std::make_pair(a.length_m[0], a.departure.y()) < std::make_pair(b.length_m[0], b.departure.y());
+    });
+    return records;
+  };
+  const std::vector<PathRecord> a = sorted(put), b = sorted(there);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(*a[i].event, *b[i].event);
+    EXPECT_NEAR(a[i].length_m[0], b[i].length_m[0], 1e-9);
+    EXPECT_NEAR(a[i].amplitude, b[i].amplitude, 1e-9 * b[i].amplitude);
+  }
+}
+
 TEST_F(Propagation, ACornerOfNamedActorsIsFoundAcrossAGap) {
   addWall("wall", "Metal", {4, -3}, {4, 3}, -2, 2);
   addBox("cabinet", "Metal", V(2.5, 1, -2), V(3.96, 2, 2));

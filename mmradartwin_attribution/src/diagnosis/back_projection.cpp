@@ -20,6 +20,12 @@ constexpr double kNearby_m = 0.6, kLargest_m = 2.5;  // of an actor that may hav
 
 }  // namespace
 
+Eigen::Vector2d awayFromRadar(const ChannelData& data, const Eigen::Vector2d& place) {
+  Eigen::Vector2d radar = Eigen::Vector2d::Zero();
+  for (const PoseChannels& p : data.poses) radar += p.pose.T_map_radar.translation().head<2>();
+  return (place - radar / static_cast<double>(data.poses.size())).normalized();
+}
+
 std::vector<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& model, const ModelState& null) {
   const ChannelData& data = model.data();
   const RadarConfig& radar = data.radar;
@@ -103,9 +109,7 @@ void freePlace(const ChannelData& data, Screened& object) {
     for (std::vector<double>& start : object.starts) start.insert(start.begin(), 0.0);
   }
   // What echoes is the side that faces the radar: of something wide the axis stands behind it.
-  Eigen::Vector2d radar = Eigen::Vector2d::Zero();
-  for (const PoseChannels& p : data.poses) radar += p.pose.T_map_radar.translation().head<2>();
-  const Eigen::Vector2d away = (place - radar / static_cast<double>(data.poses.size())).normalized();
+  const Eigen::Vector2d away = awayFromRadar(data, place);
   for (double radius_m : kWide_m) {
     const Eigen::Vector2d axis = place + radius_m * away;
     object.starts.push_back(

@@ -14,6 +14,8 @@ struct ProjectedPlace {
   double size_m = 0;        ///< diameter of an upright metal cylinder of that level, of a few
 };
 
+/// Unit vector in map's plane from where the radar was on average to a place.
+Eigen::Vector2d awayFromRadar(const ChannelData& data, const Eigen::Vector2d& place);
 /// One more upright cylinder at every place of a grid over the scene, all poses together and nothing refitted; the best
 /// places that lie apart, best first.
 std::vector<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& model, const ModelState& null);
@@ -21,7 +23,6 @@ std::vector<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& mo
 Hypothesis objectAt(const ProjectedPlace& place);
 /// Lets the place of objectAt() be fitted, too, from where it is and from behind it, as seen from where the radar was.
 void freePlace(const ChannelData& data, Screened& object);
-
 /// Of the actors that can be moved at all, by their size, the index of the one that stands nearest to a place; -1 where
 /// none stands near.
 int nearestObject(const Scene& scene, double x_m, double y_m);

@@ -28,6 +28,7 @@
 #include "replica_screen.h"
 #include "session_model.h"
 #include "shared_latents.h"
+#include "unmodelled_box.h"
 
 namespace mmradartwin {
 namespace {
@@ -48,6 +49,7 @@ constexpr double kWorthAFit = 4;  ///< nats promised
 constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kWorthALaw = 12;
 constexpr double kWorthAnObject = 3;       ///< at the best of all places
+constexpr double kWorthABox = 15;          ///< nats of a round one there
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
 constexpr double kMostLost = 0.01;         ///< of the explained power, by what the likelihood plainly gains of;
 // unless it is worth so many nats, inflation taken off. Of 20 sessions with nothing hidden (office tier, 24 poses at 17
@@ -333,7 +335,8 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   const auto isObject = [](const Hypothesis& h) { return h.mechanism.mechanism == "actor_unmodelled"; };
   std::vector<HypothesisFit> fits;
   std::size_t names_fitted = 0, laws_fitted = 0;
-  for (const Screened& s : screened) {
+  for (std::size_t i = 0; i < screened.size(); ++i) {
+    const Screened s = screened[i];
     TriedHypothesis tried;
     tried.label = s.hypothesis.label();
     tried.promised = s.promised;
@@ -348,12 +351,16 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
                          : s.hypothesis.isGeometry() || moved ? kWorthAFitOfGeometry
                                                               : kWorthAFit;
     // Where an actor went is known by the fit alone: what little the quadratic promises does not rank it.
-    const std::size_t most = law ? kMostLaws : moved ? kMostNames + kMostOutOfPlace : kMostNames;
+    const bool box = isUnmodelledBox(s.hypothesis);
+    const std::size_t most = law ? kMostLaws : moved || box ? kMostNames + kMostOutOfPlace : kMostNames;
     if (s.promised > worth && fitted < most) {
       ++fitted;
       report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
-      fits.push_back(fitter_->fit(state_, s.hypothesis, s.starts, 4));
+      fits.push_back(box ? fitBox(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
       source_->settle(mechanisms_);
+      if (isObject(s.hypothesis) && !box && fits.back().broad_gain > kWorthABox) {
+        screened.insert(screened.begin() + static_cast<std::ptrdiff_t>(i) + 1, asBox(data_, state_, fits.back()));
+      }
       // What latents bring that the fit has found, and the twin as it is had not, is nobody's gain.
       if (std::optional<ModelState> better = fitter_->improved(state_, fits.back().state.nuisance)) {
         const double nats = better->log_likelihood - state_.log_likelihood;

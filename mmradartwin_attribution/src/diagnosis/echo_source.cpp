@@ -210,7 +210,12 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
     if (!geometry.empty()) {
       cells.side = [&](const Eigen::Vector3d& p) { return base_.rays().visible(T.translation(), p, 1e-3); };
     }
-    std::vector<PathRecord> records = twin.trace(T, 0, &cells);
+    std::vector<PathRecord> records;
+    try {
+      records = twin.trace(T, 0, &cells);
+    } catch (const InputError&) {
+      // What is tried stands where the radar stood, which therefore sees nothing.
+    }
     // Paths of the other mechanisms (an unmodelled actor's echo) are theirs, not this one's.
     records.erase(std::remove_if(records.begin(), records.end(),
                                  [&](const PathRecord& r) {

@@ -13,8 +13,8 @@ namespace mmradartwin {
 /// One propagation path (DESIGN sections 3 to 5).
 struct PathRecord {
   const std::string* event = nullptr;     ///< name of the mechanism that made it (interned, never null in a result)
-  std::vector<int> actors;                ///< Scene::actors index, one per interaction
-  std::vector<int> facets;                ///< Scene::facets index or -1, one per interaction
+  std::vector<int> actors;                ///< Scene::actors index, one per interaction; -1: what the scene lacks
+  std::vector<int> facets;                ///< index into the facets that were traced or -1, one per interaction
   std::vector<Eigen::Vector3d> vertices;  ///< map, one per interaction
   /// |cos| of the angle of incidence that each interaction's coefficient was taken at, -1 where it is no reflection;
   /// empty where none is: what a mechanism of weight needs of the geometry.

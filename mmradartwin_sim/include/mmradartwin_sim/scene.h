@@ -76,6 +76,8 @@ struct Scene {
   std::vector<Actor> screens;  ///< what mechanisms put into the room: they occlude, nothing else
 
   int actorIndex(const std::string& name) const;  ///< -1 where absent
+  /// The actor of a path record's index; of -1 one that stands for what mechanisms put into the room.
+  const Actor& actorOf(int index) const;
 };
 
 /// Reads scene.yaml strictly, its meshes (assimp) and materials, and builds facets. Throws InputError naming file and
@@ -85,6 +87,8 @@ Scene loadScene(const std::string& scene_yaml, double frequency_hz);
 /// Facets and curved surfaces of all actors, ids in the order of actors and triangles. Throws InputError for an actor
 /// without area.
 void rebuildFacets(Scene& scene);
+/// One more actor behind the others, with its facets, whatever was done to the others since. Throws as rebuildFacets().
+void addActor(Scene& scene, Actor actor);
 /// Moves an actor with its facets; indices and facet-local coordinates stay.
 void moveActor(Scene& scene, int actor, const Eigen::Isometry3d& T_map_map);
 /// Takes an actor out of paths and occlusion; indices stay.

@@ -60,7 +60,7 @@ class EmpiricalLaw : public Mechanism {
   void reweight(const PoseContext& context, PathRecord& record) const override {
     if (!event_.empty() && *record.event != event_) return;
     if (!affected_.empty() &&
-        std::none_of(record.actors.begin(), record.actors.end(), [this](int a) { return affected_[a]; })) {
+        std::none_of(record.actors.begin(), record.actors.end(), [this](int a) { return a >= 0 && affected_[a]; })) {
       return;
     }
     const LawVariable::Values x = variable_->of(

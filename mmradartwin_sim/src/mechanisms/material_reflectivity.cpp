@@ -41,7 +41,7 @@ class MaterialReflectivity : public Mechanism {
   void reweight(const PoseContext&, PathRecord& record) const override {
     double factor = 1;
     for (int actor : record.actors) {
-      if (actor < static_cast<int>(affected_.size()) && affected_[actor]) factor *= factor_;
+      if (actor >= 0 && affected_[actor]) factor *= factor_;
     }
     if (factor != 1) scaleRecord(factor, record);
   }

@@ -25,7 +25,7 @@ class SurfaceRoughness : public Mechanism {
     double factor = 1;
     for (std::size_t i = 0; i < record.reflection_cosine.size(); ++i) {
       const double cosine = record.reflection_cosine[i];
-      if (cosine < 0 || !rough_[record.actors[i]]) continue;
+      if (cosine < 0 || record.actors[i] < 0 || !rough_[record.actors[i]]) continue;
       factor *= roughnessLoss(roughness_rms_m_, cosine, context.frequency_hz);
     }
     if (factor != 1) scaleRecord(factor, record);

@@ -36,8 +36,8 @@ mmradartwin_msgs::PathRecords toMsg(const Simulation& simulation, const std::vec
     mmradartwin_msgs::PathRecord& m = msg.records[i];
     m.event = *r.event;
     for (int actor : r.actors) {
-      m.actors.push_back(scene.actors[actor].name);
-      m.materials.push_back(scene.actors[actor].material_tag);
+      m.actors.push_back(scene.actorOf(actor).name);
+      m.materials.push_back(scene.actorOf(actor).material_tag);
     }
     for (const auto& v : r.vertices) m.vertices.push_back(pointMsg(v));
     m.departure = vectorMsg(r.departure);

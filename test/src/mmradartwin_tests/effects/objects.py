@@ -68,19 +68,21 @@ class ActorUnmodelled(Effect):
     """An object in the room that the scene lacks: an upright cylinder (size_m: diameter) or a turned box (side)."""
     name, rank = "actor_unmodelled", 0
     main = "size_m"
-    defaults = {"x_m": None, "y_m": None, "size_m": 0.3, "shape": "cylinder", "material": "Metal", "height_m": 1.7}
+    defaults = {"x_m": None, "y_m": None, "size_m": 0.3, "shape": "cylinder", "material": "Metal", "height_m": 1.7,
+                "yaw_deg": None}
 
     def prepare(self, measurement):
         if self.p["shape"] not in ("cylinder", "box"):
             raise ValueError(f"actor_unmodelled: shape {self.p['shape']}; cylinder or box")
         if self.p["x_m"] is None or self.p["y_m"] is None:
             self.p["x_m"], self.p["y_m"] = free_spot(measurement, 0.25 + self.p["size_m"] / 2, 130)
+        if self.p["yaw_deg"] is None:
+            self.p["yaw_deg"] = 360 * measurement.rng(131).random()
 
     def room(self, measurement, actors, materials):
         center = (self.p["x_m"], self.p["y_m"], 0.01 + self.p["height_m"] / 2)
         if self.p["shape"] == "box":
-            part = box(center, (self.p["size_m"], self.p["size_m"], self.p["height_m"]),
-                       360 * measurement.rng(131).random())
+            part = box(center, (self.p["size_m"], self.p["size_m"], self.p["height_m"]), self.p["yaw_deg"])
         else:
             part = Cylinder(np.array(center), self.p["size_m"] / 2, self.p["height_m"])
         return actors + [Actor("object", self.p["material"], [part])], materials
@@ -93,7 +95,8 @@ class ActorUnmodelled(Effect):
             echoes.add([path] if path else [])
 
     def truth(self, measurement):
-        return {key: self.p[key] for key in ("x_m", "y_m", "size_m")}
+        told = ("x_m", "y_m", "size_m") + (("shape", "yaw_deg") if self.p["shape"] == "box" else ())
+        return {key: self.p[key] for key in told}
 
 
 @effect

@@ -1,0 +1,99 @@
+#include "unmodelled_box.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "back_projection.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kSides_m[] = {0.25, 0.45};
+constexpr double kTurned_deg = 15, kSquare_deg = 90;  // ways in which it may stand, and when they are the same again
+constexpr std::size_t kFacing = 3;                    // poses that a side of it may face
+constexpr double kGrown[] = {0.6, 0.8, 1.25, 1.6};    // of a side
+constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1}, kTurns_deg[] = {-8, -3, 3, 8};
+constexpr int kSweeps = 4;
+constexpr double kHigher = 5;  // nats of a sweep that are worth another
+
+enum Coordinates { kX, kY, kSide, kYaw };
+
+/// Boxes that share something with the one that was fitted, as scaled coordinates.
+std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
+  const std::vector<Coordinate>& c = fit.hypothesis.coordinates;
+  const Eigen::Vector2d center(c[kX].value(fit.scaled[kX]), c[kY].value(fit.scaled[kY]));
+  const double side_m = c[kSide].value(fit.scaled[kSide]), yaw_deg = c[kYaw].value(fit.scaled[kYaw]);
+  const double yaw_rad = yaw_deg * M_PI / 180;
+  const Eigen::Vector2d u(std::cos(yaw_rad), std::sin(yaw_rad)), v(-u.y(), u.x());
+  std::vector<std::vector<double>> boxes;
+  const auto add = [&](const Eigen::Vector2d& at, double size_m, double turned_deg) {
+    boxes.push_back({c[kX].scaled(at.x()), c[kY].scaled(at.y()), c[kSide].scaled(size_m), c[kYaw].scaled(turned_deg)});
+  };
+  for (double grown : kGrown) {
+    const double half_m = 0.5 * (grown - 1) * side_m;
+    for (int i : {-1, 0, 1}) {
+      for (int j : {-1, 0, 1}) add(center + half_m * (i * u + j * v), grown * side_m, yaw_deg);
+    }
+  }
+  for (double shift_m : kShifts_m) {
+    add(center + shift_m * u, side_m, yaw_deg);
+    add(center + shift_m * v, side_m, yaw_deg);
+  }
+  for (double turn_deg : kTurns_deg) add(center, side_m, yaw_deg + turn_deg);
+  return boxes;
+}
+
+}  // namespace
+
+bool isUnmodelledBox(const Hypothesis& hypothesis) {
+  return hypothesis.mechanism.mechanism == "actor_unmodelled" && hypothesis.mechanism.values.text("shape") == "box";
+}
+
+Screened asBox(const ChannelData& data, const ModelState& null, const HypothesisFit& cylinder) {
+  Screened box{cylinder.hypothesis, cylinder.gain, {}};
+  Hypothesis& h = box.hypothesis;
+  h.mechanism = h.at(cylinder.scaled);
+  h.mechanism.values.set("shape", std::string("box"));
+  h.subject = "a box";
+  const Eigen::Vector2d axis(h.mechanism.values.number("x_m"), h.mechanism.values.number("y_m"));
+  h.coordinates = {{"x_m", "m", -1, axis.x(), axis.x() + 0.1, -1000, 1000, {}},
+                   {"y_m", "m", -1, axis.y(), axis.y() + 0.1, -1000, 1000, {}},
+                   {"size_m", "m", -1, 0, kSides_m[0], 0.02, 5, {}},
+                   {"yaw_deg", "deg", -1, 0, kTurned_deg, -360, 360, {}}};
+  std::vector<double> yaws_deg;
+  for (double yaw_deg = 0; yaw_deg < kSquare_deg; yaw_deg += kTurned_deg) yaws_deg.push_back(yaw_deg);
+  // Poses that see most of it may be those that a side faces.
+  std::vector<std::pair<double, std::size_t>> seen;
+  for (std::size_t i = 0; i < data.poses.size(); ++i) seen.emplace_back(null.by_pose[i] - cylinder.state.by_pose[i], i);
+  std::sort(seen.begin(), seen.end());
+  seen.resize(std::min(kFacing, seen.size()));
+  for (const auto& [gain, i] : seen) {
+    const Eigen::Vector2d way = data.poses[i].pose.T_map_radar.translation().head<2>() - axis;
+    yaws_deg.push_back(std::fmod(std::atan2(way.y(), way.x()) * 180 / M_PI + 360, kSquare_deg));
+  }
+  const Eigen::Vector2d away = awayFromRadar(data, axis);
+  const double radius_m = 0.5 * h.mechanism.values.number("size_m");
+  for (double side_m : kSides_m) {
+    const Eigen::Vector2d center = axis + (0.5 * side_m - radius_m) * away;
+    for (double yaw_deg : yaws_deg) {
+      box.starts.push_back({h.coordinates[0].scaled(center.x()), h.coordinates[1].scaled(center.y()),
+                            h.coordinates[2].scaled(side_m), h.coordinates[3].scaled(yaw_deg)});
+    }
+  }
+  return box;
+}
+
+HypothesisFit fitBox(HypothesisFitter& fitter, const ModelState& null, const Screened& box) {
+  HypothesisFit best = fitter.fit(null, box.hypothesis, box.starts, 4);
+  ModelState from = null;
+  for (int i = 0; i < kSweeps; ++i) {
+    from.nuisance = best.state.nuisance;
+    HypothesisFit other = fitter.fit(from, box.hypothesis, boxesAround(best), 4);
+    const double higher = other.gain - best.gain;
+    if (higher > 0) best = std::move(other);
+    if (higher < kHigher) break;
+  }
+  return best;
+}
+
+}  // namespace mmradartwin
