@@ -268,7 +268,13 @@ TEST_F(FrameEvidenceTest, ToneOfTheRadarIsNoWalkerAndNoSlip) {
     });
     EXPECT_TRUE(causes(examiner.findings()).empty()) << level << ": " << causes(examiner.findings())[0];
     ASSERT_EQ(examiner.unexplained().size(), 1u) << level;
-    EXPECT_EQ(examiner.unexplained()[0].poses.size(), poses_.size());
+    const FrameFinding tone = examiner.unexplained()[0];
+    EXPECT_EQ(tone.poses.size(), poses_.size());
+    const double bin_hz = radar_.sample_rate_hz / radar_.samples_per_chirp;
+    EXPECT_NEAR(tone.mechanism->values.number("beat_hz"), 2.9 / (2 * M_PI) * radar_.sample_rate_hz, 0.2 * bin_hz);
+    EXPECT_NEAR(tone.mechanism->values.number("level_db"), 20 * std::log10(level), 1.5);
+    EXPECT_NEAR(tone.mechanism->values.number("azimuth_deg"), 0, 1);
+    for (const auto& [pose, nats] : tone.held_out_nats) EXPECT_GT(nats, 10) << pose;
   }
 }
 
@@ -278,8 +284,14 @@ TEST_F(FrameEvidenceTest, GainThatSettlesIsSaidWhateverItsSize) {
         12000, [&](const Pose&, int f, ComplexGrid& x) { x *= std::pow(10.0, -loss_db * std::exp(-f / 8.0) / 20); });
     EXPECT_TRUE(causes(examiner.findings()).empty()) << loss_db << ": " << causes(examiner.findings())[0];
     ASSERT_EQ(examiner.unexplained().size(), 1u) << loss_db;
-    EXPECT_NE(examiner.unexplained()[0].description.find("lowest in frame 0"), std::string::npos)
-        << examiner.unexplained()[0].description;
+    const FrameFinding gain = examiner.unexplained()[0];
+    EXPECT_NE(gain.description.find("lowest in frame 0"), std::string::npos) << gain.description;
+    const std::vector<double> gain_db = gain.mechanism->values.numbers("gain_db");
+    const double frames = static_cast<double>(gain_db.size());
+    EXPECT_NEAR(gain_db.front() - gain_db.back(), -loss_db * (1 - std::exp(-(frames - 1) / 8)), 0.02 + 0.05 * loss_db);
+    double nats = 0;
+    for (const auto& [pose, own] : gain.held_out_nats) nats += own;
+    EXPECT_GT(nats, 0);
   }
 }
 

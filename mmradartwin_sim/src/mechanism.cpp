@@ -96,6 +96,8 @@ MechanismRegistry& MechanismRegistry::instance() {
     r.add("moving_target", makeMovingTarget);
     r.add("phase_noise", makePhaseNoise);
     r.add("phase_drift", makePhaseDrift);
+    r.add("empirical_frame_gain", makeEmpiricalFrameGain);
+    r.add("empirical_tone", makeEmpiricalTone);
     r.add("interference", makeInterference);
     r.add("noise_floor", makeNoiseFloor);
     r.add("adc_saturation", makeAdcSaturation);

@@ -140,6 +140,26 @@ TEST_F(FramesTest, DriftOfPhaseTakesFromTheAverage) {
   }
 }
 
+TEST_F(FramesTest, WhatFramesShowWithoutACauseIsPlayedAgain) {
+  const auto plain = frames("", 4), settled = frames("  empirical_frame_gain: {gain_db: [-6, -3, 0]}\n", 4);
+  const auto level = [](const AdcCube& cube) {
+    double sum = 0;
+    for (std::int16_t v : cube.data) sum += static_cast<double>(v) * v;
+    return std::sqrt(sum);
+  };
+  const std::vector<double> gain_db = {-6, -3, 0, 0};
+  for (std::size_t f = 0; f < 4; ++f) {
+    EXPECT_NEAR(db(level(settled[f]) / level(plain[f])), gain_db[f], 0.02) << f;
+  }
+  // A tone of the echo's level adds its power to each frame, and next to nothing to what frames have in common.
+  const auto toned = frames("  empirical_tone: {beat_hz: 2.31e6, level_db: 0}\n", 40), still = frames("", 40);
+  CoherentAverage with(paperRadar(), 0), without(paperRadar(), 0);
+  for (const AdcCube& c : toned) with.add(c);
+  for (const AdcCube& c : still) without.add(c);
+  EXPECT_NEAR(db(level(toned[0]) / level(still[0])), 3.0, 0.6);
+  EXPECT_LT((with.grid().x - without.grid().x).norm(), 0.4 * without.grid().x.norm());
+}
+
 TEST_F(FramesTest, NoiseHasTheLevelThatTheTwinStates) {
   for (const auto& [m, level] :
        {std::pair{std::string("level_dbfs: -50"), -50.0}, {std::string("level_dbfs: -46, delta_db: 6"), -40.0}}) {

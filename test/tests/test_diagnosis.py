@@ -1,5 +1,6 @@
 """Hides effects in measured sessions and requires the diagnosis to find them, or nothing where nothing is hidden."""
 import json
+import math
 import os
 import subprocess
 import tempfile
@@ -122,7 +123,15 @@ class HiddenEffects(unittest.TestCase):
         status, findings, errors = diagnose(self.at("session"), self.at("out"))
         self.assertEqual(status, 0, msg=errors)
         self.assertEqual([f["cause"] for f in findings["findings"]], ["unknown"], msg=f"seed {seed}")
-        self.assertIn("level of frames", findings["findings"][0]["description"])
+        first = findings["findings"][0]
+        self.assertIn("level of frames", first["description"])
+        # Weaker by 10 dB exp(-frame/15).
+        gain_db = first["mechanism"]["empirical_frame_gain"]["gain_db"]
+        self.assertEqual(len(gain_db), 20, msg=f"seed {seed}")
+        self.assertAlmostEqual(gain_db[0] - gain_db[-1], -10 * (1 - math.exp(-19 / 15)), delta=0.3, msg=f"seed {seed}")
+        self.assertGreater(first["gain"]["log_likelihood_per_pose"]["difference_ci95"][0], 0, msg=f"seed {seed}")
+        with open(self.at("out/twin.extended.yaml"), encoding="ascii") as twin:
+            self.assertIn("empirical_frame_gain", twin.read())
 
     def test_edges_have_the_level_that_they_were_given(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "77"))

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +25,10 @@ struct FrameFinding {
   std::vector<std::string> poses;            ///< that carry it
   std::vector<FindingPlace> where;
   std::string description;  ///< in words and numbers
+  /// Among FrameExaminer::unexplained(): the twin's term for it (level_db over one ADC count), and the nats that it
+  /// explains at each pose, by its name, as the poses of other locations tell the term.
+  std::optional<NamedParameters> mechanism;
+  std::map<std::string, double> held_out_nats;
 };
 
 /// Channels of an echo that moves, by range and Doppler, of a radar with many loops per frame.

@@ -669,7 +669,7 @@ Diagnosis Session::run() {
     for (int round = 0; round < (few_ ? 0 : options_.most_findings); ++round) {
       if (!judgeChannels(round)) break;
     }
-    addUnexplained(received_.unexplained, findings.findings);
+    addUnexplained(received_.unexplained, data_, findings, extended_);
   }
   result_.extended = twin_.description();
   result_.extended.mechanisms = extended_;

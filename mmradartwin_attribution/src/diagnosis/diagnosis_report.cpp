@@ -106,8 +106,10 @@ std::string diagnosisText(const Diagnosis& d) {
     out << "\n";
     if (f.description) out << "   " << *f.description << "\n";
     if (f.gain) {
-      const GainMetric& e = f.gain->explained_power;
-      out << "   explained power on held-out places " << shown(e.before) << " -> " << shown(e.after);
+      const bool in_maps = !std::isnan(f.gain->explained_power.after);
+      const GainMetric& e = in_maps ? f.gain->explained_power : f.gain->log_likelihood_per_pose;
+      out << "   " << (in_maps ? "explained power" : "log-likelihood of the frames per pose") << " on held-out places "
+          << shown(e.before) << " -> " << shown(e.after);
       if (e.difference_ci95) {
         out << " (" << shown((*e.difference_ci95)[0]) << " to " << shown((*e.difference_ci95)[1]) << ")";
       }

@@ -5,6 +5,7 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <set>
 #include <sstream>
 
@@ -73,6 +74,8 @@ struct FrameExaminer::State {
   FrameFinding interference() const;
   FrameFinding drift() const;
   FrameFinding frameGain() const;
+  /// Median over poses of each frame's level, without those of one location.
+  std::vector<double> frameLevels_db(const std::string& without, std::size_t frames) const;
 };
 
 FrameExaminer::FrameExaminer(const RadarConfig& radar) : state_(std::make_unique<State>(radar)) {}
@@ -145,7 +148,9 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   result.shots = residuals.shots;
   result.moving = std::move(residuals.cells);
   s.poses.push_back(std::move(result));
-  s.motion.push_back({pose, stack.frames, std::move(residuals.evidence), std::move(residuals.echoes)});
+  const std::vector<double>& noise = s.poses.back().noise_variance;
+  s.motion.push_back({pose, stack.frames, std::move(residuals.evidence), std::move(residuals.echoes),
+                      std::accumulate(noise.begin(), noise.end(), 0.0) / static_cast<double>(noise.size())});
   s.judged.push_back(std::move(judged));
   s.located.reset();
 }
@@ -300,6 +305,21 @@ FrameFinding FrameExaminer::State::drift() const {
   return f;
 }
 
+std::vector<double> FrameExaminer::State::frameLevels_db(const std::string& without, std::size_t frames) const {
+  std::vector<double> result(frames, 0.0);
+  for (std::size_t i = 0; i < frames; ++i) {
+    std::vector<double> levels;
+    for (std::size_t j = 0; j < judged.size(); ++j) {
+      const std::vector<double>& gain_db = judged[j].frame_gain_db;
+      if (i < gain_db.size() && gain_db.size() >= 3 && (without.empty() || motion[j].pose.location != without)) {
+        levels.push_back(gain_db[i]);
+      }
+    }
+    if (!levels.empty()) result[i] = quantile(levels, 0.5);
+  }
+  return result;
+}
+
 FrameFinding FrameExaminer::State::frameGain() const {
   FrameFinding f;
   f.cause = "unknown";
@@ -309,6 +329,7 @@ FrameFinding FrameExaminer::State::frameGain() const {
   // move; it changes where it differs between frames by far more than its error over poses.
   double chi2 = 0, lowest = 0, highest = 0;
   std::size_t lowest_at = 0, highest_at = 0, counted = 0;
+  std::vector<double> scatter_db(frames, std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < frames; ++i) {
     std::vector<double> levels, apart;
     for (const PoseJudgement& p : judged) {
@@ -318,8 +339,8 @@ FrameFinding FrameExaminer::State::frameGain() const {
     const double middle = quantile(levels, 0.5);
     for (double level : levels) apart.push_back(std::abs(level - middle));
     // Of normal errors: the deviation is 1.48 times the median of sizes, the median's own 1.25 times the mean's.
-    const double error =
-        1.25 * std::max(1.48 * quantile(apart, 0.5), 1e-4) / std::sqrt(static_cast<double>(levels.size()));
+    scatter_db[i] = std::max(1.48 * quantile(apart, 0.5), 1e-4);
+    const double error = 1.25 * scatter_db[i] / std::sqrt(static_cast<double>(levels.size()));
     chi2 += std::pow(middle / error, 2);
     ++counted;
     if (middle < lowest) {
@@ -338,6 +359,16 @@ FrameFinding FrameExaminer::State::frameGain() const {
   f.log_likelihood_gain = 0.5 * (chi2 - static_cast<double>(counted));
   f.false_alarm_rate = std::exp(-0.5 * excess);
   for (const PoseJudgement& p : judged) f.poses.push_back(p.pose);
+  f.mechanism = NamedParameters{"empirical_frame_gain", {}};
+  f.mechanism->values.set("gain_db", frameLevels_db("", frames));
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    const std::vector<double> others_db = frameLevels_db(motion[i].pose.location, frames);
+    double& nats = f.held_out_nats[judged[i].pose];
+    for (std::size_t j = 0; j < judged[i].frame_gain_db.size(); ++j) {
+      const double level = judged[i].frame_gain_db[j], rest = level - others_db[j];
+      nats += 0.5 * (level * level - rest * rest) / (scatter_db[j] * scatter_db[j]);
+    }
+  }
   std::ostringstream text;
   text << "the common level of frames changes within a pose, at all poses alike: lowest in frame " << lowest_at << " ("
        << lowest << " dB), highest in frame " << highest_at << " (" << highest << " dB against the mean)";

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "echo_source.h"
+#include "held_out_gain.h"
 #include "hypothesis_fit.h"
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/ledger.h"
@@ -68,6 +69,7 @@ Finding findingOf(const FrameFinding& frames) {
     if (place.poses.empty()) place.poses = frames.poses;
   }
   f.description = frames.description;
+  f.mechanism = frames.mechanism;
   if (f.cause == "unknown") return f;
   NamedParameters m = defaultMechanism(f.cause);
   for (const FindingParameter& p : f.parameters) {
@@ -77,12 +79,30 @@ Finding findingOf(const FrameFinding& frames) {
   return f;
 }
 
-void addUnexplained(const std::vector<FrameFinding>& frames, std::vector<Finding>& findings) {
-  for (const FrameFinding& f : frames) {
-    if (findings.empty() || findings.back().cause != "unknown") {
-      findings.push_back(findingOf(f));
+void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data, Findings& findings,
+                    std::vector<NamedParameters>& extended) {
+  for (const FrameFinding& frame : frames) {
+    Finding f = findingOf(frame);
+    if (f.mechanism->values.has("level_db")) {
+      // Of full scale, as the data are, and over the strongest echo.
+      const double over_db = 20 * std::log10(32768 * strongestMeasured(data));
+      f.mechanism->values.set("level_db", f.mechanism->values.number("level_db") - over_db);
+    }
+    extended.push_back(*f.mechanism);
+    if (data.locations.size() > 1) {
+      std::vector<double> nats;
+      for (const PoseChannels& p : data.poses) {
+        const auto at = frame.held_out_nats.find(p.pose.name);
+        nats.push_back(at == frame.held_out_nats.end() ? 0 : at->second);
+      }
+      f.gain.emplace();
+      f.gain->log_likelihood_per_pose = likelihoodGain(data, std::vector<double>(nats.size(), 0.0), nats);
+    }
+    if (findings.findings.empty() || findings.findings.back().cause != "unknown") {
+      findings.findings.push_back(std::move(f));
     } else {
-      findings.back().description = findings.back().description.value_or("") + "; besides: " + f.description;
+      std::optional<std::string>& said = findings.findings.back().description;
+      said = said.value_or("") + "; besides: " + frame.description;
     }
   }
 }
@@ -280,7 +300,7 @@ Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& o
     add(findingOf(tone, data));
   }
   if (const std::optional<ChannelErrors> errors = findChannelErrors(data)) add(findingOf(*errors));
-  addUnexplained(session.unexplained, result.findings.findings);
+  addUnexplained(session.unexplained, data, result.findings, result.extended.mechanisms);
   result.findings.poses = static_cast<int>(data.poses.size());
   result.findings.locations = static_cast<int>(data.locations.size());
   result.findings.held_out = "nothing: without a scene only frames and channels are judged";

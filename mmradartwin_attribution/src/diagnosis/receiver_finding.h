@@ -25,8 +25,10 @@ struct ReceivedSession {
 ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const ReadingProgress& on_progress);
 
 Finding findingOf(const FrameFinding& frames);
-/// What frames show and no cause explains, as the `unknown` that stands last.
-void addUnexplained(const std::vector<FrameFinding>& frames, std::vector<Finding>& findings);
+/// What frames show and no cause explains, as the `unknown` that stands last, and its terms for the extended twin. Its
+/// gain is one in nats per pose: maps of averages do not show it.
+void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data, Findings& findings,
+                    std::vector<NamedParameters>& extended);
 Finding findingOf(const Delivery& delivery, const RadarConfig& radar);
 /// rest: the data without the tone, whose strongest echo levels refer to.
 Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest);

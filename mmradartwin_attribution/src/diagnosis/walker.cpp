@@ -10,6 +10,9 @@
 #include <set>
 #include <sstream>
 
+#include "mmradartwin_attribution/ledger.h"
+#include "mmradartwin_dsp/range_angle.h"
+
 namespace mmradartwin {
 namespace {
 
@@ -150,9 +153,11 @@ class Search {
     return {x(at % columns_), y(at / columns_), *best};
   }
 
-  double strongestCell(int& bin, int& beam) const {
+  /// The cell that varies most over all poses but those of one location.
+  double strongestCell(int& bin, int& beam, const std::string& without = "") const {
     Eigen::ArrayXXf sum;
     for (const PoseMotion& p : poses_) {
+      if (!without.empty() && p.pose.location == without) continue;
       if (sum.size() == 0) sum = Eigen::ArrayXXf::Zero(p.evidence.rows(), p.evidence.cols());
       if (p.evidence.size() == sum.size()) sum += p.evidence.unaryExpr(&bounded);
     }
@@ -174,12 +179,40 @@ class Search {
     place.poses = f.poses;
     f.where = {place};
     std::ostringstream text;
-    text << "frames disagree at one beat frequency ("
-         << bin * radar_.range_bin_m() * 2 * radar_.slope_hz_per_s / kSpeedOfLight_m_per_s / 1e6 << " MHz, range "
+    f.mechanism = toneIn(bin);
+    for (const PoseMotion& p : poses_) {
+      int at_bin = 0, at_beam = 0;
+      const bool told = strongestCell(at_bin, at_beam, p.pose.location) > 0 && p.evidence.size() > 0;
+      f.held_out_nats[p.pose.name] = told ? p.evidence(at_bin, at_beam) : 0;
+    }
+    text << "frames disagree at one beat frequency (" << f.mechanism->values.number("beat_hz") / 1e6 << " MHz, range "
          << range_m << " m) at " << f.poses.size() << " of " << poses_.size()
          << " poses wherever the radar stands: it belongs to the radar, not to the room";
     f.description = text.str();
     return f;
+  }
+
+  /// The tone that is fixed to the radar, its level over one count, as the median of what frames show near its cell.
+  NamedParameters toneIn(int bin) const {
+    std::vector<double> range_m, sine, power;
+    const std::vector<double> window = hannWindow(radar_.samples_per_chirp);
+    double sum = 0, squares = 0;
+    for (double w : window) sum += w, squares += w * w;
+    for (const PoseMotion& p : poses_) {
+      for (const MovingEcho& e : p.echoes) {
+        if (std::abs(e.range_m - bin * radar_.range_bin_m()) > 1.5 * radar_.range_bin_m()) continue;
+        range_m.push_back(e.range_m);
+        sine.push_back(std::sin(e.azimuth_rad));
+        // Of a tone of amplitude A: A^2 (sum w)^2 M / (variance sum w^2).
+        power.push_back(e.snr * p.noise_variance * squares / (sum * sum * radar_.channels()));
+      }
+    }
+    NamedParameters tone{"empirical_tone", {}};
+    const double per_m = 2 * radar_.slope_hz_per_s / kSpeedOfLight_m_per_s;
+    tone.values.set("beat_hz", per_m * (range_m.empty() ? bin * radar_.range_bin_m() : quantile(range_m, 0.5)));
+    tone.values.set("level_db", power.empty() ? 0.0 : 10 * std::log10(quantile(power, 0.5)));
+    tone.values.set("azimuth_deg", sine.empty() ? 0.0 : degrees(std::asin(quantile(sine, 0.5))));
+    return tone;
   }
 
   /// Takes what lies in a span of ranges out of a pose.

@@ -15,6 +15,7 @@ struct PoseMotion {
   int frames = 0;
   Eigen::ArrayXXf evidence;  ///< [range][azimuth] nats
   std::vector<MovingEcho> echoes;
+  double noise_variance = 1.0 / 6;  ///< of one complex sample of one shot, mean over channels, counts^2
 };
 
 struct Motion {

@@ -20,6 +20,8 @@ std::unique_ptr<Mechanism> makeGainDrift();
 std::unique_ptr<Mechanism> makeMovingTarget();
 std::unique_ptr<Mechanism> makePhaseNoise();
 std::unique_ptr<Mechanism> makePhaseDrift();
+std::unique_ptr<Mechanism> makeEmpiricalFrameGain();
+std::unique_ptr<Mechanism> makeEmpiricalTone();
 std::unique_ptr<Mechanism> makeInterference();
 std::unique_ptr<Mechanism> makeNoiseFloor();
 std::unique_ptr<Mechanism> makeAdcSaturation();
