@@ -23,12 +23,12 @@
 #include "hypothesis_fit.h"
 #include "law_screen.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "object_search.h"
 #include "profiled_values.h"
 #include "receiver_finding.h"
 #include "replica_screen.h"
 #include "session_model.h"
 #include "shared_latents.h"
-#include "unmodelled_box.h"
 
 namespace mmradartwin {
 namespace {
@@ -356,7 +356,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     if (s.promised > worth && fitted < most) {
       ++fitted;
       report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
-      fits.push_back(box ? fitBox(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
+      fits.push_back(moved || box ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
       source_->settle(mechanisms_);
       if (isObject(s.hypothesis) && !box && fits.back().broad_gain > kWorthABox) {
         screened.insert(screened.begin() + static_cast<std::ptrdiff_t>(i) + 1, asBox(data_, state_, fits.back()));

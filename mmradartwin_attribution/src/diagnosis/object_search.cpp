@@ -1,4 +1,4 @@
-#include "unmodelled_box.h"
+#include "object_search.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,8 @@ constexpr std::size_t kFacing = 3;                    // poses that a side of it
 constexpr double kGrown[] = {0.6, 0.8, 1.25, 1.6};    // of a side
 constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1}, kTurns_deg[] = {-8, -3, 3, 8};
 constexpr int kSweeps = 4;
-constexpr double kHigher = 5;  // nats of a sweep that are worth another
+constexpr double kHigher = 5;        // nats of a sweep that are worth another
+constexpr double kWorthSweeps = 15;  // nats of the fit
 
 enum Coordinates { kX, kY, kSide, kYaw };
 
@@ -41,6 +42,24 @@ std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
   }
   for (double turn_deg : kTurns_deg) add(center, side_m, yaw_deg + turn_deg);
   return boxes;
+}
+
+/// Other places and ways to stand of an actor, as scaled coordinates.
+std::vector<std::vector<double>> placesAround(const HypothesisFit& fit) {
+  std::vector<std::vector<double>> places;
+  const auto add = [&](std::size_t coordinate, double by) {
+    const Coordinate& c = fit.hypothesis.coordinates[coordinate];
+    places.push_back(fit.scaled);
+    places.back()[coordinate] = c.scaled(c.value(fit.scaled[coordinate]) + by);
+  };
+  for (std::size_t i = 0; i < fit.scaled.size(); ++i) {
+    if (fit.hypothesis.coordinates[i].unit == "deg") {
+      for (double turn_deg : kTurns_deg) add(i, turn_deg);
+    } else {
+      for (double shift_m : kShifts_m) add(i, shift_m);
+    }
+  }
+  return places;
 }
 
 }  // namespace
@@ -83,12 +102,13 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
   return box;
 }
 
-HypothesisFit fitBox(HypothesisFitter& fitter, const ModelState& null, const Screened& box) {
-  HypothesisFit best = fitter.fit(null, box.hypothesis, box.starts, 4);
+HypothesisFit fitObject(HypothesisFitter& fitter, const ModelState& null, const Screened& object) {
+  const Hypothesis& h = object.hypothesis;
+  HypothesisFit best = fitter.fit(null, h, object.starts, 4);
   ModelState from = null;
-  for (int i = 0; i < kSweeps; ++i) {
+  for (int i = 0; i < kSweeps && best.broad_gain > kWorthSweeps; ++i) {
     from.nuisance = best.state.nuisance;
-    HypothesisFit other = fitter.fit(from, box.hypothesis, boxesAround(best), 4);
+    HypothesisFit other = fitter.fit(from, h, isUnmodelledBox(h) ? boxesAround(best) : placesAround(best), 4);
     const double higher = other.gain - best.gain;
     if (higher > 0) best = std::move(other);
     if (higher < kHigher) break;

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "hypothesis_fit.h"
+
+namespace mmradartwin {
+
+bool isUnmodelledBox(const Hypothesis& hypothesis);
+/// The object that was fitted as a cylinder as a box: turned in many ways, its near side where the cylinder's is.
+Screened asBox(const ChannelData& data, const ModelState& null, const HypothesisFit& cylinder);
+/// Fits an object whose place is free, moved or unmodelled. A side is seen from few poses, and the likelihood has a top
+/// for each way in which one of them may be explained: from each, places around are tried and of a box those that keep
+/// a side, a corner or the place.
+HypothesisFit fitObject(HypothesisFitter& fitter, const ModelState& null, const Screened& object);
+
+}  // namespace mmradartwin
