@@ -137,7 +137,8 @@ std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data) 
     tried.emplace_back(likelihood(&m, kIterations), m);
   }
   // Orders: two places exchanged, or one channel taken out and put elsewhere, as long as that helps, from the order as
-  // it is and from its reverse. Exchanges alone stop at an order that is the right one but for a shift of all.
+  // it is and from its reverse. These stop at an order that is the right one but for a shift of all channels, so that
+  // all shifts are tried, too.
   const int channels = data.radar.channels();
   std::vector<int> same(static_cast<std::size_t>(channels));
   std::iota(same.begin(), same.end(), 0);
@@ -148,24 +149,33 @@ std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data) 
     for (bool better = true; better;) {
       better = false;
       std::vector<int> found = order;
+      const auto tryOrder = [&](const std::vector<int>& next) {
+        m = permutation(next);
+        const double value = likelihood(&m, 0);
+        if (value <= best + 1) return;
+        best = value;
+        found = next;
+        better = true;
+      };
       for (std::size_t i = 0; i < order.size(); ++i) {
         for (std::size_t j = i + 1; j < order.size(); ++j) {
-          std::vector<std::vector<int>> orders(j == i + 1 ? 1 : 3, order);  // neighbours: all three are the same
           const auto first = static_cast<std::ptrdiff_t>(i), last = static_cast<std::ptrdiff_t>(j) + 1;
-          std::swap(orders[0][i], orders[0][j]);
-          if (orders.size() == 3) {
-            std::rotate(orders[1].begin() + first, orders[1].begin() + first + 1, orders[1].begin() + last);
-            std::rotate(orders[2].begin() + first, orders[2].begin() + last - 1, orders[2].begin() + last);
-          }
-          for (const std::vector<int>& next : orders) {
-            m = permutation(next);
-            const double value = likelihood(&m, 0);
-            if (value <= best + 1) continue;
-            best = value;
-            found = next;
-            better = true;
-          }
+          std::vector<int> next = order;
+          std::swap(next[i], next[j]);
+          tryOrder(next);
+          if (j == i + 1) continue;  // of neighbours all three are the same
+          next = order;
+          std::rotate(next.begin() + first, next.begin() + first + 1, next.begin() + last);
+          tryOrder(next);
+          next = order;
+          std::rotate(next.begin() + first, next.begin() + last - 1, next.begin() + last);
+          tryOrder(next);
         }
+      }
+      for (int shift = 1; shift < channels; ++shift) {
+        std::vector<int> next = order;
+        for (int& k : next) k = (k + shift) % channels;
+        tryOrder(next);
       }
       order = found;
     }
