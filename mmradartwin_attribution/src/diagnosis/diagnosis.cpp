@@ -55,7 +55,7 @@ constexpr double kMostLost = 0.01;         ///< of the explained power, by what 
 // unless it is worth so many nats, inflation taken off. Of 20 sessions with nothing hidden (office tier, 24 poses at 17
 // places) the best were worth 8, 36, 29 and 62 of them; of one with 154 poses 34, 93, none and none:
 constexpr double kMuch = 25;           ///< laws over all echoes,
-constexpr double kMuchOfSubject = 50;  ///< what concerns an actor or a material,
+constexpr double kMuchOfSubject = 50;  ///< what concerns an actor or a material, or a law without a name,
 constexpr double kMuchOfTraces = 45;   ///< what moves echoes in the room, whose likelihood is rough,
 constexpr double kMuchOfObject = 95;   ///< an object, which has the whole room to choose from;
 constexpr double kMuchPerPose = 0.4, kMuchOfSubjectPerPose = 1;  ///< or so many a pose: a twin's own errors add up
@@ -395,7 +395,8 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
 double Session::muchOf(const HypothesisFit& f) const {
   const double poses = static_cast<double>(data_.poses.size());
   if (f.hypothesis.mechanism.mechanism == "actor_unmodelled") return std::max(kMuchOfObject, kMuchPerPose * poses);
-  if (!f.hypothesis.subject.empty()) return std::max(kMuchOfSubject, kMuchOfSubjectPerPose * poses);
+  const bool law = !isCatalogued(f.hypothesis.mechanism.mechanism);
+  if (law || !f.hypothesis.subject.empty()) return std::max(kMuchOfSubject, kMuchOfSubjectPerPose * poses);
   const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled));
   return std::max(traces ? kMuchOfTraces : kMuch, kMuchPerPose * poses);
 }
@@ -583,7 +584,7 @@ bool Session::judgeChannels(int round) {
       const auto explained = *finding.gain->explained_power.difference_ci95;
       const double by = finding.gain->explained_power.after - finding.gain->explained_power.before;
       const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
-      const bool in_nats = finding.cause != "unknown" && explained[1] >= 0 && f.broad_gain / f.inflation > muchOf(f);
+      const bool in_nats = explained[1] >= 0 && f.broad_gain / f.inflation > muchOf(f);
       const bool likelier = (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0;
       const bool much = likelier && ((f.plain && by > -kMostLost) || in_nats);
       // What explains the same less well is no name for what a better one was refused for.
