@@ -133,6 +133,17 @@ class HiddenEffects(unittest.TestCase):
         with open(self.at("out/twin.extended.yaml"), encoding="ascii") as twin:
             self.assertIn("empirical_frame_gain", twin.read())
 
+    def test_a_turned_box_that_the_scene_lacks_is_placed(self):
+        # It shines to a few places and hides walls from others; as a cylinder it was refused.
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "91"))
+        _, first, truth = self.found(seed, {"actor_unmodelled": {"shape": "box", "size_m": 0.4}}, headings=2)
+        mechanism = first["mechanism"]["actor_unmodelled"]
+        self.assertEqual(mechanism["shape"], "box", msg=f"seed {seed}")
+        for name, delta in (("x_m", 0.1), ("y_m", 0.1), ("size_m", 0.12)):
+            self.assertAlmostEqual(mechanism[name], truth[name], delta=delta, msg=f"seed {seed}: {mechanism}")
+        turned = (mechanism["yaw_deg"] - truth["yaw_deg"] + 45) % 90 - 45
+        self.assertAlmostEqual(turned, 0, delta=3, msg=f"seed {seed}: {mechanism}")
+
     def test_edges_have_the_level_that_they_were_given(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "77"))
         _, first, truth = self.found(seed, {"edge_diffraction": {"level": 1.9}}, headings=2)

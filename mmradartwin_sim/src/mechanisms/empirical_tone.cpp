@@ -21,13 +21,7 @@ class EmpiricalTone : public Mechanism {
   void configure(const Parameters& values, const Scene&, const RadarConfig& radar) override {
     turn_rad_ = 2 * M_PI * values.number("beat_hz") / radar.sample_rate_hz;
     level_ = std::pow(10.0, values.number("level_db") / 20);
-    const double azimuth_rad = values.number("azimuth_deg") * M_PI / 180;
-    const Eigen::Vector3d towards(std::cos(azimuth_rad), std::sin(azimuth_rad), 0);
-    wave_.resize(radar.receivers());
-    for (Eigen::Index r = 0; r < wave_.size(); ++r) {
-      wave_[r] = std::polar(
-          1.0, -2 * M_PI * radar.rx_position_m[static_cast<std::size_t>(r)].dot(towards) / radar.wavelength_m());
-    }
+    wave_ = receiverWave(radar, values.number("azimuth_deg"));
   }
   bool needsStrongestAmplitude() const override { return true; }
   bool hasChirpStage() const override { return true; }

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cmath>
+#include <complex>
 #include <memory>
 
 #include "builtin.h"
@@ -28,6 +31,18 @@ std::unique_ptr<Mechanism> makeAdcSaturation();
 std::unique_ptr<Mechanism> makeQuantisation();
 std::unique_ptr<Mechanism> makePacketLoss();
 std::unique_ptr<Mechanism> makePacketMisalignment();
+
+/// Phases [receivers] of a plane wave from a direction of the horizontal plane in radar_link.
+inline Eigen::VectorXcd receiverWave(const RadarConfig& radar, double azimuth_deg) {
+  const double azimuth_rad = azimuth_deg * M_PI / 180;
+  const Eigen::Vector3d towards(std::cos(azimuth_rad), std::sin(azimuth_rad), 0);
+  Eigen::VectorXcd wave(radar.receivers());
+  for (Eigen::Index r = 0; r < wave.size(); ++r) {
+    const double along_m = radar.rx_position_m[static_cast<std::size_t>(r)].dot(towards);
+    wave[r] = std::polar(1.0, -2 * M_PI * along_m / radar.wavelength_m());
+  }
+  return wave;
+}
 
 /// A list; an empty one stands for: not given.
 inline ParameterSpec optionalListSpec(const char* name, const char* unit, double min, double max, const char* meaning) {
