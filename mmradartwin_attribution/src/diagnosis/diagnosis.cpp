@@ -88,7 +88,7 @@ class Session {
   struct Accepted;
   void takeOver(const Accepted& accepted);
   std::vector<PoseEchoes> heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m);
-  FindingGain gainOf(const HypothesisFit& fit);
+  FindingGain gainOf(HypothesisFit& fit);
   void addMetrics(const HypothesisFit& fit, FindingGain& gain) const;
   FindingGain gainOf(const ChannelData& before_data, const std::vector<NamedParameters>& before,
                      const ChannelData& after_data, const std::vector<NamedParameters>& after);
@@ -422,8 +422,9 @@ std::vector<PoseEchoes> Session::heldOutEchoes(const HypothesisFit& fit, const s
   return echoes;
 }
 
-FindingGain Session::gainOf(const HypothesisFit& fit) {
+FindingGain Session::gainOf(HypothesisFit& fit) {
   report("gain on held-out places", 0);
+  fitter_->settleFolds(state_, fit);
   FindingGain gain;
   gain.explained_power = explainedPowerGain(data_, cellPowers(data_, source_->echoes(mechanisms_)),
                                             cellPowers(data_, heldOutEchoes(fit, {})));
@@ -568,7 +569,7 @@ bool Session::judgeChannels(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
   believeAbsences(fits);
   bool refused = false;
-  for (const HypothesisFit& f : fits) {
+  for (HypothesisFit& f : fits) {
     std::string& verdict = triedAs(f, round).verdict;
     verdict = f.ranking() <= 0                   ? "gains less than its numbers cost"
               : f.false_alarm_rate > kFalseAlarm ? "chance could do as well"

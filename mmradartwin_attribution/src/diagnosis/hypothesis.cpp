@@ -98,7 +98,7 @@ void addSteps(const Hypothesis& bare, const std::vector<ParameterSpec>& specs, s
     h.mechanism.values.set(spec->name, std::vector<double>(static_cast<std::size_t>(steps), 0.0));
     for (int k = 0; k < steps; ++k)
       h.coordinates.push_back({spec->name, spec->unit, k, 0, 1, spec->min, spec->max, {}});
-    h.subject = std::to_string(steps) + (steps > 1 ? " steps" : " step");
+    h.variant = std::to_string(steps) + (steps > 1 ? " steps" : " step");
     out.push_back(std::move(h));
   }
 }
@@ -142,7 +142,9 @@ NamedParameters Hypothesis::at(const std::vector<double>& scaled) const {
   return m;
 }
 
-std::string Hypothesis::label() const { return mechanism.mechanism + (subject.empty() ? "" : " of " + subject); }
+std::string Hypothesis::label() const {
+  return mechanism.mechanism + (subject.empty() ? "" : " of " + subject) + (variant.empty() ? "" : ", " + variant);
+}
 
 bool Hypothesis::isOneSided() const {
   return std::all_of(coordinates.begin(), coordinates.end(), [](const Coordinate& c) { return c.oneSided(); });

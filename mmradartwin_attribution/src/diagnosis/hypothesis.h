@@ -33,6 +33,7 @@ struct Hypothesis {
   NamedParameters mechanism;            ///< texts set, numbers at their neutral values
   std::vector<Coordinate> coordinates;  ///< empty: it is there or not
   std::string subject;                  ///< actor or material it is about, "" for none
+  std::string variant;                  ///< what tells it from others of that mechanism and subject, "" for nothing
   int searched = 0;                     ///< further numbers (edges, a period) that were looked for, not fitted
 
   NamedParameters at(const std::vector<double>& scaled) const;

@@ -86,6 +86,9 @@ class HypothesisFitter {
   /// Fold of a location.
   int fold(int location) const { return location % folds_; }
   int folds() const { return folds_; }
+  /// Shortens the step to each fold's values until they are no worse than the fit's on the places that the fold is
+  /// fitted to: where the likelihood is rough, scores of one place lead far away.
+  void settleFolds(const ModelState& null, HypothesisFit& fit);
   /// Sets false_alarm_rate for a family of that many hypotheses.
   void judge(HypothesisFit& fit, std::size_t family) const;
   /// Of a gain in nats, inflation taken off, by that many numbers: chance that one of a family comes by it.
