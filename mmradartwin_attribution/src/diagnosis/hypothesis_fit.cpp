@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kSmallStep = 0.125;           ///< of the scale, for derivatives
 constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what rises from nothing is looked at first
+constexpr double kMore[] = {4, 16};            ///< of the scale, as long as that gains
 constexpr double kHopeless = 50;               ///< nats lost there: less of it would not gain either
 constexpr double kRadii[] = {1, 2, 4};         ///< of the scale, about a place where an object may have stood before
 constexpr int kDirections = 8;
@@ -250,7 +251,9 @@ std::pair<double, double> HypothesisFitter::valueAt(const ModelState& null, cons
     by_location[static_cast<std::size_t>(model_.data().poses[pose].location)] += v;
   }
   const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
-  return {gain, whole * gain / inflationOf(gain, by_location)};
+  return {gain,
+          whole * gain /
+              (hypothesis.isOneSided() ? inflationOfPresence(gain, by_location) : inflationOf(gain, by_location))};
 }
 
 Screened HypothesisFitter::screenAround(const ModelState& null, const Hypothesis& hypothesis, int actor,
@@ -295,7 +298,17 @@ Screened HypothesisFitter::screenDirectly(const ModelState& null, const Hypothes
   } else {
     const double gain = tryAt(kSome);
     const bool costly = source_.altersGeometry(hypothesis.at(start));
-    if (gain > (costly ? 0 : -kHopeless)) tryAt(gain > 0 ? 1 : kLittle);
+    if (gain > (costly ? 0 : -kHopeless)) {
+      double last = tryAt(gain > 0 ? 1 : kLittle);
+      // A level may be far above its typical one, where that one hardly shows.
+      const bool level = hypothesis.coordinates.size() == 1 && hypothesis.coordinates[0].logarithmic();
+      for (double scaled : kMore) {
+        if (!level || gain <= 0 || last <= gain) break;
+        const double next = tryAt(scaled);
+        if (next <= last) break;
+        last = next;
+      }
+    }
   }
   return {hypothesis, best, {start}};
 }
