@@ -41,9 +41,10 @@ constexpr double kShows = 1;            ///< information about a typical value f
 /// however many there are. 0 for a coordinate that moves no echo.
 Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_coordinate, int actors, int poses,
                                   const PoseAccuracy& accuracy, const LatentSpread& spread) {
-  const Eigen::Index n = static_cast<Eigen::Index>(by_coordinate.size()), all = n + actors + poses;
+  // What the scene lacks has a range error of its own, too: it stands behind the actors.
+  const Eigen::Index n = static_cast<Eigen::Index>(by_coordinate.size()), all = n + actors + 1 + poses;
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(all, all);
-  information.diagonal().segment(n, actors).setOnes();
+  information.diagonal().segment(n, actors + 1).setOnes();
   information.diagonal().tail(poses).setOnes();
   const double range_m = std::hypot(accuracy.path_range_m, accuracy.position_m);
   std::vector<double> strongest(static_cast<std::size_t>(poses), 0.0);
@@ -72,10 +73,9 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
       azimuth[j] = at->second->azimuth_rad / kSmallChange / accuracy.path_angle_rad;
     }
     if (!shared) continue;
-    for (int a : path->actors) {
-      if (a >= 0) range[n + a] += spread.actor_range_m / range_m;
-    }
-    azimuth[n + actors + static_cast<Eigen::Index>(path->place)] = accuracy.heading_rad / accuracy.path_angle_rad;
+    for (int a : path->actors) range[n + (a >= 0 ? a : actors)] += spread.actor_range_m / range_m;
+    if (path->actors.empty()) range[n + actors] += spread.actor_range_m / range_m;
+    azimuth[n + actors + 1 + static_cast<Eigen::Index>(path->place)] = accuracy.heading_rad / accuracy.path_angle_rad;
     information += range * range.transpose() / echoes[path->place] + azimuth * azimuth.transpose();
   }
   const Eigen::ArrayXd own = information.diagonal().head(n).array();
