@@ -309,12 +309,8 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     s.promised -= numbers + 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
     source_->settle(mechanisms_);
   }
-  report("laws without a name", 0);
-  for (Screened& s : screenLaws(twin_, *model_, state_, spread(kLawPoses))) screened.push_back(std::move(s));
-  for (Screened& s : screenReplicas(twin_, *model_, state_, spread(kLawPoses), kWorthALaw, lookAtSome)) {
-    screened.push_back(std::move(s));
-  }
-  for (Screened& s : sharedLatents(*source_, state_, model_->spread(), accuracy_, all, spread(kScreenPoses))) {
+  // A hypothesis that something else points at: with the start that it gives.
+  const auto suggest = [&screened](Screened s) {
     const auto same = std::find_if(screened.begin(), screened.end(), [&](const Screened& other) {
       return other.hypothesis.label() == s.hypothesis.label();
     });
@@ -324,6 +320,17 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
       same->promised = std::max(same->promised, s.promised);
       same->starts.push_back(s.starts.front());
     }
+  };
+  report("laws without a name", 0);
+  for (Screened& s : screenLaws(twin_, *model_, state_, spread(kLawPoses))) {
+    if (std::optional<Screened> named = namedLike(s, all)) suggest(std::move(*named));
+    screened.push_back(std::move(s));
+  }
+  for (Screened& s : screenReplicas(twin_, *model_, state_, spread(kLawPoses), kWorthALaw, lookAtSome)) {
+    screened.push_back(std::move(s));
+  }
+  for (Screened& s : sharedLatents(*source_, state_, model_->spread(), accuracy_, all, spread(kScreenPoses))) {
+    suggest(std::move(s));
   }
   source_->settle(mechanisms_);
   if (object) {

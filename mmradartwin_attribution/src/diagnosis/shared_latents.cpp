@@ -7,8 +7,9 @@
 namespace mmradartwin {
 namespace {
 
-constexpr double kSharedLatent = 3;  // standard deviations from none at which a common error is tried as a cause
-constexpr double kStep = 0.125;      // of the scale, for derivatives
+constexpr double kSharedLatent = 3;     // standard deviations from none at which a common error is tried as a cause
+constexpr double kStep = 0.125;         // of the scale, for derivatives
+constexpr Eigen::Index kAlongLaw = 25;  // places of a law that a name is compared at
 
 /// What a hypothesis' geometry makes of ranges and directions stands in the latents of actors and poses; least squares
 /// of both takes it out of them, as z = D v with the latents in standard deviations.
@@ -80,6 +81,38 @@ std::vector<Screened> sharedLatents(EchoSource& source, const ModelState& null, 
     screened.push_back({h, 0.5 * z * z, {{h.coordinates.front().scaled(delta_db)}}});
   }
   return screened;
+}
+
+std::optional<Screened> namedLike(const Screened& law, const std::vector<Hypothesis>& all) {
+  if (law.hypothesis.mechanism.mechanism != "empirical_law" || law.starts.empty()) return std::nullopt;
+  const Parameters values = law.hypothesis.at(law.starts.front()).values;
+  const std::vector<double>&at = values.numbers("at"), &delay_m = values.numbers("delay_m");
+  const std::string& variable = values.text("variable");
+  const bool of_radar = variable == "azimuth_deg", of_scene = variable == "bearing_deg";
+  if ((!of_radar && !of_scene) || delay_m.size() < 2 || delay_m.size() != at.size()) return std::nullopt;
+  const auto named = std::find_if(all.begin(), all.end(), [&](const Hypothesis& h) {
+    return h.mechanism.mechanism == (of_radar ? "radar_position_offset" : "scene_registration");
+  });
+  if (named == all.end()) return std::nullopt;
+  Eigen::MatrixXd design(kAlongLaw, 2);
+  Eigen::VectorXd delays(kAlongLaw);
+  std::size_t piece = 1;
+  for (Eigen::Index i = 0; i < kAlongLaw; ++i) {
+    const double share = static_cast<double>(i) / static_cast<double>(kAlongLaw - 1);
+    const double angle_deg = at.front() + share * (at.back() - at.front());
+    while (piece + 1 < at.size() && at[piece] < angle_deg) ++piece;
+    const double within = (angle_deg - at[piece - 1]) / std::max(1e-9, at[piece] - at[piece - 1]);
+    delays[i] = delay_m[piece - 1] + within * (delay_m[piece] - delay_m[piece - 1]);
+    const double sign = of_radar ? -1 : 1, angle_rad = angle_deg * M_PI / 180;
+    design.row(i) << sign * std::cos(angle_rad), sign * std::sin(angle_rad);
+  }
+  const Eigen::Vector2d offset_m = design.colPivHouseholderQr().solve(delays);
+  std::vector<double> start;
+  for (const Coordinate& c : named->coordinates) {
+    const bool first = c.parameter == "forward_m" || c.parameter == "x_m";
+    start.push_back(c.unit == "m" ? c.scaled(offset_m[first ? 0 : 1]) : 0.0);
+  }
+  return Screened{*named, law.promised, {start}};
 }
 
 }  // namespace mmradartwin

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "hypothesis_fit.h"
@@ -11,5 +12,10 @@ namespace mmradartwin {
 std::vector<Screened> sharedLatents(EchoSource& source, const ModelState& null, const LatentSpread& spread,
                                     const PoseAccuracy& accuracy, const std::vector<Hypothesis>& all,
                                     const std::vector<int>& poses);
+
+/// The named hypothesis that a law of delays looks like, with the start that the law gives: over azimuth an offset of
+/// the radar (-(forward cos + left sin)), over the direction in map one of the scene (x cos + y sin). None for other
+/// laws.
+std::optional<Screened> namedLike(const Screened& law, const std::vector<Hypothesis>& all);
 
 }  // namespace mmradartwin
