@@ -42,12 +42,12 @@ int Scene::actorIndex(const std::string& name) const {
 }
 
 const Actor& Scene::actorOf(int index) const {
-  static const Actor* unmodelled = [] {
-    Actor* actor = new Actor;
-    actor->name = "actor_unmodelled";
+  static const Actor unmodelled = [] {
+    Actor actor;
+    actor.name = "actor_unmodelled";
     return actor;
   }();
-  return index < 0 ? *unmodelled : actors.at(static_cast<std::size_t>(index));
+  return index < 0 ? unmodelled : actors.at(static_cast<std::size_t>(index));
 }
 
 Scene loadScene(const std::string& scene_yaml, double frequency_hz) {

@@ -15,9 +15,9 @@ from mmradartwin_tests.session import Measurement, Settings
 PROGRAM = find_program("mmradartwin_attribution", "diagnose")
 
 
-def diagnose(session, output):
+def diagnose(session, output, *options):
     """Runs the program; returns (exit status, findings or None, standard error)."""
-    run = subprocess.run([PROGRAM, session, "--output", output], capture_output=True, text=True, check=False)
+    run = subprocess.run([PROGRAM, session, "--output", output, *options], capture_output=True, text=True, check=False)
     file = os.path.join(output, "findings.json")
     findings = None
     if os.path.exists(file):
@@ -132,6 +132,12 @@ class HiddenEffects(unittest.TestCase):
         self.assertGreater(first["gain"]["log_likelihood_per_pose"]["difference_ci95"][0], 0, msg=f"seed {seed}")
         with open(self.at("out/twin.extended.yaml"), encoding="ascii") as twin:
             self.assertIn("empirical_frame_gain", twin.read())
+        # A twin that has the term is extended by it no second time: it knows each mechanism once.
+        extended = self.at("out/twin.extended.yaml")
+        status, _, errors = diagnose(self.at("session"), self.at("again"), "--twin", extended)
+        self.assertEqual(status, 0, msg=errors)
+        with open(self.at("again/twin.extended.yaml"), encoding="ascii") as twin:
+            self.assertEqual(twin.read().count("empirical_frame_gain"), 1)
 
     def test_a_turned_box_that_the_scene_lacks_is_placed(self):
         # It shines to a few places and hides walls from others; as a cylinder it was refused.

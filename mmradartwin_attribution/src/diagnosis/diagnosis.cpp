@@ -626,9 +626,7 @@ bool Session::judgeChannels(int round) {
 
 Diagnosis Session::run() {
   const auto add = [&](Finding finding) {
-    const bool there = std::any_of(extended_.begin(), extended_.end(),
-                                   [&](const NamedParameters& m) { return m.mechanism == finding.cause; });
-    if (!there) extended_.push_back(*finding.mechanism);
+    addOnce(*finding.mechanism, extended_);
     result_.findings.findings.push_back(std::move(finding));
   };
   for (const FrameFinding& f : received_.frames) add(findingOf(f));

@@ -74,8 +74,8 @@ struct FrameExaminer::State {
   FrameFinding interference() const;
   FrameFinding drift() const;
   FrameFinding frameGain() const;
-  /// Median over poses of each frame's level, without those of one location.
-  std::vector<double> frameLevels_db(const std::string& without, std::size_t frames) const;
+  /// A frame's level at all poses but those of one location.
+  std::vector<double> levelsOf_db(std::size_t frame, const std::string& without = "") const;
 };
 
 FrameExaminer::FrameExaminer(const RadarConfig& radar) : state_(std::make_unique<State>(radar)) {}
@@ -305,19 +305,14 @@ FrameFinding FrameExaminer::State::drift() const {
   return f;
 }
 
-std::vector<double> FrameExaminer::State::frameLevels_db(const std::string& without, std::size_t frames) const {
-  std::vector<double> result(frames, 0.0);
-  for (std::size_t i = 0; i < frames; ++i) {
-    std::vector<double> levels;
-    for (std::size_t j = 0; j < judged.size(); ++j) {
-      const std::vector<double>& gain_db = judged[j].frame_gain_db;
-      if (i < gain_db.size() && gain_db.size() >= 3 && (without.empty() || motion[j].pose.location != without)) {
-        levels.push_back(gain_db[i]);
-      }
-    }
-    if (!levels.empty()) result[i] = quantile(levels, 0.5);
+std::vector<double> FrameExaminer::State::levelsOf_db(std::size_t frame, const std::string& without) const {
+  std::vector<double> levels;
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    const std::vector<double>& gain_db = judged[i].frame_gain_db;
+    if (frame >= gain_db.size() || gain_db.size() < 3) continue;
+    if (without.empty() || motion[i].pose.location != without) levels.push_back(gain_db[frame]);
   }
-  return result;
+  return levels;
 }
 
 FrameFinding FrameExaminer::State::frameGain() const {
@@ -329,14 +324,12 @@ FrameFinding FrameExaminer::State::frameGain() const {
   // move; it changes where it differs between frames by far more than its error over poses.
   double chi2 = 0, lowest = 0, highest = 0;
   std::size_t lowest_at = 0, highest_at = 0, counted = 0;
-  std::vector<double> scatter_db(frames, std::numeric_limits<double>::infinity());
+  std::vector<double> middle_db(frames, 0.0), scatter_db(frames, std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < frames; ++i) {
-    std::vector<double> levels, apart;
-    for (const PoseJudgement& p : judged) {
-      if (i < p.frame_gain_db.size() && p.frame_gain_db.size() >= 3) levels.push_back(p.frame_gain_db[i]);
-    }
+    const std::vector<double> levels = levelsOf_db(i);
     if (levels.size() < 3) continue;
-    const double middle = quantile(levels, 0.5);
+    const double middle = middle_db[i] = quantile(levels, 0.5);
+    std::vector<double> apart;
     for (double level : levels) apart.push_back(std::abs(level - middle));
     // Of normal errors: the deviation is 1.48 times the median of sizes, the median's own 1.25 times the mean's.
     scatter_db[i] = std::max(1.48 * quantile(apart, 0.5), 1e-4);
@@ -360,12 +353,13 @@ FrameFinding FrameExaminer::State::frameGain() const {
   f.false_alarm_rate = std::exp(-0.5 * excess);
   for (const PoseJudgement& p : judged) f.poses.push_back(p.pose);
   f.mechanism = NamedParameters{"empirical_frame_gain", {}};
-  f.mechanism->values.set("gain_db", frameLevels_db("", frames));
+  f.mechanism->values.set("gain_db", middle_db);
   for (std::size_t i = 0; i < judged.size(); ++i) {
-    const std::vector<double> others_db = frameLevels_db(motion[i].pose.location, frames);
     double& nats = f.held_out_nats[judged[i].pose];
     for (std::size_t j = 0; j < judged[i].frame_gain_db.size(); ++j) {
-      const double level = judged[i].frame_gain_db[j], rest = level - others_db[j];
+      const std::vector<double> others = levelsOf_db(j, motion[i].pose.location);
+      if (others.empty()) continue;
+      const double level = judged[i].frame_gain_db[j], rest = level - quantile(others, 0.5);
       nats += 0.5 * (level * level - rest * rest) / (scatter_db[j] * scatter_db[j]);
     }
   }

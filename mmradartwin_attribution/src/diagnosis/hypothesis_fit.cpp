@@ -54,7 +54,7 @@ double inflationOfPresence(double gain, const std::vector<double>& by_location) 
   if (by_location.size() < 2 || !(gain > 0)) return 1;
   double squares = 0;
   for (double v : by_location) squares += std::min(v, 0.0) * std::min(v, 0.0);
-  return std::clamp(2 * squares / (2 * gain), 1.0, kMaxInflation);
+  return std::clamp(squares / gain, 1.0, kMaxInflation);
 }
 
 /// An information that can be solved with, also where a direction does nothing.
@@ -552,12 +552,14 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
 }
 
 HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hypothesis,
-                                    const std::vector<std::vector<double>>& starts, int iterations) {
+                                    const std::vector<std::vector<double>>& starts, int iterations,
+                                    const Nuisance* latents) {
   HypothesisFit f;
   f.hypothesis = hypothesis;
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());
-  Optimum o = maximise(null.mechanisms, null.nuisance, {hypothesis}, starts, iterations, &null);
+  Optimum o =
+      maximise(null.mechanisms, latents != nullptr ? *latents : null.nuisance, {hypothesis}, starts, iterations, &null);
   f.scaled = std::move(o.scaled);
   f.state = std::move(o.state);
   const Scores& scores = o.scores;

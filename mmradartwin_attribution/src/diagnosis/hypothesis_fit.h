@@ -77,9 +77,10 @@ class HypothesisFitter {
   /// Of an actor whose place is free, by the first two coordinates: the likelihood at places around it, farther away
   /// than slopes reach.
   Screened screenAround(const ModelState& null, const Hypothesis& hypothesis, int actor, const std::vector<int>& poses);
-  /// Maximum likelihood of the coordinates from the best of `starts`, the nuisance refitted along.
+  /// Maximum likelihood of the coordinates from the best of `starts`, the nuisance refitted along from `latents`; from
+  /// the null's where there are none.
   HypothesisFit fit(const ModelState& null, const Hypothesis& hypothesis,
-                    const std::vector<std::vector<double>>& starts, int iterations);
+                    const std::vector<std::vector<double>>& starts, int iterations, const Nuisance* latents = nullptr);
   /// Maximum likelihood of several hypotheses at once over `base`, which holds none of them.
   JointFit refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start);

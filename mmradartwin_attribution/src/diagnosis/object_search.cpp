@@ -105,10 +105,9 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
 HypothesisFit fitObject(HypothesisFitter& fitter, const ModelState& null, const Screened& object) {
   const Hypothesis& h = object.hypothesis;
   HypothesisFit best = fitter.fit(null, h, object.starts, 4);
-  ModelState from = null;
   for (int i = 0; i < kSweeps && best.broad_gain > kWorthSweeps; ++i) {
-    from.nuisance = best.state.nuisance;
-    HypothesisFit other = fitter.fit(from, h, isUnmodelledBox(h) ? boxesAround(best) : placesAround(best), 4);
+    HypothesisFit other =
+        fitter.fit(null, h, isUnmodelledBox(h) ? boxesAround(best) : placesAround(best), 4, &best.state.nuisance);
     const double higher = other.gain - best.gain;
     if (higher > 0) best = std::move(other);
     if (higher < kHigher) break;

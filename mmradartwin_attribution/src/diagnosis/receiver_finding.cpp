@@ -79,6 +79,12 @@ Finding findingOf(const FrameFinding& frames) {
   return f;
 }
 
+void addOnce(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms) {
+  const bool there = std::any_of(mechanisms.begin(), mechanisms.end(),
+                                 [&](const NamedParameters& m) { return m.mechanism == mechanism.mechanism; });
+  if (!there) mechanisms.push_back(mechanism);
+}
+
 void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data, Findings& findings,
                     std::vector<NamedParameters>& extended) {
   for (const FrameFinding& frame : frames) {
@@ -88,7 +94,12 @@ void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& 
       const double over_db = 20 * std::log10(32768 * strongestMeasured(data));
       f.mechanism->values.set("level_db", f.mechanism->values.number("level_db") - over_db);
     }
-    extended.push_back(*f.mechanism);
+    addOnce(*f.mechanism, extended);
+    if (!findings.findings.empty() && findings.findings.back().cause == "unknown") {
+      std::optional<std::string>& said = findings.findings.back().description;
+      said = said.value_or("") + "; besides: " + frame.description;
+      continue;
+    }
     if (data.locations.size() > 1) {
       std::vector<double> nats;
       for (const PoseChannels& p : data.poses) {
@@ -98,12 +109,7 @@ void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& 
       f.gain.emplace();
       f.gain->log_likelihood_per_pose = likelihoodGain(data, std::vector<double>(nats.size(), 0.0), nats);
     }
-    if (findings.findings.empty() || findings.findings.back().cause != "unknown") {
-      findings.findings.push_back(std::move(f));
-    } else {
-      std::optional<std::string>& said = findings.findings.back().description;
-      said = said.value_or("") + "; besides: " + frame.description;
-    }
+    findings.findings.push_back(std::move(f));
   }
 }
 

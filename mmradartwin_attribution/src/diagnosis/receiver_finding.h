@@ -25,6 +25,8 @@ struct ReceivedSession {
 ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const ReadingProgress& on_progress);
 
 Finding findingOf(const FrameFinding& frames);
+/// A mechanism more for a twin, which knows each once: what it has already stays.
+void addOnce(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms);
 /// What frames show and no cause explains, as the `unknown` that stands last, and its terms for the extended twin. Its
 /// gain is one in nats per pose: maps of averages do not show it.
 void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data, Findings& findings,
