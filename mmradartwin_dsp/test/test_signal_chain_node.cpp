@@ -211,6 +211,19 @@ TEST_F(SignalChainNodeTest, WaitsForThePoseAtTheStampAndGoesOnWithoutOne) {
   EXPECT_EQ(grids_.messages[1]->T_map_radar.orientation.w, 1);
 }
 
+TEST_F(SignalChainNodeTest, LosesNoneOfTheFramesThatALatePoseLetsGo) {
+  sendPose(stamp(-0.5), 1.0);
+  constexpr int kFrames = 80;
+  for (int i = 0; i < kFrames; ++i) send(i);
+  ros::WallDuration(0.5).sleep();
+  sendPose(stamp(kFrames), 1.0);
+  ros::WallDuration(0.5).sleep();  // nobody reads while all of them are published
+  ASSERT_TRUE(grids_.wait(kFrames) && maps_.wait(kFrames)) << grids_.messages.size() << " grids";
+  for (int i = 0; i < kFrames; ++i) {
+    EXPECT_EQ(grids_.messages[static_cast<std::size_t>(i)]->header.stamp, stamp(i));
+  }
+}
+
 TEST_F(SignalChainNodeTest, GivesNoPoseToFramesWithinAJumpOrAGapOfTf) {
   // A jump of 1 m at frame 2, 0.25 s of silence over which the radar goes 0.3 m on at frames 5 to 9, as long a silence
   // that ends where it began at frames 11 to 15.

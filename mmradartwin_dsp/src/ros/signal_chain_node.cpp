@@ -20,9 +20,10 @@ constexpr std::size_t kLongestQueue = 1000;
 
 SignalChainNode::SignalChainNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   readParameters(private_nh);
-  grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("radar/grid", 10);
-  map_publisher_ = nh.advertise<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", 10);
-  twin_map_publisher_ = nh.advertise<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", 10);
+  // A pose that comes late lets all frames go that waited for it; the answers to none of them may be pushed out.
+  grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("radar/grid", kLongestQueue);
+  map_publisher_ = nh.advertise<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", kLongestQueue);
+  twin_map_publisher_ = nh.advertise<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", kLongestQueue);
   config_subscriber_ = nh.subscribe("radar/config", 2, &SignalChainNode::onConfig, this);
   cube_subscriber_ = nh.subscribe("radar/adc", 200, &SignalChainNode::onCube, this);
   twin_subscriber_ = nh.subscribe("twin/grid", 50, &SignalChainNode::onTwinGrid, this);

@@ -31,7 +31,7 @@ Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& T) {
 TwinNode::TwinNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   readParameters(private_nh);
   tf_listener_.emplace(tf_buffer_, nh);
-  grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("twin/grid", 10);
+  grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("twin/grid", 100);  // as many as may wait
   paths_publisher_ = nh.advertise<mmradartwin_msgs::PathRecords>("twin/paths", 1, true);
   scene_publisher_ = nh.advertise<mmradartwin_msgs::Scene>("twin/scene", 1, true);
   updater_ = std::make_unique<diagnostic_updater::Updater>(nh, private_nh);
