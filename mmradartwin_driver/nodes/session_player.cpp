@@ -44,6 +44,7 @@ class SessionPlayer {
     whole_rig_ = parameters.boolean("whole_rig", false);
     publish_poses_ = parameters.boolean("publish_poses", true);
     exit_when_done_ = parameters.boolean("exit_when_done", false);
+    viewer_topic_ = parameters.text("viewer_topic", "");
     parameters.rejectUnknown();
     session_ = openPlayedSession(session_path_, "", selection_);
     for (const PoseProblem& problem : session_.problems) {
@@ -56,6 +57,7 @@ class SessionPlayer {
   /// Exit status of the program.
   int play() {
     findMount();
+    if (!viewer_topic_.empty()) waitForViewer(nh_.resolveName(viewer_topic_));
     startEmulator();
     if (whole_rig_) return followRig();
     const std::optional<std::int64_t> start_ns = waitUntilArmed();
@@ -69,6 +71,29 @@ class SessionPlayer {
   }
 
  private:
+  /// Until somebody listens to the topic: a window that opens late would miss what is played once.
+  void waitForViewer(const std::string& topic) {
+    constexpr double kWait_s = 60;
+    const auto listenedTo = [&topic] {
+      XmlRpc::XmlRpcValue request = ros::this_node::getName(), response, state;
+      if (!ros::master::execute("getSystemState", request, response, state, false)) return false;
+      XmlRpc::XmlRpcValue& subscribers = state[1];  // [[topic, [node, ...]], ...]
+      for (int i = 0; i < subscribers.size(); ++i) {
+        if (static_cast<std::string>(subscribers[i][0]) == topic) return true;
+      }
+      return false;
+    };
+    const ros::WallTime until = ros::WallTime::now() + ros::WallDuration(kWait_s);
+    while (ros::ok() && !listenedTo()) {
+      if (ros::WallTime::now() > until) {
+        ROS_WARN_STREAM("nobody listens to " << topic << " after " << kWait_s << " s: playing without a viewer");
+        return;
+      }
+      ROS_INFO_STREAM_THROTTLE(10, "waiting until somebody listens to " << topic);
+      ros::WallDuration(0.2).sleep();
+    }
+  }
+
   /// T_radar_camera, from the static transform of the mount.
   void findMount() {
     if (camera_frame_.empty() || !publish_poses_) return;
@@ -272,7 +297,8 @@ class SessionPlayer {
     return completed_;
   }
 
-  std::string session_path_, card_ip_, host_ip_, map_frame_, radar_frame_, camera_frame_, emulator_options_;
+  std::string session_path_, card_ip_, host_ip_, map_frame_, radar_frame_, camera_frame_, emulator_options_,
+      viewer_topic_;
   int config_port_ = 0, data_port_ = 0;
   double start_delay_s_ = 0, tf_lead_s_ = 0;
   bool exit_when_done_ = false, completed_ = false, whole_rig_ = false, publish_poses_ = true;
