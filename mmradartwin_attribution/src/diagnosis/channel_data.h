@@ -41,6 +41,11 @@ using ReadingProgress = std::function<void(std::size_t done, std::size_t all)>;
 ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, const ReadingProgress& on_progress,
                          const std::function<void(AdcCube&)>& repair = {});
 
+struct Scene;
+/// Throws InputError where a pose stands so far outside the scene that units or origin must differ. source: of the
+/// poses.
+void requirePlacesNear(const Scene& scene, const ChannelData& data, const std::string& source);
+
 class SignalChain;
 /// Fills y of a pose from its grid (again, after the grid was changed).
 void transformGrid(const SignalChain& chain, PoseChannels& pose);

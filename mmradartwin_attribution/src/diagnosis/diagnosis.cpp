@@ -17,6 +17,7 @@
 #include "clutter_field.h"
 #include "delivery.h"
 #include "empirical_hypothesis.h"
+#include "evidence_bounds.h"
 #include "fitted_parameters.h"
 #include "held_out_gain.h"
 #include "hypothesis_finding.h"
@@ -52,13 +53,8 @@ constexpr double kWorthAnObject = 3;       ///< at the best of all places
 constexpr double kWorthABox = 15;          ///< nats of a round one there
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
 constexpr double kMostLost = 0.01;         ///< of the explained power, by what the likelihood plainly gains of;
-// unless it is worth so many nats, inflation taken off. Of 20 sessions with nothing hidden (office tier, 24 poses at 17
-// places) the best were worth 8, 36, 29 and 62 of them; of one with 154 poses 34, 93, none and none:
-constexpr double kMuch = 25;           ///< laws over all echoes,
-constexpr double kMuchOfSubject = 50;  ///< what concerns an actor or a material, or a law without a name,
-constexpr double kMuchOfTraces = 45;   ///< what moves echoes in the room, whose likelihood is rough,
-constexpr double kMuchOfObject = 95;   ///< an object, which has the whole room to choose from;
-constexpr double kMuchPerPose = 0.4, kMuchOfSubjectPerPose = 1;  ///< or so many a pose: a twin's own errors add up
+// unless it is worth leastNats(), inflation taken off.
+constexpr std::size_t kWaysToErr = 4;     ///< geometries that alike errors of actors and poses look like
 constexpr std::size_t kMostProfiled = 6;  ///< numbers whose errors the likelihood's own fall gives
 constexpr double kObjectPlaces = 500;     ///< places of an 8 by 6 m room that a session resolves, as a family
 
@@ -72,7 +68,6 @@ class Session {
     if (options_.cancelled && options_.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
     if (options_.on_progress) options_.on_progress({stage, share});
   }
-  void checkPlaces() const;
   /// Undoes what convention of delivery fits far better than the one stated; its name.
   std::optional<std::string> judgeDelivery();
   void takeBackDelivery(const std::string& convention);
@@ -80,11 +75,10 @@ class Session {
   void judgeNoise();
   bool judgeChannels(int round);
   std::vector<HypothesisFit> fitBest(int round);
-  /// Nats from which on a hypothesis stands though no map gains by it.
-  double muchOf(const HypothesisFit& f) const;
   TriedHypothesis& triedAs(const HypothesisFit& fit, int round);
   void refitTogether();
   void profileFound();
+  bool isWithinErrors(const Hypothesis& h) const;
   struct Accepted;
   void takeOver(const Accepted& accepted);
   std::vector<PoseEchoes> heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m);
@@ -136,7 +130,7 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
                      " virtual channels; a diagnosis takes up to " + std::to_string(kMaxChannels) +
                      ", record with fewer transmitters or receivers");
   }
-  checkPlaces();
+  requirePlacesNear(twin_.scene(), data_, recording.source);
   // Levels relative to the strongest echo refer to this session's; poses inside something are left out here.
   double strongest = 0;
   std::vector<PoseChannels> usable;
@@ -160,20 +154,6 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
   source_ = std::make_unique<EchoSource>(twin_, data_, accuracy_);
   model_ = std::make_unique<SessionModel>(data_, static_cast<int>(twin_.scene().actors.size()), accuracy_);
   fitter_ = std::make_unique<HypothesisFitter>(*source_, *model_, kFolds);
-}
-
-void Session::checkPlaces() const {
-  Eigen::AlignedBox3d room;
-  for (const Actor& a : twin_.scene().actors) room.extend(a.bounds);
-  const double reach = 2 * room.diagonal().norm();
-  for (const PoseChannels& p : data_.poses) {
-    const double apart = room.exteriorDistance(p.pose.T_map_radar.translation());
-    if (apart > reach) {
-      throw InputError(recording_.source + ": pose '" + p.pose.name + "' stands " + number(apart) +
-                       " m outside the scene, whose diagonal is " + number(reach / 2) +
-                       " m; poses are in metres in the scene's map: check units and origin");
-    }
-  }
 }
 
 std::optional<std::string> Session::judgeDelivery() {
@@ -399,15 +379,6 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   return fits;
 }
 
-double Session::muchOf(const HypothesisFit& f) const {
-  const double poses = static_cast<double>(data_.poses.size());
-  if (f.hypothesis.mechanism.mechanism == "actor_unmodelled") return std::max(kMuchOfObject, kMuchPerPose * poses);
-  const bool law = !isCatalogued(f.hypothesis.mechanism.mechanism);
-  if (law || !f.hypothesis.subject.empty()) return std::max(kMuchOfSubject, kMuchOfSubjectPerPose * poses);
-  const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled));
-  return std::max(traces ? kMuchOfTraces : kMuch, kMuchPerPose * poses);
-}
-
 TriedHypothesis& Session::triedAs(const HypothesisFit& fit, int round) {
   return *std::find_if(result_.tried.begin(), result_.tried.end(),
                        [&](const TriedHypothesis& t) { return t.round == round && t.label == fit.hypothesis.label(); });
@@ -560,6 +531,16 @@ void Session::profileFound() {
   }
 }
 
+/// Where paths come and go with every millimetre, the likelihood may gain much by a geometry whose numbers are no
+/// larger than the actors' and poses' own errors make them.
+bool Session::isWithinErrors(const Hypothesis& h) const {
+  const auto a = std::find_if(accepted_.begin(), accepted_.end(),
+                              [&](const Accepted& other) { return other.hypothesis.label() == h.label(); });
+  if (a == accepted_.end() || !h.isGeometry()) return false;
+  const double nats = natsFromNothing(h, a->scaled, a->standard_error);
+  return fitter_->falseAlarmRate(nats, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
+}
+
 /// The values of what was found, wherever they stand.
 void Session::takeOver(const Accepted& a) {
   Finding& f = result_.findings.findings[a.finding];
@@ -592,7 +573,9 @@ bool Session::judgeChannels(int round) {
       const auto explained = *finding.gain->explained_power.difference_ci95;
       const double by = finding.gain->explained_power.after - finding.gain->explained_power.before;
       const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
-      const bool in_nats = explained[1] >= 0 && f.broad_gain / f.inflation > muchOf(f);
+      const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled));
+      const bool in_nats =
+          explained[1] >= 0 && f.broad_gain / f.inflation > leastNats(f.hypothesis, traces, data_.poses.size());
       const bool likelier = (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0;
       const bool much = likelier && ((f.plain && by > -kMostLost) || in_nats);
       // What explains the same less well is no name for what a better one was refused for.
@@ -607,6 +590,10 @@ bool Session::judgeChannels(int round) {
     verdict = "found";
     report("found " + f.hypothesis.label() + ", " + number(f.gain, 4) + " nats", 1);
     const bool unknown = finding.cause == "unknown";
+    const auto mechanisms = mechanisms_, extended = extended_;
+    const auto accepted = accepted_;
+    const auto findings = result_.findings.findings;
+    const Nuisance latents = state_.nuisance;
     mechanisms_ = f.state.mechanisms;
     if (source_->altersGeometry(*finding.mechanism)) no_use_.clear();
     extended_.push_back(*finding.mechanism);
@@ -616,6 +603,16 @@ bool Session::judgeChannels(int round) {
     if (accepted_.size() > 1) refitTogether();
     source_->settle(mechanisms_);
     profileFound();
+    if (isWithinErrors(f.hypothesis)) {
+      mechanisms_ = mechanisms, extended_ = extended, accepted_ = accepted;
+      result_.findings.findings = findings;
+      state_.nuisance = latents;
+      source_->settle(mechanisms_);
+      refused = true;
+      verdict = "no larger than what errors of actors and poses look like";
+      report("taken back: " + f.hypothesis.label(), 1);
+      continue;
+    }
     source_->settle(mechanisms_);
     const Nuisance nuisance = state_.nuisance;
     state_ = fitter_->state(mechanisms_, &nuisance);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
+#include <cmath>
 
 namespace mmradartwin {
 namespace {
@@ -44,6 +45,16 @@ std::vector<FindingParameter> fittedParameters(const Hypothesis& hypothesis, con
     parameters.push_back(std::move(p));
   }
   return parameters;
+}
+
+double natsFromNothing(const Hypothesis& hypothesis, const std::vector<double>& scaled,
+                       const std::vector<double>& standard_error) {
+  double nats = 0;
+  for (std::size_t j = 0; j < scaled.size(); ++j) {
+    const double error = kCalibration * standard_error[j] / std::abs(hypothesis.coordinates[j].slope(scaled[j]));
+    nats += 0.5 * scaled[j] * scaled[j] / (error * error);
+  }
+  return nats;
 }
 
 }  // namespace mmradartwin

@@ -14,4 +14,9 @@ std::vector<FindingParameter> fittedParameters(const Hypothesis& hypothesis, con
                                                const std::vector<double>& standard_error, const std::string& cause,
                                                std::size_t locations);
 
+/// Nats by which the values lie off those that do nothing, by the errors that their intervals have, taken as
+/// independent.
+double natsFromNothing(const Hypothesis& hypothesis, const std::vector<double>& scaled,
+                       const std::vector<double>& standard_error);
+
 }  // namespace mmradartwin
