@@ -20,6 +20,8 @@ constexpr double kSmallStep = 0.125;           ///< of the scale, for derivative
 constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what rises from nothing is looked at first
 constexpr double kMore[] = {4, 16};            ///< of the scale, as long as that gains
 constexpr double kHopeless = 50;               ///< nats lost there: less of it would not gain either
+constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents have stood in for it
+constexpr double kStoodIn = 1;                 ///< nats of theirs
 constexpr double kRadii[] = {1, 2, 4};         ///< of the scale, about a place where an object may have stood before
 constexpr int kDirections = 8;
 constexpr double kEnough = 0.2;       ///< nats: a further step promises less
@@ -92,6 +94,18 @@ Nuisance withoutErrors(Nuisance nuisance, int actor) {
   nuisance.actor_range_m[static_cast<std::size_t>(actor)] = 0;
   nuisance.actor_gain[static_cast<std::size_t>(actor)] = 0;
   return nuisance;
+}
+
+/// Without gains of their own of the actors of a material; and nats of what is known of those beforehand.
+std::pair<Nuisance, double> withoutGains(Nuisance nuisance, const Scene& scene, const std::string& material,
+                                         double spread) {
+  double nats = 0;
+  for (std::size_t a = 0; a < scene.actors.size(); ++a) {
+    if (scene.actors[a].material_tag != material) continue;
+    nats += 0.5 * std::pow(nuisance.actor_gain[a] / spread, 2);
+    nuisance.actor_gain[a] = 0;
+  }
+  return {std::move(nuisance), nats};
 }
 
 std::vector<int> everyPose(const ModelState& state) {
@@ -309,6 +323,17 @@ Screened HypothesisFitter::screenDirectly(const ModelState& null, const Hypothes
         last = next;
       }
     }
+  }
+  // What a material does may have been fitted as gains of its actors, beside which it has nothing to do.
+  const auto [freed, nats] =
+      withoutGains(null.nuisance, source_.base().scene(), hypothesis.subject, model_.spread().actor_gain);
+  for (double scaled : kInstead) {
+    if (nats < kStoodIn) break;
+    const std::vector<double> at(hypothesis.coordinates.size(), scaled);
+    const double promised = nats + valueAt(null, hypothesis, at, poses, freed, without).second;
+    if (promised <= best) continue;
+    best = promised;
+    start = at;
   }
   return {hypothesis, best, {start}};
 }
