@@ -29,7 +29,8 @@ std::vector<FindingParameter> fittedParameters(const Hypothesis& hypothesis, con
     if (const auto* value = std::get_if<double>(&p.value)) {
       for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
         if (hypothesis.coordinates[j].parameter != wanted.name) continue;
-        p.ci95 = {{*value - t * standard_error[j], *value + t * standard_error[j]}};
+        const Coordinate& c = hypothesis.coordinates[j];
+        p.ci95 = {{std::max(c.min, *value - t * standard_error[j]), std::min(c.max, *value + t * standard_error[j])}};
       }
       if (p.ci95.empty() && wanted.one_of > 0) continue;
     } else if (list != nullptr) {

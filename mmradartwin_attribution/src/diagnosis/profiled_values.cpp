@@ -95,7 +95,7 @@ struct Step {
 
 ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std::vector<NamedParameters>& mechanisms,
                         const Nuisance& nuisance, const PoseAccuracy& accuracy, const std::vector<Hypothesis>& parts,
-                        const ProfiledValues& fit) {
+                        const ProfiledValues& fit, int again) {
   std::vector<Coordinate> coordinates;
   bool rough = false;
   for (const Hypothesis& h : parts) {
@@ -186,9 +186,11 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
   const Eigen::MatrixXd robust = covariance * scatter * covariance;
   const Eigen::VectorXd to_top = covariance * slope;
   std::vector<double> top = scaled;
+  Eigen::VectorXd widths(n);
   for (Eigen::Index j = 0; j < n; ++j) {
     const std::size_t k = static_cast<std::size_t>(j);
     const auto [low, high] = limits(j);
+    widths[j] = steps[k].width;
     top[k] = std::clamp(scaled[k] + std::clamp(to_top[j], -steps[k].width, steps[k].width), low, high);
   }
   std::vector<int> everyone(data.poses.size());
@@ -203,6 +205,11 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
                                                       static_cast<int>(everyone.size()), accuracy, spread);
   ProfiledValues result = fit;
   if (look(top).log_likelihood > here.log_likelihood) result.scaled = top;
+  // A slope so long was no top, and its steps tell no width.
+  const bool further = (to_top.cwiseAbs().array() > widths.array()).any();
+  if (further && result.scaled == top && again > 0) {
+    return profiled(source, model, mechanisms, nuisance, accuracy, parts, result, again - 1);
+  }
   for (Eigen::Index j = 0; j < n; ++j) {
     const std::size_t k = static_cast<std::size_t>(j);
     double variance = locations > 2 ? std::max(robust(j, j), covariance(j, j)) : covariance(j, j);
