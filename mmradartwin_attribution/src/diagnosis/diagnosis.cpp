@@ -603,7 +603,7 @@ bool Session::judgeChannels(int round) {
     if (accepted_.size() > 1) refitTogether();
     source_->settle(mechanisms_);
     profileFound();
-    if (isWithinErrors(f.hypothesis)) {
+    if (!f.plain && isWithinErrors(f.hypothesis)) {
       mechanisms_ = mechanisms, extended_ = extended, accepted_ = accepted;
       result_.findings.findings = findings;
       state_.nuisance = latents;

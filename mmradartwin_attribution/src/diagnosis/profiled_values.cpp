@@ -1,6 +1,7 @@
 #include "profiled_values.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -21,7 +22,7 @@ struct Fall {
 constexpr Fall kSmooth = {1, 3, 15, 1e-6};
 // Beside what paths that come and go within millimetres bring.
 constexpr Fall kRough = {10, 25, 80, 0.1};
-constexpr double kMostAlike = 0.95;  ///< correlation of two values in the likelihood's fall
+constexpr double kMostAlike = 0.95;  ///< correlation of two values in the likelihood's fall, and of more together
 
 /// The likelihood at one place, all latents refitted.
 struct Place {
@@ -82,6 +83,16 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
   information.diagonal().head(n).array() += 1e-12;
   const Eigen::ArrayXd variance = information.inverse().diagonal().head(n).array();
   return (own > kShows).select(variance, 0.0);
+}
+
+/// The likelihood's fall with the same curvatures, but falling to all sides: differences of a rough likelihood do not
+/// add up to a top. No direction is flatter than that of two values so much alike.
+Eigen::MatrixXd fallingToAllSides(const Eigen::MatrixXd& fall) {
+  const Eigen::VectorXd scale = fall.diagonal().cwiseSqrt();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> alike(scale.cwiseInverse().asDiagonal() * fall *
+                                                             scale.cwiseInverse().asDiagonal());
+  const Eigen::MatrixXd to = scale.asDiagonal() * alike.eigenvectors();
+  return to * alike.eigenvalues().cwiseMax(1 - kMostAlike).asDiagonal() * to.transpose();
 }
 
 /// A step to both sides of the fit along one coordinate.
@@ -182,7 +193,7 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
   // Errors of actors are the same at all places: their priors say how far they reach.
   const Eigen::MatrixXd scatter =
       centred.transpose() * centred * (count / std::max(1.0, count - 1)) + latents.transpose() * latents;
-  const Eigen::MatrixXd covariance = fall.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd covariance = fallingToAllSides(fall).inverse();
   const Eigen::MatrixXd robust = covariance * scatter * covariance;
   const Eigen::VectorXd to_top = covariance * slope;
   std::vector<double> top = scaled;
