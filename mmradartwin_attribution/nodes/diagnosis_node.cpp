@@ -22,6 +22,7 @@
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/diagnosis_report.h"
 #include "mmradartwin_attribution/ros/conversions.h"
+#include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/frame_spool.h"
@@ -42,6 +43,7 @@ constexpr std::uint32_t kLongestQueue = 1000;
 struct Settings {
   FrameSpoolLimits limits;
   std::string map_frame, output_folder, config_file;
+  std::optional<ChannelCorrection> channels;  ///< errors to take out, as the signal chain does
   int jobs = 0;
 };
 
@@ -52,6 +54,8 @@ Settings readSettings(const ros::NodeHandle& private_nh) {
   s.config_file = parameters.text("config", "");
   s.map_frame = parameters.text("map_frame", "map");
   s.output_folder = parameters.text("output", "");
+  const std::string channels = parameters.text("channels", "");
+  if (!channels.empty()) s.channels = loadChannelCorrection(resolvePath(channels, "/"));
   s.jobs = parameters.integer("jobs", 0, 0, 1024);
   s.limits.folder = parameters.text("spool_folder", "");
   s.limits.frames_per_pose = parameters.integer("frames_per_pose", s.limits.frames_per_pose, 1, 1000000);
@@ -225,6 +229,7 @@ class DiagnosisNode {
     options.on_progress = [this](const DiagnosisProgress& p) { tell(p.stage, p.share); };
     const std::optional<ChosenTwin> chosen = chooseTwin(asked_twin, recording);
     if (!chosen) return diagnoseReceiver(recording, options);
+    if (recording.channels) refuseSameChannelError(chosen->description, *recording.channels);
     Twin twin(chosen->description);
     Diagnosis diagnosis = diagnose(recording, twin, options);
     if (chosen->scene_of_session) diagnosis.extended.scene_file.clear();
@@ -245,7 +250,9 @@ class DiagnosisNode {
     try {
       const std::string output = outputFolder(goal->output);
       tell("collecting poses", 0);
-      const Recording recording = spool_.recording();
+      Recording recording = spool_.recording();
+      if (settings_.channels) requireChannelsOf(recording.radar, *settings_.channels);
+      recording.channels = settings_.channels;
       const Diagnosis diagnosis = diagnosePoses(recording, goal->twin);
       DiagnosisReport(output).write(diagnosis, {"attribution/diagnose", output, goal->twin});
       result.findings_file = output + "/findings.json";
