@@ -7,6 +7,7 @@
 
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/diagnosis_report.h"
+#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
 #include "recording_arguments.h"
 
@@ -17,8 +18,16 @@ using namespace mmradartwin;
 struct Arguments {
   RecordingArguments input;
   std::string output, config;
+  std::vector<std::string> compared;
   int jobs = 0, findings = DiagnosisOptions().most_findings;
 };
+
+void requireSameScene(const TwinDescription& other, const TwinDescription& twin) {
+  if (other.scene_file == twin.scene_file) return;
+  throw InputError(other.file + ": its scene is " + other.scene_file + ", that of the twin in question " +
+                   twin.scene_file +
+                   "; --compare takes twins of one scene, give the other as --twin in a run of its own");
+}
 
 /// One line on stderr that changes, gone when this goes.
 class ProgressLine {
@@ -57,6 +66,10 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
       diagnosis = diagnoseReceiver(recording, options);
     } else {
       Twin twin(arguments.input.loadTwinOf(recording));
+      for (const std::string& file : arguments.compared) {
+        options.compared.push_back(arguments.input.loadTwinOf(recording, file));
+        requireSameScene(options.compared.back(), twin.description());
+      }
       diagnosis = diagnose(recording, twin, options);
     }
   }
@@ -81,6 +94,9 @@ int main(int argc, char** argv) {
   arguments.input.addChannelsTo(app);
   app.add_option("--output", arguments.output, "folder for findings.json, report and extended twin")->required();
   app.add_option("--config", arguments.config, "attribution.yaml of the paper's metrics (default: as shipped)");
+  app.add_option("--compare", arguments.compared,
+                 "other twin.yaml of the same scene: how much likelier or less likely each makes the same channels")
+      ->allow_extra_args(false);
   app.add_option("--jobs", arguments.jobs, "threads (default: one per core)")->check(CLI::Range(1, 1024));
   app.add_option(
          "--findings", arguments.findings,

@@ -41,7 +41,11 @@ std::string RecordingArguments::twinFile(const Recording& opened) const {
 }
 
 TwinDescription RecordingArguments::loadTwinOf(const Recording& opened) const {
-  TwinDescription description = loadTwin(twinFile(opened), sceneFile(opened), opened.radar);
+  return loadTwinOf(opened, twinFile(opened));
+}
+
+TwinDescription RecordingArguments::loadTwinOf(const Recording& opened, const std::string& file) const {
+  TwinDescription description = loadTwin(file, sceneFile(opened), opened.radar);
   if (opened.channels) refuseSameChannelError(description, *opened.channels);
   return description;
 }

@@ -30,6 +30,7 @@ struct RecordingArguments {
   std::string twinFile(const Recording& recording) const;
   /// loadTwin() with these. Throws InputError, also for a twin with the channel errors that `channels` takes out.
   TwinDescription loadTwinOf(const Recording& recording) const;
+  TwinDescription loadTwinOf(const Recording& recording, const std::string& file) const;  ///< another one
 };
 
 }  // namespace mmradartwin

@@ -4,8 +4,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <optional>
 
 #include "mmradartwin_dsp/paper_radar.h"
+#include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin {
 namespace {
@@ -26,18 +28,28 @@ class CabinetScene : public ::testing::Test {
     }
     obj << "f 1 2 3 4\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
   }
+  /// A second one to the left, its front in the plane y = 2 m.
+  void addLocker() const {
+    std::ofstream obj(folder_ + "/cabinet.obj", std::ios::app);
+    obj << "o locker\nusemtl Metal\n";
+    for (const char* z : {"-2", "2"}) {
+      for (const char* xy : {"-0.5 2 ", "0.5 2 ", "0.5 3 ", "-0.5 3 "}) obj << "v " << xy << z << "\n";
+    }
+    obj << "f 9 10 11 12\nf 13 14 15 16\nf 9 10 14 13\nf 10 11 15 14\nf 11 12 16 15\nf 12 9 13 16\n";
+  }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
   std::string folder_;
 };
 
-/// Of all channels and bins.
-double power(const PoseEchoes& echoes, int channels) {
+/// Of all channels, and of all bins or one.
+double power(const PoseEchoes& echoes, int channels, std::optional<int> bin = std::nullopt) {
   double sum = 0;
   for (const auto& group : echoes.groups) {
     const BinCovariance& cells = group->bins.power;
     const std::size_t size = static_cast<std::size_t>(channels * (channels + 1) / 2);
     for (int b = cells.first; b < cells.first + cells.bins; ++b) {
+      if (bin && b != *bin) continue;
       for (int k = 0; k < channels; ++k) sum += cells.at(b, size)[k * (k + 3) / 2].real();
     }
   }
@@ -74,6 +86,34 @@ TEST_F(CabinetScene, ExpectsOfEdgesWhatTheWholeTwinHas) {
   EXPECT_NEAR(addedPower(0) / power(without[0], 8), 0, 1e-6);
   ASSERT_GT(tracedPower(1, "edge_diffraction"), 0);
   EXPECT_NEAR(addedPower(1) / (cell * tracedPower(1, "edge_diffraction")), 1, 0.02);
+}
+
+// A square law makes echoes of two at the sum of their ranges, four times as strong as those of each at twice its own.
+TEST_F(CabinetScene, ExpectsWhatAReceiverMakesOfTwoEchoesTogether) {
+  addLocker();
+  ChannelData data;
+  data.radar = paperRadar();
+  PoseChannels pose;
+  pose.pose.T_map_radar = Eigen::AngleAxisd(0.25 * M_PI, Eigen::Vector3d::UnitZ());
+  data.poses.push_back(pose);
+  Twin twin(loadTwin("", folder_ + "/scene.yaml", data.radar));
+  twin.setStrongestAmplitude(1e-4);
+  EchoSource source(twin, data, PoseAccuracy());
+  NamedParameters specular = defaultMechanism("specular"), harmonic = defaultMechanism("second_harmonic");
+  specular.values.set("max_bounces", 1.0);
+  harmonic.values.set("level_db", -20.0);
+  const std::vector<NamedParameters> mixing = {specular, harmonic};
+  const Simulation whole = twin.changed(mixing).simulate(pose.pose.T_map_radar);
+  const Eigen::MatrixXcd spectra = SignalChain(data.radar).rangeSpectra(whole.grid.x) / (0.5 * whole.grid.x.cols());
+  const std::vector<PoseEchoes> first = source.echoes(mixing);
+  for (double range_m : {2.0, 3.0, 4.0, 5.0, 6.0}) {
+    const int bin = static_cast<int>(std::lround(range_m / data.radar.range_bin_m()));
+    EXPECT_NEAR(power(first[0], 8, bin) / spectra.col(bin).squaredNorm(), 1, 0.05) << range_m << " m";
+  }
+  // What was kept of it is the same, whatever was tried in between.
+  harmonic.values.set("level_db", -10.0);
+  EXPECT_GT(power(source.echoes({specular, harmonic})[0], 8), 1.0001 * power(first[0], 8));
+  EXPECT_DOUBLE_EQ(power(source.echoes(mixing)[0], 8), power(first[0], 8));
 }
 
 }  // namespace

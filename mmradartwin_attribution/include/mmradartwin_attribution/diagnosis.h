@@ -24,6 +24,8 @@ struct DiagnosisOptions {
   std::function<void(const DiagnosisProgress&)> on_progress;
   std::function<bool()> cancelled;  ///< asked between steps
   AttributionConfig config;         ///< of the paper's metrics
+  /// Other twins of the same scene and radar, whose likelihood is told beside that of the twin as given.
+  std::vector<TwinDescription> compared;
 };
 
 /// Thrown where DiagnosisOptions::cancelled said so.
@@ -45,6 +47,12 @@ struct TriedHypothesis {
   std::string verdict;          ///< "found", or what speaks against it; "" where none was needed
 };
 
+/// How much likelier the same data are by another twin.
+struct ComparedTwin {
+  std::string file;
+  double log_likelihood_gain = 0;  ///< nats over the twin as given, actors' and poses' errors fitted with each
+};
+
 struct Diagnosis {
   Findings findings;
   bool has_twin = true;               ///< false where there was no scene to simulate
@@ -52,6 +60,7 @@ struct Diagnosis {
   std::vector<PoseProblem> problems;  ///< poses that were left out
   std::vector<TriedHypothesis> tried;
   double explained_power = 0;    ///< of the twin as given, all poses
+  std::vector<ComparedTwin> compared;
   bool nothing_matches = false;  ///< scene and measurement have nothing in common
 };
 

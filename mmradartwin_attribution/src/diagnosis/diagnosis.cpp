@@ -94,6 +94,7 @@ class Session {
   ReceivedSession received_;
   ChannelData& data_;
   PoseAccuracy accuracy_;
+  double strongest_amplitude_ = 0;  ///< of the twin as given
   std::unique_ptr<EchoSource> source_;
   std::unique_ptr<SessionModel> model_;
   std::unique_ptr<HypothesisFitter> fitter_;
@@ -108,6 +109,10 @@ class Session {
     std::size_t finding;
   };
   std::vector<Accepted> accepted_;
+  std::vector<Accepted>::const_iterator acceptedAs(const Hypothesis& h) const {
+    return std::find_if(accepted_.begin(), accepted_.end(),
+                        [&](const Accepted& a) { return a.hypothesis.label() == h.label(); });
+  }
   std::vector<NamedParameters> before_rounds_;  ///< mechanisms without what rounds have found
   std::size_t family_ = 1;                      ///< hypotheses of a round
   std::set<std::string> no_use_;                ///< costly ones that gain nothing whatever is found beside them
@@ -132,7 +137,7 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
   }
   requirePlacesNear(twin_.scene(), data_, recording.source);
   // Levels relative to the strongest echo refer to this session's; poses inside something are left out here.
-  double strongest = 0;
+  double& strongest = strongest_amplitude_;
   std::vector<PoseChannels> usable;
   for (PoseChannels& p : data_.poses) {
     try {
@@ -204,9 +209,7 @@ void Session::judgeNoise() {
   if (stated == mechanisms_.end()) return;
   std::optional<Finding> f = noiseFloorFinding(data_, *stated);
   if (!f) return;
-  for (NamedParameters& e : extended_) {
-    if (e.mechanism == "noise_floor") e = *f->mechanism;
-  }
+  replaceBy(*f->mechanism, extended_);
   result_.findings.findings.push_back(std::move(*f));
 }
 
@@ -534,8 +537,7 @@ void Session::profileFound() {
 /// Where paths come and go with every millimetre, the likelihood may gain much by a geometry whose numbers are no
 /// larger than the actors' and poses' own errors make them.
 bool Session::isWithinErrors(const Hypothesis& h) const {
-  const auto a = std::find_if(accepted_.begin(), accepted_.end(),
-                              [&](const Accepted& other) { return other.hypothesis.label() == h.label(); });
+  const auto a = acceptedAs(h);
   if (a == accepted_.end() || !h.isGeometry()) return false;
   const double nats = natsFromNothing(h, a->scaled, a->standard_error);
   return fitter_->falseAlarmRate(nats, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
@@ -546,11 +548,8 @@ void Session::takeOver(const Accepted& a) {
   Finding& f = result_.findings.findings[a.finding];
   f.mechanism = a.hypothesis.at(a.scaled);
   f.parameters = fittedParameters(a.hypothesis, a.scaled, a.standard_error, f.cause, data_.locations.size());
-  for (std::vector<NamedParameters>* list : {&mechanisms_, &extended_}) {
-    for (NamedParameters& m : *list) {
-      if (m.mechanism == f.mechanism->mechanism) m = *f.mechanism;
-    }
-  }
+  replaceBy(*f.mechanism, mechanisms_);
+  replaceBy(*f.mechanism, extended_);
 }
 
 bool Session::judgeChannels(int round) {
@@ -602,14 +601,15 @@ bool Session::judgeChannels(int round) {
     state_.nuisance = f.state.nuisance;
     if (accepted_.size() > 1) refitTogether();
     source_->settle(mechanisms_);
-    profileFound();
-    if (!f.plain && isWithinErrors(f.hypothesis)) {
+    const bool stands = acceptedAs(f.hypothesis) != accepted_.end();
+    if (stands) profileFound();
+    if (!stands || (!f.plain && isWithinErrors(f.hypothesis))) {
       mechanisms_ = mechanisms, extended_ = extended, accepted_ = accepted;
       result_.findings.findings = findings;
       state_.nuisance = latents;
       source_->settle(mechanisms_);
       refused = true;
-      verdict = "no larger than what errors of actors and poses look like";
+      verdict = stands ? "no larger than what errors of actors and poses look like" : "worth nothing beside the rest";
       report("taken back: " + f.hypothesis.label(), 1);
       continue;
     }
@@ -642,10 +642,13 @@ Diagnosis Session::run() {
   for (Finding& f : result_.findings.findings) {
     if (f.cause != "tx_rx_leakage" && f.cause != "dc_offset") continue;
     referToStrongestEcho(twin_, *model_, state_, f);
-    std::replace_if(
-        extended_.begin(), extended_.end(), [&](const NamedParameters& m) { return m.mechanism == f.cause; },
-        *f.mechanism);
+    replaceBy(*f.mechanism, extended_);
   }
+  for (const TwinDescription& t : options_.compared) {
+    const ModelState other = fitter_->state(t.mechanisms, &state_.nuisance);
+    result_.compared.push_back({t.file, other.log_likelihood - state_.log_likelihood});
+  }
+  source_->settle(mechanisms_);
   std::vector<PoseEchoes> elsewhere = source_->echoes(mechanisms_);
   result_.explained_power = explainedPower(cellPowers(data_, elsewhere));
   // The same expectations, each at another pose's place: what chance explains.
@@ -672,6 +675,11 @@ Diagnosis Session::run() {
     before_rounds_ = mechanisms_;
     for (int round = 0; round < (few_ ? 0 : options_.most_findings); ++round) {
       if (!judgeChannels(round)) break;
+    }
+    for (Finding& f : findings.findings) {
+      if (f.cause != "second_harmonic") continue;
+      referToStrongestHost(twin_, *model_, state_, strongest_amplitude_, f);
+      replaceBy(*f.mechanism, extended_);
     }
     addUnexplained(received_.unexplained, data_, findings, extended_);
   }

@@ -99,6 +99,10 @@ std::string diagnosisText(const Diagnosis& d) {
     out << "; the twin as given explains " << shown(d.explained_power) << " of the measured power";
   }
   out << "\n";
+  for (const ComparedTwin& t : d.compared) {
+    out << t.file << " explains the same channels " << shown(std::abs(t.log_likelihood_gain), 5) << " nats "
+        << (t.log_likelihood_gain < 0 ? "less" : "more") << " likely\n";
+  }
   int i = 0;
   for (const Finding& f : d.findings.findings) {
     out << ++i << ". " << f.cause << " (" << className(causeDescription(f.cause).residual_class) << ")";

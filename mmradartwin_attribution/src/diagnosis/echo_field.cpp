@@ -15,6 +15,7 @@ constexpr int kFarSkirt =
 // Where a path passes from one of these to the next, its likelihood jumps: at -30 dB that was worth 100 nats, and
 // looked like a law over range.
 constexpr double kWeak = 1e-6, kStrong = 0.01;  ///< of the pose's strongest path's power
+constexpr double kLeastResponse = 1e-7;         ///< of the strongest bin of what a receiver made of a path
 constexpr std::size_t kMostBeamBins = 16;
 constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;  ///< of a path's power: a beam that takes less does not see it
 
@@ -170,7 +171,7 @@ void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, con
   EchoGroup& g = group(record.actors);
   const double cosine = pathCosine(record);
   const Eigen::VectorXd level = y.colwise().squaredNorm().transpose();
-  const double least = 1e-11 * level.maxCoeff();
+  const double least = kLeastResponse * level.maxCoeff();
   if (!(least > 0)) return;
   int first = 0, last = samples_ - 1;
   while (level[first] < least) ++first;

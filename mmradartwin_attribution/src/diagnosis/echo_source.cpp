@@ -10,15 +10,10 @@
 #include <tuple>
 
 #include "mmradartwin_dsp/input_error.h"
-#include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin {
 namespace {
 
-// What a receiver mixes into other ranges is made of paths above this share of the pose's strongest echo's power; those
-// below the second are summed by place first.
-constexpr double kMixedPower = 1e-6, kWeakPower = 1e-3;
-constexpr double kReceiverSine = 1.0 / 16;  // of sin(azimuth), where weak paths go through the receiver together
 // A path whose amplitude changes by less than this share within the pose's accuracy does not graze anything.
 constexpr double kSteady = 0.02;
 // Scatter points in cells that are small beside what the radar resolves; cells of the room, so that a turned or moved
@@ -55,52 +50,10 @@ std::vector<NamedParameters> lookedAt(const NamedParameters& mechanism, const st
   return beside;
 }
 
-/// Paths of one cell become one with their power; those for which cell() gives nothing stay.
-template <typename Key, typename Cell>
-std::vector<PathRecord> merged(std::vector<PathRecord> records, Cell cell) {
-  std::map<Key, std::pair<std::size_t, double>> cells;
-  std::vector<PathRecord> result;
-  for (PathRecord& r : records) {
-    const std::optional<Key> key = cell(r);
-    if (key) {
-      const auto [at, fresh] = cells.try_emplace(*key, result.size(), 0.0);
-      at->second.second += r.amplitude * r.amplitude;
-      if (!fresh) continue;
-    }
-    result.push_back(std::move(r));
-  }
-  for (const auto& [key, sum] : cells) {
-    PathRecord& r = result[sum.first];
-    if (r.amplitude > 0) scaleRecord(std::sqrt(sum.second) / r.amplitude, r);
-  }
-  return result;
-}
-
 double strongestPower(const std::vector<PathRecord>& records) {
   double strongest = 0;
   for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude * r.amplitude);
   return strongest;
-}
-
-/// Weak paths by range, direction and actors, for a receiver that they have to go through one by one.
-std::vector<PathRecord> mergedWeak(const RadarConfig& radar, std::vector<PathRecord> records, double strongest) {
-  using Key = std::tuple<std::vector<int>, int, int>;
-  return merged<Key>(std::move(records), [&](const PathRecord& r) -> std::optional<Key> {
-    if (r.amplitude * r.amplitude > kWeakPower * strongest) return std::nullopt;
-    const int direction = static_cast<int>(std::floor(0.5 * (r.departure.y() + r.arrival.y()) / kReceiverSine));
-    return Key{r.actors, rangeBin(radar, r.length_m[0]), direction};
-  });
-}
-
-/// Derivative of a path's samples by its one-way range, per metre, the phase in the window's middle held.
-ComplexGrid byRange(const RadarConfig& radar, const ComplexGrid& x) {
-  const double samples = static_cast<double>(x.cols());
-  ComplexGrid slope = x;
-  for (Eigen::Index n = 0; n < x.cols(); ++n) {
-    const double turn = 2 * M_PI * (static_cast<double>(n) - 0.5 * samples) / (samples * radar.range_bin_m());
-    slope.col(n) *= std::complex<double>(0, turn);
-  }
-  return slope;
 }
 
 using PathKey = std::tuple<const std::string*, std::vector<int>>;
@@ -405,16 +358,15 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
                                             const Paths& paths) {
   const Twin twin = base_.changed(mechanisms);
   const RadarConfig& radar = base_.radar();
-  const SignalChain chain(radar);
   const int channels = radar.channels();
-  const double window = 0.5 * radar.samples_per_chirp;  // Hann's sum
   kept_.resize(data_.poses.size());
+  mixed_.resize(data_.poses.size());
   // The twin less what mixes ranges in its receiver; nothing where it mixes none.
   std::optional<Twin> without_mixing;
   std::vector<NamedParameters> rest;
-  for (const NamedParameters& m : mechanisms) {
-    if (!mixesRanges(m)) rest.push_back(m);
-  }
+  TwinDescription mixing;
+  for (const NamedParameters& m : mechanisms) (mixesRanges(m) ? mixing.mechanisms : rest).push_back(m);
+  const std::size_t receiver = std::hash<std::string>()(mixing.toYaml());
   if (rest.size() < mechanisms.size()) without_mixing.emplace(base_.changed(rest));
 
   std::vector<PoseEchoes> result(poses.size());
@@ -439,32 +391,11 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
     if (!without_mixing) {
       addTones(twin, all, 0);
     } else {
-      // The receiver mixes ranges: each strong path is sent through it alone, less what comes without any path.
+      ReceiverMixture mixture(twin, *without_mixing, receiver, pose, mixed_[i], calls_);
       const double strongest = strongestPower(all);
-      const auto weak = std::partition(all.begin(), all.end(), [&](const PathRecord& r) {
-        return r.amplitude * r.amplitude > kMixedPower * strongest;
-      });
-      std::vector<PathRecord> tones(std::make_move_iterator(weak), std::make_move_iterator(all.end()));
-      all.erase(weak, all.end());
-      addTones(*without_mixing, tones, strongest);
-      const auto spectra = [&](const ComplexGrid& x) -> Eigen::MatrixXcd { return chain.rangeSpectra(x) / window; };
-      const ComplexGrid nothing = twin.weigh(pose.T_map_radar, std::vector<PathRecord>(), pose.stamp_ns).grid.x;
-      for (PathRecord& r : mergedWeak(radar, std::move(all), strongest)) {
-        for (int a : r.actors) {
-          if (a < 0 || a >= static_cast<int>(actor_range_m.size())) continue;
-          for (double& l : r.length_m) l += 2 * actor_range_m[a];
-        }
-        const Simulation alone = twin.weigh(pose.T_map_radar, std::vector<PathRecord>{r}, pose.stamp_ns);
-        if (alone.records.empty()) continue;
-        const ComplexGrid x = alone.grid.x - nothing;
-        collector.add(alone.records.front(), spectra(x), spectra(byRange(radar, x)));
-      }
-      if (nothing.squaredNorm() > 0) {
-        PathRecord fixed;  // to the radar: it turns with it and has no range
-        fixed.departure = fixed.arrival = Eigen::Vector3d::UnitY();
-        fixed.length_m.assign(static_cast<std::size_t>(channels), 0.0);
-        collector.add(fixed, spectra(nothing), Eigen::MatrixXcd::Zero(channels, radar.samples_per_chirp));
-      }
+      mixture.scaleTones(all, collector);
+      addTones(*without_mixing, all, strongest);
+      mixture.addTo(collector);
     }
     result[j] = collector.take();
     if (!graze_.empty()) {
@@ -492,6 +423,7 @@ void EchoSource::pointBeams(ChannelData& data, const std::vector<NamedParameters
   });
   settled_.clear();  // what grazes is to be found in the beams, too
   kept_.clear();
+  mixed_.clear();
 }
 
 void EchoSource::settle(const std::vector<NamedParameters>& mechanisms) {

@@ -10,6 +10,7 @@
 #include "channel_data.h"
 #include "echo_field.h"
 #include "mmradartwin_sim/twin.h"
+#include "receiver_mixture.h"
 
 namespace mmradartwin {
 
@@ -102,7 +103,8 @@ class EchoSource {
   };
   /// [poses] by actors: one that was met again last, and the last one that was new.
   std::vector<std::map<std::vector<int>, std::array<Kept, 2>>> kept_;
-  std::vector<PoseEchoes> graze_;  // by pose; nothing but graze
+  std::vector<ReceiverMixture::Cache> mixed_;  // by pose
+  std::vector<PoseEchoes> graze_;              // by pose; nothing but graze
   std::vector<std::string> settled_;
   enum class Geometry { kSame, kMoreScreens, kOther };
   Geometry geometryAfter(const NamedParameters& mechanism);

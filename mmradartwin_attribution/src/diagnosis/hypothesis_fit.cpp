@@ -233,21 +233,9 @@ std::vector<std::pair<int, double>> HypothesisFitter::suspects(const ModelState&
   return result;
 }
 
-double HypothesisFitter::offset(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses) {
-  // Nothing but the IF's images and harmonics has its echoes sent through the receiver one by one, which is not to the
-  // last digit what their tones are.
-  if (hypothesis.coordinates.size() != 1 || !hypothesis.coordinates[0].logarithmic()) return 0;
-  if (!source_.mixesRanges(hypothesis.at({0.0}))) return 0;
-  const std::vector<double> there = model_.byPose(
-      source_.echoes(with(null.mechanisms, hypothesis.at({0.0})), poses, null.actor_range_m), null.nuisance, poses);
-  double sum = 0;
-  for (std::size_t i = 0; i < poses.size(); ++i) sum += there[i] - null.by_pose[static_cast<std::size_t>(poses[i])];
-  return sum;
-}
-
 std::pair<double, double> HypothesisFitter::valueAt(const ModelState& null, const Hypothesis& hypothesis,
                                                     const std::vector<double>& scaled, const std::vector<int>& poses,
-                                                    const Nuisance& nuisance, double offset_per_pose) {
+                                                    const Nuisance& nuisance) {
   // About the same ranges as the null's, so that a hypothesis that does nothing gains nothing; but for an actor whose
   // own error was changed.
   std::vector<double> about_m = null.actor_range_m;
@@ -260,7 +248,7 @@ std::pair<double, double> HypothesisFitter::valueAt(const ModelState& null, cons
   double gain = 0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const std::size_t pose = static_cast<std::size_t>(poses[i]);
-    const double v = there[i] - null.by_pose[pose] - offset_per_pose;
+    const double v = there[i] - null.by_pose[pose];
     gain += v;
     by_location[static_cast<std::size_t>(model_.data().poses[pose].location)] += v;
   }
@@ -279,7 +267,7 @@ Screened HypothesisFitter::screenAround(const ModelState& null, const Hypothesis
       std::vector<double> at(hypothesis.coordinates.size(), 0.0);
       at[0] = radius * std::cos(2 * M_PI * k / kDirections);
       at[1] = radius * std::sin(2 * M_PI * k / kDirections);
-      const double promised = valueAt(null, hypothesis, at, poses, nuisance, 0).second;
+      const double promised = valueAt(null, hypothesis, at, poses, nuisance).second;
       source_.settle(null.mechanisms);
       if (promised <= result.promised) continue;
       result.promised = promised;
@@ -293,10 +281,9 @@ Screened HypothesisFitter::screenDirectly(const ModelState& null, const Hypothes
                                           const std::vector<int>& poses) {
   std::vector<double> start(hypothesis.coordinates.size(), kLittle);
   double best = 0;
-  const double without = offset(null, hypothesis, poses) / static_cast<double>(poses.size());
   const auto tryAt = [&](double scaled) {
     const std::vector<double> at(hypothesis.coordinates.size(), scaled);
-    const auto [gain, promised] = valueAt(null, hypothesis, at, poses, null.nuisance, without);
+    const auto [gain, promised] = valueAt(null, hypothesis, at, poses, null.nuisance);
     if (promised > best) {
       best = promised;
       start = at;
@@ -330,7 +317,7 @@ Screened HypothesisFitter::screenDirectly(const ModelState& null, const Hypothes
   for (double scaled : kInstead) {
     if (nats < kStoodIn) break;
     const std::vector<double> at(hypothesis.coordinates.size(), scaled);
-    const double promised = nats + valueAt(null, hypothesis, at, poses, freed, without).second;
+    const double promised = nats + valueAt(null, hypothesis, at, poses, freed).second;
     if (promised <= best) continue;
     best = promised;
     start = at;
@@ -373,7 +360,7 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
   // Slopes are of paths that stay. What a turn of the view lets in and out shows in the likelihood itself.
   if (hypothesis.isGeometry() && hypothesis.coordinates.size() == 1 && source_.altersGeometry(hypothesis.at({1.0}))) {
     for (double scaled : {-1.0, 1.0}) {
-      const double promised = valueAt(null, hypothesis, {scaled}, poses, null.nuisance, 0).second;
+      const double promised = valueAt(null, hypothesis, {scaled}, poses, null.nuisance).second;
       if (promised <= result.promised) continue;
       result.promised = promised;
       result.starts.push_back({scaled});
@@ -549,6 +536,13 @@ Eigen::MatrixXd HypothesisFitter::robustCovariance(const Effective& e) const {
   return robust;
 }
 
+double HypothesisFitter::worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
+                                         const Optimum& o, Eigen::Index first, Eigen::Index numbers) {
+  std::vector<double> scaled = o.scaled;
+  std::fill_n(scaled.begin() + first, numbers, 0.0);
+  return broadGain(state(mechanismsWith(base, parts, scaled), &o.state.nuisance), o.state);
+}
+
 JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start) {
   std::vector<double> from;
@@ -568,7 +562,12 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
       errors.push_back(std::sqrt(robust(at + j, at + j)) * std::abs(c.slope(v[j])));
     }
     fit.standard_error.push_back(std::move(errors));
-    fit.worth.push_back(n > 0 ? 0.5 * v.dot(robust.block(at, at, n, n).ldlt().solve(v)) : 0);
+    if (n > 0 && h.isOneSided()) {
+      fit.worth.push_back(worthOfPresence(base, parts, o, at, n) /
+                          std::clamp(e.scatter(at, at) / e.information(at, at), 1.0, kMaxInflation));
+    } else {
+      fit.worth.push_back(n > 0 ? 0.5 * v.dot(robust.block(at, at, n, n).ldlt().solve(v)) : 0);
+    }
     at += n;
   }
   fit.mechanisms = std::move(o.state.mechanisms);
@@ -588,9 +587,8 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
   f.scaled = std::move(o.scaled);
   f.state = std::move(o.state);
   const Scores& scores = o.scores;
-  const double without = offset(null, hypothesis, everyPose(null));
-  f.gain = f.state.log_likelihood - null.log_likelihood - without;
-  f.broad_gain = broadGain(null, f.state) - without;
+  f.gain = f.state.log_likelihood - null.log_likelihood;
+  f.broad_gain = broadGain(null, f.state);
   const std::vector<double> gain_at = gainByLocation(null, f.state);
 
   // Scatter over places: of the scores at the fit where there is a number, else of the gain itself.

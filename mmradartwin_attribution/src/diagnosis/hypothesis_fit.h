@@ -103,13 +103,15 @@ class HypothesisFitter {
     Scores scores;  ///< at the last derivative
   };
   Effective effective(const Scores& scores, int globals) const;
-  /// Nats by which the null differs from itself when it is evaluated as the hypothesis is.
-  double offset(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
   /// Gain in nats over the poses named, and what it promises for all with its inflation taken off.
   std::pair<double, double> valueAt(const ModelState& null, const Hypothesis& hypothesis,
                                     const std::vector<double>& scaled, const std::vector<int>& poses,
-                                    const Nuisance& nuisance, double offset_per_pose);
+                                    const Nuisance& nuisance);
   Screened screenDirectly(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
+  /// Nats that the numbers from `first` on, which rise from nothing, bring beside the others, without the place that
+  /// gains most. Their square laws make what the errors at the fit say of that far too small.
+  double worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
+                         const Optimum& o, Eigen::Index first, Eigen::Index numbers);
   Eigen::MatrixXd robustCovariance(const Effective& effective) const;
   /// null: what a geometry has to be well above at more than one place before it is searched without slopes; null
   /// pointer: it is.

@@ -85,6 +85,12 @@ void addOnce(const NamedParameters& mechanism, std::vector<NamedParameters>& mec
   if (!there) mechanisms.push_back(mechanism);
 }
 
+void replaceBy(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms) {
+  std::replace_if(
+      mechanisms.begin(), mechanisms.end(),
+      [&](const NamedParameters& m) { return m.mechanism == mechanism.mechanism; }, mechanism);
+}
+
 void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data, Findings& findings,
                     std::vector<NamedParameters>& extended) {
   for (const FrameFinding& frame : frames) {
@@ -224,13 +230,17 @@ Finding findingOf(const ChannelErrors& errors) {
   return f;
 }
 
-void referToStrongestEcho(const Twin& twin, const SessionModel& model, const ModelState& state, Finding& f) {
-  const auto level = std::find_if(f.parameters.begin(), f.parameters.end(),
-                                  [](const FindingParameter& p) { return p.name == "level_db"; });
-  if (level == f.parameters.end()) return;
+namespace {
+
+/// The session's strongest echo with the gains that were fitted: its power, and the standard error of its level.
+struct StrongestEcho {
+  double power = 0, error_db = 0;
+};
+
+StrongestEcho strongestEcho(const Twin& twin, const SessionModel& model, const ModelState& state) {
   const ChannelData& data = model.data();
   const Twin simulated = twin.changed(state.mechanisms);
-  double strongest = 0;  // power
+  StrongestEcho strongest;
   std::vector<int> actors, everyone;
   for (std::size_t i = 0; i < data.poses.size(); ++i) {
     const Pose& pose = data.poses[i].pose;
@@ -241,25 +251,47 @@ void referToStrongestEcho(const Twin& twin, const SessionModel& model, const Mod
       for (const std::complex<double>& c : r.c) power += std::norm(c) / static_cast<double>(r.c.size());
       for (int a : r.actors) log_gain += a < 0 ? 0 : state.nuisance.actor_gain[static_cast<std::size_t>(a)];
       power *= std::exp(log_gain);
-      if (power <= strongest) continue;
-      strongest = power;
+      if (power <= strongest.power) continue;
+      strongest.power = power;
       actors = r.actors;
     }
   }
-  if (!(strongest > 0)) return;
   const Scores scores = model.scores(state.basis, {}, everyone);
   Eigen::VectorXd direction = Eigen::VectorXd::Zero(scores.total.size());
   direction[0] = 1;
   for (int a : actors) {
     if (a >= 0) direction[model.gainOf(a)] += 1;
   }
-  const double error_db = 0.5 * kDbPerNeper * std::sqrt(direction.dot(scores.information.ldlt().solve(direction)));
+  strongest.error_db = 0.5 * kDbPerNeper * std::sqrt(direction.dot(scores.information.ldlt().solve(direction)));
+  return strongest;
+}
+
+void changeLevel(Finding& f, double by_db, double error_db) {
+  const auto level = std::find_if(f.parameters.begin(), f.parameters.end(),
+                                  [](const FindingParameter& p) { return p.name == "level_db"; });
+  if (level == f.parameters.end()) return;
   const double was_db = std::get<double>(level->value), half_db = level->ci95[0][1] - was_db;
-  const double level_db = was_db + kDbPerNeper * std::log(strongestMeasured(data) / std::sqrt(strongest));
-  const double both_db = std::hypot(half_db, 1.96 * error_db);
+  const double level_db = was_db + by_db, both_db = std::hypot(half_db, 1.96 * error_db);
   level->value = level_db;
   level->ci95 = {{level_db - both_db, level_db + both_db}};
   f.mechanism->values.set("level_db", level_db);
+}
+
+}  // namespace
+
+void referToStrongestEcho(const Twin& twin, const SessionModel& model, const ModelState& state, Finding& f) {
+  const StrongestEcho strongest = strongestEcho(twin, model, state);
+  if (!(strongest.power > 0)) return;
+  changeLevel(f, kDbPerNeper * std::log(strongestMeasured(model.data()) / std::sqrt(strongest.power)),
+              strongest.error_db);
+}
+
+void referToStrongestHost(const Twin& twin, const SessionModel& model, const ModelState& state, double amplitude,
+                          Finding& f) {
+  const StrongestEcho strongest = strongestEcho(twin, model, state);
+  if (!(strongest.power > 0)) return;
+  changeLevel(f, kDbPerNeper * (0.5 * (std::log(strongest.power) - state.nuisance.log_gain) - std::log(amplitude)),
+              strongest.error_db);
 }
 
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated) {

@@ -27,6 +27,8 @@ ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const
 Finding findingOf(const FrameFinding& frames);
 /// A mechanism more for a twin, which knows each once: what it has already stays.
 void addOnce(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms);
+/// Puts it in place of those of its name.
+void replaceBy(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms);
 /// What frames show and no cause explains, as the `unknown` that stands last, and its terms for the extended twin. Its
 /// gain is one in nats per pose: maps of averages do not show it.
 void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data, Findings& findings,
@@ -37,6 +39,10 @@ Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest);
 /// The same where a twin tells how strong the strongest echo is: in the data it may stand in one cell with others, and
 /// how well its gain is known widens the interval. Does nothing to a finding without a level.
 void referToStrongestEcho(const Twin& twin, const SessionModel& model, const ModelState& state, Finding& f);
+/// A level against its host, fitted with the session's strongest echo of the twin as given (its amplitude), as one at
+/// the strongest of the room, whose gain the fit has found.
+void referToStrongestHost(const Twin& twin, const SessionModel& model, const ModelState& state, double amplitude,
+                          Finding& f);
 Finding findingOf(const ChannelErrors& errors);
 /// Where the noise departs from the level that the twin's noise_floor states.
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated);
