@@ -507,25 +507,27 @@ void Session::refitTogether() {
 /// Values and intervals of all that rounds have found, on the likelihood that is settled on them.
 void Session::profileFound() {
   report("errors of what was found", 0);
+  // A channel error's numbers are too many, and know nothing of the others: it stays as it is.
+  const auto apart = [](const Accepted& a) { return a.scaled.size() > kMostProfiled; };
+  std::vector<NamedParameters> base = before_rounds_;
   std::vector<Hypothesis> parts;
   ProfiledValues fit;
-  for (const Accepted& a : accepted_) {
+  for (Accepted& a : accepted_) {
+    if (apart(a)) {
+      base.push_back(a.hypothesis.at(a.scaled));
+      widenGains(data_, a.hypothesis, a.standard_error);
+      takeOver(a);
+      continue;
+    }
     parts.push_back(a.hypothesis);
     fit.scaled.insert(fit.scaled.end(), a.scaled.begin(), a.scaled.end());
     fit.standard_error.insert(fit.standard_error.end(), a.standard_error.begin(), a.standard_error.end());
   }
-  if (fit.scaled.empty()) return;
-  if (fit.scaled.size() > kMostProfiled) {
-    for (Accepted& a : accepted_) {
-      if (a.hypothesis.mechanism.mechanism != "channel_phase_error") continue;
-      widenGains(data_, a.hypothesis, a.standard_error);
-      takeOver(a);
-    }
-    return;
-  }
-  fit = profiled(*source_, *model_, mechanisms_, state_.nuisance, accuracy_, parts, fit);
+  if (fit.scaled.empty() || fit.scaled.size() > kMostProfiled) return;
+  fit = profiled(*source_, *model_, mechanismsWith(base, parts, fit.scaled), state_.nuisance, accuracy_, parts, fit);
   std::ptrdiff_t from = 0;
   for (Accepted& a : accepted_) {
+    if (apart(a)) continue;
     const std::ptrdiff_t to = from + static_cast<std::ptrdiff_t>(a.scaled.size());
     a.scaled.assign(fit.scaled.begin() + from, fit.scaled.begin() + to);
     a.standard_error.assign(fit.standard_error.begin() + from, fit.standard_error.begin() + to);
@@ -641,7 +643,7 @@ Diagnosis Session::run() {
   state_ = fitter_->state(mechanisms_, nullptr);
   for (Finding& f : result_.findings.findings) {
     if (f.cause != "tx_rx_leakage" && f.cause != "dc_offset") continue;
-    referToStrongestEcho(twin_, *model_, state_, f);
+    referToStrongestEcho(twin_.changed(mechanisms_), data_, f);
     replaceBy(*f.mechanism, extended_);
   }
   for (const TwinDescription& t : options_.compared) {
@@ -678,7 +680,7 @@ Diagnosis Session::run() {
     }
     for (Finding& f : findings.findings) {
       if (f.cause != "second_harmonic") continue;
-      referToStrongestHost(twin_, *model_, state_, strongest_amplitude_, f);
+      referToStrongestHost(twin_.changed(mechanisms_), data_, state_.nuisance.log_gain, strongest_amplitude_, f);
       replaceBy(*f.mechanism, extended_);
     }
     addUnexplained(received_.unexplained, data_, findings, extended_);

@@ -16,6 +16,7 @@ namespace mmradartwin {
 namespace {
 
 constexpr double kDbPerNeper = 8.685889638065035;
+constexpr double kLevelError_db = 0.3, kSharedError_db = 3;  ///< of an echo alone in its cell, and by the others there
 
 /// Amplitude of the strongest tone of all poses.
 double strongestMeasured(const ChannelData& data) {
@@ -232,40 +233,6 @@ Finding findingOf(const ChannelErrors& errors) {
 
 namespace {
 
-/// The session's strongest echo with the gains that were fitted: its power, and the standard error of its level.
-struct StrongestEcho {
-  double power = 0, error_db = 0;
-};
-
-StrongestEcho strongestEcho(const Twin& twin, const SessionModel& model, const ModelState& state) {
-  const ChannelData& data = model.data();
-  const Twin simulated = twin.changed(state.mechanisms);
-  StrongestEcho strongest;
-  std::vector<int> actors, everyone;
-  for (std::size_t i = 0; i < data.poses.size(); ++i) {
-    const Pose& pose = data.poses[i].pose;
-    everyone.push_back(static_cast<int>(i));
-    for (const PathRecord& r :
-         simulated.receivedPaths(pose.T_map_radar, simulated.trace(pose.T_map_radar), pose.stamp_ns)) {
-      double power = 0, log_gain = state.nuisance.log_gain;
-      for (const std::complex<double>& c : r.c) power += std::norm(c) / static_cast<double>(r.c.size());
-      for (int a : r.actors) log_gain += a < 0 ? 0 : state.nuisance.actor_gain[static_cast<std::size_t>(a)];
-      power *= std::exp(log_gain);
-      if (power <= strongest.power) continue;
-      strongest.power = power;
-      actors = r.actors;
-    }
-  }
-  const Scores scores = model.scores(state.basis, {}, everyone);
-  Eigen::VectorXd direction = Eigen::VectorXd::Zero(scores.total.size());
-  direction[0] = 1;
-  for (int a : actors) {
-    if (a >= 0) direction[model.gainOf(a)] += 1;
-  }
-  strongest.error_db = 0.5 * kDbPerNeper * std::sqrt(direction.dot(scores.information.ldlt().solve(direction)));
-  return strongest;
-}
-
 void changeLevel(Finding& f, double by_db, double error_db) {
   const auto level = std::find_if(f.parameters.begin(), f.parameters.end(),
                                   [](const FindingParameter& p) { return p.name == "level_db"; });
@@ -277,23 +244,58 @@ void changeLevel(Finding& f, double by_db, double error_db) {
   f.mechanism->values.set("level_db", level_db);
 }
 
+/// The session's strongest echo: what was measured where the twin has one, and of that the share that the twin gives it
+/// beside the others there. What the twin has and the room has not is weak in the data.
+struct MeasuredEcho {
+  double amplitude = 0, share = 1;
+};
+
+MeasuredEcho strongestMeasured(const Twin& twin, const ChannelData& data) {
+  constexpr double kReach = 2.5;  // bins
+  double strongest = 0;
+  MeasuredEcho echo;
+  for (const PoseChannels& p : data.poses) {
+    const Eigen::Isometry3d& T = p.pose.T_map_radar;
+    const Eigen::VectorXd measured = p.y.colwise().squaredNorm().transpose() / static_cast<double>(p.y.rows());
+    std::vector<std::pair<double, double>> expected;  // bin and power
+    for (const PathRecord& r : twin.receivedPaths(T, twin.trace(T), p.pose.stamp_ns)) {
+      double power = 0;
+      for (const std::complex<double>& c : r.c) power += std::norm(c);
+      expected.emplace_back(0.5 * r.length_m[0] / data.radar.range_bin_m(), power);
+    }
+    for (const auto& [place, power] : expected) {
+      const Eigen::Index bin = std::lround(place);
+      if (bin < 2 || bin + 2 >= measured.size()) continue;
+      // A tone's power summed over Hann's lobe is 1.5 times its own, wherever it lies between the bins.
+      const double lobe = measured.segment(bin - 2, 5).sum() / 1.5;
+      if (lobe <= strongest) continue;
+      double all = 0;
+      for (const auto& [other, other_power] : expected) all += std::abs(other - place) < kReach ? other_power : 0;
+      const double own = lobe * power / all;
+      if (own <= strongest) continue;
+      strongest = own;
+      echo = {std::sqrt(own), power / all};
+    }
+  }
+  return echo;
+}
+
+/// Of the strongest echo's level: how it adds to others in its cell is chance.
+double errorOf_db(const MeasuredEcho& echo) { return kLevelError_db + kSharedError_db * (1 - echo.share); }
+
 }  // namespace
 
-void referToStrongestEcho(const Twin& twin, const SessionModel& model, const ModelState& state, Finding& f) {
-  const StrongestEcho strongest = strongestEcho(twin, model, state);
-  if (!(strongest.power > 0)) return;
-  changeLevel(f, kDbPerNeper * std::log(strongestMeasured(model.data()) / std::sqrt(strongest.power)),
-              strongest.error_db);
+void referToStrongestEcho(const Twin& twin, const ChannelData& data, Finding& f) {
+  const MeasuredEcho echo = strongestMeasured(twin, data);
+  if (!(echo.amplitude > 0)) return;
+  changeLevel(f, kDbPerNeper * std::log(strongestMeasured(data) / echo.amplitude), errorOf_db(echo));
 }
 
-void referToStrongestHost(const Twin& twin, const SessionModel& model, const ModelState& state, double amplitude,
-                          Finding& f) {
-  const StrongestEcho strongest = strongestEcho(twin, model, state);
-  if (!(strongest.power > 0)) return;
-  changeLevel(f, kDbPerNeper * (0.5 * (std::log(strongest.power) - state.nuisance.log_gain) - std::log(amplitude)),
-              strongest.error_db);
+void referToStrongestHost(const Twin& twin, const ChannelData& data, double log_gain, double amplitude, Finding& f) {
+  const MeasuredEcho echo = strongestMeasured(twin, data);
+  if (!(echo.amplitude > 0)) return;
+  changeLevel(f, kDbPerNeper * (std::log(echo.amplitude / amplitude) - 0.5 * log_gain), errorOf_db(echo));
 }
-
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated) {
   // A sample's noise from that of a cell of the average: Hann's sums over N samples, N/2 and 3N/8.
   std::vector<double> levels_db;

@@ -36,13 +36,12 @@ void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& 
 Finding findingOf(const Delivery& delivery, const RadarConfig& radar);
 /// rest: the data without the tone, whose strongest echo levels refer to.
 Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest);
-/// The same where a twin tells how strong the strongest echo is: in the data it may stand in one cell with others, and
-/// how well its gain is known widens the interval. Does nothing to a finding without a level.
-void referToStrongestEcho(const Twin& twin, const SessionModel& model, const ModelState& state, Finding& f);
-/// A level against its host, fitted with the session's strongest echo of the twin as given (its amplitude), as one at
-/// the strongest of the room, whose gain the fit has found.
-void referToStrongestHost(const Twin& twin, const SessionModel& model, const ModelState& state, double amplitude,
-                          Finding& f);
+/// The same where a twin tells where its strongest echoes stand: in the data several may stand in one cell. Does
+/// nothing to a finding without a level.
+void referToStrongestEcho(const Twin& twin, const ChannelData& data, Finding& f);
+/// A level against its host that was fitted beside the twin's strongest amplitude, as one at the strongest echo of the
+/// room. `log_gain`: what the measured power has more than the twin's.
+void referToStrongestHost(const Twin& twin, const ChannelData& data, double log_gain, double amplitude, Finding& f);
 Finding findingOf(const ChannelErrors& errors);
 /// Where the noise departs from the level that the twin's noise_floor states.
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated);
