@@ -73,8 +73,9 @@ void ReceiverMixture::send(Alone& path) const {
 void ReceiverMixture::scaleTones(std::vector<PathRecord>& paths, const EchoCollector& collector) {
   std::sort(paths.begin(), paths.end(),
             [](const PathRecord& a, const PathRecord& b) { return a.amplitude > b.amplitude; });
+  const double least = paths.empty() ? 0 : std::sqrt(kStrong) * paths.front().amplitude;
   for (PathRecord& r : paths) {
-    if (r.amplitude * r.amplitude <= kStrong * paths.front().amplitude * paths.front().amplitude) break;
+    if (r.amplitude <= least) break;
     Alone path{r, receiver_};
     for (double& l : path.path.length_m) l += 2 * collector.addedRange_m(r.actors);
     const auto sign = [&](double v) { boost::hash_combine(path.signature, v); };
