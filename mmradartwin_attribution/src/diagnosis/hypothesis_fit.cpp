@@ -537,10 +537,13 @@ Eigen::MatrixXd HypothesisFitter::robustCovariance(const Effective& e) const {
 }
 
 double HypothesisFitter::worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
-                                         const Optimum& o, Eigen::Index first, Eigen::Index numbers) {
+                                         const Optimum& o, const Effective& e, Eigen::Index first,
+                                         Eigen::Index numbers) {
   std::vector<double> scaled = o.scaled;
   std::fill_n(scaled.begin() + first, numbers, 0.0);
-  return broadGain(state(mechanismsWith(base, parts, scaled), &o.state.nuisance), o.state);
+  const double gain = broadGain(state(mechanismsWith(base, parts, scaled), &o.state.nuisance), o.state);
+  if (e.scatter.size() == 0) return gain;  // one place: nothing scatters
+  return gain / std::clamp(e.scatter(first, first) / e.information(first, first), 1.0, kMaxInflation);
 }
 
 JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
@@ -562,12 +565,9 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
       errors.push_back(std::sqrt(robust(at + j, at + j)) * std::abs(c.slope(v[j])));
     }
     fit.standard_error.push_back(std::move(errors));
-    if (n > 0 && h.isOneSided()) {
-      fit.worth.push_back(worthOfPresence(base, parts, o, at, n) /
-                          std::clamp(e.scatter(at, at) / e.information(at, at), 1.0, kMaxInflation));
-    } else {
-      fit.worth.push_back(n > 0 ? 0.5 * v.dot(robust.block(at, at, n, n).ldlt().solve(v)) : 0);
-    }
+    fit.worth.push_back(n == 0           ? 0
+                        : h.isOneSided() ? worthOfPresence(base, parts, o, e, at, n)
+                                         : 0.5 * v.dot(robust.block(at, at, n, n).ldlt().solve(v)));
     at += n;
   }
   fit.mechanisms = std::move(o.state.mechanisms);

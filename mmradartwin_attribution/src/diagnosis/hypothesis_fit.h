@@ -109,9 +109,9 @@ class HypothesisFitter {
                                     const Nuisance& nuisance);
   Screened screenDirectly(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
   /// Nats that the numbers from `first` on, which rise from nothing, bring beside the others, without the place that
-  /// gains most. Their square laws make what the errors at the fit say of that far too small.
+  /// gains most, inflation taken off. Their square laws make what the errors at the fit say of that far too small.
   double worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
-                         const Optimum& o, Eigen::Index first, Eigen::Index numbers);
+                         const Optimum& o, const Effective& e, Eigen::Index first, Eigen::Index numbers);
   Eigen::MatrixXd robustCovariance(const Effective& effective) const;
   /// null: what a geometry has to be well above at more than one place before it is searched without slopes; null
   /// pointer: it is.
