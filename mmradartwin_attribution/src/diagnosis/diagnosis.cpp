@@ -137,11 +137,12 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
   }
   requirePlacesNear(twin_.scene(), data_, recording.source);
   // Levels relative to the strongest echo refer to this session's; poses inside something are left out here.
-  double& strongest = strongest_amplitude_;
   std::vector<PoseChannels> usable;
   for (PoseChannels& p : data_.poses) {
     try {
-      for (const PathRecord& r : twin_.trace(p.pose.T_map_radar)) strongest = std::max(strongest, r.amplitude);
+      for (const PathRecord& r : twin_.trace(p.pose.T_map_radar)) {
+        strongest_amplitude_ = std::max(strongest_amplitude_, r.amplitude);
+      }
       usable.push_back(std::move(p));
     } catch (const InputError& error) {
       data_.problems.push_back({p.pose.name, "pose '" + p.pose.name + "': " + error.what()});
@@ -149,11 +150,11 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
   }
   data_.poses = std::move(usable);
   if (data_.poses.empty()) throw InputError(recording.source + ": " + data_.problems.back().message);
-  if (strongest == 0) {
+  if (strongest_amplitude_ == 0) {
     throw InputError(recording.source + ": the twin has no echo at any pose; check that poses.csv and scene " +
                      twin.description().scene_file + " share one map, in metres");
   }
-  twin_.setStrongestAmplitude(strongest);
+  twin_.setStrongestAmplitude(strongest_amplitude_);
   mechanisms_ = extended_ = twin_.description().mechanisms;
   expectClutter(twin_.scene(), data_);
   source_ = std::make_unique<EchoSource>(twin_, data_, accuracy_);
@@ -426,39 +427,17 @@ FindingGain Session::gainOf(const ChannelData& before_data, const std::vector<Na
 }
 
 void Session::addMetrics(const HypothesisFit& fit, FindingGain& gain) const {
-  const std::vector<std::vector<NamedParameters>> before = {extended_};
   std::vector<std::vector<NamedParameters>> after;
   for (int k = 0; k < kFolds; ++k) {
     after.push_back(extended_);
     after.back().push_back(fit.hypothesis.at(fit.fold_scaled[static_cast<std::size_t>(k)]));
   }
-  Recording used = recording_;
-  used.poses.clear();
-  for (const PoseChannels& p : data_.poses) used.poses.push_back(p.pose);
   EvaluationOptions options;
   options.config = options_.config;
   options.jobs = options_.jobs;
-  const auto summary = [&](const std::vector<std::vector<NamedParameters>>& folds) {
-    std::vector<Twin> twins;
-    for (const auto& mechanisms : folds) twins.push_back(twin_.changed(mechanisms));
-    std::vector<SimulatedBranch> branches;
-    for (const Twin& t : twins) branches.push_back(simulatedByTwin(t));
-    const SimulatedBranch simulated = [&](const Pose& pose) {
-      const auto at = std::find_if(data_.poses.begin(), data_.poses.end(),
-                                   [&](const PoseChannels& p) { return p.pose.name == pose.name; });
-      const std::size_t fold = static_cast<std::size_t>(fitter_->fold(at->location)) % branches.size();
-      return branches[fold](pose);
-    };
-    return evaluate(used, simulated, twin_.scene(), twin_.rays(), options).central;
-  };
-  const LedgerSummary b = summary(before), a = summary(after);
-  const auto set = [](GainMetric& m, double from, double to) { m = {from, to, {}}; };
-  set(gain.recall, b.recall, a.recall);
-  for (std::size_t i = 0; i < 3; ++i) set(gain.recall_band[i], b.recall_band[i], a.recall_band[i]);
-  set(gain.q1, b.q1_energy, a.q1_energy);
-  set(gain.q2, b.q2_energy, a.q2_energy);
-  set(gain.q3_median_db, b.q3_median_db, a.q3_median_db);
-  for (std::size_t i = 0; i < 5; ++i) set(gain.classes[i], b.class_count[i], a.class_count[i]);
+  addMapMetrics(
+      recording_, twin_, data_, {extended_}, after, [&](int location) { return fitter_->fold(location); }, options,
+      gain);
 }
 
 /// All that rounds have found, fitted at once; what is then worth nothing beside the rest is taken back.
@@ -508,7 +487,11 @@ void Session::refitTogether() {
 void Session::profileFound() {
   report("errors of what was found", 0);
   // A channel error's numbers are too many, and know nothing of the others: it stays as it is.
-  const auto apart = [](const Accepted& a) { return a.scaled.size() > kMostProfiled; };
+  const std::size_t numbers = std::accumulate(accepted_.begin(), accepted_.end(), std::size_t{0},
+                                              [](std::size_t sum, const Accepted& a) { return sum + a.scaled.size(); });
+  const auto apart = [&](const Accepted& a) {
+    return numbers > kMostProfiled && a.hypothesis.mechanism.mechanism == "channel_phase_error";
+  };
   std::vector<NamedParameters> base = before_rounds_;
   std::vector<Hypothesis> parts;
   ProfiledValues fit;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/functional/hash.hpp>
 #include <cmath>
 #include <utility>
 
@@ -80,6 +81,14 @@ class HannTable {
 const HannTable kHann;
 
 }  // namespace
+
+void addToSignature(const PathRecord& record, std::size_t& signature) {
+  const auto sign = [&](double v) { boost::hash_combine(signature, v); };
+  for (double v : record.length_m) sign(v);
+  for (const std::complex<double>& v : record.c) sign(v.real()), sign(v.imag());
+  sign(record.departure.y());
+  sign(record.arrival.y());
+}
 
 EchoCollector::EchoCollector(const RadarConfig& radar, double angle_error_rad, const std::vector<EchoBeam>& beams,
                              const std::vector<double>& actor_range_m)

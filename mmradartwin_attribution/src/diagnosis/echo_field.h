@@ -82,6 +82,9 @@ class EchoCollector {
   BinCovariance graze_, graze_beams_;
 };
 
+/// Changes a signature of paths by all of a record that collected echoes follow from, but its actors.
+void addToSignature(const PathRecord& record, std::size_t& signature);
+
 /// Hann's response at `offset` bins from a tone, 1 at 0: sinc(d)/(1 - d^2), the limit for many samples (error below
 /// 1e-3 within three bins of 64).
 double hannResponse(double offset);

@@ -336,12 +336,7 @@ void EchoSource::addGroups(std::size_t pose, const std::vector<PathRecord>& reco
     const auto sign = [&](double v) { boost::hash_combine(signature, v); };
     sign(strongest);
     sign(to.addedRange_m(actors));
-    for (const PathRecord* r : members) {
-      for (double v : r->length_m) sign(v);
-      for (const std::complex<double>& v : r->c) sign(v.real()), sign(v.imag());
-      sign(r->departure.y());
-      sign(r->arrival.y());
-    }
+    for (const PathRecord* r : members) addToSignature(*r, signature);
     std::array<Kept, 2>& kept = kept_[pose][actors];
     if (kept[1].group && kept[1].signature == signature) std::swap(kept[0], kept[1]);
     if (!kept[0].group || kept[0].signature != signature) {

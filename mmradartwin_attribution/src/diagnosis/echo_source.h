@@ -67,8 +67,6 @@ class EchoSource {
   void pointBeams(ChannelData& data, const std::vector<NamedParameters>& mechanisms, int first_bin);
   /// True where the mechanism edits the scene or moves the radar: trying it traces everything again.
   bool altersGeometry(const NamedParameters& mechanism);
-  /// True where its receiver makes of a path more than its tone in all channels (an image, a harmonic).
-  bool mixesRanges(const NamedParameters& mechanism);
   const Twin& base() const { return base_; }
 
  private:
@@ -76,6 +74,8 @@ class EchoSource {
   /// Paths of one of the mechanisms.
   const Traced& traced(const std::vector<NamedParameters>& geometry, const NamedParameters& mechanism,
                        const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
+  /// True where its receiver makes of a path more than its tone in all channels (an image, a harmonic).
+  bool mixesRanges(const NamedParameters& mechanism);
   /// Keeps memory bounded while one hypothesis' geometry is searched for.
   void forgetLongUnused();
   std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);

@@ -174,4 +174,34 @@ GainMetric likelihoodGain(const ChannelData& data, const std::vector<double>& be
   return m;
 }
 
+void addMapMetrics(const Recording& recording, const Twin& twin, const ChannelData& data,
+                   const std::vector<std::vector<NamedParameters>>& before,
+                   const std::vector<std::vector<NamedParameters>>& after, const std::function<int(int)>& fold_of,
+                   const EvaluationOptions& options, FindingGain& gain) {
+  Recording used = recording;
+  used.poses.clear();
+  for (const PoseChannels& p : data.poses) used.poses.push_back(p.pose);
+  const auto summary = [&](const std::vector<std::vector<NamedParameters>>& folds) {
+    std::vector<Twin> twins;
+    for (const auto& mechanisms : folds) twins.push_back(twin.changed(mechanisms));
+    std::vector<SimulatedBranch> branches;
+    for (const Twin& t : twins) branches.push_back(simulatedByTwin(t));
+    const SimulatedBranch simulated = [&](const Pose& pose) {
+      const auto at = std::find_if(data.poses.begin(), data.poses.end(),
+                                   [&](const PoseChannels& p) { return p.pose.name == pose.name; });
+      const std::size_t fold = static_cast<std::size_t>(fold_of(at->location)) % branches.size();
+      return branches[fold](pose);
+    };
+    return evaluate(used, simulated, twin.scene(), twin.rays(), options).central;
+  };
+  const LedgerSummary b = summary(before), a = summary(after);
+  const auto set = [](GainMetric& m, double from, double to) { m = {from, to, {}}; };
+  set(gain.recall, b.recall, a.recall);
+  for (std::size_t i = 0; i < 3; ++i) set(gain.recall_band[i], b.recall_band[i], a.recall_band[i]);
+  set(gain.q1, b.q1_energy, a.q1_energy);
+  set(gain.q2, b.q2_energy, a.q2_energy);
+  set(gain.q3_median_db, b.q3_median_db, a.q3_median_db);
+  for (std::size_t i = 0; i < 5; ++i) set(gain.classes[i], b.class_count[i], a.class_count[i]);
+}
+
 }  // namespace mmradartwin

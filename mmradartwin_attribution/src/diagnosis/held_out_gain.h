@@ -1,11 +1,14 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "channel_data.h"
 #include "echo_field.h"
+#include "mmradartwin_attribution/evaluation.h"
 #include "mmradartwin_attribution/finding.h"
+#include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
 
@@ -24,5 +27,12 @@ GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPow
 
 /// Mean difference per pose with its 95 % interval by bootstrap over locations.
 GainMetric likelihoodGain(const ChannelData& data, const std::vector<double>& before, const std::vector<double>& after);
+
+/// The paper's metrics of the poses in `data` (recall by band, Q1, Q2, Q3, C1 to C5) before and after: mechanisms by
+/// fold, or one list for all. `fold_of` a location.
+void addMapMetrics(const Recording& recording, const Twin& twin, const ChannelData& data,
+                   const std::vector<std::vector<NamedParameters>>& before,
+                   const std::vector<std::vector<NamedParameters>>& after, const std::function<int(int)>& fold_of,
+                   const EvaluationOptions& options, FindingGain& gain);
 
 }  // namespace mmradartwin

@@ -18,16 +18,21 @@ namespace {
 constexpr double kDbPerNeper = 8.685889638065035;
 constexpr double kLevelError_db = 0.3, kSharedError_db = 3;  ///< of an echo alone in its cell, and by the others there
 
+/// By bin, mean over the channels.
+Eigen::VectorXd measuredPower(const PoseChannels& pose) {
+  return pose.y.colwise().squaredNorm().transpose() / static_cast<double>(pose.y.rows());
+}
+
+/// Of a tone about that bin: its power summed over Hann's lobe is 1.5 times its own, wherever it lies between the bins.
+double tonePower(const Eigen::VectorXd& power, Eigen::Index bin) { return power.segment(bin - 2, 5).sum() / 1.5; }
+
 /// Amplitude of the strongest tone of all poses.
 double strongestMeasured(const ChannelData& data) {
   double strongest = 0;
   for (const PoseChannels& p : data.poses) {
-    const Eigen::VectorXd power = p.y.colwise().squaredNorm().transpose() / static_cast<double>(p.y.rows());
+    const Eigen::VectorXd power = measuredPower(p);
     for (Eigen::Index r = 2; r + 2 < power.size(); ++r) {
-      // A tone's power summed over Hann's lobe is 1.5 times its own, wherever it lies between the bins.
-      if (power[r] >= power[r - 1] && power[r] >= power[r + 1]) {
-        strongest = std::max(strongest, power.segment(r - 2, 5).sum() / 1.5);
-      }
+      if (power[r] >= power[r - 1] && power[r] >= power[r + 1]) strongest = std::max(strongest, tonePower(power, r));
     }
   }
   return std::sqrt(strongest);
@@ -256,7 +261,7 @@ MeasuredEcho strongestMeasured(const Twin& twin, const ChannelData& data) {
   MeasuredEcho echo;
   for (const PoseChannels& p : data.poses) {
     const Eigen::Isometry3d& T = p.pose.T_map_radar;
-    const Eigen::VectorXd measured = p.y.colwise().squaredNorm().transpose() / static_cast<double>(p.y.rows());
+    const Eigen::VectorXd measured = measuredPower(p);
     std::vector<std::pair<double, double>> expected;  // bin and power
     for (const PathRecord& r : twin.receivedPaths(T, twin.trace(T), p.pose.stamp_ns)) {
       double power = 0;
@@ -266,8 +271,7 @@ MeasuredEcho strongestMeasured(const Twin& twin, const ChannelData& data) {
     for (const auto& [place, power] : expected) {
       const Eigen::Index bin = std::lround(place);
       if (bin < 2 || bin + 2 >= measured.size()) continue;
-      // A tone's power summed over Hann's lobe is 1.5 times its own, wherever it lies between the bins.
-      const double lobe = measured.segment(bin - 2, 5).sum() / 1.5;
+      const double lobe = tonePower(measured, bin);
       if (lobe <= strongest) continue;
       double all = 0;
       for (const auto& [other, other_power] : expected) all += std::abs(other - place) < kReach ? other_power : 0;
@@ -296,6 +300,7 @@ void referToStrongestHost(const Twin& twin, const ChannelData& data, double log_
   if (!(echo.amplitude > 0)) return;
   changeLevel(f, kDbPerNeper * (std::log(echo.amplitude / amplitude) - 0.5 * log_gain), errorOf_db(echo));
 }
+
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated) {
   // A sample's noise from that of a cell of the average: Hann's sums over N samples, N/2 and 3N/8.
   std::vector<double> levels_db;

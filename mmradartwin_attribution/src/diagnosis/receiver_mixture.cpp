@@ -78,17 +78,11 @@ void ReceiverMixture::scaleTones(std::vector<PathRecord>& paths, const EchoColle
     if (r.amplitude <= least) break;
     Alone path{r, receiver_};
     for (double& l : path.path.length_m) l += 2 * collector.addedRange_m(r.actors);
-    const auto sign = [&](double v) { boost::hash_combine(path.signature, v); };
-    sign(collector.addedRange_m(r.actors));
+    boost::hash_combine(path.signature, collector.addedRange_m(r.actors));
     boost::hash_combine(path.signature, r.actors);
     const std::vector<PathRecord> received = linear_.receivedPaths(pose_.T_map_radar, {path.path}, pose_.stamp_ns);
     if (received.empty()) continue;
-    for (const PathRecord& part : received) {
-      for (double v : part.length_m) sign(v);
-      for (const std::complex<double>& v : part.c) sign(v.real()), sign(v.imag());
-      sign(part.departure.y());
-      sign(part.arrival.y());
-    }
+    for (const PathRecord& part : received) addToSignature(part, path.signature);
     path.received = received.front();
     Kept& kept = cache_[path.signature];
     if (kept.used == 0) {

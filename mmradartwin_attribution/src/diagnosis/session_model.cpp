@@ -181,8 +181,6 @@ void SessionModel::addClutter(const Nuisance& n, int pose, int cell, double fact
   addApart(cell, beam.weights.dot(clutter * beam.weights).real(), to);
 }
 
-int SessionModel::gainOf(int actor) const { return kActors + actor; }
-
 std::pair<int, double> SessionModel::shapeAt(int bin) const {
   const int most = static_cast<int>(Nuisance().floor_shape.size()) - 1;
   const double first = firstBin(),

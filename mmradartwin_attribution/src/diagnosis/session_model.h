@@ -115,8 +115,6 @@ class SessionModel {
   /// y|^2.
   double gainOfPoint(const Whitened& cell, double power, double noise, double found) const;
 
-  /// Place among the globals of an actor's gain; that of all echoes stands first.
-  int gainOf(int actor) const;
   const ChannelData& data() const { return data_; }
   const LatentSpread& spread() const { return spread_; }
   int firstBin() const { return 2; }  ///< the radar's own near range is judged apart
