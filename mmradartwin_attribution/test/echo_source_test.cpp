@@ -88,6 +88,43 @@ TEST_F(CabinetScene, ExpectsOfEdgesWhatTheWholeTwinHas) {
   EXPECT_NEAR(addedPower(1) / (cell * tracedPower(1, "edge_diffraction")), 1, 0.02);
 }
 
+// The echo of each of two objects is its own, whatever one hides of the other and of the room.
+TEST_F(CabinetScene, ExpectsOfTwoObjectsWhatTheWholeTwinHas) {
+  ChannelData data;
+  data.radar = paperRadar();
+  PoseChannels pose;
+  pose.pose.T_map_radar = Eigen::Isometry3d::Identity();
+  data.poses.push_back(pose);
+  const Twin twin(loadTwin("", folder_ + "/scene.yaml", data.radar));
+  const NamedParameters specular = defaultMechanism("specular");
+  const auto object = [](double x_m, double y_m, const std::string& shape) {
+    NamedParameters m = defaultMechanism("actor_unmodelled");
+    m.values.set("x_m", x_m);
+    m.values.set("y_m", y_m);
+    m.values.set("size_m", 0.3);
+    m.values.set("bottom_m", -1.0);
+    m.values.set("shape", shape);
+    return m;
+  };
+  const std::string round = "cylinder", box = "box";
+  for (const auto& objects : {std::vector<NamedParameters>{object(2, 0.5, round), object(2, -0.5, round)},
+                              {object(1.5, 0, round), object(2.5, 0, round)},
+                              {object(2, 0.6, box), object(2, 0, round)},
+                              {object(2, 0, round), object(2, 0.6, box)}}) {
+    std::vector<NamedParameters> all = objects;
+    all.push_back(specular);
+    EchoSource source(twin, data, PoseAccuracy());
+    double expected = 0;
+    for (const PathRecord& r : twin.changed(all).trace(pose.pose.T_map_radar)) expected += r.amplitude * r.amplitude;
+    // The window's power in a cell is the same for all paths.
+    double alone = 0;
+    for (const PathRecord& r : twin.changed({specular}).trace(pose.pose.T_map_radar))
+      alone += r.amplitude * r.amplitude;
+    const double cell = power(source.echoes({specular})[0], 8) / alone;
+    EXPECT_NEAR(power(source.echoes(all)[0], 8) / (cell * expected), 1, 0.02);
+  }
+}
+
 // A square law makes echoes of two at the sum of their ranges, four times as strong as those of each at twice its own.
 TEST_F(CabinetScene, ExpectsWhatAReceiverMakesOfTwoEchoesTogether) {
   addLocker();

@@ -154,6 +154,8 @@ std::vector<std::string> YamlMap::keys() const {
   return keys;
 }
 
+bool YamlMap::isList(const std::string& key) const { return lookUp(state_->node, key).IsSequence(); }
+
 void YamlMap::fail(const std::string& key, const std::string& why) const {
   throw InputError(state_->file + ": key " + state_->prefix + key + ": " + why);
 }

@@ -110,7 +110,7 @@ Twin Twin::changed(std::vector<NamedParameters> mechanisms) const {
 
 bool Twin::altersGeometry() const { return impl_->edited || impl_->movesRadar(); }
 
-bool Twin::addsScreensAlone() const { return impl_->screens && !impl_->movesRadar(); }
+bool Twin::addsScreensAlone() const { return impl_->screens && impl_->screens_alone && !impl_->movesRadar(); }
 
 void Twin::removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord>& records,
                         std::int64_t stamp_ns) const {
@@ -134,6 +134,7 @@ void Twin::Impl::assemble() {
     for (const NamedParameters& named : m.description.mechanisms) {
       m.mechanisms.push_back(MechanismRegistry::instance().create(named.mechanism));
       m.mechanisms.back()->configure(named.values, m.scene, radar);
+      m.as_described.push_back(m.mechanisms.back().get());
     }
     std::stable_sort(m.mechanisms.begin(), m.mechanisms.end(), [](const auto& a, const auto& b) {
       return std::make_pair(a->rank(), a->name()) < std::make_pair(b->rank(), b->name());
@@ -154,10 +155,11 @@ void Twin::Impl::assemble() {
     } else {
       m.edited_rays = std::make_unique<RayCaster>(*m.edited);
     }
-    if (same && m.edited) {
+    if (m.edited && !m.edited->screens.empty()) {
       Scene alone;
       alone.screens = m.edited->screens;
       m.screens = std::make_unique<RayCaster>(alone);
+      m.screens_alone = same;
     }
     for (const auto& mechanism : m.mechanisms) {
       mechanism->build(m.model(), radar);
@@ -245,6 +247,25 @@ std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar, std::i
   for (const auto& m : impl_->mechanisms) {
     if (!m->needsStrongestAmplitude()) impl_->addPaths(*m, c, records);
   }
+  return records;
+}
+
+std::vector<PathRecord> Twin::trace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
+                                    const CloudCells* cloud) const {
+  PoseContext c = impl_->context(T_map_radar);
+  c.cloud = cloud;
+  impl_->refuseUnusablePose(c);
+  const Mechanism& wanted = *impl_->as_described[mechanism];
+  const std::vector<std::string> beside = wanted.looksAtPathsOf();
+  std::vector<PathRecord> records;
+  if (wanted.needsStrongestAmplitude()) return records;
+  for (const auto& m : impl_->mechanisms) {
+    if (m.get() == &wanted) break;  // of those that it looks at, all act before it
+    if (std::find(beside.begin(), beside.end(), m->name()) != beside.end()) impl_->addPaths(*m, c, records);
+  }
+  const auto known = static_cast<std::ptrdiff_t>(records.size());
+  impl_->addPaths(wanted, c, records);
+  records.erase(records.begin(), records.begin() + known);
   return records;
 }
 

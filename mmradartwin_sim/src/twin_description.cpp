@@ -1,6 +1,7 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <iomanip>
+#include <set>
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
@@ -120,6 +121,18 @@ void write(std::ostream& out, const Parameters::Value& value) {
   }
 }
 
+void write(std::ostream& out, const Parameters& values) {
+  out << '{';
+  bool first = true;
+  for (const auto& [key, value] : values.all()) {
+    if (isEmpty(value)) continue;  // stands for: not given
+    out << (first ? "" : ", ") << key << ": ";
+    write(out, value);
+    first = false;
+  }
+  out << '}';
+}
+
 }  // namespace
 
 std::string TwinDescription::toYaml() const {
@@ -127,18 +140,40 @@ std::string TwinDescription::toYaml() const {
   if (!scene_file.empty()) out << "scene: " << quoted(scene_file) << "\n";
   if (!radar_file.empty()) out << "radar: " << quoted(radar_file) << "\n";
   out << "mechanisms:\n";
-  for (const NamedParameters& m : mechanisms) {
-    out << "  " << m.mechanism << ": {";
-    bool first = true;
-    for (const auto& [key, value] : m.values.all()) {
-      if (isEmpty(value)) continue;  // stands for: not given
-      out << (first ? "" : ", ") << key << ": ";
-      write(out, value);
-      first = false;
+  std::set<std::string> written;
+  for (const NamedParameters& named : mechanisms) {
+    if (!written.insert(named.mechanism).second) continue;
+    std::vector<const Parameters*> all;
+    for (const NamedParameters& m : mechanisms) {
+      if (m.mechanism == named.mechanism) all.push_back(&m.values);
     }
-    out << "}\n";
+    out << "  " << named.mechanism << ": ";
+    if (all.size() == 1) {
+      write(out, *all.front());
+    } else {
+      for (const Parameters* values : all) write(out << "\n    - ", *values);
+    }
+    out << "\n";
   }
   return out.str();
+}
+
+std::string subjectOf(const NamedParameters& mechanism) {
+  std::string subject;
+  for (const char* key : {"actor", "actors", "material", "walls", "pose", "variable"}) {
+    if (!mechanism.values.has(key) || isEmpty(mechanism.values.all().at(key))) continue;
+    std::ostringstream text;
+    write(text << key << ' ', mechanism.values.all().at(key));
+    subject += (subject.empty() ? "" : ", ") + text.str();
+  }
+  return subject;
+}
+
+bool excludeEachOther(const NamedParameters& a, const NamedParameters& b) {
+  if (a.mechanism != b.mechanism) return false;
+  const std::string subject = subjectOf(a);
+  return !MechanismRegistry::instance().create(a.mechanism)->standsSeveralTimes() ||
+         (!subject.empty() && subject == subjectOf(b));
 }
 
 TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::string>& default_scene,
@@ -174,9 +209,25 @@ TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::
       } catch (const InputError& e) {
         mechanisms.fail(name, e.what());
       }
-      YamlMap parameters = mechanisms.map(name);
-      twin.mechanisms.push_back({name, readParameters(parameters, specs, name)});
-      parameters.rejectUnknownKeys();
+      // One mapping, or a list of them where it stands several times.
+      std::vector<YamlMap> entries;
+      if (mechanisms.isList(name)) {
+        entries = mechanisms.maps(name);
+        if (entries.empty()) mechanisms.fail(name, "is an empty list; write {} for its defaults or leave the key out");
+      } else {
+        entries.push_back(mechanisms.map(name));
+      }
+      for (YamlMap& parameters : entries) {
+        NamedParameters named{name, readParameters(parameters, specs, name)};
+        parameters.rejectUnknownKeys();
+        for (const NamedParameters& m : twin.mechanisms) {
+          if (!excludeEachOther(m, named)) continue;
+          const std::string subject = subjectOf(named);
+          mechanisms.fail(name, subject.empty() ? "stands once in a twin, not in a list"
+                                                : "names " + subject + " twice; leave one of the two out");
+        }
+        twin.mechanisms.push_back(std::move(named));
+      }
     }
   }
   yaml.rejectUnknownKeys();

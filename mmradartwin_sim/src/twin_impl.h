@@ -20,12 +20,13 @@ struct Twin::Impl {
   std::shared_ptr<const RayCaster> rays;
   std::unique_ptr<Scene> edited;  // null where no mechanism edits the scene
   std::unique_ptr<RayCaster> edited_rays;
-  std::unique_ptr<RayCaster> screens;  // of the screens alone; null where they are not all that was added
+  std::unique_ptr<RayCaster> screens;                  // of the screens alone; null where there are none
+  bool screens_alone = false;                          // are all that was added
   std::vector<std::unique_ptr<Mechanism>> mechanisms;  // by rank
+  std::vector<const Mechanism*> as_described;          // the same by Twin::description()
   double strongest = -1;                               // of the session, where it is known
   mutable std::atomic<double> strongest_so_far{0};
-  bool has_tone_gain = false, has_receive = false, has_distort = false, has_replicas = false,
-       needs_strongest = false;
+  bool has_tone_gain = false, has_receive = false, has_distort = false, has_replicas = false, needs_strongest = false;
   bool has_chirp_paths = false, has_modulation = false, has_chirp_stage = false, has_digitise = false,
        has_transport = false;
   std::vector<std::int64_t> session_ns;  // stamps of the session's poses in order of time

@@ -369,6 +369,43 @@ TEST_F(TwinTest, ReadsTwinsStrictly) {
   EXPECT_EQ(loadTwin(path("again.yaml"), std::nullopt, paperRadar()).toYaml(), resolved);
 }
 
+TEST_F(TwinTest, HasAMechanismForSeveralThings) {
+  addRoom();
+  const std::string scene = writeScene();
+  const Eigen::Isometry3d T = radarPose(2, 2.5, 1, 30);
+  const std::string near = "{material: RoughConcrete, delta_db: -3}", far = "{material: Metal, delta_db: -5}";
+  const Twin both = makeTwin(scene, "  specular: {}\n  material_reflectivity: [" + near + ", " + far + "]\n");
+  const auto factors = [&](const std::string& one) {
+    const Twin with = makeTwin(scene, "  specular: {}\n  material_reflectivity: " + one + "\n");
+    const auto base = makeTwin(scene, "  specular: {}\n").simulate(T).records, changed = with.simulate(T).records;
+    std::vector<double> factor;
+    for (std::size_t i = 0; i < base.size(); ++i) factor.push_back(changed[i].amplitude / base[i].amplitude);
+    return factor;
+  };
+  const std::vector<double> first = factors(near), second = factors(far),
+                            together = factors("[" + near + ", " + far + "]");
+  ASSERT_FALSE(together.empty());
+  double least = 1;
+  for (std::size_t i = 0; i < together.size(); ++i) {
+    EXPECT_NEAR(together[i], first[i] * second[i], 1e-12);
+    least = std::min({least, first[i]});
+  }
+  EXPECT_LT(least, 0.9) << "or nothing is shown";
+  const std::string resolved = both.description().toYaml();
+  write("again.yaml", resolved);
+  EXPECT_EQ(loadTwin(path("again.yaml"), std::nullopt, paperRadar()).toYaml(), resolved);
+  const auto error = [&](const std::string& text) {
+    write("twin.yaml", "mechanisms: {" + text + "}\n");
+    return errorOf([&] { loadTwin(path("twin.yaml"), path("scene.yaml"), paperRadar()); });
+  };
+  EXPECT_EQ(error("actor_unmodelled: [{x_m: 1, y_m: 1, size_m: 0.2}, {x_m: 2, y_m: 1, size_m: 0.2}]"), "");
+  EXPECT_NE(error("range_bias: [{range_m: 0.1}, {range_m: 0.2}]").find("range_bias: stands once"), std::string::npos);
+  EXPECT_NE(error("material_reflectivity: [" + near + ", " + near + "]").find("RoughConcrete"), std::string::npos);
+  EXPECT_NE(error("material_reflectivity: []").find("empty list"), std::string::npos);
+  EXPECT_NE(error("material_reflectivity: [{material: Metal, delta: 1}]").find("material_reflectivity[0].delta"),
+            std::string::npos);
+}
+
 class SimulateSessionTest : public TwinTest {
  protected:
   void writeSession(const std::string& poses) {

@@ -42,8 +42,9 @@ class HiddenEffects(unittest.TestCase):
         return os.path.join(self.folder.name, name)
 
     def measured(self, seed, hidden, headings=7, strength=None, tier="default"):
-        """Writes a session with these effects; the truth stays outside of it."""
-        chosen = [effects.make_effect(name, values, strength) for name, values in hidden.items()]
+        """Writes a session with these effects, {name: parameters} or pairs of both; the truth stays outside of it."""
+        named = hidden.items() if isinstance(hidden, dict) else hidden
+        chosen = [effects.make_effect(name, values, strength) for name, values in named]
         Measurement(Settings(output=self.at("session"), seed=seed, poses=24, headings=headings, frames=20, tier=tier,
                              effects=chosen, truth=self.at("truth.json"))).run()
         with open(self.at("truth.json"), encoding="utf-8") as text:
@@ -149,6 +150,26 @@ class HiddenEffects(unittest.TestCase):
             self.assertAlmostEqual(mechanism[name], truth[name], delta=delta, msg=f"seed {seed}: {mechanism}")
         turned = (mechanism["yaw_deg"] - truth["yaw_deg"] + 45) % 90 - 45
         self.assertAlmostEqual(turned, 0, delta=3, msg=f"seed {seed}: {mechanism}")
+
+    def test_two_objects_that_the_scene_lacks_are_both_placed(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "92"))
+        truth = self.measured(seed, [("actor_unmodelled", {"size_m": 0.4}), ("actor_unmodelled", {"size_m": 0.3})],
+                              headings=2)
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["actor_unmodelled"] * 2, msg=f"seed {seed}")
+        places = [(f["mechanism"]["actor_unmodelled"]["x_m"], f["mechanism"]["actor_unmodelled"]["y_m"])
+                  for f in findings["findings"]]
+        for hidden in truth:
+            place = hidden["parameters"]["x_m"], hidden["parameters"]["y_m"]
+            self.assertLess(min(math.dist(place, p) for p in places), 0.1, msg=f"seed {seed}: {places}")
+        # The twin that it wrote has both, and nothing more is found with it.
+        extended = self.at("out/twin.extended.yaml")
+        with open(extended, encoding="ascii") as twin:
+            self.assertEqual(len(yaml.safe_load(twin)["mechanisms"]["actor_unmodelled"]), 2)
+        status, findings, errors = diagnose(self.at("session"), self.at("again"), "--twin", extended)
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual(findings["verdict"], "none", msg=f"seed {seed}: {findings}")
 
     def test_edges_have_the_level_that_they_were_given(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "77"))

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
+#include <sstream>
 
 namespace mmradartwin {
 namespace {
@@ -80,12 +82,19 @@ std::vector<ProjectedPlace> projectBack(const Twin& twin, const SessionModel& mo
   });
   std::stable_sort(places.begin(), places.end(),
                    [](const ProjectedPlace& a, const ProjectedPlace& b) { return a.promised > b.promised; });
+  // What remains around an object that the twin has by now is of its shape.
+  std::vector<ProjectedPlace> known;
+  for (const NamedParameters& m : null.mechanisms) {
+    if (m.mechanism != "actor_unmodelled") continue;
+    known.push_back({m.values.number("x_m"), m.values.number("y_m")});
+  }
   std::vector<ProjectedPlace> best;
   for (const ProjectedPlace& p : places) {
     if (best.size() == kMostPlaces || !(p.promised > 0)) break;
-    const bool taken = std::any_of(best.begin(), best.end(), [&](const ProjectedPlace& other) {
+    const auto near = [&](const ProjectedPlace& other) {
       return std::hypot(p.x_m - other.x_m, p.y_m - other.y_m) < kApart_m;
-    });
+    };
+    const bool taken = std::any_of(best.begin(), best.end(), near) || std::any_of(known.begin(), known.end(), near);
     if (!taken) best.push_back(p);
   }
   return best;
@@ -97,6 +106,9 @@ Hypothesis objectAt(const ProjectedPlace& place) {
   h.mechanism.values.set("x_m", place.x_m);
   h.mechanism.values.set("y_m", place.y_m);
   h.coordinates = {{"size_m", "m", -1, 0, std::max(0.02, place.size_m), 0.002, 5}};
+  std::ostringstream at;
+  at << std::fixed << std::setprecision(1) << "at " << place.x_m << ", " << place.y_m << " m";
+  h.variant = at.str();
   return h;
 }
 

@@ -80,7 +80,7 @@ class Session {
   void profileFound();
   bool isWithinErrors(const Hypothesis& h) const;
   struct Accepted;
-  void takeOver(const Accepted& accepted);
+  void restate();
   std::vector<PoseEchoes> heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m);
   FindingGain gainOf(HypothesisFit& fit);
   void addMetrics(const HypothesisFit& fit, FindingGain& gain) const;
@@ -113,9 +113,10 @@ class Session {
     return std::find_if(accepted_.begin(), accepted_.end(),
                         [&](const Accepted& a) { return a.hypothesis.label() == h.label(); });
   }
-  std::vector<NamedParameters> before_rounds_;  ///< mechanisms without what rounds have found
-  std::size_t family_ = 1;                      ///< hypotheses of a round
-  std::set<std::string> no_use_;                ///< costly ones that gain nothing whatever is found beside them
+  /// mechanisms_ and extended_ without what rounds have found.
+  std::vector<NamedParameters> before_rounds_, extended_before_rounds_;
+  std::size_t family_ = 1;        ///< hypotheses of a round
+  std::set<std::string> no_use_;  ///< costly ones that gain nothing whatever is found beside them
   Diagnosis result_;
 };
 
@@ -452,14 +453,12 @@ void Session::refitTogether() {
     }
     const JointFit fit = fitter_->refit(before_rounds_, state_.nuisance, parts, start);
     state_.nuisance = fit.nuisance;
-    mechanisms_ = fit.mechanisms;
     std::size_t weakest = 0;
     double weakest_rate = -1;
     for (std::size_t i = 0; i < accepted_.size(); ++i) {
       Accepted& a = accepted_[i];
       a.scaled = fit.scaled[i];
       a.standard_error = fit.standard_error[i];
-      takeOver(a);
       const std::size_t numbers = a.hypothesis.coordinates.size();
       // There or not, or plain whatever its scatter: its own round has judged it.
       if (numbers == 0 || a.plain) continue;
@@ -469,18 +468,15 @@ void Session::refitTogether() {
         weakest_rate = rate;
       }
     }
-    if (weakest_rate <= kFalseAlarm || accepted_.size() < 2) return;
+    if (weakest_rate <= kFalseAlarm || accepted_.size() < 2) break;
     const Accepted gone = accepted_[weakest];
     report("taken back: " + gone.hypothesis.label(), 1);
     std::vector<Finding>& findings = result_.findings.findings;
     findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(gone.finding));
     accepted_.erase(accepted_.begin() + static_cast<std::ptrdiff_t>(weakest));
     for (Accepted& a : accepted_) a.finding -= a.finding > gone.finding ? 1 : 0;
-    extended_.erase(
-        std::remove_if(extended_.begin(), extended_.end(),
-                       [&](const NamedParameters& m) { return m.mechanism == gone.hypothesis.mechanism.mechanism; }),
-        extended_.end());
   }
+  restate();
 }
 
 /// Values and intervals of all that rounds have found, on the likelihood that is settled on them.
@@ -499,14 +495,13 @@ void Session::profileFound() {
     if (apart(a)) {
       base.push_back(a.hypothesis.at(a.scaled));
       widenGains(data_, a.hypothesis, a.standard_error);
-      takeOver(a);
       continue;
     }
     parts.push_back(a.hypothesis);
     fit.scaled.insert(fit.scaled.end(), a.scaled.begin(), a.scaled.end());
     fit.standard_error.insert(fit.standard_error.end(), a.standard_error.begin(), a.standard_error.end());
   }
-  if (fit.scaled.empty() || fit.scaled.size() > kMostProfiled) return;
+  if (fit.scaled.empty() || fit.scaled.size() > kMostProfiled) return restate();
   fit = profiled(*source_, *model_, mechanismsWith(base, parts, fit.scaled), state_.nuisance, accuracy_, parts, fit);
   std::ptrdiff_t from = 0;
   for (Accepted& a : accepted_) {
@@ -515,8 +510,8 @@ void Session::profileFound() {
     a.scaled.assign(fit.scaled.begin() + from, fit.scaled.begin() + to);
     a.standard_error.assign(fit.standard_error.begin() + from, fit.standard_error.begin() + to);
     from = to;
-    takeOver(a);
   }
+  restate();
 }
 
 /// Where paths come and go with every millimetre, the likelihood may gain much by a geometry whose numbers are no
@@ -528,13 +523,17 @@ bool Session::isWithinErrors(const Hypothesis& h) const {
   return fitter_->falseAlarmRate(nats, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
 }
 
-/// The values of what was found, wherever they stand.
-void Session::takeOver(const Accepted& a) {
-  Finding& f = result_.findings.findings[a.finding];
-  f.mechanism = a.hypothesis.at(a.scaled);
-  f.parameters = fittedParameters(a.hypothesis, a.scaled, a.standard_error, f.cause, data_.locations.size());
-  replaceBy(*f.mechanism, mechanisms_);
-  replaceBy(*f.mechanism, extended_);
+/// The values of what rounds have found, wherever they stand.
+void Session::restate() {
+  mechanisms_ = before_rounds_;
+  extended_ = extended_before_rounds_;
+  for (const Accepted& a : accepted_) {
+    Finding& f = result_.findings.findings[a.finding];
+    f.mechanism = a.hypothesis.at(a.scaled);
+    f.parameters = fittedParameters(a.hypothesis, a.scaled, a.standard_error, f.cause, data_.locations.size());
+    mechanisms_.push_back(*f.mechanism);
+    extended_.push_back(*f.mechanism);
+  }
 }
 
 bool Session::judgeChannels(int round) {
@@ -574,23 +573,22 @@ bool Session::judgeChannels(int round) {
     verdict = "found";
     report("found " + f.hypothesis.label() + ", " + number(f.gain, 4) + " nats", 1);
     const bool unknown = finding.cause == "unknown";
-    const auto mechanisms = mechanisms_, extended = extended_;
     const auto accepted = accepted_;
     const auto findings = result_.findings.findings;
     const Nuisance latents = state_.nuisance;
-    mechanisms_ = f.state.mechanisms;
     if (source_->altersGeometry(*finding.mechanism)) no_use_.clear();
-    extended_.push_back(*finding.mechanism);
     accepted_.push_back({f.hypothesis, f.scaled, f.standard_error, f.plain, result_.findings.findings.size()});
     result_.findings.findings.push_back(std::move(finding));
     state_.nuisance = f.state.nuisance;
+    restate();
     if (accepted_.size() > 1) refitTogether();
     source_->settle(mechanisms_);
     const bool stands = acceptedAs(f.hypothesis) != accepted_.end();
     if (stands) profileFound();
     if (!stands || (!f.plain && isWithinErrors(f.hypothesis))) {
-      mechanisms_ = mechanisms, extended_ = extended, accepted_ = accepted;
+      accepted_ = accepted;
       result_.findings.findings = findings;
+      restate();
       state_.nuisance = latents;
       source_->settle(mechanisms_);
       refused = true;
@@ -658,6 +656,7 @@ Diagnosis Session::run() {
     findings.findings.push_back(std::move(f));
   } else {
     before_rounds_ = mechanisms_;
+    extended_before_rounds_ = extended_;
     for (int round = 0; round < (few_ ? 0 : options_.most_findings); ++round) {
       if (!judgeChannels(round)) break;
     }

@@ -50,6 +50,21 @@ std::vector<NamedParameters> lookedAt(const NamedParameters& mechanism, const st
   return beside;
 }
 
+/// The one of `list` that stands where mechanisms[at] does among those of its name and subject; null where there are
+/// fewer.
+const NamedParameters* counterpart(const std::vector<NamedParameters>& mechanisms, std::size_t at,
+                                   const std::vector<NamedParameters>& list) {
+  const NamedParameters& wanted = mechanisms[at];
+  const std::string subject = subjectOf(wanted);
+  const auto alike = [&](const NamedParameters& m) {
+    return m.mechanism == wanted.mechanism && subjectOf(m) == subject;
+  };
+  auto before = std::count_if(mechanisms.begin(), mechanisms.begin() + static_cast<std::ptrdiff_t>(at), alike);
+  const auto found =
+      std::find_if(list.begin(), list.end(), [&](const NamedParameters& m) { return alike(m) && before-- == 0; });
+  return found == list.end() ? nullptr : &*found;
+}
+
 double strongestPower(const std::vector<PathRecord>& records) {
   double strongest = 0;
   for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude * r.amplitude);
@@ -135,7 +150,8 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
     if (!entry.known[i]) missing.push_back(i);
   }
   if (missing.empty()) return entry.paths;
-  if (!geometry.empty() && geometry.back().mechanism != mechanism.mechanism &&
+  const std::string key = tracedKey(mechanism);
+  if (!geometry.empty() && tracedKey(geometry.back()) != key &&
       geometryAfter(geometry.back()) == Geometry::kMoreScreens) {
     // What only hides needs no new trace: paths without it, less those that it stands in the way of.
     const Traced& open = traced({geometry.begin(), geometry.end() - 1}, mechanism, mechanisms, missing);
@@ -148,11 +164,10 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
     });
     return entry.paths;
   }
-  std::vector<NamedParameters> others = beside;
+  std::vector<NamedParameters> all = beside;
   for (const NamedParameters& m : geometry) {
-    if (m.mechanism != mechanism.mechanism) others.push_back(m);
+    if (tracedKey(m) != key) all.push_back(m);
   }
-  std::vector<NamedParameters> all = others;
   all.push_back(mechanism);
   const Twin twin = base_.changed(all);
   tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t j) {
@@ -163,21 +178,12 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
     if (!geometry.empty()) {
       cells.side = [&](const Eigen::Vector3d& p) { return base_.rays().visible(T.translation(), p, 1e-3); };
     }
-    std::vector<PathRecord> records;
     try {
-      records = twin.trace(T, 0, &cells);
+      entry.paths[i] = twin.trace(all.size() - 1, T, &cells);
     } catch (const InputError&) {
       // What is tried stands where the radar stood, which therefore sees nothing.
+      entry.paths[i].clear();
     }
-    // Paths of the other mechanisms (an unmodelled actor's echo) are theirs, not this one's.
-    records.erase(std::remove_if(records.begin(), records.end(),
-                                 [&](const PathRecord& r) {
-                                   return std::any_of(others.begin(), others.end(), [&](const NamedParameters& o) {
-                                     return o.mechanism == *r.event;
-                                   });
-                                 }),
-                  records.end());
-    entry.paths[i] = std::move(records);
     entry.known[i] = 1;
   });
   return entry.paths;
@@ -256,11 +262,10 @@ std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms), geometry_from = geometryOf(from);
   if (keyOf(geometry) == keyOf(geometry_from)) return echoes(mechanisms, poses, actor_range_m);
   std::vector<std::pair<const Traced*, const Traced*>> parts;  // there and here
-  for (const NamedParameters& m : mechanisms) {
-    const auto same =
-        std::find_if(from.begin(), from.end(), [&](const NamedParameters& f) { return f.mechanism == m.mechanism; });
-    parts.emplace_back(&traced(geometry, m, mechanisms, poses),
-                       same == from.end() ? nullptr : &traced(geometry_from, *same, from, poses));
+  for (std::size_t k = 0; k < mechanisms.size(); ++k) {
+    const NamedParameters* same = counterpart(mechanisms, k, from);
+    parts.emplace_back(&traced(geometry, mechanisms[k], mechanisms, poses),
+                       same == nullptr ? nullptr : &traced(geometry_from, *same, from, poses));
   }
   return collect(mechanisms, poses, actor_range_m, [&](std::size_t i, std::vector<PathRecord>& all) {
     all.clear();
@@ -279,11 +284,10 @@ std::vector<PathShift> EchoSource::pathShifts(const std::vector<NamedParameters>
   forgetLongUnused();
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms), geometry_from = geometryOf(from);
   std::vector<std::pair<const Traced*, const Traced*>> parts;  // there and here
-  for (const NamedParameters& f : from) {
-    for (const NamedParameters& m : mechanisms) {
-      if (m.mechanism != f.mechanism) continue;
-      parts.emplace_back(&traced(geometry, m, mechanisms, poses), &traced(geometry_from, f, from, poses));
-    }
+  for (std::size_t k = 0; k < from.size(); ++k) {
+    const NamedParameters* same = counterpart(from, k, mechanisms);
+    if (same == nullptr) continue;
+    parts.emplace_back(&traced(geometry, *same, mechanisms, poses), &traced(geometry_from, from[k], from, poses));
   }
   const Twin there_twin = base_.changed(mechanisms), here_twin = base_.changed(from);
   const auto azimuth = [](const PathRecord& p) { return std::atan2(p.departure.y(), p.departure.x()); };

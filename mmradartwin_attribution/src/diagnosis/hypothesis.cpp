@@ -171,9 +171,6 @@ std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedPara
   const MechanismRegistry& registry = MechanismRegistry::instance();
   const std::size_t channels = static_cast<std::size_t>(twin.radar().channels());
   for (const std::string& name : registry.names()) {
-    const bool there =
-        std::any_of(present.begin(), present.end(), [&](const NamedParameters& m) { return m.mechanism == name; });
-    if (there) continue;  // twin.yaml knows each mechanism once
     const std::vector<ParameterSpec> specs = registry.create(name)->parameters();
     if (!hasTried(specs) && !isPresence(specs)) continue;
     Hypothesis bare;
@@ -196,6 +193,9 @@ std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedPara
     addSubjects(twin, bare, specs, all);
     addSteps(bare, specs, all);
     for (Hypothesis& h : all) {
+      const bool there = std::any_of(present.begin(), present.end(),
+                                     [&](const NamedParameters& m) { return excludeEachOther(m, h.mechanism); });
+      if (there) continue;
       try {  // what the scene or the radar does not allow is no hypothesis
         twin.changed({h.at(std::vector<double>(h.coordinates.size(), 1.0))});
         result.push_back(std::move(h));

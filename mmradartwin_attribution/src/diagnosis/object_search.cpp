@@ -73,7 +73,7 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
   Hypothesis& h = box.hypothesis;
   h.mechanism = h.at(cylinder.scaled);
   h.mechanism.values.set("shape", std::string("box"));
-  h.variant = "a box";
+  h.variant = "a box " + h.variant;
   const Eigen::Vector2d axis(h.mechanism.values.number("x_m"), h.mechanism.values.number("y_m"));
   h.coordinates = {{"x_m", "m", -1, axis.x(), axis.x() + 0.1, -1000, 1000, {}},
                    {"y_m", "m", -1, axis.y(), axis.y() + 0.1, -1000, 1000, {}},

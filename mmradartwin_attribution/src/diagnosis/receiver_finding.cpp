@@ -87,7 +87,7 @@ Finding findingOf(const FrameFinding& frames) {
 
 void addOnce(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms) {
   const bool there = std::any_of(mechanisms.begin(), mechanisms.end(),
-                                 [&](const NamedParameters& m) { return m.mechanism == mechanism.mechanism; });
+                                 [&](const NamedParameters& m) { return excludeEachOther(m, mechanism); });
   if (!there) mechanisms.push_back(mechanism);
 }
 

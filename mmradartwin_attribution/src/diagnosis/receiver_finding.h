@@ -25,7 +25,7 @@ struct ReceivedSession {
 ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const ReadingProgress& on_progress);
 
 Finding findingOf(const FrameFinding& frames);
-/// A mechanism more for a twin, which knows each once: what it has already stays.
+/// A mechanism more for a twin; where it has one that excludes it, that one stays.
 void addOnce(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms);
 /// Puts it in place of those of its name.
 void replaceBy(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms);

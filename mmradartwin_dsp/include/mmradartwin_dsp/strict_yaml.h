@@ -24,6 +24,7 @@ class YamlMap {
 
   bool has(const std::string& key) const;
   std::vector<std::string> keys() const;
+  bool isList(const std::string& key) const;
 
   /// Required values.
   double number(const std::string& key, double min, double max);

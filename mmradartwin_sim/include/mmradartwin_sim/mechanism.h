@@ -126,6 +126,8 @@ class Mechanism {
   /// Takes checked parameters; throws InputError where they do not fit the scene or radar (an unknown actor, say).
   virtual void configure(const Parameters& values, const Scene& scene, const RadarConfig& radar) = 0;
 
+  /// True where a twin may have it several times, each for another thing in the room.
+  virtual bool standsSeveralTimes() const { return false; }
   /// What the user should know about this scene with this mechanism, a line each; asked for after build().
   virtual std::vector<std::string> notes() const { return {}; }
   /// Where the order of two mechanisms in one stage matters, the lower rank acts first; the file's order never matters.

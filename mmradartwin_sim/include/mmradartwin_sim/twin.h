@@ -27,6 +27,12 @@ struct NamedParameters {
   Parameters values;
 };
 
+/// What a mechanism's parameters say that it concerns: actors, a material, walls, a pose, of a law its variable; "" for
+/// nothing of the kind.
+std::string subjectOf(const NamedParameters& mechanism);
+/// True where a twin cannot have both: the same mechanism for the same thing, or twice where it stands once.
+bool excludeEachOther(const NamedParameters& a, const NamedParameters& b);
+
 /// twin.yaml, checked: scene, radar and mechanisms.
 struct TwinDescription {
   std::string file;  ///< "" where the base twin stands in
@@ -103,6 +109,9 @@ class Twin {
   /// cloud: cells within which scatter points are summed; not kept.
   std::vector<PathRecord> trace(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0,
                                 const CloudCells* cloud = nullptr) const;
+  /// Of those paths the ones of description().mechanisms[mechanism] alone.
+  std::vector<PathRecord> trace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
+                                const CloudCells* cloud) const;
   Simulation weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                    std::int64_t stamp_ns = 0) const;
   /// The paths that weigh() makes a grid of: weighted, with leakage, and as the receiver's filters leave them.

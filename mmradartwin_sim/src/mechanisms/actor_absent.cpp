@@ -9,6 +9,7 @@ const std::string kName = "actor_absent";
 class ActorAbsent : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override { return {textSpec("actor", true, "", "name of the actor")}; }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
     actor_ = requireActor(scene, kName, values.text("actor"));

@@ -11,6 +11,7 @@ const std::string kName = "actor_moved";
 class ActorMoved : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("actor", true, "", "name of the actor"),
             tried(numberSpec("dx_m", "m", -100, 100, 0, "true minus twin, along map's x"), 0, 0.05),

@@ -11,18 +11,19 @@ const std::string kName = "actor_unmodelled";
 constexpr int kSides = 24;  // of the screen that stands for the cylinder in occlusion
 
 /// Something of metal in the room that the scene lacks.
-/// shape cylinder: upright, of diameter size_m, which shows the same level from all sides. Its echo is the image's level
-/// with the curvature's divergence sqrt(r/(r + R)) and the Fresnel aperture of its height (far off: 2 pi r L^2/lambda),
-/// from its nearest line; it hides what is behind it.
-/// shape box: upright, with a square of side size_m for its plan, turned by yaw_deg. It is an actor of the scene like
-/// any other: its faces reflect, make corners with others, diffract at their edges and hide, each where the twin's
-/// mechanisms do so.
-/// Records know neither by an index: it is -1, or there is none.
+/// shape cylinder: upright, of diameter size_m, which shows the same level from all sides. Its echo is the image's
+/// level with the curvature's divergence sqrt(r/(r + R)) and the Fresnel aperture of its height (far off: 2 pi r
+/// L^2/lambda), from its nearest line; it hides what is behind it. shape box: upright, with a square of side size_m for
+/// its plan, turned by yaw_deg. It is an actor of the scene like any other: its faces reflect, make corners with
+/// others, diffract at their edges and hide, each where the twin's mechanisms do so. Records know neither by an index:
+/// it is -1, or there is none.
 class ActorUnmodelled : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
-    return {numberSpec("x_m", "m", -1000, 1000, "axis in map"), numberSpec("y_m", "m", -1000, 1000, "axis in map"),
+    return {numberSpec("x_m", "m", -1000, 1000, "axis in map"),
+            numberSpec("y_m", "m", -1000, 1000, "axis in map"),
             numberSpec("size_m", "m", 0.001, 5, "diameter, or side of a box"),
             numberSpec("height_m", "m", 0.001, 1000, 1.7, "from its foot to its top"),
             numberSpec("bottom_m", "m", -1000, 1000, 0.01, "its foot over map's floor level"),

@@ -16,6 +16,7 @@ const std::string kName = "corner_reflection";
 class CornerReflection : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textsSpec("actors", "names of the actors whose faces form the corner"),
             numberSpec("gap_m", "m", 0, 1, 0.06, "faces form a corner though this gap is between them")};

@@ -11,6 +11,7 @@ const std::string kName = "diffuse_scattering";
 class DiffuseScattering : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("material", true, "", "material tag"),
             tried(numberSpec("scattering_coefficient", "1", 0, 1, "S: the share S^2 of the reflected power scatters"),

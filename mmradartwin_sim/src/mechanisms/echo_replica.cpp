@@ -13,6 +13,7 @@ const std::string kName = "echo_replica";
 class EchoReplica : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {weighing(numberSpec("behind_m", "m", -50, 50, "one-way range of the replica less that of its echo")),
             weighing(numberSpec("level_db", "dB", -200, 20, "of the replica against its echo")),

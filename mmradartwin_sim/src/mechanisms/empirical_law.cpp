@@ -16,6 +16,7 @@ const std::string kName = "empirical_law";
 class EmpiricalLaw : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     ParameterSpec at = optionalNumbersSpec("at", "of the variable", -1e6, 1e6, "where the law is given, ascending");
     at.required = true;

@@ -13,6 +13,7 @@ const std::string kName = "empirical_tone";
 class EmpiricalTone : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("beat_hz", "Hz", -1e9, 1e9, "in the sampled signal, that of an echo being positive"),
             numberSpec("level_db", "dB", -200, 200, "over the session's strongest echo"),

@@ -12,6 +12,7 @@ const std::string kName = "material_reflectivity";
 class MaterialReflectivity : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("material", false, "", "material tag; give this or actor"),
             textSpec("actor", false, "", "actor; give this or material"),

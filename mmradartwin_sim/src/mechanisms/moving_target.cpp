@@ -15,6 +15,7 @@ const std::string kName = "moving_target";
 class MovingTarget : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("x_m", "m", -1e4, 1e4, "map, middle of the walk"),
             numberSpec("y_m", "m", -1e4, 1e4, "map, middle of the walk"),

@@ -12,6 +12,7 @@ constexpr std::size_t kPacketBytes = 1456;
 class PacketMisalignment : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("pose", true, "", "name of the pose"),
             integerSpec("packet", "1", -1, 1e9, -1, "number of the packet from 0; -1: one of the first half")};

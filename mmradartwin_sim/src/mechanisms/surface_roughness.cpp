@@ -13,6 +13,7 @@ const std::string kName = "surface_roughness";
 class SurfaceRoughness : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("material", true, "", "material tag"),
             tried(numberSpec("roughness_rms_m", "m", 0, 0.01, "rms height of the surface"), 0, 0.0003)};

@@ -13,6 +13,7 @@ const std::string kName = "transmission";
 class Transmission : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("actor", true, "", "name of the actor"),
             weighing(tried(numberSpec("one_way_db", "dB", -200, 0, "level of one crossing, negative"), -200, -5))};

@@ -30,6 +30,7 @@ bool enclosesRoom(const Scene& scene, const Actor& actor) {
 class WallGhost : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
+  bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textsSpec("walls", "names of the actors that mirror"),
             numberSpec("spacing_m", "m", 0.005, 5, 0.2, "mean distance of scatter points"),

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from mmradartwin_tests.effects import UNCATALOGUED
+from mmradartwin_tests.effects.objects import FURNITURE, MOVABLE
 
 MATERIALS = ("Concrete", "Metal", "Glass", "Wood")
 CORNERS = ("cabinet_north;wall_north", "bookshelf;wall_east")
@@ -202,7 +203,10 @@ DECOYS = {
 }
 OUTSIDE = tuple(name for name in UNCATALOGUED if name not in DECOYS)
 
-ROWS = ("clean", "single", "pair", "outside", "decoy", "recording")
+ROWS = ("clean", "single", "pair", "twice", "outside", "decoy", "recording")
+# Causes that a room may hold for several things at once, with the parameter that tells them apart.
+TWICE = {"actor_absent": ("actor", MOVABLE), "actor_moved": ("actor", FURNITURE), "actor_unmodelled": None,
+         "material_reflectivity": ("material", MATERIALS)}
 
 
 def shuffled(names, trial):
@@ -231,6 +235,14 @@ def draw(trial):
         return [(name, DECOYS[name](rng, trial), None)]
     if trial.row == "outside":
         return [(shuffled(OUTSIDE, trial), {}, outside_strength(rng))]
+    if trial.row == "twice":
+        name = shuffled(TWICE, trial)
+        hidden = [(name, SINGLE[name](rng, trial), None) for _ in range(2)]
+        if TWICE[name]:
+            parameter, subjects = TWICE[name]
+            for (_, values, _), subject in zip(hidden, rng.choice(subjects, 2, replace=False)):
+                values[parameter] = str(subject)
+        return hidden
     if trial.row != "pair":
         raise ValueError(f"row '{trial.row}' hides nothing in generated sessions; rows: {', '.join(ROWS)}")
     while True:

@@ -120,6 +120,19 @@ def place_error_m(truth, finding):
     return min(distances, default=math.inf)
 
 
+def match(truths, findings):
+    """The finding of each truth's cause, None where there is none; one finding answers one truth, of several of one
+    cause the one about the right subject or the nearer place."""
+    left, matched = list(findings), []
+    for truth in truths:
+        alike = [f for f in left if same_cause(truth, f["cause"])]
+        best = min(alike, default=None,
+                   key=lambda f: (subject_right(truth, f) is False, place_error_m(truth, f) or 0))
+        matched.append(best)
+        left = [f for f in left if f is not best]
+    return matched
+
+
 def gain_of(findings):
     """Held-out explained power that all findings add, None where none was measured."""
     pairs = [f["gain"]["explained_power"] for f in findings if f.get("gain")]
@@ -149,10 +162,18 @@ def score(row, truths, findings):
         if truths[0]["parameters"].get("x_m") is not None:
             result["place"] = min(errors, default=math.inf) <= PLACE_M
         return result
-    matched = [next((f for f in findings if same_cause(t, f["cause"])), None) for t in truths]
+    matched = match(truths, findings)
+    # The right cause of one thing more than there is.
+    more = [f["cause"] for f in findings
+            if any(f["cause"] == t["cause"] for t in truths) and not any(f is m for m in matched)]
+    result["wrong_names"] += more
+    result["wrong"] = bool(result["wrong_names"])
     result["named"] = [m is not None for m in matched]
     result["coverage"] = [c for t, m in zip(truths, matched) if m for c in coverage(t, m)]
     result["subjects"] = [s for s in (subject_right(t, m) for t, m in zip(truths, matched) if m) if s is not None]
+    if row == "twice":
+        result["told_apart"] = all(m is not None and subject_right(t, m) is not False
+                                   and (place_error_m(t, m) or 0) <= PLACE_M for t, m in zip(truths, matched))
     if row in ("single", "recording"):
         first = findings[0] if findings else None
         names = group(first) if first else {}

@@ -8,11 +8,12 @@ from mmradartwin_tests.effects.effect import Effect, effect
 from mmradartwin_tests.geometry import Actor, Cylinder, box, rotation_z
 from mmradartwin_tests.tracing import Path
 
-MOVABLE = ["cabinet_north", "cabinet_east", "wardrobe", "bookshelf", "pillar", "tv", "whiteboard", "monitor_east"]
+FURNITURE = ["cabinet_north", "cabinet_east", "wardrobe", "bookshelf", "pillar"]
+MOVABLE = FURNITURE + ["tv", "whiteboard", "monitor_east"]
 
 
-def free_spot(measurement, margin_m, stream):
-    """A place on the floor clear of furniture and of all radars, and faced by many poses."""
+def free_spot(measurement, margin_m, stream, taken=()):
+    """A place on the floor clear of furniture, of all radars and by 1 m of `taken`, and faced by many poses."""
     rng = measurement.rng(stream)
     best, best_count = None, -1
     for _ in range(4000):
@@ -20,6 +21,8 @@ def free_spot(measurement, margin_m, stream):
         distance = [np.hypot(*(s.true.position - p)[:2]) for s in measurement.stations]
         room = measurement.described_room
         if min(distance) < margin_m + 0.3 or room.inside(p) or room.clearance(p) < margin_m:
+            continue
+        if any(math.dist(p[:2], other) < 1 for other in taken):
             continue
         seen = 0
         for s in measurement.stations:
@@ -74,10 +77,14 @@ class ActorUnmodelled(Effect):
     def prepare(self, measurement):
         if self.p["shape"] not in ("cylinder", "box"):
             raise ValueError(f"actor_unmodelled: shape {self.p['shape']}; cylinder or box")
+        objects = [e for e in measurement.settings.effects if e.name == self.name]
+        before = objects[:objects.index(self)]
+        self.actor = f"object_{len(before)}"
         if self.p["x_m"] is None or self.p["y_m"] is None:
-            self.p["x_m"], self.p["y_m"] = free_spot(measurement, 0.25 + self.p["size_m"] / 2, 130)
+            taken = [(e.p["x_m"], e.p["y_m"]) for e in before]
+            self.p["x_m"], self.p["y_m"] = free_spot(measurement, 0.25 + self.p["size_m"] / 2, 130, taken)
         if self.p["yaw_deg"] is None:
-            self.p["yaw_deg"] = 360 * measurement.rng(131).random()
+            self.p["yaw_deg"] = (360 * measurement.rng(131).random() + 31 * len(before)) % 360
 
     def room(self, measurement, actors, materials):
         center = (self.p["x_m"], self.p["y_m"], 0.01 + self.p["height_m"] / 2)
@@ -85,11 +92,11 @@ class ActorUnmodelled(Effect):
             part = box(center, (self.p["size_m"], self.p["size_m"], self.p["height_m"]), self.p["yaw_deg"])
         else:
             part = Cylinder(np.array(center), self.p["size_m"] / 2, self.p["height_m"])
-        return actors + [Actor("object", self.p["material"], [part])], materials
+        return actors + [Actor(self.actor, self.p["material"], [part])], materials
 
     def echoes(self, measurement, station, echoes):
         if self.p["shape"] == "cylinder":
-            index = measurement.room.actor_index("object")
+            index = measurement.room.actor_index(self.actor)
             part = measurement.room.actors[index].parts[0]
             path = cylinder_path(measurement, station, index, part, measurement.room.material[index], "specular")
             echoes.add([path] if path else [])
@@ -122,8 +129,7 @@ class ActorMoved(Effect):
 
     def prepare(self, measurement):
         rng = measurement.rng(133)
-        self.p["actor"] = self.p["actor"] or str(rng.choice(["cabinet_north", "cabinet_east", "wardrobe", "bookshelf",
-                                                             "pillar"]))
+        self.p["actor"] = self.p["actor"] or str(rng.choice(FURNITURE))
         actor = measurement.described_actors[measurement.described_room.actor_index(self.p["actor"])]
         if self.p["dx_m"] is None or self.p["dy_m"] is None:
             # Into the room, so that it does not run into its wall.
