@@ -50,7 +50,8 @@ constexpr double kWorthAFit = 4;  ///< nats promised
 constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kWorthALaw = 12;
 constexpr double kWorthAnObject = 3;       ///< at the best of all places
-constexpr double kWorthABox = 15;          ///< nats of a round one there
+constexpr double kWorthABox = 15;          ///< nats of a round one there,
+constexpr double kShareWorthABox = 0.3;    ///< and so much of what the best other fit brings
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
 constexpr double kMostLost = 0.01;         ///< of the explained power, by what the likelihood plainly gains of;
 // unless it is worth leastNats(), inflation taken off.
@@ -338,20 +339,21 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
     std::size_t& fitted = law ? laws_fitted : names_fitted;
     const bool moved = s.hypothesis.mechanism.mechanism == "actor_moved";
-    const double worth = isObject(s.hypothesis)               ? kWorthAnObject
+    const bool box = isUnmodelledBox(s.hypothesis);
+    const double worth = box                                  ? kShareWorthABox * fits.front().gain
+                         : isObject(s.hypothesis)             ? kWorthAnObject
                          : law                                ? kWorthALaw
                          : s.hypothesis.isGeometry() || moved ? kWorthAFitOfGeometry
                                                               : kWorthAFit;
     // Where an actor went is known by the fit alone: what little the quadratic promises does not rank it.
-    const bool box = isUnmodelledBox(s.hypothesis);
-    const std::size_t most = law ? kMostLaws : moved || box ? kMostNames + kMostOutOfPlace : kMostNames;
-    if (s.promised > worth && fitted < most) {
+    const std::size_t most = law ? kMostLaws : moved ? kMostNames + kMostOutOfPlace : kMostNames;
+    if (s.promised > worth && (box || fitted < most)) {
       ++fitted;
       report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
       fits.push_back(moved || box ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
       source_->settle(mechanisms_);
       if (isObject(s.hypothesis) && !box && fits.back().broad_gain > kWorthABox) {
-        screened.insert(screened.begin() + static_cast<std::ptrdiff_t>(i) + 1, asBox(data_, state_, fits.back()));
+        screened.push_back(asBox(data_, state_, fits.back()));  // last: the slowest of all fits
       }
       // What latents bring that the fit has found, and the twin as it is had not, is nobody's gain.
       if (std::optional<ModelState> better = fitter_->improved(state_, fits.back().state.nuisance)) {

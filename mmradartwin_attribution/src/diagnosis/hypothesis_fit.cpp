@@ -28,6 +28,7 @@ constexpr double kEnough = 0.2;       ///< nats: a further step promises less
 constexpr double kRising = 5;         ///< nats of the last step that are worth going on for
 constexpr double kClimb = 4;          ///< steps like the last within which a climb has to get somewhere
 constexpr double kWorthASearch = 25;  ///< nats gained by slopes, before a rough likelihood is searched
+constexpr double kSearched[] = {0.3, 0.15};  ///< of the scale, around where slopes end
 constexpr double kImprovement = 0.5;  ///< nats by which latents have to be better to be taken over
 constexpr double kMaxInflation = 50;
 // Nats a pose without the best place: seven clean sessions of 66 to 154 poses brought at most 1.9 by any hypothesis. At
@@ -372,7 +373,7 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
 HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                                                      const std::vector<Hypothesis>& parts,
                                                      const std::vector<std::vector<double>>& starts, int iterations,
-                                                     const ModelState* null) {
+                                                     const ModelState* null, const HypothesisFit* known) {
   std::vector<Coordinate> coordinates;
   for (const Hypothesis& h : parts) coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
   const int globals = nuisance.globals();
@@ -394,10 +395,13 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   std::fill(placed.actor_range_m.begin(), placed.actor_range_m.end(), 0.0);
   Nuisance bare = placed;
   std::fill(bare.actor_gain.begin(), bare.actor_gain.end(), 0.0);
-  std::vector<Nuisance> candidates = {nuisance, without, placed, bare};
-  for (const Hypothesis& h : parts) {
-    const int actor = source_.base().scene().actorIndex(h.subject);
-    if (actor >= 0) candidates.push_back(withoutErrors(nuisance, actor));
+  std::vector<Nuisance> candidates = {nuisance};
+  if (known == nullptr) {
+    candidates.insert(candidates.end(), {without, placed, bare});
+    for (const Hypothesis& h : parts) {
+      const int actor = source_.base().scene().actorIndex(h.subject);
+      if (actor >= 0) candidates.push_back(withoutErrors(nuisance, actor));
+    }
   }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Nuisance& a, const Nuisance& b) { return a.actor_range_m < b.actor_range_m; });
@@ -484,9 +488,17 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   }
   if (!geometric || n == 0 || n > kMostRough) return o;
   if (null != nullptr && broadGain(*null, o.state) < kWorthASearch) return o;
+  if (known != nullptr) {
+    const double higher = o.state.log_likelihood - known->state.log_likelihood;
+    double apart = 0;
+    for (std::size_t j = 0; j < o.scaled.size(); ++j) {
+      apart = std::max(apart, std::abs(o.scaled[j] - known->scaled[j]));
+    }
+    if (higher < -kWorthASearch || (apart < kSearched[1] && higher < kRising)) return o;
+  }
   // Where paths come and go with every millimetre the likelihood is rough: slopes end at the first bump, a quadratic
   // through values some millimetres apart does not. The latents follow to first order.
-  for (double initial : {0.3, 0.15}) {
+  for (double initial : kSearched) {
     const Optimum from = o;
     const Eigen::MatrixXd information = regularised(from.scores.information);
     const Eigen::LDLT<Eigen::MatrixXd> latents(information.topLeftCorner(globals, globals));
@@ -577,13 +589,13 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
 
 HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hypothesis,
                                     const std::vector<std::vector<double>>& starts, int iterations,
-                                    const Nuisance* latents) {
+                                    const HypothesisFit* known) {
   HypothesisFit f;
   f.hypothesis = hypothesis;
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());
-  Optimum o =
-      maximise(null.mechanisms, latents != nullptr ? *latents : null.nuisance, {hypothesis}, starts, iterations, &null);
+  Optimum o = maximise(null.mechanisms, known != nullptr ? known->state.nuisance : null.nuisance, {hypothesis}, starts,
+                       iterations, &null, known);
   f.scaled = std::move(o.scaled);
   f.state = std::move(o.state);
   const Scores& scores = o.scores;

@@ -77,10 +77,10 @@ class HypothesisFitter {
   /// Of an actor whose place is free, by the first two coordinates: the likelihood at places around it, farther away
   /// than slopes reach.
   Screened screenAround(const ModelState& null, const Hypothesis& hypothesis, int actor, const std::vector<int>& poses);
-  /// Maximum likelihood of the coordinates from the best of `starts`, the nuisance refitted along from `latents`; from
-  /// the null's where there are none.
+  /// Maximum likelihood of the coordinates from the best of `starts`, the nuisance refitted along from the null's.
+  /// known: a fit of the same from whose latents it starts instead; what climbs to its top again is not searched.
   HypothesisFit fit(const ModelState& null, const Hypothesis& hypothesis,
-                    const std::vector<std::vector<double>>& starts, int iterations, const Nuisance* latents = nullptr);
+                    const std::vector<std::vector<double>>& starts, int iterations, const HypothesisFit* known = nullptr);
   /// Maximum likelihood of several hypotheses at once over `base`, which holds none of them.
   JointFit refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start);
@@ -114,10 +114,10 @@ class HypothesisFitter {
                          const Optimum& o, const Effective& e, Eigen::Index first, Eigen::Index numbers);
   Eigen::MatrixXd robustCovariance(const Effective& effective) const;
   /// null: what a geometry has to be well above at more than one place before it is searched without slopes; null
-  /// pointer: it is.
+  /// pointer: it is. known: as of fit().
   Optimum maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                    const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& starts, int iterations,
-                   const ModelState* null);
+                   const ModelState* null, const HypothesisFit* known = nullptr);
   std::vector<double> gainByLocation(const ModelState& null, const ModelState& state) const;
   /// Beyond the null, without the place that gains most.
   double broadGain(const ModelState& null, const ModelState& state) const;
