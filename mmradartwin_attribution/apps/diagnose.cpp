@@ -62,6 +62,11 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
     ProgressLine line;
     options.on_progress = [&line](const DiagnosisProgress& progress) { line.show(progress); };
     if (!scene && twin_file.empty()) {
+      if (!arguments.compared.empty()) {
+        throw InputError(recording.source +
+                         ": names no scene that twins could be compared in; leave --compare out, or "
+                         "add a line scene: to session.yaml");
+      }
       std::cerr << "the recording names no scene: only its frames and channels are judged\n";
       diagnosis = diagnoseReceiver(recording, options);
     } else {
@@ -100,7 +105,7 @@ int main(int argc, char** argv) {
   app.add_option("--jobs", arguments.jobs, "threads (default: one per core)")->check(CLI::Range(1, 1024));
   app.add_option(
          "--findings", arguments.findings,
-         "most causes to look for among echoes (default 4; 0: how much of the measured power the twin explains)")
+         "most causes to look for among echoes (default 6; 0: how much of the measured power the twin explains)")
       ->check(CLI::Range(0, 16));
   const std::vector<std::string> command(argv, argv + argc);
   return runProgram(app, argc, argv, [&] { return run(arguments, command); });

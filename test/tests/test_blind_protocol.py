@@ -305,7 +305,8 @@ class Draws(unittest.TestCase):
         self.assertEqual(len(seeds), 4 * len(draws.ROWS) * 50)
 
     def test_all_that_is_drawn_can_be_hidden(self):
-        for row, count in (("single", len(draws.SINGLE)), ("decoy", len(draws.DECOYS)), ("pair", 3)):
+        for row, count in (("single", len(draws.SINGLE)), ("decoy", len(draws.DECOYS)), ("pair", 3),
+                           ("twice", len(draws.TWICE))):
             for i in range(count):
                 trial = draws.Trial(row, "clean", 8, i, poses=2, frames=2)
                 chosen = [effects.make_effect(*d) for d in draws.draw(trial)]
@@ -360,6 +361,22 @@ class Scoring(unittest.TestCase):
     def test_a_doubtful_name_is_not_said_with_confidence(self):
         names = [("range_scale", 0.4), ("if_highpass", 0.35), ("gain_drift", 0.25)]
         self.assertFalse(score("single", [BIAS], [finding("range_scale", names)])["wrong"])
+
+    def test_of_one_cause_for_two_things_each_finding_answers_one(self):
+        truths = [{"cause": "actor_absent", "parameters": {"actor": a}} for a in ("tv", "pillar")]
+        tv, pillar, wardrobe = (finding("actor_absent", actor={"value": a}) for a in ("tv", "pillar", "wardrobe"))
+        s = score("twice", truths, [pillar, tv])
+        self.assertTrue(s["told_apart"])
+        self.assertFalse(s["wrong"])
+        self.assertFalse(score("twice", truths, [tv])["told_apart"])
+        self.assertFalse(score("twice", truths, [tv, wardrobe])["told_apart"])
+        self.assertTrue(score("twice", truths, [tv, wardrobe, pillar])["wrong"])
+        self.assertTrue(score("single", truths[:1], [tv, pillar])["wrong"], msg="one more than there is")
+        objects = [{"cause": "actor_unmodelled", "parameters": {"x_m": x, "y_m": 1.0}} for x in (1.0, 3.0)]
+        near, far = (dict(finding("actor_unmodelled"), mechanism={"actor_unmodelled": {"x_m": x, "y_m": 1.1}})
+                     for x in (1.1, 3.1))
+        self.assertTrue(score("twice", objects, [far, near])["told_apart"])
+        self.assertFalse(score("twice", objects, [far, dict(far)])["told_apart"])
 
     def test_reversed_channels_have_two_names(self):
         truth = {"cause": "channel_permutation", "parameters": {"order": [7, 6, 5, 4, 3, 2, 1, 0]}}

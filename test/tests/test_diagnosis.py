@@ -2,6 +2,7 @@
 import json
 import math
 import os
+import re
 import subprocess
 import tempfile
 import unittest
@@ -72,6 +73,12 @@ class HiddenEffects(unittest.TestCase):
             extended = yaml.safe_load(text)
         self.assertAlmostEqual(extended["mechanisms"]["element_pattern"]["cos_exponent"],
                                first["parameters"]["cos_exponent"]["value"], places=6)
+        # The extended twin makes the same channels likelier by what the finding says, but for later fits of the latents.
+        run = subprocess.run([PROGRAM, self.at("session"), "--output", self.at("compared"), "--findings", "0",
+                              "--compare", self.at("out/twin.extended.yaml")], capture_output=True, text=True, check=True)
+        said = re.search(r"explains the same channels ([0-9.]+) nats more likely", run.stdout)
+        self.assertIsNotNone(said, msg=run.stdout)
+        self.assertAlmostEqual(float(said.group(1)) / first["evidence"]["log_likelihood_gain"], 1, delta=0.05)
 
     def test_leakage_is_named_with_place_and_level(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "32"))

@@ -113,6 +113,12 @@ class RealRecording(InFolder):
             out.write("scene: scene.yaml\n")
         self.check_untouched()
 
+    def test_twins_are_compared_in_a_scene_alone(self):
+        recordings.write_payload(self.session, recordings.inject("packet_loss", np.random.default_rng(3))[0])
+        status, _, errors = diagnose(self.session, self.output, "--compare", "other.yaml")
+        self.assertEqual(status, 2)
+        self.assertIn("names no scene", errors)
+
     def test_conjugated_samples_are_seen_by_the_leakage_and_undone(self):
         findings, _ = self.injected("iq_conjugation", 1)
         self.assertIn("iq_conjugation", causes(findings))

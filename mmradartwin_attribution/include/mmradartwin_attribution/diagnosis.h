@@ -20,7 +20,7 @@ struct DiagnosisProgress {
 
 struct DiagnosisOptions {
   int jobs = 0;           ///< 0: as many as there are cores
-  int most_findings = 4;  ///< among echoes; 0: frames, conventions and what the twin as given explains
+  int most_findings = 6;  ///< among echoes; 0: frames, conventions and what the twin as given explains
   std::function<void(const DiagnosisProgress&)> on_progress;
   std::function<bool()> cancelled;  ///< asked between steps
   AttributionConfig config;         ///< of the paper's metrics

@@ -533,6 +533,11 @@ void Session::restate() {
     Finding& f = result_.findings.findings[a.finding];
     f.mechanism = a.hypothesis.at(a.scaled);
     f.parameters = fittedParameters(a.hypothesis, a.scaled, a.standard_error, f.cause, data_.locations.size());
+    for (FindingPlace& place : f.where) {
+      if (!place.x_m) continue;
+      place.x_m = f.mechanism->values.number("x_m");
+      place.y_m = f.mechanism->values.number("y_m");
+    }
     mechanisms_.push_back(*f.mechanism);
     extended_.push_back(*f.mechanism);
   }

@@ -24,12 +24,12 @@ constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents 
 constexpr double kStoodIn = 1;                 ///< nats of theirs
 constexpr double kRadii[] = {1, 2, 4};         ///< of the scale, about a place where an object may have stood before
 constexpr int kDirections = 8;
-constexpr double kEnough = 0.2;       ///< nats: a further step promises less
-constexpr double kRising = 5;         ///< nats of the last step that are worth going on for
-constexpr double kClimb = 4;          ///< steps like the last within which a climb has to get somewhere
-constexpr double kWorthASearch = 25;  ///< nats gained by slopes, before a rough likelihood is searched
+constexpr double kEnough = 0.2;              ///< nats: a further step promises less
+constexpr double kRising = 5;                ///< nats of the last step that are worth going on for
+constexpr double kClimb = 4;                 ///< steps like the last within which a climb has to get somewhere
+constexpr double kWorthASearch = 25;         ///< nats gained by slopes, before a rough likelihood is searched
 constexpr double kSearched[] = {0.3, 0.15};  ///< of the scale, around where slopes end
-constexpr double kImprovement = 0.5;  ///< nats by which latents have to be better to be taken over
+constexpr double kImprovement = 0.5;         ///< nats by which latents have to be better to be taken over
 constexpr double kMaxInflation = 50;
 // Nats a pose without the best place: seven clean sessions of 66 to 154 poses brought at most 1.9 by any hypothesis. At
 // few places the scatter of a rough likelihood's slopes hides gains ten times that.

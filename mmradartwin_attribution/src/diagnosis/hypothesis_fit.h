@@ -80,7 +80,8 @@ class HypothesisFitter {
   /// Maximum likelihood of the coordinates from the best of `starts`, the nuisance refitted along from the null's.
   /// known: a fit of the same from whose latents it starts instead; what climbs to its top again is not searched.
   HypothesisFit fit(const ModelState& null, const Hypothesis& hypothesis,
-                    const std::vector<std::vector<double>>& starts, int iterations, const HypothesisFit* known = nullptr);
+                    const std::vector<std::vector<double>>& starts, int iterations,
+                    const HypothesisFit* known = nullptr);
   /// Maximum likelihood of several hypotheses at once over `base`, which holds none of them.
   JointFit refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start);
