@@ -14,6 +14,8 @@ namespace {
 constexpr int kRefits = 3;  ///< of the latents, at each place
 constexpr int kWidths = 3;  ///< that are tried of a step
 
+constexpr double kWidest = 1;  ///< of the scale, where geometry is first looked at: slopes may know nothing of it
+
 /// What a step should cost, in nats, and how narrow it may be.
 struct Fall {
   double least, wanted, most;
@@ -100,6 +102,7 @@ struct Step {
   double width = 0;
   Place ahead, behind;
   double curvature = 0;
+  bool flat = false;  ///< the likelihood does not fall: its width is all that is known of an error
 };
 
 }  // namespace
@@ -108,11 +111,12 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
                         const Nuisance& nuisance, const PoseAccuracy& accuracy, const std::vector<Hypothesis>& parts,
                         const ProfiledValues& fit, int again) {
   std::vector<Coordinate> coordinates;
-  bool rough = false;
+  std::vector<char> traces;  // by coordinate
   for (const Hypothesis& h : parts) {
     coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
-    rough = rough || source.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0)));
+    traces.resize(coordinates.size(), source.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0))));
   }
+  const bool rough = std::count(traces.begin(), traces.end(), 1) > 0;
   const std::vector<NamedParameters> base(mechanisms.begin(),
                                           mechanisms.end() - static_cast<std::ptrdiff_t>(parts.size()));
   const ChannelData& data = model.data();
@@ -145,6 +149,14 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
   const std::vector<double>& scaled = fit.scaled;
   const Fall wanted = rough ? kRough : kSmooth;
   const Place here = look(scaled);
+  // The best place of all that are looked at.
+  double highest = here.log_likelihood;
+  std::vector<double> highest_at = scaled;
+  const auto consider = [&](const Place& place, const std::vector<double>& at) {
+    if (place.log_likelihood <= highest) return;
+    highest = place.log_likelihood;
+    highest_at = at;
+  };
   std::vector<Step> steps;
   for (Eigen::Index j = 0; j < n; ++j) {
     const std::size_t k = static_cast<std::size_t>(j);
@@ -153,6 +165,7 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
     const double widest = std::min(scaled[k] - low, high - scaled[k]);
     Step step;
     step.width = std::max(wanted.narrowest, 2 * fit.standard_error[k] / slope);
+    if (traces[k]) step.width = std::min(step.width, kWidest);
     for (int i = 1;; ++i) {
       if (widest > 0) step.width = std::min(step.width, widest);
       std::vector<double> at = scaled;
@@ -167,23 +180,35 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
       step.width *= std::clamp(std::sqrt(wanted.wanted / std::max(fall, 0.1)), 0.1, 4.0);
       step.width = std::max(step.width, wanted.narrowest);
     }
-    step.curvature = std::max(step.curvature, 0.2 / (step.width * step.width));
+    const double least = 0.2 / (step.width * step.width);
+    step.flat = step.curvature < least;
+    step.curvature = std::max(step.curvature, least);
+    for (double side : {-1.0, 1.0}) {
+      std::vector<double> at = scaled;
+      at[k] += side * step.width;
+      consider(side < 0 ? step.behind : step.ahead, at);
+    }
     steps.push_back(std::move(step));
   }
-  Eigen::VectorXd slope(n);
-  Eigen::MatrixXd fall(n, n), scores(locations, n), latents(here.latents.size(), n);
+  Eigen::VectorXd slope = Eigen::VectorXd::Zero(n);
+  Eigen::MatrixXd fall = Eigen::MatrixXd::Zero(n, n), scores = Eigen::MatrixXd::Zero(locations, n),
+                  latents = Eigen::MatrixXd::Zero(here.latents.size(), n);
   for (Eigen::Index j = 0; j < n; ++j) {
     const Step& a = steps[static_cast<std::size_t>(j)];
     fall(j, j) = a.curvature;
+    if (a.flat) continue;
     slope[j] = (a.ahead.log_likelihood - a.behind.log_likelihood) / (2 * a.width);
     scores.col(j) = (a.ahead.by_location - a.behind.by_location) / (2 * a.width);
     latents.col(j) = (a.ahead.latents - a.behind.latents) / (2 * a.width);
     for (Eigen::Index k = 0; k < j; ++k) {
       const Step& b = steps[static_cast<std::size_t>(k)];
+      if (b.flat) continue;
       std::vector<double> at = scaled;
       at[static_cast<std::size_t>(j)] += a.width;
       at[static_cast<std::size_t>(k)] += b.width;
-      const double both = look(at).log_likelihood - a.ahead.log_likelihood - b.ahead.log_likelihood;
+      const Place corner = look(at);
+      consider(corner, at);
+      const double both = corner.log_likelihood - a.ahead.log_likelihood - b.ahead.log_likelihood;
       const double most = kMostAlike * std::sqrt(a.curvature * b.curvature);
       fall(j, k) = fall(k, j) = std::clamp(-(both + here.log_likelihood) / (a.width * b.width), -most, most);
     }
@@ -215,10 +240,11 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
   const Eigen::VectorXd geometric = geometricVariance(by_coordinate, static_cast<int>(nuisance.actor_gain.size()),
                                                       static_cast<int>(everyone.size()), accuracy, spread);
   ProfiledValues result = fit;
-  if (look(top).log_likelihood > here.log_likelihood) result.scaled = top;
+  consider(look(top), top);
+  result.scaled = highest_at;
   // A slope so long was no top, and its steps tell no width.
   const bool further = (to_top.cwiseAbs().array() > widths.array()).any();
-  if (further && result.scaled == top && again > 0) {
+  if (result.scaled != scaled && (further || result.scaled != top) && again > 0) {
     return profiled(source, model, mechanisms, nuisance, accuracy, parts, result, again - 1);
   }
   for (Eigen::Index j = 0; j < n; ++j) {
