@@ -10,6 +10,7 @@ import unittest
 import yaml
 
 from mmradartwin_tests import effects
+from mmradartwin_tests.blind import draws, trials
 from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.session import Measurement, Settings
 
@@ -206,6 +207,18 @@ class HiddenEffects(unittest.TestCase):
         self.assertEqual(first["parameters"]["material"]["value"], truth["material"], msg=f"seed {seed}")
         self.assertAlmostEqual(first["parameters"]["roughness_rms_m"]["value"], truth["roughness_rms_m"], delta=8e-5,
                                msg=f"seed {seed}")
+
+    def test_what_errors_and_clutter_look_like_takes_no_name_away(self):
+        # Sessions of the blind protocol: a cabinet's corner with the wall was called the cabinet's move by 5 (-8 to 19)
+        # cm, a filter glass that scatters 0.6 % of what it reflects.
+        for trial, cause in ((25, "corner_reflection"), (2, "if_lowpass")):
+            with self.subTest(cause):
+                session = self.at(cause)
+                truth = trials.hide(draws.Trial("single", "office", 81, trial, poses=24), session)
+                self.assertEqual(truth[0]["cause"], cause)
+                status, findings, errors = diagnose(session, self.at(f"{cause}_out"))
+                self.assertEqual(status, 0, msg=errors)
+                self.assertEqual([f["cause"] for f in findings["findings"]], [cause])
 
     def test_errors_that_look_like_a_registration_are_none(self):
         # Here 13 mm of registration let paths through that gain 129 nats and 0.035 of the measured power; actors and

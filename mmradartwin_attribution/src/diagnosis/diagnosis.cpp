@@ -59,6 +59,8 @@ constexpr std::size_t kWaysToErr = 4;     ///< geometries that alike errors of a
 constexpr std::size_t kMostProfiled = 6;  ///< numbers whose errors the likelihood's own fall gives
 constexpr double kObjectPlaces = 500;     ///< places of an 8 by 6 m room that a session resolves, as a family
 
+bool isMove(const Hypothesis& h) { return h.mechanism.mechanism == "actor_moved"; }
+
 class Session {
  public:
   Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options);
@@ -79,7 +81,7 @@ class Session {
   TriedHypothesis& triedAs(const HypothesisFit& fit, int round);
   void refitTogether();
   void profileFound();
-  bool isWithinErrors(const Hypothesis& h) const;
+  bool isWithinErrors(const HypothesisFit& f) const;
   struct Accepted;
   void restate();
   std::vector<PoseEchoes> heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m);
@@ -240,9 +242,8 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   };
   const auto look = [&](const Hypothesis& h, const std::vector<int>& poses) {
     const int actor = twin_.scene().actorIndex(h.subject);
-    return out_of_place.count(actor) > 0 && h.mechanism.mechanism == "actor_moved"
-               ? fitter_->screenAround(state_, h, actor, poses)
-               : fitter_->screen(state_, h, poses);
+    return out_of_place.count(actor) > 0 && isMove(h) ? fitter_->screenAround(state_, h, actor, poses)
+                                                      : fitter_->screen(state_, h, poses);
   };
   const auto lookAtSome = [&](const Hypothesis& h) { return look(h, spread(kScreenPoses)); };
   std::optional<Screened> object;
@@ -338,7 +339,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     // A promise is a quadratic's and often far too small: names get several chances, laws without a name three.
     const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
     std::size_t& fitted = law ? laws_fitted : names_fitted;
-    const bool moved = s.hypothesis.mechanism.mechanism == "actor_moved";
+    const bool moved = isMove(s.hypothesis);
     const bool box = isUnmodelledBox(s.hypothesis);
     const double worth = box                                  ? kShareWorthABox * fits.front().gain
                          : isObject(s.hypothesis)             ? kWorthAnObject
@@ -517,10 +518,12 @@ void Session::profileFound() {
 }
 
 /// Where paths come and go with every millimetre, the likelihood may gain much by a geometry whose numbers are no
-/// larger than the actors' and poses' own errors make them.
-bool Session::isWithinErrors(const Hypothesis& h) const {
+/// larger than the actors' and poses' own errors make them; an actor that is no farther away than that has not moved,
+/// whatever its likelihood gains.
+bool Session::isWithinErrors(const HypothesisFit& f) const {
+  const Hypothesis& h = f.hypothesis;
   const auto a = acceptedAs(h);
-  if (a == accepted_.end() || !h.isGeometry()) return false;
+  if (a == accepted_.end() || !(isMove(h) || (h.isGeometry() && !f.plain))) return false;
   const double nats = natsFromNothing(h, a->scaled, a->standard_error);
   return fitter_->falseAlarmRate(nats, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
 }
@@ -552,7 +555,7 @@ bool Session::judgeChannels(int round) {
     verdict = f.ranking() <= 0                   ? "gains less than its numbers cost"
               : f.false_alarm_rate > kFalseAlarm ? "chance could do as well"
               : !(f.held_out_gain > 0)           ? "loses on places not fitted"
-                                                 : noObjectBecause(f, received_.frames);
+                                                 : noFindingBecause(f, received_.frames);
     if (!verdict.empty()) continue;
     Finding finding = findingOf(f, fits, state_, twin_.scene(), data_);
     if (data_.locations.size() > 1) {
@@ -592,13 +595,13 @@ bool Session::judgeChannels(int round) {
     source_->settle(mechanisms_);
     const bool stands = acceptedAs(f.hypothesis) != accepted_.end();
     if (stands) profileFound();
-    if (!stands || (!f.plain && isWithinErrors(f.hypothesis))) {
+    if (!stands || isWithinErrors(f)) {
       accepted_ = accepted;
       result_.findings.findings = findings;
       restate();
       state_.nuisance = latents;
       source_->settle(mechanisms_);
-      refused = true;
+      refused = refused || !stands || !isMove(f.hypothesis);
       verdict = stands ? "no larger than what errors of actors and poses look like" : "worth nothing beside the rest";
       report("taken back: " + f.hypothesis.label(), 1);
       continue;

@@ -14,6 +14,7 @@ namespace {
 constexpr double kAlike = 5;  ///< nats within which two names are not told apart
 constexpr double kLeastSize_m =
     0.02;  ///< of an object: any room is full of smaller ones, and the likelihood knows that
+constexpr double kLeastScattering = 0.1;  ///< S: less lies under the clutter of any room, whose law is not its own
 constexpr double kPerson_m = 0.3, kWalk_m = 0.6;  ///< size, and how far from the middle of a walk
 
 }  // namespace
@@ -81,9 +82,13 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   return f;
 }
 
-std::string noObjectBecause(const HypothesisFit& object, const std::vector<FrameFinding>& walkers) {
-  if (object.hypothesis.mechanism.mechanism != "actor_unmodelled") return "";
-  const Parameters values = object.hypothesis.at(object.scaled).values;
+std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers) {
+  const Parameters values = fit.hypothesis.at(fit.scaled).values;
+  const std::string& name = fit.hypothesis.mechanism.mechanism;
+  if (name == "diffuse_scattering" && values.number("scattering_coefficient") < kLeastScattering) {
+    return "no more than clutter is: S = " + number(values.number("scattering_coefficient"));
+  }
+  if (name != "actor_unmodelled") return "";
   const double size_m = values.number("size_m"), x_m = values.number("x_m"), y_m = values.number("y_m");
   const std::string which = ": " + number(size_m) + " m at (" + number(x_m) + ", " + number(y_m) + ")";
   if (size_m < kLeastSize_m) return "no larger than clutter is" + which;

@@ -14,9 +14,10 @@ namespace mmradartwin {
 Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
                   const Scene& scene, const ChannelData& data);
 
-/// Why an actor_unmodelled is none, "" where it is one and for every other hypothesis: too small, or where one of the
-/// `walkers` (other causes are passed over) walks, whose echo does not average out over a pose's frames.
-std::string noObjectBecause(const HypothesisFit& object, const std::vector<FrameFinding>& walkers);
+/// Why something fitted is nothing found, "" where it may be: an object or a scattering that clutter is as large as, an
+/// object where one of the `walkers` (other causes are passed over) walks, whose echo does not average out over a
+/// pose's frames.
+std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers);
 
 /// To so many digits.
 std::string number(double value, int digits = 3);
