@@ -55,9 +55,8 @@ constexpr double kShareWorthABox = 0.3;    ///< and so much of what the best oth
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
 constexpr double kMostLost = 0.01;         ///< of the explained power, by what the likelihood plainly gains of;
 // unless it is worth leastNats(), inflation taken off.
-constexpr std::size_t kWaysToErr = 4;     ///< geometries that alike errors of actors and poses look like
-constexpr std::size_t kMostProfiled = 6;  ///< numbers whose errors the likelihood's own fall gives
-constexpr double kObjectPlaces = 500;     ///< places of an 8 by 6 m room that a session resolves, as a family
+constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
+constexpr double kObjectPlaces = 500;  ///< places of an 8 by 6 m room that a session resolves, as a family
 
 bool isMove(const Hypothesis& h) { return h.mechanism.mechanism == "actor_moved"; }
 
@@ -485,34 +484,20 @@ void Session::refitTogether() {
 /// Values and intervals of all that rounds have found, on the likelihood that is settled on them.
 void Session::profileFound() {
   report("errors of what was found", 0);
-  // A channel error's numbers are too many, and know nothing of the others: it stays as it is.
-  const std::size_t numbers = std::accumulate(accepted_.begin(), accepted_.end(), std::size_t{0},
-                                              [](std::size_t sum, const Accepted& a) { return sum + a.scaled.size(); });
-  const auto apart = [&](const Accepted& a) {
-    return numbers > kMostProfiled && a.hypothesis.mechanism.mechanism == "channel_phase_error";
-  };
-  std::vector<NamedParameters> base = before_rounds_;
   std::vector<Hypothesis> parts;
-  ProfiledValues fit;
-  for (Accepted& a : accepted_) {
-    if (apart(a)) {
-      base.push_back(a.hypothesis.at(a.scaled));
-      widenGains(data_, a.hypothesis, a.standard_error);
-      continue;
-    }
+  std::vector<ProfiledValues> fits;
+  for (const Accepted& a : accepted_) {
     parts.push_back(a.hypothesis);
-    fit.scaled.insert(fit.scaled.end(), a.scaled.begin(), a.scaled.end());
-    fit.standard_error.insert(fit.standard_error.end(), a.standard_error.begin(), a.standard_error.end());
+    fits.push_back({a.scaled, a.standard_error});
   }
-  if (fit.scaled.empty() || fit.scaled.size() > kMostProfiled) return restate();
-  fit = profiled(*source_, *model_, mechanismsWith(base, parts, fit.scaled), state_.nuisance, accuracy_, parts, fit);
-  std::ptrdiff_t from = 0;
-  for (Accepted& a : accepted_) {
-    if (apart(a)) continue;
-    const std::ptrdiff_t to = from + static_cast<std::ptrdiff_t>(a.scaled.size());
-    a.scaled.assign(fit.scaled.begin() + from, fit.scaled.begin() + to);
-    a.standard_error.assign(fit.standard_error.begin() + from, fit.standard_error.begin() + to);
-    from = to;
+  profileParts(*source_, *model_, before_rounds_, state_.nuisance, accuracy_, parts, fits);
+  for (std::size_t i = 0; i < accepted_.size(); ++i) {
+    Accepted& a = accepted_[i];
+    a.scaled = fits[i].scaled;
+    a.standard_error = fits[i].standard_error;
+    if (a.hypothesis.mechanism.mechanism == "channel_phase_error") {
+      widenGains(data_, a.hypothesis, a.standard_error);
+    }
   }
   restate();
 }

@@ -11,8 +11,9 @@
 namespace mmradartwin {
 namespace {
 
-constexpr int kRefits = 3;  ///< of the latents, at each place
-constexpr int kWidths = 3;  ///< that are tried of a step
+constexpr int kRefits = 3;                ///< of the latents, at each place
+constexpr std::size_t kMostProfiled = 6;  ///< numbers: each pair of them is a place
+constexpr int kWidths = 3;                ///< that are tried of a step
 
 constexpr double kWidest = 1;  ///< of the scale, where geometry is first looked at: slopes may know nothing of it
 
@@ -254,6 +255,44 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
     result.standard_error[k] = std::sqrt(std::max(0.0, variance)) * std::abs(coordinates[k].slope(result.scaled[k]));
   }
   return result;
+}
+
+void profileParts(EchoSource& source, const SessionModel& model, const std::vector<NamedParameters>& base,
+                  const Nuisance& nuisance, const PoseAccuracy& accuracy, const std::vector<Hypothesis>& parts,
+                  std::vector<ProfiledValues>& fits) {
+  std::vector<std::size_t> few;
+  std::size_t numbers = 0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (fits[i].scaled.empty() || fits[i].scaled.size() > kMostProfiled) continue;
+    few.push_back(i);
+    numbers += fits[i].scaled.size();
+  }
+  std::vector<std::vector<std::size_t>> groups;
+  if (numbers <= kMostProfiled && !few.empty()) groups.push_back(few);
+  for (std::size_t i : few) {
+    if (numbers > kMostProfiled) groups.push_back({i});
+  }
+  for (const std::vector<std::size_t>& group : groups) {
+    std::vector<NamedParameters> beside = base;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (std::find(group.begin(), group.end(), i) == group.end()) beside.push_back(parts[i].at(fits[i].scaled));
+    }
+    std::vector<Hypothesis> members;
+    ProfiledValues all;
+    for (std::size_t i : group) {
+      members.push_back(parts[i]);
+      all.scaled.insert(all.scaled.end(), fits[i].scaled.begin(), fits[i].scaled.end());
+      all.standard_error.insert(all.standard_error.end(), fits[i].standard_error.begin(), fits[i].standard_error.end());
+    }
+    all = profiled(source, model, mechanismsWith(beside, members, all.scaled), nuisance, accuracy, members, all);
+    auto scaled = all.scaled.begin(), error = all.standard_error.begin();
+    for (std::size_t i : group) {
+      const auto count = static_cast<std::ptrdiff_t>(fits[i].scaled.size());
+      fits[i] = {{scaled, scaled + count}, {error, error + count}};
+      scaled += count;
+      error += count;
+    }
+  }
 }
 
 }  // namespace mmradartwin

@@ -24,4 +24,11 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
                         const Nuisance& nuisance, const PoseAccuracy& accuracy, const std::vector<Hypothesis>& parts,
                         const ProfiledValues& fit, int again = 2);
 
+/// The same of several hypotheses over `base`, in place: together where they have few numbers, else one by one beside
+/// the others as they are. What has too many by itself (a channel error) knows nothing of the others and stays as it
+/// is.
+void profileParts(EchoSource& source, const SessionModel& model, const std::vector<NamedParameters>& base,
+                  const Nuisance& nuisance, const PoseAccuracy& accuracy, const std::vector<Hypothesis>& parts,
+                  std::vector<ProfiledValues>& fits);
+
 }  // namespace mmradartwin
