@@ -141,7 +141,7 @@ class HiddenEffects(unittest.TestCase):
         self.assertGreater(first["gain"]["log_likelihood_per_pose"]["difference_ci95"][0], 0, msg=f"seed {seed}")
         with open(self.at("out/twin.extended.yaml"), encoding="ascii") as twin:
             self.assertIn("empirical_frame_gain", twin.read())
-        # A twin that has the term is extended by it no second time: it knows each mechanism once.
+        # A twin that has the term is extended by it no second time.
         extended = self.at("out/twin.extended.yaml")
         status, _, errors = diagnose(self.at("session"), self.at("again"), "--twin", extended)
         self.assertEqual(status, 0, msg=errors)

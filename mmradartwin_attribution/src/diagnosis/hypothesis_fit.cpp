@@ -582,7 +582,6 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
                                          : 0.5 * v.dot(robust.block(at, at, n, n).ldlt().solve(v)));
     at += n;
   }
-  fit.mechanisms = std::move(o.state.mechanisms);
   fit.nuisance = std::move(o.state.nuisance);
   return fit;
 }

@@ -50,7 +50,6 @@ struct JointFit {
   std::vector<std::vector<double>> standard_error;  ///< of the values (not scaled), by location
   std::vector<double>
       worth;  ///< nats that each is worth beside the others, by the scatter over places; 0 without number
-  std::vector<NamedParameters> mechanisms;
   Nuisance nuisance;
 };
 

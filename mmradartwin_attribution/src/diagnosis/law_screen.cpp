@@ -502,7 +502,7 @@ std::vector<Screened> screenLaws(const Twin& base, const SessionModel& model, co
                                  const std::vector<int>& poses) {
   std::vector<Screened> result;
   for (const NamedParameters& m : null.mechanisms) {
-    if (m.mechanism == "empirical_law") return result;  // twin.yaml knows it once
+    if (m.mechanism == "empirical_law") return result;  // what it leaves is of its own shape
   }
   if (poses.empty()) return result;
   const LawScreen screen(base, model, null, poses);

@@ -23,7 +23,7 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
                                      const std::vector<int>& poses, double least,
                                      const std::function<Screened(const Hypothesis&)>& look) {
   for (const NamedParameters& m : null.mechanisms) {
-    if (m.mechanism == "echo_replica") return {};  // twin.yaml knows it once
+    if (m.mechanism == "echo_replica") return {};  // what it leaves is of its own shape
   }
   const ChannelData& data = model.data();
   const RadarConfig& radar = base.radar();
