@@ -167,6 +167,9 @@ class EmulatedRig(unittest.TestCase):
             time.sleep(4)
             os.kill(player, signal.SIGCONT)
             time.sleep(4)
+            # Faults may have left too few packets so far to fill the disk; then diagnostics say so within a second.
+            rig.wait_for_text("are free on its disk")
+            time.sleep(3)
 
             self.stop(core)
             rig.wait_for_text("the ROS master is gone")
