@@ -306,7 +306,7 @@ class Draws(unittest.TestCase):
 
     def test_all_that_is_drawn_can_be_hidden(self):
         for row, count in (("single", len(draws.SINGLE)), ("decoy", len(draws.DECOYS)), ("pair", 3),
-                           ("twice", len(draws.TWICE))):
+                           ("twice", len(draws.TWICE)), ("faint", len(draws.FAINT))):
             for i in range(count):
                 trial = draws.Trial(row, "clean", 8, i, poses=2, frames=2)
                 chosen = [effects.make_effect(*d) for d in draws.draw(trial)]
@@ -490,6 +490,41 @@ class Table(InFolder):
         self.assertEqual(told["decoys: material blamed"], ("not run", 0))
         self.assertEqual(told["wall time of one diagnosis, median and longest"], ("13 s, 16 s", 7))
         self.assertEqual(told["CPU time of one diagnosis, median and longest"], ("11 s, 14 s", 7))
+
+    def test_strength_is_told_in_limits_of_the_matched_test(self):
+        def strength(nats, low, high):
+            return table.strength_over_limit({"told": {"nats": nats, "nats_ci95": [low, high], "explained_power": 0.1}})
+        self.assertIsNone(table.strength_over_limit({}))
+        self.assertIsNone(table.strength_over_limit({"told": None}))
+        self.assertAlmostEqual(strength(4 * table.MATCHED_NATS, 30, 43), 2)     # scatters less than by chance
+        self.assertEqual(strength(-3.0, -9, 3), 0)
+        # A standard deviation of twice sqrt(2 nats): four times as many nats are needed.
+        self.assertAlmostEqual(strength(50.0, 50 - 1.96 * 20, 50 + 1.96 * 20), math.sqrt(12.5 / table.MATCHED_NATS), 4)
+
+    def test_the_strength_of_half_power_is_the_one_that_draws_were_made_by(self):
+        rng = np.random.default_rng(4)
+        strengths = np.exp(rng.uniform(-2, 2, 300))
+        named = rng.random(300) < 1 / (1 + (1.4 / strengths) ** 4)
+        half, low, high = table.half_power(strengths, named)
+        self.assertLess(abs(half - 1.4), 0.2)
+        self.assertLess(low, half)
+        self.assertLess(half, high)
+        self.assertLess(high / low, 1.5)
+        self.assertIsNone(table.half_power(strengths, [True] * 300))
+        self.assertIsNone(table.half_power(strengths[:15], named[:15]))
+
+    def test_effects_of_twice_their_limit_are_a_row_of_their_own(self):
+        ledger, records = Ledger(self.folder), []
+        for i, (nats, cause) in enumerate(((400.0, "range_bias"), (400.0, "range_scale"), (5.0, "range_scale"),
+                                           (None, "range_bias"))):
+            ledger.seal(str(i), {"effects": [BIAS]})
+            told = None if nats is None else {"nats": nats, "nats_ci95": [nats, nats], "explained_power": 0.1}
+            records.append({"key": str(i), "row": "single", "findings": [finding(cause)], "status": "ok", "seconds": 1.0,
+                            "cpu_s": 1.0, "peak_mib": 1.0, "told": told})
+        told = self.measured(table.Scores(records, ledger))
+        self.assertEqual(told["single effects: right name first"][1], 4)
+        self.assertEqual(told["– of those of at least twice their detection limit"][1], 3)   # one cannot be told
+        self.assertTrue(told["– of those of at least twice their detection limit"][0].startswith("66.7 %"))
 
     def test_causes_by_name(self):
         rows = self.scores([("single", [BIAS], [finding("range_bias")], "ok"),

@@ -75,11 +75,13 @@ class HiddenEffects(unittest.TestCase):
         self.assertAlmostEqual(extended["mechanisms"]["element_pattern"]["cos_exponent"],
                                first["parameters"]["cos_exponent"]["value"], places=6)
         # The extended twin makes the same channels likelier by what the finding says, but for later fits of the latents.
-        run = subprocess.run([PROGRAM, self.at("session"), "--output", self.at("compared"), "--findings", "0",
-                              "--compare", self.at("out/twin.extended.yaml")], capture_output=True, text=True, check=True)
-        said = re.search(r"explains the same channels ([0-9.]+) nats more likely", run.stdout)
-        self.assertIsNotNone(said, msg=run.stdout)
-        self.assertAlmostEqual(float(said.group(1)) / first["evidence"]["log_likelihood_gain"], 1, delta=0.05)
+        told = trials.told(PROGRAM, self.at("session"), {"cause": "element_pattern", "parameters": {
+            "cos_exponent": first["parameters"]["cos_exponent"]["value"]}}, self.folder.name, 300, 2)
+        self.assertIsNotNone(told, msg=f"seed {seed}")
+        self.assertAlmostEqual(told["nats"] / first["evidence"]["log_likelihood_gain"], 1, delta=0.05)
+        self.assertLess(told["nats_ci95"][0], told["nats"])
+        self.assertGreater(told["nats_ci95"][1], told["nats"])
+        self.assertAlmostEqual(told["explained_power"], gain["after"] - gain["before"], delta=0.02)
 
     def test_leakage_is_named_with_place_and_level(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "32"))

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <stdexcept>
 #include <string>
@@ -51,6 +52,8 @@ struct TriedHypothesis {
 struct ComparedTwin {
   std::string file;
   double log_likelihood_gain = 0;  ///< nats over the twin as given, actors' and poses' errors fitted with each
+  std::array<double, 2> log_likelihood_gain_ci95{};  ///< by bootstrap over locations
+  double explained_power = 0;                        ///< all poses
 };
 
 struct Diagnosis {
@@ -59,7 +62,7 @@ struct Diagnosis {
   TwinDescription extended;           ///< the twin with all findings' mechanisms
   std::vector<PoseProblem> problems;  ///< poses that were left out
   std::vector<TriedHypothesis> tried;
-  double explained_power = 0;    ///< of the twin as given, all poses
+  double explained_power = 0;  ///< of the twin as given, all poses
   std::vector<ComparedTwin> compared;
   bool nothing_matches = false;  ///< scene and measurement have nothing in common
 };

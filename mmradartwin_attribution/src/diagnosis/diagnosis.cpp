@@ -624,7 +624,13 @@ Diagnosis Session::run() {
   }
   for (const TwinDescription& t : options_.compared) {
     const ModelState other = fitter_->state(t.mechanisms, &state_.nuisance);
-    result_.compared.push_back({t.file, other.log_likelihood - state_.log_likelihood});
+    auto [low, high] = *likelihoodGain(data_, state_.by_pose, other.by_pose).difference_ci95;
+    const double poses = static_cast<double>(data_.poses.size());
+    source_->settle(t.mechanisms);
+    result_.compared.push_back({t.file,
+                                other.log_likelihood - state_.log_likelihood,
+                                {poses * low, poses * high},
+                                explainedPower(cellPowers(data_, source_->echoes(t.mechanisms)))});
   }
   source_->settle(mechanisms_);
   std::vector<PoseEchoes> elsewhere = source_->echoes(mechanisms_);

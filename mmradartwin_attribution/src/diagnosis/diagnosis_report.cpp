@@ -101,7 +101,9 @@ std::string diagnosisText(const Diagnosis& d) {
   out << "\n";
   for (const ComparedTwin& t : d.compared) {
     out << t.file << " explains the same channels " << shown(std::abs(t.log_likelihood_gain), 5) << " nats "
-        << (t.log_likelihood_gain < 0 ? "less" : "more") << " likely\n";
+        << (t.log_likelihood_gain < 0 ? "less" : "more") << " likely (" << shown(t.log_likelihood_gain_ci95[0], 5)
+        << " to " << shown(t.log_likelihood_gain_ci95[1], 5) << " more by places) and " << shown(t.explained_power)
+        << " of the measured power\n";
   }
   int i = 0;
   for (const Finding& f : d.findings.findings) {

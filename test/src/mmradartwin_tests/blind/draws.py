@@ -203,7 +203,15 @@ DECOYS = {
 }
 OUTSIDE = tuple(name for name in UNCATALOGUED if name not in DECOYS)
 
-ROWS = ("clean", "single", "pair", "twice", "outside", "decoy", "recording")
+ROWS = ("clean", "single", "faint", "pair", "twice", "outside", "decoy", "recording")
+# Effects of any strength, with what their strength multiplies.
+FAINT = {"range_bias": ("range_m",), "range_scale": ("scale",), "carrier_scale": ("scale",),
+         "excess_attenuation": ("db_per_m",), "radar_yaw_offset": ("yaw_deg",), "radar_pitch_offset": ("pitch_deg",),
+         "radar_position_offset": ("forward_m", "left_m"), "scene_registration": ("x_m", "y_m", "yaw_deg"),
+         "channel_phase_error": ("rms_deg", "rms_db"), "tx_imbalance": ("phase_deg", "gain_db"),
+         "element_pattern": ("cos_exponent",), "material_reflectivity": ("delta_db",), "iq_imbalance": ("image_db",),
+         "edge_diffraction": ("level",), "actor_moved": ("distance_m", "dyaw_deg")}
+LEAST_STRENGTH = 0.03   # of the row single's
 # Causes that a room may hold for several things at once, with the parameter that tells them apart.
 TWICE = {"actor_absent": ("actor", MOVABLE), "actor_moved": ("actor", FURNITURE), "actor_unmodelled": None,
          "material_reflectivity": ("material", MATERIALS)}
@@ -235,6 +243,13 @@ def draw(trial):
         return [(name, DECOYS[name](rng, trial), None)]
     if trial.row == "outside":
         return [(shuffled(OUTSIDE, trial), {}, outside_strength(rng))]
+    if trial.row == "faint":
+        name = shuffled(FAINT, trial)
+        values, strength = SINGLE[name](rng, trial), math.exp(rng.uniform(math.log(LEAST_STRENGTH), 0))
+        for parameter in FAINT[name]:
+            values[parameter] = (values[parameter] + 20 * math.log10(strength) if parameter == "image_db"
+                                 else values[parameter] * strength)
+        return [(name, values, None)]
     if trial.row == "twice":
         name = shuffled(TWICE, trial)
         hidden = [(name, SINGLE[name](rng, trial), None) for _ in range(2)]

@@ -1,8 +1,11 @@
 """The protocol's table: figures, what is required, what was measured, with exact binomial bounds."""
 import collections
+import math
 import statistics
 
-from scipy.stats import binomtest
+import numpy as np
+from scipy.special import log_expit
+from scipy.stats import binomtest, chi2, norm
 
 from mmradartwin_tests.blind.scoring import score
 
@@ -23,6 +26,37 @@ def share(values):
     count, n = sum(values), len(values)
     low, high = bounds(count, n)
     return f"{100 * count / n:.1f} % ({100 * low:.1f} to {100 * high:.1f})", n
+
+
+def strength_over_limit(record):
+    """Strength of a hidden effect over the one at which the matched test, the likelihood of the twin that is told it,
+    detects it; None where the twin cannot be told. Nats go by the square of small strengths.
+
+    What a gain scatters over places beyond the sqrt(2 nats) that chance gives it is taken off, as the diagnosis does.
+    """
+    told = record.get("told")
+    if not told:
+        return None
+    low, high = told["nats_ci95"]
+    deviation = (high - low) / (2 * norm.ppf(0.975))
+    inflation = max(1.0, deviation ** 2 / (2 * told["nats"])) if told["nats"] > 0 else 1.0
+    return math.sqrt(max(0.0, told["nats"]) / inflation / MATCHED_NATS)
+
+
+def half_power(strengths, named):
+    """(strength at which half are named, its 95 % interval) by maximum likelihood of a logistic curve over log strength
+    and its profile; None where there are fewer than ten of each, or the curve has no such place."""
+    x = np.log(np.maximum(strengths, 1e-2))
+    y = np.where(np.asarray(named, bool), 1.0, -1.0)
+    if min((y > 0).sum(), (y < 0).sum()) < 10:
+        return None
+    places, slopes = np.linspace(math.log(0.1), math.log(10), 400), np.geomspace(0.5, 30, 60)
+    curve = slopes[None, :, None] * (x[None, None, :] - places[:, None, None])
+    profile = log_expit(curve * y).sum(axis=2).max(axis=1)
+    within = places[profile > profile.max() - chi2.ppf(0.95, 1) / 2]
+    if within[0] == places[0] or within[-1] == places[-1]:
+        return None
+    return tuple(float(math.exp(v)) for v in (places[profile.argmax()], within[0], within[-1]))
 
 
 class Scores:
@@ -52,15 +86,24 @@ class Scores:
         sizes = self.each("single", "group_size")
         covered = [c[1] for c in self.coverage()]
         gains = self.each("clean", "gain")
-        ratios = [s["gain"] / record["true_gain"] for record, _, s in self.rows["single"]
-                  if (record.get("true_gain") or 0) >= LEAST_TRUE_GAIN and s["gain"] is not None]
+        ratios = [s["gain"] / record["told"]["explained_power"] for record, _, s in self.rows["single"]
+                  if (record.get("told") or {}).get("explained_power", 0) >= LEAST_TRUE_GAIN and s["gain"] is not None]
+        strengths = [(strength_over_limit(record), s) for record, _, s in self.rows["single"]]
+        strong = [s["first"] for strength, s in strengths if strength is None or strength >= 2]
+        faint = [(strength, all(s["named"])) for strength, s in strengths + [
+            (strength_over_limit(record), s) for record, _, s in self.rows["faint"]] if strength is not None]
+        half = half_power(*zip(*faint)) if faint else None
         rows = [
             ("false alarms on clean sessions", "≤ 1 %", *share(self.each("clean", "alarm", answered=True))),
             ("single effects: right name first", "≥ 92 %", *share(self.each("single", "first"))),
+            ("– of those of at least twice their detection limit", "≥ 92 %", *share(strong)),
             ("single effects: wrong with confidence", "≤ 2 %", *share(self.each("single", "wrong"))),
             ("single effects: truth within the first group", "≥ 98 %", *share(self.each("single", "in_group"))),
             ("mean size of that group", "≤ 1.6", f"{statistics.mean(sizes):.2f}" if sizes else "not run",
              len(sizes)),
+            ("effects of any strength: wrong with confidence", "≤ 2 %", *share(self.each("faint", "wrong"))),
+            ("detection strength at 50 % power over that of the matched test", "≤ 1.5",
+             "{:.2f} ({:.2f} to {:.2f})".format(*half) if half else "not run", len(faint)),
             ("actor, material, walls, pose or order right where the name is", "",
              *share([v for row in ("single", "pair", "twice") for s in self.each(row, "subjects") for v in s])),
             ("pairs: both named", "≥ 85 %", *share([all(n) for n in named])),
@@ -96,12 +139,12 @@ class Scores:
     def by_cause(self):
         """Rows of text over the hidden effects of the rows with one: effect, trials, right, what else was said first."""
         groups = collections.defaultdict(list)
-        for row in ("single", "outside", "decoy", "recording"):
+        for row in ("single", "faint", "outside", "decoy", "recording"):
             for record, truths, s in self.rows[row]:
                 groups[(row, truths[0]["cause"])].append((record, s))
         rows = []
         for (row, cause), trials in sorted(groups.items()):
-            right = {"single": "first", "outside": "unknown"}.get(row)
+            right = {"single": "first", "faint": "first", "outside": "unknown"}.get(row)
             if row == "recording":
                 good = sum(s["named"][0] for _, s in trials)
             else:
@@ -126,6 +169,7 @@ def markdown(head, rows):
     return "\n".join(lines + ["| " + " | ".join(str(c) for c in row) + " |" for row in rows])
 
 
+MATCHED_NATS = 9.2       # chance brings a likelihood ratio of e^9.2 once in 10,000 tests at most (Markov's inequality)
 LEAST_TRUE_GAIN = 0.01   # of explained power: less is lost in the figures' rounding
 COLORS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#bcbd22", "#17becf")
 SIDE = 400    # of the plot's square, pixels

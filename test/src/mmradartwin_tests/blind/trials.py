@@ -103,29 +103,32 @@ def answer(program, session, folder, limit_s, jobs):
     return record
 
 
-def explained_power(program, session, twin, folder, limit_s, jobs):
-    """Share of the measured power that a twin explains, as diagnose says it; None where it has no answer."""
-    output, log = os.path.join(folder, "explained"), os.path.join(folder, "explained.log")
+def told(program, session, truth, folder, limit_s, jobs):
+    """What a twin that is told the effect explains more than the session's own, None where it cannot be told all of it:
+    causes are mechanisms of the same name and parameters. {"explained_power", "nats", "nats_ci95" over places}."""
+    output, log = os.path.join(folder, "told"), os.path.join(folder, "told.log")
     shutil.rmtree(output, ignore_errors=True)
-    command = [program, session, "--twin", twin, "--findings", "0", "--output", output, "--jobs", str(jobs)]
-    status, *_ = run_measured(command, limit_s, log)
-    with open(log, encoding="utf-8", errors="replace") as text:
-        said = re.search(r"the twin as given explains ([0-9.]+)", text.read())
-    return float(said.group(1)) if status == 0 and said else None
-
-
-def true_gain(program, session, truth, folder, limit_s, jobs):
-    """What the effect that is hidden adds to the explained power of the session's twin, None where the twin cannot be
-    told all of it: causes are mechanisms of the same name and parameters."""
-    power = []
     parameters = json.loads(json.dumps(truth["parameters"]))   # YAML knows no numbers of numpy
-    for mechanisms in ({}, {truth["cause"]: parameters}):
-        twin = os.path.join(session, "told.yaml")
-        with open(twin, "w", encoding="ascii") as out:
+    twins = []
+    for name, mechanisms in (("untold", {}), ("told", {truth["cause"]: parameters})):
+        twins.append(os.path.join(session, name + ".yaml"))
+        with open(twins[-1], "w", encoding="ascii") as out:
             yaml.safe_dump({"mechanisms": {"specular": {"max_bounces": 3}, "corner": {}, "diffuse": {}, **mechanisms}}, out)
-        power.append(explained_power(program, session, twin, folder, limit_s, jobs))
+    status, *_ = run_measured([program, session, "--twin", twins[0], "--compare", twins[1], "--findings", "0",
+                               "--output", output, "--jobs", str(jobs)], limit_s, log)
+    for twin in twins:
         os.remove(twin)
-    return None if None in power else round(power[1] - power[0], 6)
+    with open(log, encoding="utf-8", errors="replace") as text:
+        said = text.read()
+    number = r"(-?[0-9.]+(?:e[-+]?[0-9]+)?)"
+    before = re.search("the twin as given explains " + number, said)
+    other = re.search(f"explains the same channels {number} nats (more|less) likely \\({number} to {number} more by "
+                      f"places\\) and {number} of", said)
+    if status != 0 or not before or not other:
+        return None
+    nats = float(other[1]) if other[2] == "more" else -float(other[1])
+    return {"explained_power": round(float(other[5]) - float(before[1]), 6), "nats": nats,
+            "nats_ci95": [float(other[3]), float(other[4])]}
 
 
 def hide(trial, session):
@@ -149,8 +152,8 @@ def run_trial(trial, ledger, program, limit_s=600.0, jobs=1):
         ledger.seal(trial.key(), {"key": trial.key(), "effects": truths})
         made_s = time.monotonic() - start
         record = answer(program, session, folder, limit_s, jobs)
-        if trial.row == "single" and record["findings"] and truths[0]["cause"] not in UNTOLD:
-            record["true_gain"] = true_gain(program, session, truths[0], folder, limit_s, jobs)
+        if trial.row in ("single", "faint") and truths[0]["cause"] not in UNTOLD:
+            record["told"] = told(program, session, truths[0], folder, limit_s, jobs)
         if trial.row == "recording":
             plain = os.path.join(folder, "plain")
             recordings.write_untouched(plain)
