@@ -107,13 +107,14 @@ EchoCollector::EchoCollector(const RadarConfig& radar, double angle_error_rad, c
 
 double EchoCollector::addedRange_m(const std::vector<int>& actors) const {
   double sum = 0;
-  for (int a : actors) {
-    if (a >= 0 && a < static_cast<int>(actor_range_m_.size())) sum += actor_range_m_[a];
-  }
+  if (actor_range_m_.empty()) return sum;
+  for (int a : actors) sum += actor_range_m_[errorOf(a, actor_range_m_.size())];
   return sum;
 }
 
-EchoGroup& EchoCollector::group(const std::vector<int>& actors) {
+EchoGroup& EchoCollector::group(const PathRecord& record) {
+  static const std::vector<int> lacking{-1};  // a bounce of no actor
+  const std::vector<int>& actors = record.actors.empty() && record.bounces > 0 ? lacking : record.actors;
   for (EchoGroup* g : open_) {
     if (g->actors == actors) return *g;
   }
@@ -149,7 +150,7 @@ void EchoCollector::outer(const std::complex<double>* c, double cosine,
 
 void EchoCollector::add(const PathRecord& record, double share) {
   const bool weak = share < kWeak;
-  EchoGroup& g = group(record.actors);
+  EchoGroup& g = group(record);
   const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + g.added_range_m) / bin_m_;
   std::vector<std::complex<float>> packed;
   outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error drowns in the others
@@ -177,7 +178,7 @@ void EchoCollector::add(const PathRecord& record, double share) {
 }
 
 void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, const Eigen::MatrixXcd& slope) {
-  EchoGroup& g = group(record.actors);
+  EchoGroup& g = group(record);
   const double cosine = pathCosine(record);
   const Eigen::VectorXd level = y.colwise().squaredNorm().transpose();
   const double least = kLeastResponse * level.maxCoeff();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <complex>
 #include <cstddef>
 #include <memory>
@@ -33,12 +34,18 @@ struct PoseEchoes {
   BinCovariance graze_beams;
 };
 
+/// Place of an actor's errors among `errors` of them: all that the scene lacks (actor -1, or one that a mechanism adds)
+/// shares the last.
+inline std::size_t errorOf(int actor, std::size_t errors) {
+  return actor < 0 ? errors - 1 : std::min(static_cast<std::size_t>(actor), errors - 1);
+}
+
 /// Collects paths into groups.
 class EchoCollector {
  public:
   /// Keeps references. beams: of the pose that the paths are collected for. actor_range_m: one-way range that each
-  /// interaction with an actor adds, [actors] or empty; what Nuisance::actor_range_m says beyond it is taken to first
-  /// order, good to some 2 cm.
+  /// interaction with an actor adds, as errorOf() has it, or empty; what Nuisance::actor_range_m says beyond it is
+  /// taken to first order, good to some 2 cm.
   EchoCollector(const RadarConfig& radar, double angle_error_rad, const std::vector<EchoBeam>& beams,
                 const std::vector<double>& actor_range_m);
   /// A path as its tone stands on the channels. share: of the pose's strongest path's power; of a weak one only the
@@ -61,7 +68,7 @@ class EchoCollector {
   PoseEchoes take();
 
  private:
-  EchoGroup& group(const std::vector<int>& actors);
+  EchoGroup& group(const PathRecord& record);
   void outer(const std::complex<double>* c, double cosine, std::vector<std::complex<float>>& packed) const;
 
   /// Adds factor |b^H c|^2 times outer products of the responses over a beam's bins; null where not wanted.

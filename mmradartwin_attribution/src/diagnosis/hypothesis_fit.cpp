@@ -225,7 +225,7 @@ std::optional<ModelState> HypothesisFitter::improved(const ModelState& null, con
 std::vector<std::pair<int, double>> HypothesisFitter::suspects(const ModelState& null) const {
   std::vector<std::pair<int, double>> result;
   const LatentSpread spread = model_.spread();
-  for (std::size_t a = 0; a < null.nuisance.actor_gain.size(); ++a) {
+  for (std::size_t a = 0; a + 1 < null.nuisance.actor_gain.size(); ++a) {  // the last is of no actor
     const double gain = null.nuisance.actor_gain[a] / spread.actor_gain;
     const double range = null.nuisance.actor_range_m[a] / spread.actor_range_m;
     result.emplace_back(static_cast<int>(a), 0.5 * (gain * gain + range * range));

@@ -137,7 +137,7 @@ MeasuredPose LawScreen::measured(const Twin& twin, int pose, double session_s) c
           model_.whitened(null_.echoes[static_cast<std::size_t>(pose)], null_.nuisance, pose, bin).inverse.inverse();
     }
     double latent = 0;  // what the state has as this path's own: it is fitted anew beside the law
-    for (int actor : r.actors) latent += actor >= 0 ? null_.nuisance.actor_gain[static_cast<std::size_t>(actor)] : 0;
+    for (int actor : r.actors) latent += null_.nuisance.actor_gain[errorOf(actor, null_.nuisance.actor_gain.size())];
     const double response = hannResponse(bin - place), all = a.dot(sigma * a).real();
     const double own = gain * std::exp(latent) * channels * r.amplitude * r.amplitude * response * response;
     MeasuredPath path;

@@ -238,7 +238,7 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
     at[k] += kSmallChange;
     by_coordinate.push_back(source.pathShifts(mechanismsAt(at), mechanisms, everyone));
   }
-  const Eigen::VectorXd geometric = geometricVariance(by_coordinate, static_cast<int>(nuisance.actor_gain.size()),
+  const Eigen::VectorXd geometric = geometricVariance(by_coordinate, static_cast<int>(nuisance.actor_gain.size()) - 1,
                                                       static_cast<int>(everyone.size()), accuracy, spread);
   ProfiledValues result = fit;
   consider(look(top), top);

@@ -55,7 +55,7 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
     for (const PathRecord& r : records) {
       if (r.bounces == 0 || r.amplitude * r.amplitude < kLeastPower * strongest * strongest) continue;
       double own = gain;
-      for (int a : r.actors) own *= a < 0 ? 1 : std::exp(null.nuisance.actor_gain[static_cast<std::size_t>(a)]);
+      for (int a : r.actors) own *= std::exp(null.nuisance.actor_gain[errorOf(a, null.nuisance.actor_gain.size())]);
       const Eigen::Map<const Eigen::VectorXcd> c(r.c.data(), channels);
       for (int bin = 0; bin < samples; ++bin) {
         const SessionModel::Whitened& cell = cells[static_cast<std::size_t>(bin)];

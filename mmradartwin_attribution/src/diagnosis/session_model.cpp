@@ -71,18 +71,14 @@ class Turn {
 
 double groupGain(const EchoGroup& group, const Nuisance& nuisance) {
   double sum = 0;
-  for (int a : group.actors) {
-    if (a >= 0 && a < static_cast<int>(nuisance.actor_gain.size())) sum += nuisance.actor_gain[a];
-  }
+  for (int a : group.actors) sum += nuisance.actor_gain[errorOf(a, nuisance.actor_gain.size())];
   return std::exp(sum);
 }
 
 /// One-way range that the group's actors add beyond what its fields hold already.
 double groupShift_m(const EchoGroup& group, const Nuisance& nuisance) {
   double sum = -group.added_range_m;
-  for (int a : group.actors) {
-    if (a >= 0 && a < static_cast<int>(nuisance.actor_range_m.size())) sum += nuisance.actor_range_m[a];
-  }
+  for (int a : group.actors) sum += nuisance.actor_range_m[errorOf(a, nuisance.actor_range_m.size())];
   return sum;
 }
 
@@ -152,7 +148,7 @@ double traceOf(const double* v, int channels) {
 SessionModel::SessionModel(const ChannelData& data, int actors, const PoseAccuracy& accuracy,
                            const LatentSpread& spread)
     : data_(data),
-      actors_(actors),
+      errors_(actors + 1),
       accuracy_(accuracy),
       spread_(spread),
       channels_(data.radar.channels()),
@@ -363,8 +359,8 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
         turn(own);
         touch(direction).triangularView<Eigen::Lower>() += own;
       };
-      for (int a : g.actors) {
-        if (a < 0 || a >= actors_) continue;
+      for (int actor : g.actors) {
+        const int a = static_cast<int>(errorOf(actor, static_cast<std::size_t>(errors_)));
         own.setZero();
         if (power != nullptr) unpack(power, f, own);
         if (shift != nullptr && moved != 0) unpack(shift, f * moved, own);
@@ -372,7 +368,7 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
         own.setZero();
         if (shift != nullptr) unpack(shift, f, own);
         if (bend != nullptr && moved != 0) unpack(bend, 2 * f * moved, own);
-        add(kActors + actors_ + a);
+        add(kActors + errors_ + a);
       }
       if (bend != nullptr) {
         own.setZero();
@@ -534,15 +530,15 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
   }
   s.total = s.by_location.colwise().sum().transpose();
   s.prior = Eigen::VectorXd::Zero(globals);
-  for (int a = 0; a < actors_; ++a) {
+  for (int a = 0; a < errors_; ++a) {
     const double gain = 1 / (spread_.actor_gain * spread_.actor_gain);
     const double range = 1 / (spread_.actor_range_m * spread_.actor_range_m);
     s.prior[kActors + a] = gain;
-    s.prior[kActors + actors_ + a] = range;
+    s.prior[kActors + errors_ + a] = range;
     s.information(kActors + a, kActors + a) += gain;
     s.total[kActors + a] -= gain * n.actor_gain[a];
-    s.information(kActors + actors_ + a, kActors + actors_ + a) += range;
-    s.total[kActors + actors_ + a] -= range * n.actor_range_m[a];
+    s.information(kActors + errors_ + a, kActors + errors_ + a) += range;
+    s.total[kActors + errors_ + a] -= range * n.actor_range_m[a];
   }
   // Levels of errors are known roughly (a factor of 10 in power), so that none runs away where nothing shows it.
   const double rough = 1 / (2.3 * 2.3);
@@ -575,9 +571,9 @@ Nuisance SessionModel::stepped(const Nuisance& from, const Eigen::VectorXd& g, c
   n.log_relative = std::clamp(n.log_relative + held(g[kRelative], 2), -11.5, -2.0);
   n.log_graze = std::clamp(n.log_graze + held(g[kGraze], 2), -6.0, 6.0);
   n.log_range = std::clamp(n.log_range + held(g[kRange], 2), -6.0, 4.0);
-  for (int a = 0; a < actors_; ++a) {
+  for (int a = 0; a < errors_; ++a) {
     n.actor_gain[a] = std::clamp(n.actor_gain[a] + held(g[kActors + a], 0.5), -2.0, 2.0);
-    n.actor_range_m[a] = std::clamp(n.actor_range_m[a] + held(g[kActors + actors_ + a], 0.02), -0.08, 0.08);
+    n.actor_range_m[a] = std::clamp(n.actor_range_m[a] + held(g[kActors + errors_ + a], 0.02), -0.08, 0.08);
   }
   for (std::size_t i = 0; i < n.yaw_rad.size(); ++i) {
     const double step =
@@ -618,8 +614,8 @@ double SessionModel::fit(const std::vector<PoseEchoes>& echoes, Nuisance& nuisan
 
 Nuisance SessionModel::start(const std::vector<PoseEchoes>& echoes) const {
   Nuisance n;
-  n.actor_gain.assign(static_cast<std::size_t>(actors_), 0.0);
-  n.actor_range_m.assign(static_cast<std::size_t>(actors_), 0.0);
+  n.actor_gain.assign(static_cast<std::size_t>(errors_), 0.0);
+  n.actor_range_m.assign(static_cast<std::size_t>(errors_), 0.0);
   n.yaw_rad.assign(data_.poses.size(), 0.0);
   // Gain: median over poses of power over expected power. Floor: the lower quartile of cells, taken to 3 m.
   std::vector<double> ratio, low;

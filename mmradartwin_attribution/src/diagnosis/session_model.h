@@ -19,8 +19,8 @@ struct Nuisance {
   double log_relative = -8;             ///< what differs from channel to channel of an echo, of its power
   double log_graze = 0;                 ///< factor of PoseEchoes::graze
   double log_range = 0;                 ///< factor of the variance of a path's own range
-  std::vector<double> actor_gain;       ///< [actors] natural logarithm of power, per interaction
-  std::vector<double> actor_range_m;    ///< [actors] added one-way range, shared by the interactions of a path
+  std::vector<double> actor_gain;       ///< as errorOf() has it: natural logarithm of power, per interaction
+  std::vector<double> actor_range_m;    ///< the same: added one-way range, per interaction
   std::vector<double> yaw_rad;          ///< [poses] error of the heading
 
   int globals() const { return 5 + static_cast<int>(floor_shape.size() + actor_gain.size() + actor_range_m.size()); }
@@ -138,7 +138,7 @@ class SessionModel {
   double informationOf(double product, double trace_a, double trace_b) const;
 
   const ChannelData& data_;
-  int actors_;
+  int errors_;  ///< of actors, as errorOf() has them
   PoseAccuracy accuracy_;
   LatentSpread spread_;
   int channels_, samples_;

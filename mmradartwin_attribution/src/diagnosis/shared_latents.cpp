@@ -16,7 +16,7 @@ constexpr Eigen::Index kAlongLaw = 25;  // places of a law that a name is compar
 Screened sharedGeometry(EchoSource& source, const Hypothesis& h, const ModelState& null, const LatentSpread& spread,
                         const PoseAccuracy& accuracy, const std::vector<int>& poses) {
   const Nuisance& n = null.nuisance;
-  const Eigen::Index actors = static_cast<Eigen::Index>(n.actor_range_m.size());
+  const Eigen::Index actors = static_cast<Eigen::Index>(n.actor_range_m.size()) - 1;  // the last is of none
   const Eigen::Index rows = actors + static_cast<Eigen::Index>(poses.size());
   const Eigen::Index columns = static_cast<Eigen::Index>(h.coordinates.size());
   Eigen::VectorXd latents(rows);
@@ -69,7 +69,7 @@ std::vector<Screened> sharedLatents(EchoSource& source, const ModelState& null, 
   for (const Hypothesis& h : all) {
     if (h.mechanism.mechanism != "material_reflectivity" || h.coordinates.size() != 1) continue;
     double sum = 0, count = 0;
-    for (std::size_t a = 0; a < n.actor_gain.size(); ++a) {
+    for (std::size_t a = 0; a < scene.actors.size(); ++a) {
       const Actor& actor = scene.actors[a];
       if ((actor.name != h.subject && actor.material_tag != h.subject) || n.actor_gain[a] == 0) continue;
       sum += n.actor_gain[a];
