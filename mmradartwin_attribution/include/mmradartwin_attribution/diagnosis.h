@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <functional>
 #include <stdexcept>
@@ -56,6 +57,21 @@ struct ComparedTwin {
   double explained_power = 0;                        ///< all poses
 };
 
+/// The survey seen from above, in map, for the findings' figures.
+struct SurveyPlan {
+  struct Wall {  ///< an upright triangle of an actor
+    std::string actor;
+    Eigen::Vector2d from_m, to_m;
+  };
+  struct Station {
+    std::string pose;
+    Eigen::Vector2d at_m;
+    Eigen::Vector2d boresight;
+  };
+  std::vector<Wall> walls;  ///< none without a scene
+  std::vector<Station> stations;
+};
+
 struct Diagnosis {
   Findings findings;
   bool has_twin = true;               ///< false where there was no scene to simulate
@@ -64,6 +80,7 @@ struct Diagnosis {
   std::vector<TriedHypothesis> tried;
   double explained_power = 0;  ///< of the twin as given, all poses
   std::vector<ComparedTwin> compared;
+  SurveyPlan plan;
   bool nothing_matches = false;  ///< scene and measurement have nothing in common
 };
 

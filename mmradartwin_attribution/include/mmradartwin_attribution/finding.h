@@ -2,11 +2,13 @@
 
 #include <array>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "mmradartwin_attribution/residual.h"
+#include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_sim/mechanism.h"
 #include "mmradartwin_sim/twin.h"
 
@@ -80,6 +82,13 @@ struct FindingPlace {
   std::optional<double> x_m, y_m;  ///< map
 };
 
+/// What a finding's figure shows of the maps: simulated over measured power, each summed over all poses, with and
+/// without the finding. NaN where neither has an echo to speak of.
+struct FindingMaps {
+  RangeAngleAxes axes;
+  RealGrid before_db, after_db;  ///< [N][64]
+};
+
 /// One entry of findings.json (DESIGN section 5). Class and action follow from the cause.
 struct Finding {
   std::string cause;  ///< a binding name or "unknown"
@@ -90,8 +99,9 @@ struct Finding {
   FindingEvidence evidence;
   std::optional<FindingGain> gain;  ///< none with fewer than two locations
   std::vector<FindingPlace> where;
-  std::optional<std::string> figure;       ///< relative to findings.json
-  std::optional<std::string> description;  ///< in words and numbers; `unknown` has one
+  std::optional<std::string> figure;        ///< relative to findings.json
+  std::optional<std::string> description;   ///< in words and numbers; `unknown` has one
+  std::shared_ptr<const FindingMaps> maps;  ///< for the figure; none where maps of averages do not show it
 
   const FindingParameter* parameter(const std::string& name) const;  ///< nullptr where it has none of that name
 };

@@ -18,6 +18,7 @@
 #include "delivery.h"
 #include "empirical_hypothesis.h"
 #include "evidence_bounds.h"
+#include "finding_figure.h"
 #include "fitted_parameters.h"
 #include "held_out_gain.h"
 #include "hypothesis_finding.h"
@@ -84,10 +85,10 @@ class Session {
   struct Accepted;
   void restate();
   std::vector<PoseEchoes> heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m);
-  FindingGain gainOf(HypothesisFit& fit);
+  void measureGain(HypothesisFit& fit, Finding& f);
   void addMetrics(const HypothesisFit& fit, FindingGain& gain) const;
-  FindingGain gainOf(const ChannelData& before_data, const std::vector<NamedParameters>& before,
-                     const ChannelData& after_data, const std::vector<NamedParameters>& after);
+  void measureGain(const ChannelData& before_data, const std::vector<NamedParameters>& before,
+                   const ChannelData& after_data, const std::vector<NamedParameters>& after, Finding& f);
 
   const Recording& recording_;
   Twin& twin_;
@@ -172,7 +173,7 @@ std::optional<std::string> Session::judgeDelivery() {
   const ChannelData recorded = data_;
   undoDelivery(*delivery, data_);
   Finding f = findingOf(*delivery, data_.radar);
-  if (data_.locations.size() > 1) f.gain = gainOf(recorded, mechanisms_, data_, mechanisms_);
+  measureGain(recorded, mechanisms_, data_, mechanisms_, f);
   extended_.push_back(*f.mechanism);
   result_.findings.findings.push_back(f);
   return f.cause;
@@ -202,7 +203,7 @@ void Session::judgeTone() {
   Finding f = findingOf(tone, data_);
   std::vector<NamedParameters> with = mechanisms_;
   with.push_back(*f.mechanism);
-  if (data_.locations.size() > 1) f.gain = gainOf(recorded, mechanisms_, recorded, with);
+  measureGain(recorded, mechanisms_, recorded, with, f);
   extended_.push_back(*f.mechanism);
   result_.findings.findings.push_back(std::move(f));
 }
@@ -407,26 +408,22 @@ std::vector<PoseEchoes> Session::heldOutEchoes(const HypothesisFit& fit, const s
   return echoes;
 }
 
-FindingGain Session::gainOf(HypothesisFit& fit) {
+void Session::measureGain(HypothesisFit& fit, Finding& f) {
   report("gain on held-out places", 0);
   fitter_->settleFolds(state_, fit);
-  FindingGain gain;
-  gain.explained_power = explainedPowerGain(data_, cellPowers(data_, source_->echoes(mechanisms_)),
-                                            cellPowers(data_, heldOutEchoes(fit, {})));
+  compareMaps(data_, cellPowers(data_, source_->echoes(mechanisms_)), cellPowers(data_, heldOutEchoes(fit, {})), f);
   std::vector<double> likelihood;
   model_->logLikelihood(heldOutEchoes(fit, fit.state.actor_range_m), fit.state.nuisance, &likelihood);
   source_->settle(mechanisms_);
-  gain.log_likelihood_per_pose = likelihoodGain(data_, state_.by_pose, likelihood);
-  return gain;
+  f.gain->log_likelihood_per_pose = likelihoodGain(data_, state_.by_pose, likelihood);
 }
 
-FindingGain Session::gainOf(const ChannelData& before_data, const std::vector<NamedParameters>& before,
-                            const ChannelData& after_data, const std::vector<NamedParameters>& after) {
-  FindingGain gain;
+void Session::measureGain(const ChannelData& before_data, const std::vector<NamedParameters>& before,
+                          const ChannelData& after_data, const std::vector<NamedParameters>& after, Finding& f) {
+  if (data_.locations.size() < 2) return;
   const std::vector<PoseEchoes> b = source_->echoes(before), a = source_->echoes(after);
   source_->settle(mechanisms_);
-  gain.explained_power = explainedPowerGain(data_, cellPowers(before_data, b), cellPowers(after_data, a));
-  return gain;
+  compareMaps(data_, cellPowers(before_data, b), cellPowers(after_data, a), f);
 }
 
 void Session::addMetrics(const HypothesisFit& fit, FindingGain& gain) const {
@@ -544,7 +541,7 @@ bool Session::judgeChannels(int round) {
     if (!verdict.empty()) continue;
     Finding finding = findingOf(f, fits, state_, twin_.scene(), data_);
     if (data_.locations.size() > 1) {
-      finding.gain = gainOf(f);
+      measureGain(f, finding);
       // Where the likelihood gains little and the maps nothing, it is the likelihood's own shortcomings that were
       // fitted: what a pose's error does at edges looks like a little of many things. Much of it may be real though no
       // map shows it (an image at -26 dB), unless the maps get plainly worse.
@@ -671,6 +668,7 @@ Diagnosis Session::run() {
   result_.extended = twin_.description();
   result_.extended.mechanisms = extended_;
   result_.problems = data_.problems;
+  result_.plan = surveyPlan(&twin_.scene(), recording_.poses);
   return std::move(result_);
 }
 

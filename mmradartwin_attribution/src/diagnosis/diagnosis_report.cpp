@@ -4,10 +4,13 @@
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
+#include <map>
 #include <sstream>
 
+#include "finding_figure.h"
 #include "mmradartwin_attribution/report.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/map_picture.h"
 
 namespace mmradartwin {
 namespace {
@@ -36,6 +39,19 @@ std::string shown(const FindingParameter& p) {
     for (std::size_t i = 0; i < texts->size(); ++i) out << (i ? ", " : "") << (*texts)[i];
   }
   return out.str();
+}
+
+/// What its mechanism needs beyond the cause's parameters: the shape of an object and so on. Lists of laws are left to
+/// findings.json.
+std::vector<std::string> shownBesides(const Finding& f) {
+  std::vector<std::string> words;
+  if (!f.mechanism || f.cause == "unknown") return words;
+  for (const auto& [name, value] : f.mechanism->values.all()) {
+    if (f.parameter(name) != nullptr) continue;
+    if (const auto* number = std::get_if<double>(&value)) words.push_back(name + " = " + shown(*number, 4));
+    if (const auto* text = std::get_if<std::string>(&value)) words.push_back(name + " = " + *text);
+  }
+  return words;
 }
 
 std::string escaped(const std::string& text) {
@@ -83,13 +99,15 @@ void save(const std::string& file, const std::string& text) {
   if (!out) throw InputError(file + ": cannot be written; check free space and rights");
 }
 
-}  // namespace
-
-DiagnosisReport::DiagnosisReport(const std::string& directory) : directory_(directory) {
+void makeFolder(const std::string& directory) {
   std::error_code error;
   fs::create_directories(directory, error);
   if (error) throw InputError(directory + ": cannot be created (" + error.message() + "); choose another --output");
 }
+
+}  // namespace
+
+DiagnosisReport::DiagnosisReport(const std::string& directory) : directory_(directory) { makeFolder(directory); }
 
 std::string diagnosisText(const Diagnosis& d) {
   std::ostringstream out;
@@ -109,6 +127,7 @@ std::string diagnosisText(const Diagnosis& d) {
   for (const Finding& f : d.findings.findings) {
     out << ++i << ". " << f.cause << " (" << className(causeDescription(f.cause).residual_class) << ")";
     for (const FindingParameter& p : f.parameters) out << ", " << shown(p);
+    for (const std::string& more : shownBesides(f)) out << ", " << more;
     out << "\n";
     if (f.description) out << "   " << *f.description << "\n";
     if (f.gain) {
@@ -136,6 +155,13 @@ std::string diagnosisText(const Diagnosis& d) {
 
 void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::string>& command) const {
   Findings findings = diagnosis.findings;
+  if (!findings.findings.empty()) makeFolder(directory_ + "/figures");
+  std::map<std::string, int> times;
+  for (Finding& f : findings.findings) {
+    const int time = ++times[f.cause];
+    f.figure = "figures/" + f.cause + (time > 1 ? "_" + std::to_string(time) : "") + ".png";
+    writePicture(drawFinding(f, diagnosis.plan), directory_ + "/" + *f.figure);
+  }
   if (diagnosis.has_twin) {
     findings.extended_twin = "twin.extended.yaml";
     save(directory_ + "/twin.extended.yaml", diagnosis.extended.toYaml());
@@ -173,6 +199,7 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
     html << "<h2>" << ++i << ". " << f.cause << " (" << className(cause.residual_class)
          << ")</h2><p>Action: " << escaped(cause.action()) << "</p><ul>";
     for (const FindingParameter& p : f.parameters) html << "<li>" << escaped(shown(p)) << "</li>";
+    for (const std::string& more : shownBesides(f)) html << "<li>" << escaped(more) << "</li>";
     html << "</ul>";
     if (f.description) html << "<p>" << escaped(*f.description) << "</p>";
     html << "<p>Evidence: " << shown(f.evidence.log_likelihood_gain, 4) << " nats, false alarms at most "
@@ -198,6 +225,8 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
         html << "</p>";
       }
     }
+    html << "<p><a href=\"" << *f.figure << "\"><img style=\"max-width:100%\" src=\"" << *f.figure
+         << "\" alt=\"figure of " << f.cause << "\"></a></p>";
     if (f.gain) {
       html << "<table><tr><th>on held-out places</th><th>before</th><th>after</th><th>difference, 95 %</th></tr>";
       for (const GainRow& row : gainRows(*f.gain)) {

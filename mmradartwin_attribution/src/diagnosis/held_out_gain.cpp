@@ -15,6 +15,7 @@ namespace mmradartwin {
 namespace {
 
 constexpr int kDraws = 1000;
+constexpr double kLeastDrawn = 3e-4;  ///< of the strongest cell's power
 constexpr double kMinRange_m = 0.16, kMaxAzimuth_rad = M_PI / 3;
 
 /// 95 % interval of a statistic over locations drawn with replacement. The same draws every time.
@@ -149,6 +150,46 @@ GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPow
     return explained(a, &times) - explained(b, &times);
   });
   return m;
+}
+
+namespace {
+
+/// Simulated over measured power of a cell, over all poses.
+RealGrid differences_db(const RangeAngleAxes& axes, const std::vector<CellPowers>& poses) {
+  std::vector<double> measured(poses.front().measured.size(), 0.0), expected(measured);
+  const double gain = std::pow(sessionGain(poses), 2);
+  for (const CellPowers& p : poses) {
+    for (std::size_t j = 0; j < measured.size(); ++j) {
+      measured[j] += p.measured[j];
+      expected[j] += gain * p.expected[j];
+    }
+  }
+  const double least = kLeastDrawn * *std::max_element(measured.begin(), measured.end());
+  RealGrid grid = RealGrid::Constant(static_cast<Eigen::Index>(axes.range_m.size()), kAngleBins,
+                                     std::numeric_limits<double>::quiet_NaN());
+  std::size_t j = 0;
+  for (std::size_t bin = 0; bin < axes.range_m.size(); ++bin) {
+    if (axes.range_m[bin] <= kMinRange_m) continue;
+    for (std::size_t a = 0; a < static_cast<std::size_t>(kAngleBins); ++a) {
+      if (!(std::abs(axes.azimuth_rad[a]) <= kMaxAzimuth_rad)) continue;
+      if (std::max(measured[j], expected[j]) > least) {
+        grid(static_cast<Eigen::Index>(bin), static_cast<Eigen::Index>(a)) =
+            10 * std::log10(std::max(expected[j], 0.1 * least) / std::max(measured[j], 0.1 * least));
+      }
+      ++j;
+    }
+  }
+  return grid;
+}
+
+}  // namespace
+
+void compareMaps(const ChannelData& data, const std::vector<CellPowers>& before, const std::vector<CellPowers>& after,
+                 Finding& f) {
+  if (!f.gain) f.gain.emplace();
+  f.gain->explained_power = explainedPowerGain(data, before, after);
+  const RangeAngleAxes axes = SignalChain(data.radar).axes();
+  f.maps = std::make_shared<FindingMaps>(FindingMaps{axes, differences_db(axes, before), differences_db(axes, after)});
 }
 
 GainMetric likelihoodGain(const ChannelData& data, const std::vector<double>& before,

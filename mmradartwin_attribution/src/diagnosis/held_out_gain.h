@@ -25,6 +25,10 @@ double explainedPower(const std::vector<CellPowers>& poses);
 GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPowers>& before,
                               const std::vector<CellPowers>& after);
 
+/// A finding's explained power before and after, held out where `after` is, and the maps for its figure.
+void compareMaps(const ChannelData& data, const std::vector<CellPowers>& before, const std::vector<CellPowers>& after,
+                 Finding& f);
+
 /// Mean difference per pose with its 95 % interval by bootstrap over locations.
 GainMetric likelihoodGain(const ChannelData& data, const std::vector<double>& before, const std::vector<double>& after);
 

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "echo_source.h"
+#include "finding_figure.h"
 #include "held_out_gain.h"
 #include "hypothesis_fit.h"
 #include "mmradartwin_attribution/diagnosis.h"
@@ -352,6 +353,7 @@ Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& o
   result.has_twin = false;
   result.extended.radar = recording.radar;
   result.problems = data.problems;
+  result.plan = surveyPlan(nullptr, recording.poses);
   return result;
 }
 

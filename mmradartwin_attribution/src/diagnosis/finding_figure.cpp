@@ -1,0 +1,163 @@
+#include "finding_figure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <set>
+#include <string>
+
+#include "mmradartwin_dsp/map_picture.h"
+#include "mmradartwin_sim/scene.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr int kHeight_px = 470, kMargin_px = 34;
+constexpr double kUpright = 0.7;  ///< sine of a triangle's slope from which on a plan shows it
+constexpr double kLimit_db = 12;  ///< of the maps' colours
+const cv::Scalar kPaper(255, 255, 255), kInk(40, 40, 40), kSoft(205, 205, 205), kWall(150, 150, 150),
+    kBlue(200, 100, 20), kRed(30, 30, 220);
+
+/// A part of map drawn upright, x to the right.
+class PlanView {
+ public:
+  explicit PlanView(const Eigen::AlignedBox2d& shown)
+      : shown_(shown),
+        px_per_m_((kHeight_px - 2 * kMargin_px) / std::max(shown.sizes().x() / kWidest, shown.sizes().y())),
+        picture_(kHeight_px, 2 * kMargin_px + static_cast<int>(px_per_m_ * shown.sizes().x()), CV_8UC3, kPaper) {}
+  cv::Point at(const Eigen::Vector2d& p_m) const {
+    return {kMargin_px + static_cast<int>(std::lround(px_per_m_ * (p_m.x() - shown_.min().x()))),
+            kHeight_px - kMargin_px - static_cast<int>(std::lround(px_per_m_ * (p_m.y() - shown_.min().y())))};
+  }
+  void line(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m, const cv::Scalar& color, int width_px) {
+    cv::line(picture_, at(from_m), at(to_m), color, width_px, cv::LINE_AA);
+  }
+  void text(const std::string& words, const cv::Point& at_px, const cv::Scalar& color) {
+    cv::putText(picture_, words, at_px, cv::FONT_HERSHEY_SIMPLEX, 0.4, color, 1, cv::LINE_AA);
+  }
+  double px_per_m() const { return px_per_m_; }
+  cv::Mat& picture() { return picture_; }
+
+ private:
+  static constexpr double kWidest = 1.6;  ///< width over height
+  Eigen::AlignedBox2d shown_;
+  double px_per_m_;
+  cv::Mat picture_;
+};
+
+/// Whole metres about all that is to be seen.
+Eigen::AlignedBox2d extent(const SurveyPlan& plan, const std::vector<Eigen::Vector2d>& places) {
+  Eigen::AlignedBox2d box;
+  for (const SurveyPlan::Wall& w : plan.walls) box.extend(w.from_m).extend(w.to_m);
+  for (const SurveyPlan::Station& s : plan.stations) box.extend(s.at_m);
+  for (const Eigen::Vector2d& p : places) box.extend(p);
+  return {(box.min().array() - 0.5).floor().matrix(), (box.max().array() + 0.5).ceil().matrix()};
+}
+
+void drawGrid(PlanView& view, const Eigen::AlignedBox2d& shown) {
+  const double step = std::max(1.0, std::ceil(shown.sizes().maxCoeff() / 12));
+  for (double x = shown.min().x(); x <= shown.max().x(); x += step) {
+    view.line({x, shown.min().y()}, {x, shown.max().y()}, kSoft, 1);
+    view.text(cv::format("%g", x), view.at({x, shown.min().y()}) + cv::Point(-4, 15), kInk);
+  }
+  for (double y = shown.min().y(); y <= shown.max().y(); y += step) {
+    view.line({shown.min().x(), y}, {shown.max().x(), y}, kSoft, 1);
+    view.text(cv::format("%g", y), view.at({shown.min().x(), y}) + cv::Point(-20, 4), kInk);
+  }
+}
+
+/// Half the width of a coordinate's 95 % interval, 0 where it has none.
+double halfInterval_m(const Finding& f, const char* name) {
+  const FindingParameter* p = f.parameter(name);
+  return p != nullptr && !p->ci95.empty() ? (p->ci95[0][1] - p->ci95[0][0]) / 2 : 0;
+}
+
+std::set<std::string> actorsOf(const Finding& f) {
+  std::set<std::string> names;
+  for (const FindingPlace& place : f.where) names.insert(place.actors.begin(), place.actors.end());
+  for (const FindingParameter& p : f.parameters) {
+    if (const auto* text = std::get_if<std::string>(&p.value)) names.insert(*text);
+    if (const auto* texts = std::get_if<std::vector<std::string>>(&p.value)) names.insert(texts->begin(), texts->end());
+  }
+  return names;
+}
+
+cv::Mat drawPlan(const Finding& f, const SurveyPlan& plan) {
+  std::vector<Eigen::Vector2d> places;
+  std::set<std::string> poses;
+  for (const FindingPlace& place : f.where) {
+    if (place.x_m && place.y_m) places.emplace_back(*place.x_m, *place.y_m);
+    poses.insert(place.poses.begin(), place.poses.end());
+  }
+  const std::set<std::string> actors = actorsOf(f);
+  const Eigen::AlignedBox2d shown = extent(plan, places);
+  PlanView view(shown);
+  drawGrid(view, shown);
+  for (const SurveyPlan::Wall& w : plan.walls) view.line(w.from_m, w.to_m, kWall, 1);
+  for (const SurveyPlan::Wall& w : plan.walls) {
+    if (actors.count(w.actor) > 0) view.line(w.from_m, w.to_m, kRed, 2);
+  }
+  for (const SurveyPlan::Station& s : plan.stations) {
+    const bool carries = poses.count(s.pose) > 0;
+    const cv::Scalar& color = carries ? kBlue : kWall;
+    cv::circle(view.picture(), view.at(s.at_m), carries ? 4 : 2, color, cv::FILLED, cv::LINE_AA);
+    view.line(s.at_m, s.at_m + s.boresight * 14 / view.px_per_m(), color, carries ? 2 : 1);
+  }
+  for (const Eigen::Vector2d& p : places) {
+    cv::drawMarker(view.picture(), view.at(p), kRed, cv::MARKER_TILTED_CROSS, 14, 2, cv::LINE_AA);
+    const double x = view.px_per_m() * halfInterval_m(f, "x_m"), y = view.px_per_m() * halfInterval_m(f, "y_m");
+    if (places.size() > 1 || !(x > 0) || !(y > 0) || std::max(x, y) > kHeight_px) continue;
+    cv::ellipse(view.picture(), view.at(p), cv::Size(static_cast<int>(x) + 1, static_cast<int>(y) + 1), 0, 0, 360, kRed,
+                1, cv::LINE_AA);
+  }
+  view.text(std::string("map [m]") + (poses.empty() ? "" : "; blue: poses that carry it most") +
+                (actors.empty() && places.empty() ? "" : "; red: what it is about"),
+            {kMargin_px, 18}, kInk);
+  return view.picture();
+}
+
+}  // namespace
+
+SurveyPlan surveyPlan(const Scene* scene, const std::vector<Pose>& poses) {
+  SurveyPlan plan;
+  if (scene != nullptr) {
+    for (const Actor& actor : scene->actors) {
+      for (const std::array<int, 3>& t : actor.triangles) {
+        std::array<Eigen::Vector3d, 3> p;
+        for (std::size_t i = 0; i < 3; ++i) p[i] = actor.vertices[static_cast<std::size_t>(t[i])];
+        const Eigen::Vector3d normal = (p[1] - p[0]).cross(p[2] - p[0]);
+        if (!(std::hypot(normal.x(), normal.y()) > kUpright * normal.norm())) continue;
+        // From above, the longest of three sides covers the others of what stands upright.
+        std::size_t longest = 0;
+        const auto side_m = [&p](std::size_t i) { return (p[(i + 1) % 3] - p[i]).head<2>().norm(); };
+        for (std::size_t i = 1; i < 3; ++i) longest = side_m(i) > side_m(longest) ? i : longest;
+        plan.walls.push_back({actor.name, p[longest].head<2>(), p[(longest + 1) % 3].head<2>()});
+      }
+    }
+  }
+  for (const Pose& pose : poses) {
+    const Eigen::Vector2d ahead = pose.T_map_radar.linear().col(0).head<2>();
+    plan.stations.push_back({pose.name, pose.T_map_radar.translation().head<2>(), ahead});
+  }
+  return plan;
+}
+
+cv::Mat drawFinding(const Finding& finding, const SurveyPlan& plan) {
+  const cv::Mat survey = drawPlan(finding, plan);
+  if (!finding.maps) return survey;
+  FanStyle style;
+  style.diverging = true;
+  style.max_db = kLimit_db;
+  style.min_db = -kLimit_db;
+  style.height_px = kHeight_px;
+  style.max_range_m = std::min(10.0, std::ceil(finding.maps->axes.range_m.back()));
+  style.title = "simulated - measured, without it";
+  const cv::Mat before = drawFan(finding.maps->axes, finding.maps->before_db, style);
+  style.title = "with " + finding.cause;
+  const cv::Mat after = drawFan(finding.maps->axes, finding.maps->after_db, style);
+  cv::Mat all;
+  cv::hconcat(std::vector<cv::Mat>{before, after, survey}, all);
+  return all;
+}
+
+}  // namespace mmradartwin
