@@ -172,7 +172,14 @@ class HiddenEffects(unittest.TestCase):
                   for f in findings["findings"]]
         for hidden in truth:
             place = hidden["parameters"]["x_m"], hidden["parameters"]["y_m"]
-            self.assertLess(min(math.dist(place, p) for p in places), 0.1, msg=f"seed {seed}: {places}")
+            self.assertLess(min(math.dist(place, p) for p in places), 0.06, msg=f"seed {seed}: {places}")
+        figures = [f["figure"] for f in findings["findings"]]
+        self.assertEqual(figures, ["figures/actor_unmodelled.png", "figures/actor_unmodelled_2.png"])
+        for figure in figures:
+            with open(self.at(os.path.join("out", figure)), "rb") as picture:
+                self.assertEqual(picture.read(8), b"\x89PNG\r\n\x1a\n")
+            with open(self.at("out/index.html"), encoding="utf-8") as report:
+                self.assertIn(f'src="{figure}"', report.read())
         # The twin that it wrote has both, and nothing more is found with it.
         extended = self.at("out/twin.extended.yaml")
         with open(extended, encoding="ascii") as twin:
@@ -221,6 +228,18 @@ class HiddenEffects(unittest.TestCase):
                 status, findings, errors = diagnose(session, self.at(f"{cause}_out"))
                 self.assertEqual(status, 0, msg=errors)
                 self.assertEqual([f["cause"] for f in findings["findings"]], [cause])
+
+    def test_a_cabinet_whose_own_errors_hide_that_it_moved_is_looked_for_elsewhere(self):
+        session = self.at("session")
+        truth = trials.hide(draws.Trial("faint", "office", 91, 3, poses=24), session)
+        self.assertEqual(truth[0]["parameters"]["actor"], "cabinet_east")
+        status, findings, errors = diagnose(session, self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["actor_moved"], msg=str(findings))
+        told = findings["findings"][0]["parameters"]
+        self.assertEqual(told["actor"]["value"], "cabinet_east")
+        for name in ("dx_m", "dy_m"):
+            self.assertAlmostEqual(told[name]["value"], truth[0]["parameters"][name], delta=0.05)
 
     def test_errors_that_look_like_a_registration_are_none(self):
         # Here 13 mm of registration let paths through that gain 129 nats and 0.035 of the measured power; actors and

@@ -5,7 +5,7 @@ import statistics
 
 import numpy as np
 from scipy.special import log_expit
-from scipy.stats import binomtest, chi2, norm
+from scipy.stats import binomtest, chi2
 
 from mmradartwin_tests.blind.scoring import score
 
@@ -32,15 +32,10 @@ def strength_over_limit(record):
     """Strength of a hidden effect over the one at which the matched test, the likelihood of the twin that is told it,
     detects it; None where the twin cannot be told. Nats go by the square of small strengths.
 
-    What a gain scatters over places beyond the sqrt(2 nats) that chance gives it is taken off, as the diagnosis does.
+    The likelihood is taken at its word, without what it scatters over places: a matched test better than there is.
     """
     told = record.get("told")
-    if not told:
-        return None
-    low, high = told["nats_ci95"]
-    deviation = (high - low) / (2 * norm.ppf(0.975))
-    inflation = max(1.0, deviation ** 2 / (2 * told["nats"])) if told["nats"] > 0 else 1.0
-    return math.sqrt(max(0.0, told["nats"]) / inflation / MATCHED_NATS)
+    return math.sqrt(max(0.0, told["nats"]) / MATCHED_NATS) if told else None
 
 
 def half_power(strengths, named):
