@@ -19,10 +19,9 @@ namespace {
 constexpr double kSmallStep = 0.125;           ///< of the scale, for derivatives
 constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what rises from nothing is looked at first
 constexpr double kMore[] = {4, 16};            ///< of the scale, as long as that gains
-constexpr double kHopeless = 50;               ///< nats lost there: less of it would not gain either
 constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents have stood in for it
 constexpr double kStoodIn = 1;                 ///< nats of theirs
-constexpr double kRadii[] = {1, 2, 4};         ///< of the scale, about a place where an object may have stood before
+constexpr double kRadii[] = {1, 2, 4, 7};      ///< of the scale, about a place where an object may have stood before
 constexpr int kDirections = 8;
 constexpr double kEnough = 0.2;              ///< nats: a further step promises less
 constexpr double kRising = 5;                ///< nats of the last step that are worth going on for
@@ -308,7 +307,7 @@ Screened HypothesisFitter::screenDirectly(const ModelState& null, const Hypothes
   } else {
     const double gain = tryAt(kSome);
     const bool costly = source_.altersGeometry(hypothesis.at(start));
-    if (gain > (costly ? 0 : -kHopeless)) {
+    if (gain > 0 || !costly) {
       double last = tryAt(gain > 0 ? 1 : kLittle);
       // A level may be far above its typical one, where that one hardly shows.
       const bool level = hypothesis.coordinates.size() == 1 && hypothesis.coordinates[0].logarithmic();
