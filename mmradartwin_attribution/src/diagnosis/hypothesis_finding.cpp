@@ -91,7 +91,7 @@ std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFi
   if (name != "actor_unmodelled") return "";
   const double size_m = values.number("size_m"), x_m = values.number("x_m"), y_m = values.number("y_m");
   const std::string which = ": " + number(size_m) + " m at (" + number(x_m) + ", " + number(y_m) + ")";
-  if (size_m < kLeastSize_m) return "no larger than clutter is" + which;
+  if (size_m <= kLeastSize_m) return "no larger than clutter is" + which;
   for (const FrameFinding& f : walkers) {
     if (f.cause != "moving_target" || size_m > kPerson_m) continue;
     for (const FindingPlace& place : f.where) {
