@@ -43,6 +43,8 @@ constexpr double kLawShare = 2.0 / 3;
 // that is another's (the corner with a wall that a cabinet stands too near to).
 constexpr double kLeastMove_m = 0.06;
 
+constexpr double kSomewhere = 10;  ///< nats more for an object: it is the best of some 500 places of a room
+
 /// Of a gain that scatters over places more than one by chance would: of G nats, sqrt(2 G).
 double inflationOf(double gain, const std::vector<double>& by_location) {
   const double locations = static_cast<double>(by_location.size());
@@ -155,6 +157,7 @@ std::size_t HypothesisFit::numbers() const {
 double HypothesisFit::ranking() const {
   const bool named = isCatalogued(hypothesis.mechanism.mechanism);
   double nats = (named ? gain : kLawShare * gain) - kPrice * static_cast<double>(numbers());
+  if (hypothesis.mechanism.mechanism == "actor_unmodelled") nats -= kSomewhere;
   if (hypothesis.mechanism.mechanism == "actor_moved") {
     const NamedParameters m = hypothesis.at(scaled);
     if (std::hypot(m.values.number("dx_m"), m.values.number("dy_m")) < kLeastMove_m) nats -= kPrice;
