@@ -57,6 +57,7 @@ constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less
 constexpr double kMostLost = 0.01;         ///< of the explained power, by what the likelihood plainly gains of;
 // unless it is worth leastNats(), inflation taken off.
 constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
+constexpr double kFarAway_m = 0.12;    ///< six times what a scene's actors err by
 constexpr double kObjectPlaces = 500;  ///< places of an 8 by 6 m room that a session resolves, as a family
 
 bool isMove(const Hypothesis& h) { return h.mechanism.mechanism == "actor_moved"; }
@@ -506,6 +507,7 @@ bool Session::isWithinErrors(const HypothesisFit& f) const {
   const Hypothesis& h = f.hypothesis;
   const auto a = acceptedAs(h);
   if (a == accepted_.end() || !(isMove(h) || (h.isGeometry() && !f.plain))) return false;
+  if (f.plain && f.moved_m() > kFarAway_m) return false;  // an interval may be wide where the likelihood is rough
   const double nats = natsFromNothing(h, a->scaled, a->standard_error);
   return fitter_->falseAlarmRate(nats, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
 }

@@ -20,6 +20,7 @@ constexpr double kSmallStep = 0.125;           ///< of the scale, for derivative
 constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what rises from nothing is looked at first
 constexpr double kMore[] = {4, 16};            ///< of the scale, as long as that gains
 constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents have stood in for it
+constexpr int kSettling = 3;                   ///< steps of the latents at each of several starts
 constexpr double kStoodIn = 1;                 ///< nats of theirs
 constexpr double kRadii[] = {1, 2, 4, 7};      ///< of the scale, about a place where an object may have stood before
 constexpr int kDirections = 8;
@@ -158,11 +159,14 @@ double HypothesisFit::ranking() const {
   const bool named = isCatalogued(hypothesis.mechanism.mechanism);
   double nats = (named ? gain : kLawShare * gain) - kPrice * static_cast<double>(numbers());
   if (hypothesis.mechanism.mechanism == "actor_unmodelled") nats -= kSomewhere;
-  if (hypothesis.mechanism.mechanism == "actor_moved") {
-    const NamedParameters m = hypothesis.at(scaled);
-    if (std::hypot(m.values.number("dx_m"), m.values.number("dy_m")) < kLeastMove_m) nats -= kPrice;
-  }
+  if (hypothesis.mechanism.mechanism == "actor_moved" && moved_m() < kLeastMove_m) nats -= kPrice;
   return nats;
+}
+
+double HypothesisFit::moved_m() const {
+  if (hypothesis.mechanism.mechanism != "actor_moved") return 0;
+  const NamedParameters m = hypothesis.at(scaled);
+  return std::hypot(m.values.number("dx_m"), m.values.number("dy_m"));
 }
 
 void HypothesisFit::loseGain(double nats) {
@@ -416,8 +420,13 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Nuisance& a, const Nuisance& b) { return a.actor_range_m < b.actor_range_m; });
   Optimum o;
+  const auto take = [&](const ModelState& s, const std::vector<double>& scaled) {
+    if (!o.state.echoes.empty() && s.log_likelihood <= o.state.log_likelihood) return;
+    o.state = s;
+    o.scaled = scaled;
+  };
   const auto consider = [&](const std::vector<double>& scaled) {
-    ModelState s;
+    ModelState s, best;
     for (const Nuisance& candidate : candidates) {
       if (s.echoes.empty() || s.actor_range_m != candidate.actor_range_m) {
         s = evaluate(scaled, candidate);
@@ -425,12 +434,19 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
         s.nuisance = candidate;
         s.log_likelihood = model_.logLikelihood(s.echoes, candidate, &s.by_pose);
       }
-      if (!o.state.echoes.empty() && s.log_likelihood <= o.state.log_likelihood) continue;
-      o.state = s;
-      o.scaled = scaled;
+      if (best.echoes.empty() || s.log_likelihood > best.log_likelihood) best = s;
     }
+    take(best, scaled);
+    return best;
   };
-  for (const std::vector<double>& start : starts) consider(start);
+  for (const std::vector<double>& start : starts) {
+    const ModelState s = consider(start);
+    if (null == nullptr || known != nullptr || starts.size() < 2 || !parts.front().isGeometry()) continue;
+    // Of several starts the right one may lose to a small one as long as the latents stand as that one needs them.
+    Nuisance settled = s.nuisance;
+    model_.fit(s.echoes, settled, kSettling);
+    take(evaluate(start, settled), start);
+  }
   // A quadratic's promise is far off where a level rises from nothing.
   const bool one_sided = parts.size() == 1 && std::any_of(coordinates.begin(), coordinates.end(),
                                                           [](const Coordinate& c) { return c.oneSided(); });

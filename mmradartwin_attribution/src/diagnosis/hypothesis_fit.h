@@ -41,6 +41,7 @@ struct HypothesisFit {
   bool plain = false;  ///< broad_gain is far beyond what clean sessions bring, whatever the scatter over places
   std::size_t numbers() const;  ///< fitted or searched for, at least one
   double ranking() const;       ///< gain less a price per number; of a law without a name, part of it
+  double moved_m() const;       ///< how far it moves an actor; 0 of all others
   void loseGain(double nats);   ///< that the state without it has gained since
 };
 
