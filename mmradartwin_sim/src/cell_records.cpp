@@ -90,7 +90,7 @@ void addCell(const RadarConfig& radar, const std::vector<PathRecord>& records, c
     sums.push_back(standIn(any));
     PathRecord& sum = sums.back();
     sum.c.assign(channels, 0);
-    sum.length_m = offset;
+    sum.length_m.assign(offset.begin(), offset.end());
     for (double& length : sum.length_m) length += middle + half * interpolation.point(p);
     sum.vertices.assign(any.vertices.size(), Eigen::Vector3d::Zero());
     sum.departure.setZero();

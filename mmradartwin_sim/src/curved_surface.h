@@ -24,7 +24,7 @@ struct CurvedEcho {
   /// lambda/(8 pi R), R the perpendicular distance, times the divergence r/(r+R) of a sphere, sqrt(r/(r+R)) of a
   /// cylinder, and its Fresnel aperture along the axis: far off pi r^2 and 2 pi r L^2/lambda.
   std::complex<double> coefficient;
-  std::vector<double> length_m;  ///< per virtual element
+  PerChannel<double> length_m;  ///< per virtual element
 };
 /// None from inside, out of range or view, or where the aperture leaves less than 0.01. Beside a cylinder's ends the
 /// echo comes from 1 cm inside, as beside a facet.

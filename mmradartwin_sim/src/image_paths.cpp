@@ -120,7 +120,7 @@ bool ImageSearch::faces(int a, bool positive_side, int b) const {
   return positive_side ? d.maxCoeff() > kOnPlane_m : d.minCoeff() < -kOnPlane_m;
 }
 
-bool ImageSearch::solve(const Eigen::Vector3d& p, const std::vector<int>& sequence, const RayCaster& rays,
+bool ImageSearch::solve(const Eigen::Vector3d& p, const PerInteraction<int>& sequence, const RayCaster& rays,
                         const Limits& limits, ImagePath& path) const {
   const int order = static_cast<int>(sequence.size());
   if (order < 1 || order > 8) return false;
@@ -233,12 +233,12 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
   // Where the line to an image runs through an edge, several orders of the same facets are one path.
   std::vector<ImagePath> unique;
   for (const ImagePath& f : found) {
-    std::vector<int> set = f.facets;
+    PerInteraction<int> set = f.facets;
     std::sort(set.begin(), set.end());
     bool known = false;
     for (const ImagePath& u : unique) {
       if (u.facets.size() != f.facets.size() || f.facets.size() < 2 || (u.image - f.image).norm() > 1e-6) continue;
-      std::vector<int> other = u.facets;
+      PerInteraction<int> other = u.facets;
       std::sort(other.begin(), other.end());
       known = known || other == set;
     }
@@ -250,7 +250,7 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
 std::vector<ImageSearch::Seed> ImageSearch::seeds(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
                                                   int rays_launched, const Eigen::Matrix3d& R_map_radar,
                                                   double max_elevation_rad) const {
-  std::map<std::vector<int>, bool> sequences;  // and whether an even ray met it
+  std::map<PerInteraction<int>, bool> sequences;  // and whether an even ray met it
   const double golden = 0.6180339887498949;
   for (int i = 0; i < rays_launched; ++i) {
     const double azimuth = M_PI * ((i + 0.5) / rays_launched - 0.5);
@@ -258,7 +258,7 @@ std::vector<ImageSearch::Seed> ImageSearch::seeds(const Eigen::Vector3d& p, cons
     Eigen::Vector3d d = R_map_radar * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
                                                       std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
     Eigen::Vector3d from = p;
-    std::vector<int> sequence;
+    PerInteraction<int> sequence;
     double length = 0;
     while (static_cast<int>(sequence.size()) < limits.max_order) {
       const auto hit = rays.firstHit(from, d, limits.max_length_m - length);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "mmradartwin_sim/path_record.h"
 #include "mmradartwin_sim/scene.h"
 
 namespace mmradartwin {
@@ -15,8 +16,8 @@ inline Eigen::Vector3d mirror(const Eigen::Vector3d& p, const Facet& facet) {
 
 /// A closed specular path from a point back to it.
 struct ImagePath {
-  std::vector<int> facets;  ///< in the order in which they are met
-  std::vector<Eigen::Vector3d> vertices;
+  PerInteraction<int> facets;  ///< in the order in which they are met
+  PerInteraction<Eigen::Vector3d> vertices;
   Eigen::Vector3d image;  ///< of the point through all facets; the path is as long as it is far
 };
 
@@ -43,10 +44,10 @@ class ImageSearch {
                               int min_order = 1) const;
 
   /// The path of one facet sequence, where it exists.
-  bool solve(const Eigen::Vector3d& p, const std::vector<int>& sequence, const RayCaster& rays, const Limits& limits,
+  bool solve(const Eigen::Vector3d& p, const PerInteraction<int>& sequence, const RayCaster& rays, const Limits& limits,
              ImagePath& path) const;
   struct Seed {
-    std::vector<int> facets;
+    PerInteraction<int> facets;
     bool by_half;  ///< every second ray would have been enough to find it
   };
   /// Facet sequences that launched rays meet, up to max_order: seeds where there are too many facets to try all.

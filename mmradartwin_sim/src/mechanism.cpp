@@ -33,6 +33,14 @@ bool PoseContext::inFieldOfView(const Eigen::Vector3d& direction_radar) const {
   return mmradartwin::inFieldOfView(direction_radar);
 }
 
+namespace {
+constexpr double kMargin_m = 0.02;  // of an actor's bounds: what touches its faces, gaps at the ends of rays
+}
+
+void SceneChange::addBounds(const Eigen::AlignedBox3d& box) {
+  bounds.emplace_back(box.min().array() - kMargin_m, box.max().array() + kMargin_m);
+}
+
 bool SceneChange::crosses(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const {
   const Eigen::Vector3d way = b - a, inverse = way.cwiseInverse();
   for (const Eigen::AlignedBox3d& box : bounds) {
@@ -62,6 +70,17 @@ bool SceneChange::touches(const Eigen::Vector3d& radar, const PathRecord& record
   }
   // The way back from a single point is the way there.
   return record.vertices.size() > 1 && crosses(from, radar);
+}
+
+Eigen::Array3d CloudCells::placeOf(const Eigen::Vector3d& point) const {
+  const Eigen::Vector3d way = T_map_radar.linear().transpose() * (point - T_map_radar.translation());
+  const double r = std::max(1e-6, way.norm());
+  return {r / range_m, way.y() / r / sine, way.z() / r / elevation_sine};
+}
+
+CloudCells::Cell CloudCells::cellOf(int facet, const Eigen::Vector3d& point) const {
+  const Eigen::Array3i at = placeOf(point).floor().cast<int>();
+  return {facet, at.x(), at.y(), at.z()};
 }
 
 MechanismRegistry& MechanismRegistry::instance() {
@@ -142,8 +161,8 @@ ElementsInMap::ElementsInMap(const PoseContext& context)
   for (const auto& r : context.radar.rx_position_m) rx.push_back(context.T_map_radar * r);
 }
 
-std::vector<double> ElementsInMap::lengthsVia(const Eigen::Vector3d& point) const {
-  std::vector<double> lengths;
+PerChannel<double> ElementsInMap::lengthsVia(const Eigen::Vector3d& point) const {
+  PerChannel<double> lengths;
   lengths.reserve(tx.size() * rx.size());
   for (const auto& t : tx) {
     const double out = (point - t).norm();

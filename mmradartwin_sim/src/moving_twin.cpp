@@ -10,7 +10,6 @@ namespace mmradartwin {
 namespace {
 
 constexpr double kStands_m = 1e-9;  // roundings of a transform are no move
-constexpr double kMargin_m = 0.02;  // of an actor's bounds: what touches its faces, gaps at the ends of rays
 constexpr int kUpdates = 64;        // before rounding of differences is thrown away
 constexpr double kCancelled = 1e3;  // a difference so much above what is left leaves too few digits
 
@@ -59,15 +58,12 @@ SceneChange MovingTwin::moveActors() {
   Scene& scene = *m.edited;
   SceneChange change;
   bool rebuild = false;
-  const auto margin = [](const Eigen::AlignedBox3d& box) {
-    return Eigen::AlignedBox3d(box.min().array() - kMargin_m, box.max().array() + kMargin_m);
-  };
   for (Mover& mover : movers_) {
     if (mover.wanted.matrix() == mover.moved.matrix()) continue;
     const auto a = static_cast<std::size_t>(mover.actor);
     Actor& actor = scene.actors[a];
     change.actors.push_back(mover.actor);
-    change.bounds.push_back(margin(actor.bounds));
+    change.addBounds(actor.bounds);
     // From where it was at rest, so that roundings do not add up.
     const Actor& at_rest = rest_.actors[a];
     actor.vertices = at_rest.vertices;
@@ -78,7 +74,7 @@ SceneChange MovingTwin::moveActors() {
     }
     moveActor(scene, mover.actor, mover.wanted);
     mover.moved = mover.wanted;
-    change.bounds.push_back(margin(actor.bounds));
+    change.addBounds(actor.bounds);
     if (!actor.present) continue;
     if (actor.occludes) {
       m.edited_rays->place(mover.actor, mover.moved * mover.built.inverse());

@@ -74,10 +74,10 @@ double meanLength_m(const PathRecord& record) {
 }
 
 void lengthen(const RadarConfig& radar, double extra_m, PathRecord& record) {
-  lengthenChannels(radar, std::vector<double>(record.c.size(), extra_m), record);
+  lengthenChannels(radar, PerChannel<double>(record.c.size(), extra_m), record);
 }
 
-void lengthenChannels(const RadarConfig& radar, const std::vector<double>& extra_m, PathRecord& record) {
+void lengthenChannels(const RadarConfig& radar, const PerChannel<double>& extra_m, PathRecord& record) {
   for (std::size_t k = 0; k < record.c.size(); ++k) {
     const double before = phaseAtCenter_rad(radar, record.length_m[k] / kSpeedOfLight_m_per_s);
     record.length_m[k] += extra_m[k];

@@ -7,7 +7,7 @@
 namespace mmradartwin {
 
 std::vector<std::vector<std::size_t>> groupByFacet(const std::vector<PathRecord>& records, int fewest) {
-  using Key = std::tuple<const std::string*, std::vector<int>, std::vector<int>>;
+  using Key = std::tuple<const std::string*, PerInteraction<int>, PerInteraction<int>>;
   std::map<Key, std::vector<std::size_t>> same;
   for (std::size_t i = 0; i < records.size(); ++i) {
     const PathRecord& r = records[i];
@@ -28,7 +28,7 @@ std::vector<std::vector<std::size_t>> groupByFacetOrActor(const std::vector<Path
   for (const auto& group : groups) {
     for (std::size_t i : group) grouped[i] = 1;
   }
-  std::map<std::pair<const std::string*, std::vector<int>>, std::vector<std::size_t>> rest;
+  std::map<std::pair<const std::string*, PerInteraction<int>>, std::vector<std::size_t>> rest;
   for (std::size_t i = 0; i < records.size(); ++i) {
     const PathRecord& r = records[i];
     if (grouped[i] || r.facets.size() != 1 || !r.reflection_cosine.empty() || r.departure != r.arrival) continue;

@@ -26,6 +26,12 @@ std::string formatPoint(const Eigen::Vector3d& p) {
   return out.str();
 }
 
+/// Whether an actor was edited shows in what Embree and the facets would see.
+bool isSame(const Actor& a, const Actor& b) {
+  return a.present == b.present && a.vertices == b.vertices && a.material_tag == b.material_tag &&
+         a.occludes == b.occludes && a.material.scattering_coefficient == b.material.scattering_coefficient;
+}
+
 constexpr double kFollows_s = 0.2;  // poses further apart say nothing about the time between them
 
 /// Along poses that follow each other closely, evenly from one to the next; at others the radar stands.
@@ -110,6 +116,38 @@ Twin Twin::changed(std::vector<NamedParameters> mechanisms) const {
 
 bool Twin::altersGeometry() const { return impl_->edited || impl_->movesRadar(); }
 
+std::optional<SceneChange> Twin::changesFrom(const Twin& other) const {
+  const Eigen::Isometry3d here = Eigen::Isometry3d::Identity();
+  if (impl_->poseLag_s() != other.impl_->poseLag_s() ||
+      !impl_->modelPose(here, 0).isApprox(other.impl_->modelPose(here, 0), 0)) {
+    return std::nullopt;
+  }
+  SceneChange change;
+  const auto compare = [&](const std::vector<Actor>& a, const std::vector<Actor>& b, std::size_t known) {
+    for (std::size_t i = 0; i < std::max(a.size(), b.size()); ++i) {
+      if (i < a.size() && i < b.size() && isSame(a[i], b[i])) continue;
+      if (i < known) change.actors.push_back(static_cast<int>(i));
+      for (const std::vector<Actor>* list : {&a, &b}) {
+        if (i >= list->size()) continue;
+        Eigen::AlignedBox3d bounds;
+        for (const Eigen::Vector3d& v : (*list)[i].vertices) bounds.extend(v);
+        change.addBounds(bounds);
+      }
+    }
+  };
+  compare(impl_->model().actors, other.impl_->model().actors, impl_->scene.actors.size());
+  compare(impl_->model().screens, other.impl_->model().screens, 0);
+  return change;
+}
+
+bool Twin::opensActors() const {
+  if (!impl_->edited) return false;
+  const std::vector<Actor>&before = impl_->scene.actors, &after = impl_->edited->actors;
+  return !std::equal(before.begin(), before.end(), after.begin(), [](const Actor& a, const Actor& b) {
+    return !a.occludes || b.occludes || !b.present;
+  });
+}
+
 bool Twin::addsScreensAlone() const { return impl_->screens && impl_->screens_alone && !impl_->movesRadar(); }
 
 void Twin::removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord>& records,
@@ -141,15 +179,8 @@ void Twin::Impl::assemble() {
     });
     m.edited = std::make_unique<Scene>(m.scene);
     for (const auto& mechanism : m.mechanisms) mechanism->editScene(*m.edited);
-    // Whether anything was edited shows in what Embree and the facets would see.
-    bool same = m.edited->actors.size() == m.scene.actors.size();
-    for (std::size_t i = 0; same && i < m.scene.actors.size(); ++i) {
-      same = m.edited->actors[i].present == m.scene.actors[i].present &&
-             m.edited->actors[i].vertices == m.scene.actors[i].vertices &&
-             m.edited->actors[i].material_tag == m.scene.actors[i].material_tag &&
-             m.edited->actors[i].occludes == m.scene.actors[i].occludes &&
-             m.edited->actors[i].material.scattering_coefficient == m.scene.actors[i].material.scattering_coefficient;
-    }
+    const bool same = std::equal(m.edited->actors.begin(), m.edited->actors.end(), m.scene.actors.begin(),
+                                 m.scene.actors.end(), isSame);
     if (same && m.edited->screens.empty()) {
       m.edited.reset();
     } else {
@@ -266,6 +297,29 @@ std::vector<PathRecord> Twin::trace(std::size_t mechanism, const Eigen::Isometry
   const auto known = static_cast<std::ptrdiff_t>(records.size());
   impl_->addPaths(wanted, c, records);
   records.erase(records.begin(), records.begin() + known);
+  return records;
+}
+
+std::vector<PathRecord> Twin::retrace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
+                                      const CloudCells& cloud, const SceneChange& change,
+                                      const std::vector<PathRecord>& known) const {
+  const Mechanism& wanted = *impl_->as_described[mechanism];
+  if (!wanted.tracesChanges()) return trace(mechanism, T_map_radar, &cloud);
+  PoseContext c = impl_->context(T_map_radar);
+  impl_->refuseUnusablePose(c);
+  CloudCells::CellSet touched;
+  CloudCells cells = cloud;
+  cells.touched = &touched;
+  c.cloud = &cells;
+  c.change = &change;
+  std::vector<PathRecord> records;
+  impl_->addPaths(wanted, c, records);
+  for (const PathRecord& r : known) {
+    if (r.actors.size() == 1 && r.actors[0] >= 0 && !change.moved(r.actors[0]) &&
+        touched.count(cells.cellOf(r.facets[0], r.vertices[0])) == 0) {
+      records.push_back(r);
+    }
+  }
   return records;
 }
 

@@ -7,7 +7,7 @@ namespace mmradartwin {
 
 WeightBasis::WeightBasis(const RadarConfig& radar, const std::vector<PathRecord>& records)
     : channels_(radar.channels()), samples_(radar.samples_per_chirp) {
-  std::map<std::pair<const std::string*, std::vector<int>>, std::size_t> known;
+  std::map<std::pair<const std::string*, PerInteraction<int>>, std::size_t> known;
   std::vector<std::vector<PathRecord>> members;
   for (const PathRecord& r : records) {
     const auto [group, fresh] = known.emplace(std::make_pair(r.event, r.actors), groups_.size());

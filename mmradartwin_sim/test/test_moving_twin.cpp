@@ -49,7 +49,7 @@ class MovingTwinTest : public SceneFiles {
   static void expectAlike(const Simulation& is, const Simulation& expected, const std::string& what) {
     EXPECT_LT((is.grid.x - expected.grid.x).norm(), 1e-9 * expected.grid.x.norm()) << what;
     const auto keys = [](const Simulation& s) {
-      std::vector<std::pair<std::string, std::vector<int>>> keys;
+      std::vector<std::pair<std::string, PerInteraction<int>>> keys;
       for (const PathRecord& r : s.records) keys.emplace_back(*r.event, r.facets);
       std::sort(keys.begin(), keys.end());
       return keys;

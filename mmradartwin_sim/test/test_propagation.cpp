@@ -337,7 +337,7 @@ TEST_F(Propagation, ABoxUnmodelledIsLikeOneInTheScene) {
     return *r.event == "specular" && std::abs(r.length_m[0] - 4) < 1e-3;
   });
   ASSERT_NE(facing, put.end());
-  EXPECT_EQ(facing->actors, std::vector<int>{-1});
+  EXPECT_EQ(facing->actors, PerInteraction<int>{-1});
   EXPECT_TRUE(std::none_of(put.begin(), put.end(), [](const PathRecord& r) {
     return *r.event == "specular" && std::abs(r.length_m[0] - 8) < 1e-3;
   }));

@@ -129,7 +129,7 @@ TEST_F(TwinNodeTest, PathsAreFewAndAddUpToTheGrid) {
   std::vector<PathRecord> records(paths_->records.size());
   for (std::size_t i = 0; i < records.size(); ++i) {
     const mmradartwin_msgs::PathRecord& m = paths_->records[i];
-    records[i].length_m = m.length_m;
+    records[i].length_m.assign(m.length_m.begin(), m.length_m.end());
     for (std::size_t k = 0; k < m.c_re.size(); ++k) records[i].c.emplace_back(m.c_re[k], m.c_im[k]);
   }
   ComplexGrid sum;

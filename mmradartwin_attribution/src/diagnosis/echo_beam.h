@@ -15,7 +15,11 @@ struct EchoBeam {
   int first_bin = 0;
   Eigen::VectorXcd weights;  ///< [M] of unit norm; the beam is weights^H y
   Eigen::VectorXcd y;        ///< [M] of the bins from first_bin on, at the window's middle
+  double clutter = 0;        ///< power in the beam that PoseChannels::clutter has in its middle bin
 };
+
+/// Its bin in the middle; a beam has as many bins as there are channels.
+inline int middleBin(const EchoBeam& beam, int channels) { return beam.first_bin + channels / 2; }
 
 /// A beam of range spectra [M][N], at its bins and at the window's middle.
 Eigen::VectorXcd formBeam(const EchoBeam& beam, const Eigen::MatrixXcd& y);

@@ -105,7 +105,7 @@ EchoCollector::EchoCollector(const RadarConfig& radar, double angle_error_rad, c
   }
 }
 
-double EchoCollector::addedRange_m(const std::vector<int>& actors) const {
+double EchoCollector::addedRange_m(const PerInteraction<int>& actors) const {
   double sum = 0;
   if (actor_range_m_.empty()) return sum;
   for (int a : actors) sum += actor_range_m_[errorOf(a, actor_range_m_.size())];
@@ -113,8 +113,8 @@ double EchoCollector::addedRange_m(const std::vector<int>& actors) const {
 }
 
 EchoGroup& EchoCollector::group(const PathRecord& record) {
-  static const std::vector<int> lacking{-1};  // a bounce of no actor
-  const std::vector<int>& actors = record.actors.empty() && record.bounces > 0 ? lacking : record.actors;
+  static const PerInteraction<int> lacking{-1};  // a bounce of no actor
+  const PerInteraction<int>& actors = record.actors.empty() && record.bounces > 0 ? lacking : record.actors;
   for (EchoGroup* g : open_) {
     if (g->actors == actors) return *g;
   }

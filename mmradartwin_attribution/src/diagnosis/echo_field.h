@@ -21,7 +21,7 @@ struct EchoGroup {
     BinCovariance bend;    ///< W'^2 c c^H per m^2: half the second derivative, and what a random range adds
     BinCovariance cosine;  ///< |W|^2 cos(azimuth) c c^H: what a turn of the radar acts on; not of beams
   };
-  std::vector<int> actors;   ///< one per interaction, in order; empty where a path meets none
+  PerInteraction<int> actors;  ///< one per interaction, in order; empty where a path meets none
   double added_range_m = 0;  ///< one-way, that the actors' known errors have put into the fields
   Fields bins;               ///< channels by range bin
   Fields beams;              ///< bins by beam: |b^H c|^2 W W^T with W over the beam's bins, and so on
@@ -64,7 +64,7 @@ class EchoCollector {
     return groups_.back();
   }
   /// One-way range that the interactions add.
-  double addedRange_m(const std::vector<int>& actors) const;
+  double addedRange_m(const PerInteraction<int>& actors) const;
   PoseEchoes take();
 
  private:

@@ -10,15 +10,16 @@
 #include <tuple>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "packed_hermitian.h"
 
 namespace mmradartwin {
 namespace {
 
 // A path whose amplitude changes by less than this share within the pose's accuracy does not graze anything.
 constexpr double kSteady = 0.02;
-// Scatter points in cells that are small beside what the radar resolves; cells of the room, so that a turned or moved
-// radar sees the same ones.
-constexpr double kCloud_m = 0.12, kCloudHeight_m = 0.3;
+// Scatter points in cells that are small beside what the radar resolves, seen from the pose as reported: a turned or
+// moved radar sees the same ones.
+constexpr double kCloud_bins = 0.75, kCloud_lobes = 0.5, kCloudElevation = 0.175;
 constexpr std::size_t kMostTraced = 64;  ///< entries of one mechanism and geometry that are kept
 
 /// One line that tells two mechanisms apart that trace different paths.
@@ -71,7 +72,7 @@ double strongestPower(const std::vector<PathRecord>& records) {
   return strongest;
 }
 
-using PathKey = std::tuple<const std::string*, std::vector<int>>;
+using PathKey = std::tuple<const std::string*, PerInteraction<int>>;
 
 /// Paths of `there` that `here` has, too, and those of `here` that `there` lacks. Scatter points of one facet are many
 /// under one name, and their cells change with every step: they stay as they are here.
@@ -90,6 +91,31 @@ void addShared(const std::vector<PathRecord>& there, const std::vector<PathRecor
     if (found.find(PathKey{r.event, r.facets}) == found.end()) all.push_back(r);
   }
 }
+
+/// True where a parameter of the mechanism weighs paths.
+bool weighs(const std::string& mechanism) {
+  const std::vector<ParameterSpec> specs = MechanismRegistry::instance().create(mechanism)->parameters();
+  return std::any_of(specs.begin(), specs.end(), [](const ParameterSpec& s) { return s.weighs; });
+}
+
+/// What lies behind the radar by so much stays there whatever its own offsets are.
+constexpr double kBehind_m = 0.15, kBehind = 0.1;
+
+/// False where nothing of what is changed lies before the radar, nor in the way of what bounces behind it.
+bool mayTouch(const SceneChange& change, const Eigen::Isometry3d& T_map_radar, const std::vector<PathRecord>& paths) {
+  const Eigen::Vector3d p = T_map_radar.translation(), forward = T_map_radar.linear().col(0);
+  for (const Eigen::AlignedBox3d& box : change.bounds) {
+    for (int k = 0; k < 8; ++k) {
+      const Eigen::Vector3d way = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k)) - p;
+      if (forward.dot(way) > -kBehind_m - kBehind * way.norm()) return true;
+    }
+  }
+  return std::any_of(paths.begin(), paths.end(),
+                     [&](const PathRecord& r) { return r.vertices.size() > 1 && change.touches(p, r); });
+}
+
+/// The same for all that have none.
+const auto nothing = std::make_shared<const std::vector<PathRecord>>();
 
 }  // namespace
 
@@ -141,50 +167,70 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
                                              const std::vector<NamedParameters>& mechanisms,
                                              const std::vector<int>& poses) {
   const std::vector<NamedParameters> beside = lookedAt(mechanism, mechanisms);
-  Entry& entry = cache_[keyOf(geometry) + keyOf(beside) + tracedKey(mechanism)];
+  const std::string key = tracedKey(mechanism), behind = keyOf(beside) + key;
+  Entry& entry = cache_[keyOf(geometry) + behind];
   entry.used = calls_;
   entry.paths.resize(data_.poses.size());
-  entry.known.resize(data_.poses.size(), 0);
   std::vector<int> missing;
   for (int i : poses) {
-    if (!entry.known[i]) missing.push_back(i);
+    if (!entry.paths[i]) missing.push_back(i);
   }
   if (missing.empty()) return entry.paths;
-  const std::string key = tracedKey(mechanism);
-  if (!geometry.empty() && tracedKey(geometry.back()) != key &&
-      geometryAfter(geometry.back()) == Geometry::kMoreScreens) {
-    // What only hides needs no new trace: paths without it, less those that it stands in the way of.
-    const Traced& open = traced({geometry.begin(), geometry.end() - 1}, mechanism, mechanisms, missing);
-    const Twin twin = base_.changed(geometry);
-    tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t j) {
-      const std::size_t i = static_cast<std::size_t>(missing[j]);
-      entry.paths[i] = open[i];
-      twin.removeHidden(data_.poses[i].pose.T_map_radar, entry.paths[i]);
-      entry.known[i] = 1;
-    });
-    return entry.paths;
-  }
   std::vector<NamedParameters> all = beside;
   for (const NamedParameters& m : geometry) {
     if (tracedKey(m) != key) all.push_back(m);
   }
   all.push_back(mechanism);
   const Twin twin = base_.changed(all);
+  // Without the last edit, where that is not the mechanism's own.
+  const Traced* before = nullptr;
+  std::optional<SceneChange> change;
+  const bool only_hides = !geometry.empty() && geometryAfter(geometry.back()) == Geometry::kMoreScreens;
+  if (!geometry.empty() && tracedKey(geometry.back()) != key) {
+    const std::vector<NamedParameters> rest(geometry.begin(), geometry.end() - 1);
+    const std::string rest_key = keyOf(rest);
+    const auto known = cache_.find(rest_key + behind);
+    if (only_hides) {
+      before = &traced(rest, mechanism, mechanisms, missing);
+    } else if (known != cache_.end()) {
+      known->second.used = calls_;
+      before = &known->second.paths;
+    }
+    if (before != nullptr) {
+      if (!without_ || without_->first != rest_key) without_.emplace(rest_key, base_.changed(rest));
+      change = twin.changesFrom(without_->second);
+    }
+  }
+  const bool opens = twin.opensActors();
   tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t j) {
     const std::size_t i = static_cast<std::size_t>(missing[j]);
     const Eigen::Isometry3d& T = data_.poses[i].pose.T_map_radar;
-    CloudCells cells{{kCloud_m, kCloud_m, kCloudHeight_m}, {}};
-    // What the scene as given hides stays apart: it may be weighed otherwise.
-    if (!geometry.empty()) {
-      cells.side = [&](const Eigen::Vector3d& p) { return base_.rays().visible(T.translation(), p, 1e-3); };
+    const std::shared_ptr<const Paths> known = before != nullptr ? (*before)[i] : nullptr;
+    if (known && change && !mayTouch(*change, T, *known)) {
+      entry.paths[i] = known;
+      return;
     }
+    CloudCells cells{T, kCloud_bins * base_.radar().range_bin_m(), kCloud_lobes * 2 / base_.radar().channels(),
+                     kCloudElevation};
+    // What the scene as given hides stays apart where rays come through: it is weighed otherwise.
+    if (opens) {
+      cells.sides = [&](const std::vector<Eigen::Vector3d>& points) {
+        return base_.rays().visible(T.translation(), points, std::vector<double>(points.size(), 1e-3));
+      };
+    }
+    Paths paths;
     try {
-      entry.paths[i] = twin.trace(all.size() - 1, T, &cells);
+      if (known && only_hides) {  // paths without it, less those that it stands in the way of
+        paths = *known;
+        twin.removeHidden(T, paths);
+      } else {
+        paths = known && change && !opens ? twin.retrace(all.size() - 1, T, cells, *change, *known)
+                                          : twin.trace(all.size() - 1, T, &cells);
+      }
     } catch (const InputError&) {
       // What is tried stands where the radar stood, which therefore sees nothing.
-      entry.paths[i].clear();
     }
-    entry.known[i] = 1;
+    entry.paths[i] = paths.empty() ? nothing : std::make_shared<const Paths>(std::move(paths));
   });
   return entry.paths;
 }
@@ -243,16 +289,9 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
                                            const std::vector<int>& poses, const std::vector<double>& actor_range_m) {
   forgetLongUnused();
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
-  std::vector<const Traced*> parts;
-  for (const NamedParameters& m : mechanisms) parts.push_back(&traced(geometry, m, mechanisms, poses));
-  return collect(mechanisms, poses, actor_range_m, [&](std::size_t i, std::vector<PathRecord>& all) {
-    std::size_t count = 0, to = 0;
-    for (const Traced* part : parts) count += (*part)[i].size();
-    all.resize(count);
-    for (const Traced* part : parts) {
-      for (const PathRecord& r : (*part)[i]) all[to++] = r;
-    }
-  });
+  std::vector<Part> parts;
+  for (const NamedParameters& m : mechanisms) parts.push_back({&traced(geometry, m, mechanisms, poses)});
+  return collect(mechanisms, poses, actor_range_m, parts);
 }
 
 std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters>& mechanisms,
@@ -261,33 +300,25 @@ std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters
   forgetLongUnused();
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms), geometry_from = geometryOf(from);
   if (keyOf(geometry) == keyOf(geometry_from)) return echoes(mechanisms, poses, actor_range_m);
-  std::vector<std::pair<const Traced*, const Traced*>> parts;  // there and here
+  std::vector<Part> parts;
   for (std::size_t k = 0; k < mechanisms.size(); ++k) {
     const NamedParameters* same = counterpart(mechanisms, k, from);
-    parts.emplace_back(&traced(geometry, mechanisms[k], mechanisms, poses),
-                       same == nullptr ? nullptr : &traced(geometry_from, *same, from, poses));
+    const Traced& there = traced(geometry, mechanisms[k], mechanisms, poses);
+    parts.push_back({&there, same == nullptr ? nullptr : &traced(geometry_from, *same, from, poses)});
   }
-  return collect(mechanisms, poses, actor_range_m, [&](std::size_t i, std::vector<PathRecord>& all) {
-    all.clear();
-    for (const auto& [there, here] : parts) {
-      if (here == nullptr) {
-        all.insert(all.end(), (*there)[i].begin(), (*there)[i].end());
-      } else {
-        addShared((*there)[i], (*here)[i], all);
-      }
-    }
-  });
+  return collect(mechanisms, poses, actor_range_m, parts);
 }
 
 std::vector<PathShift> EchoSource::pathShifts(const std::vector<NamedParameters>& mechanisms,
                                               const std::vector<NamedParameters>& from, const std::vector<int>& poses) {
   forgetLongUnused();
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms), geometry_from = geometryOf(from);
-  std::vector<std::pair<const Traced*, const Traced*>> parts;  // there and here
+  std::vector<Part> parts;
   for (std::size_t k = 0; k < from.size(); ++k) {
     const NamedParameters* same = counterpart(from, k, mechanisms);
     if (same == nullptr) continue;
-    parts.emplace_back(&traced(geometry, *same, mechanisms, poses), &traced(geometry_from, from[k], from, poses));
+    const Traced& there = traced(geometry, *same, mechanisms, poses);
+    parts.push_back({&there, &traced(geometry_from, from[k], from, poses)});
   }
   const Twin there_twin = base_.changed(mechanisms), here_twin = base_.changed(from);
   const auto azimuth = [](const PathRecord& p) { return std::atan2(p.departure.y(), p.departure.x()); };
@@ -297,10 +328,10 @@ std::vector<PathShift> EchoSource::pathShifts(const std::vector<NamedParameters>
     const Pose& at = data_.poses[i].pose;
     for (const auto& [there, here] : parts) {
       std::map<PathKey, std::vector<PathRecord>> pairs;
-      for (PathRecord& r : here_twin.receivedPaths(at.T_map_radar, (*here)[i], at.stamp_ns)) {
+      for (PathRecord& r : here_twin.receivedPaths(at.T_map_radar, *(*here)[i], at.stamp_ns)) {
         pairs[PathKey{r.event, r.facets}].push_back(std::move(r));
       }
-      for (const PathRecord& r : there_twin.receivedPaths(at.T_map_radar, (*there)[i], at.stamp_ns)) {
+      for (const PathRecord& r : there_twin.receivedPaths(at.T_map_radar, *(*there)[i], at.stamp_ns)) {
         const auto same = pairs.find(PathKey{r.event, r.facets});
         if (same == pairs.end() || same->second.size() > 1) continue;
         const PathRecord& s = same->second.front();
@@ -333,7 +364,7 @@ EchoShift EchoSource::shift(const std::vector<NamedParameters>& mechanisms, cons
 
 void EchoSource::addGroups(std::size_t pose, const std::vector<PathRecord>& records, double strongest,
                            EchoCollector& to) {
-  std::map<std::vector<int>, std::vector<const PathRecord*>> groups;
+  std::map<PerInteraction<int>, std::vector<const PathRecord*>> groups;
   for (const PathRecord& r : records) groups[r.actors].push_back(&r);
   for (const auto& [actors, members] : groups) {
     std::size_t signature = 0;
@@ -354,11 +385,12 @@ void EchoSource::addGroups(std::size_t pose, const std::vector<PathRecord>& reco
 
 std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& mechanisms,
                                             const std::vector<int>& poses, const std::vector<double>& actor_range_m,
-                                            const Paths& paths) {
+                                            const std::vector<Part>& parts) {
   const Twin twin = base_.changed(mechanisms);
   const RadarConfig& radar = base_.radar();
   const int channels = radar.channels();
   kept_.resize(data_.poses.size());
+  kept_poses_.resize(data_.poses.size());
   mixed_.resize(data_.poses.size());
   // The twin less what mixes ranges in its receiver; nothing where it mixes none.
   std::optional<Twin> without_mixing;
@@ -367,14 +399,49 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
   for (const NamedParameters& m : mechanisms) (mixesRanges(m) ? mixing.mechanisms : rest).push_back(m);
   const std::size_t receiver = std::hash<std::string>()(mixing.toYaml());
   if (rest.size() < mechanisms.size()) without_mixing.emplace(base_.changed(rest));
+  // What a pose's echoes follow from beside its paths.
+  TwinDescription weights;
+  for (const NamedParameters& m : mechanisms) {
+    if (!altersGeometry(m) || weighs(m.mechanism)) weights.mechanisms.push_back(m);
+  }
+  std::size_t alike = std::hash<std::string>()(weights.toYaml());
+  boost::hash_range(alike, actor_range_m.begin(), actor_range_m.end());
 
   std::vector<PoseEchoes> result(poses.size());
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
     const std::size_t i = static_cast<std::size_t>(poses[j]);
     const Pose& pose = data_.poses[i].pose;
+    KeptPose own;
+    own.signature = alike;
+    for (const auto& [there, here] : parts) {
+      for (const Traced* part : {there, here}) {
+        if (part == nullptr) continue;
+        own.paths.push_back((*part)[i]);
+        boost::hash_combine(own.signature, own.paths.back().get());
+      }
+    }
+    if (!graze_.empty()) {
+      result[j].graze = graze_[i].graze;
+      result[j].graze_beams = graze_[i].graze_beams;
+    }
+    std::array<KeptPose, 2>& kept = kept_poses_[i];
+    if (!kept[1].groups.empty() && kept[1].signature == own.signature) std::swap(kept[0], kept[1]);
+    if (!kept[0].groups.empty() && kept[0].signature == own.signature) {
+      result[j].groups = kept[0].groups;
+      return;
+    }
     // Kept from pose to pose: most of the time went into the small vectors of records that were made and thrown away.
     thread_local std::vector<PathRecord> all;
-    paths(i, all);
+    std::size_t count = 0, to = 0;
+    for (const Part& part : parts) count += part.here == nullptr ? (*part.there)[i]->size() : 0;
+    all.resize(count);
+    for (const Part& part : parts) {
+      if (part.here != nullptr) continue;
+      for (const PathRecord& r : *(*part.there)[i]) all[to++] = r;
+    }
+    for (const Part& part : parts) {
+      if (part.here != nullptr) addShared(*(*part.there)[i], *(*part.here)[i], all);
+    }
     EchoCollector collector(radar, accuracy_.path_angle_rad, data_.poses[i].beams, actor_range_m);
     const auto addTones = [&](const Twin& receiver, std::vector<PathRecord>& records, double strongest) {
       std::optional<Eigen::MatrixXcd> matrix;
@@ -396,11 +463,10 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
       addTones(*without_mixing, all, strongest);
       mixture.addTo(collector);
     }
-    result[j] = collector.take();
-    if (!graze_.empty()) {
-      result[j].graze = graze_[i].graze;
-      result[j].graze_beams = graze_[i].graze_beams;
-    }
+    result[j].groups = collector.take().groups;
+    if (without_mixing) return;
+    own.groups = result[j].groups;
+    (kept[0].groups.empty() ? kept[0] : kept[1]) = std::move(own);
   });
   return result;
 }
@@ -418,10 +484,17 @@ void EchoSource::pointBeams(ChannelData& data, const std::vector<NamedParameters
     PoseChannels& p = data.poses[i];
     const Eigen::Isometry3d& T = p.pose.T_map_radar;
     p.beams = chooseBeams(base_.radar(), twin.receivedPaths(T, twin.trace(T), p.pose.stamp_ns), first_bin);
-    for (EchoBeam& beam : p.beams) beam.y = formBeam(beam, p.y);
+    for (EchoBeam& beam : p.beams) {
+      beam.y = formBeam(beam, p.y);
+      const int channels = base_.radar().channels();
+      PackedHermitian clutter(channels);
+      clutter.add(p.clutter.at(middleBin(beam, channels), static_cast<std::size_t>(clutter.size())), 1);
+      beam.clutter = clutter.quadratic(beam.weights.data());
+    }
   });
   settled_.clear();  // what grazes is to be found in the beams, too
   kept_.clear();
+  kept_poses_.clear();
   mixed_.clear();
 }
 

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,7 +25,7 @@ struct PoseAccuracy {
 struct PathShift {
   std::size_t place;  ///< of its pose among the poses named
   const std::string* event;
-  std::vector<int> facets, actors;
+  PerInteraction<int> facets, actors;
   double amplitude;
   double range_m, azimuth_rad;
 };
@@ -70,7 +70,14 @@ class EchoSource {
   const Twin& base() const { return base_; }
 
  private:
-  using Traced = std::vector<std::vector<PathRecord>>;  // by pose; empty where not traced
+  using Paths = std::vector<PathRecord>;
+  /// By pose; null where not traced. What a change does not touch is shared with what stood before it.
+  using Traced = std::vector<std::shared_ptr<const Paths>>;
+  /// Paths of one mechanism, and, of a small step, those that it starts from.
+  struct Part {
+    const Traced* there;
+    const Traced* here = nullptr;
+  };
   /// Paths of one of the mechanisms.
   const Traced& traced(const std::vector<NamedParameters>& geometry, const NamedParameters& mechanism,
                        const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
@@ -79,9 +86,8 @@ class EchoSource {
   /// Keeps memory bounded while one hypothesis' geometry is searched for.
   void forgetLongUnused();
   std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);
-  using Paths = std::function<void(std::size_t pose, std::vector<PathRecord>& to)>;
   std::vector<PoseEchoes> collect(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
-                                  const std::vector<double>& actor_range_m, const Paths& paths);
+                                  const std::vector<double>& actor_range_m, const std::vector<Part>& parts);
   /// Adds records as their tones, those that meet the same actors together; what is the same as before is not collected
   /// again.
   void addGroups(std::size_t pose, const std::vector<PathRecord>& records, double strongest, EchoCollector& to);
@@ -92,8 +98,7 @@ class EchoSource {
   PoseAccuracy accuracy_;
   struct Entry {
     Traced paths;
-    std::vector<char> known;  // by pose
-    std::size_t used = 0;     // when, in calls
+    std::size_t used = 0;  // when, in calls
   };
   std::map<std::string, Entry> cache_;
   std::size_t calls_ = 0;
@@ -102,13 +107,22 @@ class EchoSource {
     std::shared_ptr<const EchoGroup> group;
   };
   /// [poses] by actors: one that was met again last, and the last one that was new.
-  std::vector<std::map<std::vector<int>, std::array<Kept, 2>>> kept_;
+  std::vector<std::map<PerInteraction<int>, std::array<Kept, 2>>> kept_;
+  /// What was collected of the same paths, weighed alike: as kept_. Holds the paths, so that no others come to stand
+  /// there.
+  struct KeptPose {
+    std::size_t signature = 0;
+    std::vector<std::shared_ptr<const Paths>> paths;
+    std::vector<std::shared_ptr<const EchoGroup>> groups;
+  };
+  std::vector<std::array<KeptPose, 2>> kept_poses_;
   std::vector<ReceiverMixture::Cache> mixed_;  // by pose
   std::vector<PoseEchoes> graze_;              // by pose; nothing but graze
   std::vector<std::string> settled_;
   enum class Geometry { kSame, kMoreScreens, kOther };
   Geometry geometryAfter(const NamedParameters& mechanism);
-  std::map<std::string, Geometry> geometry_;  // by mechanism text
+  std::map<std::string, Geometry> geometry_;         // by mechanism text
+  std::optional<std::pair<std::string, Twin>> without_;  // the last edit that was tried, by what is left
   std::map<std::string, bool> mixes_ranges_;  // by mechanism name
 };
 

@@ -257,8 +257,22 @@ std::pair<double, double> HypothesisFitter::valueAt(const ModelState& null, cons
   for (std::size_t a = 0; a < about_m.size(); ++a) {
     if (nuisance.actor_range_m[a] != null.nuisance.actor_range_m[a]) about_m[a] = nuisance.actor_range_m[a];
   }
-  const auto echoes = source_.echoes(with(null.mechanisms, hypothesis.at(scaled)), poses, about_m);
-  const std::vector<double> there = model_.byPose(echoes, nuisance, poses);
+  auto echoes = source_.echoes(with(null.mechanisms, hypothesis.at(scaled)), poses, about_m);
+  // Of poses whose echoes stay the value is known.
+  std::vector<double> there;
+  std::vector<int> changed;
+  std::vector<PoseEchoes> changed_echoes;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::size_t pose = static_cast<std::size_t>(poses[i]);
+    there.push_back(null.by_pose[pose]);
+    if (&nuisance == &null.nuisance && echoes[i].groups == null.echoes[pose].groups) continue;
+    changed.push_back(static_cast<int>(i));
+    changed_echoes.push_back(std::move(echoes[i]));
+  }
+  std::vector<int> changed_poses;
+  for (int i : changed) changed_poses.push_back(poses[static_cast<std::size_t>(i)]);
+  const std::vector<double> values = model_.byPose(changed_echoes, nuisance, changed_poses);
+  for (std::size_t i = 0; i < changed.size(); ++i) there[static_cast<std::size_t>(changed[i])] = values[i];
   std::vector<double> by_location(model_.data().locations.size(), 0.0);
   double gain = 0;
   for (std::size_t i = 0; i < poses.size(); ++i) {

@@ -55,7 +55,7 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
   for (const PathShift& p : by_coordinate.front()) {
     strongest[p.place] = std::max(strongest[p.place], p.amplitude);
   }
-  using Key = std::tuple<std::size_t, const std::string*, std::vector<int>>;
+  using Key = std::tuple<std::size_t, const std::string*, PerInteraction<int>>;
   std::vector<std::map<Key, const PathShift*>> shifts(by_coordinate.size());
   for (std::size_t j = 0; j < shifts.size(); ++j) {
     for (const PathShift& p : by_coordinate[j]) shifts[j][{p.place, p.event, p.facets}] = &p;

@@ -79,7 +79,7 @@ void ReceiverMixture::scaleTones(std::vector<PathRecord>& paths, const EchoColle
     Alone path{r, receiver_};
     for (double& l : path.path.length_m) l += 2 * collector.addedRange_m(r.actors);
     boost::hash_combine(path.signature, collector.addedRange_m(r.actors));
-    boost::hash_combine(path.signature, r.actors);
+    boost::hash_range(path.signature, r.actors.begin(), r.actors.end());
     const std::vector<PathRecord> received = linear_.receivedPaths(pose_.T_map_radar, {path.path}, pose_.stamp_ns);
     if (received.empty()) continue;
     for (const PathRecord& part : received) addToSignature(part, path.signature);

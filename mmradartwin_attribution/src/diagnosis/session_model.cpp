@@ -10,9 +10,6 @@
 namespace mmradartwin {
 namespace {
 
-using Matrix = SessionModel::Matrix;
-using Vector = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, 1, 0, kMaxChannels, 1>;
-
 constexpr double kTail = 4;  ///< degrees of freedom of the complex t
 
 // Hann's neighbours are so alike that a beam's least eigenvalue drowns in single precision's errors without this share
@@ -32,42 +29,11 @@ enum Global {
   kActors = kShape + std::tuple_size_v<decltype(Nuisance::floor_shape)>
 };
 
-void unpack(const std::complex<float>* packed, double factor, Matrix& to) {
-  std::size_t i = 0;
-  for (Eigen::Index k = 0; k < to.rows(); ++k) {
-    for (Eigen::Index l = 0; l <= k; ++l) to(k, l) += factor * std::complex<double>(packed[i++]);
-  }
+/// A heading's error turns the mean direction of a group's echoes in a bin by so many radians of sine.
+double turnOf(double yaw_rad, const std::complex<float>* power, const std::complex<float>* cosine) {
+  if (yaw_rad == 0 || power == nullptr || cosine == nullptr || !(power[0].real() > 0)) return 0;
+  return yaw_rad * cosine[0].real() / power[0].real();
 }
-
-void mirror(Matrix& m) {
-  for (Eigen::Index k = 0; k < m.rows(); ++k) {
-    m(k, k) = m(k, k).real();
-    for (Eigen::Index l = 0; l < k; ++l) m(l, k) = std::conj(m(k, l));
-  }
-}
-
-/// Turns lower triangles by phases: a heading's error moves a group's mean direction, and phases alone keep the matrix
-/// definite. `power` and `cosine` are the group's fields of the bin.
-class Turn {
- public:
-  Turn(double yaw_rad, const std::vector<double>& element_phase, const std::complex<float>* power,
-       const std::complex<float>* cosine) {
-    if (yaw_rad == 0 || power == nullptr || cosine == nullptr || !(power[0].real() > 0)) return;
-    const double turn = yaw_rad * cosine[0].real() / power[0].real();
-    phase_.resize(static_cast<Eigen::Index>(element_phase.size()));
-    for (Eigen::Index k = 0; k < phase_.size(); ++k) {
-      phase_[k] = std::polar(1.0, element_phase[static_cast<std::size_t>(k)] * turn);
-    }
-  }
-  void operator()(Matrix& m) const {
-    for (Eigen::Index k = 0; k < phase_.size(); ++k) {
-      for (Eigen::Index l = 0; l < k; ++l) m(k, l) *= phase_[k] * std::conj(phase_[l]);
-    }
-  }
-
- private:
-  Vector phase_;  // none where nothing turns
-};
 
 double groupGain(const EchoGroup& group, const Nuisance& nuisance) {
   double sum = 0;
@@ -79,67 +45,6 @@ double groupGain(const EchoGroup& group, const Nuisance& nuisance) {
 double groupShift_m(const EchoGroup& group, const Nuisance& nuisance) {
   double sum = -group.added_range_m;
   for (int a : group.actors) sum += nuisance.actor_range_m[errorOf(a, nuisance.actor_range_m.size())];
-  return sum;
-}
-
-}  // namespace
-
-namespace {
-
-/// Whitens Hermitian matrices by one cell's covariance L L^H: L^-1 D L^-H, as M^2 real numbers, so that tr(D~ E~) is a
-/// dot product. Triangles alone, real and imaginary parts apart: several times faster than products of such matrices.
-class Whitener {
- public:
-  explicit Whitener(const Matrix& inverse_lower) : channels_(static_cast<int>(inverse_lower.rows())) {
-    for (int j = 0; j < channels_; ++j) {
-      for (int k = j; k < channels_; ++k) {
-        re_[j][k] = inverse_lower(k, j).real();
-        im_[j][k] = inverse_lower(k, j).imag();
-      }
-    }
-  }
-  /// Reads the lower triangle of m, whose diagonal is real.
-  void operator()(const Matrix& m, double* v) const {
-    Columns half_re, half_im;  // of L^-1 D, the lower triangle
-    for (int c = 0; c < channels_; ++c) {
-      double *to_re = half_re[c], *to_im = half_im[c];
-      std::fill(to_re + c, to_re + channels_, 0.0);
-      std::fill(to_im + c, to_im + channels_, 0.0);
-      for (int i = 0; i < channels_; ++i) {
-        const double re = i >= c ? m(i, c).real() : m(c, i).real();
-        const double im = i == c ? 0 : i > c ? m(i, c).imag() : -m(c, i).imag();
-        for (int k = std::max(i, c); k < channels_; ++k) {
-          to_re[k] += re_[i][k] * re - im_[i][k] * im;
-          to_im[k] += re_[i][k] * im + im_[i][k] * re;
-        }
-      }
-    }
-    for (int l = 0; l < channels_; ++l) {
-      double sum_re[kMaxChannels] = {}, sum_im[kMaxChannels] = {};
-      for (int j = 0; j <= l; ++j) {
-        const double re = re_[j][l], im = -im_[j][l];
-        for (int k = l; k < channels_; ++k) {
-          sum_re[k] += half_re[j][k] * re - half_im[j][k] * im;
-          sum_im[k] += half_re[j][k] * im + half_im[j][k] * re;
-        }
-      }
-      v[l * l] = sum_re[l];
-      for (int k = l + 1; k < channels_; ++k) {  // row k begins after 1 + 3 + ... = k^2 numbers
-        v[k * k + 1 + 2 * l] = M_SQRT2 * sum_re[k];
-        v[k * k + 2 + 2 * l] = M_SQRT2 * sum_im[k];
-      }
-    }
-  }
-
- private:
-  using Columns = double[kMaxChannels][kMaxChannels];
-  int channels_;
-  Columns re_, im_;
-};
-
-double traceOf(const double* v, int channels) {
-  double sum = 0;
-  for (int k = 0; k < channels; ++k) sum += v[k * k];
   return sum;
 }
 
@@ -159,22 +64,17 @@ SessionModel::SessionModel(const ChannelData& data, int actors, const PoseAccura
   }
 }
 
-void SessionModel::addClutter(const Nuisance& n, int pose, int cell, double factor, Matrix& to) const {
+void SessionModel::addClutter(const Nuisance& n, int pose, int cell, double factor, PackedHermitian& to) const {
   const PoseChannels& p = data_.poses[pose];
   const int bin = binOf(pose, cell);
-  const auto* packed = p.clutter.at(bin, size_);
   const auto [at, share] = shapeAt(bin);
   const auto* shape = &n.floor_shape[static_cast<std::size_t>(at)];
   const double level = factor * std::exp(n.log_floor + (1 - share) * shape[0] + share * shape[1]);
-  if (!isBeam(cell)) {
-    unpack(packed, level, to);
-    return;
+  if (isBeam(cell)) {
+    addApart(cell, level * p.beams[static_cast<std::size_t>(cell - samples_)].clutter, to);
+  } else {
+    to.add(p.clutter.at(bin, size_), level);
   }
-  Matrix clutter = Matrix::Zero(channels_, channels_);
-  unpack(packed, level, clutter);
-  mirror(clutter);
-  const EchoBeam& beam = p.beams[static_cast<std::size_t>(cell - samples_)];
-  addApart(cell, beam.weights.dot(clutter * beam.weights).real(), to);
 }
 
 std::pair<int, double> SessionModel::shapeAt(int bin) const {
@@ -186,54 +86,51 @@ std::pair<int, double> SessionModel::shapeAt(int bin) const {
 }
 
 int SessionModel::binOf(int pose, int cell) const {
-  return isBeam(cell) ? data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)].first_bin + channels_ / 2
-                      : cell;
+  return isBeam(cell) ? middleBin(data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)], channels_) : cell;
 }
 
-Eigen::VectorXcd SessionModel::dataOf(int pose, int cell) const {
-  if (isBeam(cell)) return data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)].y;
-  return data_.poses[pose].y.col(cell);
+const std::complex<double>* SessionModel::dataOf(int pose, int cell) const {
+  if (isBeam(cell)) return data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)].y.data();
+  return data_.poses[pose].y.col(cell).data();
 }
 
-void SessionModel::addApart(int cell, double power, Matrix& to) const {
-  to.diagonal().array() += power;
-  if (!isBeam(cell)) return;
-  // Hann's neighbours share what falls between them: sum of w^2 exp(j 2 pi n/N) over that of w^2.
-  for (int k = 1; k < channels_; ++k) {
-    to(k, k - 1) += 2.0 / 3 * power;
-    if (k > 1) to(k, k - 2) += 1.0 / 6 * power;
+void SessionModel::addApart(int cell, double power, PackedHermitian& to) const {
+  for (int k = 0; k < channels_; ++k) {
+    const std::size_t at = static_cast<std::size_t>(PackedHermitian::diagonal(k));
+    to.re[at] += power;
+    if (!isBeam(cell)) continue;
+    // Hann's neighbours share what falls between them: sum of w^2 exp(j 2 pi n/N) over that of w^2.
+    if (k > 0) to.re[at - 1] += 2.0 / 3 * power;
+    if (k > 1) to.re[at - 2] += 1.0 / 6 * power;
   }
 }
 
-SessionModel::Matrix SessionModel::sigma(const PoseEchoes& echoes, const Nuisance& n, int pose, int cell) const {
+PackedHermitian SessionModel::sigma(const PoseEchoes& echoes, const Nuisance& n, int pose, int cell) const {
   const int at = isBeam(cell) ? cell - samples_ : cell;
-  Matrix s = Matrix::Zero(channels_, channels_);
+  PackedHermitian s(channels_), own(channels_);
   const double gain = std::exp(n.log_gain);
   const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
-  Matrix own(channels_, channels_);
   for (const auto& group : echoes.groups) {
     const EchoGroup& g = *group;
     const EchoGroup::Fields& f = isBeam(cell) ? g.beams : g.bins;
     const auto *power = f.power.at(at, size_), *bend = f.bend.at(at, size_);
     if (power == nullptr && bend == nullptr) continue;
     const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
-    own.setZero();
-    if (power != nullptr) unpack(power, u, own);
-    if (shift != 0) {
-      if (const auto* p = f.shift.at(at, size_)) unpack(p, u * shift, own);
-    }
-    if (bend != nullptr) unpack(bend, u * (shift * shift + range_variance), own);
-    Turn(n.yaw_rad[pose], element_phase_, power, f.cosine.at(at, size_))(own);
-    s.triangularView<Eigen::Lower>() += own;
+    own.setTurned({power, f.shift.at(at, size_), bend}, {u, u * shift, u * (shift * shift + range_variance)},
+                  element_phase_.data(), turnOf(n.yaw_rad[pose], power, f.cosine.at(at, size_)));
+    s.add(own, 1);
   }
   const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
-  if (const auto* p = graze.at(at, size_)) unpack(p, gain * std::exp(n.log_graze), s);
+  if (const auto* p = graze.at(at, size_)) s.add(p, gain * std::exp(n.log_graze));
   // At least a share of the mean power everywhere keeps the matrix definite where the first-order terms would not.
-  const double relative = std::exp(n.log_relative), mean = s.diagonal().real().mean();
+  const double relative = std::exp(n.log_relative), mean = s.trace() / channels_;
   addApart(cell, relative * std::max(mean, 0.0) + data_.poses[pose].noise_power, s);
-  if (isBeam(cell)) s.diagonal().array() += kBeamShare * std::max(mean, 0.0);
+  if (isBeam(cell)) {
+    for (int k = 0; k < channels_; ++k) {
+      s.re[static_cast<std::size_t>(PackedHermitian::diagonal(k))] += kBeamShare * std::max(mean, 0.0);
+    }
+  }
   addClutter(n, pose, cell, 1, s);
-  mirror(s);
   return s;
 }
 
@@ -247,15 +144,14 @@ double SessionModel::prior(const Nuisance& n) const {
 
 double SessionModel::poseLikelihood(const PoseEchoes& echoes, const Nuisance& n, int pose) const {
   double sum = 0;
+  InverseFactor factor;
+  std::array<std::complex<double>, kMaxChannels> y;
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
-    const Matrix s = sigma(echoes, n, pose, cell);
-    const Eigen::LLT<Matrix> llt(s);
-    if (llt.info() != Eigen::Success) return -1e9;
-    Vector y = dataOf(pose, cell);
-    llt.matrixL().solveInPlace(y);
-    double log_det = 0;
-    for (int k = 0; k < channels_; ++k) log_det += 2 * std::log(llt.matrixLLT()(k, k).real());
-    sum += -log_det - (channels_ + kTail) * std::log1p(y.squaredNorm() / kTail);
+    if (!factor.compute(sigma(echoes, n, pose, cell))) return -1e9;
+    factor.apply(dataOf(pose, cell), y.data());
+    double q = 0;
+    for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
+    sum += -factor.logDeterminant() - (channels_ + kTail) * std::log1p(q / kTail);
   }
   return weight() * sum;
 }
@@ -284,24 +180,19 @@ SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes
   const double gain = std::exp(n.log_gain);
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
     result[i].assign(static_cast<std::size_t>(cells(poses[i])) * size_, {});
-    Matrix own(channels_, channels_);
+    PackedHermitian own(channels_);
     for (const auto& group : echoes[i].groups) {
       const EchoGroup& g = *group;
       const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
       for (const EchoGroup::Fields* f : {&g.bins, &g.beams}) {
         for (int at = f->power.first; at < f->power.first + f->power.bins; ++at) {
           const auto* power = f->power.at(at, size_);
-          own.setZero();
-          unpack(power, u, own);
-          if (shift != 0) {
-            if (const auto* p = f->shift.at(at, size_)) unpack(p, u * shift, own);
-            if (const auto* p = f->bend.at(at, size_)) unpack(p, u * shift * shift, own);
-          }
-          Turn(n.yaw_rad[poses[i]], element_phase_, power, f->cosine.at(at, size_))(own);
+          own.setTurned({power, f->shift.at(at, size_), f->bend.at(at, size_)}, {u, u * shift, u * shift * shift},
+                        element_phase_.data(), turnOf(n.yaw_rad[poses[i]], power, f->cosine.at(at, size_)));
           const int cell = f == &g.beams ? samples_ + at : at;
           std::complex<float>* to = result[i].data() + static_cast<std::size_t>(cell) * size_;
-          for (int k = 0; k < channels_; ++k) {
-            for (int l = 0; l <= k; ++l) *to++ += std::complex<float>(own(k, l));
+          for (std::size_t j = 0; j < size_; ++j) {
+            to[j] += std::complex<float>(static_cast<float>(own.re[j]), static_cast<float>(own.im[j]));
           }
         }
       }
@@ -321,10 +212,10 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
   const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
   // Only directions that do something in a bin enter its products.
   std::vector<int> active;
-  Matrix own(channels_, channels_);
+  PackedHermitian own(channels_);
   std::vector<char> is_active(static_cast<std::size_t>(globals + 1));
-  std::vector<Matrix> raw(static_cast<std::size_t>(globals + 1), Matrix::Zero(channels_, channels_));
-  const auto touch = [&](int j) -> Matrix& {
+  std::vector<PackedHermitian> raw(static_cast<std::size_t>(globals + 1), PackedHermitian(channels_));
+  const auto touch = [&](int j) -> PackedHermitian& {
     if (!is_active[j]) {
       is_active[j] = 1;
       active.push_back(j);
@@ -332,19 +223,20 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     }
     return raw[j];
   };
+  std::array<std::complex<double>, kMaxChannels> y;
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
     for (int j : active) is_active[j] = 0;
     active.clear();
     const int at = isBeam(cell) ? cell - samples_ : cell;
-    const Matrix s = sigma(echoes, n, pose, cell);
-    const Eigen::LLT<Matrix> llt(s);
-    if (llt.info() != Eigen::Success) continue;
-    Vector y = dataOf(pose, cell);
-    llt.matrixL().solveInPlace(y);
-    const double q = y.squaredNorm(), w = (channels_ + kTail) / (kTail + q);
-    double log_det = 0;
-    for (int k = 0; k < channels_; ++k) log_det += 2 * std::log(llt.matrixLLT()(k, k).real());
-    out.log_likelihood += -log_det - (channels_ + kTail) * std::log1p(q / kTail);
+    const PackedHermitian s = sigma(echoes, n, pose, cell);
+    BinBasis basis;
+    basis.cell = cell;
+    if (!basis.factor.compute(s)) continue;
+    basis.factor.apply(dataOf(pose, cell), y.data());
+    double q = 0;
+    for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
+    const double w = (channels_ + kTail) / (kTail + q);
+    out.log_likelihood += -basis.factor.logDeterminant() - (channels_ + kTail) * std::log1p(q / kTail);
 
     for (const auto& group : echoes.groups) {
       const EchoGroup& g = *group;
@@ -354,68 +246,48 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
       if (power == nullptr && bend == nullptr) continue;
       const auto* cosine = fields.cosine.at(at, size_);
       const double f = gain * groupGain(g, n), moved = groupShift_m(g, n);
-      const Turn turn(n.yaw_rad[pose], element_phase_, power, cosine);
-      const auto add = [&](int direction) {
-        turn(own);
-        touch(direction).triangularView<Eigen::Lower>() += own;
+      const double turn = turnOf(n.yaw_rad[pose], power, cosine);
+      const auto add = [&](int direction, const std::array<const std::complex<float>*, 3>& of,
+                           const std::array<double, 3>& by) {
+        own.setTurned(of, by, element_phase_.data(), turn);
+        touch(direction).add(own, 1);
       };
       for (int actor : g.actors) {
         const int a = static_cast<int>(errorOf(actor, static_cast<std::size_t>(errors_)));
-        own.setZero();
-        if (power != nullptr) unpack(power, f, own);
-        if (shift != nullptr && moved != 0) unpack(shift, f * moved, own);
-        add(kActors + a);
-        own.setZero();
-        if (shift != nullptr) unpack(shift, f, own);
-        if (bend != nullptr && moved != 0) unpack(bend, 2 * f * moved, own);
-        add(kActors + errors_ + a);
+        add(kActors + a, {power, shift, nullptr}, {f, f * moved, 0});
+        add(kActors + errors_ + a, {nullptr, shift, bend}, {0, f, 2 * f * moved});
       }
-      if (bend != nullptr) {
-        own.setZero();
-        unpack(bend, f * range_variance, own);
-        add(kRange);
-      }
+      if (bend != nullptr) add(kRange, {bend, nullptr, nullptr}, {f * range_variance, 0, 0});
       if (cosine != nullptr) {
-        own.setZero();
-        std::size_t i = 0;
-        for (int k = 0; k < channels_; ++k) {
-          for (int l = 0; l <= k; ++l, ++i) {
-            own(k, l) =
-                f * std::complex<double>(0, element_phase_[k] - element_phase_[l]) * std::complex<double>(cosine[i]);
-          }
-        }
-        add(heading);
+        own.setTurned({cosine, nullptr, nullptr}, {f, 0, 0}, element_phase_.data(), turn);
+        own.differentiateTurn(element_phase_.data());
+        touch(heading).add(own, 1);
       }
     }
     const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
-    if (const auto* p = graze.at(at, size_)) unpack(p, gain * std::exp(n.log_graze), touch(kGraze));
-    addClutter(n, pose, cell, 1, touch(kFloor));
+    if (const auto* p = graze.at(at, size_)) touch(kGraze).add(p, gain * std::exp(n.log_graze));
+    PackedHermitian& floor = touch(kFloor);
+    addClutter(n, pose, cell, 1, floor);
     const auto [shape_at, shape_share] = shapeAt(binOf(pose, cell));
-    addClutter(n, pose, cell, 1 - shape_share, touch(kShape + shape_at));
-    addClutter(n, pose, cell, shape_share, touch(kShape + shape_at + 1));
-    Matrix& level = touch(kGain);
-    level = s;
-    level.triangularView<Eigen::Lower>() -= raw[kFloor];
+    touch(kShape + shape_at).add(floor, 1 - shape_share);
+    touch(kShape + shape_at + 1).add(floor, shape_share);
+    PackedHermitian& level = touch(kGain);
+    level.add(s, 1);
+    level.add(floor, -1);
     addApart(cell, -data_.poses[pose].noise_power, level);
-    const double mean = level.diagonal().real().mean() / (1 + relative);
+    const double mean = level.trace() / channels_ / (1 + relative);
     addApart(cell, relative * mean, touch(kRelative));
-    BinBasis basis;
-    basis.cell = cell;
-    Matrix inverse = Matrix::Identity(channels_, channels_);
-    llt.matrixL().solveInPlace(inverse);
-    basis.inverse_lower = inverse;
     basis.active = active;
     basis.whitened.resize(numbers, static_cast<Eigen::Index>(active.size()));
-    const Whitener whiten(inverse);
     for (std::size_t a = 0; a < active.size(); ++a) {
-      whiten(raw[active[a]], basis.whitened.col(static_cast<Eigen::Index>(a)).data());
+      basis.factor.whiten(raw[active[a]], basis.whitened.col(static_cast<Eigen::Index>(a)).data());
     }
     // Data in the same numbers: w y y^H - I.
     basis.data.resize(numbers);
     int i = 0;
-    for (int k = 0; k < channels_; ++k) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(channels_); ++k) {
       basis.data[i++] = w * std::norm(y[k]) - 1;
-      for (int l = 0; l < k; ++l) {
+      for (std::size_t l = 0; l < k; ++l) {
         const std::complex<double> v = w * y[k] * std::conj(y[l]);
         basis.data[i++] = M_SQRT2 * v.real();
         basis.data[i++] = M_SQRT2 * v.imag();
@@ -426,7 +298,7 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     basis.traces.resize(static_cast<Eigen::Index>(active.size()));
     for (std::size_t a = 0; a < active.size(); ++a) {
       const Eigen::Index ia = static_cast<Eigen::Index>(a);
-      basis.traces[ia] = traceOf(basis.whitened.col(ia).data(), channels_);
+      basis.traces[ia] = traceOfWhitened(basis.whitened.col(ia).data(), channels_);
       out.score[active[a]] += weight() * score[ia];
       for (std::size_t b = 0; b <= a; ++b) {
         const Eigen::Index ib = static_cast<Eigen::Index>(b);
@@ -475,9 +347,8 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
     own.information.row(all).head(globals) = p.information.row(globals).head(globals);
     own.information(all, all) = p.information(globals, globals);
     Eigen::MatrixXd v(numbers, more);
-    Matrix m(channels_, channels_);
+    PackedHermitian m(channels_);
     for (const BinBasis& bin : p.bins) {
-      const Whitener whiten(bin.inverse_lower);
       std::vector<int> active;
       Eigen::VectorXd traces(more);
       for (int h = 0; h < more; ++h) {
@@ -486,9 +357,9 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
         const auto* from = field.data() + static_cast<std::size_t>(bin.cell) * size_;
         if (std::all_of(from, from + size_, [](auto x) { return x == 0.0f; })) continue;
         m.setZero();
-        unpack(from, 1, m);
-        whiten(m, v.col(h).data());
-        traces[h] = traceOf(v.col(h).data(), channels_);
+        m.add(from, 1);
+        bin.factor.whiten(m, v.col(h).data());
+        traces[h] = traceOfWhitened(v.col(h).data(), channels_);
         active.push_back(h);
       }
       for (int h : active) {
@@ -653,7 +524,16 @@ Nuisance SessionModel::start(const std::vector<PoseEchoes>& echoes) const {
 
 SessionModel::Whitened SessionModel::whitened(const PoseEchoes& echoes, const Nuisance& n, int pose, int bin) const {
   Whitened w;
-  const Eigen::LLT<Eigen::MatrixXcd> llt(sigma(echoes, n, pose, bin));
+  const PackedHermitian packed = sigma(echoes, n, pose, bin);
+  Eigen::MatrixXcd full(channels_, channels_);
+  std::size_t i = 0;
+  for (int k = 0; k < channels_; ++k) {
+    for (int l = 0; l <= k; ++l, ++i) {
+      full(k, l) = {packed.re[i], packed.im[i]};
+      full(l, k) = std::conj(full(k, l));
+    }
+  }
+  const Eigen::LLT<Eigen::MatrixXcd> llt(full);
   w.inverse = llt.solve(Eigen::MatrixXcd::Identity(channels_, channels_));
   const Eigen::VectorXcd y = data_.poses[pose].y.col(bin);
   w.solved = w.inverse * y;

@@ -8,6 +8,7 @@
 #include "channel_data.h"
 #include "echo_field.h"
 #include "echo_source.h"
+#include "packed_hermitian.h"
 
 namespace mmradartwin {
 
@@ -47,13 +48,11 @@ struct Scores {
   Eigen::MatrixXd yaw_coupling;  ///< [poses][directions] of that change by a change of the directions
 };
 
-constexpr int kMaxChannels = 16;
-
 /// One cell's whitened directions of the nuisance and the data in the same numbers: the likelihood's derivatives are
 /// then products, and a further direction costs nothing but its own.
 struct BinBasis {
   int cell = 0;
-  Eigen::Matrix<std::complex<double>, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxChannels, kMaxChannels> inverse_lower;
+  InverseFactor factor;
   std::vector<int> active;   ///< directions that do something here; the heading is the last of all
   Eigen::MatrixXd whitened;  ///< [M^2][active]
   Eigen::VectorXd data, traces;
@@ -76,7 +75,6 @@ struct Basis {
 /// through the window and beams are formed of them, so that each counts half (composite likelihood).
 class SessionModel {
  public:
-  using Matrix = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxChannels, kMaxChannels>;
   /// Keeps a reference. actors: Scene::actors' number.
   SessionModel(const ChannelData& data, int actors, const PoseAccuracy& accuracy, const LatentSpread& spread = {});
 
@@ -126,12 +124,12 @@ class SessionModel {
   int binOf(int pose, int cell) const;
   /// Two neighbours of floor_shape that hold for a bin: the first one's index and the second one's share.
   std::pair<int, double> shapeAt(int bin) const;
-  Eigen::VectorXcd dataOf(int pose, int cell) const;
+  const std::complex<double>* dataOf(int pose, int cell) const;
   /// Adds power that no two channels share, and that a beam's bins share as their window has it.
-  void addApart(int cell, double power, Matrix& to) const;
-  Matrix sigma(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, int cell) const;
-  /// Clutter's covariance in a cell, lower triangle, times factor.
-  void addClutter(const Nuisance& nuisance, int pose, int cell, double factor, Matrix& to) const;
+  void addApart(int cell, double power, PackedHermitian& to) const;
+  PackedHermitian sigma(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, int cell) const;
+  /// Clutter's covariance in a cell, times factor.
+  void addClutter(const Nuisance& nuisance, int pose, int cell, double factor, PackedHermitian& to) const;
   double prior(const Nuisance& nuisance) const;
   double poseLikelihood(const PoseEchoes& echoes, const Nuisance& nuisance, int pose) const;
   void addBasis(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, PoseBasis& out) const;

@@ -153,7 +153,7 @@ std::vector<PathRecord> pathsFromMsg(const mmradartwin_msgs::PathRecords& msg, c
     r.range_bin = static_cast<int>(m.range_bin);
     r.amplitude = m.amplitude;
     r.phase_rad = m.phase_rad;
-    r.length_m = m.length_m;
+    r.length_m.assign(m.length_m.begin(), m.length_m.end());
     if (m.c_re.size() != m.c_im.size() || m.c_re.size() != m.length_m.size()) {
       throw InputError("path records: record " + std::to_string(records.size()) +
                        " has contributions and lengths of different number; send one of each per virtual element");

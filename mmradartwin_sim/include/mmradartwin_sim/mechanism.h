@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <complex>
 #include <cstdint>
+#include <array>
+#include <boost/functional/hash.hpp>
 #include <functional>
 #include <limits>
 #include <map>
 #include <memory>
+#include <unordered_set>
 #include <string>
 #include <variant>
 #include <vector>
@@ -61,6 +64,8 @@ struct SceneChange {
   std::vector<int> actors;                  ///< Scene::actors index
   std::vector<Eigen::AlignedBox3d> bounds;  ///< map, with a margin; where they were and where they are
 
+  /// Adds bounds with the margin that what touches an actor's faces needs.
+  void addBounds(const Eigen::AlignedBox3d& box);
   bool moved(int actor) const { return std::find(actors.begin(), actors.end(), actor) != actors.end(); }
   /// True where the segment comes into one of the bounds.
   bool crosses(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const;
@@ -68,11 +73,25 @@ struct SceneChange {
   bool touches(const Eigen::Vector3d& radar, const PathRecord& record) const;
 };
 
-/// Cells of the room within which scatter points of one facet are one path with their power, at the place and with the
-/// phase of the first of them: thousands of points become hundreds where the phases between them say nothing.
+/// Cells, as a radar resolves them, within which scatter points of one facet are one path with their power, at the place
+/// and with the phase of the one that lies nearest to their mean: thousands of points become a hundred where the phases
+/// between them say nothing.
 struct CloudCells {
-  Eigen::Vector3d size_m;
-  std::function<bool(const Eigen::Vector3d& point)> side;  ///< points that it tells apart share no cell; may be null
+  using Cell = std::array<int, 4>;  ///< facet, range, sine, elevation
+  using CellSet = std::unordered_set<Cell, boost::hash<Cell>>;
+
+  Eigen::Isometry3d T_map_radar;  ///< about which the cells lie, wherever a mechanism moves the radar
+  double range_m;                 ///< their size in slant range,
+  double sine;                    ///< in the sine of the direction along the array
+  double elevation_sine;          ///< and upwards
+  /// Points that it tells apart share no cell; may be null.
+  std::function<std::vector<char>(const std::vector<Eigen::Vector3d>& points)> sides = {};
+  /// With PoseContext::change: filled with the cells that it touches, whose paths alone are added; may be null.
+  CellSet* touched = nullptr;
+
+  /// A point's place in units of the cells' size.
+  Eigen::Array3d placeOf(const Eigen::Vector3d& point) const;
+  Cell cellOf(int facet, const Eigen::Vector3d& point) const;
 };
 
 /// Everything a mechanism may look at for one pose.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <boost/container/small_vector.hpp>
 #include <complex>
 #include <string>
 #include <vector>
@@ -10,22 +11,28 @@
 
 namespace mmradartwin {
 
+/// Few numbers that need no memory of their own: records are made, copied and thrown away by the million.
+template <typename T>
+using PerInteraction = boost::container::small_vector<T, 3>;
+template <typename T>
+using PerChannel = boost::container::small_vector<T, 8>;
+
 /// One propagation path (DESIGN sections 3 to 5).
 struct PathRecord {
-  const std::string* event = nullptr;     ///< name of the mechanism that made it (interned, never null in a result)
-  std::vector<int> actors;                ///< Scene::actors index, one per interaction; -1: what the scene lacks
-  std::vector<int> facets;                ///< index into the facets that were traced or -1, one per interaction
-  std::vector<Eigen::Vector3d> vertices;  ///< map, one per interaction
+  const std::string* event = nullptr;        ///< name of the mechanism that made it (interned, never null in a result)
+  PerInteraction<int> actors;                ///< Scene::actors index; -1: what the scene lacks
+  PerInteraction<int> facets;                ///< index into the facets that were traced or -1
+  PerInteraction<Eigen::Vector3d> vertices;  ///< map
   /// |cos| of the angle of incidence that each interaction's coefficient was taken at, -1 where it is no reflection;
   /// empty where none is: what a mechanism of weight needs of the geometry.
-  std::vector<double> reflection_cosine;
+  PerInteraction<double> reflection_cosine;
   Eigen::Vector3d departure, arrival;  ///< unit vectors in radar_link, both from the radar outwards
   int bounces = 0;
   int range_bin = 0;                    ///< nearest bin of length/2
   double amplitude = 0;                 ///< A_p, common to the channels
   double phase_rad = 0;                 ///< of c[0]
-  std::vector<double> length_m;         ///< [M] exact path length per virtual element
-  std::vector<std::complex<double>> c;  ///< [M] at the window's centre; sum|c|^2 = M A_p^2
+  PerChannel<double> length_m;          ///< [M] exact path length per virtual element
+  PerChannel<std::complex<double>> c;   ///< [M] at the window's centre; sum|c|^2 = M A_p^2
 };
 
 /// Adds records to grid x [M][N]: x_k[n] += c_k exp(j 2 pi mu (length_k/c)(t_n - t_c)). The one place where paths
@@ -42,7 +49,7 @@ double meanLength_m(const PathRecord& record);
 /// Makes a record's path longer by extra_m at all elements (a constant delay); amplitude and direction stay.
 void lengthen(const RadarConfig& radar, double extra_m, PathRecord& record);
 /// The same by an amount of its own per virtual element.
-void lengthenChannels(const RadarConfig& radar, const std::vector<double>& extra_m, PathRecord& record);
+void lengthenChannels(const RadarConfig& radar, const PerChannel<double>& extra_m, PathRecord& record);
 /// Multiplies amplitude and contribution.
 void scaleRecord(std::complex<double> factor, PathRecord& record);
 /// Nearest range bin of length/2, held within the grid.

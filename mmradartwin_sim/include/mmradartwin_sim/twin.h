@@ -91,6 +91,11 @@ class Twin {
   /// True where a mechanism edits the scene or moves the radar, so that every path has to be traced anew; else the
   /// paths of a twin are those of its mechanisms one by one.
   bool altersGeometry() const;
+  /// What another twin of the same scene has otherwise: its actors, and bounds of where they are in both; of what one
+  /// of them put into the room the bounds alone. Nothing where mechanisms have the radar elsewhere.
+  std::optional<SceneChange> changesFrom(const Twin& other) const;
+  /// True where an edit lets rays through what occludes in scene().
+  bool opensActors() const;
   /// True where all that the edits add are screens (things that hide what is behind them): its paths are those of the
   /// scene without them, less what removeHidden() takes.
   bool addsScreensAlone() const;
@@ -112,6 +117,9 @@ class Twin {
   /// Of those paths the ones of description().mechanisms[mechanism] alone.
   std::vector<PathRecord> trace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
                                 const CloudCells* cloud) const;
+  /// The same where those of another twin are known, from which this one differs by a change.
+  std::vector<PathRecord> retrace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar, const CloudCells& cloud,
+                                  const SceneChange& change, const std::vector<PathRecord>& known) const;
   Simulation weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                    std::int64_t stamp_ns = 0) const;
   /// The paths that weigh() makes a grid of: weighted, with leakage, and as the receiver's filters leave them.

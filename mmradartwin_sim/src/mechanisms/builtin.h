@@ -79,11 +79,11 @@ struct ElementsInMap {
   Eigen::Vector3d up;  ///< axis of the vertical antennas
 
   /// Full lengths by way of one point, per virtual element.
-  std::vector<double> lengthsVia(const Eigen::Vector3d& point) const;
+  PerChannel<double> lengthsVia(const Eigen::Vector3d& point) const;
   /// Full lengths where `image` maps a transmitter to its image.
   template <typename Image>
-  std::vector<double> lengthsByImage(Image image) const {
-    std::vector<double> lengths;
+  PerChannel<double> lengthsByImage(Image image) const {
+    PerChannel<double> lengths;
     lengths.reserve(tx.size() * rx.size());
     for (const auto& t : tx) {
       const Eigen::Vector3d i = image(t);

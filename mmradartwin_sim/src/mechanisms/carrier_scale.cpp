@@ -19,7 +19,7 @@ class CarrierScale : public Mechanism {
   void reweight(const PoseContext& context, PathRecord& record) const override {
     if (record.bounces == 0) return;  // coupling inside the radar has no angle
     const double reference_m = record.length_m[0];
-    std::vector<double> extra_m(record.length_m.size());
+    PerChannel<double> extra_m(record.length_m.size());
     for (std::size_t k = 0; k < extra_m.size(); ++k) extra_m[k] = scale_ * (record.length_m[k] - reference_m);
     lengthenChannels(context.radar, extra_m, record);
   }

@@ -47,7 +47,7 @@ class CornerReflection : public Mechanism {
     return {"corner_reflection: the named actors form no corner; check actors and gap_m"};
   }
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
-    std::set<std::vector<int>> known;
+    std::set<PerInteraction<int>> known;
     for (const PathRecord& r : records) {
       if (*r.event == "corner") known.insert(r.facets);
     }

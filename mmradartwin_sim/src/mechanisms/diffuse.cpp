@@ -2,7 +2,6 @@
 #include <boost/functional/hash.hpp>
 #include <cmath>
 #include <optional>
-#include <tuple>
 #include <unordered_map>
 
 #include "../polarisation.h"
@@ -87,20 +86,26 @@ class Diffuse : public Mechanism {
     std::vector<const ScatterPoint*> lit;
     std::vector<Eigen::Vector3d> position, seen_along;
     std::vector<double> level, gap;
+    const SceneChange* change = context.change;
     std::optional<ViewCones> changed;
-    if (context.change) changed.emplace(elements.p, context.change->bounds);
+    if (change) changed.emplace(elements.p, change->bounds);
+    const auto touches = [&](const ScatterPoint& point) {
+      if (change->moved(context.scene.facets[point.facet].actor)) return true;
+      return changed->mayMeet(point.position - elements.p) && change->crosses(elements.p, point.position);
+    };
+    CloudCells::CellSet* touched = change && context.cloud ? context.cloud->touched : nullptr;
+    for (const ScatterPoint& point : points_) {
+      if (touched && touches(point)) touched->insert(context.cloud->cellOf(point.facet, point.position));
+    }
     for (const ScatterPoint& point : points_) {
       const Eigen::Vector3d way = point.position - elements.p;
-      if (changed && !changed->mayMeet(way) && !context.change->moved(context.scene.facets[point.facet].actor))
-        continue;
       const double r2 = way.squaredNorm();
       if (r2 > max2 || r2 < 1e-6) continue;
       const double r = std::sqrt(r2);
       const Eigen::Vector3d direction_radar = to_radar * way / r;
       if (!context.inFieldOfView(direction_radar)) continue;
       const Facet& facet = context.scene.facets[point.facet];
-      if (context.change && !context.change->moved(facet.actor) &&
-          !context.change->crosses(elements.p, point.position)) {
+      if (touched ? touched->count(context.cloud->cellOf(point.facet, point.position)) == 0 : change && !touches(point)) {
         continue;
       }
       const Eigen::Vector3d in = way / r;
@@ -142,19 +147,49 @@ class Diffuse : public Mechanism {
   }
 
  private:
-  /// Leaves the first point of each cell, with the level of all.
+  /// Leaves one point of each cell, with the level of all.
   static void sumCells(const CloudCells& cells, const std::vector<const ScatterPoint*>& points,
                        std::vector<char>& visible, std::vector<double>& level) {
-    using Key = std::tuple<int, int, int, int, bool>;
-    std::unordered_map<Key, std::size_t, boost::hash<Key>> first;
+    std::vector<Eigen::Vector3d> positions;
+    std::vector<std::size_t> seen;
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!visible[i]) continue;
-      const Eigen::Array3i at = (points[i]->position.array() / cells.size_m.array()).floor().cast<int>();
-      const bool side = cells.side && cells.side(points[i]->position);
-      const auto [cell, fresh] = first.try_emplace(Key{points[i]->facet, at.x(), at.y(), at.z(), side}, i);
-      if (fresh) continue;
-      level[cell->second] = std::hypot(level[cell->second], level[i]);
-      visible[i] = 0;
+      seen.push_back(i);
+      positions.push_back(points[i]->position);
+    }
+    const std::vector<char> side = cells.sides ? cells.sides(positions) : std::vector<char>(seen.size(), 0);
+    struct Cell {
+      double power = 0;
+      Eigen::Array3d place = Eigen::Array3d::Zero();  // weighted by power
+      std::size_t nearest = 0;
+      double distance = 1e300;
+    };
+    using Key = std::pair<CloudCells::Cell, char>;
+    std::unordered_map<Key, std::size_t, boost::hash<Key>> number;
+    std::vector<Cell> all;
+    std::vector<std::size_t> cell_of;
+    std::vector<Eigen::Array3d> place;
+    for (std::size_t j = 0; j < seen.size(); ++j) {
+      place.push_back(cells.placeOf(positions[j]));
+      const Key key{cells.cellOf(points[seen[j]]->facet, positions[j]), side[j]};
+      const auto [known, fresh] = number.try_emplace(key, all.size());
+      if (fresh) all.emplace_back();
+      const double power = level[seen[j]] * level[seen[j]];
+      all[known->second].power += power;
+      all[known->second].place += power * place.back();
+      cell_of.push_back(known->second);
+    }
+    for (std::size_t j = 0; j < seen.size(); ++j) {
+      Cell& cell = all[cell_of[j]];
+      const double distance = (place[j] - cell.place / cell.power).square().sum();
+      if (distance >= cell.distance) continue;
+      cell.distance = distance;
+      cell.nearest = seen[j];
+    }
+    for (std::size_t i : seen) visible[i] = 0;
+    for (const Cell& cell : all) {
+      visible[cell.nearest] = 1;
+      level[cell.nearest] = std::sqrt(cell.power);
     }
   }
 

@@ -102,7 +102,7 @@ class EmpiricalLaw : public Mechanism {
   static void turn(const RadarConfig& radar, double angle_rad, PathRecord& record) {
     const Eigen::AngleAxisd R(angle_rad, Eigen::Vector3d::UnitZ());
     const Eigen::Vector3d departure = R * record.departure, arrival = R * record.arrival;
-    std::vector<double> extra_m;
+    PerChannel<double> extra_m;
     for (const auto& t : radar.tx_position_m) {
       for (const auto& r : radar.rx_position_m) {
         extra_m.push_back(-(departure - record.departure).dot(t) - (arrival - record.arrival).dot(r));

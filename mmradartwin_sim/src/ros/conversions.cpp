@@ -46,7 +46,7 @@ mmradartwin_msgs::PathRecords toMsg(const Simulation& simulation, const std::vec
     m.range_bin = static_cast<std::uint32_t>(r.range_bin);
     m.amplitude = r.amplitude;
     m.phase_rad = r.phase_rad;
-    m.length_m = r.length_m;
+    m.length_m.assign(r.length_m.begin(), r.length_m.end());
     m.c_re.reserve(r.c.size());
     m.c_im.reserve(r.c.size());
     for (const auto& c : r.c) {

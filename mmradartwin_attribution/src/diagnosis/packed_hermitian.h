@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <complex>
+
+#include "bin_covariance.h"
+
+namespace mmradartwin {
+
+constexpr int kMaxChannels = 16;
+constexpr int kMaxPacked = kMaxChannels * (kMaxChannels + 1) / 2;
+
+/// A Hermitian matrix of up to kMaxChannels rows: its lower triangle row by row as BinCovariance has it, in double
+/// precision, real and imaginary parts apart, so that sums of such matrices are loops over plain numbers. The
+/// likelihood's time is spent here.
+struct PackedHermitian {
+  alignas(64) std::array<double, kMaxPacked> re, im;
+  int channels = 0;
+
+  explicit PackedHermitian(int channels);
+  int size() const { return channels * (channels + 1) / 2; }
+  static int diagonal(int row) { return row * (row + 3) / 2; }
+  void setZero();
+  double trace() const;
+  /// Adds a field of single precision times a factor.
+  void add(const std::complex<float>* field, double factor);
+  void add(const PackedHermitian& other, double factor);
+  /// The same of up to three fields (null: nothing), then turned: element (k, l) times exp(j (phase[k] - phase[l])
+  /// turn). Phases alone keep the matrix definite. Sets instead of adding to what stands here.
+  void setTurned(const std::array<const std::complex<float>*, 3>& fields, const std::array<double, 3>& factors,
+                 const double* phase, double turn);
+  /// Element (k, l) times j (phase[k] - phase[l]): the derivative of the above by the turn.
+  void differentiateTurn(const double* phase);
+  /// w^H this w.
+  double quadratic(const std::complex<double>* w) const;
+};
+
+/// The inverse of the Cholesky factor of such a matrix: L^-1.
+class InverseFactor {
+ public:
+  /// False where the matrix is not definite.
+  bool compute(const PackedHermitian& matrix);
+  double logDeterminant() const { return log_determinant_; }
+  /// L^-1 y; its squared norm is y^H matrix^-1 y. y and to: [channels], may be the same.
+  void apply(const std::complex<double>* y, std::complex<double>* to) const;
+  /// L^-1 D L^-H as M^2 real numbers, so that tr(D~ E~) is a dot product: of row k its diagonal, then real and imaginary
+  /// parts of the elements before it, times sqrt 2.
+  void whiten(const PackedHermitian& matrix, double* to) const;
+  int channels() const { return channels_; }
+
+ private:
+  using Columns = std::array<std::array<double, kMaxChannels>, kMaxChannels>;
+  int channels_ = 0;
+  double log_determinant_ = 0;
+  alignas(64) Columns re_, im_;  ///< [column][row], the lower triangle, zero above it
+};
+
+/// Sum of the diagonal of what whiten() gives.
+double traceOfWhitened(const double* v, int channels);
+
+}  // namespace mmradartwin
