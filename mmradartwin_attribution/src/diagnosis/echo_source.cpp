@@ -20,6 +20,7 @@ constexpr double kSteady = 0.02;
 // Scatter points in cells that are small beside what the radar resolves, seen from the pose as reported: a turned or
 // moved radar sees the same ones.
 constexpr double kCloud_bins = 0.75, kCloud_lobes = 0.5, kCloudElevation = 0.175;
+constexpr std::size_t kMostTwins = 6;     ///< that are kept
 constexpr std::size_t kMostTraced = 64;  ///< entries of one mechanism and geometry that are kept
 
 /// One line that tells two mechanisms apart that trace different paths.
@@ -154,6 +155,20 @@ bool EchoSource::mixesRanges(const NamedParameters& mechanism) {
   return at->second;
 }
 
+std::shared_ptr<const Twin> EchoSource::twinOf(const std::vector<NamedParameters>& mechanisms) {
+  TwinDescription description;
+  description.mechanisms = mechanisms;
+  std::string text = description.toYaml();
+  const auto at = std::find_if(twins_.begin(), twins_.end(), [&](const auto& known) { return known.first == text; });
+  if (at != twins_.end()) {
+    std::rotate(twins_.begin(), at, at + 1);
+  } else {
+    twins_.insert(twins_.begin(), {std::move(text), std::make_shared<const Twin>(base_.changed(mechanisms))});
+    if (twins_.size() > kMostTwins) twins_.pop_back();
+  }
+  return twins_.front().second;
+}
+
 std::vector<NamedParameters> EchoSource::geometryOf(const std::vector<NamedParameters>& mechanisms) {
   std::vector<NamedParameters> geometry;
   for (const NamedParameters& m : mechanisms) {
@@ -176,32 +191,36 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
     if (!entry.paths[i]) missing.push_back(i);
   }
   if (missing.empty()) return entry.paths;
-  std::vector<NamedParameters> all = beside;
-  for (const NamedParameters& m : geometry) {
-    if (tracedKey(m) != key) all.push_back(m);
-  }
-  all.push_back(mechanism);
-  const Twin twin = base_.changed(all);
+  // One twin traces all of a geometry's mechanisms.
+  const auto within = [&](const std::vector<NamedParameters>& edits) {
+    std::vector<NamedParameters> all;
+    for (const NamedParameters& m : mechanisms) {
+      if (!altersGeometry(m)) all.push_back(m);
+    }
+    all.insert(all.end(), edits.begin(), edits.end());
+    return all;
+  };
+  const std::vector<NamedParameters> all = within(geometry);
+  const auto wanted = static_cast<std::size_t>(
+      std::find_if(all.begin(), all.end(), [&](const NamedParameters& m) { return tracedKey(m) == key; }) -
+      all.begin());
+  const std::shared_ptr<const Twin> twin = twinOf(all);
   // Without the last edit, where that is not the mechanism's own.
   const Traced* before = nullptr;
   std::optional<SceneChange> change;
   const bool only_hides = !geometry.empty() && geometryAfter(geometry.back()) == Geometry::kMoreScreens;
   if (!geometry.empty() && tracedKey(geometry.back()) != key) {
     const std::vector<NamedParameters> rest(geometry.begin(), geometry.end() - 1);
-    const std::string rest_key = keyOf(rest);
-    const auto known = cache_.find(rest_key + behind);
+    const auto known = cache_.find(keyOf(rest) + behind);
     if (only_hides) {
       before = &traced(rest, mechanism, mechanisms, missing);
     } else if (known != cache_.end()) {
       known->second.used = calls_;
       before = &known->second.paths;
     }
-    if (before != nullptr) {
-      if (!without_ || without_->first != rest_key) without_.emplace(rest_key, base_.changed(rest));
-      change = twin.changesFrom(without_->second);
-    }
+    if (before != nullptr) change = twin->changesFrom(*twinOf(within(rest)));
   }
-  const bool opens = twin.opensActors();
+  const bool opens = twin->opensActors();
   tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t j) {
     const std::size_t i = static_cast<std::size_t>(missing[j]);
     const Eigen::Isometry3d& T = data_.poses[i].pose.T_map_radar;
@@ -222,10 +241,10 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
     try {
       if (known && only_hides) {  // paths without it, less those that it stands in the way of
         paths = *known;
-        twin.removeHidden(T, paths);
+        twin->removeHidden(T, paths);
       } else {
-        paths = known && change && !opens ? twin.retrace(all.size() - 1, T, cells, *change, *known)
-                                          : twin.trace(all.size() - 1, T, &cells);
+        paths = known && change && !opens ? twin->retrace(wanted, T, cells, *change, *known)
+                                          : twin->trace(wanted, T, &cells);
       }
     } catch (const InputError&) {
       // What is tried stands where the radar stood, which therefore sees nothing.
@@ -320,7 +339,7 @@ std::vector<PathShift> EchoSource::pathShifts(const std::vector<NamedParameters>
     const Traced& there = traced(geometry, *same, mechanisms, poses);
     parts.push_back({&there, &traced(geometry_from, from[k], from, poses)});
   }
-  const Twin there_twin = base_.changed(mechanisms), here_twin = base_.changed(from);
+  const std::shared_ptr<const Twin> there_twin = twinOf(mechanisms), here_twin = twinOf(from);
   const auto azimuth = [](const PathRecord& p) { return std::atan2(p.departure.y(), p.departure.x()); };
   std::vector<PathShift> shifts;
   for (std::size_t place = 0; place < poses.size(); ++place) {
@@ -328,10 +347,10 @@ std::vector<PathShift> EchoSource::pathShifts(const std::vector<NamedParameters>
     const Pose& at = data_.poses[i].pose;
     for (const auto& [there, here] : parts) {
       std::map<PathKey, std::vector<PathRecord>> pairs;
-      for (PathRecord& r : here_twin.receivedPaths(at.T_map_radar, *(*here)[i], at.stamp_ns)) {
+      for (PathRecord& r : here_twin->receivedPaths(at.T_map_radar, *(*here)[i], at.stamp_ns)) {
         pairs[PathKey{r.event, r.facets}].push_back(std::move(r));
       }
-      for (const PathRecord& r : there_twin.receivedPaths(at.T_map_radar, *(*there)[i], at.stamp_ns)) {
+      for (const PathRecord& r : there_twin->receivedPaths(at.T_map_radar, *(*there)[i], at.stamp_ns)) {
         const auto same = pairs.find(PathKey{r.event, r.facets});
         if (same == pairs.end() || same->second.size() > 1) continue;
         const PathRecord& s = same->second.front();
@@ -386,19 +405,20 @@ void EchoSource::addGroups(std::size_t pose, const std::vector<PathRecord>& reco
 std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& mechanisms,
                                             const std::vector<int>& poses, const std::vector<double>& actor_range_m,
                                             const std::vector<Part>& parts) {
-  const Twin twin = base_.changed(mechanisms);
+  const std::shared_ptr<const Twin> whole = twinOf(mechanisms);
+  const Twin& twin = *whole;
   const RadarConfig& radar = base_.radar();
   const int channels = radar.channels();
   kept_.resize(data_.poses.size());
   kept_poses_.resize(data_.poses.size());
   mixed_.resize(data_.poses.size());
   // The twin less what mixes ranges in its receiver; nothing where it mixes none.
-  std::optional<Twin> without_mixing;
+  std::shared_ptr<const Twin> without_mixing;
   std::vector<NamedParameters> rest;
   TwinDescription mixing;
   for (const NamedParameters& m : mechanisms) (mixesRanges(m) ? mixing.mechanisms : rest).push_back(m);
   const std::size_t receiver = std::hash<std::string>()(mixing.toYaml());
-  if (rest.size() < mechanisms.size()) without_mixing.emplace(base_.changed(rest));
+  if (rest.size() < mechanisms.size()) without_mixing = twinOf(rest);
   // What a pose's echoes follow from beside its paths.
   TwinDescription weights;
   for (const NamedParameters& m : mechanisms) {

@@ -83,6 +83,7 @@ class EchoSource {
                        const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
   /// True where its receiver makes of a path more than its tone in all channels (an image, a harmonic).
   bool mixesRanges(const NamedParameters& mechanism);
+  std::shared_ptr<const Twin> twinOf(const std::vector<NamedParameters>& mechanisms);
   /// Keeps memory bounded while one hypothesis' geometry is searched for.
   void forgetLongUnused();
   std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);
@@ -122,7 +123,7 @@ class EchoSource {
   enum class Geometry { kSame, kMoreScreens, kOther };
   Geometry geometryAfter(const NamedParameters& mechanism);
   std::map<std::string, Geometry> geometry_;         // by mechanism text
-  std::optional<std::pair<std::string, Twin>> without_;  // the last edit that was tried, by what is left
+  std::vector<std::pair<std::string, std::shared_ptr<const Twin>>> twins_;  // last used first
   std::map<std::string, bool> mixes_ranges_;  // by mechanism name
 };
 

@@ -16,7 +16,8 @@ namespace {
 
 /// The usual array's number of channels, known to the compiler; kAny stands for all others.
 constexpr int kUsual = 8, kAny = 0;
-constexpr double kSmallTurn_rad = 1.5;  // up to there a short series is right to 1e-9
+constexpr int kWide = 4;  // numbers of a vector
+constexpr double kSmallTurn_rad = 0.7;  // up to there a short series is right to 1e-9
 
 template <int kChannels>
 constexpr int packedSize(int channels) {
@@ -34,30 +35,18 @@ MMRADARTWIN_INLINE void addField(const float* from, double factor, int channels,
 }
 
 template <int kChannels>
-MMRADARTWIN_INLINE void turnBy(const double* phase, double turn, int channels, double* re, double* im) {
-  const int n = kChannels == kAny ? channels : kChannels;
-  double sine[kMaxChannels], cosine[kMaxChannels];
-  double most = 0;
-  for (int k = 0; k < n; ++k) most = std::max(most, std::abs(phase[k] * turn));
-  if (most < kSmallTurn_rad) {
-    for (int k = 0; k < n; ++k) {
-      const double x = phase[k] * turn, y = x * x;
-      sine[k] = x * (1 - y / 6 * (1 - y / 20 * (1 - y / 42 * (1 - y / 72 * (1 - y / 110 * (1 - y / 156))))));
-      cosine[k] = 1 - y / 2 * (1 - y / 12 * (1 - y / 30 * (1 - y / 56 * (1 - y / 90 * (1 - y / 132 * (1 - y / 182))))));
+MMRADARTWIN_INLINE void phasors(const double* apart, double most, double turn, int channels, double* re, double* im) {
+  const int size = packedSize<kChannels>(channels);
+  if (most * std::abs(turn) < kSmallTurn_rad) {
+    for (int i = 0; i < size; ++i) {
+      const double x = apart[i] * turn, y = x * x;
+      im[i] = x * (1 + y * (-1.0 / 6 + y * (1.0 / 120 + y * (-1.0 / 5040 + y * (1.0 / 362880)))));
+      re[i] = 1 + y * (-0.5 + y * (1.0 / 24 + y * (-1.0 / 720 + y * (1.0 / 40320 + y * (-1.0 / 3628800)))));
     }
   } else {
-    for (int k = 0; k < n; ++k) {
-      sine[k] = std::sin(phase[k] * turn);
-      cosine[k] = std::cos(phase[k] * turn);
-    }
-  }
-  for (int k = 1; k < n; ++k) {
-    double *a = re + k * (k + 1) / 2, *b = im + k * (k + 1) / 2;
-    for (int l = 0; l < k; ++l) {
-      const double c = cosine[k] * cosine[l] + sine[k] * sine[l], s = sine[k] * cosine[l] - cosine[k] * sine[l];
-      const double turned = a[l] * c - b[l] * s;
-      b[l] = a[l] * s + b[l] * c;
-      a[l] = turned;
+    for (int i = 0; i < size; ++i) {
+      im[i] = std::sin(apart[i] * turn);
+      re[i] = std::cos(apart[i] * turn);
     }
   }
 }
@@ -132,7 +121,7 @@ MMRADARTWIN_INLINE void whitenBy(const double (*re)[kMaxChannels], const double 
     for (int i = 0; i < n; ++i) {
       const int at = i >= c ? i * (i + 1) / 2 + c : c * (c + 1) / 2 + i;
       const double a = packed_re[at], b = i > c ? packed_im[at] : i == c ? 0 : -packed_im[at];
-      for (int k = 0; k < n; ++k) {
+      for (int k = i / kWide * kWide; k < n; ++k) {  // rows above are zero
         to_re[k] += re[i][k] * a - im[i][k] * b;
         to_im[k] += re[i][k] * b + im[i][k] * a;
       }
@@ -143,7 +132,7 @@ MMRADARTWIN_INLINE void whitenBy(const double (*re)[kMaxChannels], const double 
     for (int k = 0; k < n; ++k) sum_re[k] = sum_im[k] = 0;
     for (int j = 0; j <= l; ++j) {
       const double a = re[j][l], b = -im[j][l];
-      for (int k = 0; k < n; ++k) {
+      for (int k = l / kWide * kWide; k < n; ++k) {
         sum_re[k] += half_re[j][k] * a - half_im[j][k] * b;
         sum_im[k] += half_re[j][k] * b + half_im[j][k] * a;
       }
@@ -161,21 +150,68 @@ MMRADARTWIN_VECTORISED void addFieldTo(const float* from, double factor, int cha
   addField<kAny>(from, factor, channels, re, im);
 }
 
-MMRADARTWIN_VECTORISED void setTurnedTo(const float* const* fields, const double* factors, const double* phase,
-                                        double turn, int channels, double* re, double* im) {
-  const int size = channels * (channels + 1) / 2;
-  for (int i = 0; i < size; ++i) re[i] = im[i] = 0;
+MMRADARTWIN_VECTORISED void phasorsTo(const double* apart, double most, double turn, int channels, double* re,
+                                      double* im) {
+  if (channels == kUsual) return phasors<kUsual>(apart, most, turn, channels, re, im);
+  phasors<kAny>(apart, most, turn, channels, re, im);
+}
+
+template <int kChannels>
+MMRADARTWIN_INLINE void addTurned(const float* const* fields, const double* factors, const double* turn_re,
+                                  const double* turn_im, int channels, double* re, double* im) {
+  const int size = packedSize<kChannels>(channels);
+  alignas(64) double own_re[kMaxPacked], own_im[kMaxPacked];
+  for (int i = 0; i < size; ++i) own_re[i] = own_im[i] = 0;
   for (int f = 0; f < 3; ++f) {
-    if (fields[f] == nullptr || factors[f] == 0) continue;
-    if (channels == kUsual) {
-      addField<kUsual>(fields[f], factors[f], channels, re, im);
-    } else {
-      addField<kAny>(fields[f], factors[f], channels, re, im);
+    if (fields[f] != nullptr && factors[f] != 0) addField<kChannels>(fields[f], factors[f], channels, own_re, own_im);
+  }
+  for (int i = 0; i < size; ++i) {
+    re[i] += own_re[i] * turn_re[i] - own_im[i] * turn_im[i];
+    im[i] += own_re[i] * turn_im[i] + own_im[i] * turn_re[i];
+  }
+}
+
+MMRADARTWIN_VECTORISED void addTurnedTo(const float* const* fields, const double* factors, const double* turn_re,
+                                        const double* turn_im, int channels, double* re, double* im) {
+  if (channels == kUsual) return addTurned<kUsual>(fields, factors, turn_re, turn_im, channels, re, im);
+  addTurned<kAny>(fields, factors, turn_re, turn_im, channels, re, im);
+}
+
+/// Four columns beside each other: each number is read once for four products.
+MMRADARTWIN_VECTORISED void pairProductsTo(const double* v, int rows, int columns, double* to) {
+  for (int a = 0; a < columns; ++a) {
+    const double* x = v + a * rows;
+    int b = 0;
+    for (; b + 3 <= a; b += 4) {
+      const double *y0 = v + b * rows, *y1 = y0 + rows, *y2 = y1 + rows, *y3 = y2 + rows;
+      double s0[kWide] = {}, s1[kWide] = {}, s2[kWide] = {}, s3[kWide] = {};
+      int i = 0;
+      for (; i + kWide <= rows; i += kWide) {
+        for (int w = 0; w < kWide; ++w) {
+          s0[w] += x[i + w] * y0[i + w];
+          s1[w] += x[i + w] * y1[i + w];
+          s2[w] += x[i + w] * y2[i + w];
+          s3[w] += x[i + w] * y3[i + w];
+        }
+      }
+      for (; i < rows; ++i) {
+        s0[0] += x[i] * y0[i];
+        s1[0] += x[i] * y1[i];
+        s2[0] += x[i] * y2[i];
+        s3[0] += x[i] * y3[i];
+      }
+      double* at = to + a * columns + b;
+      at[0] = (s0[0] + s0[1]) + (s0[2] + s0[3]);
+      at[1] = (s1[0] + s1[1]) + (s1[2] + s1[3]);
+      at[2] = (s2[0] + s2[1]) + (s2[2] + s2[3]);
+      at[3] = (s3[0] + s3[1]) + (s3[2] + s3[3]);
+    }
+    for (; b <= a; ++b) {
+      double sum = 0;
+      for (int i = 0; i < rows; ++i) sum += x[i] * v[b * rows + i];
+      to[a * columns + b] = sum;
     }
   }
-  if (turn == 0) return;
-  if (channels == kUsual) return turnBy<kUsual>(phase, turn, channels, re, im);
-  turnBy<kAny>(phase, turn, channels, re, im);
 }
 
 MMRADARTWIN_VECTORISED bool invertFactorOf(const double* packed_re, const double* packed_im, int channels,
@@ -220,21 +256,54 @@ void PackedHermitian::add(const PackedHermitian& other, double factor) {
   }
 }
 
-void PackedHermitian::setTurned(const std::array<const std::complex<float>*, 3>& fields,
-                                const std::array<double, 3>& factors, const double* phase, double turn) {
-  const float* from[3] = {numbers(fields[0]), numbers(fields[1]), numbers(fields[2])};
-  setTurnedTo(from, factors.data(), phase, turn, channels, re.data(), im.data());
+double PackedHermitian::traceOfProduct(const std::complex<float>* field) const {
+  double all = 0, diagonals = 0;
+  if (field == nullptr) return 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(size()); ++i) {
+    all += re[i] * static_cast<double>(field[i].real()) + im[i] * static_cast<double>(field[i].imag());
+  }
+  for (int k = 0; k < channels; ++k) {
+    const std::size_t i = static_cast<std::size_t>(diagonal(k));
+    diagonals += re[i] * static_cast<double>(field[i].real());
+  }
+  return 2 * all - diagonals;
 }
 
-void PackedHermitian::differentiateTurn(const double* phase) {
+void PackedHermitian::addTurned(const std::array<const std::complex<float>*, 3>& fields,
+                                const std::array<double, 3>& factors, const PackedTurn& turn) {
+  if (turn.none) {
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+      if (fields[f] != nullptr && factors[f] != 0) add(fields[f], factors[f]);
+    }
+    return;
+  }
+  const float* from[3] = {numbers(fields[0]), numbers(fields[1]), numbers(fields[2])};
+  addTurnedTo(from, factors.data(), turn.re.data(), turn.im.data(), channels, re.data(), im.data());
+}
+
+void PackedHermitian::addTurnDerivative(const std::complex<float>* field, double factor, const PhasesApart& apart,
+                                        const PackedTurn& turn) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(size()); ++i) {
+    const double by = factor * apart.packed[i];
+    const double a = by * -static_cast<double>(field[i].imag()), b = by * static_cast<double>(field[i].real());
+    re[i] += turn.none ? a : a * turn.re[i] - b * turn.im[i];
+    im[i] += turn.none ? b : a * turn.im[i] + b * turn.re[i];
+  }
+}
+
+PhasesApart::PhasesApart(const std::vector<double>& phase) : channels(static_cast<int>(phase.size())) {
   std::size_t i = 0;
   for (int k = 0; k < channels; ++k) {
-    for (int l = 0; l <= k; ++l, ++i) {
-      const double by = phase[k] - phase[l], was = re[i];
-      re[i] = -by * im[i];
-      im[i] = by * was;
+    for (int l = 0; l <= k; ++l) {
+      packed[i] = phase[static_cast<std::size_t>(k)] - phase[static_cast<std::size_t>(l)];
+      most = std::max(most, std::abs(packed[i++]));
     }
   }
+}
+
+void PackedTurn::set(const PhasesApart& apart, double turn) {
+  none = turn == 0;
+  if (!none) phasorsTo(apart.packed.data(), apart.most, turn, apart.channels, re.data(), im.data());
 }
 
 double PackedHermitian::quadratic(const std::complex<double>* w) const {
@@ -270,6 +339,21 @@ void InverseFactor::apply(const std::complex<double>* y, std::complex<double>* t
   for (int k = 0; k < channels_; ++k) to[k] = {sum_re[k], sum_im[k]};
 }
 
+PackedHermitian InverseFactor::inverse() const {
+  PackedHermitian s(channels_);
+  std::size_t i = 0;
+  const std::size_t n = static_cast<std::size_t>(channels_);
+  for (std::size_t k = 0; k < n; ++k) {
+    for (std::size_t l = 0; l <= k; ++l, ++i) {
+      for (std::size_t j = k; j < n; ++j) {
+        s.re[i] += re_[k][j] * re_[l][j] + im_[k][j] * im_[l][j];
+        s.im[i] += re_[k][j] * im_[l][j] - im_[k][j] * re_[l][j];
+      }
+    }
+  }
+  return s;
+}
+
 void InverseFactor::whiten(const PackedHermitian& matrix, double* to) const {
   whitenTo(reinterpret_cast<const double(*)[kMaxChannels]>(re_.data()),
            reinterpret_cast<const double(*)[kMaxChannels]>(im_.data()), matrix.re.data(), matrix.im.data(), channels_,
@@ -281,5 +365,7 @@ double traceOfWhitened(const double* v, int channels) {
   for (int k = 0; k < channels; ++k) sum += v[k * k];
   return sum;
 }
+
+void pairProducts(const double* v, int rows, int columns, double* to) { pairProductsTo(v, rows, columns, to); }
 
 }  // namespace mmradartwin

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <complex>
+#include <vector>
 
 #include "bin_covariance.h"
 
@@ -9,6 +10,21 @@ namespace mmradartwin {
 
 constexpr int kMaxChannels = 16;
 constexpr int kMaxPacked = kMaxChannels * (kMaxChannels + 1) / 2;
+
+/// phase[k] - phase[l] of the channels' phases by the sine of a direction, in the same order as the matrices below.
+struct PhasesApart {
+  alignas(64) std::array<double, kMaxPacked> packed;
+  double most = 0;
+  int channels = 0;
+  explicit PhasesApart(const std::vector<double>& phase);
+};
+
+/// Turns such matrices: element (k, l) times exp(j (phase[k] - phase[l]) turn). Phases alone keep a matrix definite.
+struct PackedTurn {
+  alignas(64) std::array<double, kMaxPacked> re, im;
+  bool none = true;
+  void set(const PhasesApart& apart, double turn);
+};
 
 /// A Hermitian matrix of up to kMaxChannels rows: its lower triangle row by row as BinCovariance has it, in double
 /// precision, real and imaginary parts apart, so that sums of such matrices are loops over plain numbers. The
@@ -25,12 +41,14 @@ struct PackedHermitian {
   /// Adds a field of single precision times a factor.
   void add(const std::complex<float>* field, double factor);
   void add(const PackedHermitian& other, double factor);
-  /// The same of up to three fields (null: nothing), then turned: element (k, l) times exp(j (phase[k] - phase[l])
-  /// turn). Phases alone keep the matrix definite. Sets instead of adding to what stands here.
-  void setTurned(const std::array<const std::complex<float>*, 3>& fields, const std::array<double, 3>& factors,
-                 const double* phase, double turn);
-  /// Element (k, l) times j (phase[k] - phase[l]): the derivative of the above by the turn.
-  void differentiateTurn(const double* phase);
+  /// The same of up to three fields (null: nothing), turned.
+  void addTurned(const std::array<const std::complex<float>*, 3>& fields, const std::array<double, 3>& factors,
+                 const PackedTurn& turn);
+  /// Element (k, l) times j (phase[k] - phase[l]) more: the derivative of that by the turn.
+  void addTurnDerivative(const std::complex<float>* field, double factor, const PhasesApart& apart,
+                         const PackedTurn& turn);
+  /// Trace of this times a field; 0 of none.
+  double traceOfProduct(const std::complex<float>* field) const;
   /// w^H this w.
   double quadratic(const std::complex<double>* w) const;
 };
@@ -41,6 +59,8 @@ class InverseFactor {
   /// False where the matrix is not definite.
   bool compute(const PackedHermitian& matrix);
   double logDeterminant() const { return log_determinant_; }
+  /// The matrix' inverse.
+  PackedHermitian inverse() const;
   /// L^-1 y; its squared norm is y^H matrix^-1 y. y and to: [channels], may be the same.
   void apply(const std::complex<double>* y, std::complex<double>* to) const;
   /// L^-1 D L^-H as M^2 real numbers, so that tr(D~ E~) is a dot product: of row k its diagonal, then real and imaginary
@@ -57,5 +77,8 @@ class InverseFactor {
 
 /// Sum of the diagonal of what whiten() gives.
 double traceOfWhitened(const double* v, int channels);
+
+/// Products of all pairs of columns of v [rows][columns], column by column: to[a * columns + b] for b <= a.
+void pairProducts(const double* v, int rows, int columns, double* to);
 
 }  // namespace mmradartwin

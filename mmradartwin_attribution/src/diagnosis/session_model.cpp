@@ -16,6 +16,9 @@ constexpr double kTail = 4;  ///< degrees of freedom of the complex t
 // of its power.
 constexpr double kBeamShare = 3e-6;
 
+// A group that changes a cell's covariance by less than this share even where it moves so far has no slope there.
+constexpr double kNegligible = 3e-4, kMoved_m = 0.03;
+
 constexpr double kMostShape = 8;  ///< of the logarithm of clutter's power
 constexpr double kEnough = 0.1;   ///< nats: what a further step would bring is not worth it
 
@@ -33,6 +36,15 @@ enum Global {
 double turnOf(double yaw_rad, const std::complex<float>* power, const std::complex<float>* cosine) {
   if (yaw_rad == 0 || power == nullptr || cosine == nullptr || !(power[0].real() > 0)) return 0;
   return yaw_rad * cosine[0].real() / power[0].real();
+}
+
+/// 2 pi y_k / lambda of the virtual elements.
+std::vector<double> elementPhases(const RadarConfig& radar) {
+  std::vector<double> phases;
+  for (int k = 0; k < radar.channels(); ++k) {
+    phases.push_back(2 * M_PI / radar.wavelength_m() * radar.virtual_element_m(k).y());
+  }
+  return phases;
 }
 
 double groupGain(const EchoGroup& group, const Nuisance& nuisance) {
@@ -58,11 +70,8 @@ SessionModel::SessionModel(const ChannelData& data, int actors, const PoseAccura
       spread_(spread),
       channels_(data.radar.channels()),
       samples_(data.radar.samples_per_chirp),
-      size_(static_cast<std::size_t>(channels_) * (channels_ + 1) / 2) {
-  for (int k = 0; k < channels_; ++k) {
-    element_phase_.push_back(2 * M_PI / data.radar.wavelength_m() * data.radar.virtual_element_m(k).y());
-  }
-}
+      size_(static_cast<std::size_t>(channels_) * (channels_ + 1) / 2),
+      apart_(elementPhases(data.radar)) {}
 
 void SessionModel::addClutter(const Nuisance& n, int pose, int cell, double factor, PackedHermitian& to) const {
   const PoseChannels& p = data_.poses[pose];
@@ -105,20 +114,28 @@ void SessionModel::addApart(int cell, double power, PackedHermitian& to) const {
   }
 }
 
-PackedHermitian SessionModel::sigma(const PoseEchoes& echoes, const Nuisance& n, int pose, int cell) const {
+std::vector<SessionModel::GroupLevel> SessionModel::levels(const PoseEchoes& echoes, const Nuisance& n) const {
+  std::vector<GroupLevel> levels;
+  const double gain = std::exp(n.log_gain);
+  for (const auto& group : echoes.groups) levels.push_back({gain * groupGain(*group, n), groupShift_m(*group, n)});
+  return levels;
+}
+
+PackedHermitian SessionModel::sigma(const PoseEchoes& echoes, const std::vector<GroupLevel>& levels, const Nuisance& n,
+                                    int pose, int cell) const {
   const int at = isBeam(cell) ? cell - samples_ : cell;
-  PackedHermitian s(channels_), own(channels_);
+  PackedHermitian s(channels_);
+  PackedTurn turn;
   const double gain = std::exp(n.log_gain);
   const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
-  for (const auto& group : echoes.groups) {
-    const EchoGroup& g = *group;
+  for (std::size_t i = 0; i < echoes.groups.size(); ++i) {
+    const EchoGroup& g = *echoes.groups[i];
     const EchoGroup::Fields& f = isBeam(cell) ? g.beams : g.bins;
     const auto *power = f.power.at(at, size_), *bend = f.bend.at(at, size_);
     if (power == nullptr && bend == nullptr) continue;
-    const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
-    own.setTurned({power, f.shift.at(at, size_), bend}, {u, u * shift, u * (shift * shift + range_variance)},
-                  element_phase_.data(), turnOf(n.yaw_rad[pose], power, f.cosine.at(at, size_)));
-    s.add(own, 1);
+    const auto [u, shift] = levels[i];
+    turn.set(apart_, turnOf(n.yaw_rad[pose], power, f.cosine.at(at, size_)));
+    s.addTurned({power, f.shift.at(at, size_), bend}, {u, u * shift, u * (shift * shift + range_variance)}, turn);
   }
   const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
   if (const auto* p = graze.at(at, size_)) s.add(p, gain * std::exp(n.log_graze));
@@ -146,8 +163,9 @@ double SessionModel::poseLikelihood(const PoseEchoes& echoes, const Nuisance& n,
   double sum = 0;
   InverseFactor factor;
   std::array<std::complex<double>, kMaxChannels> y;
+  const std::vector<GroupLevel> level = levels(echoes, n);
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
-    if (!factor.compute(sigma(echoes, n, pose, cell))) return -1e9;
+    if (!factor.compute(sigma(echoes, level, n, pose, cell))) return -1e9;
     factor.apply(dataOf(pose, cell), y.data());
     double q = 0;
     for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
@@ -181,14 +199,16 @@ SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
     result[i].assign(static_cast<std::size_t>(cells(poses[i])) * size_, {});
     PackedHermitian own(channels_);
+    PackedTurn turn;
     for (const auto& group : echoes[i].groups) {
       const EchoGroup& g = *group;
       const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
       for (const EchoGroup::Fields* f : {&g.bins, &g.beams}) {
         for (int at = f->power.first; at < f->power.first + f->power.bins; ++at) {
           const auto* power = f->power.at(at, size_);
-          own.setTurned({power, f->shift.at(at, size_), f->bend.at(at, size_)}, {u, u * shift, u * shift * shift},
-                        element_phase_.data(), turnOf(n.yaw_rad[poses[i]], power, f->cosine.at(at, size_)));
+          turn.set(apart_, turnOf(n.yaw_rad[poses[i]], power, f->cosine.at(at, size_)));
+          own.setZero();
+          own.addTurned({power, f->shift.at(at, size_), f->bend.at(at, size_)}, {u, u * shift, u * shift * shift}, turn);
           const int cell = f == &g.beams ? samples_ + at : at;
           std::complex<float>* to = result[i].data() + static_cast<std::size_t>(cell) * size_;
           for (std::size_t j = 0; j < size_; ++j) {
@@ -201,7 +221,7 @@ SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes
   return result;
 }
 
-void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pose, PoseBasis& out) const {
+void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pose, bool keep, PoseBasis& out) const {
   const int globals = n.globals(), heading = globals;
   const int numbers = channels_ * channels_;
   out.score = Eigen::VectorXd::Zero(globals + 1);
@@ -212,7 +232,7 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
   const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
   // Only directions that do something in a bin enter its products.
   std::vector<int> active;
-  PackedHermitian own(channels_);
+  PackedTurn turn;
   std::vector<char> is_active(static_cast<std::size_t>(globals + 1));
   std::vector<PackedHermitian> raw(static_cast<std::size_t>(globals + 1), PackedHermitian(channels_));
   const auto touch = [&](int j) -> PackedHermitian& {
@@ -224,45 +244,41 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     return raw[j];
   };
   std::array<std::complex<double>, kMaxChannels> y;
+  const std::vector<GroupLevel> of_groups = levels(echoes, n);
+  std::vector<double> products(static_cast<std::size_t>((globals + 1) * (globals + 1)));
+  BinBasis basis;
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
     for (int j : active) is_active[j] = 0;
     active.clear();
     const int at = isBeam(cell) ? cell - samples_ : cell;
-    const PackedHermitian s = sigma(echoes, n, pose, cell);
-    BinBasis basis;
+    const PackedHermitian s = sigma(echoes, of_groups, n, pose, cell);
     basis.cell = cell;
     if (!basis.factor.compute(s)) continue;
     basis.factor.apply(dataOf(pose, cell), y.data());
     double q = 0;
     for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
     const double w = (channels_ + kTail) / (kTail + q);
+    const PackedHermitian inverse = basis.factor.inverse();
     out.log_likelihood += -basis.factor.logDeterminant() - (channels_ + kTail) * std::log1p(q / kTail);
 
-    for (const auto& group : echoes.groups) {
-      const EchoGroup& g = *group;
+    for (std::size_t i = 0; i < echoes.groups.size(); ++i) {
+      const EchoGroup& g = *echoes.groups[i];
       const EchoGroup::Fields& fields = isBeam(cell) ? g.beams : g.bins;
       const auto *power = fields.power.at(at, size_), *shift = fields.shift.at(at, size_),
                  *bend = fields.bend.at(at, size_);
       if (power == nullptr && bend == nullptr) continue;
       const auto* cosine = fields.cosine.at(at, size_);
-      const double f = gain * groupGain(g, n), moved = groupShift_m(g, n);
-      const double turn = turnOf(n.yaw_rad[pose], power, cosine);
-      const auto add = [&](int direction, const std::array<const std::complex<float>*, 3>& of,
-                           const std::array<double, 3>& by) {
-        own.setTurned(of, by, element_phase_.data(), turn);
-        touch(direction).add(own, 1);
-      };
+      const auto [f, moved] = of_groups[i];
+      const double share = inverse.traceOfProduct(power) + kMoved_m * kMoved_m * inverse.traceOfProduct(bend);
+      if (f * share < kNegligible) continue;
+      turn.set(apart_, turnOf(n.yaw_rad[pose], power, cosine));
       for (int actor : g.actors) {
         const int a = static_cast<int>(errorOf(actor, static_cast<std::size_t>(errors_)));
-        add(kActors + a, {power, shift, nullptr}, {f, f * moved, 0});
-        add(kActors + errors_ + a, {nullptr, shift, bend}, {0, f, 2 * f * moved});
+        touch(kActors + a).addTurned({power, shift, nullptr}, {f, f * moved, 0}, turn);
+        touch(kActors + errors_ + a).addTurned({nullptr, shift, bend}, {0, f, 2 * f * moved}, turn);
       }
-      if (bend != nullptr) add(kRange, {bend, nullptr, nullptr}, {f * range_variance, 0, 0});
-      if (cosine != nullptr) {
-        own.setTurned({cosine, nullptr, nullptr}, {f, 0, 0}, element_phase_.data(), turn);
-        own.differentiateTurn(element_phase_.data());
-        touch(heading).add(own, 1);
-      }
+      if (bend != nullptr) touch(kRange).addTurned({bend, nullptr, nullptr}, {f * range_variance, 0, 0}, turn);
+      if (cosine != nullptr) touch(heading).addTurnDerivative(cosine, f, apart_, turn);
     }
     const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
     if (const auto* p = graze.at(at, size_)) touch(kGraze).add(p, gain * std::exp(n.log_graze));
@@ -294,7 +310,8 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
       }
     }
     const Eigen::VectorXd score = basis.whitened.transpose() * basis.data;
-    const Eigen::MatrixXd products = basis.whitened.transpose() * basis.whitened;
+    const int count = static_cast<int>(active.size());
+    pairProducts(basis.whitened.data(), numbers, count, products.data());
     basis.traces.resize(static_cast<Eigen::Index>(active.size()));
     for (std::size_t a = 0; a < active.size(); ++a) {
       const Eigen::Index ia = static_cast<Eigen::Index>(a);
@@ -302,12 +319,12 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
       out.score[active[a]] += weight() * score[ia];
       for (std::size_t b = 0; b <= a; ++b) {
         const Eigen::Index ib = static_cast<Eigen::Index>(b);
-        const double v = weight() * informationOf(products(ia, ib), basis.traces[ia], basis.traces[ib]);
+        const double v = weight() * informationOf(products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
         out.information(active[a], active[b]) += v;
         if (a != b) out.information(active[b], active[a]) += v;
       }
     }
-    out.bins.push_back(std::move(basis));
+    if (keep) out.bins.push_back(basis);
   }
   out.log_likelihood *= weight();
 }
@@ -317,12 +334,12 @@ double SessionModel::informationOf(double product, double trace_a, double trace_
   return ((channels_ + kTail) * product - trace_a * trace_b) / (channels_ + kTail + 1);
 }
 
-Basis SessionModel::basis(const std::vector<PoseEchoes>& echoes, const Nuisance& n) const {
+Basis SessionModel::basis(const std::vector<PoseEchoes>& echoes, const Nuisance& n, bool further) const {
   Basis b;
   b.nuisance = n;
   b.poses.resize(echoes.size());
   tbb::parallel_for(std::size_t{0}, echoes.size(),
-                    [&](std::size_t i) { addBasis(echoes[i], n, static_cast<int>(i), b.poses[i]); });
+                    [&](std::size_t i) { addBasis(echoes[i], n, static_cast<int>(i), further, b.poses[i]); });
   return b;
 }
 
@@ -459,7 +476,7 @@ double SessionModel::fit(const std::vector<PoseEchoes>& echoes, Nuisance& nuisan
   std::vector<int> all(echoes.size());
   std::iota(all.begin(), all.end(), 0);
   for (int i = 0; i < iterations; ++i) {
-    const Scores s = scores(basis(echoes, nuisance), {}, all);
+    const Scores s = scores(basis(echoes, nuisance, false), {}, all);
     best = s.log_likelihood;
     const Eigen::VectorXd step = s.information.ldlt().solve(s.total);
     const double promised = 0.5 * s.total.dot(step);
@@ -524,7 +541,7 @@ Nuisance SessionModel::start(const std::vector<PoseEchoes>& echoes) const {
 
 SessionModel::Whitened SessionModel::whitened(const PoseEchoes& echoes, const Nuisance& n, int pose, int bin) const {
   Whitened w;
-  const PackedHermitian packed = sigma(echoes, n, pose, bin);
+  const PackedHermitian packed = sigma(echoes, levels(echoes, n), n, pose, bin);
   Eigen::MatrixXcd full(channels_, channels_);
   std::size_t i = 0;
   for (int k = 0; k < channels_; ++k) {

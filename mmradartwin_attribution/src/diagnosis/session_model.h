@@ -89,7 +89,8 @@ class SessionModel {
   /// Expected covariance of the echoes alone, with their gain and latents; echoes[i] are those of poses[i].
   SessionCovariance covariance(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
                                const std::vector<int>& poses) const;
-  Basis basis(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance) const;
+  /// further: what scores() needs of directions beside the globals is kept, too.
+  Basis basis(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance, bool further = true) const;
   /// Scores by the globals of Nuisance (in the order of its members) and by more directions: changes of covariance(),
   /// [poses named]. Poses that are not named do not count.
   Scores scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
@@ -127,12 +128,18 @@ class SessionModel {
   const std::complex<double>* dataOf(int pose, int cell) const;
   /// Adds power that no two channels share, and that a beam's bins share as their window has it.
   void addApart(int cell, double power, PackedHermitian& to) const;
-  PackedHermitian sigma(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, int cell) const;
+  /// Factor of a group's power, and one-way range that its actors add.
+  struct GroupLevel {
+    double gain, shift_m;
+  };
+  std::vector<GroupLevel> levels(const PoseEchoes& echoes, const Nuisance& nuisance) const;
+  PackedHermitian sigma(const PoseEchoes& echoes, const std::vector<GroupLevel>& levels, const Nuisance& nuisance,
+                        int pose, int cell) const;
   /// Clutter's covariance in a cell, times factor.
   void addClutter(const Nuisance& nuisance, int pose, int cell, double factor, PackedHermitian& to) const;
   double prior(const Nuisance& nuisance) const;
   double poseLikelihood(const PoseEchoes& echoes, const Nuisance& nuisance, int pose) const;
-  void addBasis(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, PoseBasis& out) const;
+  void addBasis(const PoseEchoes& echoes, const Nuisance& nuisance, int pose, bool keep, PoseBasis& out) const;
   double informationOf(double product, double trace_a, double trace_b) const;
 
   const ChannelData& data_;
@@ -141,7 +148,7 @@ class SessionModel {
   LatentSpread spread_;
   int channels_, samples_;
   std::size_t size_;
-  std::vector<double> element_phase_;
+  PhasesApart apart_;
 };
 
 }  // namespace mmradartwin
