@@ -192,6 +192,14 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
     const double y = o.along2_m + share * (m.e2.dot(image_before) - m.first2_m - o.along2_m);
     return y > -1e-6 && y < m.size2_m + 1e-6;
   };
+  // Where one actor alone is wanted: its facets, and those behind each side of each facet.
+  const bool all_wanted = limits.only_actor < 0;
+  std::vector<char> wanted(static_cast<std::size_t>(count), 1);
+  std::vector<int> few;
+  for (int i = 0; !all_wanted && i < count; ++i) {
+    wanted[i] = scene_.facets[static_cast<std::size_t>(reflectors_[i])].actor == limits.only_actor;
+    if (wanted[i]) few.push_back(i);
+  }
   const auto beyond = [this](int b, const Eigen::Vector3d& image) {
     const Mirror& m = mirrors_[static_cast<std::size_t>(b)];
     return m.normal.dot(image) - m.offset_m;
@@ -203,7 +211,7 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
     const Facet& fa = scene_.facets[reflectors_[a]];
     const double da = fa.planeDistance(p);
     if (std::abs(da) < kOnPlane_m) continue;
-    if (min_order <= 1 && solve(p, {fa.id}, rays, limits, path)) found.push_back(path);
+    if (min_order <= 1 && wanted[a] && solve(p, {fa.id}, rays, limits, path)) found.push_back(path);
     if (limits.max_order < 2) continue;
     const Eigen::Vector3d image1 = mirror(p, fa);
     const Beam beam(image1, corners_[a].point);
@@ -211,7 +219,7 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
       // Cheap tests first: few facets pass them where no third bounce follows.
       const double db = beyond(b, image1);
       if (b == a || std::abs(db) < kOnPlane_m) continue;
-      const bool last = min_order <= 2 && in_front[b] && meetsLast(b, db, image1);
+      const bool last = min_order <= 2 && (wanted[a] || wanted[b]) && in_front[b] && meetsLast(b, db, image1);
       if ((!last && limits.max_order < 3) || (on_side_.empty() && !faces(a, da > 0, b))) continue;
       if (!beam.meets(corners_[b].point)) continue;
       const Facet& fb = scene_.facets[reflectors_[b]];
@@ -219,9 +227,14 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
       if (limits.max_order < 3) continue;
       const Eigen::Vector3d image2 = mirror(image1, fb);
       // The way on from b stays on the side that it came from. A path runs both ways, so c is searched from a on.
-      const std::vector<int>& thirds = on_side_[static_cast<std::size_t>(2 * b + (db > 0))];
+      const bool any = wanted[a] || wanted[b];
+      const std::vector<int>& thirds = any ? on_side_[static_cast<std::size_t>(2 * b + (db > 0))] : few;
       for (auto third = std::lower_bound(thirds.begin(), thirds.end(), a); third != thirds.end(); ++third) {
         const int c = *third;
+        if (!any && !(sides_[static_cast<std::size_t>(b) * static_cast<std::size_t>(count) + static_cast<std::size_t>(c)] &
+                      (db > 0 ? 2 : 1))) {
+          continue;
+        }
         if (!in_front[c] || !meetsLast(c, beyond(c, image2), image2) || c == b) continue;
         const int fc = reflectors_[c];
         if (solve(p, {fa.id, fb.id, fc}, rays, limits, path)) found.push_back(path);

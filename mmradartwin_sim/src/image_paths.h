@@ -32,6 +32,7 @@ class ImageSearch {
   struct Limits {
     int max_order = 3;
     double max_length_m = 1e9;
+    int only_actor = -1;  ///< paths that meet this actor alone are found; -1: all are
     /// Directions (map, from the point outwards) in which the radar sends and receives; empty: all.
     std::function<bool(const Eigen::Vector3d&)> in_view;
     /// Half space of in_view, for pruning: unit vector, or zero.

@@ -10,6 +10,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/traced_session.h"
 #include "twin_impl.h"
+#include "view_cone.h"
 
 namespace mmradartwin {
 namespace {
@@ -30,6 +31,16 @@ std::string formatPoint(const Eigen::Vector3d& p) {
 bool isSame(const Actor& a, const Actor& b) {
   return a.present == b.present && a.vertices == b.vertices && a.material_tag == b.material_tag &&
          a.occludes == b.occludes && a.material.scattering_coefficient == b.material.scattering_coefficient;
+}
+
+/// True where something stands in the way of a path from the radar and back.
+bool hides(const RayCaster& screen, const Eigen::Vector3d& radar, const PathRecord& r) {
+  Eigen::Vector3d from = radar;
+  for (const Eigen::Vector3d& v : r.vertices) {
+    if (!screen.visible(from, v)) return true;
+    from = v;
+  }
+  return r.vertices.size() > 1 && !screen.visible(from, radar);  // from a single point back on the way there
 }
 
 constexpr double kFollows_s = 0.2;  // poses further apart say nothing about the time between them
@@ -140,6 +151,21 @@ std::optional<SceneChange> Twin::changesFrom(const Twin& other) const {
   return change;
 }
 
+std::optional<Twin::PlacedActor> Twin::placesOneActor() const {
+  if (!impl_->edited || impl_->movesRadar() || !impl_->edited->screens.empty()) return std::nullopt;
+  const std::vector<Actor>&before = impl_->scene.actors, &after = impl_->edited->actors;
+  std::optional<PlacedActor> placed;
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    const bool added = i >= before.size();
+    if (!added && isSame(before[i], after[i])) continue;
+    Actor moved = after[i];
+    if (!added) moved.vertices = before[i].vertices;
+    if (placed || !after[i].present || (!added && !isSame(before[i], moved))) return std::nullopt;
+    placed = {added ? -1 : static_cast<int>(i), after[i].occludes};
+  }
+  return placed;
+}
+
 bool Twin::opensActors() const {
   if (!impl_->edited) return false;
   const std::vector<Actor>&before = impl_->scene.actors, &after = impl_->edited->actors;
@@ -154,14 +180,7 @@ void Twin::removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRe
                         std::int64_t stamp_ns) const {
   if (!impl_->screens) return;
   const Eigen::Vector3d radar = impl_->modelPose(T_map_radar, stamp_ns).translation();
-  const auto hidden = [&](const PathRecord& r) {
-    Eigen::Vector3d from = radar;
-    for (const Eigen::Vector3d& v : r.vertices) {
-      if (!impl_->screens->visible(from, v)) return true;
-      from = v;
-    }
-    return !r.vertices.empty() && !impl_->screens->visible(from, radar);
-  };
+  const auto hidden = [&](const PathRecord& r) { return hides(*impl_->screens, radar, r); };
   records.erase(std::remove_if(records.begin(), records.end(), hidden), records.end());
 }
 
@@ -319,6 +338,33 @@ std::vector<PathRecord> Twin::retrace(std::size_t mechanism, const Eigen::Isomet
         touched.count(cells.cellOf(r.facets[0], r.vertices[0])) == 0) {
       records.push_back(r);
     }
+  }
+  return records;
+}
+
+std::vector<PathRecord> Twin::traceAround(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
+                                          const CloudCells& cloud, const PlacedActor& placed,
+                                          const std::vector<PathRecord>& without) const {
+  const Mechanism& wanted = *impl_->as_described[mechanism];
+  if (!wanted.looksAtPathsOf().empty()) return trace(mechanism, T_map_radar, &cloud);
+  PoseContext c = impl_->context(T_map_radar);
+  impl_->refuseUnusablePose(c);
+  const Scene& scene = impl_->model();
+  c.only_actor = placed.actor >= 0 ? placed.actor : static_cast<int>(scene.actors.size()) - 1;
+  c.cloud = &cloud;
+  std::vector<PathRecord> records;
+  wanted.addPaths(c, records);
+  const auto others = [&](const PathRecord& r) {
+    return std::find(r.actors.begin(), r.actors.end(), c.only_actor) == r.actors.end();
+  };
+  records.erase(std::remove_if(records.begin(), records.end(), others), records.end());
+  impl_->nameAddedActors(records, 0);
+  const Eigen::Vector3d radar = c.T_map_radar.translation();
+  const ViewCones cones(radar, {scene.actors[static_cast<std::size_t>(c.only_actor)].bounds});
+  const RayCaster& screen = impl_->alone(c.only_actor);
+  for (const PathRecord& r : without) {
+    const bool beside = r.vertices.size() == 1 && !cones.mayMeet(r.vertices[0] - radar);
+    if (beside || !placed.hides || !hides(screen, radar, r)) records.push_back(r);
   }
   return records;
 }

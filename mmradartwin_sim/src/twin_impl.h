@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "mmradartwin_sim/twin.h"
@@ -26,6 +27,8 @@ struct Twin::Impl {
   std::vector<const Mechanism*> as_described;          // the same by Twin::description()
   double strongest = -1;                               // of the session, where it is known
   mutable std::atomic<double> strongest_so_far{0};
+  mutable std::once_flag alone_made;
+  mutable std::unique_ptr<RayCaster> alone_rays;
   bool has_tone_gain = false, has_receive = false, has_distort = false, has_replicas = false, needs_strongest = false;
   bool has_chirp_paths = false, has_modulation = false, has_chirp_stage = false, has_digitise = false,
        has_transport = false;
@@ -39,10 +42,22 @@ struct Twin::Impl {
   void addPaths(const Mechanism& mechanism, const PoseContext& c, std::vector<PathRecord>& records) const {
     const std::size_t known = records.size();
     mechanism.addPaths(c, records);
+    nameAddedActors(records, known);
+  }
+  void nameAddedActors(std::vector<PathRecord>& records, std::size_t from) const {
     if (model().actors.size() == scene.actors.size()) return;
-    for (std::size_t i = known; i < records.size(); ++i) {
+    for (std::size_t i = from; i < records.size(); ++i) {
       for (int& actor : records[i].actors) actor = actor < static_cast<int>(scene.actors.size()) ? actor : -1;
     }
+  }
+  /// Rays that meet one actor of model() alone; made at the first call.
+  const RayCaster& alone(int actor) const {
+    std::call_once(alone_made, [&] {
+      Scene only;
+      only.screens = {model().actors[static_cast<std::size_t>(actor)]};
+      alone_rays = std::make_unique<RayCaster>(only);
+    });
+    return *alone_rays;
   }
 
   const Scene& model() const { return edited ? *edited : scene; }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -264,6 +265,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   }
   const auto better = [](const Screened& a, const Screened& b) { return a.promised > b.promised; };
   std::vector<Screened> screened;
+  std::map<std::string, std::size_t> looked_at;  // poses
   for (std::size_t i = 0; i < all.size(); ++i) {
     report("trying " + all[i].label(), static_cast<double>(i) / static_cast<double>(all.size()));
     const bool of_actor = twin_.scene().actorIndex(all[i].subject) >= 0;
@@ -279,6 +281,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     if (costly && !(s.promised > 0)) no_use_.insert(all[i].label());
     // What chance promises: half a nat per number on the poses looked at, scaled up like the rest.
     s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
+    looked_at[s.hypothesis.label()] = poses.size();
     screened.push_back(std::move(s));
     source_->settle(mechanisms_);
   }
@@ -293,9 +296,12 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     report("looking again at " + s.hypothesis.label(), 0);
     const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
     const std::vector<int> poses = spread(numbers > 3 ? kScreenPoses : data_.poses.size());
-    s = look(s.hypothesis, poses);
-    s.promised -= numbers + 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
-    source_->settle(mechanisms_);
+    if (looked_at[s.hypothesis.label()] < poses.size()) {
+      s = look(s.hypothesis, poses);
+      s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
+      source_->settle(mechanisms_);
+    }
+    s.promised -= numbers;
   }
   // A hypothesis that something else points at: with the start that it gives.
   const auto suggest = [&screened](Screened s) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "packed_hermitian.h"
+
 namespace mmradartwin {
 namespace {
 
@@ -112,9 +114,13 @@ double EchoCollector::addedRange_m(const PerInteraction<int>& actors) const {
   return sum;
 }
 
-EchoGroup& EchoCollector::group(const PathRecord& record) {
+const PerInteraction<int>& actorsOf(const PathRecord& record) {
   static const PerInteraction<int> lacking{-1};  // a bounce of no actor
-  const PerInteraction<int>& actors = record.actors.empty() && record.bounces > 0 ? lacking : record.actors;
+  return record.actors.empty() && record.bounces > 0 ? lacking : record.actors;
+}
+
+EchoGroup& EchoCollector::group(const PathRecord& record) {
+  const PerInteraction<int>& actors = actorsOf(record);
   for (EchoGroup* g : open_) {
     if (g->actors == actors) return *g;
   }
@@ -148,11 +154,64 @@ void EchoCollector::outer(const std::complex<double>* c, double cosine,
   }
 }
 
-void EchoCollector::add(const PathRecord& record, double share) {
+namespace {
+
+/// Fields of a group while its paths are added: [bin][field][real and imaginary parts], so that a path's outer product
+/// is read once for all of them. Kept from group to group, zero where nothing was added.
+struct OpenFields {
+  std::vector<float> sums;
+  std::size_t stride = 0;  // of a bin
+  int first = 0, last = -1;
+
+  void open(std::size_t size, int bins) {
+    stride = 2 * size * kFields;
+    if (sums.size() != stride * static_cast<std::size_t>(bins)) sums.assign(stride * static_cast<std::size_t>(bins), 0);
+    first = bins;
+    last = -1;
+  }
+  void add(int bin, const std::complex<float>* packed, std::size_t size, const float* factors) {
+    first = std::min(first, bin);
+    last = std::max(last, bin);
+    addMultiples(packed, size, factors, kFields, sums.data() + static_cast<std::size_t>(bin) * stride);
+  }
+  void close(std::size_t size, const std::array<BinCovariance*, 4>& to) {
+    if (last < first) return;
+    for (std::size_t f = 0; f < to.size(); ++f) {
+      BinCovariance& field = *to[f];
+      field.first = first;
+      field.bins = last + 1 - first;
+      field.packed.reserve(static_cast<std::size_t>(field.bins) * size);
+      for (int bin = first; bin <= last; ++bin) {
+        const float* from = sums.data() + static_cast<std::size_t>(bin) * stride + 2 * size * f;
+        const auto* own = reinterpret_cast<const std::complex<float>*>(from);
+        field.packed.insert(field.packed.end(), own, own + size);
+      }
+    }
+    std::fill(sums.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(first) * stride),
+              sums.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(last + 1) * stride), 0.0f);
+  }
+  static constexpr std::size_t kFields = 4;
+};
+
+thread_local OpenFields open_fields;
+
+}  // namespace
+
+std::shared_ptr<const EchoGroup> EchoCollector::addTones(const std::vector<const PathRecord*>& records,
+                                                         double strongest) {
+  open_.clear();
+  EchoGroup& g = group(*records.front());
+  open_fields.open(size_, samples_);
+  for (const PathRecord* r : records) addTone(*r, r->amplitude * r->amplitude / strongest, g);
+  open_fields.close(size_, {&g.bins.power, &g.bins.shift, &g.bins.bend, &g.bins.cosine});
+  open_.clear();
+  return groups_.back();
+}
+
+void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g) {
   const bool weak = share < kWeak;
-  EchoGroup& g = group(record);
   const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + g.added_range_m) / bin_m_;
-  std::vector<std::complex<float>> packed;
+  thread_local std::vector<std::complex<float>> packed;
   outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error drowns in the others
   const bool strong = share >= kStrong;
   const int reach = weak ? kLobe : strong ? std::min(kFarSkirt, samples_ / 2 - 1) : kSkirt;
@@ -162,17 +221,14 @@ void EchoCollector::add(const PathRecord& record, double share) {
   const bool around = strong && (middle - reach < 0 || middle + reach > samples_ - 1);
   const int low = around ? 0 : std::max(0, middle - reach),
             high = around ? samples_ - 1 : std::min(samples_ - 1, middle + reach);
-  EchoGroup::Fields& f = g.bins;
-  for (BinCovariance* field : {&f.power, &f.shift, &f.bend, &f.cosine}) cover(*field, low, high, size_);
   for (int r = middle - reach; r <= middle + reach; ++r) {
     if (!around && (r < low || r > high)) continue;
     const int bin = (r + samples_) % samples_;
     const auto [w, per_bin] = kHann.at(r - place);
     const double slope = -per_bin / bin_m_;
-    accumulate(f.power, bin, w * w, packed);
-    accumulate(f.shift, bin, 2 * w * slope, packed);
-    accumulate(f.bend, bin, slope * slope, packed);
-    accumulate(f.cosine, bin, w * w * cosine, packed);
+    const float factors[OpenFields::kFields] = {static_cast<float>(w * w), static_cast<float>(2 * w * slope),
+                                                static_cast<float>(slope * slope), static_cast<float>(w * w * cosine)};
+    open_fields.add(bin, packed.data(), size_, factors);
   }
   addToBeams(record.c.data(), place, 1, weak ? kOffBeamWeak : kOffBeam, &g.beams.power, &g.beams.shift, &g.beams.bend);
 }

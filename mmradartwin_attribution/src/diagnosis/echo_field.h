@@ -40,6 +40,9 @@ inline std::size_t errorOf(int actor, std::size_t errors) {
   return actor < 0 ? errors - 1 : std::min(static_cast<std::size_t>(actor), errors - 1);
 }
 
+/// What a path's group goes by: its actors, -1 where it bounces off none.
+const PerInteraction<int>& actorsOf(const PathRecord& record);
+
 /// Collects paths into groups.
 class EchoCollector {
  public:
@@ -48,9 +51,9 @@ class EchoCollector {
   /// taken to first order, good to some 2 cm.
   EchoCollector(const RadarConfig& radar, double angle_error_rad, const std::vector<EchoBeam>& beams,
                 const std::vector<double>& actor_range_m);
-  /// A path as its tone stands on the channels. share: of the pose's strongest path's power; of a weak one only the
-  /// main lobe counts.
-  void add(const PathRecord& record, double share);
+  /// Paths that meet the same actors, as their tones stand on the channels; of a weak one only the main lobe counts.
+  /// strongest: power of the pose's strongest path. The group is the last one.
+  std::shared_ptr<const EchoGroup> addTones(const std::vector<const PathRecord*>& records, double strongest);
   /// A path whose response the receiver has changed: y [M][N] instead of the tone, its actors' added range already in
   /// it, and its derivative by the one-way range, per metre. Actors and direction are the record's.
   void add(const PathRecord& record, const Eigen::MatrixXcd& y, const Eigen::MatrixXcd& slope);
@@ -69,6 +72,7 @@ class EchoCollector {
 
  private:
   EchoGroup& group(const PathRecord& record);
+  void addTone(const PathRecord& record, double share, EchoGroup& group);
   void outer(const std::complex<double>* c, double cosine, std::vector<std::complex<float>>& packed) const;
 
   /// Adds factor |b^H c|^2 times outer products of the responses over a beam's bins; null where not wanted.

@@ -131,18 +131,23 @@ NamedParameters defaultMechanism(const std::string& name) {
 EchoSource::EchoSource(const Twin& base, const ChannelData& data, const PoseAccuracy& accuracy)
     : base_(base), data_(data), accuracy_(accuracy) {}
 
-EchoSource::Geometry EchoSource::geometryAfter(const NamedParameters& mechanism) {
+const EchoSource::Edit& EchoSource::editOf(const NamedParameters& mechanism) {
   const std::string key = tracedKey(mechanism);
-  const auto at = geometry_.find(key);
-  if (at != geometry_.end()) return at->second;
+  const auto at = edits_.find(key);
+  if (at != edits_.end()) return at->second;
   const Twin twin = base_.changed({mechanism});
-  return geometry_[key] = twin.addsScreensAlone() ? Geometry::kMoreScreens
-                          : twin.altersGeometry() ? Geometry::kOther
-                                                  : Geometry::kSame;
+  const Geometry geometry = twin.addsScreensAlone() ? Geometry::kMoreScreens
+                            : twin.altersGeometry() ? Geometry::kOther
+                                                    : Geometry::kSame;
+  return edits_[key] = {geometry, twin.placesOneActor()};
+}
+
+bool EchoSource::addsToOthers(const Edit& edit) {
+  return edit.geometry == Geometry::kMoreScreens || edit.placed.has_value();
 }
 
 bool EchoSource::altersGeometry(const NamedParameters& mechanism) {
-  return geometryAfter(mechanism) != Geometry::kSame;
+  return editOf(mechanism).geometry != Geometry::kSame;
 }
 
 bool EchoSource::mixesRanges(const NamedParameters& mechanism) {
@@ -174,6 +179,10 @@ std::vector<NamedParameters> EchoSource::geometryOf(const std::vector<NamedParam
   for (const NamedParameters& m : mechanisms) {
     if (altersGeometry(m)) geometry.push_back(m);
   }
+  // What is found around an actor that was placed follows from what is found without it: those come last, whatever was
+  // tried last, so that the same edits always make the same paths.
+  std::stable_partition(geometry.begin(), geometry.end(),
+                        [this](const NamedParameters& m) { return !addsToOthers(editOf(m)); });
   return geometry;
 }
 
@@ -208,11 +217,16 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
   // Without the last edit, where that is not the mechanism's own.
   const Traced* before = nullptr;
   std::optional<SceneChange> change;
-  const bool only_hides = !geometry.empty() && geometryAfter(geometry.back()) == Geometry::kMoreScreens;
-  if (!geometry.empty() && tracedKey(geometry.back()) != key) {
-    const std::vector<NamedParameters> rest(geometry.begin(), geometry.end() - 1);
+  const Edit edit = geometry.empty() || tracedKey(geometry.back()) == key ? Edit() : editOf(geometry.back());
+  if (edit.geometry != Geometry::kSame) {
+    std::vector<NamedParameters> rest(geometry.begin(), geometry.end() - 1);
+    if (edit.placed && edit.placed->actor >= 0) {
+      NamedParameters absent = defaultMechanism("actor_absent");
+      absent.values.set("actor", base_.scene().actors[static_cast<std::size_t>(edit.placed->actor)].name);
+      rest.push_back(std::move(absent));
+    }
     const auto known = cache_.find(keyOf(rest) + behind);
-    if (only_hides) {
+    if (addsToOthers(edit)) {
       before = &traced(rest, mechanism, mechanisms, missing);
     } else if (known != cache_.end()) {
       known->second.used = calls_;
@@ -239,9 +253,12 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
     }
     Paths paths;
     try {
-      if (known && only_hides) {  // paths without it, less those that it stands in the way of
+      if (known && edit.geometry == Geometry::kMoreScreens) {
+        // What only hides needs no new trace: paths without it, less those that it stands in the way of.
         paths = *known;
         twin->removeHidden(T, paths);
+      } else if (known && edit.placed) {
+        paths = twin->traceAround(wanted, T, cells, *edit.placed, *known);
       } else {
         paths = known && change && !opens ? twin->retrace(wanted, T, cells, *change, *known)
                                           : twin->trace(wanted, T, &cells);
@@ -384,7 +401,7 @@ EchoShift EchoSource::shift(const std::vector<NamedParameters>& mechanisms, cons
 void EchoSource::addGroups(std::size_t pose, const std::vector<PathRecord>& records, double strongest,
                            EchoCollector& to) {
   std::map<PerInteraction<int>, std::vector<const PathRecord*>> groups;
-  for (const PathRecord& r : records) groups[r.actors].push_back(&r);
+  for (const PathRecord& r : records) groups[actorsOf(r)].push_back(&r);
   for (const auto& [actors, members] : groups) {
     std::size_t signature = 0;
     const auto sign = [&](double v) { boost::hash_combine(signature, v); };
@@ -394,8 +411,7 @@ void EchoSource::addGroups(std::size_t pose, const std::vector<PathRecord>& reco
     std::array<Kept, 2>& kept = kept_[pose][actors];
     if (kept[1].group && kept[1].signature == signature) std::swap(kept[0], kept[1]);
     if (!kept[0].group || kept[0].signature != signature) {
-      for (const PathRecord* r : members) to.add(*r, r->amplitude * r->amplitude / strongest);
-      (kept[0].group ? kept[1] : kept[0]) = {signature, to.finishGroup()};
+      (kept[0].group ? kept[1] : kept[0]) = {signature, to.addTones(members, strongest)};
     } else {
       to.add(kept[0].group);
     }

@@ -121,8 +121,14 @@ class EchoSource {
   std::vector<PoseEchoes> graze_;              // by pose; nothing but graze
   std::vector<std::string> settled_;
   enum class Geometry { kSame, kMoreScreens, kOther };
-  Geometry geometryAfter(const NamedParameters& mechanism);
-  std::map<std::string, Geometry> geometry_;         // by mechanism text
+  struct Edit {
+    Geometry geometry = Geometry::kSame;
+    std::optional<Twin::PlacedActor> placed = {};
+  };
+  /// True where it only puts something beside paths that are known without it.
+  static bool addsToOthers(const Edit& edit);
+  const Edit& editOf(const NamedParameters& mechanism);
+  std::map<std::string, Edit> edits_;                                       // by mechanism text
   std::vector<std::pair<std::string, std::shared_ptr<const Twin>>> twins_;  // last used first
   std::map<std::string, bool> mixes_ranges_;  // by mechanism name
 };

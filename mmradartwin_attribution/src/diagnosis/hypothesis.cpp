@@ -30,6 +30,14 @@ bool isPresence(const std::vector<ParameterSpec>& specs) {
   });
 }
 
+/// False of what lies: floors, ceilings, table tops reflect and scatter nothing (DESIGN section 4).
+bool takesPart(const Scene& scene, const Actor& actor) {
+  return std::any_of(actor.facets.begin(), actor.facets.end(), [&](int id) {
+    const Facet& f = scene.facets[static_cast<std::size_t>(id)];
+    return f.present && f.reflects;
+  });
+}
+
 double mirrorArea_m2(const Scene& scene, const Actor& actor) {
   double largest = 0;
   for (int id : actor.facets) {
@@ -64,7 +72,7 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
   }
   if (actor) {
     for (const Actor& a : scene.actors) {
-      if (a.present) with("actor", a.name, a.name);
+      if (a.present && takesPart(scene, a)) with("actor", a.name, a.name);
     }
   }
   if (spec("walls") != specs.end()) {

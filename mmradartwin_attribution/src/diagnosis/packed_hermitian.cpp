@@ -227,6 +227,15 @@ MMRADARTWIN_VECTORISED void whitenTo(const double (*re)[kMaxChannels], const dou
   whitenBy<kAny>(re, im, packed_re, packed_im, channels, v);
 }
 
+MMRADARTWIN_VECTORISED void addMultiplesTo(const float* field, std::size_t numbers, const float* factors,
+                                           std::size_t count, float* to) {
+  for (std::size_t f = 0; f < count; ++f) {
+    const float factor = factors[f];
+    float* sum = to + f * numbers;
+    for (std::size_t i = 0; i < numbers; ++i) sum[i] += factor * field[i];
+  }
+}
+
 const float* numbers(const std::complex<float>* field) { return reinterpret_cast<const float*>(field); }
 
 }  // namespace
@@ -364,6 +373,11 @@ double traceOfWhitened(const double* v, int channels) {
   double sum = 0;
   for (int k = 0; k < channels; ++k) sum += v[k * k];
   return sum;
+}
+
+void addMultiples(const std::complex<float>* field, std::size_t size, const float* factors, std::size_t count,
+                  float* to) {
+  addMultiplesTo(numbers(field), 2 * size, factors, count, to);
 }
 
 void pairProducts(const double* v, int rows, int columns, double* to) { pairProductsTo(v, rows, columns, to); }

@@ -115,6 +115,8 @@ struct PoseContext {
   /// Where the pose's paths are known but for what a change touches; else null (Mechanism::tracesChanges).
   const SceneChange* change = nullptr;
   const CloudCells* cloud = nullptr;  ///< null: every scatter point is a path
+  /// Paths that meet this actor (index in `scene`) are wanted alone; others that are added are thrown away. -1: all are.
+  int only_actor = -1;
 };
 
 /// One chirp of one frame of a pose, for what differs from chirp to chirp (DESIGN section 3: chirps come as

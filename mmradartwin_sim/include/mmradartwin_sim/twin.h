@@ -94,6 +94,12 @@ class Twin {
   /// What another twin of the same scene has otherwise: its actors, and bounds of where they are in both; of what one
   /// of them put into the room the bounds alone. Nothing where mechanisms have the radar elsewhere.
   std::optional<SceneChange> changesFrom(const Twin& other) const;
+  /// Where all that the edits do is that one actor stands elsewhere, or that they put one there: that one.
+  struct PlacedActor {
+    int actor;   ///< in scene(); -1 where they put it there
+    bool hides;  ///< what is behind it
+  };
+  std::optional<PlacedActor> placesOneActor() const;
   /// True where an edit lets rays through what occludes in scene().
   bool opensActors() const;
   /// True where all that the edits add are screens (things that hide what is behind them): its paths are those of the
@@ -120,6 +126,11 @@ class Twin {
   /// The same where those of another twin are known, from which this one differs by a change.
   std::vector<PathRecord> retrace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar, const CloudCells& cloud,
                                   const SceneChange& change, const std::vector<PathRecord>& known) const;
+  /// The same where those are known of a twin without the actor that the last edit places: all that it does not hide,
+  /// and those that meet it.
+  std::vector<PathRecord> traceAround(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
+                                      const CloudCells& cloud, const PlacedActor& placed,
+                                      const std::vector<PathRecord>& without) const;
   Simulation weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                    std::int64_t stamp_ns = 0) const;
   /// The paths that weigh() makes a grid of: weighted, with leakage, and as the receiver's filters leave them.

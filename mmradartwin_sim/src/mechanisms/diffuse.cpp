@@ -98,6 +98,7 @@ class Diffuse : public Mechanism {
       if (touched && touches(point)) touched->insert(context.cloud->cellOf(point.facet, point.position));
     }
     for (const ScatterPoint& point : points_) {
+      if (context.only_actor >= 0 && context.scene.facets[point.facet].actor != context.only_actor) continue;
       const Eigen::Vector3d way = point.position - elements.p;
       const double r2 = way.squaredNorm();
       if (r2 > max2 || r2 < 1e-6) continue;

@@ -66,15 +66,24 @@ class Specular : public Mechanism {
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
     if (max_bounces_ < 1) return;
     const ElementsInMap elements(context);
-    for (int id : search_->reflectors()) addFirstOrder(context, elements, context.scene.facets[id], records);
-    for (std::size_t i = 0; i < context.scene.curved.size(); ++i)
-      addCurved(context, elements, static_cast<int>(i), records);
+    const int only = context.only_actor;
+    for (int id : search_->reflectors()) {
+      if (only < 0 || context.scene.facets[id].actor == only) {
+        addFirstOrder(context, elements, context.scene.facets[id], records);
+      }
+    }
+    for (std::size_t i = 0; i < context.scene.curved.size(); ++i) {
+      if (only < 0 || context.scene.curved[i].actor == only) {
+        addCurved(context, elements, static_cast<int>(i), records);
+      }
+    }
     if (max_bounces_ < 2) return;
     ImageSearch::Limits limits;
     limits.max_order = exhaustive_;
     limits.max_length_m = 2 * context.max_range_m;
     limits.forward = context.T_map_radar.linear().col(0);
     const Eigen::Matrix3d to_radar = context.T_map_radar.linear().transpose();
+    limits.only_actor = only;
     limits.in_view = [&](const Eigen::Vector3d& d) { return context.inFieldOfView(to_radar * d); };
     if (exhaustive_ >= 2) {
       for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2))
