@@ -13,7 +13,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/scene.h"
-#include "ply_check.h"
+#include "ply_reader.h"
 
 namespace mmradartwin {
 namespace {
@@ -32,8 +32,12 @@ struct FloatHash {
   }
 };
 
-/// assimp keeps single precision; an OBJ file's own digits are looked up by the float they round to.
+/// assimp keeps single precision; an OBJ or PLY file's own digits are looked up by the float they round to.
 using FullPrecision = std::unordered_map<std::array<float, 3>, Eigen::Vector3d, FloatHash>;
+
+void keep(const Eigen::Vector3d& v, FullPrecision& exact) {
+  exact.emplace(std::array<float, 3>{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])}, v);
+}
 
 FullPrecision readObjVertices(const std::string& file) {
   FullPrecision exact;
@@ -50,10 +54,7 @@ FullPrecision readObjVertices(const std::string& file) {
       good = end != at;
       at = end;
     }
-    if (good) {
-      exact.emplace(std::array<float, 3>{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])},
-                    v);
-    }
+    if (good) keep(v, exact);
   }
   return exact;
 }
@@ -84,10 +85,9 @@ std::string lowerExtension(const std::string& file) {
 
 class Collector {
  public:
-  Collector(const std::string& file, const aiScene& scene)
-      : file_(file), scene_(scene), extension_(lowerExtension(file)) {
+  Collector(const std::string& file, const aiScene& scene, FullPrecision exact)
+      : file_(file), scene_(scene), extension_(lowerExtension(file)), exact_(std::move(exact)) {
     stem_ = std::filesystem::path(file).stem().string();
-    if (extension_ == ".obj") exact_ = readObjVertices(file);
     // glTF is y-up by its specification; the others are taken as they are.
     if (extension_ == ".gltf" || extension_ == ".glb")
       up_ = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
@@ -186,16 +186,27 @@ class Collector {
 std::vector<Actor> loadMesh(const std::string& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) throw InputError(file + ": no such mesh file");
-  if (lowerExtension(file) == ".ply") checkPly(file);
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_LINE | aiPrimitiveType_POINT);
-  const aiScene* scene = importer.ReadFile(file, aiProcess_Triangulate | aiProcess_SortByPType);
+  const unsigned steps = aiProcess_Triangulate | aiProcess_SortByPType;
+  const std::string extension = lowerExtension(file);
+  FullPrecision exact;
+  const aiScene* scene = nullptr;
+  if (extension == ".ply") {
+    const PlyMesh mesh = readPly(file);
+    for (const Eigen::Vector3d& v : mesh.vertices) keep(v, exact);
+    const std::string text = mesh.toObj();
+    scene = importer.ReadFileFromMemory(text.data(), text.size(), steps, "obj");
+  } else {
+    if (extension == ".obj") exact = readObjVertices(file);
+    scene = importer.ReadFile(file, steps);
+  }
   if (!scene || !scene->mRootNode) {
     std::string why = importer.GetErrorString();
     std::replace(why.begin(), why.end(), '\n', ' ');
     throw InputError(file + ": cannot be read as a mesh (" + why + "); OBJ, PLY, STL and glTF are known");
   }
-  std::vector<Actor> actors = Collector(file, *scene).collect();
+  std::vector<Actor> actors = Collector(file, *scene, std::move(exact)).collect();
   actors.erase(std::remove_if(actors.begin(), actors.end(), [](const Actor& a) { return a.triangles.empty(); }),
                actors.end());
   if (actors.empty()) throw InputError(file + ": holds no triangles; export the surfaces as a triangle mesh");

@@ -97,6 +97,29 @@ TEST_F(SceneTest, NamesPlyAndStlByTheirFiles) {
   EXPECT_EQ(scene.actors[1].material_tag, "Concrete");
 }
 
+// Data may begin like a line's end.
+TEST_F(SceneTest, ReadsBinaryPlyWhateverItsFirstByte) {
+  for (const unsigned first : {0x0au, 0x0du, 0x20u}) {
+    const std::uint32_t bits = 0x40000000u + first;
+    float x = 0;
+    std::memcpy(&x, &bits, sizeof x);
+    std::string data =
+        "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    for (const float v : {x, 0.0f, 0.0f, x, 1.0f, 0.0f, x, 1.0f, 1.0f, x, 0.0f, 1.0f}) {
+      data.append(reinterpret_cast<const char*>(&v), sizeof v);
+    }
+    data += '\4';
+    for (const std::int32_t v : {0, 1, 2, 3}) data.append(reinterpret_cast<const char*>(&v), sizeof v);
+    write("panel.ply", data);
+    write("s.yaml", "meshes: [{file: panel.ply}]\nmaterials: materials.yaml\nactors: {panel: {material: Metal}}\n");
+    const Scene scene = loadScene(path("s.yaml"), kFrequency_hz);
+    ASSERT_EQ(scene.facets.size(), 1u);
+    EXPECT_EQ(scene.facets[0].area_m2, 1);
+    EXPECT_EQ(scene.facets[0].origin.x(), static_cast<double>(x));
+  }
+}
+
 TEST_F(SceneTest, TurnsGltfUpright) {
   // One triangle (0,0,0) (1,0,0) (0,1,0), y up: the third vertex is above the first.
   write(

@@ -1,8 +1,9 @@
-#include "ply_check.h"
+#include "ply_reader.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -37,27 +38,43 @@ std::size_t bytesOf(const std::string& type) {
   return found == kSizes.end() ? 0 : found->second;
 }
 
-class PlyCheck {
+class PlyReader {
  public:
-  explicit PlyCheck(const std::string& file) : file_(file) {
+  explicit PlyReader(const std::string& file) : file_(file) {
     std::ifstream in(file, std::ios::binary);
     bytes_.assign(std::istreambuf_iterator<char>(in), {});
   }
 
-  void run() {
+  PlyMesh run() {
     readHeader();
     const Element* vertices = element("vertex");
     const Element* faces = element("face");
     if (!vertices || vertices->count == 0) refuse("has no vertices");
     if (!faces || faces->count == 0) refuse("has no faces; export the surfaces as a triangle mesh");
-    vertices_ = vertices->count;
+    for (const char* axis : {"x", "y", "z"}) {
+      const auto& properties = vertices->properties;
+      if (std::none_of(properties.begin(), properties.end(), [&](const Property& p) { return p.name == axis; })) {
+        refuse(std::string("its vertices have no ") + axis);
+      }
+    }
+    mesh_.vertices.reserve(vertices->count);
     for (const Element& e : elements_) {
       if (e.properties.empty() && e.count > 0) refuse("element " + e.name + " has no properties");
       current_ = &e;
       for (item_ = 0; item_ < e.count; ++item_) {
+        if (&e == vertices) mesh_.vertices.emplace_back();
         for (const Property& property : e.properties) walk(e, property);
       }
     }
+    for (const std::vector<int>& face : mesh_.faces) {
+      for (int vertex : face) {
+        if (static_cast<std::size_t>(vertex) >= mesh_.vertices.size()) {
+          refuse("face " + std::to_string(&face - mesh_.faces.data()) + " of " + std::to_string(mesh_.faces.size()) +
+                 " names a vertex that is not there");
+        }
+      }
+    }
+    return std::move(mesh_);
   }
 
  private:
@@ -142,7 +159,10 @@ class PlyCheck {
 
   void walk(const Element& e, const Property& property) {
     if (property.count_type.empty()) {
-      next(property.type);
+      const double value = next(property.type);
+      if (e.name == "vertex" && property.name.size() == 1 && property.name[0] >= 'x' && property.name[0] <= 'z') {
+        mesh_.vertices.back()[property.name[0] - 'x'] = value;
+      }
       return;
     }
     const bool corners = e.name == "face" && (property.name == "vertex_indices" || property.name == "vertex_index");
@@ -150,24 +170,41 @@ class PlyCheck {
     if (!(count >= (corners ? 3 : 0)) || count != std::floor(count) || count > static_cast<double>(bytes_.size())) {
       refuse("a list of " + std::to_string(count) + " at " + where());
     }
+    if (corners) mesh_.faces.emplace_back();
     for (double i = 0; i < count; ++i) {
       const double vertex = next(property.type);
-      if (corners && !(vertex >= 0 && vertex < static_cast<double>(vertices_))) {
-        refuse(where() + " names a vertex that is not there");
-      }
+      if (!corners) continue;
+      if (!(vertex >= 0 && vertex < 2147483648.0)) refuse(where() + " names a vertex that is not there");
+      mesh_.faces.back().push_back(static_cast<int>(vertex));
     }
   }
 
   const std::string file_;
   std::string bytes_, format_;
   std::size_t at_ = 0;
-  std::uint64_t vertices_ = 0, item_ = 0;
+  std::uint64_t item_ = 0;
+  PlyMesh mesh_;
   const Element* current_ = nullptr;
   std::vector<Element> elements_;
 };
 
 }  // namespace
 
-void checkPly(const std::string& file) { PlyCheck(file).run(); }
+std::string PlyMesh::toObj() const {
+  std::string text;
+  char line[128];
+  for (const Eigen::Vector3d& v : vertices) {
+    std::snprintf(line, sizeof line, "v %.9g %.9g %.9g\n", v.x(), v.y(), v.z());
+    text += line;
+  }
+  for (const std::vector<int>& face : faces) {
+    text += 'f';
+    for (int vertex : face) text += ' ' + std::to_string(vertex + 1);
+    text += '\n';
+  }
+  return text;
+}
+
+PlyMesh readPly(const std::string& file) { return PlyReader(file).run(); }
 
 }  // namespace mmradartwin

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace mmradartwin {
+
+/// A polygon mesh in its file's coordinates.
+struct PlyMesh {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<std::vector<int>> faces;  ///< of three corners or more
+
+  /// The same as an OBJ file's text, in single precision: what assimp reads without fault.
+  std::string toObj() const;
+};
+
+/// Throws InputError where a PLY file is not whole: a header without end, no vertices, no faces, fewer data than the
+/// header says, a face of fewer than three vertices or of one that is not there. assimp does not come back from some of
+/// these, and misreads binary data that begin like a line's end.
+PlyMesh readPly(const std::string& file);
+
+}  // namespace mmradartwin
