@@ -35,7 +35,7 @@ std::string sceneFile() {
 class BareEmbree {
  public:
   explicit BareEmbree(const Scene& scene) : device_(rtcNewDevice("threads=1")), scene_(rtcNewScene(device_)) {
-    rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
+    rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_MEDIUM);
     Eigen::AlignedBox3d all;
     for (const Actor& a : scene.actors) {
       for (const auto& v : a.vertices) all.extend(v);

@@ -115,6 +115,10 @@ void commitAlone(RTCScene scene) {
   rtcCommitScene(scene);
 }
 
+// Not RTC_BUILD_QUALITY_HIGH: its spatial splits end the program in rooms whose walls stand at an angle to the axes
+// (assertion in heuristic_spatial_array.h of 3.13; RenderKit/embree pull request 489).
+constexpr RTCBuildQuality kQuality = RTC_BUILD_QUALITY_MEDIUM;
+
 }  // namespace
 
 RayCaster::RayCaster(const Scene& scene, const std::vector<int>& movable) : embree_(new Embree) {
@@ -123,11 +127,11 @@ RayCaster::RayCaster(const Scene& scene, const std::vector<int>& movable) : embr
   e.device = rtcNewDevice("set_affinity=0");
   if (!e.device) throw std::runtime_error("Embree cannot be started");
   e.scene = rtcNewScene(e.device);
-  rtcSetSceneBuildQuality(e.scene, RTC_BUILD_QUALITY_HIGH);
+  rtcSetSceneBuildQuality(e.scene, kQuality);
   RTCScene standing = e.scene;
   if (!movable.empty()) {
     standing = e.still = rtcNewScene(e.device);
-    rtcSetSceneBuildQuality(e.still, RTC_BUILD_QUALITY_HIGH);
+    rtcSetSceneBuildQuality(e.still, kQuality);
   }
   Eigen::AlignedBox3d all;
   for (const Actor& actor : scene.actors) {
@@ -149,7 +153,7 @@ RayCaster::RayCaster(const Scene& scene, const std::vector<int>& movable) : embr
     RTCScene target = standing;
     if (actor.occludes && std::find(movable.begin(), movable.end(), static_cast<int>(a)) != movable.end()) {
       target = rtcNewScene(e.device);
-      rtcSetSceneBuildQuality(target, RTC_BUILD_QUALITY_HIGH);
+      rtcSetSceneBuildQuality(target, kQuality);
       e.instances.push_back({static_cast<int>(a), target, nullptr, actor.bounds});
     } else if (!actor.occludes) {
       if (!e.veil) e.veil = rtcNewScene(e.device);
