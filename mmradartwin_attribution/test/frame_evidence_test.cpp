@@ -295,6 +295,21 @@ TEST_F(FrameEvidenceTest, GainThatSettlesIsSaidWhateverItsSize) {
   }
 }
 
+TEST_F(FrameEvidenceTest, FramesThatTakeTurnsAreNobodyWhoWalks) {
+  // Every second frame comes late and weak: all echoes change, in many places at once.
+  const double late_m = 0.45;
+  const FrameExaminer examiner = examine(12000, [&](const Pose&, int f, ComplexGrid& x) {
+    for (int n = 0; f % 2 == 1 && n < radar_.samples_per_chirp; ++n) {
+      const double cycles = radar_.slope_hz_per_s * 2 * late_m / kSpeedOfLight_m_per_s * radar_.sample_time_s(n);
+      x.col(n) *= std::polar(0.6, 2 * M_PI * cycles);
+    }
+  });
+  EXPECT_TRUE(causes(examiner.findings()).empty()) << causes(examiner.findings())[0];
+  ASSERT_FALSE(examiner.unexplained().empty());
+  EXPECT_EQ(examiner.unexplained()[0].cause, "unknown");
+  EXPECT_NE(examiner.unexplained()[0].description.find("nothing moves"), std::string::npos);
+}
+
 TEST(FrameEvidenceOfRecordings, TwoPeopleWalkInOpposite) {
   const char* folder = std::getenv("MMRADARTWIN_DATA");
   const std::filesystem::path repository = std::filesystem::path(MMRADARTWIN_TEST_DIR).parent_path();

@@ -25,8 +25,8 @@ struct FrameFinding {
   std::vector<std::string> poses;            ///< that carry it
   std::vector<FindingPlace> where;
   std::string description;  ///< in words and numbers
-  /// Among FrameExaminer::unexplained(): the twin's term for it (level_db over one ADC count), and the nats that it
-  /// explains at each pose, by its name, as the poses of other locations tell the term.
+  /// Among FrameExaminer::unexplained(): the twin's term for it where there is one (level_db over one ADC count), and
+  /// the nats that it explains at each pose, by its name, as the poses of other locations tell the term.
   std::optional<NamedParameters> mechanism;
   std::map<std::string, double> held_out_nats;
 };

@@ -102,18 +102,18 @@ void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& 
                     std::vector<NamedParameters>& extended) {
   for (const FrameFinding& frame : frames) {
     Finding f = findingOf(frame);
-    if (f.mechanism->values.has("level_db")) {
+    if (f.mechanism && f.mechanism->values.has("level_db")) {
       // Of full scale, as the data are, and over the strongest echo.
       const double over_db = 20 * std::log10(32768 * strongestMeasured(data));
       f.mechanism->values.set("level_db", f.mechanism->values.number("level_db") - over_db);
     }
-    addOnce(*f.mechanism, extended);
+    if (f.mechanism) addOnce(*f.mechanism, extended);
     if (!findings.findings.empty() && findings.findings.back().cause == "unknown") {
       std::optional<std::string>& said = findings.findings.back().description;
       said = said.value_or("") + "; besides: " + frame.description;
       continue;
     }
-    if (data.locations.size() > 1) {
+    if (data.locations.size() > 1 && !frame.held_out_nats.empty()) {
       std::vector<double> nats;
       for (const PoseChannels& p : data.poses) {
         const auto at = frame.held_out_nats.find(p.pose.name);
