@@ -56,12 +56,13 @@ constexpr double kWorthABox = 15;          ///< nats of a round one there,
 constexpr double kShareWorthABox = 0.3;    ///< and so much of what the best other fit brings
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
 constexpr double kMostLost = 0.01;         ///< of the explained power, by what the likelihood plainly gains of;
-// unless it is worth leastNats(), inflation taken off.
+// unless it is worth leastNats(), inflation taken off, and is not like clutter.
 constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
 constexpr double kFarAway_m = 0.12;    ///< six times what a scene's actors err by
 constexpr double kObjectPlaces = 500;  ///< places of an 8 by 6 m room that a session resolves, as a family
 
 bool isMove(const Hypothesis& h) { return h.mechanism.mechanism == "actor_moved"; }
+bool isObject(const Hypothesis& h) { return h.mechanism.mechanism == "actor_unmodelled"; }
 
 class Session {
  public:
@@ -333,7 +334,6 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   }
   std::stable_sort(screened.begin(), screened.end(), better);
   family_ = all.size() + static_cast<std::size_t>(kLawFamily);
-  const auto isObject = [](const Hypothesis& h) { return h.mechanism.mechanism == "actor_unmodelled"; };
   std::vector<HypothesisFit> fits;
   std::size_t names_fitted = 0, laws_fitted = 0;
   for (std::size_t i = 0; i < screened.size(); ++i) {
@@ -556,16 +556,22 @@ bool Session::judgeChannels(int round) {
       const auto explained = *finding.gain->explained_power.difference_ci95;
       const double by = finding.gain->explained_power.after - finding.gain->explained_power.before;
       const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
+      const auto refuse = [&](const std::string& why) {
+        verdict = why + ": " + number(by, 2) + " (" + number(explained[0], 2) + " to " + number(explained[1], 2) + ")";
+      };
+      if (!in_maps && isLikeClutter(f, by >= kLeastExplained, explained[0] > 0)) {
+        refuse("clutter is like that, by what the maps gain");
+        continue;
+      }
       const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled));
-      const bool in_nats =
-          explained[1] >= 0 && f.broad_gain / f.inflation > leastNats(f.hypothesis, traces, data_.poses.size());
+      const double least_nats = leastNats(f.hypothesis, traces, data_.poses.size(), !accepted_.empty());
+      const bool in_nats = explained[1] >= 0 && f.broad_gain / f.inflation > least_nats;
       const bool likelier = (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0;
       const bool much = likelier && ((f.plain && by > -kMostLost) || in_nats);
       // What explains the same less well is no name for what a better one was refused for.
       if (!in_maps && (!much || refused)) {
         refused = refused || likelier;
-        verdict = "the maps gain nothing: " + number(by, 2) + " (" + number(explained[0], 2) + " to " +
-                  number(explained[1], 2) + ")";
+        refuse("the maps gain nothing");
         continue;
       }
       addMetrics(f, *finding.gain);

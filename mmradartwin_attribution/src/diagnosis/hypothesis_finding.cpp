@@ -15,6 +15,7 @@ constexpr double kAlike = 5;  ///< nats within which two names are not told apar
 constexpr double kLeastSize_m =
     0.02;  ///< of an object: any room is full of smaller ones, and the likelihood knows that
 constexpr double kLeastScattering = 0.1;  ///< S: less lies under the clutter of any room, whose law is not its own
+constexpr double kFurniture_m = 0.1;    ///< smaller than this is what lies about
 constexpr double kPerson_m = 0.3, kWalk_m = 0.6;  ///< size, and how far from the middle of a walk
 
 }  // namespace
@@ -101,6 +102,12 @@ std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFi
     }
   }
   return "";
+}
+
+bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure) {
+  const std::string& name = fit.hypothesis.mechanism.mechanism;
+  if (name == "actor_unmodelled") return !explains_more || (!sure && fit.size_m() < kFurniture_m);
+  return (name == "diffuse_scattering" || name == "transmission") && !sure;
 }
 
 void believeAbsences(std::vector<HypothesisFit>& fits) {

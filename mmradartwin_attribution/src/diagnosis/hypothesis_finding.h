@@ -19,6 +19,11 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
 /// pose's frames.
 std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers);
 
+/// True where the likelihood may have gained by what stands about in any room and no scene has: an object that explains
+/// no more of the measured power than `explains_more` tells, or a small one, a material's scattering and what shines
+/// through a panel of which it is not `sure` that they explain more, by however little.
+bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure);
+
 /// To so many digits.
 std::string number(double value, int digits = 3);
 

@@ -169,6 +169,11 @@ double HypothesisFit::moved_m() const {
   return std::hypot(m.values.number("dx_m"), m.values.number("dy_m"));
 }
 
+double HypothesisFit::size_m() const {
+  if (hypothesis.mechanism.mechanism != "actor_unmodelled") return 0;
+  return hypothesis.at(scaled).values.number("size_m");
+}
+
 void HypothesisFit::loseGain(double nats) {
   gain -= nats;
   broad_gain -= nats;

@@ -42,6 +42,7 @@ struct HypothesisFit {
   std::size_t numbers() const;  ///< fitted or searched for, at least one
   double ranking() const;       ///< gain less a price per number; of a law without a name, part of it
   double moved_m() const;       ///< how far it moves an actor; 0 of all others
+  double size_m() const;        ///< of an object that the twin lacks; 0 of all others
   void loseGain(double nats);   ///< that the state without it has gained since
 };
 
