@@ -499,6 +499,18 @@ class Table(InFolder):
         self.assertAlmostEqual(strength(4 * table.MATCHED_NATS), 2)
         self.assertEqual(strength(-3.0), 0)
 
+    def test_strength_can_do_without_what_the_likelihood_scatters_over_places(self):
+        def strength(nats, deviation):
+            between = [nats - 1.96 * deviation, nats + 1.96 * deviation]
+            told = {"nats": nats, "nats_ci95": between, "explained_power": 0.1}
+            return table.strength_over_limit({"told": told}, at_its_word=False)
+        nats = 4 * table.MATCHED_NATS
+        as_it_would_be = math.sqrt(2 * nats)
+        self.assertAlmostEqual(strength(nats, as_it_would_be), 2, places=3)
+        self.assertAlmostEqual(strength(nats, 0.3 * as_it_would_be), 2)
+        self.assertAlmostEqual(strength(nats, 3 * as_it_would_be), 2 / 3, places=3)
+        self.assertEqual(strength(-3.0, 5.0), 0)
+
     def test_the_strength_of_half_power_is_the_one_that_draws_were_made_by(self):
         rng = np.random.default_rng(4)
         strengths = np.exp(rng.uniform(-2, 2, 300))

@@ -14,7 +14,7 @@ namespace {
 constexpr double kAlike = 5;  ///< nats within which two names are not told apart
 constexpr double kLeastSize_m =
     0.02;  ///< of an object: any room is full of smaller ones, and the likelihood knows that
-constexpr double kLeastScattering = 0.1;  ///< S: less lies under the clutter of any room, whose law is not its own
+constexpr double kLeastScattering = 0.15;  ///< S: less lies under the clutter of any room, whose law is not its own
 constexpr double kFurniture_m = 0.1;    ///< smaller than this is what lies about
 constexpr double kPerson_m = 0.3, kWalk_m = 0.6;  ///< size, and how far from the middle of a walk
 

@@ -5,7 +5,7 @@ import statistics
 
 import numpy as np
 from scipy.special import log_expit
-from scipy.stats import binomtest, chi2
+from scipy.stats import binomtest, chi2, norm
 
 from mmradartwin_tests.blind.scoring import score
 
@@ -28,14 +28,22 @@ def share(values):
     return f"{100 * count / n:.1f} % ({100 * low:.1f} to {100 * high:.1f})", n
 
 
-def strength_over_limit(record):
+def strength_over_limit(record, at_its_word=True):
     """Strength of a hidden effect over the one at which the matched test, the likelihood of the twin that is told it,
     detects it; None where the twin cannot be told. Nats go by the square of small strengths.
 
-    The likelihood is taken at its word, without what it scatters over places: a matched test better than there is.
+    At its word the likelihood knows all errors of rooms and poses: a matched test better than there is. Otherwise its
+    nats are divided by what they scatter over places more than they would then, twice their mean (variance of a
+    likelihood ratio of two simple hypotheses): a worse one where few places see the effect.
     """
     told = record.get("told")
-    return math.sqrt(max(0.0, told["nats"]) / MATCHED_NATS) if told else None
+    if not told:
+        return None
+    nats = max(0.0, told["nats"])
+    if not at_its_word and nats > 0:
+        deviation = (told["nats_ci95"][1] - told["nats_ci95"][0]) / (2 * norm.ppf(0.975))
+        nats /= max(1.0, deviation ** 2 / (2 * nats))
+    return math.sqrt(nats / MATCHED_NATS)
 
 
 def half_power(strengths, named):
@@ -85,9 +93,12 @@ class Scores:
                   if (record.get("told") or {}).get("explained_power", 0) >= LEAST_TRUE_GAIN and s["gain"] is not None]
         strengths = [(strength_over_limit(record), s) for record, _, s in self.rows["single"]]
         strong = [s["first"] for strength, s in strengths if strength is None or strength >= 2]
-        faint = [(strength, all(s["named"])) for strength, s in strengths + [
-            (strength_over_limit(record), s) for record, _, s in self.rows["faint"]] if strength is not None]
-        half = half_power(*zip(*faint)) if faint else None
+        halves = []
+        for at_its_word in (True, False):
+            faint = [(strength_over_limit(record, at_its_word), all(s["named"]))
+                     for record, _, s in self.rows["single"] + self.rows["faint"] if record.get("told")]
+            half = half_power(*zip(*faint)) if faint else None
+            halves.append(("{:.2f} ({:.2f} to {:.2f})".format(*half) if half else "not run", len(faint)))
         rows = [
             ("false alarms on clean sessions", "≤ 1 %", *share(self.each("clean", "alarm", answered=True))),
             ("single effects: right name first", "≥ 92 %", *share(self.each("single", "first"))),
@@ -97,8 +108,8 @@ class Scores:
             ("mean size of that group", "≤ 1.6", f"{statistics.mean(sizes):.2f}" if sizes else "not run",
              len(sizes)),
             ("effects of any strength: wrong with confidence", "≤ 2 %", *share(self.each("faint", "wrong"))),
-            ("detection strength at 50 % power over that of the matched test", "≤ 1.5",
-             "{:.2f} ({:.2f} to {:.2f})".format(*half) if half else "not run", len(faint)),
+            ("detection strength at 50 % power over that of the matched test", "≤ 1.5", *halves[0]),
+            ("– with the scatter of its likelihood over places taken off", "≤ 1.5", *halves[1]),
             ("actor, material, walls, pose or order right where the name is", "",
              *share([v for row in ("single", "pair", "twice") for s in self.each(row, "subjects") for v in s])),
             ("pairs: both named", "≥ 85 %", *share([all(n) for n in named])),
