@@ -3,6 +3,7 @@ import json
 import math
 import os
 import re
+import shutil
 import subprocess
 import tempfile
 import unittest
@@ -93,6 +94,20 @@ class HiddenEffects(unittest.TestCase):
         self.assertAlmostEqual(level["value"], truth["level_db"], delta=1.2, msg=f"seed {seed}")
         self.assertLess(level["ci95"][0], truth["level_db"], msg=f"seed {seed}")
         self.assertGreater(level["ci95"][1], truth["level_db"], msg=f"seed {seed}")
+
+    def test_every_order_that_exchanged_lanes_make_is_read(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "2"))
+        for lanes in ([2, 3, 0, 1], [1, 0, 3, 2], [2, 0, 3, 1]):
+            order = lanes + [4 + lane for lane in lanes]
+            Measurement(Settings(output=self.at("session"), seed=seed, poses=16, locations=8, headings=2, frames=5,
+                                 effects=[effects.make_effect("channel_permutation", {"order": order}, None)])).run()
+            status, findings, errors = diagnose(self.at("session"), self.at("out"), "--findings", "1")
+            self.assertEqual(status, 0, msg=errors)
+            first = findings["findings"][0]
+            self.assertEqual(first["cause"], "channel_permutation", msg=f"seed {seed}, {order}")
+            self.assertEqual(first["parameters"]["order"]["value"], order, msg=f"seed {seed}")
+            self.assertGreater(first["evidence"]["margin"], 100, msg=f"seed {seed}, {order}")
+            shutil.rmtree(self.at("session"))
 
     def test_a_scene_is_found_and_its_intervals_know_what_actors_and_headings_hide(self):
         # Range errors of 2 cm an actor and heading errors of 0.3 deg a pose: nobody knows its place to a millimetre.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <numeric>
+#include <set>
 
 #include "body_fixed_tone.h"
 #include "channel_errors.h"
@@ -16,6 +18,7 @@ constexpr std::size_t kPoses = 8;  ///< a delivery shows in every pose; so many 
 constexpr double kPerPose = 2;     ///< nats per pose below which nothing is claimed
 constexpr int kIterations = 3;
 constexpr double kPlainlyBehind = 12;  ///< nats
+constexpr int kMostReceivers = 4, kMostTransmitters = 3;  ///< whose orders are all tried
 
 /// What the mechanism of that name does to a grid; each conjugation is its own inverse.
 ComplexGrid delivered(const ComplexGrid& x, const NamedParameters& mechanism) {
@@ -53,6 +56,27 @@ NamedParameters permutation(const std::vector<int>& order) {
   NamedParameters m = defaultMechanism("channel_permutation");
   m.values.set("order", std::vector<double>(order.begin(), order.end()));
   return m;
+}
+
+/// Orders that wrong lanes and transmitters in another order make: receivers in any order, the same under every
+/// transmitter. None where there are too many.
+std::vector<std::vector<int>> ordersOfLanes(const RadarConfig& radar) {
+  std::vector<std::vector<int>> all;
+  std::vector<int> blocks(static_cast<std::size_t>(radar.slots()));
+  std::iota(blocks.begin(), blocks.end(), 0);
+  if (radar.receivers() > kMostReceivers || radar.slots() > kMostTransmitters) return all;
+  do {
+    std::vector<int> lanes(static_cast<std::size_t>(radar.receivers()));
+    std::iota(lanes.begin(), lanes.end(), 0);
+    do {
+      std::vector<int> order;
+      for (int block : blocks) {
+        for (int lane : lanes) order.push_back(block * radar.receivers() + lane);
+      }
+      all.push_back(std::move(order));
+    } while (std::next_permutation(lanes.begin(), lanes.end()));
+  } while (std::next_permutation(blocks.begin(), blocks.end()));
+  return all;
 }
 
 }  // namespace
@@ -137,13 +161,24 @@ std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data) 
     tried.emplace_back(likelihood(&m, kIterations), m);
   }
   // Orders: two places exchanged, or one channel taken out and put elsewhere, as long as that helps, from the order as
-  // it is and from its reverse. These stop at an order that is the right one but for a shift of all channels, so that
+  // it is, from its reverse, and from the best that exchanged lanes make. These stop at an order that is the right one but for a shift of all channels, so that
   // all shifts are tried, too.
   const int channels = data.radar.channels();
   std::vector<int> same(static_cast<std::size_t>(channels));
   std::iota(same.begin(), same.end(), 0);
   std::vector<int> reverse(same.rbegin(), same.rend());
-  for (std::vector<int> order : {same, reverse}) {
+  std::vector<std::vector<int>> starts = {same, reverse};
+  double best_of_lanes = -std::numeric_limits<double>::infinity();
+  for (const std::vector<int>& order : ordersOfLanes(data.radar)) {
+    const NamedParameters m = permutation(order);
+    const double value = likelihood(&m, 0);
+    if (value <= best_of_lanes) continue;
+    best_of_lanes = value;
+    starts.resize(2);
+    starts.push_back(order);
+  }
+  std::set<std::vector<int>> ends;
+  for (std::vector<int> order : starts) {
     NamedParameters m = permutation(order);
     double best = likelihood(&m, 0);
     for (bool better = true; better;) {
@@ -179,7 +214,7 @@ std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data) 
       }
       order = found;
     }
-    if (order == same) continue;
+    if (order == same || !ends.insert(order).second) continue;
     m = permutation(order);
     tried.emplace_back(likelihood(&m, kIterations), m);
   }
