@@ -564,7 +564,7 @@ bool Session::judgeChannels(int round) {
         continue;
       }
       const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled));
-      const double least_nats = leastNats(f.hypothesis, traces, data_.poses.size(), !accepted_.empty());
+      const double least_nats = leastNats(f.hypothesis, traces, data_.poses.size());
       const bool in_nats = explained[1] >= 0 && f.broad_gain / f.inflation > least_nats;
       const bool likelier = (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0;
       const bool much = likelier && ((f.plain && by > -kMostLost) || in_nats);

@@ -12,27 +12,27 @@ namespace {
 // actor or a material, 10 of laws without a name, 18 of what moves echoes (40 of one that its own errors refuse) and 47
 // of an object (too small to be one); of one with 154 poses none, 47, 13, 4, 4 and none, of another 124 of a material.
 // Of 40 more (seed 72) one had glass that scatters by 33.
-constexpr double kLaw = 18, kLawOfMore = 25;
+constexpr double kLaw = 18;
+// Edges, and ways over floor and ceiling: what is left of an object that was found, or of wood that is rough, was worth
+// 69 to 86 and 143 as edges at 24 and 44 poses; edges of UTD's size are worth 370 to 460 at 44, ways over the floor 700.
+constexpr double kLawOfMore = 25, kLawOfMorePerPose = 4;
 constexpr double kSubject = 24;  ///< and laws without a name
 constexpr double kSubjectOfMore = 45;
 constexpr double kTraces = 30;                            ///< the likelihood is rough there
 constexpr double kObject = 70;                            ///< it has the whole room to choose from
-// What an object that was found leaves looks like edges: 69 to 86 nats at 24 and 44 poses; real ones of UTD's size are
-// worth 370 to 460 at 44.
-constexpr double kMoreBesidePerPose = 3;
 constexpr double kLawPerPose = 0.4, kSubjectPerPose = 1;  ///< a twin's own errors add up
 
 }  // namespace
 
-double leastNats(const Hypothesis& hypothesis, bool traces, std::size_t poses, bool beside) {
+double leastNats(const Hypothesis& hypothesis, bool traces, std::size_t poses) {
   const double n = static_cast<double>(poses);
   if (hypothesis.mechanism.mechanism == "actor_unmodelled") return std::max(kObject, kLawPerPose * n);
   const std::string& name = hypothesis.mechanism.mechanism;
   const bool unnamed = !isCatalogued(name);
   const bool adds = !unnamed && causeDescription(name).residual_class == ResidualClass::kMissingMechanism;
   if (unnamed || !hypothesis.subject.empty()) return std::max(adds ? kSubjectOfMore : kSubject, kSubjectPerPose * n);
-  if (adds && beside) return std::max(kLawOfMore, kMoreBesidePerPose * n);
-  return std::max(traces ? kTraces : adds ? kLawOfMore : kLaw, kLawPerPose * n);
+  if (adds) return std::max(kLawOfMore, kLawOfMorePerPose * n);
+  return std::max(traces ? kTraces : kLaw, kLawPerPose * n);
 }
 
 }  // namespace mmradartwin
