@@ -91,10 +91,6 @@ SessionCovariance difference(SessionCovariance of, const SessionCovariance& from
   return of;
 }
 
-/// True for what turns phases. The channels of one strong path are a narrow ridge: a secant to one side climbs out of
-/// it with the square of the turn, which hides the slope and makes the information many times too large.
-bool turnsPhases(const Coordinate& c) { return !c.oneSided() && c.unit != "dB"; }
-
 /// With no error of this actor's own.
 Nuisance withoutErrors(Nuisance nuisance, int actor) {
   nuisance.actor_range_m[static_cast<std::size_t>(actor)] = 0;
@@ -377,9 +373,9 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
                    : source_.echoes(with(null.mechanisms, hypothesis.at(at)), poses, null.actor_range_m);
       return model_.covariance(echoes, null.nuisance, poses);
     };
-    directions.push_back(turnsPhases(hypothesis.coordinates[j])
-                             ? difference(covarianceAt(step), covarianceAt(-step), 2 * step)
-                             : difference(covarianceAt(step), null.covariance, poses, step));
+    directions.push_back(hypothesis.coordinates[j].oneSided()
+                             ? difference(covarianceAt(step), null.covariance, poses, step)
+                             : difference(covarianceAt(step), covarianceAt(-step), 2 * step));
   }
   const Effective e = effective(model_.scores(null.basis, directions, poses), null.nuisance.globals());
   const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
@@ -494,8 +490,10 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
         return model_.covariance(source_.echoesNear(mechanisms(moved), s.mechanisms, everyone, s.actor_range_m),
                                  s.nuisance, everyone);
       };
-      directions.push_back(turnsPhases(c) ? difference(covarianceAt(step), covarianceAt(-step), 2 * step)
-                                          : difference(covarianceAt(step), here, everyone, step));
+      // The channels of one strong path are a narrow ridge: a secant to one side climbs out of it with the square of a
+      // turn or of a gain, which hides the slope and makes the information many times too large.
+      directions.push_back(c.oneSided() ? difference(covarianceAt(step), here, everyone, step)
+                                        : difference(covarianceAt(step), covarianceAt(-step), 2 * step));
     }
     return model_.scores(model_.basis(s.echoes, s.nuisance), directions, everyone);
   };
