@@ -15,7 +15,8 @@ constexpr double kAlike = 5;  ///< nats within which two names are not told apar
 constexpr double kLeastSize_m =
     0.02;  ///< of an object: any room is full of smaller ones, and the likelihood knows that
 constexpr double kLeastScattering = 0.15;  ///< S: less lies under the clutter of any room, whose law is not its own
-constexpr double kFurniture_m = 0.1;    ///< smaller than this is what lies about
+constexpr double kStrongScattering = 0.35;  ///< an eighth of what is reflected is no clutter
+constexpr double kFurniture_m = 0.1;        ///< smaller than this is what lies about
 constexpr double kPerson_m = 0.3, kWalk_m = 0.6;  ///< size, and how far from the middle of a walk
 
 }  // namespace
@@ -107,7 +108,10 @@ std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFi
 bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure) {
   const std::string& name = fit.hypothesis.mechanism.mechanism;
   if (name == "actor_unmodelled") return !explains_more || (!sure && fit.size_m() < kFurniture_m);
-  return (name == "diffuse_scattering" || name == "transmission") && !sure;
+  if (name == "diffuse_scattering") {
+    return !sure && fit.hypothesis.at(fit.scaled).values.number("scattering_coefficient") < kStrongScattering;
+  }
+  return name == "transmission" && !sure;
 }
 
 void believeAbsences(std::vector<HypothesisFit>& fits) {

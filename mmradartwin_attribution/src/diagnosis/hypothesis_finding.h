@@ -20,7 +20,7 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
 std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers);
 
 /// True where the likelihood may have gained by what stands about in any room and no scene has: an object that explains
-/// no more of the measured power than `explains_more` tells, or a small one, a material's scattering and what shines
+/// no more of the measured power (explains_more), or a small one, a material that scatters somewhat and what shines
 /// through a panel of which it is not `sure` that they explain more, by however little.
 bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure);
 
