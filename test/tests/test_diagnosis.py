@@ -95,6 +95,13 @@ class HiddenEffects(unittest.TestCase):
         self.assertLess(level["ci95"][0], truth["level_db"], msg=f"seed {seed}")
         self.assertGreater(level["ci95"][1], truth["level_db"], msg=f"seed {seed}")
 
+    def test_images_are_measured_against_their_hosts(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "1"))
+        _, first, truth = self.found(seed, {"iq_imbalance": {"image_db": -29.0}}, headings=2)
+        image = first["parameters"]["image_db"]
+        self.assertAlmostEqual(image["value"], truth["image_db"], delta=0.15, msg=f"seed {seed}")
+        self.assertLess(image["ci95"][1] - image["ci95"][0], 0.5, msg=f"seed {seed}")
+
     def test_every_order_that_exchanged_lanes_make_is_read(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "2"))
         for lanes in ([2, 3, 0, 1], [1, 0, 3, 2], [2, 0, 3, 1]):

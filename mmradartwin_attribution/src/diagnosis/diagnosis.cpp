@@ -673,6 +673,10 @@ Diagnosis Session::run() {
       if (!judgeChannels(round)) break;
     }
     for (Finding& f : findings.findings) {
+      if (f.cause == "iq_imbalance") {
+        measureImage(data_, f);
+        replaceBy(*f.mechanism, extended_);
+      }
       if (f.cause != "second_harmonic") continue;
       referToStrongestHost(twin_.changed(mechanisms_), data_, state_.nuisance.log_gain, strongest_amplitude_, f);
       replaceBy(*f.mechanism, extended_);

@@ -42,6 +42,11 @@ void referToStrongestEcho(const Twin& twin, const ChannelData& data, Finding& f)
 /// A level against its host that was fitted beside the twin's strongest amplitude, as one at the strongest echo of the
 /// room. `log_gain`: what the measured power has more than the twin's.
 void referToStrongestHost(const Twin& twin, const ChannelData& data, double log_gain, double amplitude, Finding& f);
+
+/// Level and phase of an iq_imbalance by what images share with their hosts, conj(x) at the mirrored frequency of the
+/// same pose: no echo of the room has its phase. Levels of the power there alone come out some 2 dB high. Left as it is
+/// where no cell is its host's image alone.
+void measureImage(const ChannelData& data, Finding& f);
 Finding findingOf(const ChannelErrors& errors);
 /// Where the noise departs from the level that the twin's noise_floor states.
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated);
