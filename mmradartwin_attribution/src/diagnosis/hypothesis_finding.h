@@ -14,9 +14,9 @@ namespace mmradartwin {
 Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
                   const Scene& scene, const ChannelData& data);
 
-/// Why something fitted is nothing found, "" where it may be: an object or a scattering that clutter is as large as, an
-/// object where one of the `walkers` (other causes are passed over) walks, whose echo does not average out over a
-/// pose's frames.
+/// Why something fitted is nothing found, "" where it may be: an object or a scattering that clutter is as large as, a
+/// panel that lets all through, an object where one of the `walkers` (other causes are passed over) walks, whose echo
+/// does not average out over a pose's frames.
 std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers);
 
 /// True where the likelihood may have gained by what stands about in any room and no scene has: an object that explains
