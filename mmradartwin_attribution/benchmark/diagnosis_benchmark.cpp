@@ -1,5 +1,5 @@
-// Where a diagnosis spends its time: expected channels of a pose, their likelihood and its derivatives, one moved actor.
-// Each beside what bounds it in the same run.
+// Where a diagnosis spends its time: expected channels of a pose, their likelihood and its derivatives, one moved
+// actor. Each beside what bounds it in the same run.
 
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
@@ -17,8 +17,9 @@ namespace {
 
 // The shipped office and radar at some poses; measured is what the twin expects, with noise.
 struct Bench {
-  Bench() : twin(loadTwin("", std::string(MMRADARTWIN_CONFIG_DIR "/office/scene.yaml"),
-                          loadRadarConfig(MMRADARTWIN_CONFIG_DIR "/radar.yaml"))) {
+  Bench()
+      : twin(loadTwin("", std::string(MMRADARTWIN_CONFIG_DIR "/office/scene.yaml"),
+                      loadRadarConfig(MMRADARTWIN_CONFIG_DIR "/radar.yaml"))) {
     data.radar = twin.radar();
     const SignalChain chain(data.radar);
     std::mt19937 random(1);
@@ -31,7 +32,8 @@ struct Bench {
       p.location = i;
       p.noise_power = 1e-15;
       p.grid = twin.simulate(p.pose.T_map_radar).grid;
-      for (Eigen::Index k = 0; k < p.grid.x.size(); ++k) p.grid.x.data()[k] += std::complex<double>(noise(random), noise(random));
+      for (Eigen::Index k = 0; k < p.grid.x.size(); ++k)
+        p.grid.x.data()[k] += std::complex<double>(noise(random), noise(random));
       transformGrid(chain, p);
       data.locations.push_back(p.pose.name);
       poses.push_back(i);
@@ -108,7 +110,8 @@ void BM_LimitWholeTwinTraced(benchmark::State& state) {
   double dx_m = 0.1;
   for (auto _ : state) {
     const Twin twin = b.twin.changed(b.withPillarAt(dx_m += 1e-4));
-    for (int i : b.poses) benchmark::DoNotOptimize(twin.trace(b.data.poses[static_cast<std::size_t>(i)].pose.T_map_radar));
+    for (int i : b.poses)
+      benchmark::DoNotOptimize(twin.trace(b.data.poses[static_cast<std::size_t>(i)].pose.T_map_radar));
   }
   state.SetItemsProcessed(state.iterations() * 8);
 }

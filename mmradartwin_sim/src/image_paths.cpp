@@ -231,8 +231,9 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
       const std::vector<int>& thirds = any ? on_side_[static_cast<std::size_t>(2 * b + (db > 0))] : few;
       for (auto third = std::lower_bound(thirds.begin(), thirds.end(), a); third != thirds.end(); ++third) {
         const int c = *third;
-        if (!any && !(sides_[static_cast<std::size_t>(b) * static_cast<std::size_t>(count) + static_cast<std::size_t>(c)] &
-                      (db > 0 ? 2 : 1))) {
+        if (!any &&
+            !(sides_[static_cast<std::size_t>(b) * static_cast<std::size_t>(count) + static_cast<std::size_t>(c)] &
+              (db > 0 ? 2 : 1))) {
           continue;
         }
         if (!in_front[c] || !meetsLast(c, beyond(c, image2), image2) || c == b) continue;

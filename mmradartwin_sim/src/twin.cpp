@@ -169,9 +169,8 @@ std::optional<Twin::PlacedActor> Twin::placesOneActor() const {
 bool Twin::opensActors() const {
   if (!impl_->edited) return false;
   const std::vector<Actor>&before = impl_->scene.actors, &after = impl_->edited->actors;
-  return !std::equal(before.begin(), before.end(), after.begin(), [](const Actor& a, const Actor& b) {
-    return !a.occludes || b.occludes || !b.present;
-  });
+  return !std::equal(before.begin(), before.end(), after.begin(),
+                     [](const Actor& a, const Actor& b) { return !a.occludes || b.occludes || !b.present; });
 }
 
 bool Twin::addsScreensAlone() const { return impl_->screens && impl_->screens_alone && !impl_->movesRadar(); }

@@ -354,8 +354,9 @@ TEST_F(DiffuseTest, SumsThePowerOfCells) {
     std::map<Cell, std::pair<double, int>> sum;
     for (const PathRecord& r : records) {
       const V p = r.vertices[0], u = p.normalized();
-      auto& [power, count] = sum[{static_cast<int>(std::floor(p.norm() / 0.1)), static_cast<int>(std::floor(u.y() / 0.07)),
-                                  static_cast<int>(std::floor(u.z() / 0.2)), left(p)}];
+      auto& [power, count] =
+          sum[{static_cast<int>(std::floor(p.norm() / 0.1)), static_cast<int>(std::floor(u.y() / 0.07)),
+               static_cast<int>(std::floor(u.z() / 0.2)), left(p)}];
       power += r.amplitude * r.amplitude;
       ++count;
     }

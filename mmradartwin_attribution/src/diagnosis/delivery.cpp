@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kPoses = 8;  ///< a delivery shows in every pose; so many decide by hundreds of nats
 constexpr double kPerPose = 2;     ///< nats per pose below which nothing is claimed
 constexpr int kIterations = 3;
-constexpr double kPlainlyBehind = 12;  ///< nats
+constexpr double kPlainlyBehind = 12;                     ///< nats
 constexpr int kMostReceivers = 4, kMostTransmitters = 3;  ///< whose orders are all tried
 
 /// What the mechanism of that name does to a grid; each conjugation is its own inverse.
@@ -161,8 +161,8 @@ std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data) 
     tried.emplace_back(likelihood(&m, kIterations), m);
   }
   // Orders: two places exchanged, or one channel taken out and put elsewhere, as long as that helps, from the order as
-  // it is, from its reverse, and from the best that exchanged lanes make. These stop at an order that is the right one but for a shift of all channels, so that
-  // all shifts are tried, too.
+  // it is, from its reverse, and from the best that exchanged lanes make. These stop at an order that is the right one
+  // but for a shift of all channels, so that all shifts are tried, too.
   const int channels = data.radar.channels();
   std::vector<int> same(static_cast<std::size_t>(channels));
   std::iota(same.begin(), same.end(), 0);

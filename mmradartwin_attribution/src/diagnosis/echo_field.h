@@ -22,9 +22,9 @@ struct EchoGroup {
     BinCovariance cosine;  ///< |W|^2 cos(azimuth) c c^H: what a turn of the radar acts on; not of beams
   };
   PerInteraction<int> actors;  ///< one per interaction, in order; empty where a path meets none
-  double added_range_m = 0;  ///< one-way, that the actors' known errors have put into the fields
-  Fields bins;               ///< channels by range bin
-  Fields beams;              ///< bins by beam: |b^H c|^2 W W^T with W over the beam's bins, and so on
+  double added_range_m = 0;    ///< one-way, that the actors' known errors have put into the fields
+  Fields bins;                 ///< channels by range bin
+  Fields beams;                ///< bins by beam: |b^H c|^2 W W^T with W over the beam's bins, and so on
 };
 
 /// The expected channels of one pose. Groups do not change once collected: states of the fit share them.

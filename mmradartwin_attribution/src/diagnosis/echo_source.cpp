@@ -20,7 +20,7 @@ constexpr double kSteady = 0.02;
 // Scatter points in cells that are small beside what the radar resolves, seen from the pose as reported: a turned or
 // moved radar sees the same ones.
 constexpr double kCloud_bins = 0.75, kCloud_lobes = 0.5, kCloudElevation = 0.175;
-constexpr std::size_t kMostTwins = 6;     ///< that are kept
+constexpr std::size_t kMostTwins = 6;    ///< that are kept
 constexpr std::size_t kMostTraced = 64;  ///< entries of one mechanism and geometry that are kept
 
 /// One line that tells two mechanisms apart that trace different paths.

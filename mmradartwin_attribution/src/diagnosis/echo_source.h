@@ -130,7 +130,7 @@ class EchoSource {
   const Edit& editOf(const NamedParameters& mechanism);
   std::map<std::string, Edit> edits_;                                       // by mechanism text
   std::vector<std::pair<std::string, std::shared_ptr<const Twin>>> twins_;  // last used first
-  std::map<std::string, bool> mixes_ranges_;  // by mechanism name
+  std::map<std::string, bool> mixes_ranges_;                                // by mechanism name
 };
 
 /// Defaults of every parameter of a mechanism. Throws InputError for an unknown name.

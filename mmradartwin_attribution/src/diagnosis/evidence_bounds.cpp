@@ -14,7 +14,8 @@ namespace {
 // Of 40 more (seed 72) one had glass that scatters by 33.
 constexpr double kLaw = 18;
 // Edges, and ways over floor and ceiling: what is left of an object that was found, or of wood that is rough, was worth
-// 69 to 86 and 143 as edges at 24 and 44 poses; edges of UTD's size are worth 370 to 460 at 44, ways over the floor 700.
+// 69 to 86 and 143 as edges at 24 and 44 poses; edges of UTD's size are worth 370 to 460 at 44, ways over the floor
+// 700.
 constexpr double kLawOfMore = 25, kLawOfMorePerPose = 4;
 constexpr double kSubject = 24;  ///< and laws without a name
 constexpr double kSubjectOfMore = 45;

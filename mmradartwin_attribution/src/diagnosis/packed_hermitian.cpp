@@ -16,7 +16,7 @@ namespace {
 
 /// The usual array's number of channels, known to the compiler; kAny stands for all others.
 constexpr int kUsual = 8, kAny = 0;
-constexpr int kWide = 4;  // numbers of a vector
+constexpr int kWide = 4;                // numbers of a vector
 constexpr double kSmallTurn_rad = 0.7;  // up to there a short series is right to 1e-9
 
 template <int kChannels>

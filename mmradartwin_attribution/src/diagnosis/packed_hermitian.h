@@ -63,8 +63,8 @@ class InverseFactor {
   PackedHermitian inverse() const;
   /// L^-1 y; its squared norm is y^H matrix^-1 y. y and to: [channels], may be the same.
   void apply(const std::complex<double>* y, std::complex<double>* to) const;
-  /// L^-1 D L^-H as M^2 real numbers, so that tr(D~ E~) is a dot product: of row k its diagonal, then real and imaginary
-  /// parts of the elements before it, times sqrt 2.
+  /// L^-1 D L^-H as M^2 real numbers, so that tr(D~ E~) is a dot product: of row k its diagonal, then real and
+  /// imaginary parts of the elements before it, times sqrt 2.
   void whiten(const PackedHermitian& matrix, double* to) const;
   int channels() const { return channels_; }
 

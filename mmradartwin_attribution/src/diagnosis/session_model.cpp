@@ -208,7 +208,8 @@ SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes
           const auto* power = f->power.at(at, size_);
           turn.set(apart_, turnOf(n.yaw_rad[poses[i]], power, f->cosine.at(at, size_)));
           own.setZero();
-          own.addTurned({power, f->shift.at(at, size_), f->bend.at(at, size_)}, {u, u * shift, u * shift * shift}, turn);
+          own.addTurned({power, f->shift.at(at, size_), f->bend.at(at, size_)}, {u, u * shift, u * shift * shift},
+                        turn);
           const int cell = f == &g.beams ? samples_ + at : at;
           std::complex<float>* to = result[i].data() + static_cast<std::size_t>(cell) * size_;
           for (std::size_t j = 0; j < size_; ++j) {

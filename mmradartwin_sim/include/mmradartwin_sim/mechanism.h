@@ -2,16 +2,16 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <complex>
-#include <cstdint>
 #include <array>
 #include <boost/functional/hash.hpp>
+#include <complex>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <map>
 #include <memory>
-#include <unordered_set>
 #include <string>
+#include <unordered_set>
 #include <variant>
 #include <vector>
 
@@ -73,9 +73,9 @@ struct SceneChange {
   bool touches(const Eigen::Vector3d& radar, const PathRecord& record) const;
 };
 
-/// Cells, as a radar resolves them, within which scatter points of one facet are one path with their power, at the place
-/// and with the phase of the one that lies nearest to their mean: thousands of points become a hundred where the phases
-/// between them say nothing.
+/// Cells, as a radar resolves them, within which scatter points of one facet are one path with their power, at the
+/// place and with the phase of the one that lies nearest to their mean: thousands of points become a hundred where the
+/// phases between them say nothing.
 struct CloudCells {
   using Cell = std::array<int, 4>;  ///< facet, range, sine, elevation
   using CellSet = std::unordered_set<Cell, boost::hash<Cell>>;
@@ -115,7 +115,8 @@ struct PoseContext {
   /// Where the pose's paths are known but for what a change touches; else null (Mechanism::tracesChanges).
   const SceneChange* change = nullptr;
   const CloudCells* cloud = nullptr;  ///< null: every scatter point is a path
-  /// Paths that meet this actor (index in `scene`) are wanted alone; others that are added are thrown away. -1: all are.
+  /// Paths that meet this actor (index in `scene`) are wanted alone; others that are added are thrown away. -1: all
+  /// are.
   int only_actor = -1;
 };
 

@@ -28,11 +28,11 @@ struct PathRecord {
   PerInteraction<double> reflection_cosine;
   Eigen::Vector3d departure, arrival;  ///< unit vectors in radar_link, both from the radar outwards
   int bounces = 0;
-  int range_bin = 0;                    ///< nearest bin of length/2
-  double amplitude = 0;                 ///< A_p, common to the channels
-  double phase_rad = 0;                 ///< of c[0]
-  PerChannel<double> length_m;          ///< [M] exact path length per virtual element
-  PerChannel<std::complex<double>> c;   ///< [M] at the window's centre; sum|c|^2 = M A_p^2
+  int range_bin = 0;                   ///< nearest bin of length/2
+  double amplitude = 0;                ///< A_p, common to the channels
+  double phase_rad = 0;                ///< of c[0]
+  PerChannel<double> length_m;         ///< [M] exact path length per virtual element
+  PerChannel<std::complex<double>> c;  ///< [M] at the window's centre; sum|c|^2 = M A_p^2
 };
 
 /// Adds records to grid x [M][N]: x_k[n] += c_k exp(j 2 pi mu (length_k/c)(t_n - t_c)). The one place where paths

@@ -18,7 +18,7 @@ class WeightBasis {
  public:
   struct Group {
     const std::string* event = nullptr;  ///< interned name, as in the records
-    PerInteraction<int> actors;             ///< Scene::actors index, one per interaction
+    PerInteraction<int> actors;          ///< Scene::actors index, one per interaction
     int paths = 0;
     ComplexGrid x;     ///< [M][N]
     double power = 0;  ///< sum of A_p^2

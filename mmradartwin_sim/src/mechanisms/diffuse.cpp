@@ -106,7 +106,8 @@ class Diffuse : public Mechanism {
       const Eigen::Vector3d direction_radar = to_radar * way / r;
       if (!context.inFieldOfView(direction_radar)) continue;
       const Facet& facet = context.scene.facets[point.facet];
-      if (touched ? touched->count(context.cloud->cellOf(point.facet, point.position)) == 0 : change && !touches(point)) {
+      if (touched ? touched->count(context.cloud->cellOf(point.facet, point.position)) == 0
+                  : change && !touches(point)) {
         continue;
       }
       const Eigen::Vector3d in = way / r;
