@@ -168,15 +168,16 @@ std::optional<Delivery> findDelivery(const Twin& twin, const ChannelData& data) 
   std::iota(same.begin(), same.end(), 0);
   std::vector<int> reverse(same.rbegin(), same.rend());
   std::vector<std::vector<int>> starts = {same, reverse};
+  std::vector<int> of_lanes;
   double best_of_lanes = -std::numeric_limits<double>::infinity();
   for (const std::vector<int>& order : ordersOfLanes(data.radar)) {
     const NamedParameters m = permutation(order);
     const double value = likelihood(&m, 0);
     if (value <= best_of_lanes) continue;
     best_of_lanes = value;
-    starts.resize(2);
-    starts.push_back(order);
+    of_lanes = order;
   }
+  if (!of_lanes.empty()) starts.push_back(of_lanes);
   std::set<std::vector<int>> ends;
   for (std::vector<int> order : starts) {
     NamedParameters m = permutation(order);

@@ -675,10 +675,11 @@ Diagnosis Session::run() {
     for (Finding& f : findings.findings) {
       if (f.cause == "iq_imbalance") {
         measureImage(data_, f);
-        replaceBy(*f.mechanism, extended_);
+      } else if (f.cause == "second_harmonic") {
+        referToStrongestHost(twin_.changed(mechanisms_), data_, state_.nuisance.log_gain, strongest_amplitude_, f);
+      } else {
+        continue;
       }
-      if (f.cause != "second_harmonic") continue;
-      referToStrongestHost(twin_.changed(mechanisms_), data_, state_.nuisance.log_gain, strongest_amplitude_, f);
       replaceBy(*f.mechanism, extended_);
     }
     addUnexplained(received_.unexplained, data_, findings, extended_);

@@ -310,9 +310,11 @@ void measureImage(const ChannelData& data, Finding& f) {
   constexpr int kIterations = 6;
   constexpr double kLeastError_db = 0.03;
   const std::size_t locations = data.locations.size();
+  if (locations < 3) return;
   std::vector<std::complex<double>> shared;
   std::vector<double> host;
   std::complex<double> beta = 0;
+  double hosts = 0;
   // Cells count by what stands there beside the image: by all power there, those that echoes of the room make weaker
   // would count most.
   for (int i = 0; i < kIterations; ++i) {
@@ -328,12 +330,10 @@ void measureImage(const ChannelData& data, Finding& f) {
         host[l] += there.squaredNorm() / beside;
       }
     }
-    const double hosts = std::accumulate(host.begin(), host.end(), 0.0);
+    hosts = std::accumulate(host.begin(), host.end(), 0.0);
     if (!(hosts > 0)) return;
     beta = std::accumulate(shared.begin(), shared.end(), std::complex<double>()) / hosts;
   }
-  if (locations < 3) return;
-  const double hosts = std::accumulate(host.begin(), host.end(), 0.0);
   double scatter = 0;
   for (std::size_t l = 0; l < locations; ++l) {
     scatter += std::pow(std::real((shared[l] - beta * host[l]) * std::conj(beta)) / std::norm(beta) / hosts, 2);

@@ -45,7 +45,7 @@ void referToStrongestHost(const Twin& twin, const ChannelData& data, double log_
 
 /// Level and phase of an iq_imbalance by what images share with their hosts, conj(x) at the mirrored frequency of the
 /// same pose: no echo of the room has its phase. Levels of the power there alone come out some 2 dB high. Left as it is
-/// where no cell is its host's image alone.
+/// where no cell is its host's image alone, and with fewer than three locations.
 void measureImage(const ChannelData& data, Finding& f);
 Finding findingOf(const ChannelErrors& errors);
 /// Where the noise departs from the level that the twin's noise_floor states.
