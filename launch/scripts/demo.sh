@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The demo: generate a session that hides an effect, play it over UDP through the live loop, evaluate what was recorded,
-# find the effect, and evaluate again with the twin that knows it.
+# find the effect, replay and evaluate again with the twin that knows it.
 # usage: demo.sh OUTPUT [POSES]
 set -euo pipefail
 
@@ -11,7 +11,8 @@ frames=${DEMO_FRAMES:-100}
 say() { printf '== %s\n' "$*" >&2; }
 
 mkdir -p "$out"
-rm -rf "$out/session" "$out/report" "$out/diagnosis" "$out/report_extended" "$out/demo.bag" "$out/demo.bag.active" "$out/rviz.png"
+rm -rf "$out/session" "$out/report" "$out/diagnosis" "$out/report_extended" "$out/demo.bag" "$out/demo.bag.active" \
+  "$out/rviz.png" "$out/rviz_extended.png" "$out/rviz_before_after.png"
 
 say "1/5 generating a measured session: $locations places x $headings headings, $frames frames each"
 rosrun mmradartwin_tests make_session.py --output "$out/session" --locations "$locations" --headings "$headings" \
@@ -36,6 +37,16 @@ picture() {
   import -window "$id" "$1" 2>/dev/null && [ -n "$(rviz_window)" ]
 }
 
+# watch FILE: waits for the launch; the last picture taken while it runs is the one that stays.
+watch() {
+  while kill -0 "$launch" 2>/dev/null; do
+    sleep 3
+    picture "$out/.rviz.png" && mv -f "$out/.rviz.png" "$1" || true
+  done
+  wait "$launch" || true
+  launch=
+}
+
 launch=
 cleanup() {
   [ -n "$launch" ] && kill -INT "$launch" 2>/dev/null && wait "$launch" 2>/dev/null
@@ -53,13 +64,7 @@ say "2/5 playing it over UDP at the real pace: driver, signal chain, twin, attri
 roslaunch -p "$port" mmradartwin_launch demo.launch session:="$out/session" bag:="$out/demo.bag" \
   average_frames:="$frames" ${DEMO_ARGS:-} &
 launch=$!
-# The last picture taken while the loop runs is the one that stays.
-while kill -0 "$launch" 2>/dev/null; do
-  sleep 3
-  picture "$out/.rviz.png" && mv -f "$out/.rviz.png" "$out/rviz.png" || true
-done
-wait "$launch" || true
-launch=
+watch "$out/rviz.png"
 say "the session was played to its end (roslaunch calls that the death of session_player; all is well)"
 
 bag=$out/demo.bag
@@ -72,15 +77,22 @@ rosrun mmradartwin_attribution evaluate "$bag" --output "$out/report" || status=
 say "4/5 what does the twin get wrong? (the answer is in $out/truth.json, which nothing here reads)"
 rosrun mmradartwin_attribution diagnose "$out/session" --output "$out/diagnosis" || status=$?
 
-say "5/5 evaluating again with the extended twin"
-rosrun mmradartwin_attribution evaluate "$out/session" --twin "$out/diagnosis/twin.extended.yaml" \
-  --output "$out/report_extended" --no-bag || status=$?
+say "5/5 the recording again, with the extended twin: rviz, then the report"
+extended=$out/diagnosis/twin.extended.yaml
+roslaunch -p "$port" mmradartwin_launch replay.launch bag:="$bag" twin:="$extended" average_frames:="$frames" \
+  diagnosis:=false ${DEMO_ARGS:-} &
+launch=$!
+watch "$out/rviz_extended.png"
+if [ -f "$out/rviz.png" ] && [ -f "$out/rviz_extended.png" ]; then
+  convert "$out/rviz.png" "$out/rviz_extended.png" -append "$out/rviz_before_after.png"
+fi
+rosrun mmradartwin_attribution evaluate "$bag" --twin "$extended" --output "$out/report_extended" --no-bag || status=$?
 
 cat >&2 <<TEXT
    report         $out/report/index.html
    diagnosis      $out/diagnosis/index.html
    after it       $out/report_extended/index.html
-   rviz           $out/rviz.png
+   rviz           $out/rviz_before_after.png
    recording      $bag        (replay: ./run.sh exec roslaunch mmradartwin_launch replay.launch bag:=$bag)
    session        $out/session
 TEXT

@@ -81,7 +81,13 @@ class DemoLoop(unittest.TestCase):
         self.assertAlmostEqual(ledger.q3_median_db, central["q3_median_db"], delta=0.1)
 
     def test_rviz_shows_both_fans(self):
-        pixels = picture_pixels(self.path("rviz.png"))
+        for name in ("rviz.png", "rviz_extended.png"):
+            with self.subTest(name):
+                self.check_fans(picture_pixels(self.path(name)))
+        before_after = picture_pixels(self.path("rviz_before_after.png"))
+        self.assertEqual(before_after.shape[0], 2 * picture_pixels(self.path("rviz.png")).shape[0])
+
+    def check_fans(self, pixels):
         fans = fan_columns(pixels)
         self.assertGreaterEqual(len(fans), 2, f"fans found in columns {fans}")
         # Each holds echoes too: the upper half of viridis, teal to yellow, has more green than blue or red in it.
