@@ -38,6 +38,8 @@ FindingParameter number(const char* name, const char* unit, double value, const 
   return {name, unit, value, {ci95}};
 }
 
+constexpr double kUnsteady = 0.5;  ///< of the bins with standing echoes, where it is not something in the room
+
 /// Of one pose, what findings() judges.
 struct PoseJudgement {
   std::string pose;
@@ -49,6 +51,7 @@ struct PoseJudgement {
   double turn_rad_per_frame = 0, turn_variance = 0;
   int turn_cells = 0, frames = 0;
   std::vector<double> frame_gain_db;  ///< common to all channels and samples
+  double unsteady_share = 0, unsteady_nats = 0;
 };
 
 }  // namespace
@@ -74,6 +77,7 @@ struct FrameExaminer::State {
   FrameFinding interference() const;
   FrameFinding drift() const;
   FrameFinding frameGain() const;
+  FrameFinding unsteadiness() const;
   /// A frame's level at all poses but those of one location.
   std::vector<double> levelsOf_db(std::size_t frame, const std::string& without = "") const;
 };
@@ -132,6 +136,8 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   judged.turn_rad_per_frame = turn + residuals.turn_rad_per_frame;
   judged.turn_variance = residuals.turn_variance;
   judged.turn_cells = residuals.turn_cells;
+  judged.unsteady_share = residuals.unsteady_share;
+  judged.unsteady_nats = residuals.unsteady_nats;
   for (double level : residuals.frame_level) judged.frame_gain_db.push_back(20 * std::log10(std::max(level, 1e-6)));
 
   PoseFrames result;
@@ -370,13 +376,35 @@ FrameFinding FrameExaminer::State::frameGain() const {
   return f;
 }
 
+FrameFinding FrameExaminer::State::unsteadiness() const {
+  FrameFinding f;
+  f.cause = "unknown";
+  for (const PoseJudgement& p : judged) {
+    if (p.unsteady_share < kUnsteady) continue;
+    f.poses.push_back(p.pose);
+    f.log_likelihood_gain += p.unsteady_nats;
+  }
+  if (f.poses.size() < 3 || 3 * f.poses.size() < 2 * judged.size()) return {};
+  f.false_alarm_rate = 1e-6;  // nobody who walks is in half of all bins at two thirds of the poses
+  f.description = "frames of one pose disagree about what stands, in most of its echoes at once, at " +
+                  std::to_string(f.poses.size()) + " of " + std::to_string(judged.size()) +
+                  " poses: the radar itself changes from frame to frame";
+  return f;
+}
+
 std::vector<FrameFinding> FrameExaminer::findings() const {
   const State& s = *state_;
-  std::vector<FrameFinding> all = {s.saturation(), s.packetLoss(), s.misalignment(), s.interference(), s.drift()};
+  std::vector<FrameFinding> all = {s.saturation(), s.packetLoss(), s.misalignment()};
+  // What moves, bursts and turns are told from a radar that is the same in all frames.
+  const bool steady = s.unsteadiness().poses.empty();
+  if (steady) {
+    all.push_back(s.interference());
+    all.push_back(s.drift());
+  }
   // A strong walker pulls the gain that a frame's samples share, and what that leaves looks like a burst; what is left
   // of bursts looks like something that moves. Of two that stand at the same poses the one with more poses is the
   // cause.
-  const std::vector<FrameFinding> walkers = s.locate().walkers;
+  const std::vector<FrameFinding> walkers = steady ? s.locate().walkers : std::vector<FrameFinding>();
   std::set<std::string> walked, hit;
   for (const FrameFinding& walker : walkers) walked.insert(walker.poses.begin(), walker.poses.end());
   const auto within = [](const FrameFinding& f, const std::set<std::string>& poses) {
@@ -399,6 +427,7 @@ std::vector<FrameFinding> FrameExaminer::findings() const {
 }
 
 std::vector<FrameFinding> FrameExaminer::unexplained() const {
+  if (FrameFinding f = state_->unsteadiness(); !f.poses.empty()) return {std::move(f)};
   std::vector<FrameFinding> all = state_->locate().unexplained;
   FrameFinding gain = state_->frameGain();
   if (gain.log_likelihood_gain > 0) all.push_back(std::move(gain));

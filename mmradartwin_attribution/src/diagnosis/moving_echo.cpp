@@ -227,6 +227,35 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotResid
   }
 }
 
+void ShotExaminer::readSteadiness(const Spectra& s, ShotResiduals& result) const {
+  const double freedom = static_cast<double>(s.shot.size()) - 1;
+  if (freedom < 4) return;
+  std::vector<double> varied(static_cast<std::size_t>(s.bins), 0), standing(varied);
+  for (int b = 0; b < s.bins; ++b) {
+    const auto bin = static_cast<std::size_t>(b);
+    for (std::size_t i = 0; i < s.shot.size(); ++i) {
+      varied[bin] += Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm() / freedom;
+    }
+    standing[bin] =
+        Eigen::Map<const Eigen::VectorXcf>(&s.average[bin * static_cast<std::size_t>(s.channels)], s.channels)
+            .squaredNorm();
+  }
+  // Noise fills all bins alike: the steadiest hold no more than it.
+  std::vector<double> sorted = varied;
+  std::sort(sorted.begin(), sorted.end());
+  const double noise = sorted[sorted.size() / 10];
+  double all = 0, unsteady = 0;
+  for (std::size_t b = 0; b < varied.size(); ++b) {
+    if (!(standing[b] > 30 * noise)) continue;
+    ++all;
+    if (!(varied[b] > 4 * noise && varied[b] - noise > 0.1 * standing[b])) continue;
+    ++unsteady;
+    const double q = varied[b] / std::max(noise, 1e-30);
+    result.unsteady_nats += freedom * s.channels * (q - 1 - std::log(q));
+  }
+  if (all > 0) result.unsteady_share = unsteady / all;
+}
+
 void ShotExaminer::readNoise(Spectra& s, ShotResiduals& result) const {
   double window_power = 0;
   for (float w : window_) window_power += w * w;
@@ -377,6 +406,7 @@ ShotResiduals ShotExaminer::examine(const FrameStack& stack, const std::vector<C
   Spectra s = spectra(stack, average);
   takeCommonGain(stack, s, result);
   result.shots = static_cast<int>(s.shot.size());
+  readSteadiness(s, result);
   readNoise(s, result);
   readTurn(stack, s, result);
   readEvidence(s, result);

@@ -33,6 +33,10 @@ struct ShotResiduals {
   /// [frame] level of the whole signal against the average, amplitude; 1 where the signal does not stand out of the
   /// noise.
   std::vector<double> frame_level;
+  /// Of the range bins with standing echoes, those that vary by more than a tenth of themselves beyond noise and beyond
+  /// what all share: few where something moves, most where the radar itself changes.
+  double unsteady_share = 0;
+  double unsteady_nats = 0;  ///< by which those bins vary more than noise does
 };
 
 /// Looks at what the shots differ by, in range, angle and time.
@@ -49,6 +53,7 @@ class ShotExaminer {
   struct Spectra;
   Spectra spectra(const FrameStack& stack, const std::vector<std::complex<float>>& average) const;
   void takeCommonGain(const FrameStack& stack, Spectra& spectra, ShotResiduals& result) const;
+  void readSteadiness(const Spectra& s, ShotResiduals& result) const;
   void readNoise(Spectra& spectra, ShotResiduals& result) const;
   void readEvidence(const Spectra& spectra, ShotResiduals& result) const;
   void readEchoes(const Spectra& spectra, ShotResiduals& result) const;

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
 #include <sstream>
 
 #include "mmradartwin_attribution/ledger.h"
@@ -20,7 +19,6 @@ constexpr double kCell_m = 0.15;  // of the map: about a range bin of the paper'
 // A walker and the width of a beam at some metres.
 constexpr double kReach_m = 1.0;
 constexpr std::size_t kMostWalkers = 4;
-constexpr double kStands_m_per_s = 0.05;  // slower than this nobody walks
 // A pose carries a finding from here on: chance makes one cell in 2e4.
 constexpr float kPoseEvidence = 10;
 // Evidence of one pose beyond this convinces no more: several poses that agree on a place weigh more than one alone.
@@ -127,40 +125,10 @@ class Search {
       if (log_chance >= kLogFalseAlarm || motion.walkers.size() == kMostWalkers) break;
       motion.walkers.push_back(walker(place, std::exp(log_chance)));
     }
-    if (motion.walkers.size() == kMostWalkers && noneMoves(motion.walkers)) {
-      motion.unexplained.push_back(framesDiffer(motion.walkers));
-      motion.walkers.clear();
-    }
     return motion;
   }
 
  private:
-  static bool noneMoves(const std::vector<FrameFinding>& walkers) {
-    return std::all_of(walkers.begin(), walkers.end(), [](const FrameFinding& f) {
-      const auto speed = std::find_if(f.parameters.begin(), f.parameters.end(),
-                                      [](const auto& p) { return p.name == "speed_m_per_s"; });
-      return speed != f.parameters.end() && std::get<double>(speed->value) < kStands_m_per_s;
-    });
-  }
-
-  /// Echoes that change from frame to frame in many places, and none of them goes anywhere.
-  FrameFinding framesDiffer(const std::vector<FrameFinding>& places) const {
-    FrameFinding f;
-    f.cause = "unknown";
-    std::set<std::string> names;
-    for (const FrameFinding& p : places) {
-      f.log_likelihood_gain = std::max(f.log_likelihood_gain, p.log_likelihood_gain);
-      f.false_alarm_rate = std::max(f.false_alarm_rate, p.false_alarm_rate);
-      names.insert(p.poses.begin(), p.poses.end());
-      f.where.insert(f.where.end(), p.where.begin(), p.where.end());
-    }
-    f.poses.assign(names.begin(), names.end());
-    f.description = "frames of one pose disagree in many places at once, at " + std::to_string(names.size()) + " of " +
-                    std::to_string(poses_.size()) + " poses, and nothing moves there: the radar itself changes from " +
-                    "frame to frame";
-    return f;
-  }
-
   Place strongestPlace() const {
     std::vector<float> sum(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), 0);
     for (std::size_t i = 0; i < poses_.size(); ++i) {
