@@ -107,6 +107,7 @@ MechanismRegistry& MechanismRegistry::instance() {
     r.add("channel_conjugation", makeChannelConjugation);
     r.add("channel_permutation", makeChannelPermutation);
     r.add("mutual_coupling", makeMutualCoupling);
+    r.add("transmitter_coupling", makeTransmitterCoupling);
     r.add("iq_imbalance", makeIqImbalance);
     r.add("dc_offset", makeDcOffset);
     r.add("second_harmonic", makeSecondHarmonic);

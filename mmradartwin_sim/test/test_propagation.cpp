@@ -522,6 +522,20 @@ TEST_F(Propagation, AnEmpiricalLawIsItsTable) {
   }
 }
 
+TEST_F(Propagation, ALateEchoIsAPointFartherAway) {
+  addWall("wall", "Metal", {8, -3}, {8, 3}, -2, 2);
+  writeScene();
+  const std::vector<PathRecord> found =
+      of(run("  empirical_echo: {x_m: 3, y_m: 0, height_m: 0, rcs_dbsm: 0, behind_m: 1.5}\n"), "empirical_echo");
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NEAR(found[0].length_m[0], 9, 0.01);
+  EXPECT_NEAR(found[0].arrival.x(), 1, 1e-3);
+  // The radar equation of a square metre at 3 m, whatever the delay.
+  expectForm("a late point's amplitude", "lambda sqrt(sigma)/((4 pi)^(3/2) r^2)",
+             kLambda77_m / (std::pow(4 * M_PI, 1.5) * 9), found[0].amplitude, 1e-2 * found[0].amplitude);
+  EXPECT_TRUE(of(run("  empirical_echo: {x_m: 9, y_m: 0, height_m: 0, rcs_dbsm: 0}\n"), "empirical_echo").empty());
+}
+
 TEST_F(Propagation, LawVariablesReadPathAndSession) {
   Scene scene;
   Facet facet;
@@ -547,7 +561,16 @@ TEST_F(Propagation, LawVariablesReadPathAndSession) {
   EXPECT_NEAR(value("incidence_deg").of[0], 60, 1e-9);
   where.strongest_amplitude = 0;
   EXPECT_EQ(value("amplitude_db").count, 0);  // no session is known
-  EXPECT_NEAR(LawVariable("passing_m", 0, 3).of(where, record).of[0], std::sqrt(4.5), 1e-9);
+  EXPECT_EQ(value("foot_m").count, 0);        // the face is no actor's
+  scene.facets[0].actor = 0;
+  scene.actors.resize(1);
+  scene.actors[0].bounds.extend(Eigen::Vector3d(2, 1, 0));
+  scene.actors[0].bounds.extend(Eigen::Vector3d(2, 2, 3));
+  EXPECT_NEAR(value("foot_m").of[0], 0.5, 1e-9);
+  where.T_map_radar.translation() = Eigen::Vector3d(3, 4, 1);
+  EXPECT_NEAR(LawVariable("standing_m", {0, 0, 90}).of(where, record).of[0], 4, 1e-9);
+  where.T_map_radar = Eigen::Isometry3d::Identity();
+  EXPECT_NEAR(LawVariable("passing_m", {0, 3}).of(where, record).of[0], std::sqrt(4.5), 1e-9);
   EXPECT_NE(errorOf([] { LawVariable("colour"); }).find("time_s"), std::string::npos);
 }
 

@@ -124,6 +124,18 @@ TEST_F(ReceiverTest, CouplingFeedsNeighbours) {
             std::string::npos);
 }
 
+TEST_F(ReceiverTest, ATransmitterIsHeardInTheOthersSlots) {
+  addPlate();
+  writeScene();
+  const ComplexGrid base = look("").grid.x;
+  const ComplexGrid x = look("  transmitter_coupling: {share_real: 0.3, share_imaginary: -0.2}\n").grid.x;
+  const Complex share(0.3, -0.2);
+  for (int channel : {1, 6}) {
+    const Complex expected = base(channel, 9) + share * base((channel + 4) % 8, 9);
+    EXPECT_NEAR(std::abs(x(channel, 9) - expected) / std::abs(expected), 0, 1e-6);
+  }
+}
+
 TEST_F(ReceiverTest, AReplicaFollowsEveryEchoOrOneActors) {
   addPlate();
   addPlate(5, -20);

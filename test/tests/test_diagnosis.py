@@ -150,6 +150,47 @@ class HiddenEffects(unittest.TestCase):
         self.assertAlmostEqual(first["mechanism"]["echo_replica"]["behind_m"], 0.7, delta=0.05, msg=f"seed {seed}")
         self.assertGreater(first["gain"]["explained_power"]["difference_ci95"][0], 0, msg=f"seed {seed}")
 
+    def unknown(self, seed, hidden, strength=None):
+        """The mechanism of the one finding, `unknown`, of a session that hides an effect of no name, and the truth."""
+        truth = self.measured(seed, hidden, headings=2, strength=strength)
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["unknown"], msg=f"seed {seed}: {findings}")
+        return findings["findings"][0]["mechanism"], truth[0]["parameters"]
+
+    def test_a_tag_that_answers_late_is_unknown_and_placed(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "41"))
+        mechanism, truth = self.unknown(seed, {"late_tag": {}})
+        echo = mechanism["empirical_echo"]
+        self.assertLess(math.dist((echo["x_m"], echo["y_m"]), (truth["x_m"], truth["y_m"])), 0.1, msg=f"seed {seed}")
+        self.assertAlmostEqual(echo["behind_m"], truth["late_m"], delta=0.1, msg=f"seed {seed}")  # half a bin
+        self.assertAlmostEqual(echo["rcs_dbsm"], 10 * math.log10(truth["rcs_m2"]), delta=2.5, msg=f"seed {seed}")
+
+    def test_a_level_that_goes_with_where_the_radar_stands_is_unknown(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "42"))
+        mechanism, truth = self.unknown(seed, {"standing_field": {}}, strength=1.4)
+        law = mechanism["empirical_law"]
+        self.assertEqual(law["variable"], "standing_m", msg=f"seed {seed}")
+        apart_deg = (law["bearing_deg"] - truth["toward_deg"] + 90) % 180 - 90
+        self.assertAlmostEqual(apart_deg, 0, delta=15, msg=f"seed {seed}")
+        swing_db = max(law["gain_db"]) - min(law["gain_db"])
+        self.assertAlmostEqual(swing_db, 2 * truth["swing_db"], delta=3, msg=f"seed {seed}")
+
+    def test_transmitters_that_are_heard_in_each_others_slots_are_unknown(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "43"))
+        mechanism, truth = self.unknown(seed, {"slot_crosstalk": {}})
+        coupling = mechanism["transmitter_coupling"]
+        share = complex(coupling["share_real"], coupling["share_imaginary"])
+        self.assertAlmostEqual(20 * math.log10(abs(share)), truth["level_db"], delta=1, msg=f"seed {seed}")
+
+    def test_a_radar_of_two_states_is_unknown_and_nobody_walks(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "11"))
+        self.measured(seed, {"two_states": {}}, headings=2)
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual({f["cause"] for f in findings["findings"]}, {"unknown"}, msg=f"seed {seed}: {findings}")
+        self.assertIn("from frame to frame", findings["findings"][0]["description"])
+
     def test_a_gain_that_settles_within_a_pose_is_unknown(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "39"))
         self.measured(seed, {"slow_start": {}}, headings=2)

@@ -46,6 +46,7 @@ struct TriedHypothesis {
   double inflation = 1;         ///< of chance over places, by which that is divided before it is judged
   double held_out_gain = 0;     ///< nats on places that the fit did not see
   double false_alarm_rate = 1;  ///< family-wise
+  std::string fitted;           ///< its numbers, as "forward_m 0.031; left_m -0.002"
   std::string verdict;          ///< "found", or what speaks against it; "" where none was needed
 };
 

@@ -50,6 +50,7 @@ constexpr std::size_t kMostNames = 5;  ///< fits of one round
 constexpr std::size_t kMostLaws = 3;
 constexpr double kWorthAFit = 4;  ///< nats promised
 constexpr double kWorthAFitOfGeometry = 0.5;
+constexpr double kLonger[] = {1.5, 2};  ///< starts of a geometry
 constexpr double kWorthALaw = 12;
 constexpr double kWorthAnObject = 3;       ///< at the best of all places
 constexpr double kWorthABox = 15;          ///< nats of a round one there,
@@ -63,6 +64,7 @@ constexpr double kObjectPlaces = 500;  ///< places of an 8 by 6 m room that a se
 
 bool isMove(const Hypothesis& h) { return h.mechanism.mechanism == "actor_moved"; }
 bool isObject(const Hypothesis& h) { return h.mechanism.mechanism == "actor_unmodelled"; }
+bool isPlaced(const Hypothesis& h) { return isObject(h) || h.mechanism.mechanism == "empirical_echo"; }
 
 class Session {
  public:
@@ -255,6 +257,11 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     Screened s = lookAtSome(objectAt(place));
     if (!object || s.promised > object->promised) object = std::move(s);
   }
+  std::optional<Screened> late;
+  for (const ProjectedPlace& place : projectLateBack(twin_, *model_, state_)) {
+    Screened s = lookAtSome(lateEchoAt(place));
+    if (!late || s.promised > late->promised) late = std::move(s);
+  }
   source_->settle(mechanisms_);
   if (object && object->promised > kWorthAnObject) {
     // It may be one of the scene's that stands elsewhere.
@@ -328,16 +335,17 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     suggest(std::move(s));
   }
   source_->settle(mechanisms_);
-  if (object) {
-    freePlace(data_, *object);
-    screened.push_back(std::move(*object));
+  for (std::optional<Screened>* placed : {&object, &late}) {
+    if (!*placed) continue;
+    freePlace(data_, **placed);
+    screened.push_back(std::move(**placed));
   }
   std::stable_sort(screened.begin(), screened.end(), better);
   family_ = all.size() + static_cast<std::size_t>(kLawFamily);
   std::vector<HypothesisFit> fits;
   std::size_t names_fitted = 0, laws_fitted = 0;
   for (std::size_t i = 0; i < screened.size(); ++i) {
-    const Screened s = screened[i];
+    Screened s = screened[i];
     TriedHypothesis tried;
     tried.label = s.hypothesis.label();
     tried.promised = s.promised;
@@ -357,8 +365,19 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     const std::size_t most = law ? kMostLaws : moved ? kMostNames + kMostOutOfPlace : kMostNames;
     if (s.promised > worth && (box || fitted < most)) {
       ++fitted;
+      if (s.hypothesis.isGeometry()) {
+        // Latents stand in for a part of it only, as much as their own spread lets them.
+        const std::vector<std::vector<double>> starts = s.starts;
+        for (double longer : kLonger) {
+          for (std::vector<double> start : starts) {
+            for (double& scaled : start) scaled *= longer;
+            s.starts.push_back(std::move(start));
+          }
+        }
+      }
       report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
-      fits.push_back(moved || box ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
+      const bool around = moved || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
+      fits.push_back(around ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
       source_->settle(mechanisms_);
       if (isObject(s.hypothesis) && !box && fits.back().broad_gain > kWorthABox) {
         screened.push_back(asBox(data_, state_, fits.back()));  // last: the slowest of all fits
@@ -383,13 +402,17 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     result_.tried.push_back(tried);
   }
   for (HypothesisFit& f : fits) {
-    fitter_->judge(f, family_ + static_cast<std::size_t>(isObject(f.hypothesis) ? kObjectPlaces : 0));
+    fitter_->judge(f, family_ + static_cast<std::size_t>(isPlaced(f.hypothesis) ? kObjectPlaces : 0));
     TriedHypothesis& t = triedAs(f, round);
     t.gain = f.gain;
     t.broad_gain = f.broad_gain;
     t.inflation = f.inflation;
     t.held_out_gain = f.held_out_gain;
     t.false_alarm_rate = f.false_alarm_rate;
+    for (std::size_t i = 0; i < f.scaled.size(); ++i) {
+      const Coordinate& c = f.hypothesis.coordinates[i];
+      t.fitted += (i ? "; " : "") + c.parameter + " " + number(c.value(f.scaled[i]));
+    }
   }
   return fits;
 }
@@ -468,7 +491,7 @@ void Session::refitTogether() {
       const std::size_t numbers = a.hypothesis.coordinates.size();
       // There or not, or plain whatever its scatter: its own round has judged it.
       if (numbers == 0 || a.plain) continue;
-      const double rate = fitter_->falseAlarmRate(fit.worth[i], numbers, family_);
+      const double rate = fitter_->falseAlarmRate(fit.worth[i], numbers, family_, numbers);
       if (rate > weakest_rate) {
         weakest = i;
         weakest_rate = rate;
@@ -515,7 +538,7 @@ bool Session::isWithinErrors(const HypothesisFit& f) const {
   if (a == accepted_.end() || !(isMove(h) || (h.isGeometry() && !f.plain))) return false;
   if (f.plain && f.moved_m() > kFarAway_m) return false;  // an interval may be wide where the likelihood is rough
   const double nats = natsFromNothing(h, a->scaled, a->standard_error);
-  return fitter_->falseAlarmRate(nats, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
+  return fitter_->falseAlarmRate(nats, h.coordinates.size(), kWaysToErr, h.coordinates.size()) > kFalseAlarm;
 }
 
 /// The values of what rounds have found, wherever they stand.
@@ -556,17 +579,18 @@ bool Session::judgeChannels(int round) {
       const auto explained = *finding.gain->explained_power.difference_ci95;
       const double by = finding.gain->explained_power.after - finding.gain->explained_power.before;
       const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
+      const bool likelier = (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0;
       const auto refuse = [&](const std::string& why) {
         verdict = why + ": " + number(by, 2) + " (" + number(explained[0], 2) + " to " + number(explained[1], 2) + ")";
       };
-      if (!in_maps && isLikeClutter(f, by >= kLeastExplained, explained[0] > 0)) {
+      const bool sure = explained[0] > 0 && likelier;
+      if (!(in_maps && likelier) && isLikeClutter(f, by >= kLeastExplained, sure)) {
         refuse("clutter is like that, by what the maps gain");
         continue;
       }
       const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled));
       const double least_nats = leastNats(f.hypothesis, traces, data_.poses.size());
       const bool in_nats = explained[1] >= 0 && f.broad_gain / f.inflation > least_nats;
-      const bool likelier = (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0;
       const bool much = likelier && ((f.plain && by > -kMostLost) || in_nats);
       // What explains the same less well is no name for what a better one was refused for.
       if (!in_maps && (!much || refused)) {

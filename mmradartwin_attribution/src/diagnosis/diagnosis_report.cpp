@@ -169,14 +169,14 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
   writeFindings(findings, directory_ + "/findings.json");
   std::ostringstream tried;
   tried << "round,hypothesis,promised_nats,gain_nats,gain_without_best_place_nats,inflation,held_out_nats,false_alarm_"
-           "rate,verdict\n";
+           "rate,fitted,verdict\n";
   for (const TriedHypothesis& t : diagnosis.tried) {
     tried << t.round << ",\"" << t.label << "\"," << shown(t.promised, 6) << ",";
     if (std::isnan(t.gain)) {
-      tried << ",,,,,";
+      tried << ",,,,,,";
     } else {
       tried << shown(t.gain, 6) << "," << shown(t.broad_gain, 6) << "," << shown(t.inflation, 4) << ","
-            << shown(t.held_out_gain, 6) << "," << shown(t.false_alarm_rate, 3) << ",";
+            << shown(t.held_out_gain, 6) << "," << shown(t.false_alarm_rate, 3) << ",\"" << t.fitted << "\",";
     }
     tried << t.verdict << "\n";
   }

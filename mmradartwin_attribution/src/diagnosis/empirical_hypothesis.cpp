@@ -33,6 +33,9 @@ std::string describeLaw(const Hypothesis& hypothesis, const NamedParameters& fit
     if (variable == "passing_m") {
       out << " from x_m " << fitted.values.number("x_m") << ", y_m " << fitted.values.number("y_m");
     }
+    if (variable == "standing_m") out << " along bearing_deg " << fitted.values.number("bearing_deg");
+    if (!fitted.values.text("actor").empty()) out << " of " << fitted.values.text("actor");
+    if (!hypothesis.variant.empty()) out << " (" << hypothesis.variant << ")";
     if (values.size() > kMostInWords) {
       const auto [low, high] = std::minmax_element(values.begin(), values.end());
       out << ": from " << *low << " at " << at[static_cast<std::size_t>(low - values.begin())] << " to " << *high

@@ -27,8 +27,8 @@ constexpr double kLawPerPose = 0.4, kSubjectPerPose = 1;  ///< a twin's own erro
 
 double leastNats(const Hypothesis& hypothesis, bool traces, std::size_t poses) {
   const double n = static_cast<double>(poses);
-  if (hypothesis.mechanism.mechanism == "actor_unmodelled") return std::max(kObject, kLawPerPose * n);
   const std::string& name = hypothesis.mechanism.mechanism;
+  if (name == "actor_unmodelled" || name == "empirical_echo") return std::max(kObject, kLawPerPose * n);
   const bool unnamed = !isCatalogued(name);
   const bool adds = !unnamed && causeDescription(name).residual_class == ResidualClass::kMissingMechanism;
   if (unnamed || !hypothesis.subject.empty()) return std::max(adds ? kSubjectOfMore : kSubject, kSubjectPerPose * n);

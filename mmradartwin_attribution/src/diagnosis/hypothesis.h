@@ -17,7 +17,7 @@ struct Coordinate {
   std::vector<double> shape = {};  ///< of a list: adds value() times this to all of it, neutral being 0; else empty
 
   /// True for levels in dB whose neutral value stands for nothing at all: then the scale is one of power.
-  bool logarithmic() const { return unit == "dB" && neutral <= -60; }
+  bool logarithmic() const { return (unit == "dB" || unit == "dBsm") && neutral <= -60; }
   /// True for corner frequencies that do nothing when they are far above: then the scale is one of 1/frequency.
   bool reciprocal() const { return unit == "Hz" && neutral > typical; }
   /// True where it has one side: what is there or not, more or less.

@@ -63,7 +63,8 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   }
   FindingPlace place;
   if (scene.actorIndex(best.hypothesis.subject) >= 0) place.actors = {best.hypothesis.subject};
-  const bool of_place = m.mechanism == "empirical_law" && m.values.text("variable") == "passing_m";
+  const bool of_place =
+      m.mechanism == "empirical_echo" || (m.mechanism == "empirical_law" && m.values.text("variable") == "passing_m");
   if (f.cause == "actor_unmodelled" || of_place) {
     place.x_m = m.values.number("x_m");
     place.y_m = m.values.number("y_m");
@@ -114,6 +115,7 @@ bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure) {
   if (name == "diffuse_scattering") {
     return !sure && fit.hypothesis.at(fit.scaled).values.number("scattering_coefficient") < kStrongScattering;
   }
+  if (name == "empirical_echo") return !explains_more;
   return name == "transmission" && !sure;
 }
 

@@ -702,16 +702,18 @@ void HypothesisFitter::settleFolds(const ModelState& null, HypothesisFit& f) {
 }
 
 void HypothesisFitter::judge(HypothesisFit& f, std::size_t family) const {
-  f.false_alarm_rate = falseAlarmRate(f.broad_gain / f.inflation, f.numbers(), family);
+  f.false_alarm_rate = falseAlarmRate(f.broad_gain / f.inflation, f.numbers(), family, f.hypothesis.coordinates.size());
   f.plain = f.broad_gain > kPlain * static_cast<double>(model_.data().poses.size());
   if (f.plain) f.false_alarm_rate = std::min(f.false_alarm_rate, kPlainFalseAlarm);
 }
 
-double HypothesisFitter::falseAlarmRate(double gain, std::size_t numbers, std::size_t family) const {
-  // Twice the gain against F: the inflation that it was divided by was estimated from the places.
+double HypothesisFitter::falseAlarmRate(double gain, std::size_t numbers, std::size_t family,
+                                        std::size_t followed) const {
+  // Twice the gain against F: the inflation that it was divided by was estimated from the places, of which the fit has
+  // followed as many as it has coordinates.
   const double n = static_cast<double>(std::max<std::size_t>(1, numbers));
   const double locations = static_cast<double>(model_.data().locations.size());
-  const boost::math::fisher_f distribution(n, std::max(1.0, locations - n));
+  const boost::math::fisher_f distribution(n, std::max(1.0, locations - static_cast<double>(followed)));
   const double statistic = 2 * std::max(0.0, gain) / n;
   return std::min(1.0,
                   static_cast<double>(family) * boost::math::cdf(boost::math::complement(distribution, statistic)));

@@ -94,8 +94,9 @@ class HypothesisFitter {
   void settleFolds(const ModelState& null, HypothesisFit& fit);
   /// Sets false_alarm_rate for a family of that many hypotheses.
   void judge(HypothesisFit& fit, std::size_t family) const;
-  /// Of a gain in nats, inflation taken off, by that many numbers: chance that one of a family comes by it.
-  double falseAlarmRate(double gain, std::size_t numbers, std::size_t family) const;
+  /// Of a gain in nats, inflation taken off, by that many numbers, of which `followed` are coordinates that were fitted
+  /// (the rest were searched for): chance that one of a family comes by it.
+  double falseAlarmRate(double gain, std::size_t numbers, std::size_t family, std::size_t followed) const;
 
  private:
   struct Effective;

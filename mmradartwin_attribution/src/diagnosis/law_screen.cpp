@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iomanip>
 #include <map>
 #include <optional>
+#include <set>
+#include <sstream>
 
 #include "echo_field.h"
 #include "mmradartwin_sim/law_variable.h"
@@ -27,6 +30,8 @@ constexpr double kMostPeriods = 10;
 constexpr int kSectorStep = 2;  ///< fine steps between edges that are tried
 constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;
 constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4};
+constexpr int kBearings = 24;         ///< that half a turn is divided into
+constexpr int kOften = 12;            ///< paths of an actor
 constexpr double kLeastShare = 0.02;  ///< of the paths that lie beyond a table's first and last node
 constexpr double kMaxInflation = 50;
 constexpr double kWeakest_db = -45;  ///< echoes below this are one for a law over amplitudes
@@ -73,15 +78,24 @@ struct Promise {
 class LawScreen {
  public:
   LawScreen(const Twin& base, const SessionModel& model, const ModelState& null, const std::vector<int>& poses);
-  std::optional<Screened> best(int kind, const std::string& variable) const;
+  /// What a law is over, and whose paths.
+  struct Over {
+    std::string variable, actor = "";  ///< all paths where no actor is given
+    double bearing_deg = 0;            ///< of standing_m
+  };
+  std::optional<Screened> best(int kind, const Over& over) const;
+  /// Over where the radar stands, along the direction that promises most.
+  std::optional<Screened> bestBearing() const;
   std::optional<Screened> bestPlace() const;
+  /// Actors of whom enough paths are measured for a law of their own.
+  std::vector<std::string> oftenSeen() const;
 
  private:
   MeasuredPose measured(const Twin& twin, int pose, double session_s) const;
   void prepare(int kind);
   /// Of directions [P][K], beyond what a constant and the actors' own errors explain.
   Promise promise(int kind, const Eigen::MatrixXd& directions) const;
-  Hypothesis law(int kind, const std::string& variable, const std::vector<double>& at) const;
+  Hypothesis law(int kind, const Over& over, const std::vector<double>& at) const;
 
   const Twin& base_;
   const SessionModel& model_;
@@ -252,14 +266,16 @@ Promise LawScreen::promise(int kind, const Eigen::MatrixXd& directions) const {
   return p;
 }
 
-Hypothesis LawScreen::law(int kind, const std::string& variable, const std::vector<double>& at) const {
+Hypothesis LawScreen::law(int kind, const Over& over, const std::vector<double>& at) const {
   const Observable& o = kObservables[kind];
   Hypothesis h;
   h.mechanism = defaultMechanism("empirical_law");
-  h.mechanism.values.set("variable", variable);
+  h.mechanism.values.set("variable", over.variable);
   h.mechanism.values.set("at", at);
   h.mechanism.values.set(o.parameter, std::vector<double>(at.size(), 0.0));
-  h.subject = std::string(o.parameter) + " over " + variable;
+  h.mechanism.values.set("actor", over.actor);
+  h.mechanism.values.set("bearing_deg", over.bearing_deg);
+  h.subject = std::string(o.parameter) + " over " + over.variable + (over.actor.empty() ? "" : " of " + over.actor);
   return h;
 }
 
@@ -302,14 +318,17 @@ std::vector<double> evenNodes(const std::vector<double>& sorted, int count) {
   return nodes;
 }
 
-std::optional<Screened> LawScreen::best(int kind, const std::string& variable) const {
-  const LawVariable of(variable);
+std::optional<Screened> LawScreen::best(int kind, const Over& over) const {
+  const std::string& variable = over.variable;
+  const LawVariable of(variable, {0, 0, over.bearing_deg});
+  const int actor = base_.scene().actorIndex(over.actor);
   const Observable& o = kObservables[kind];
   std::vector<LawVariable::Values> values;
   std::vector<double> all;
   for (const MeasuredPose& pose : poses_) {
     for (const MeasuredPath& p : pose.paths) {
       LawVariable::Values v = of.of(pose.where, p.record);
+      if (actor >= 0 && std::count(p.record.actors.begin(), p.record.actors.end(), actor) == 0) v.count = 0;
       for (int i = 0; i < v.count; ++i) {
         double& x = v.of[static_cast<std::size_t>(i)];
         if (variable == "amplitude_db") x = std::max(x, kWeakest_db);
@@ -370,7 +389,7 @@ std::optional<Screened> LawScreen::best(int kind, const std::string& variable) c
     if (!o.constant) combined = combined.rightCols(combined.cols() - 1).eval();  // the session's gain is free already
     const int numbers = static_cast<int>(combined.cols());
     offer(combined, numbers - (o.constant ? 1 : 0), 0, [&] {
-      Hypothesis h = law(kind, variable, nodes);
+      Hypothesis h = law(kind, over, nodes);
       for (int k = o.constant ? 0 : 1; k < static_cast<int>(nodes.size()) - (turns ? 1 : 0); ++k) {
         Coordinate c{o.parameter, o.unit, k, 0, o.typical, -o.limit, o.limit};
         if (turns) {
@@ -384,8 +403,10 @@ std::optional<Screened> LawScreen::best(int kind, const std::string& variable) c
       return h;
     });
   }
-  const auto shaped = [&](const std::vector<double>& at, const std::vector<std::vector<double>>& shapes) {
-    Hypothesis h = law(kind, variable, at);
+  const auto shaped = [&](const std::vector<double>& at, const std::vector<std::vector<double>>& shapes,
+                          const std::string& expression) {
+    Hypothesis h = law(kind, over, at);
+    h.variant = expression;
     for (const std::vector<double>& shape : shapes) {
       Coordinate c{o.parameter, o.unit, -1, 0, o.typical, -o.limit, o.limit};
       c.shape = shape;
@@ -416,7 +437,12 @@ std::optional<Screened> LawScreen::best(int kind, const std::string& variable) c
         for (double x : fine) shape.push_back(std::cos(2 * M_PI * place(x) * periods / span - 0.5 * M_PI * quarter));
         shapes.push_back(std::move(shape));
       }
-      offer(columns(shapes), 2, 1, [&] { return shaped(fine, shapes); });
+      offer(columns(shapes), 2, 1, [&] {
+        std::ostringstream expression;
+        expression << std::setprecision(3) << "a ripple of period " << span / periods;
+        if (in_sine) expression << " of the sine";
+        return shaped(fine, shapes, expression.str());
+      });
     }
   }
   // Sectors, steps among them.
@@ -428,11 +454,45 @@ std::optional<Screened> LawScreen::best(int kind, const std::string& variable) c
       std::vector<std::vector<double>> shapes;
       if (o.constant) shapes.push_back(ones);
       shapes.push_back(sector);
-      offer(columns(shapes), 1, from == 0 || to >= kFine ? 1 : 2, [&] { return shaped(fine, shapes); });
+      offer(columns(shapes), 1, from == 0 || to >= kFine ? 1 : 2, [&] {
+        std::ostringstream expression;
+        expression << std::setprecision(3) << "one value from " << fine[static_cast<std::size_t>(from)] << " to "
+                   << fine[static_cast<std::size_t>(to - 1)];
+        return shaped(fine, shapes, expression.str());
+      });
     }
   }
   if (!(best > 0)) return std::nullopt;
   return result;
+}
+
+std::vector<std::string> LawScreen::oftenSeen() const {
+  std::vector<int> paths(base_.scene().actors.size(), 0);
+  for (const MeasuredPose& pose : poses_) {
+    for (const MeasuredPath& p : pose.paths) {
+      for (int a : std::set<int>(p.record.actors.begin(), p.record.actors.end())) {
+        if (a >= 0) ++paths[static_cast<std::size_t>(a)];
+      }
+    }
+  }
+  std::vector<std::string> names;
+  for (std::size_t a = 0; a < paths.size(); ++a) {
+    if (paths[a] >= kOften) names.push_back(base_.scene().actors[a].name);
+  }
+  return names;
+}
+
+std::optional<Screened> LawScreen::bestBearing() const {
+  std::optional<Screened> best_of_all;
+  for (int i = 0; i < kBearings; ++i) {
+    std::optional<Screened> s = best(0, {"standing_m", "", 180.0 * i / kBearings});
+    if (s && (!best_of_all || s->promised > best_of_all->promised)) best_of_all = std::move(s);
+  }
+  if (best_of_all) {
+    ++best_of_all->hypothesis.searched;
+    best_of_all->promised -= 0.5;
+  }
+  return best_of_all;
 }
 
 std::optional<Screened> LawScreen::bestPlace() const {
@@ -445,7 +505,7 @@ std::optional<Screened> LawScreen::bestPlace() const {
     Promise promise;
   };
   const auto spotAt = [&](double x_m, double y_m, double radius_m) {
-    const LawVariable passing("passing_m", x_m, y_m);
+    const LawVariable passing("passing_m", {x_m, y_m});
     Eigen::MatrixXd direction(static_cast<Eigen::Index>(location_.size()), 1);
     Eigen::Index at = 0;
     for (const MeasuredPose& pose : poses_) {
@@ -486,7 +546,7 @@ std::optional<Screened> LawScreen::bestPlace() const {
   const double nats = best.promise.raw / best.promise.inflation;
   if (!(nats > kPricePerNumber * 4)) return std::nullopt;
   Screened result;
-  result.hypothesis = law(0, "passing_m", {0, best.radius_m});
+  result.hypothesis = law(0, {"passing_m"}, {0, best.radius_m});
   result.hypothesis.mechanism.values.set("x_m", best.x_m);
   result.hypothesis.mechanism.values.set("y_m", best.y_m);
   result.hypothesis.coordinates = {{o.parameter, o.unit, 0, 0, o.typical, -o.limit, o.limit}};
@@ -508,10 +568,14 @@ std::vector<Screened> screenLaws(const Twin& base, const SessionModel& model, co
   const LawScreen screen(base, model, null, poses);
   for (int kind = 0; kind < kKinds; ++kind) {
     for (const std::string& variable : LawVariable::names()) {
-      if (variable == "passing_m") continue;
-      if (auto s = screen.best(kind, variable)) result.push_back(std::move(*s));
+      if (variable == "passing_m" || variable == "standing_m") continue;
+      if (auto s = screen.best(kind, {variable})) result.push_back(std::move(*s));
     }
   }
+  for (const std::string& actor : screen.oftenSeen()) {
+    if (auto s = screen.best(0, {"foot_m", actor})) result.push_back(std::move(*s));
+  }
+  if (auto s = screen.bestBearing()) result.push_back(std::move(*s));
   if (auto s = screen.bestPlace()) result.push_back(std::move(*s));
   std::stable_sort(result.begin(), result.end(),
                    [](const Screened& a, const Screened& b) { return a.promised > b.promised; });

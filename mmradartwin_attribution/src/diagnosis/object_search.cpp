@@ -44,7 +44,7 @@ std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
   return boxes;
 }
 
-/// Other places and ways to stand of an actor, as scaled coordinates.
+/// Other places and ways to stand of an actor, places and distances of a late echo, as scaled coordinates.
 std::vector<std::vector<double>> placesAround(const HypothesisFit& fit) {
   std::vector<std::vector<double>> places;
   const auto add = [&](std::size_t coordinate, double by) {
@@ -55,7 +55,7 @@ std::vector<std::vector<double>> placesAround(const HypothesisFit& fit) {
   for (std::size_t i = 0; i < fit.scaled.size(); ++i) {
     if (fit.hypothesis.coordinates[i].unit == "deg") {
       for (double turn_deg : kTurns_deg) add(i, turn_deg);
-    } else {
+    } else if (fit.hypothesis.coordinates[i].unit == "m") {
       for (double shift_m : kShifts_m) add(i, shift_m);
     }
   }

@@ -13,8 +13,14 @@ namespace mmradartwin {
 /// What a law without a name may run over, as a number of a path (empirical_law).
 class LawVariable {
  public:
-  /// x_m, y_m: the place in map that passing_m is about. Throws InputError for a name that is none of names().
-  explicit LawVariable(const std::string& name, double x_m = 0, double y_m = 0);
+  /// What the variables that have a place or a direction are about.
+  struct About {
+    double x_m = 0, y_m = 0;  ///< in map, of passing_m
+    double bearing_deg = 0;   ///< in map, of standing_m
+  };
+  /// Throws InputError for a name that is none of names().
+  explicit LawVariable(const std::string& name, const About& about);
+  explicit LawVariable(const std::string& name) : LawVariable(name, About()) {}
   static const std::vector<std::string>& names();
   /// names() in a line, each with what it means.
   static std::string meaning();
@@ -34,9 +40,21 @@ class LawVariable {
   Values of(const Where& where, const PathRecord& record) const;
 
  private:
-  enum class Kind { kRange, kAzimuth, kIncidence, kHeight, kHeading, kBearing, kTime, kAmplitude, kPassing };
+  enum class Kind {
+    kRange,
+    kAzimuth,
+    kIncidence,
+    kHeight,
+    kHeading,
+    kBearing,
+    kTime,
+    kAmplitude,
+    kFoot,
+    kStanding,
+    kPassing
+  };
   Kind kind_;
-  Eigen::Vector2d place_;
+  Eigen::Vector2d place_, along_;
 };
 
 }  // namespace mmradartwin

@@ -28,6 +28,7 @@ class EmpiricalLaw : public Mechanism {
         optionalNumbersSpec("angle_deg", "deg", -90, 90, "added to azimuths of departure and arrival, per point"),
         numberSpec("x_m", "m", -1e4, 1e4, 0, "place in map that passing_m is about"),
         numberSpec("y_m", "m", -1e4, 1e4, 0, "place in map that passing_m is about"),
+        numberSpec("bearing_deg", "deg", -360, 360, 0, "direction in map that standing_m is along"),
         textSpec("actor", false, "", "only paths that meet this actor"),
         textSpec("material", false, "", "only paths that meet this material"),
         textSpec("event", false, "", "only paths of this mechanism")};
@@ -35,7 +36,8 @@ class EmpiricalLaw : public Mechanism {
     return all;
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
-    variable_.emplace(values.text("variable"), values.number("x_m"), values.number("y_m"));
+    variable_.emplace(values.text("variable"),
+                      LawVariable::About{values.number("x_m"), values.number("y_m"), values.number("bearing_deg")});
     by_amplitude_ = values.text("variable") == "amplitude_db";
     at_ = values.numbers("at");
     if (at_.empty() || std::adjacent_find(at_.begin(), at_.end(), std::greater_equal<double>()) != at_.end()) {

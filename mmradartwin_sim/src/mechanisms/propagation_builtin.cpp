@@ -13,6 +13,7 @@ void addPropagationMechanisms(MechanismRegistry& registry) {
   registry.add("diffuse_scattering", makeDiffuseScattering);
   registry.add("edge_diffraction", makeEdgeDiffraction);
   registry.add("empirical_law", makeEmpiricalLaw);
+  registry.add("empirical_echo", makeEmpiricalEcho);
   registry.add("echo_replica", makeEchoReplica);
   registry.add("excess_attenuation", makeExcessAttenuation);
   registry.add("floor_ceiling_multipath", makeFloorCeilingMultipath);

@@ -11,6 +11,7 @@ std::unique_ptr<Mechanism> makeCornerReflection();
 std::unique_ptr<Mechanism> makeDiffuseScattering();
 std::unique_ptr<Mechanism> makeEdgeDiffraction();
 std::unique_ptr<Mechanism> makeEmpiricalLaw();
+std::unique_ptr<Mechanism> makeEmpiricalEcho();
 std::unique_ptr<Mechanism> makeEchoReplica();
 std::unique_ptr<Mechanism> makeExcessAttenuation();
 std::unique_ptr<Mechanism> makeFloorCeilingMultipath();

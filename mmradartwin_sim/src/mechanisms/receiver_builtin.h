@@ -15,6 +15,7 @@ std::unique_ptr<Mechanism> makeIqConjugation();
 std::unique_ptr<Mechanism> makeChannelConjugation();
 std::unique_ptr<Mechanism> makeChannelPermutation();
 std::unique_ptr<Mechanism> makeMutualCoupling();
+std::unique_ptr<Mechanism> makeTransmitterCoupling();
 std::unique_ptr<Mechanism> makeIqImbalance();
 std::unique_ptr<Mechanism> makeDcOffset();
 std::unique_ptr<Mechanism> makeSecondHarmonic();

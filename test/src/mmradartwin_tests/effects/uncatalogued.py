@@ -8,6 +8,7 @@ import numpy as np
 
 from mmradartwin_tests.campaign import rotation_from_vector
 from mmradartwin_tests.effects.effect import Effect, uncatalogued
+from mmradartwin_tests.effects.objects import free_spot
 from mmradartwin_tests.tracing import Path
 
 
@@ -122,6 +123,19 @@ class CompassGain(EchoLaw):
         world = arrival @ station.true.rotation.T
         away = np.arctan2(world[:, 1], world[:, 0]) - math.radians(self.p["toward_deg"])
         return 10**(self.p["swing_db"] * np.cos(away) / 20)
+
+
+@uncatalogued
+class StandingField(EchoLaw):
+    """Level comes and goes with where the radar stands, as in another transmitter's standing wave."""
+    name, main, variable = "standing_field", "swing_db", "where the radar stands"
+    defaults = {"swing_db": 4.0, "period_m": 2.4, "toward_deg": 35.0}
+
+    def factor(self, measurement, station, departure, arrival, length_m, size):
+        toward = math.radians(self.p["toward_deg"])
+        along_m = station.true.position[:2] @ np.array([math.cos(toward), math.sin(toward)])
+        swing_db = self.p["swing_db"] * math.sin(2 * math.pi * along_m / self.p["period_m"])
+        return np.full(len(length_m), 10**(swing_db / 20))
 
 
 @uncatalogued
@@ -289,6 +303,49 @@ class TrailingEcho(Effect):
 
 
 @uncatalogued
+class LateTag(Effect):
+    """A small tag answers all directions alike, after a delay line."""
+    name, main = "late_tag", "rcs_m2"
+    defaults = {"x_m": None, "y_m": None, "height_m": 1.2, "rcs_m2": 0.6, "late_m": 1.3}
+
+    def prepare(self, measurement):
+        if self.p["x_m"] is None or self.p["y_m"] is None:
+            self.p["x_m"], self.p["y_m"] = free_spot(measurement, 0.3, 162)
+
+    def echoes(self, measurement, station, echoes):
+        point = np.array([self.p["x_m"], self.p["y_m"], self.p["height_m"]])
+        away = point - station.true.position
+        distance = float(np.linalg.norm(away))
+        if not station.true.sees(away / distance)[0] or not measurement.room.visible(station.true.position, point)[0]:
+            return
+        # Radar equation: received over sent power is sigma lambda^2 / ((4 pi)^3 r^4).
+        wavelength = measurement.radar.wavelength_m
+        level = math.sqrt(self.p["rcs_m2"] / (4 * math.pi)) * wavelength / (4 * math.pi * distance**2)
+        lengths = measurement.tracer.point_lengths(station.true, point[None])[0] + 2 * self.p["late_m"]
+        ray = away / distance
+        echoes.add([Path("tag", (), (), point[None], ray, ray, 2 * (distance + self.p["late_m"]),
+                         complex(level), lengths, ())])
+
+    def truth(self, measurement):
+        return {**self.p, "variable": "range behind a place"}
+
+
+@uncatalogued
+class SlotCrosstalk(Effect):
+    """The transmitter that should rest radiates a little in the other's slot."""
+    name, main, rank = "slot_crosstalk", "level_db", 2
+    defaults = {"level_db": -10.0, "phase_deg": 40.0}
+
+    def receive(self, measurement, index, station, x):
+        slots = x.reshape(len(measurement.radar.tx), len(measurement.radar.rx), -1)
+        leak = 10**(self.p["level_db"] / 20) * np.exp(1j * math.radians(self.p["phase_deg"]))
+        return (slots + leak * (slots.sum(axis=0) - slots)).reshape(x.shape)
+
+    def truth(self, measurement):
+        return {**self.p, "variable": "transmitter"}
+
+
+@uncatalogued
 class MutualCoupling(Effect):
     """Each receiver leaks into its neighbours."""
     name, main, rank = "mutual_coupling", "level_db", 2
@@ -333,6 +390,22 @@ class WindowMismatch(Effect):
 
     def truth(self, measurement):
         return {**self.p, "variable": "fast time"}
+
+
+@uncatalogued
+class TwoStates(Effect):
+    """A synthesiser that locks in two ways by turns: every second frame is weaker and comes later."""
+    name, main, rank = "two_states", "loss_db", 2
+    defaults = {"loss_db": 4.0, "late_m": 0.4}
+
+    def frames(self, measurement, index, station, frames, rng):
+        radar = measurement.radar
+        t = np.arange(radar.samples) / radar.sample_rate_hz
+        other = 10**(-self.p["loss_db"] / 20) * np.exp(2j * np.pi * measurement.beat_hz(2 * self.p["late_m"]) * t)
+        return np.where((np.arange(len(frames)) % 2)[:, None, None] > 0, other, 1) * np.asarray(frames)
+
+    def truth(self, measurement):
+        return {**self.p, "variable": "frame"}
 
 
 @uncatalogued
