@@ -1,6 +1,9 @@
 // Finds what a twin gets wrong about a recording, names the cause, extends the twin by it and measures the gain.
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <iomanip>
 #include <iostream>
 #include <sstream>
@@ -29,11 +32,20 @@ void requireSameScene(const TwinDescription& other, const TwinDescription& twin)
                    "; --compare takes twins of one scene, give the other as --twin in a run of its own");
 }
 
-/// One line on stderr that changes, gone when this goes.
+/// One line on stderr that changes, gone when this goes; where nobody watches, a line now and then that stays.
 class ProgressLine {
  public:
-  ~ProgressLine() { std::cerr << '\r' << std::string(width_, ' ') << '\r' << std::flush; }
+  ~ProgressLine() {
+    if (terminal_) std::cerr << '\r' << std::string(width_, ' ') << '\r' << std::flush;
+  }
   void show(const DiagnosisProgress& progress) {
+    if (!terminal_) {
+      const auto now = std::chrono::steady_clock::now();
+      if (now - shown_ < std::chrono::seconds(5)) return;
+      shown_ = now;
+      std::cerr << progress.stage << ", " << static_cast<int>(100 * progress.share) << " %" << std::endl;
+      return;
+    }
     std::ostringstream line;
     line << '\r' << std::setw(3) << static_cast<int>(100 * progress.share) << " % " << progress.stage;
     std::string text = line.str();
@@ -44,7 +56,9 @@ class ProgressLine {
   }
 
  private:
+  const bool terminal_ = isatty(STDERR_FILENO) == 1;
   std::size_t width_ = 0;
+  std::chrono::steady_clock::time_point shown_{};
 };
 
 int run(const Arguments& arguments, const std::vector<std::string>& command) {

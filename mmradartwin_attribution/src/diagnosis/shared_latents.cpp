@@ -83,9 +83,30 @@ std::vector<Screened> sharedLatents(EchoSource& source, const ModelState& null, 
   return screened;
 }
 
+namespace {
+
+/// Of a level that falls or rises with range or with time: the name of a straight one, its slope as the start.
+std::optional<Screened> namedSlope(const Screened& law, const Parameters& values, const std::vector<Hypothesis>& all) {
+  const std::vector<double>&at = values.numbers("at"), &gain_db = values.numbers("gain_db");
+  const std::string& variable = values.text("variable");
+  const bool over_range = variable == "range_m";
+  if ((!over_range && variable != "time_s") || gain_db.size() < 2 || gain_db.size() != at.size()) return std::nullopt;
+  const double slope = (gain_db.back() - gain_db.front()) / (at.back() - at.front());
+  const double value = over_range ? -slope : 3600 * slope;
+  for (const Hypothesis& h : all) {
+    if (h.mechanism.mechanism != (over_range ? "excess_attenuation" : "gain_drift") || !h.variant.empty()) continue;
+    if (h.coordinates.size() != 1 || !(value > h.coordinates[0].min && value < h.coordinates[0].max)) continue;
+    return Screened{h, law.promised, {{h.coordinates[0].scaled(value)}}};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::optional<Screened> namedLike(const Screened& law, const std::vector<Hypothesis>& all) {
   if (law.hypothesis.mechanism.mechanism != "empirical_law" || law.starts.empty()) return std::nullopt;
   const Parameters values = law.hypothesis.at(law.starts.front()).values;
+  if (std::optional<Screened> slope = namedSlope(law, values, all)) return slope;
   const std::vector<double>&at = values.numbers("at"), &delay_m = values.numbers("delay_m");
   const std::string& variable = values.text("variable");
   const bool of_radar = variable == "azimuth_deg", of_scene = variable == "bearing_deg";

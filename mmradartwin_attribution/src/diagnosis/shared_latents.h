@@ -13,9 +13,9 @@ std::vector<Screened> sharedLatents(EchoSource& source, const ModelState& null, 
                                     const PoseAccuracy& accuracy, const std::vector<Hypothesis>& all,
                                     const std::vector<int>& poses);
 
-/// The named hypothesis that a law of delays looks like, with the start that the law gives: over azimuth an offset of
-/// the radar (-(forward cos + left sin)), over the direction in map one of the scene (x cos + y sin). None for other
-/// laws.
+/// The named hypothesis that a law looks like, with the start that the law gives: of delays over azimuth an offset of
+/// the radar (-(forward cos + left sin)), over the direction in map one of the scene (x cos + y sin); of levels over
+/// range an attenuation, over time a drift. None for other laws.
 std::optional<Screened> namedLike(const Screened& law, const std::vector<Hypothesis>& all);
 
 }  // namespace mmradartwin
