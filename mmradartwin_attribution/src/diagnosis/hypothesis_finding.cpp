@@ -116,6 +116,7 @@ bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure) {
     return !sure && fit.hypothesis.at(fit.scaled).values.number("scattering_coefficient") < kStrongScattering;
   }
   if (name == "empirical_echo") return !explains_more;
+  if (name == "echo_replica") return !explains_more && !fit.hypothesis.subject.empty();
   return name == "transmission" && !sure;
 }
 
