@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "point_echo.h"
 #include "propagation_builtin.h"
 
 namespace mmradartwin {
@@ -25,22 +26,12 @@ class EmpiricalEcho : public Mechanism {
     behind_m_ = values.number("behind_m");
   }
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
-    const ElementsInMap elements(context);
-    const Eigen::Vector3d ray = place_ - elements.p;
-    const double r = ray.norm();
-    PathRecord record;
-    record.event = &kName;
-    record.departure = record.arrival = context.T_map_radar.linear().transpose() * ray / r;
-    if (r + behind_m_ > context.max_range_m || r < 0.01 || !context.inFieldOfView(record.departure)) return;
-    if (!context.rays.visible(elements.p, place_)) return;
-    record.bounces = 1;
-    record.vertices = {place_};
-    record.length_m = elements.lengthsVia(place_);
-    const double wavelength_m = kSpeedOfLight_m_per_s / context.frequency_hz;
-    const double amplitude = wavelength_m * std::sqrt(cross_section_m2_) / (std::pow(4 * M_PI, 1.5) * r * r);
-    setContribution(context.radar, amplitude, record);
-    lengthen(context.radar, 2 * behind_m_, record);
-    records.push_back(std::move(record));
+    std::optional<PointEcho> echo = pointEcho(context, place_, cross_section_m2_);
+    if (!echo || echo->distance_m + behind_m_ > context.max_range_m) return;
+    echo->record.event = &kName;
+    setContribution(context.radar, echo->amplitude, echo->record);
+    lengthen(context.radar, 2 * behind_m_, echo->record);
+    records.push_back(std::move(echo->record));
   }
 
  private:

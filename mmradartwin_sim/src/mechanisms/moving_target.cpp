@@ -2,6 +2,7 @@
 
 #include "../random_draw.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "point_echo.h"
 #include "receiver_builtin.h"
 
 namespace mmradartwin {
@@ -49,21 +50,11 @@ class MovingTarget : public Mechanism {
       walked_m = speed_m_per_s_ * (start_ns * 1e-9 + now.time_s);
     }
     const Eigen::Vector3d place = middle_ + along(walked_m) * direction_;
-    const ElementsInMap elements(context);
-    const Eigen::Vector3d ray = place - elements.p;
-    const double r = ray.norm();
-    PathRecord record;
-    record.event = &kName;
-    record.departure = record.arrival = context.T_map_radar.linear().transpose() * ray / r;
-    if (r > context.max_range_m || r < 0.01 || !context.inFieldOfView(record.departure)) return;
-    if (!context.rays.visible(elements.p, place)) return;
-    record.bounces = 1;
-    record.vertices = {place};
-    record.length_m = elements.lengthsVia(place);
-    const double wavelength_m = kSpeedOfLight_m_per_s / context.frequency_hz;
-    const double amplitude = wavelength_m * std::sqrt(cross_section_m2_) / (std::pow(4 * M_PI, 1.5) * r * r);
-    setContribution(context.radar, amplitude * fading(now, walked_m), record);
-    records.push_back(std::move(record));
+    std::optional<PointEcho> echo = pointEcho(context, place, cross_section_m2_);
+    if (!echo) return;
+    echo->record.event = &kName;
+    setContribution(context.radar, echo->amplitude * fading(now, walked_m), echo->record);
+    records.push_back(std::move(echo->record));
   }
 
  private:
