@@ -251,17 +251,17 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
                                                       : fitter_->screen(state_, h, poses);
   };
   const auto lookAtSome = [&](const Hypothesis& h) { return look(h, spread(kScreenPoses)); };
-  std::optional<Screened> object;
+  const auto bestOf = [&](const std::vector<ProjectedPlace>& places, Hypothesis (*at)(const ProjectedPlace&)) {
+    std::optional<Screened> best;
+    for (const ProjectedPlace& place : places) {
+      Screened s = lookAtSome(at(place));
+      if (!best || s.promised > best->promised) best = std::move(s);
+    }
+    return best;
+  };
   report("objects that the twin lacks", 0);
-  for (const ProjectedPlace& place : projectBack(twin_, *model_, state_)) {
-    Screened s = lookAtSome(objectAt(place));
-    if (!object || s.promised > object->promised) object = std::move(s);
-  }
-  std::optional<Screened> late;
-  for (const ProjectedPlace& place : projectLateBack(twin_, *model_, state_)) {
-    Screened s = lookAtSome(lateEchoAt(place));
-    if (!late || s.promised > late->promised) late = std::move(s);
-  }
+  std::optional<Screened> object = bestOf(projectBack(twin_, *model_, state_), objectAt);
+  std::optional<Screened> late = bestOf(projectLateBack(twin_, *model_, state_), lateEchoAt);
   source_->settle(mechanisms_);
   if (object && object->promised > kWorthAnObject) {
     // It may be one of the scene's that stands elsewhere.
