@@ -398,6 +398,10 @@ class TwoStates(Effect):
     name, main, rank = "two_states", "loss_db", 2
     defaults = {"loss_db": 4.0, "late_m": 0.4}
 
+    def scale(self, strength):
+        for key in self.defaults:
+            self.p[key] *= strength
+
     def frames(self, measurement, index, station, frames, rng):
         radar = measurement.radar
         t = np.arange(radar.samples) / radar.sample_rate_hz
