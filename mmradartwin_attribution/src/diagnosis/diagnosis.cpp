@@ -491,7 +491,7 @@ void Session::refitTogether() {
       const std::size_t numbers = a.hypothesis.coordinates.size();
       // There or not, or plain whatever its scatter: its own round has judged it.
       if (numbers == 0 || a.plain) continue;
-      const double rate = fitter_->falseAlarmRate(fit.worth[i], numbers, family_, numbers);
+      const double rate = fitter_->falseAlarmRate(fit.worth[i], a.hypothesis, numbers, family_);
       if (rate > weakest_rate) {
         weakest = i;
         weakest_rate = rate;
@@ -538,7 +538,7 @@ bool Session::isWithinErrors(const HypothesisFit& f) const {
   if (a == accepted_.end() || !(isMove(h) || (h.isGeometry() && !f.plain))) return false;
   if (f.plain && f.moved_m() > kFarAway_m) return false;  // an interval may be wide where the likelihood is rough
   const double nats = natsFromNothing(h, a->scaled, a->standard_error);
-  return fitter_->falseAlarmRate(nats, h.coordinates.size(), kWaysToErr, h.coordinates.size()) > kFalseAlarm;
+  return fitter_->falseAlarmRate(nats, h, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
 }
 
 /// The values of what rounds have found, wherever they stand.

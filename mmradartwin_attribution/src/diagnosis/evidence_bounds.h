@@ -10,4 +10,11 @@ namespace mmradartwin {
 /// the room. Set by sessions with nothing hidden: see evidence_bounds.cpp.
 double leastNats(const Hypothesis& hypothesis, bool traces, std::size_t poses);
 
+/// How far scores scatter over places beyond what the likelihood expects, in sessions with nothing hidden, and how many
+/// places' scatter it is worth to know that; 0 where it differs from session to session.
+struct UsualScatter {
+  double inflation = 1, places = 0;
+};
+UsualScatter usualScatter(const Hypothesis& hypothesis);
+
 }  // namespace mmradartwin

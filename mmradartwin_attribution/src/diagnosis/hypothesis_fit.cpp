@@ -11,6 +11,7 @@
 #include <memory>
 #include <numeric>
 
+#include "evidence_bounds.h"
 #include "mmradartwin_attribution/finding.h"
 
 namespace mmradartwin {
@@ -204,7 +205,7 @@ HypothesisFitter::Effective HypothesisFitter::effective(const Scores& s, int glo
     // Errors of actors are the same at all places: no scatter over places shows them, their priors do.
     e.scatter += projection.transpose() * s.prior.asDiagonal() * projection;
     const Eigen::MatrixXd ratio = e.information.ldlt().solve(e.scatter);
-    e.inflation = std::clamp(ratio.trace() / static_cast<double>(n), 1.0, kMaxInflation);
+    e.inflation = std::min(ratio.trace() / static_cast<double>(n), kMaxInflation);
   }
   return e;
 }
@@ -386,7 +387,7 @@ Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypo
     if (one_sided && step[static_cast<Eigen::Index>(j)] <= 0) possible = false;
     result.starts.front()[j] = std::clamp(step[static_cast<Eigen::Index>(j)], one_sided ? 0.02 : -8.0, 8.0);
   }
-  if (possible) result.promised = whole * 0.5 * e.total.dot(step) / e.inflation;
+  if (possible) result.promised = whole * 0.5 * e.total.dot(step) / moderated(e.inflation, hypothesis);
   // Slopes are of paths that stay. What a turn of the view lets in and out shows in the likelihood itself.
   if (hypothesis.isGeometry() && hypothesis.coordinates.size() == 1 && source_.altersGeometry(hypothesis.at({1.0}))) {
     for (double scaled : {-1.0, 1.0}) {
@@ -601,13 +602,20 @@ double HypothesisFitter::worthOfPresence(const std::vector<NamedParameters>& bas
   return gain / std::clamp(e.scatter(first, first) / e.information(first, first), 1.0, kMaxInflation);
 }
 
+double HypothesisFitter::worthOf(const Hypothesis& hypothesis, const Eigen::VectorXd& scaled,
+                                 const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& robust) const {
+  const double by_likelihood = 0.5 * scaled.dot(covariance.ldlt().solve(scaled));
+  const double by_scatter = 0.5 * scaled.dot(robust.ldlt().solve(scaled));
+  return by_scatter > 0 ? by_likelihood / moderated(by_likelihood / by_scatter, hypothesis) : 0;
+}
+
 JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start) {
   std::vector<double> from;
   for (const std::vector<double>& s : start) from.insert(from.end(), s.begin(), s.end());
   Optimum o = maximise(base, nuisance, parts, {from}, 3, nullptr);
   const Effective e = effective(o.scores, nuisance.globals());
-  const Eigen::MatrixXd robust = robustCovariance(e);
+  const Eigen::MatrixXd covariance = e.information.inverse(), robust = robustCovariance(e);
   JointFit fit;
   Eigen::Index at = 0;
   for (const Hypothesis& h : parts) {
@@ -622,7 +630,7 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
     fit.standard_error.push_back(std::move(errors));
     fit.worth.push_back(n == 0           ? 0
                         : h.isOneSided() ? worthOfPresence(base, parts, o, e, at, n)
-                                         : 0.5 * v.dot(robust.block(at, at, n, n).ldlt().solve(v)));
+                                         : worthOf(h, v, covariance.block(at, at, n, n), robust.block(at, at, n, n)));
     at += n;
   }
   fit.nuisance = std::move(o.state.nuisance);
@@ -649,7 +657,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
   const double locations = static_cast<double>(gain_at.size());
   if (n > 0) {
     const Effective e = effective(scores, globals);
-    f.inflation = e.inflation;
+    f.inflation = moderated(e.inflation, hypothesis);
     const Eigen::MatrixXd covariance = e.information.inverse(), robust = robustCovariance(e);
     for (Eigen::Index j = 0; j < n; ++j) {
       f.standard_error.push_back(
@@ -702,21 +710,29 @@ void HypothesisFitter::settleFolds(const ModelState& null, HypothesisFit& f) {
 }
 
 void HypothesisFitter::judge(HypothesisFit& f, std::size_t family) const {
-  f.false_alarm_rate = falseAlarmRate(f.broad_gain / f.inflation, f.numbers(), family, f.hypothesis.coordinates.size());
+  f.false_alarm_rate = falseAlarmRate(f.broad_gain / f.inflation, f.hypothesis, f.numbers(), family);
   f.plain = f.broad_gain > kPlain * static_cast<double>(model_.data().poses.size());
   if (f.plain) f.false_alarm_rate = std::min(f.false_alarm_rate, kPlainFalseAlarm);
 }
 
-double HypothesisFitter::falseAlarmRate(double gain, std::size_t numbers, std::size_t family,
-                                        std::size_t followed) const {
-  // Twice the gain against F: the inflation that it was divided by was estimated from the places, of which the fit has
-  // followed as many as it has coordinates.
+double HypothesisFitter::falseAlarmRate(double gain, const Hypothesis& hypothesis, std::size_t numbers,
+                                        std::size_t family) const {
+  // Twice the gain against F (Smyth 2004's moderated one): the inflation that it was divided by was estimated from the
+  // places, of which the fit has followed as many as it has coordinates, and from what is usual.
   const double n = static_cast<double>(std::max<std::size_t>(1, numbers));
-  const double locations = static_cast<double>(model_.data().locations.size());
-  const boost::math::fisher_f distribution(n, std::max(1.0, locations - static_cast<double>(followed)));
+  const double followed = static_cast<double>(hypothesis.coordinates.size());
+  const double places = static_cast<double>(model_.data().locations.size()) + usualScatter(hypothesis).places;
+  const boost::math::fisher_f distribution(n, std::max(1.0, places - followed));
   const double statistic = 2 * std::max(0.0, gain) / n;
   return std::min(1.0,
                   static_cast<double>(family) * boost::math::cdf(boost::math::complement(distribution, statistic)));
+}
+
+double HypothesisFitter::moderated(double inflation, const Hypothesis& hypothesis) const {
+  const UsualScatter usual = usualScatter(hypothesis);
+  const double places = static_cast<double>(model_.data().locations.size()) - 1;
+  if (usual.places + places <= 0) return std::max(1.0, inflation);
+  return std::max(1.0, (usual.places * usual.inflation + places * inflation) / (usual.places + places));
 }
 
 }  // namespace mmradartwin

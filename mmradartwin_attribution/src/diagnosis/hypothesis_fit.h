@@ -94,9 +94,9 @@ class HypothesisFitter {
   void settleFolds(const ModelState& null, HypothesisFit& fit);
   /// Sets false_alarm_rate for a family of that many hypotheses.
   void judge(HypothesisFit& fit, std::size_t family) const;
-  /// Of a gain in nats, inflation taken off, by that many numbers, of which `followed` are coordinates that were fitted
-  /// (the rest were searched for): chance that one of a family comes by it.
-  double falseAlarmRate(double gain, std::size_t numbers, std::size_t family, std::size_t followed) const;
+  /// Of a gain in nats, inflation taken off, by that many numbers (coordinates, and what was searched for): chance that
+  /// one of a family comes by it.
+  double falseAlarmRate(double gain, const Hypothesis& hypothesis, std::size_t numbers, std::size_t family) const;
 
  private:
   struct Effective;
@@ -116,6 +116,11 @@ class HypothesisFitter {
   double worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
                          const Optimum& o, const Effective& e, Eigen::Index first, Eigen::Index numbers);
   Eigen::MatrixXd robustCovariance(const Effective& effective) const;
+  /// Nats that values are worth, far from nothing as they are by their errors.
+  double worthOf(const Hypothesis& hypothesis, const Eigen::VectorXd& scaled, const Eigen::MatrixXd& covariance,
+                 const Eigen::MatrixXd& robust) const;
+  /// Of scatter over these places and the usual one, weighed by what each is known by; at least 1.
+  double moderated(double inflation, const Hypothesis& hypothesis) const;
   /// null: what a geometry has to be well above at more than one place before it is searched without slopes; null
   /// pointer: it is. known: as of fit().
   Optimum maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
