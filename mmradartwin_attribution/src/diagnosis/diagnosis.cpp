@@ -53,6 +53,7 @@ constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kLonger[] = {1.5, 2};  ///< starts of a geometry
 constexpr double kWorthALaw = 12;
 constexpr double kWorthAnObject = 3;       ///< at the best of all places
+constexpr std::size_t kMostObjects = 4;    ///< what is wide or turned promises less than a point elsewhere
 constexpr double kWorthABox = 15;          ///< nats of a round one there,
 constexpr double kShareWorthABox = 0.3;    ///< and so much of what the best other fit brings
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
@@ -86,6 +87,7 @@ class Session {
   TriedHypothesis& triedAs(const HypothesisFit& fit, int round);
   void refitTogether();
   void profileFound();
+  void takeOutImage();
   bool isWithinErrors(const HypothesisFit& f) const;
   struct Accepted;
   void restate();
@@ -224,7 +226,7 @@ void Session::judgeNoise() {
 }
 
 std::vector<HypothesisFit> Session::fitBest(int round) {
-  const std::vector<Hypothesis> all = hypotheses(twin_, mechanisms_);
+  const std::vector<Hypothesis> all = hypotheses(twin_, extended_);
   const auto suspects = fitter_->suspects(state_);
   std::set<std::string> suspicious;
   for (std::size_t i = 0; i < std::min(kSuspects, suspects.size()); ++i) {
@@ -251,27 +253,28 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
                                                       : fitter_->screen(state_, h, poses);
   };
   const auto lookAtSome = [&](const Hypothesis& h) { return look(h, spread(kScreenPoses)); };
-  const auto bestOf = [&](const std::vector<ProjectedPlace>& places, Hypothesis (*at)(const ProjectedPlace&)) {
-    std::optional<Screened> best;
-    for (const ProjectedPlace& place : places) {
-      Screened s = lookAtSome(at(place));
-      if (!best || s.promised > best->promised) best = std::move(s);
-    }
+  const auto better = [](const Screened& a, const Screened& b) { return a.promised > b.promised; };
+  const auto bestOf = [&](std::size_t most, const std::vector<ProjectedPlace>& places,
+                          Hypothesis (*at)(const ProjectedPlace&)) {
+    std::vector<Screened> best;
+    for (const ProjectedPlace& place : places) best.push_back(lookAtSome(at(place)));
+    std::stable_sort(best.begin(), best.end(), better);
+    best.resize(std::min(most, best.size()));
     return best;
   };
   report("objects that the twin lacks", 0);
-  std::optional<Screened> object = bestOf(projectBack(twin_, *model_, state_), objectAt);
-  std::optional<Screened> late = bestOf(projectLateBack(twin_, *model_, state_), lateEchoAt);
+  std::vector<Screened> placed = bestOf(kMostObjects, projectBack(twin_, *model_, state_), objectAt);
+  const std::size_t objects = placed.size();
+  for (Screened& s : bestOf(1, projectLateBack(twin_, *model_, state_), lateEchoAt)) placed.push_back(std::move(s));
   source_->settle(mechanisms_);
-  if (object && object->promised > kWorthAnObject) {
+  if (objects > 0 && placed.front().promised > kWorthAnObject) {
     // It may be one of the scene's that stands elsewhere.
-    const NamedParameters& m = object->hypothesis.mechanism;
+    const NamedParameters& m = placed.front().hypothesis.mechanism;
     if (const int actor = nearestObject(twin_.scene(), m.values.number("x_m"), m.values.number("y_m")); actor >= 0) {
       suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(actor)].name);
       out_of_place.insert(actor);
     }
   }
-  const auto better = [](const Screened& a, const Screened& b) { return a.promised > b.promised; };
   std::vector<Screened> screened;
   std::map<std::string, std::size_t> looked_at;  // poses
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -335,15 +338,15 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     suggest(std::move(s));
   }
   source_->settle(mechanisms_);
-  for (std::optional<Screened>* placed : {&object, &late}) {
-    if (!*placed) continue;
-    freePlace(data_, **placed);
-    screened.push_back(std::move(**placed));
+  for (Screened& s : placed) {
+    freePlace(data_, s);
+    screened.push_back(std::move(s));
   }
   std::stable_sort(screened.begin(), screened.end(), better);
   family_ = all.size() + static_cast<std::size_t>(kLawFamily);
   std::vector<HypothesisFit> fits;
-  std::size_t names_fitted = 0, laws_fitted = 0;
+  std::size_t names_fitted = 0, laws_fitted = 0, objects_fitted = 0;
+  double best_object = 0;  // nats
   for (std::size_t i = 0; i < screened.size(); ++i) {
     Screened s = screened[i];
     TriedHypothesis tried;
@@ -353,16 +356,20 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     tried.round = round;
     // A promise is a quadratic's and often far too small: names get several chances, laws without a name three.
     const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
-    std::size_t& fitted = law ? laws_fitted : names_fitted;
+    const bool object = isObject(s.hypothesis);
+    std::size_t& fitted = law ? laws_fitted : object ? objects_fitted : names_fitted;
     const bool moved = isMove(s.hypothesis);
     const bool box = isUnmodelledBox(s.hypothesis);
     const double worth = box                                  ? kShareWorthABox * fits.front().gain
-                         : isObject(s.hypothesis)             ? kWorthAnObject
+                         : object                             ? kWorthAnObject
                          : law                                ? kWorthALaw
                          : s.hypothesis.isGeometry() || moved ? kWorthAFitOfGeometry
                                                               : kWorthAFit;
     // Where an actor went is known by the fit alone: what little the quadratic promises does not rank it.
-    const std::size_t most = law ? kMostLaws : moved ? kMostNames + kMostOutOfPlace : kMostNames;
+    const std::size_t most = law      ? kMostLaws
+                             : object ? kMostObjects
+                             : moved  ? kMostNames + kMostOutOfPlace
+                                      : kMostNames;
     if (s.promised > worth && (box || fitted < most)) {
       ++fitted;
       if (s.hypothesis.isGeometry()) {
@@ -379,7 +386,9 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
       const bool around = moved || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
       fits.push_back(around ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
       source_->settle(mechanisms_);
-      if (isObject(s.hypothesis) && !box && fits.back().broad_gain > kWorthABox) {
+      if (object && !box && fits.back().broad_gain > std::max(kWorthABox, best_object)) {
+        best_object = fits.back().broad_gain;
+        if (isUnmodelledBox(screened.back().hypothesis)) screened.pop_back();
         screened.push_back(asBox(data_, state_, fits.back()));  // last: the slowest of all fits
       }
       // What latents bring that the fit has found, and the twin as it is had not, is nobody's gain.
@@ -541,6 +550,20 @@ bool Session::isWithinErrors(const HypothesisFit& f) const {
   return fitter_->falseAlarmRate(nats, h, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
 }
 
+/// An image, once found, is measured against its hosts and taken out: as a power it would be 2 dB high, and what that
+/// leaves beside it looks like echoes.
+void Session::takeOutImage() {
+  const auto image = std::find_if(accepted_.begin(), accepted_.end(),
+                                  [](const Accepted& a) { return a.hypothesis.mechanism.mechanism == "iq_imbalance"; });
+  if (image == accepted_.end()) return;
+  Finding& f = result_.findings.findings[image->finding];
+  if (!measureImage(data_, f)) return;
+  subtractImage(*f.mechanism, data_);
+  extended_before_rounds_.push_back(*f.mechanism);
+  accepted_.erase(image);
+  restate();
+}
+
 /// The values of what rounds have found, wherever they stand.
 void Session::restate() {
   mechanisms_ = before_rounds_;
@@ -626,6 +649,7 @@ bool Session::judgeChannels(int round) {
       report("taken back: " + f.hypothesis.label(), 1);
       continue;
     }
+    takeOutImage();
     source_->settle(mechanisms_);
     const Nuisance nuisance = state_.nuisance;
     state_ = fitter_->state(mechanisms_, &nuisance);
@@ -697,13 +721,8 @@ Diagnosis Session::run() {
       if (!judgeChannels(round)) break;
     }
     for (Finding& f : findings.findings) {
-      if (f.cause == "iq_imbalance") {
-        measureImage(data_, f);
-      } else if (f.cause == "second_harmonic") {
-        referToStrongestHost(twin_.changed(mechanisms_), data_, state_.nuisance.log_gain, strongest_amplitude_, f);
-      } else {
-        continue;
-      }
+      if (f.cause != "second_harmonic") continue;
+      referToStrongestHost(twin_.changed(mechanisms_), data_, state_.nuisance.log_gain, strongest_amplitude_, f);
       replaceBy(*f.mechanism, extended_);
     }
     addUnexplained(received_.unexplained, data_, findings, extended_);

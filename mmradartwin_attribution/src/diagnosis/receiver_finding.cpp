@@ -14,6 +14,7 @@
 #include "hypothesis_fit.h"
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/ledger.h"
+#include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin {
 namespace {
@@ -304,13 +305,13 @@ void referToStrongestHost(const Twin& twin, const ChannelData& data, double log_
   changeLevel(f, kDbPerNeper * (std::log(echo.amplitude / amplitude) - 0.5 * log_gain), errorOf_db(echo));
 }
 
-void measureImage(const ChannelData& data, Finding& f) {
+bool measureImage(const ChannelData& data, Finding& f) {
   constexpr double kHost = 10;        // times the power beside its image
   constexpr Eigen::Index kFirst = 2;  // leakage and offset stand below, their images at the end
   constexpr int kIterations = 6;
   constexpr double kLeastError_db = 0.03;
   const std::size_t locations = data.locations.size();
-  if (locations < 3) return;
+  if (locations < 3) return false;
   std::vector<std::complex<double>> shared;
   std::vector<double> host;
   std::complex<double> beta = 0;
@@ -331,7 +332,7 @@ void measureImage(const ChannelData& data, Finding& f) {
       }
     }
     hosts = std::accumulate(host.begin(), host.end(), 0.0);
-    if (!(hosts > 0)) return;
+    if (!(hosts > 0)) return false;
     beta = std::accumulate(shared.begin(), shared.end(), std::complex<double>()) / hosts;
   }
   double scatter = 0;
@@ -348,6 +349,17 @@ void measureImage(const ChannelData& data, Finding& f) {
     if (p.name != "image_db") continue;
     p.value = image_db;
     p.ci95 = {{image_db - half_db, image_db + half_db}};
+  }
+  return true;
+}
+
+void subtractImage(const NamedParameters& m, ChannelData& data) {
+  const std::complex<double> beta =
+      std::polar(std::pow(10.0, m.values.number("image_db") / 20), m.values.number("phase_deg") * M_PI / 180);
+  const SignalChain chain(data.radar);
+  for (PoseChannels& p : data.poses) {
+    p.grid.x -= beta * p.grid.x.conjugate().eval();
+    transformGrid(chain, p);
   }
 }
 

@@ -44,9 +44,11 @@ void referToStrongestEcho(const Twin& twin, const ChannelData& data, Finding& f)
 void referToStrongestHost(const Twin& twin, const ChannelData& data, double log_gain, double amplitude, Finding& f);
 
 /// Level and phase of an iq_imbalance by what images share with their hosts, conj(x) at the mirrored frequency of the
-/// same pose: no echo of the room has its phase. Levels of the power there alone come out some 2 dB high. Left as it is
-/// where no cell is its host's image alone, and with fewer than three locations.
-void measureImage(const ChannelData& data, Finding& f);
+/// same pose: no echo of the room has its phase. Levels of the power there alone come out some 2 dB high. False, and
+/// all left as it is, where no cell is its host's image alone, and with fewer than three locations.
+bool measureImage(const ChannelData& data, Finding& f);
+/// Takes an image of a known level and phase out of the data.
+void subtractImage(const NamedParameters& iq_imbalance, ChannelData& data);
 Finding findingOf(const ChannelErrors& errors);
 /// Where the noise departs from the level that the twin's noise_floor states.
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated);
