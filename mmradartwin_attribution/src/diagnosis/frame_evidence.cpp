@@ -429,6 +429,16 @@ std::vector<FrameFinding> FrameExaminer::findings() const {
 std::vector<FrameFinding> FrameExaminer::unexplained() const {
   if (FrameFinding f = state_->unsteadiness(); !f.poses.empty()) return {std::move(f)};
   std::vector<FrameFinding> all = state_->locate().unexplained;
+  // A tone of the radar's own is at most poses; one beat at a few of those with bursts is what is left of these.
+  const std::vector<std::string> hit = state_->interference().poses;
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [&](const FrameFinding& f) {
+                             return 2 * f.poses.size() < hit.size() &&
+                                    std::all_of(f.poses.begin(), f.poses.end(), [&](const std::string& p) {
+                                      return std::find(hit.begin(), hit.end(), p) != hit.end();
+                                    });
+                           }),
+            all.end());
   FrameFinding gain = state_->frameGain();
   if (gain.log_likelihood_gain > 0) all.push_back(std::move(gain));
   return all;

@@ -14,6 +14,7 @@ namespace {
 constexpr double kAlike = 5;                ///< nats within which two names are not told apart
 constexpr double kLeastSize_m = 0.05;       ///< of an object: any room is full of smaller ones
 constexpr double kLeastScattering = 0.15;   ///< S: less lies under the clutter of any room, whose law is not its own
+constexpr double kMostScattering = 0.98;    ///< no surface mirrors nothing: what wants all is clutter beside its actors
 constexpr double kStrongScattering = 0.35;  ///< an eighth of what is reflected is no clutter
 constexpr double kFurniture_m = 0.1;        ///< smaller than this is what lies about
 constexpr double kLeastLoss_db = 0.5;       ///< of a crossing: what lets all through is not there, or not the cause
@@ -90,6 +91,9 @@ std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFi
   const std::string& name = fit.hypothesis.mechanism.mechanism;
   if (name == "diffuse_scattering" && values.number("scattering_coefficient") < kLeastScattering) {
     return "no more than clutter is: S = " + number(values.number("scattering_coefficient"));
+  }
+  if (name == "diffuse_scattering" && values.number("scattering_coefficient") > kMostScattering) {
+    return "no surface scatters all that it reflects: S = " + number(values.number("scattering_coefficient"));
   }
   if (name == "transmission" && values.number("one_way_db") > -kLeastLoss_db) {
     return "no panel lets all through: " + number(values.number("one_way_db")) + " dB";
