@@ -265,6 +265,13 @@ class HiddenEffects(unittest.TestCase):
         for name, delta in (("x_m", 0.2), ("y_m", 0.2), ("speed_m_per_s", 0.12)):
             self.assertAlmostEqual(first["parameters"][name]["value"], truth[name], delta=delta, msg=f"seed {seed}")
 
+    def test_how_fast_someone_walks_is_told_from_how_often_he_turns(self):
+        # At 1 m/s he turns every 0.6 s; most of his ways are across the view.
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "308"))
+        _, first, truth = self.found(seed, {"moving_target": {"speed_m_per_s": 1.0}}, headings=2, tier="office")
+        self.assertAlmostEqual(first["parameters"]["speed_m_per_s"]["value"], truth["speed_m_per_s"], delta=0.08,
+                               msg=f"seed {seed}")
+
     def test_a_step_of_the_gain_is_a_drift(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "37"))
         _, first, _ = self.found(seed, {"gain_drift": {"steps_db": [-4.0]}}, headings=2)

@@ -1,8 +1,7 @@
 #include "walker.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -27,6 +26,9 @@ constexpr float kConvincing = 50;
 constexpr float kBeside = 0.01f;
 // Cells' noise is itself an estimate of some hundred values, good to a tenth: evidence counts less by so much.
 constexpr double kTrust = 0.8;
+// What poses share and a jackknife over them does not see: how often a walk turns, and frames in which its echo fades.
+// Eight walks of 0.35 to 1.2 m/s came out between 19 % slow and 3 % fast.
+constexpr double kWalkError = 0.07;  // of the speed, standard deviation
 const double kLogFalseAlarm = std::log(1e-6);
 
 struct Place {
@@ -378,9 +380,8 @@ class Search {
 
   /// Speed^2 of bodies that turn back every straight_s: the mean square of the way between two frames is
   /// v^2 t^2 (1 - 2/3 t / straight_s) for a time t between them, for the share t / straight_s of ways has a turn in it
-  /// and is a third of v^2 t^2 in the mean; the error of a single place adds a constant. Along the line of sight alone
-  /// where several directions of view together tell the speed: v^2 cos^2(heading - bearing) has the mean v^2/2.
-  /// misfit: of the mean over tracks along the line of sight, by which one straight_s is better than another.
+  /// and is a third of v^2 t^2 in the mean; the errors of single places add a constant to each track's.
+  /// misfit: of the mean over tracks, by which one straight_s is better than another.
   double speed2(const std::vector<const Track*>& tracks, double straight_s, double& misfit) const {
     constexpr int kLags = 8;
     double counts[kLags] = {}, means[kLags] = {}, grows[kLags];
@@ -388,49 +389,34 @@ class Search {
       const double time_s = (lag + 1) * radar_.frame_period_s;
       grows[lag] = time_s * time_s * (1 - 2.0 / 3 * std::min(time_s, straight_s) / straight_s);
     }
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
     double all_weight = 0, all_slope = 0;
-    int used = 0;
     for (const Track* t : tracks) {
-      const Eigen::Vector2d along = (t->mean - views_[t->pose].position()).normalized();
-      double count[kLags] = {}, radial[kLags] = {}, whole[kLags] = {};
+      double count[kLags] = {}, square[kLags] = {};
       for (std::size_t i = 0; i < t->frame.size(); ++i) {
         for (std::size_t j = i + 1; j < t->frame.size() && t->frame[j] - t->frame[i] <= kLags; ++j) {
           const int lag = t->frame[j] - t->frame[i] - 1;
-          const Eigen::Vector2d way = t->at[j] - t->at[i];
           ++count[lag];
-          radial[lag] += std::pow(way.dot(along), 2);
-          whole[lag] += way.squaredNorm();
+          square[lag] += (t->at[j] - t->at[i]).squaredNorm();
         }
       }
-      double w = 0, mx = 0, mr = 0, mw = 0, xx = 0, xr = 0, xw = 0;
+      double w = 0, mx = 0, my = 0, xx = 0, xy = 0;
       for (int lag = 0; lag < kLags; ++lag) {
-        if (count[lag] == 0) continue;
         const double x = grows[lag];
         counts[lag] += count[lag];
-        means[lag] += radial[lag];
+        means[lag] += square[lag];
         w += count[lag];
         mx += count[lag] * x;
-        mr += radial[lag];
-        mw += whole[lag];
+        my += square[lag];
         xx += count[lag] * x * x;
-        xr += x * radial[lag];
-        xw += x * whole[lag];
+        xy += x * square[lag];
       }
       const double spread = w > 0 ? xx - mx * mx / w : 0;
       if (!(spread > 0) || w < 8) continue;
-      const double slope_radial = (xr - mx * mr / w) / spread, slope_whole = (xw - mx * mw / w) / spread;
-      const double bearing = std::atan2(along.y(), along.x());
-      const Eigen::Vector3d row(1, std::cos(2 * bearing), std::sin(2 * bearing));
-      normal += w * row * row.transpose();
-      right += w * row * slope_radial;
       all_weight += w;
-      all_slope += w * slope_whole;
-      ++used;
+      all_slope += w * (xy - mx * my / w) / spread;
     }
     misfit = 0;
-    if (used == 0) return 0;
+    if (!(all_weight > 0)) return 0;
     Eigen::Matrix<double, kLags, 2> basis;
     Eigen::Matrix<double, kLags, 1> weight, mean;
     for (int lag = 0; lag < kLags; ++lag) {
@@ -440,17 +426,13 @@ class Search {
     }
     const Eigen::Vector2d line = basis.colPivHouseholderQr().solve(mean);
     misfit = (mean - basis * line).squaredNorm();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(normal);
-    if (used >= 5 && eigen.eigenvalues()[0] > 0.05 * eigen.eigenvalues()[2]) {
-      return std::max(0.0, 2 * normal.ldlt().solve(right)[0]);
-    }
     return std::max(0.0, all_slope / all_weight);
   }
 
   /// With the way between two turns that leaves the least misfit.
   double speedOf(const std::vector<const Track*>& tracks) const {
     double least = std::numeric_limits<double>::infinity(), best = 0;
-    for (double straight_s : {100.0, 2.0, 1.4, 1.0, 0.8, 0.65, 0.5}) {
+    for (double straight_s : {100.0, 2.0, 1.4, 1.0, 0.8, 0.7, 0.65, 0.6, 0.55, 0.5, 0.45}) {
       double misfit = 0;
       const double v2 = speed2(tracks, straight_s, misfit);
       if (misfit < least) best = std::sqrt(v2);
@@ -471,7 +453,9 @@ class Search {
       rest.erase(rest.begin() + static_cast<long>(i));
       variance += std::pow(speedOf(rest) - s.value, 2);
     }
-    const double half = all.size() > 2 ? 1.96 * std::sqrt(variance * (all.size() - 1.0) / all.size()) : s.value;
+    const double half =
+        all.size() > 2 ? 1.96 * std::hypot(std::sqrt(variance * (all.size() - 1.0) / all.size()), kWalkError * s.value)
+                       : s.value;
     s.low = std::max(0.0, s.value - half);
     s.high = s.value + half;
     return s;
