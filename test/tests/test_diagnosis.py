@@ -298,9 +298,10 @@ class HiddenEffects(unittest.TestCase):
     def test_what_errors_and_clutter_look_like_takes_no_name_away(self):
         # Sessions of the blind protocol: a cabinet's corner with the wall was called the cabinet's move by 5 (-8 to 19)
         # cm, a filter glass that scatters 0.6 % of what it reflects, a scale of ranges lost to a tenth of it, and an
-        # image was a corner, too, while it stood in the data of all that came after it.
+        # image was a corner, too, while it stood in the data of all that came after it. What someone who walked at a
+        # printer had left in the averages was plastic that scatters all it reflects.
         for seed, trial, cause in ((81, 25, "corner_reflection"), (81, 2, "if_lowpass"), (101, 4, "range_scale"),
-                                   (111, 22, "iq_imbalance")):
+                                   (111, 22, "iq_imbalance"), (121, 25, "moving_target")):
             with self.subTest(cause):
                 session = self.at(cause)
                 truth = trials.hide(draws.Trial("single", "office", seed, trial, poses=24), session)

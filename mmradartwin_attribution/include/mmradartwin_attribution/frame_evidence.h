@@ -49,6 +49,9 @@ struct PoseFrames {
   /// leaves at least 1/6. The mean carries this over `shots`.
   std::vector<double> noise_variance;
   int shots = 0;  ///< whole ones, of frames x loops
+  /// [N] of range: variance of the mean over that of noise alone, 1 but where something moves; empty where nothing
+  /// does.
+  std::vector<double> unsteadiness;
   std::vector<MovingCell> moving;
 };
 

@@ -75,6 +75,7 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
         }
       }
       channels.noise_power = per_sample * sum(noise) / static_cast<double>(noise.size()) / std::max(1, seen.shots);
+      channels.unsteadiness = seen.unsteadiness;
       channels.shots = std::max(1, seen.shots);
       transformGrid(chain, channels);
       const auto at = std::find(data.locations.begin(), data.locations.end(), pose.location);

@@ -24,6 +24,9 @@ struct PoseChannels {
   std::vector<EchoBeam> beams;
   BinCovariance clutter;   ///< of all bins: see clutter_field.h
   double noise_power = 0;  ///< thermal power in a cell of y, from the scatter of the frames
+  /// [N] factor of it in bins where frames scatter by more, as what moves leaves some of itself in their average; empty
+  /// where nothing moves.
+  std::vector<double> unsteadiness;
   std::vector<MovingCell> moving;
 };
 

@@ -152,6 +152,7 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   }
   result.noise_variance = std::move(residuals.noise_variance);
   result.shots = residuals.shots;
+  result.unsteadiness = std::move(residuals.unsteadiness);
   result.moving = std::move(residuals.cells);
   s.poses.push_back(std::move(result));
   const std::vector<double>& noise = s.poses.back().noise_variance;

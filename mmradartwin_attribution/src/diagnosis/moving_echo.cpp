@@ -17,6 +17,9 @@ constexpr int kLeastLoops = 16;
 // Of a frame's moving echoes the strongest are kept.
 constexpr std::size_t kEchoesPerFrame = 3;
 constexpr double kLimb_m = 0.75;
+constexpr double kUnsteadyRadar = 0.5;      ///< of the standing echoes: more change with the radar itself
+constexpr double kChance = 6;               ///< standard deviations of a bin's scatter
+constexpr double kAlike = 2;                ///< a body's echo is alike for some frames: its average scatters by more
 constexpr double kLeastOfStrongest = 0.03;  ///< power of the moving cells that are told of
 
 template <typename T>
@@ -279,6 +282,22 @@ void ShotExaminer::readNoise(Spectra& s, ShotResiduals& result) const {
   for (std::size_t i = 0; i < s.average.size(); ++i) s.average[i] *= scale[i % scale.size()];
 }
 
+void ShotExaminer::readUnsteadiness(const Spectra& s, ShotResiduals& result) const {
+  const double values = static_cast<double>(s.shot.size()) * s.channels, freedom = values - s.channels;
+  // A radar that changes itself does so in all its echoes, which are what is to be explained.
+  if (freedom < 1 || result.unsteady_share > kUnsteadyRadar) return;
+  for (int b = 0; b < s.bins; ++b) {
+    double power = 0;
+    for (std::size_t i = 0; i < s.shot.size(); ++i) {
+      power += Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm();
+    }
+    const double beyond = power / freedom - 1;
+    if (beyond < kChance / std::sqrt(freedom)) continue;
+    result.unsteadiness.resize(static_cast<std::size_t>(s.bins), 1.0);
+    result.unsteadiness[static_cast<std::size_t>(b)] += kAlike * beyond;
+  }
+}
+
 void ShotExaminer::readEvidence(const Spectra& s, ShotResiduals& result) const {
   result.evidence = Eigen::ArrayXXf::Zero(s.bins, kAngleBins);
   const double freedom = static_cast<double>(s.shot.size()) - 1;
@@ -409,6 +428,7 @@ ShotResiduals ShotExaminer::examine(const FrameStack& stack, const std::vector<C
   readSteadiness(s, result);
   readNoise(s, result);
   readTurn(stack, s, result);
+  readUnsteadiness(s, result);
   readEvidence(s, result);
   if (stack.loops >= kLeastLoops) {
     readDopplerEchoes(s, result);

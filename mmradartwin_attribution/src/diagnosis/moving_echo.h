@@ -22,6 +22,8 @@ struct MovingEcho {
 struct ShotResiduals {
   std::vector<double> noise_variance;  ///< [M] of one complex sample, counts^2
   int shots = 0;                       ///< that were used
+  /// [N] of range: variance of the average over that of noise alone; empty where shots differ by no more than noise.
+  std::vector<double> unsteadiness;
   /// Nats by which cell [range][azimuth] varies more than noise does.
   Eigen::ArrayXXf evidence;
   std::vector<MovingEcho> echoes;
@@ -55,6 +57,7 @@ class ShotExaminer {
   void takeCommonGain(const FrameStack& stack, Spectra& spectra, ShotResiduals& result) const;
   void readSteadiness(const Spectra& s, ShotResiduals& result) const;
   void readNoise(Spectra& spectra, ShotResiduals& result) const;
+  void readUnsteadiness(const Spectra& spectra, ShotResiduals& result) const;
   void readEvidence(const Spectra& spectra, ShotResiduals& result) const;
   void readEchoes(const Spectra& spectra, ShotResiduals& result) const;
   void readDopplerEchoes(const Spectra& spectra, ShotResiduals& result) const;

@@ -98,6 +98,14 @@ int SessionModel::binOf(int pose, int cell) const {
   return isBeam(cell) ? middleBin(data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)], channels_) : cell;
 }
 
+double SessionModel::noiseOf(int pose, int cell) const {
+  const PoseChannels& p = data_.poses[pose];
+  if (p.unsteadiness.empty()) return p.noise_power;
+  if (!isBeam(cell)) return p.noise_power * p.unsteadiness[static_cast<std::size_t>(cell)];
+  const auto first = p.unsteadiness.begin() + p.beams[static_cast<std::size_t>(cell - samples_)].first_bin;
+  return p.noise_power * *std::max_element(first, first + channels_);
+}
+
 const std::complex<double>* SessionModel::dataOf(int pose, int cell) const {
   if (isBeam(cell)) return data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)].y.data();
   return data_.poses[pose].y.col(cell).data();
@@ -141,7 +149,7 @@ PackedHermitian SessionModel::sigma(const PoseEchoes& echoes, const std::vector<
   if (const auto* p = graze.at(at, size_)) s.add(p, gain * std::exp(n.log_graze));
   // At least a share of the mean power everywhere keeps the matrix definite where the first-order terms would not.
   const double relative = std::exp(n.log_relative), mean = s.trace() / channels_;
-  addApart(cell, relative * std::max(mean, 0.0) + data_.poses[pose].noise_power, s);
+  addApart(cell, relative * std::max(mean, 0.0) + noiseOf(pose, cell), s);
   if (isBeam(cell)) {
     for (int k = 0; k < channels_; ++k) {
       s.re[static_cast<std::size_t>(PackedHermitian::diagonal(k))] += kBeamShare * std::max(mean, 0.0);
@@ -291,7 +299,7 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     PackedHermitian& level = touch(kGain);
     level.add(s, 1);
     level.add(floor, -1);
-    addApart(cell, -data_.poses[pose].noise_power, level);
+    addApart(cell, -noiseOf(pose, cell), level);
     const double mean = level.trace() / channels_ / (1 + relative);
     addApart(cell, relative * mean, touch(kRelative));
     basis.active = active;

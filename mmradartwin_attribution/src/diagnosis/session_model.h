@@ -126,6 +126,8 @@ class SessionModel {
   /// Two neighbours of floor_shape that hold for a bin: the first one's index and the second one's share.
   std::pair<int, double> shapeAt(int bin) const;
   const std::complex<double>* dataOf(int pose, int cell) const;
+  /// Power in a cell in which the average is uncertain by noise and by what moves.
+  double noiseOf(int pose, int cell) const;
   /// Adds power that no two channels share, and that a beam's bins share as their window has it.
   void addApart(int cell, double power, PackedHermitian& to) const;
   /// Factor of a group's power, and one-way range that its actors add.
