@@ -393,6 +393,14 @@ FrameFinding FrameExaminer::State::unsteadiness() const {
   return f;
 }
 
+namespace {
+
+bool standsWithin(const FrameFinding& f, const std::set<std::string>& poses) {
+  return std::all_of(f.poses.begin(), f.poses.end(), [&](const std::string& p) { return poses.count(p) > 0; });
+}
+
+}  // namespace
+
 std::vector<FrameFinding> FrameExaminer::findings() const {
   const State& s = *state_;
   std::vector<FrameFinding> all = {s.saturation(), s.packetLoss(), s.misalignment()};
@@ -408,17 +416,14 @@ std::vector<FrameFinding> FrameExaminer::findings() const {
   const std::vector<FrameFinding> walkers = steady ? s.locate().walkers : std::vector<FrameFinding>();
   std::set<std::string> walked, hit;
   for (const FrameFinding& walker : walkers) walked.insert(walker.poses.begin(), walker.poses.end());
-  const auto within = [](const FrameFinding& f, const std::set<std::string>& poses) {
-    return std::all_of(f.poses.begin(), f.poses.end(), [&](const std::string& p) { return poses.count(p) > 0; });
-  };
   all.erase(std::remove_if(all.begin(), all.end(),
-                           [&](const FrameFinding& f) { return f.cause == "interference" && within(f, walked); }),
+                           [&](const FrameFinding& f) { return f.cause == "interference" && standsWithin(f, walked); }),
             all.end());
   for (const FrameFinding& f : all) {
     if (f.cause == "interference" && f.log_likelihood_gain > 0) hit.insert(f.poses.begin(), f.poses.end());
   }
   for (const FrameFinding& walker : walkers) {
-    if (!within(walker, hit)) all.push_back(walker);
+    if (!standsWithin(walker, hit)) all.push_back(walker);
   }
   all.erase(std::remove_if(all.begin(), all.end(), [](const auto& f) { return f.log_likelihood_gain <= 0; }),
             all.end());
@@ -431,15 +436,12 @@ std::vector<FrameFinding> FrameExaminer::unexplained() const {
   if (FrameFinding f = state_->unsteadiness(); !f.poses.empty()) return {std::move(f)};
   std::vector<FrameFinding> all = state_->locate().unexplained;
   // A tone of the radar's own is at most poses; one beat at a few of those with bursts is what is left of these.
-  const std::vector<std::string> hit = state_->interference().poses;
-  all.erase(std::remove_if(all.begin(), all.end(),
-                           [&](const FrameFinding& f) {
-                             return 2 * f.poses.size() < hit.size() &&
-                                    std::all_of(f.poses.begin(), f.poses.end(), [&](const std::string& p) {
-                                      return std::find(hit.begin(), hit.end(), p) != hit.end();
-                                    });
-                           }),
-            all.end());
+  const FrameFinding bursts = state_->interference();
+  const std::set<std::string> hit(bursts.poses.begin(), bursts.poses.end());
+  all.erase(
+      std::remove_if(all.begin(), all.end(),
+                     [&](const FrameFinding& f) { return 2 * f.poses.size() < hit.size() && standsWithin(f, hit); }),
+      all.end());
   FrameFinding gain = state_->frameGain();
   if (gain.log_likelihood_gain > 0) all.push_back(std::move(gain));
   return all;
