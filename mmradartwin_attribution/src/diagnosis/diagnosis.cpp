@@ -6,13 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <sstream>
 
-#include "back_projection.h"
 #include "body_fixed_tone.h"
 #include "channel_data.h"
 #include "clutter_field.h"
@@ -24,14 +21,13 @@
 #include "held_out_gain.h"
 #include "hypothesis_finding.h"
 #include "hypothesis_fit.h"
+#include "hypothesis_ranking.h"
 #include "law_screen.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "object_search.h"
 #include "profiled_values.h"
 #include "receiver_finding.h"
-#include "replica_screen.h"
 #include "session_model.h"
-#include "shared_latents.h"
 
 namespace mmradartwin {
 namespace {
@@ -39,21 +35,11 @@ namespace {
 constexpr int kFolds = 5;
 constexpr double kFalseAlarm = 0.01;       ///< family-wise, per round
 constexpr std::size_t kFewestForLaws = 3;  ///< poses: of fewer only frames and channels are judged
-constexpr std::size_t kScreenPoses = 44;   ///< a part of the session ranks hypotheses well enough
-constexpr std::size_t kFewestPoses = 12;
-constexpr std::size_t kLawPoses = 66;   ///< whose paths are scored for laws without a name
-constexpr std::size_t kSecondLook = 9;  ///< hypotheses that are looked at on all poses
-constexpr std::size_t kSuspects = 6;    ///< actors whose geometry is tried
-constexpr double kOutOfPlace = 1.2;     ///< nats of an actor's own errors from which on it is looked for elsewhere
-constexpr std::size_t kMostOutOfPlace = 4;
-constexpr std::size_t kMostNames = 5;  ///< fits of one round
+constexpr std::size_t kMostNames = 5;      ///< fits of one round
 constexpr std::size_t kMostLaws = 3;
 constexpr double kWorthAFit = 4;  ///< nats promised
 constexpr double kWorthAFitOfGeometry = 0.5;
-constexpr double kLonger[] = {1.5, 2};  ///< starts of a geometry
-constexpr double kWorthALaw = 12;
-constexpr double kWorthAnObject = 3;       ///< at the best of all places
-constexpr std::size_t kMostObjects = 4;    ///< what is wide or turned promises less than a point elsewhere
+constexpr double kLonger[] = {1.5, 2};     ///< starts of a geometry
 constexpr double kWorthABox = 15;          ///< nats of a round one there,
 constexpr double kShareWorthABox = 0.3;    ///< and so much of what the best other fit brings
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
@@ -108,6 +94,7 @@ class Session {
   std::unique_ptr<EchoSource> source_;
   std::unique_ptr<SessionModel> model_;
   std::unique_ptr<HypothesisFitter> fitter_;
+  std::unique_ptr<HypothesisRanking> ranking_;
   std::vector<NamedParameters> mechanisms_;  ///< as the engine simulates them
   std::vector<NamedParameters> extended_;    ///< the same with what was taken out of the data instead
   ModelState state_;
@@ -125,8 +112,7 @@ class Session {
   }
   /// mechanisms_ and extended_ without what rounds have found.
   std::vector<NamedParameters> before_rounds_, extended_before_rounds_;
-  std::size_t family_ = 1;        ///< hypotheses of a round
-  std::set<std::string> no_use_;  ///< costly ones that gain nothing whatever is found beside them
+  std::size_t family_ = 1;  ///< hypotheses of a round
   Diagnosis result_;
 };
 
@@ -171,6 +157,8 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
   source_ = std::make_unique<EchoSource>(twin_, data_, accuracy_);
   model_ = std::make_unique<SessionModel>(data_, static_cast<int>(twin_.scene().actors.size()), accuracy_);
   fitter_ = std::make_unique<HypothesisFitter>(*source_, *model_, kFolds);
+  ranking_ = std::make_unique<HypothesisRanking>(
+      twin_, *source_, *model_, accuracy_, [this](const std::string& stage, double share) { report(stage, share); });
 }
 
 std::optional<std::string> Session::judgeDelivery() {
@@ -227,122 +215,7 @@ void Session::judgeNoise() {
 
 std::vector<HypothesisFit> Session::fitBest(int round) {
   const std::vector<Hypothesis> all = hypotheses(twin_, extended_);
-  const auto suspects = fitter_->suspects(state_);
-  std::set<std::string> suspicious;
-  for (std::size_t i = 0; i < std::min(kSuspects, suspects.size()); ++i) {
-    suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(suspects[i].first)].name);
-  }
-  std::set<int> out_of_place;
-  for (const auto& [actor, nats] : suspects) {
-    if (nats > kOutOfPlace && out_of_place.size() < kMostOutOfPlace) out_of_place.insert(actor);
-  }
-  const auto spread = [&](std::size_t wanted) {
-    const std::size_t count = data_.poses.size();
-    wanted = std::min(count, wanted);
-    std::vector<int> poses;
-    for (std::size_t i = 0; i < wanted; ++i) poses.push_back(static_cast<int>(i * count / wanted));
-    return poses;
-  };
-  // The more numbers a hypothesis has, the more evaluations, and the fewer poses rank it.
-  const auto some = [&](const Hypothesis& h) {
-    return spread(std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
-  };
-  const auto look = [&](const Hypothesis& h, const std::vector<int>& poses) {
-    const int actor = twin_.scene().actorIndex(h.subject);
-    return out_of_place.count(actor) > 0 && isMove(h) ? fitter_->screenAround(state_, h, actor, poses)
-                                                      : fitter_->screen(state_, h, poses);
-  };
-  const auto lookAtSome = [&](const Hypothesis& h) { return look(h, spread(kScreenPoses)); };
-  const auto better = [](const Screened& a, const Screened& b) { return a.promised > b.promised; };
-  const auto bestOf = [&](std::size_t most, const std::vector<ProjectedPlace>& places,
-                          Hypothesis (*at)(const ProjectedPlace&)) {
-    std::vector<Screened> best;
-    for (const ProjectedPlace& place : places) best.push_back(lookAtSome(at(place)));
-    std::stable_sort(best.begin(), best.end(), better);
-    best.resize(std::min(most, best.size()));
-    return best;
-  };
-  report("objects that the twin lacks", 0);
-  std::vector<Screened> placed = bestOf(kMostObjects, projectBack(twin_, *model_, state_), objectAt);
-  const std::size_t objects = placed.size();
-  for (Screened& s : bestOf(1, projectLateBack(twin_, *model_, state_), lateEchoAt)) placed.push_back(std::move(s));
-  source_->settle(mechanisms_);
-  if (objects > 0 && placed.front().promised > kWorthAnObject) {
-    // It may be one of the scene's that stands elsewhere.
-    const NamedParameters& m = placed.front().hypothesis.mechanism;
-    if (const int actor = nearestObject(twin_.scene(), m.values.number("x_m"), m.values.number("y_m")); actor >= 0) {
-      suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(actor)].name);
-      out_of_place.insert(actor);
-    }
-  }
-  std::vector<Screened> screened;
-  std::map<std::string, std::size_t> looked_at;  // poses
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    report("trying " + all[i].label(), static_cast<double>(i) / static_cast<double>(all.size()));
-    const bool of_actor = twin_.scene().actorIndex(all[i].subject) >= 0;
-    const double numbers = static_cast<double>(all[i].coordinates.size());
-    const std::vector<double> typical(all[i].coordinates.size(), 1.0);
-    // Each of these traces the session anew: of actors without suspicion, what is there or not on a few poses, and
-    // nothing else.
-    const bool costly =
-        of_actor && suspicious.count(all[i].subject) == 0 && source_->altersGeometry(all[i].at(typical));
-    if (costly && (!all[i].isOneSided() || no_use_.count(all[i].label()) > 0)) continue;
-    const std::vector<int> poses = costly ? spread(kFewestPoses) : some(all[i]);
-    Screened s = look(all[i], poses);
-    if (costly && !(s.promised > 0)) no_use_.insert(all[i].label());
-    // What chance promises: half a nat per number on the poses looked at, scaled up like the rest.
-    s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
-    looked_at[s.hypothesis.label()] = poses.size();
-    screened.push_back(std::move(s));
-    source_->settle(mechanisms_);
-  }
-  std::stable_sort(screened.begin(), screened.end(), better);
-  // Geometry before materials: what is wrong with all ranges or directions stands in every latent, and its score is
-  // small for that.
-  std::size_t kept = 0;
-  screened.erase(std::remove_if(screened.begin(), screened.end(),
-                                [&](const Screened& s) { return ++kept > kSecondLook && !s.hypothesis.isGeometry(); }),
-                 screened.end());
-  for (Screened& s : screened) {
-    report("looking again at " + s.hypothesis.label(), 0);
-    const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
-    const std::vector<int> poses = spread(numbers > 3 ? kScreenPoses : data_.poses.size());
-    if (looked_at[s.hypothesis.label()] < poses.size()) {
-      s = look(s.hypothesis, poses);
-      s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
-      source_->settle(mechanisms_);
-    }
-    s.promised -= numbers;
-  }
-  // A hypothesis that something else points at: with the start that it gives.
-  const auto suggest = [&screened](Screened s) {
-    const auto same = std::find_if(screened.begin(), screened.end(), [&](const Screened& other) {
-      return other.hypothesis.label() == s.hypothesis.label();
-    });
-    if (same == screened.end()) {
-      screened.push_back(std::move(s));
-    } else {
-      same->promised = std::max(same->promised, s.promised);
-      same->starts.push_back(s.starts.front());
-    }
-  };
-  report("laws without a name", 0);
-  for (Screened& s : screenLaws(twin_, *model_, state_, spread(kLawPoses))) {
-    if (std::optional<Screened> named = namedLike(s, all)) suggest(std::move(*named));
-    screened.push_back(std::move(s));
-  }
-  for (Screened& s : screenReplicas(twin_, *model_, state_, spread(kLawPoses), kWorthALaw, lookAtSome)) {
-    screened.push_back(std::move(s));
-  }
-  for (Screened& s : sharedLatents(*source_, state_, model_->spread(), accuracy_, all, spread(kScreenPoses))) {
-    suggest(std::move(s));
-  }
-  source_->settle(mechanisms_);
-  for (Screened& s : placed) {
-    freePlace(data_, s);
-    screened.push_back(std::move(s));
-  }
-  std::stable_sort(screened.begin(), screened.end(), better);
+  std::vector<Screened> screened = ranking_->rank(all, state_);
   family_ = all.size() + static_cast<std::size_t>(kLawFamily);
   std::vector<HypothesisFit> fits;
   std::size_t names_fitted = 0, laws_fitted = 0, objects_fitted = 0;
@@ -629,7 +502,7 @@ bool Session::judgeChannels(int round) {
     const auto accepted = accepted_;
     const auto findings = result_.findings.findings;
     const Nuisance latents = state_.nuisance;
-    if (source_->altersGeometry(*finding.mechanism)) no_use_.clear();
+    if (source_->altersGeometry(*finding.mechanism)) ranking_->tryAllAgain();
     accepted_.push_back({f.hypothesis, f.scaled, f.standard_error, f.plain, result_.findings.findings.size()});
     result_.findings.findings.push_back(std::move(finding));
     state_.nuisance = f.state.nuisance;

@@ -11,27 +11,20 @@
 #include <memory>
 #include <numeric>
 
+#include "effective_scores.h"
 #include "evidence_bounds.h"
 #include "mmradartwin_attribution/finding.h"
 
 namespace mmradartwin {
 namespace {
 
-constexpr double kSmallStep = 0.125;           ///< of the scale, for derivatives
-constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what rises from nothing is looked at first
-constexpr double kMore[] = {4, 16};            ///< of the scale, as long as that gains
-constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents have stood in for it
-constexpr int kSettling = 3;                   ///< steps of the latents at each of several starts
-constexpr double kStoodIn = 1;                 ///< nats of theirs
-constexpr double kRadii[] = {1, 2, 4, 7};      ///< of the scale, about a place where an object may have stood before
-constexpr int kDirections = 8;
+constexpr int kSettling = 3;                 ///< steps of the latents at each of several starts
 constexpr double kEnough = 0.2;              ///< nats: a further step promises less
 constexpr double kRising = 5;                ///< nats of the last step that are worth going on for
 constexpr double kClimb = 4;                 ///< steps like the last within which a climb has to get somewhere
 constexpr double kWorthASearch = 25;         ///< nats gained by slopes, before a rough likelihood is searched
 constexpr double kSearched[] = {0.3, 0.15};  ///< of the scale, around where slopes end
 constexpr double kImprovement = 0.5;         ///< nats by which latents have to be better to be taken over
-constexpr double kMaxInflation = 50;
 // Nats a pose without the best place: seven clean sessions of 66 to 154 poses brought at most 1.9 by any hypothesis. At
 // few places the scatter of a rough likelihood's slopes hides gains ten times that.
 constexpr double kPlain = 5, kPlainFalseAlarm = 0.01;
@@ -47,79 +40,10 @@ constexpr double kLeastMove_m = 0.06;
 
 constexpr double kSomewhere = 10;  ///< nats more for an object: it is the best of some 500 places of a room
 
-/// Of a gain that scatters over places more than one by chance would: of G nats, sqrt(2 G).
-double inflationOf(double gain, const std::vector<double>& by_location) {
-  const double locations = static_cast<double>(by_location.size());
-  if (by_location.size() < 2 || !(gain > 0)) return 1;
-  const double mean = std::accumulate(by_location.begin(), by_location.end(), 0.0) / locations;
-  double squares = 0;
-  for (double v : by_location) squares += (v - mean) * (v - mean);
-  return std::clamp(squares * locations / (locations - 1) / (2 * gain), 1.0, kMaxInflation);
-}
-
-/// The same for what is there or not, whose paths may be seen from few places: those that see none do not gain, and it
-/// is those that lose that tell of chance.
-double inflationOfPresence(double gain, const std::vector<double>& by_location) {
-  if (by_location.size() < 2 || !(gain > 0)) return 1;
-  double squares = 0;
-  for (double v : by_location) squares += std::min(v, 0.0) * std::min(v, 0.0);
-  return std::clamp(squares / gain, 1.0, kMaxInflation);
-}
-
-/// An information that can be solved with, also where a direction does nothing.
-Eigen::MatrixXd regularised(Eigen::MatrixXd information) {
-  information.diagonal().array() += 1e-9 * information.diagonal().array().abs() + 1e-12;
-  return information;
-}
-
-/// of[i] is of poses[i], from is of all poses.
-SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, const std::vector<int>& poses,
-                             double per) {
-  const float f = static_cast<float>(1 / per);
-  for (std::size_t i = 0; i < of.size(); ++i) {
-    const PoseCovariance& base = from[static_cast<std::size_t>(poses[i])];
-    for (std::size_t j = 0; j < of[i].size(); ++j) of[i][j] = (of[i][j] - base[j]) * f;
-  }
-  return of;
-}
-
-/// The same between two sides; both are of the same poses.
-SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, double per) {
-  const float f = static_cast<float>(1 / per);
-  for (std::size_t i = 0; i < of.size(); ++i) {
-    for (std::size_t j = 0; j < of[i].size(); ++j) of[i][j] = (of[i][j] - from[i][j]) * f;
-  }
-  return of;
-}
-
-/// With no error of this actor's own.
-Nuisance withoutErrors(Nuisance nuisance, int actor) {
-  nuisance.actor_range_m[static_cast<std::size_t>(actor)] = 0;
-  nuisance.actor_gain[static_cast<std::size_t>(actor)] = 0;
-  return nuisance;
-}
-
-/// Without gains of their own of the actors of a material; and nats of what is known of those beforehand.
-std::pair<Nuisance, double> withoutGains(Nuisance nuisance, const Scene& scene, const std::string& material,
-                                         double spread) {
-  double nats = 0;
-  for (std::size_t a = 0; a < scene.actors.size(); ++a) {
-    if (scene.actors[a].material_tag != material) continue;
-    nats += 0.5 * std::pow(nuisance.actor_gain[a] / spread, 2);
-    nuisance.actor_gain[a] = 0;
-  }
-  return {std::move(nuisance), nats};
-}
-
 std::vector<int> everyPose(const ModelState& state) {
   std::vector<int> poses(state.echoes.size());
   std::iota(poses.begin(), poses.end(), 0);
   return poses;
-}
-
-std::vector<NamedParameters> with(std::vector<NamedParameters> mechanisms, NamedParameters added) {
-  mechanisms.push_back(std::move(added));
-  return mechanisms;
 }
 
 /// Calls `value` at places that lead to its maximum (BOBYQA, Powell 2009: no slopes).
@@ -178,37 +102,8 @@ void HypothesisFit::loseGain(double nats) {
 }
 
 /// Scores of the hypothesis' own directions with the nuisance's part taken out.
-struct HypothesisFitter::Effective {
-  Eigen::MatrixXd by_location;  // [L][n]
-  Eigen::MatrixXd information;  // [n][n]
-  Eigen::MatrixXd scatter;      // [n][n] of the scores' sums, over places and the latents' priors
-  Eigen::VectorXd total;
-  double inflation = 1;
-};
-
 HypothesisFitter::HypothesisFitter(EchoSource& source, const SessionModel& model, int folds)
     : source_(source), model_(model), folds_(folds) {}
-
-HypothesisFitter::Effective HypothesisFitter::effective(const Scores& s, int globals) const {
-  Effective e;
-  const Eigen::Index n = s.information.rows() - globals;
-  const Eigen::MatrixXd nuisance = s.information.topLeftCorner(globals, globals);
-  const Eigen::MatrixXd projection = nuisance.ldlt().solve(s.information.topRightCorner(globals, n));  // [g][n]
-  e.by_location = s.by_location.rightCols(n) - s.by_location.leftCols(globals) * projection;
-  e.information = regularised(s.information.bottomRightCorner(n, n) -
-                              s.information.topRightCorner(globals, n).transpose() * projection);
-  e.total = s.total.tail(n) - projection.transpose() * s.total.head(globals);
-  const double locations = static_cast<double>(e.by_location.rows());
-  if (locations > 1 && n > 0) {
-    const Eigen::MatrixXd centred = e.by_location.rowwise() - e.by_location.colwise().mean();
-    e.scatter = centred.transpose() * centred * (locations / (locations - 1));
-    // Errors of actors are the same at all places: no scatter over places shows them, their priors do.
-    e.scatter += projection.transpose() * s.prior.asDiagonal() * projection;
-    const Eigen::MatrixXd ratio = e.information.ldlt().solve(e.scatter);
-    e.inflation = std::min(ratio.trace() / static_cast<double>(n), kMaxInflation);
-  }
-  return e;
-}
 
 ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanisms, const Nuisance* start) {
   ModelState s;
@@ -236,168 +131,6 @@ std::optional<ModelState> HypothesisFitter::improved(const ModelState& null, con
   ModelState s = state(null.mechanisms, &other);
   if (s.log_likelihood < null.log_likelihood + kImprovement) return std::nullopt;
   return s;
-}
-
-std::vector<std::pair<int, double>> HypothesisFitter::suspects(const ModelState& null) const {
-  std::vector<std::pair<int, double>> result;
-  const LatentSpread spread = model_.spread();
-  for (std::size_t a = 0; a + 1 < null.nuisance.actor_gain.size(); ++a) {  // the last is of no actor
-    const double gain = null.nuisance.actor_gain[a] / spread.actor_gain;
-    const double range = null.nuisance.actor_range_m[a] / spread.actor_range_m;
-    result.emplace_back(static_cast<int>(a), 0.5 * (gain * gain + range * range));
-  }
-  std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
-  return result;
-}
-
-std::pair<double, double> HypothesisFitter::valueAt(const ModelState& null, const Hypothesis& hypothesis,
-                                                    const std::vector<double>& scaled, const std::vector<int>& poses,
-                                                    const Nuisance& nuisance) {
-  // About the same ranges as the null's, so that a hypothesis that does nothing gains nothing; but for an actor whose
-  // own error was changed.
-  std::vector<double> about_m = null.actor_range_m;
-  for (std::size_t a = 0; a < about_m.size(); ++a) {
-    if (nuisance.actor_range_m[a] != null.nuisance.actor_range_m[a]) about_m[a] = nuisance.actor_range_m[a];
-  }
-  auto echoes = source_.echoes(with(null.mechanisms, hypothesis.at(scaled)), poses, about_m);
-  // Of poses whose echoes stay the value is known.
-  std::vector<double> there;
-  std::vector<int> changed;
-  std::vector<PoseEchoes> changed_echoes;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const std::size_t pose = static_cast<std::size_t>(poses[i]);
-    there.push_back(null.by_pose[pose]);
-    if (&nuisance == &null.nuisance && echoes[i].groups == null.echoes[pose].groups) continue;
-    changed.push_back(static_cast<int>(i));
-    changed_echoes.push_back(std::move(echoes[i]));
-  }
-  std::vector<int> changed_poses;
-  for (int i : changed) changed_poses.push_back(poses[static_cast<std::size_t>(i)]);
-  const std::vector<double> values = model_.byPose(changed_echoes, nuisance, changed_poses);
-  for (std::size_t i = 0; i < changed.size(); ++i) there[static_cast<std::size_t>(changed[i])] = values[i];
-  std::vector<double> by_location(model_.data().locations.size(), 0.0);
-  double gain = 0;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const std::size_t pose = static_cast<std::size_t>(poses[i]);
-    const double v = there[i] - null.by_pose[pose];
-    gain += v;
-    by_location[static_cast<std::size_t>(model_.data().poses[pose].location)] += v;
-  }
-  const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
-  return {gain,
-          whole * gain /
-              (hypothesis.isOneSided() ? inflationOfPresence(gain, by_location) : inflationOf(gain, by_location))};
-}
-
-Screened HypothesisFitter::screenAround(const ModelState& null, const Hypothesis& hypothesis, int actor,
-                                        const std::vector<int>& poses) {
-  Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 0.0)}};
-  const Nuisance nuisance = withoutErrors(null.nuisance, actor);  // they have stood in for the move
-  for (double radius : kRadii) {
-    for (int k = 0; k < kDirections; ++k) {
-      std::vector<double> at(hypothesis.coordinates.size(), 0.0);
-      at[0] = radius * std::cos(2 * M_PI * k / kDirections);
-      at[1] = radius * std::sin(2 * M_PI * k / kDirections);
-      const double promised = valueAt(null, hypothesis, at, poses, nuisance).second;
-      source_.settle(null.mechanisms);
-      if (promised <= result.promised) continue;
-      result.promised = promised;
-      result.starts.front() = at;
-    }
-  }
-  return result;
-}
-
-Screened HypothesisFitter::screenDirectly(const ModelState& null, const Hypothesis& hypothesis,
-                                          const std::vector<int>& poses) {
-  std::vector<double> start(hypothesis.coordinates.size(), kLittle);
-  double best = 0;
-  const auto tryAt = [&](double scaled) {
-    const std::vector<double> at(hypothesis.coordinates.size(), scaled);
-    const auto [gain, promised] = valueAt(null, hypothesis, at, poses, null.nuisance);
-    if (promised > best) {
-      best = promised;
-      start = at;
-    }
-    return gain;
-  };
-  const auto reciprocal = [](const Coordinate& c) { return c.reciprocal(); };
-  if (hypothesis.coordinates.empty()) {
-    tryAt(1);
-  } else if (std::all_of(hypothesis.coordinates.begin(), hypothesis.coordinates.end(), reciprocal)) {
-    // A steep edge far above all tones does nothing: it is looked for among them.
-    for (double scaled : {0.8, 1.0, 1.3}) tryAt(scaled);
-  } else {
-    const double gain = tryAt(kSome);
-    const bool costly = source_.altersGeometry(hypothesis.at(start));
-    if (gain > 0 || !costly) {
-      double last = tryAt(gain > 0 ? 1 : kLittle);
-      // A level may be far above its typical one, where that one hardly shows.
-      const bool level = hypothesis.coordinates.size() == 1 && hypothesis.coordinates[0].logarithmic();
-      for (double scaled : kMore) {
-        if (!level || gain <= 0 || last <= gain) break;
-        const double next = tryAt(scaled);
-        if (next <= last) break;
-        last = next;
-      }
-    }
-  }
-  // What a material does may have been fitted as gains of its actors, beside which it has nothing to do.
-  const auto [freed, nats] =
-      withoutGains(null.nuisance, source_.base().scene(), hypothesis.subject, model_.spread().actor_gain);
-  for (double scaled : kInstead) {
-    if (nats < kStoodIn) break;
-    const std::vector<double> at(hypothesis.coordinates.size(), scaled);
-    const double promised = nats + valueAt(null, hypothesis, at, poses, freed).second;
-    if (promised <= best) continue;
-    best = promised;
-    start = at;
-  }
-  return {hypothesis, best, {start}};
-}
-
-Screened HypothesisFitter::screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses) {
-  if (hypothesis.isOneSided()) return screenDirectly(null, hypothesis, poses);
-  Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 1.0)}};
-  std::vector<SessionCovariance> directions;
-  for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
-    const std::vector<double> nothing(hypothesis.coordinates.size(), 0.0);
-    // What rises from nothing does so with its power: its typical value shows more than the slope at nothing. What
-    // shifts or turns does so to first order for small amounts alone.
-    const double step = hypothesis.coordinates[j].oneSided() ? 1 : kSmallStep;
-    const auto covarianceAt = [&](double scaled) {
-      std::vector<double> at = nothing;
-      at[j] = scaled;
-      const auto echoes =
-          step < 1 ? source_.echoesNear(with(null.mechanisms, hypothesis.at(at)),
-                                        with(null.mechanisms, hypothesis.at(nothing)), poses, null.actor_range_m)
-                   : source_.echoes(with(null.mechanisms, hypothesis.at(at)), poses, null.actor_range_m);
-      return model_.covariance(echoes, null.nuisance, poses);
-    };
-    directions.push_back(hypothesis.coordinates[j].oneSided()
-                             ? difference(covarianceAt(step), null.covariance, poses, step)
-                             : difference(covarianceAt(step), covarianceAt(-step), 2 * step));
-  }
-  const Effective e = effective(model_.scores(null.basis, directions, poses), null.nuisance.globals());
-  const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
-  Eigen::VectorXd step = e.information.ldlt().solve(e.total);
-  bool possible = true;
-  for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
-    const bool one_sided = hypothesis.coordinates[j].oneSided();
-    if (one_sided && step[static_cast<Eigen::Index>(j)] <= 0) possible = false;
-    result.starts.front()[j] = std::clamp(step[static_cast<Eigen::Index>(j)], one_sided ? 0.02 : -8.0, 8.0);
-  }
-  if (possible) result.promised = whole * 0.5 * e.total.dot(step) / moderated(e.inflation, hypothesis);
-  // Slopes are of paths that stay. What a turn of the view lets in and out shows in the likelihood itself.
-  if (hypothesis.isGeometry() && hypothesis.coordinates.size() == 1 && source_.altersGeometry(hypothesis.at({1.0}))) {
-    for (double scaled : {-1.0, 1.0}) {
-      const double promised = valueAt(null, hypothesis, {scaled}, poses, null.nuisance).second;
-      if (promised <= result.promised) continue;
-      result.promised = promised;
-      result.starts.push_back({scaled});
-    }
-  }
-  return result;
 }
 
 HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
@@ -579,7 +312,7 @@ double HypothesisFitter::broadGain(const ModelState& null, const ModelState& sta
   return at.size() > 1 ? gain - std::max(0.0, *std::max_element(at.begin(), at.end())) : gain;
 }
 
-Eigen::MatrixXd HypothesisFitter::robustCovariance(const Effective& e) const {
+Eigen::MatrixXd HypothesisFitter::robustCovariance(const EffectiveScores& e) const {
   const double locations = static_cast<double>(e.by_location.rows());
   const Eigen::MatrixXd covariance = e.information.inverse();
   if (locations <= 2) return covariance;
@@ -593,20 +326,22 @@ Eigen::MatrixXd HypothesisFitter::robustCovariance(const Effective& e) const {
 }
 
 double HypothesisFitter::worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
-                                         const Optimum& o, const Effective& e, Eigen::Index first,
+                                         const Optimum& o, const EffectiveScores& e, Eigen::Index first,
                                          Eigen::Index numbers) {
   std::vector<double> scaled = o.scaled;
   std::fill_n(scaled.begin() + first, numbers, 0.0);
   const double gain = broadGain(state(mechanismsWith(base, parts, scaled), &o.state.nuisance), o.state);
   if (e.scatter.size() == 0) return gain;  // one place: nothing scatters
-  return gain / std::clamp(e.scatter(first, first) / e.information(first, first), 1.0, kMaxInflation);
+  return gain / std::clamp(e.scatter(first, first) / e.information(first, first), 1.0, kMostInflation);
 }
 
 double HypothesisFitter::worthOf(const Hypothesis& hypothesis, const Eigen::VectorXd& scaled,
                                  const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& robust) const {
   const double by_likelihood = 0.5 * scaled.dot(covariance.ldlt().solve(scaled));
   const double by_scatter = 0.5 * scaled.dot(robust.ldlt().solve(scaled));
-  return by_scatter > 0 ? by_likelihood / moderated(by_likelihood / by_scatter, hypothesis) : 0;
+  return by_scatter > 0
+             ? by_likelihood / moderated(by_likelihood / by_scatter, hypothesis, model_.data().locations.size())
+             : 0;
 }
 
 JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
@@ -614,7 +349,7 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
   std::vector<double> from;
   for (const std::vector<double>& s : start) from.insert(from.end(), s.begin(), s.end());
   Optimum o = maximise(base, nuisance, parts, {from}, 3, nullptr);
-  const Effective e = effective(o.scores, nuisance.globals());
+  const EffectiveScores e = effectiveScores(o.scores, nuisance.globals());
   const Eigen::MatrixXd covariance = e.information.inverse(), robust = robustCovariance(e);
   JointFit fit;
   Eigen::Index at = 0;
@@ -656,8 +391,8 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
   // Scatter over places: of the scores at the fit where there is a number, else of the gain itself.
   const double locations = static_cast<double>(gain_at.size());
   if (n > 0) {
-    const Effective e = effective(scores, globals);
-    f.inflation = moderated(e.inflation, hypothesis);
+    const EffectiveScores e = effectiveScores(scores, globals);
+    f.inflation = moderated(e.inflation, hypothesis, model_.data().locations.size());
     const Eigen::MatrixXd covariance = e.information.inverse(), robust = robustCovariance(e);
     for (Eigen::Index j = 0; j < n; ++j) {
       f.standard_error.push_back(
@@ -701,7 +436,8 @@ void HypothesisFitter::settleFolds(const ModelState& null, HypothesisFit& f) {
     const std::vector<double> whole = fold;
     for (double share : kFoldShares) {
       for (std::size_t j = 0; j < fold.size(); ++j) fold[j] = f.scaled[j] + share * (whole[j] - f.scaled[j]);
-      const auto echoes = source_.echoes(with(null.mechanisms, f.hypothesis.at(fold)), poses, f.state.actor_range_m);
+      const auto echoes =
+          source_.echoes(mechanismsWith(null.mechanisms, {f.hypothesis}, fold), poses, f.state.actor_range_m);
       const std::vector<double> there = model_.byPose(echoes, f.state.nuisance, poses);
       if (std::accumulate(there.begin(), there.end(), 0.0) >= fitted) break;
     }
@@ -726,13 +462,6 @@ double HypothesisFitter::falseAlarmRate(double gain, const Hypothesis& hypothesi
   const double statistic = 2 * std::max(0.0, gain) / n;
   return std::min(1.0,
                   static_cast<double>(family) * boost::math::cdf(boost::math::complement(distribution, statistic)));
-}
-
-double HypothesisFitter::moderated(double inflation, const Hypothesis& hypothesis) const {
-  const UsualScatter usual = usualScatter(hypothesis);
-  const double places = static_cast<double>(model_.data().locations.size()) - 1;
-  if (usual.places + places <= 0) return std::max(1.0, inflation);
-  return std::max(1.0, (usual.places * usual.inflation + places * inflation) / (usual.places + places));
 }
 
 }  // namespace mmradartwin

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "echo_source.h"
+#include "effective_scores.h"
 #include "hypothesis.h"
 #include "session_model.h"
 
@@ -61,7 +62,7 @@ struct Screened {
   std::vector<std::vector<double>> starts;  ///< of a fit
 };
 
-/// Scores and fits hypotheses against a state.
+/// Fits hypotheses against a state.
 class HypothesisFitter {
  public:
   HypothesisFitter(EchoSource& source, const SessionModel& model, int folds);
@@ -69,15 +70,6 @@ class HypothesisFitter {
   ModelState state(const std::vector<NamedParameters>& mechanisms, const Nuisance* start);
   /// The same mechanisms with latents that are better than its own, looked for from latents that a fit has found.
   std::optional<ModelState> improved(const ModelState& null, const Nuisance& latents);
-  /// Actors by how far their echoes' level and range are from where the twin has them, the priors of their errors
-  /// included: most suspicious first, with nats (inflation taken off).
-  std::vector<std::pair<int, double>> suspects(const ModelState& null) const;
-  /// What a hypothesis promises without a refit. Of what is there or not, more or less, the likelihood at some values:
-  /// a quadratic about nothing says little of it. Of all others a score test.
-  Screened screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
-  /// Of an actor whose place is free, by the first two coordinates: the likelihood at places around it, farther away
-  /// than slopes reach.
-  Screened screenAround(const ModelState& null, const Hypothesis& hypothesis, int actor, const std::vector<int>& poses);
   /// Maximum likelihood of the coordinates from the best of `starts`, the nuisance refitted along from the null's.
   /// known: a fit of the same from whose latents it starts instead; what climbs to its top again is not searched.
   HypothesisFit fit(const ModelState& null, const Hypothesis& hypothesis,
@@ -99,28 +91,19 @@ class HypothesisFitter {
   double falseAlarmRate(double gain, const Hypothesis& hypothesis, std::size_t numbers, std::size_t family) const;
 
  private:
-  struct Effective;
   struct Optimum {
     std::vector<double> scaled;
     ModelState state;
     Scores scores;  ///< at the last derivative
   };
-  Effective effective(const Scores& scores, int globals) const;
-  /// Gain in nats over the poses named, and what it promises for all with its inflation taken off.
-  std::pair<double, double> valueAt(const ModelState& null, const Hypothesis& hypothesis,
-                                    const std::vector<double>& scaled, const std::vector<int>& poses,
-                                    const Nuisance& nuisance);
-  Screened screenDirectly(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
   /// Nats that the numbers from `first` on, which rise from nothing, bring beside the others, without the place that
   /// gains most, inflation taken off. Their square laws make what the errors at the fit say of that far too small.
   double worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
-                         const Optimum& o, const Effective& e, Eigen::Index first, Eigen::Index numbers);
-  Eigen::MatrixXd robustCovariance(const Effective& effective) const;
+                         const Optimum& o, const EffectiveScores& e, Eigen::Index first, Eigen::Index numbers);
+  Eigen::MatrixXd robustCovariance(const EffectiveScores& effective) const;
   /// Nats that values are worth, far from nothing as they are by their errors.
   double worthOf(const Hypothesis& hypothesis, const Eigen::VectorXd& scaled, const Eigen::MatrixXd& covariance,
                  const Eigen::MatrixXd& robust) const;
-  /// Of scatter over these places and the usual one, weighed by what each is known by; at least 1.
-  double moderated(double inflation, const Hypothesis& hypothesis) const;
   /// null: what a geometry has to be well above at more than one place before it is searched without slopes; null
   /// pointer: it is. known: as of fit().
   Optimum maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,

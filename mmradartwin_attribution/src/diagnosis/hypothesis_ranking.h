@@ -1,0 +1,47 @@
+#pragma once
+
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "hypothesis_screen.h"
+
+namespace mmradartwin {
+
+constexpr std::size_t kMostOutOfPlace = 4;  ///< actors that are looked for elsewhere
+constexpr double kWorthALaw = 12;           ///< nats promised
+constexpr double kWorthAnObject = 3;        ///< at the best of all places
+constexpr std::size_t kMostObjects = 4;     ///< what is wide or turned promises less than a point elsewhere
+
+/// What a round of a diagnosis fits, and in which order: everything that could be wrong, looked at without a fit.
+class HypothesisRanking {
+ public:
+  /// Keeps references. report: called with a stage and its share done.
+  HypothesisRanking(Twin& twin, EchoSource& source, const SessionModel& model, const PoseAccuracy& accuracy,
+                    std::function<void(const std::string& stage, double share)> report)
+      : twin_(twin),
+        source_(source),
+        model_(model),
+        data_(model.data()),
+        accuracy_(accuracy),
+        screen_(source, model),
+        report_(std::move(report)) {}
+
+  /// Names, and what they leave out: objects, late points, laws and replicas. Most nats promised first.
+  std::vector<Screened> rank(const std::vector<Hypothesis>& all, const ModelState& state);
+  /// The geometry has changed: what gained nothing before may gain now.
+  void tryAllAgain() { no_use_.clear(); }
+
+ private:
+  Twin& twin_;
+  EchoSource& source_;
+  const SessionModel& model_;
+  const ChannelData& data_;
+  const PoseAccuracy& accuracy_;
+  HypothesisScreen screen_;
+  std::function<void(const std::string&, double)> report_;
+  std::set<std::string> no_use_;  ///< costly ones that gain nothing whatever is found beside them
+};
+
+}  // namespace mmradartwin

@@ -1,0 +1,198 @@
+#include "hypothesis_screen.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "effective_scores.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what rises from nothing is looked at first
+constexpr double kMore[] = {4, 16};            ///< of the scale, as long as that gains
+constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents have stood in for it
+constexpr double kStoodIn = 1;                 ///< nats of theirs
+constexpr double kRadii[] = {1, 2, 4, 7};      ///< of the scale, about a place where an object may have stood before
+constexpr int kDirections = 8;
+
+/// Without gains of their own of the actors of a material; and nats of what is known of those beforehand.
+std::pair<Nuisance, double> withoutGains(Nuisance nuisance, const Scene& scene, const std::string& material,
+                                         double spread) {
+  double nats = 0;
+  for (std::size_t a = 0; a < scene.actors.size(); ++a) {
+    if (scene.actors[a].material_tag != material) continue;
+    nats += 0.5 * std::pow(nuisance.actor_gain[a] / spread, 2);
+    nuisance.actor_gain[a] = 0;
+  }
+  return {std::move(nuisance), nats};
+}
+
+}  // namespace
+
+std::vector<std::pair<int, double>> HypothesisScreen::suspects(const ModelState& null) const {
+  std::vector<std::pair<int, double>> result;
+  const LatentSpread spread = model_.spread();
+  for (std::size_t a = 0; a + 1 < null.nuisance.actor_gain.size(); ++a) {  // the last is of no actor
+    const double gain = null.nuisance.actor_gain[a] / spread.actor_gain;
+    const double range = null.nuisance.actor_range_m[a] / spread.actor_range_m;
+    result.emplace_back(static_cast<int>(a), 0.5 * (gain * gain + range * range));
+  }
+  std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  return result;
+}
+
+std::pair<double, double> HypothesisScreen::valueAt(const ModelState& null, const Hypothesis& hypothesis,
+                                                    const std::vector<double>& scaled, const std::vector<int>& poses,
+                                                    const Nuisance& nuisance) {
+  // About the same ranges as the null's, so that a hypothesis that does nothing gains nothing; but for an actor whose
+  // own error was changed.
+  std::vector<double> about_m = null.actor_range_m;
+  for (std::size_t a = 0; a < about_m.size(); ++a) {
+    if (nuisance.actor_range_m[a] != null.nuisance.actor_range_m[a]) about_m[a] = nuisance.actor_range_m[a];
+  }
+  auto echoes = source_.echoes(mechanismsWith(null.mechanisms, {hypothesis}, scaled), poses, about_m);
+  // Of poses whose echoes stay the value is known.
+  std::vector<double> there;
+  std::vector<int> changed;
+  std::vector<PoseEchoes> changed_echoes;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::size_t pose = static_cast<std::size_t>(poses[i]);
+    there.push_back(null.by_pose[pose]);
+    if (&nuisance == &null.nuisance && echoes[i].groups == null.echoes[pose].groups) continue;
+    changed.push_back(static_cast<int>(i));
+    changed_echoes.push_back(std::move(echoes[i]));
+  }
+  std::vector<int> changed_poses;
+  for (int i : changed) changed_poses.push_back(poses[static_cast<std::size_t>(i)]);
+  const std::vector<double> values = model_.byPose(changed_echoes, nuisance, changed_poses);
+  for (std::size_t i = 0; i < changed.size(); ++i) there[static_cast<std::size_t>(changed[i])] = values[i];
+  std::vector<double> by_location(model_.data().locations.size(), 0.0);
+  double gain = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::size_t pose = static_cast<std::size_t>(poses[i]);
+    const double v = there[i] - null.by_pose[pose];
+    gain += v;
+    by_location[static_cast<std::size_t>(model_.data().poses[pose].location)] += v;
+  }
+  const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
+  return {gain,
+          whole * gain /
+              (hypothesis.isOneSided() ? inflationOfPresence(gain, by_location) : inflationOf(gain, by_location))};
+}
+
+Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypothesis, int actor,
+                                  const std::vector<int>& poses) {
+  Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 0.0)}};
+  const Nuisance nuisance = withoutErrors(null.nuisance, actor);  // they have stood in for the move
+  for (double radius : kRadii) {
+    for (int k = 0; k < kDirections; ++k) {
+      std::vector<double> at(hypothesis.coordinates.size(), 0.0);
+      at[0] = radius * std::cos(2 * M_PI * k / kDirections);
+      at[1] = radius * std::sin(2 * M_PI * k / kDirections);
+      const double promised = valueAt(null, hypothesis, at, poses, nuisance).second;
+      source_.settle(null.mechanisms);
+      if (promised <= result.promised) continue;
+      result.promised = promised;
+      result.starts.front() = at;
+    }
+  }
+  return result;
+}
+
+Screened HypothesisScreen::directly(const ModelState& null, const Hypothesis& hypothesis,
+                                    const std::vector<int>& poses) {
+  std::vector<double> start(hypothesis.coordinates.size(), kLittle);
+  double best = 0;
+  const auto tryAt = [&](double scaled) {
+    const std::vector<double> at(hypothesis.coordinates.size(), scaled);
+    const auto [gain, promised] = valueAt(null, hypothesis, at, poses, null.nuisance);
+    if (promised > best) {
+      best = promised;
+      start = at;
+    }
+    return gain;
+  };
+  const auto reciprocal = [](const Coordinate& c) { return c.reciprocal(); };
+  if (hypothesis.coordinates.empty()) {
+    tryAt(1);
+  } else if (std::all_of(hypothesis.coordinates.begin(), hypothesis.coordinates.end(), reciprocal)) {
+    // A steep edge far above all tones does nothing: it is looked for among them.
+    for (double scaled : {0.8, 1.0, 1.3}) tryAt(scaled);
+  } else {
+    const double gain = tryAt(kSome);
+    const bool costly = source_.altersGeometry(hypothesis.at(start));
+    if (gain > 0 || !costly) {
+      double last = tryAt(gain > 0 ? 1 : kLittle);
+      // A level may be far above its typical one, where that one hardly shows.
+      const bool level = hypothesis.coordinates.size() == 1 && hypothesis.coordinates[0].logarithmic();
+      for (double scaled : kMore) {
+        if (!level || gain <= 0 || last <= gain) break;
+        const double next = tryAt(scaled);
+        if (next <= last) break;
+        last = next;
+      }
+    }
+  }
+  // What a material does may have been fitted as gains of its actors, beside which it has nothing to do.
+  const auto [freed, nats] =
+      withoutGains(null.nuisance, source_.base().scene(), hypothesis.subject, model_.spread().actor_gain);
+  for (double scaled : kInstead) {
+    if (nats < kStoodIn) break;
+    const std::vector<double> at(hypothesis.coordinates.size(), scaled);
+    const double promised = nats + valueAt(null, hypothesis, at, poses, freed).second;
+    if (promised <= best) continue;
+    best = promised;
+    start = at;
+  }
+  return {hypothesis, best, {start}};
+}
+
+Screened HypothesisScreen::screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses) {
+  if (hypothesis.isOneSided()) return directly(null, hypothesis, poses);
+  Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 1.0)}};
+  std::vector<SessionCovariance> directions;
+  for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
+    const std::vector<double> nothing(hypothesis.coordinates.size(), 0.0);
+    // What rises from nothing does so with its power: its typical value shows more than the slope at nothing. What
+    // shifts or turns does so to first order for small amounts alone.
+    const double step = hypothesis.coordinates[j].oneSided() ? 1 : kSmallStep;
+    const auto covarianceAt = [&](double scaled) {
+      std::vector<double> at = nothing;
+      at[j] = scaled;
+      const auto echoes =
+          step < 1
+              ? source_.echoesNear(mechanismsWith(null.mechanisms, {hypothesis}, at),
+                                   mechanismsWith(null.mechanisms, {hypothesis}, nothing), poses, null.actor_range_m)
+              : source_.echoes(mechanismsWith(null.mechanisms, {hypothesis}, at), poses, null.actor_range_m);
+      return model_.covariance(echoes, null.nuisance, poses);
+    };
+    directions.push_back(hypothesis.coordinates[j].oneSided()
+                             ? difference(covarianceAt(step), null.covariance, poses, step)
+                             : difference(covarianceAt(step), covarianceAt(-step), 2 * step));
+  }
+  const EffectiveScores e = effectiveScores(model_.scores(null.basis, directions, poses), null.nuisance.globals());
+  const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
+  Eigen::VectorXd step = e.information.ldlt().solve(e.total);
+  bool possible = true;
+  for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
+    const bool one_sided = hypothesis.coordinates[j].oneSided();
+    if (one_sided && step[static_cast<Eigen::Index>(j)] <= 0) possible = false;
+    result.starts.front()[j] = std::clamp(step[static_cast<Eigen::Index>(j)], one_sided ? 0.02 : -8.0, 8.0);
+  }
+  if (possible)
+    result.promised =
+        whole * 0.5 * e.total.dot(step) / moderated(e.inflation, hypothesis, model_.data().locations.size());
+  // Slopes are of paths that stay. What a turn of the view lets in and out shows in the likelihood itself.
+  if (hypothesis.isGeometry() && hypothesis.coordinates.size() == 1 && source_.altersGeometry(hypothesis.at({1.0}))) {
+    for (double scaled : {-1.0, 1.0}) {
+      const double promised = valueAt(null, hypothesis, {scaled}, poses, null.nuisance).second;
+      if (promised <= result.promised) continue;
+      result.promised = promised;
+      result.starts.push_back({scaled});
+    }
+  }
+  return result;
+}
+
+}  // namespace mmradartwin

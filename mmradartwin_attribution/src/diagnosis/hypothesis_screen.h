@@ -1,0 +1,37 @@
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "hypothesis_fit.h"
+
+namespace mmradartwin {
+
+/// What hypotheses promise against a state, without a fit.
+class HypothesisScreen {
+ public:
+  /// Keeps references.
+  HypothesisScreen(EchoSource& source, const SessionModel& model) : source_(source), model_(model) {}
+
+  /// Actors by how far their echoes' level and range are from where the twin has them, the priors of their errors
+  /// included: most suspicious first, with nats (inflation taken off).
+  std::vector<std::pair<int, double>> suspects(const ModelState& null) const;
+  /// Of what is there or not, more or less, the likelihood at some values: a quadratic about nothing says little of it.
+  /// Of all others a score test.
+  Screened screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
+  /// Of an actor whose place is free, by the first two coordinates: the likelihood at places around it, farther away
+  /// than slopes reach.
+  Screened around(const ModelState& null, const Hypothesis& hypothesis, int actor, const std::vector<int>& poses);
+
+ private:
+  /// Gain in nats over the poses named, and what it promises for all with its inflation taken off.
+  std::pair<double, double> valueAt(const ModelState& null, const Hypothesis& hypothesis,
+                                    const std::vector<double>& scaled, const std::vector<int>& poses,
+                                    const Nuisance& nuisance);
+  Screened directly(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
+
+  EchoSource& source_;
+  const SessionModel& model_;
+};
+
+}  // namespace mmradartwin
