@@ -290,13 +290,10 @@ void PackedHermitian::addTurned(const std::array<const std::complex<float>*, 3>&
   addTurnedTo(from, factors.data(), turn.re.data(), turn.im.data(), channels, re.data(), im.data());
 }
 
-void PackedHermitian::addTurnDerivative(const std::complex<float>* field, double factor, const PhasesApart& apart,
-                                        const PackedTurn& turn) {
+void PackedHermitian::addTurnDerivative(const PackedHermitian& turned, double by, const PhasesApart& apart) {
   for (std::size_t i = 0; i < static_cast<std::size_t>(size()); ++i) {
-    const double by = factor * apart.packed[i];
-    const double a = by * -static_cast<double>(field[i].imag()), b = by * static_cast<double>(field[i].real());
-    re[i] += turn.none ? a : a * turn.re[i] - b * turn.im[i];
-    im[i] += turn.none ? b : a * turn.im[i] + b * turn.re[i];
+    re[i] -= by * apart.packed[i] * turned.im[i];
+    im[i] += by * apart.packed[i] * turned.re[i];
   }
 }
 

@@ -44,9 +44,8 @@ struct PackedHermitian {
   /// The same of up to three fields (null: nothing), turned.
   void addTurned(const std::array<const std::complex<float>*, 3>& fields, const std::array<double, 3>& factors,
                  const PackedTurn& turn);
-  /// Element (k, l) times j (phase[k] - phase[l]) more: the derivative of that by the turn.
-  void addTurnDerivative(const std::complex<float>* field, double factor, const PhasesApart& apart,
-                         const PackedTurn& turn);
+  /// Adds the derivative of a turned matrix by its turn, times `by`: element (k, l) times j (phase[k] - phase[l]).
+  void addTurnDerivative(const PackedHermitian& turned, double by, const PhasesApart& apart);
   /// Trace of this times a field; 0 of none.
   double traceOfProduct(const std::complex<float>* field) const;
   /// w^H this w.

@@ -122,11 +122,24 @@ void SessionModel::addApart(int cell, double power, PackedHermitian& to) const {
   }
 }
 
+void SessionModel::addRelative(const Nuisance& n, int cell, PackedHermitian& to) const {
+  const double mean = to.trace() / channels_;
+  addApart(cell, std::exp(n.log_relative) * mean, to);
+  if (!isBeam(cell)) return;
+  for (int k = 0; k < channels_; ++k) {
+    to.re[static_cast<std::size_t>(PackedHermitian::diagonal(k))] += kBeamShare * mean;
+  }
+}
+
 std::vector<SessionModel::GroupLevel> SessionModel::levels(const PoseEchoes& echoes, const Nuisance& n) const {
   std::vector<GroupLevel> levels;
   const double gain = std::exp(n.log_gain);
   for (const auto& group : echoes.groups) levels.push_back({gain * groupGain(*group, n), groupShift_m(*group, n)});
   return levels;
+}
+
+double SessionModel::rangeVariance_m2(const Nuisance& n) const {
+  return accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
 }
 
 PackedHermitian SessionModel::sigma(const PoseEchoes& echoes, const std::vector<GroupLevel>& levels, const Nuisance& n,
@@ -135,7 +148,7 @@ PackedHermitian SessionModel::sigma(const PoseEchoes& echoes, const std::vector<
   PackedHermitian s(channels_);
   PackedTurn turn;
   const double gain = std::exp(n.log_gain);
-  const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
+  const double range_variance = rangeVariance_m2(n);
   for (std::size_t i = 0; i < echoes.groups.size(); ++i) {
     const EchoGroup& g = *echoes.groups[i];
     const EchoGroup::Fields& f = isBeam(cell) ? g.beams : g.bins;
@@ -148,13 +161,8 @@ PackedHermitian SessionModel::sigma(const PoseEchoes& echoes, const std::vector<
   const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
   if (const auto* p = graze.at(at, size_)) s.add(p, gain * std::exp(n.log_graze));
   // At least a share of the mean power everywhere keeps the matrix definite where the first-order terms would not.
-  const double relative = std::exp(n.log_relative), mean = s.trace() / channels_;
-  addApart(cell, relative * std::max(mean, 0.0) + noiseOf(pose, cell), s);
-  if (isBeam(cell)) {
-    for (int k = 0; k < channels_; ++k) {
-      s.re[static_cast<std::size_t>(PackedHermitian::diagonal(k))] += kBeamShare * std::max(mean, 0.0);
-    }
-  }
+  if (s.trace() > 0) addRelative(n, cell, s);
+  addApart(cell, noiseOf(pose, cell), s);
   addClutter(n, pose, cell, 1, s);
   return s;
 }
@@ -204,6 +212,7 @@ SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes
                                            const std::vector<int>& poses) const {
   SessionCovariance result(poses.size());
   const double gain = std::exp(n.log_gain);
+  const double range_variance = rangeVariance_m2(n);
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
     result[i].assign(static_cast<std::size_t>(cells(poses[i])) * size_, {});
     PackedHermitian own(channels_);
@@ -216,8 +225,8 @@ SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes
           const auto* power = f->power.at(at, size_);
           turn.set(apart_, turnOf(n.yaw_rad[poses[i]], power, f->cosine.at(at, size_)));
           own.setZero();
-          own.addTurned({power, f->shift.at(at, size_), f->bend.at(at, size_)}, {u, u * shift, u * shift * shift},
-                        turn);
+          own.addTurned({power, f->shift.at(at, size_), f->bend.at(at, size_)},
+                        {u, u * shift, u * (shift * shift + range_variance)}, turn);
           const int cell = f == &g.beams ? samples_ + at : at;
           std::complex<float>* to = result[i].data() + static_cast<std::size_t>(cell) * size_;
           for (std::size_t j = 0; j < size_; ++j) {
@@ -238,10 +247,11 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
   out.log_likelihood = 0;
   out.bins.clear();
   const double gain = std::exp(n.log_gain), relative = std::exp(n.log_relative);
-  const double range_variance = accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
+  const double range_variance = rangeVariance_m2(n);
   // Only directions that do something in a bin enter its products.
   std::vector<int> active;
   PackedTurn turn;
+  PackedHermitian own(channels_);  // of a group
   std::vector<char> is_active(static_cast<std::size_t>(globals + 1));
   std::vector<PackedHermitian> raw(static_cast<std::size_t>(globals + 1), PackedHermitian(channels_));
   const auto touch = [&](int j) -> PackedHermitian& {
@@ -281,16 +291,22 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
       const double share = inverse.traceOfProduct(power) + kMoved_m * kMoved_m * inverse.traceOfProduct(bend);
       if (f * share < kNegligible) continue;
       turn.set(apart_, turnOf(n.yaw_rad[pose], power, cosine));
+      own.setZero();
+      own.addTurned({power, shift, bend}, {f, f * moved, f * (moved * moved + range_variance)}, turn);
       for (int actor : g.actors) {
         const int a = static_cast<int>(errorOf(actor, static_cast<std::size_t>(errors_)));
-        touch(kActors + a).addTurned({power, shift, nullptr}, {f, f * moved, 0}, turn);
+        touch(kActors + a).add(own, 1);
         touch(kActors + errors_ + a).addTurned({nullptr, shift, bend}, {0, f, 2 * f * moved}, turn);
       }
       if (bend != nullptr) touch(kRange).addTurned({bend, nullptr, nullptr}, {f * range_variance, 0, 0}, turn);
-      if (cosine != nullptr) touch(heading).addTurnDerivative(cosine, f, apart_, turn);
+      const double by_yaw = turnOf(1, power, cosine);
+      if (by_yaw != 0) touch(heading).addTurnDerivative(own, by_yaw, apart_);
     }
     const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
     if (const auto* p = graze.at(at, size_)) touch(kGraze).add(p, gain * std::exp(n.log_graze));
+    for (int j : active) {  // a heading's trace is 0
+      if (j != heading) addRelative(n, cell, raw[j]);
+    }
     PackedHermitian& floor = touch(kFloor);
     addClutter(n, pose, cell, 1, floor);
     const auto [shape_at, shape_share] = shapeAt(binOf(pose, cell));
@@ -300,7 +316,7 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     level.add(s, 1);
     level.add(floor, -1);
     addApart(cell, -noiseOf(pose, cell), level);
-    const double mean = level.trace() / channels_ / (1 + relative);
+    const double mean = level.trace() / channels_ / (1 + relative + (isBeam(cell) ? kBeamShare : 0));
     addApart(cell, relative * mean, touch(kRelative));
     basis.active = active;
     basis.whitened.resize(numbers, static_cast<Eigen::Index>(active.size()));
@@ -384,6 +400,7 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
         if (std::all_of(from, from + size_, [](auto x) { return x == 0.0f; })) continue;
         m.setZero();
         m.add(from, 1);
+        addRelative(n, bin.cell, m);
         bin.factor.whiten(m, v.col(h).data());
         traces[h] = traceOfWhitened(v.col(h).data(), channels_);
         active.push_back(h);

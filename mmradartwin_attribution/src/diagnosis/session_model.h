@@ -86,7 +86,8 @@ class SessionModel {
   /// The same of the poses named alone, without priors; echoes[i] are those of poses[i].
   std::vector<double> byPose(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
                              const std::vector<int>& poses) const;
-  /// Expected covariance of the echoes alone, with their gain and latents; echoes[i] are those of poses[i].
+  /// Expected covariance of the echoes alone, with their gain and latents and what they have of range errors;
+  /// echoes[i] are those of poses[i].
   SessionCovariance covariance(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance,
                                const std::vector<int>& poses) const;
   /// further: what scores() needs of directions beside the globals is kept, too.
@@ -130,6 +131,9 @@ class SessionModel {
   double noiseOf(int pose, int cell) const;
   /// Adds power that no two channels share, and that a beam's bins share as their window has it.
   void addApart(int cell, double power, PackedHermitian& to) const;
+  /// Adds what is not shared between the channels of the echoes that a cell holds so far, or of a change of them.
+  void addRelative(const Nuisance& nuisance, int cell, PackedHermitian& to) const;
+  double rangeVariance_m2(const Nuisance& nuisance) const;
   /// Factor of a group's power, and one-way range that its actors add.
   struct GroupLevel {
     double gain, shift_m;

@@ -1,0 +1,162 @@
+#include "../src/diagnosis/session_model.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "../src/diagnosis/echo_beam.h"
+#include "mmradartwin_dsp/paper_radar.h"
+
+namespace mmradartwin {
+namespace {
+
+const std::string kEvent = "specular";
+
+/// An echo from a point at range and azimuth of the radar, off one actor.
+PathRecord echoAt(const RadarConfig& radar, int actor, double range_m, double azimuth_rad, double amplitude) {
+  PathRecord r;
+  r.event = &kEvent;
+  r.actors = {actor};
+  r.facets = {actor};
+  r.bounces = 1;
+  r.departure = r.arrival = {std::cos(azimuth_rad), std::sin(azimuth_rad), 0};
+  for (int k = 0; k < radar.channels(); ++k) {
+    r.length_m.push_back(2 * range_m - radar.virtual_element_m(k).y() * std::sin(azimuth_rad));
+  }
+  setContribution(radar, amplitude, r);
+  return r;
+}
+
+/// Two poses before three actors, two of which share a bin of the second pose, and channels that are not as expected.
+class ThreeActors : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    data_.radar = paperRadar();
+    data_.locations = {"a", "b"};
+    std::mt19937 random(1);
+    std::normal_distribution<double> normal(0, 1);
+    const double ranges_m[][3] = {{2.0, 2.3, 4.1}, {3.0, 3.02, 5.3}};
+    for (int i = 0; i < 2; ++i) {
+      std::vector<PathRecord>& paths = paths_.emplace_back();
+      for (int a = 0; a < 3; ++a) {
+        paths.push_back(echoAt(data_.radar, a, ranges_m[i][a], 0.3 * a - 0.2, 0.03 / (1 + a)));
+        paths.push_back(echoAt(data_.radar, a, ranges_m[i][a] + 0.05, 0.3 * a - 0.15, 0.01 / (1 + a)));
+      }
+      PoseChannels p;
+      p.location = i;
+      p.noise_power = 1e-9;
+      p.beams = chooseBeams(data_.radar, paths, 2);
+      ASSERT_FALSE(p.beams.empty());
+      const int channels = data_.radar.channels(), bins = data_.radar.samples_per_chirp;
+      p.y.resize(channels, bins);
+      for (int k = 0; k < channels; ++k) {
+        for (int b = 0; b < bins; ++b) p.y(k, b) = 2e-5 * std::complex<double>(normal(random), normal(random));
+      }
+      for (const PathRecord& r : paths) {
+        const int bin = static_cast<int>(std::lround(0.5 * meanLength_m(r) / data_.radar.range_bin_m()));
+        for (int k = 0; k < channels; ++k) p.y(k, bin) += (1 + 0.1 * normal(random)) * r.c[static_cast<std::size_t>(k)];
+      }
+      for (EchoBeam& beam : p.beams) {
+        beam.y = formBeam(beam, p.y);
+        beam.clutter = 1;
+      }
+      const std::size_t size = static_cast<std::size_t>(channels * (channels + 1) / 2);
+      p.clutter.bins = bins;
+      p.clutter.packed.assign(static_cast<std::size_t>(bins) * size, {});
+      for (int b = 0; b < bins; ++b) {
+        for (int k = 0; k < channels; ++k) p.clutter.at(b, size)[k * (k + 3) / 2] = 1;
+      }
+      data_.poses.push_back(p);
+    }
+    nuisance_.log_gain = 0.2;
+    nuisance_.log_floor = std::log(1e-9);
+    nuisance_.log_relative = -3.5;
+    nuisance_.log_range = 0.3;
+    nuisance_.floor_shape = {0.1, -0.2, 0.3, 0, 0.2, -0.1};
+    nuisance_.actor_gain = {0.1, -0.2, 0.15, 0};
+    nuisance_.actor_range_m = {0.006, -0.004, 0.003, 0};
+    nuisance_.yaw_rad = {0.002, -0.003};
+  }
+  /// share: of the third actor's power.
+  std::vector<PoseEchoes> echoes(double share = 1) const {
+    std::vector<PoseEchoes> all;
+    static const std::vector<double> kNone;
+    for (std::size_t i = 0; i < paths_.size(); ++i) {
+      EchoCollector collector(data_.radar, 0.003, data_.poses[i].beams, kNone);
+      for (int a = 0; a < 3; ++a) {
+        std::vector<PathRecord> own;
+        for (PathRecord r : paths_[i]) {
+          if (r.actors.front() != a) continue;
+          if (a == 2) scaleRecord(std::sqrt(share), r);
+          own.push_back(r);
+        }
+        std::vector<const PathRecord*> records;
+        for (const PathRecord& r : own) records.push_back(&r);
+        collector.addTones(records, 0.03 * 0.03);
+      }
+      collector.addGraze(paths_[i][1], 0.2);
+      all.push_back(collector.take());
+    }
+    return all;
+  }
+
+  ChannelData data_;
+  std::vector<std::vector<PathRecord>> paths_;
+  Nuisance nuisance_;
+};
+
+// What a step promises is only as good as its slope.
+TEST_F(ThreeActors, ScoresAreTheLikelihoodsSlopes) {
+  const SessionModel model(data_, 3, PoseAccuracy());
+  const auto expected = echoes();
+  const Basis basis = model.basis(expected, nuisance_);
+  const auto slope = [&](const std::function<double&(Nuisance&)>& of, double step, std::size_t pose) {
+    Nuisance up = nuisance_, down = nuisance_;
+    of(up) += step;
+    of(down) -= step;
+    return (model.byPose(expected, up, {0, 1})[pose] - model.byPose(expected, down, {0, 1})[pose]) / (2 * step);
+  };
+  std::vector<std::function<double&(Nuisance&)>> globals = {
+      [](Nuisance& n) -> double& { return n.log_gain; }, [](Nuisance& n) -> double& { return n.log_floor; },
+      [](Nuisance& n) -> double& { return n.log_relative; }, [](Nuisance& n) -> double& { return n.log_graze; },
+      [](Nuisance& n) -> double& { return n.log_range; }};
+  for (std::size_t j = 0; j < nuisance_.floor_shape.size(); ++j) {
+    globals.emplace_back([j](Nuisance& n) -> double& { return n.floor_shape[j]; });
+  }
+  for (std::size_t a = 0; a < 4; ++a) globals.emplace_back([a](Nuisance& n) -> double& { return n.actor_gain[a]; });
+  for (std::size_t a = 0; a < 4; ++a) globals.emplace_back([a](Nuisance& n) -> double& { return n.actor_range_m[a]; });
+  for (std::size_t pose = 0; pose < 2; ++pose) {
+    for (std::size_t j = 0; j < globals.size(); ++j) {
+      const double want = slope(globals[j], 1e-4, pose);
+      EXPECT_NEAR(basis.poses[pose].score[static_cast<Eigen::Index>(j)], want, 0.01 * std::abs(want) + 0.05)
+          << "of number " << j << ", pose " << pose;
+    }
+    const double want = slope([pose](Nuisance& n) -> double& { return n.yaw_rad[pose]; }, 1e-5, pose);
+    EXPECT_NEAR(basis.poses[pose].score[static_cast<Eigen::Index>(globals.size())], want, 0.01 * std::abs(want) + 0.5)
+        << "of the heading, pose " << pose;
+  }
+}
+
+TEST_F(ThreeActors, ScoresOfAMechanismAreTheLikelihoodsSlopes) {
+  PoseAccuracy known;
+  known.heading_rad = 1e-7;  // nothing is eliminated
+  nuisance_.yaw_rad = {0, 0};
+  const SessionModel model(data_, 3, known);
+  const double step = 0.01;
+  const auto at = [&](double share) { return model.covariance(echoes(share), nuisance_, {0, 1}); };
+  SessionCovariance direction = at(1.5);
+  const SessionCovariance down = at(0.5);
+  for (std::size_t i = 0; i < direction.size(); ++i) {
+    for (std::size_t j = 0; j < direction[i].size(); ++j) {
+      direction[i][j] = direction[i][j] - down[i][j];
+    }
+  }
+  const Scores scores = model.scores(model.basis(echoes(), nuisance_), {direction}, {0, 1});
+  const double want =
+      (model.logLikelihood(echoes(1 + step), nuisance_) - model.logLikelihood(echoes(1 - step), nuisance_)) /
+      (2 * step);
+  EXPECT_NEAR(scores.total[scores.total.size() - 1], want, 0.01 * std::abs(want));
+}
+
+}  // namespace
+}  // namespace mmradartwin
