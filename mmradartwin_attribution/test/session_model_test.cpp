@@ -33,8 +33,6 @@ class ThreeActors : public ::testing::Test {
   void SetUp() override {
     data_.radar = paperRadar();
     data_.locations = {"a", "b"};
-    std::mt19937 random(1);
-    std::normal_distribution<double> normal(0, 1);
     const double ranges_m[][3] = {{2.0, 2.3, 4.1}, {3.0, 3.02, 5.3}};
     for (int i = 0; i < 2; ++i) {
       std::vector<PathRecord>& paths = paths_.emplace_back();
@@ -45,21 +43,7 @@ class ThreeActors : public ::testing::Test {
       PoseChannels p;
       p.location = i;
       p.noise_power = 1e-9;
-      p.beams = chooseBeams(data_.radar, paths, 2);
-      ASSERT_FALSE(p.beams.empty());
       const int channels = data_.radar.channels(), bins = data_.radar.samples_per_chirp;
-      p.y.resize(channels, bins);
-      for (int k = 0; k < channels; ++k) {
-        for (int b = 0; b < bins; ++b) p.y(k, b) = 2e-5 * std::complex<double>(normal(random), normal(random));
-      }
-      for (const PathRecord& r : paths) {
-        const int bin = static_cast<int>(std::lround(0.5 * meanLength_m(r) / data_.radar.range_bin_m()));
-        for (int k = 0; k < channels; ++k) p.y(k, bin) += (1 + 0.1 * normal(random)) * r.c[static_cast<std::size_t>(k)];
-      }
-      for (EchoBeam& beam : p.beams) {
-        beam.y = formBeam(beam, p.y);
-        beam.clutter = 1;
-      }
       const std::size_t size = static_cast<std::size_t>(channels * (channels + 1) / 2);
       p.clutter.bins = bins;
       p.clutter.packed.assign(static_cast<std::size_t>(bins) * size, {});
@@ -68,6 +52,7 @@ class ThreeActors : public ::testing::Test {
       }
       data_.poses.push_back(p);
     }
+    measure(0.1);
     nuisance_.log_gain = 0.2;
     nuisance_.log_floor = std::log(1e-9);
     nuisance_.log_relative = -3.5;
@@ -76,6 +61,28 @@ class ThreeActors : public ::testing::Test {
     nuisance_.actor_gain = {0.1, -0.2, 0.15, 0};
     nuisance_.actor_range_m = {0.006, -0.004, 0.003, 0};
     nuisance_.yaw_rad = {0.002, -0.003};
+  }
+  /// Fills the channels, each of which an echo has with an error of its own.
+  void measure(double channel_error) {
+    std::mt19937 random(1);
+    std::normal_distribution<double> normal(0, 1);
+    for (std::size_t i = 0; i < paths_.size(); ++i) {
+      PoseChannels& p = data_.poses[i];
+      p.y.resize(data_.radar.channels(), data_.radar.samples_per_chirp);
+      for (std::complex<double>& y : p.y.reshaped()) y = 2e-5 * std::complex<double>(normal(random), normal(random));
+      for (const PathRecord& r : paths_[i]) {
+        const int bin = static_cast<int>(std::lround(0.5 * meanLength_m(r) / data_.radar.range_bin_m()));
+        for (int k = 0; k < data_.radar.channels(); ++k) {
+          p.y(k, bin) += (1 + channel_error * normal(random)) * r.c[static_cast<std::size_t>(k)];
+        }
+      }
+      p.beams = chooseBeams(data_.radar, paths_[i], 2);
+      ASSERT_FALSE(p.beams.empty());
+      for (EchoBeam& beam : p.beams) {
+        beam.y = formBeam(beam, p.y);
+        beam.clutter = 1;
+      }
+    }
   }
   /// share: of the third actor's power.
   std::vector<PoseEchoes> echoes(double share = 1) const {
@@ -116,24 +123,31 @@ TEST_F(ThreeActors, ScoresAreTheLikelihoodsSlopes) {
     of(down) -= step;
     return (model.byPose(expected, up, {0, 1})[pose] - model.byPose(expected, down, {0, 1})[pose]) / (2 * step);
   };
-  std::vector<std::function<double&(Nuisance&)>> globals = {
-      [](Nuisance& n) -> double& { return n.log_gain; }, [](Nuisance& n) -> double& { return n.log_floor; },
-      [](Nuisance& n) -> double& { return n.log_relative; }, [](Nuisance& n) -> double& { return n.log_graze; },
-      [](Nuisance& n) -> double& { return n.log_range; }};
-  for (std::size_t j = 0; j < nuisance_.floor_shape.size(); ++j) {
-    globals.emplace_back([j](Nuisance& n) -> double& { return n.floor_shape[j]; });
-  }
-  for (std::size_t a = 0; a < 4; ++a) globals.emplace_back([a](Nuisance& n) -> double& { return n.actor_gain[a]; });
-  for (std::size_t a = 0; a < 4; ++a) globals.emplace_back([a](Nuisance& n) -> double& { return n.actor_range_m[a]; });
   for (std::size_t pose = 0; pose < 2; ++pose) {
-    for (std::size_t j = 0; j < globals.size(); ++j) {
-      const double want = slope(globals[j], 1e-4, pose);
-      EXPECT_NEAR(basis.poses[pose].score[static_cast<Eigen::Index>(j)], want, 0.01 * std::abs(want) + 0.05)
+    for (int j = 0; j < nuisance_.globals(); ++j) {
+      const double want = slope([j](Nuisance& n) -> double& { return n.global(j); }, 1e-4, pose);
+      EXPECT_NEAR(basis.poses[pose].score[j], want, 0.01 * std::abs(want) + 0.05)
           << "of number " << j << ", pose " << pose;
     }
     const double want = slope([pose](Nuisance& n) -> double& { return n.yaw_rad[pose]; }, 1e-5, pose);
-    EXPECT_NEAR(basis.poses[pose].score[static_cast<Eigen::Index>(globals.size())], want, 0.01 * std::abs(want) + 0.5)
+    EXPECT_NEAR(basis.poses[pose].score[nuisance_.globals()], want, 0.01 * std::abs(want) + 0.5)
         << "of the heading, pose " << pose;
+  }
+}
+
+// A step in which a number goes beyond its limit promises what it cannot bring.
+TEST_F(ThreeActors, PromisesNothingBeyondALimit) {
+  const int relative = 2;
+  nuisance_.global(relative) = -11.5;
+  for (double channel_error : {0.1, 0.0}) {
+    measure(channel_error);
+    const SessionModel model(data_, 3, PoseAccuracy());
+    const Basis basis = model.basis(echoes(), nuisance_);
+    const double beyond = basis.poses[0].score[relative] + basis.poses[1].score[relative];
+    ASSERT_EQ(beyond < 0, channel_error == 0) << beyond;
+    const Scores scores = model.scores(basis, {}, {0, 1});
+    EXPECT_EQ(scores.total[relative] == 0, channel_error == 0);
+    EXPECT_EQ(scores.information.ldlt().solve(scores.total)[relative] == 0, channel_error == 0);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace mmradartwin {
@@ -19,8 +20,7 @@ constexpr double kBeamShare = 3e-6;
 // A group that changes a cell's covariance by less than this share even where it moves so far has no slope there.
 constexpr double kNegligible = 3e-4, kMoved_m = 0.03;
 
-constexpr double kMostShape = 8;  ///< of the logarithm of clutter's power
-constexpr double kEnough = 0.1;   ///< nats: what a further step would bring is not worth it
+constexpr double kEnough = 0.1;  ///< nats: what a further step would bring is not worth it
 
 enum Global {
   kGain,
@@ -31,6 +31,27 @@ enum Global {
   kShape,
   kActors = kShape + std::tuple_size_v<decltype(Nuisance::floor_shape)>
 };
+
+/// Where a number of the nuisance may stand, and how far it may go in one step.
+struct Limits {
+  double low, high, step;
+};
+Limits limitsOf(int global, int errors) {
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  if (global >= kActors + errors) return {-0.08, 0.08, 0.02};  // m
+  if (global >= kActors) return {-2, 2, 0.5};
+  if (global >= kShape) return {-8, 8, 1};
+  switch (global) {
+    case kRelative:  // lower, and single precision would no longer keep every matrix definite
+      return {-11.5, -2, 2};
+    case kGraze:
+      return {-6, 6, 2};
+    case kRange:
+      return {-6, 4, 2};
+    default:
+      return {-kAny, kAny, 2};
+  }
+}
 
 /// A heading's error turns the mean direction of a group's echoes in a bin by so many radians of sine.
 double turnOf(double yaw_rad, const std::complex<float>* power, const std::complex<float>* cosine) {
@@ -61,6 +82,16 @@ double groupShift_m(const EchoGroup& group, const Nuisance& nuisance) {
 }
 
 }  // namespace
+
+double& Nuisance::global(int j) {
+  const auto at = [j](int first) { return static_cast<std::size_t>(j - first); };
+  const int ranges = kActors + static_cast<int>(actor_gain.size());
+  if (j >= ranges) return actor_range_m[at(ranges)];
+  if (j >= kActors) return actor_gain[at(kActors)];
+  if (j >= kShape) return floor_shape[at(kShape)];
+  double* const first[] = {&log_gain, &log_floor, &log_relative, &log_graze, &log_range};
+  return *first[j];
+}
 
 SessionModel::SessionModel(const ChannelData& data, int actors, const PoseAccuracy& accuracy,
                            const LatentSpread& spread)
@@ -467,6 +498,18 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
     s.information(kShape + j, kShape + j) += rough;
     s.total[kShape + j] -= rough * n.floor_shape[static_cast<std::size_t>(j)];
   }
+  // What stands at a limit and would go beyond it moves no more, and nothing else moves as if it did.
+  for (int j = 0; j < globals; ++j) {
+    const Limits limits = limitsOf(j, errors_);
+    const double v = n.global(j);
+    if (s.total[j] > 0 ? v < limits.high : v > limits.low) continue;
+    s.total[j] = 0;
+    s.by_location.col(j).setZero();
+    s.yaw_coupling.col(j).setZero();
+    s.information.row(j).setZero();
+    s.information.col(j).setZero();
+    s.information(j, j) = 1;
+  }
   s.log_likelihood += prior(n);
   return s;
 }
@@ -475,19 +518,10 @@ Nuisance SessionModel::stepped(const Nuisance& from, const Eigen::VectorXd& g, c
                                const Eigen::VectorXd& whole_step, double share) const {
   Nuisance n = from;
   const auto held = [share](double step, double limit) { return std::clamp(share * step, -limit, limit); };
-  n.log_gain += held(g[kGain], 2);
-  n.log_floor += held(g[kFloor], 2);
-  for (int j = 0; j < static_cast<int>(n.floor_shape.size()); ++j) {
-    double& coefficient = n.floor_shape[static_cast<std::size_t>(j)];
-    coefficient = std::clamp(coefficient + held(g[kShape + j], 1), -kMostShape, kMostShape);
-  }
-  // Below -11.5 single precision would no longer keep every matrix definite.
-  n.log_relative = std::clamp(n.log_relative + held(g[kRelative], 2), -11.5, -2.0);
-  n.log_graze = std::clamp(n.log_graze + held(g[kGraze], 2), -6.0, 6.0);
-  n.log_range = std::clamp(n.log_range + held(g[kRange], 2), -6.0, 4.0);
-  for (int a = 0; a < errors_; ++a) {
-    n.actor_gain[a] = std::clamp(n.actor_gain[a] + held(g[kActors + a], 0.5), -2.0, 2.0);
-    n.actor_range_m[a] = std::clamp(n.actor_range_m[a] + held(g[kActors + errors_ + a], 0.02), -0.08, 0.08);
+  for (int j = 0; j < n.globals(); ++j) {
+    const Limits limits = limitsOf(j, errors_);
+    double& v = n.global(j);
+    v = std::clamp(v + held(g[j], limits.step), limits.low, limits.high);
   }
   for (std::size_t i = 0; i < n.yaw_rad.size(); ++i) {
     const double step =

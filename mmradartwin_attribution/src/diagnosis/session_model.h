@@ -24,6 +24,9 @@ struct Nuisance {
   std::vector<double> actor_range_m;    ///< the same: added one-way range, per interaction
   std::vector<double> yaw_rad;          ///< [poses] error of the heading
 
+  /// Numbers that all poses share, in the order of scores.
+  double& global(int j);
+  double global(int j) const { return const_cast<Nuisance*>(this)->global(j); }
   int globals() const { return 5 + static_cast<int>(floor_shape.size() + actor_gain.size() + actor_range_m.size()); }
 };
 
@@ -92,7 +95,7 @@ class SessionModel {
                                const std::vector<int>& poses) const;
   /// further: what scores() needs of directions beside the globals is kept, too.
   Basis basis(const std::vector<PoseEchoes>& echoes, const Nuisance& nuisance, bool further = true) const;
-  /// Scores by the globals of Nuisance (in the order of its members) and by more directions: changes of covariance(),
+  /// Scores by the globals of Nuisance and by more directions: changes of covariance(),
   /// [poses named]. Poses that are not named do not count.
   Scores scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
                 const std::vector<int>& poses) const;
