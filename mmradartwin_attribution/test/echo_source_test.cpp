@@ -43,9 +43,10 @@ class CabinetScene : public ::testing::Test {
 };
 
 /// Of all channels, and of all bins or one.
-double power(const PoseEchoes& echoes, int channels, std::optional<int> bin = std::nullopt) {
+double power(const std::vector<std::shared_ptr<const EchoGroup>>& groups, int channels,
+             std::optional<int> bin = std::nullopt) {
   double sum = 0;
-  for (const auto& group : echoes.groups) {
+  for (const auto& group : groups) {
     const BinCovariance& cells = group->bins.power;
     const std::size_t size = static_cast<std::size_t>(channels * (channels + 1) / 2);
     for (int b = cells.first; b < cells.first + cells.bins; ++b) {
@@ -54,6 +55,10 @@ double power(const PoseEchoes& echoes, int channels, std::optional<int> bin = st
     }
   }
   return sum;
+}
+
+double power(const PoseEchoes& echoes, int channels, std::optional<int> bin = std::nullopt) {
+  return power(echoes.groups, channels, bin);
 }
 
 // Paths are traced one mechanism at a time, but an edge that a specular return holds is no path of the whole twin.
@@ -123,6 +128,31 @@ TEST_F(CabinetScene, ExpectsOfTwoObjectsWhatTheWholeTwinHas) {
     const double cell = power(source.echoes({specular})[0], 8) / alone;
     EXPECT_NEAR(power(source.echoes(all)[0], 8) / (cell * expected), 1, 0.02);
   }
+}
+
+// An edge that the radar stands before within the accuracy of its pose makes an echo uncertain, wherever it is that
+// a hypothesis puts the radar.
+TEST_F(CabinetScene, ExpectsEchoesThatAPosesErrorMayBring) {
+  ChannelData data;
+  data.radar = paperRadar();
+  PoseChannels pose;
+  pose.pose.T_map_radar = Eigen::Isometry3d::Identity();
+  data.poses.push_back(pose);
+  const Twin twin(loadTwin("", folder_ + "/scene.yaml", data.radar));
+  const NamedParameters specular = defaultMechanism("specular");
+  EchoSource source(twin, data, PoseAccuracy());
+  source.settle({specular});
+  const auto beside = [&](double left_m) {
+    NamedParameters offset = defaultMechanism("radar_position_offset");
+    offset.values.set("left_m", left_m);
+    return source.echoes({specular, offset})[0];
+  };
+  EXPECT_TRUE(source.echoes({specular})[0].grazing.empty());
+  const PoseEchoes off = beside(0.503);
+  ASSERT_EQ(off.grazing.size(), 1);
+  EXPECT_EQ(twin.scene().actors[static_cast<std::size_t>(off.grazing[0]->actors[0])].name, "cabinet");
+  // The shadow of an edge at a metre is some centimetres wide at this wavelength: 1 cm takes a part, rarely.
+  EXPECT_GT(power(off.grazing, 8), 1e-3 * power(off, 8));
 }
 
 // A square law makes echoes of two at the sum of their ranges, four times as strong as those of each at twice its own.

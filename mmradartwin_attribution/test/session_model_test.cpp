@@ -101,8 +101,10 @@ class ThreeActors : public ::testing::Test {
         for (const PathRecord& r : own) records.push_back(&r);
         collector.addTones(records, 0.03 * 0.03);
       }
-      collector.addGraze(paths_[i][1], 0.2);
-      all.push_back(collector.take());
+      PoseEchoes& of_pose = all.emplace_back();
+      of_pose.groups = collector.take();
+      collector.addTones({&paths_[i][1]}, 0.03 * 0.03);
+      of_pose.grazing = collector.take();
     }
     return all;
   }

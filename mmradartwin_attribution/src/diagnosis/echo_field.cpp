@@ -19,7 +19,7 @@ constexpr int kFarSkirt =
 // -30 dB, that was worth 100 nats and looked like a law over range; where it began at -20 dB, 4 nats at a pose, and an
 // attenuation's interval at 154 poses ended short of the truth.
 constexpr double kWeak = 1e-6, kStrong = 0.001;  ///< of the pose's strongest path's power
-constexpr double kLeastResponse = 1e-7;         ///< of the strongest bin of what a receiver made of a path
+constexpr double kLeastResponse = 1e-7;          ///< of the strongest bin of what a receiver made of a path
 constexpr std::size_t kMostBeamBins = 16;
 constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;  ///< of a path's power: a beam that takes less does not see it
 
@@ -306,24 +306,9 @@ void EchoCollector::addToBeams(const std::complex<double>* c, double place, doub
   }
 }
 
-void EchoCollector::addGraze(const PathRecord& record, double share) {
-  const double place = 0.5 * meanLength_m(record) / bin_m_;
-  std::vector<std::complex<float>> packed;
-  outer(record.c.data(), pathCosine(record), packed);
-  const int middle = static_cast<int>(std::lround(place));
-  const int low = std::max(0, middle - kLobe), high = std::min(samples_ - 1, middle + kLobe);
-  if (low > high) return;
-  cover(graze_, low, high, size_);
-  for (int r = low; r <= high; ++r) {
-    const double w = kHann.at(r - place).first;
-    accumulate(graze_, r, share * w * w, packed);
-  }
-  addToBeams(record.c.data(), place, share, kOffBeam, &graze_beams_, nullptr, nullptr);
-}
-
-PoseEchoes EchoCollector::take() {
+std::vector<std::shared_ptr<const EchoGroup>> EchoCollector::take() {
   open_.clear();
-  return {std::exchange(groups_, {}), std::exchange(graze_, {}), std::exchange(graze_beams_, {})};
+  return std::exchange(groups_, {});
 }
 
 }  // namespace mmradartwin

@@ -30,8 +30,12 @@ struct EchoGroup {
 /// The expected channels of one pose. Groups do not change once collected: states of the fit share them.
 struct PoseEchoes {
   std::vector<std::shared_ptr<const EchoGroup>> groups;
-  BinCovariance graze;  ///< power of paths that come, go or change within the accuracy of the pose
-  BinCovariance graze_beams;
+  /// The same of paths that come, go or change within the accuracy of the pose: as much of their power as is uncertain.
+  std::vector<std::shared_ptr<const EchoGroup>> grazing;
+  std::size_t all() const { return groups.size() + grazing.size(); }
+  /// Those of grazing come last.
+  const EchoGroup& at(std::size_t i) const { return i < groups.size() ? *groups[i] : *grazing[i - groups.size()]; }
+  bool grazes(std::size_t i) const { return i >= groups.size(); }
 };
 
 /// Place of an actor's errors among `errors` of them: all that the scene lacks (actor -1, or one that a mechanism adds)
@@ -57,8 +61,6 @@ class EchoCollector {
   /// A path whose response the receiver has changed: y [M][N] instead of the tone, its actors' added range already in
   /// it, and its derivative by the one-way range, per metre. Actors and direction are the record's.
   void add(const PathRecord& record, const Eigen::MatrixXcd& y, const Eigen::MatrixXcd& slope);
-  /// Power without an actor, direction or range of its own.
-  void addGraze(const PathRecord& record, double share);
   /// A group that was collected before for this pose, instead of its paths.
   void add(std::shared_ptr<const EchoGroup> group) { groups_.push_back(std::move(group)); }
   /// The group of the last path, to which no more is added.
@@ -68,7 +70,7 @@ class EchoCollector {
   }
   /// One-way range that the interactions add.
   double addedRange_m(const PerInteraction<int>& actors) const;
-  PoseEchoes take();
+  std::vector<std::shared_ptr<const EchoGroup>> take();
 
  private:
   EchoGroup& group(const PathRecord& record);
@@ -90,7 +92,6 @@ class EchoCollector {
   std::vector<double> element_phase_;  ///< 2 pi y_k / lambda of the virtual elements
   std::vector<std::shared_ptr<const EchoGroup>> groups_;
   std::vector<EchoGroup*> open_;  ///< of groups_, those that are collected here
-  BinCovariance graze_, graze_beams_;
 };
 
 /// Changes a signature of paths by all of a record that collected echoes follow from, but its actors.

@@ -17,6 +17,12 @@ namespace {
 
 // A path whose amplitude changes by less than this share within the pose's accuracy does not graze anything.
 constexpr double kSteady = 0.02;
+constexpr double kFaint = 1e-4;  ///< of the pose's strongest amplitude: what changes by less is below the clutter
+// How far off a pose may be, to both sides: by what is usual, and across that by what one pose in a hundred is.
+struct Offset {
+  double direction_rad, sigma, weight;
+};
+constexpr Offset kOffsets[] = {{0, 1.41, 0.5}, {M_PI / 2, 2.8, 0.02}};
 // Scatter points in cells that are small beside what the radar resolves, seen from the pose as reported: a turned or
 // moved radar sees the same ones.
 constexpr double kCloud_bins = 0.75, kCloud_lobes = 0.5, kCloudElevation = 0.175;
@@ -273,52 +279,88 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
 
 void EchoSource::forgetLongUnused() {
   ++calls_;
-  while (cache_.size() > kMostTraced) {
-    cache_.erase(std::min_element(cache_.begin(), cache_.end(),
-                                  [](const auto& a, const auto& b) { return a.second.used < b.second.used; }));
-  }
+  const auto forget = [](auto& known, std::size_t most) {
+    while (known.size() > most) {
+      known.erase(std::min_element(known.begin(), known.end(),
+                                   [](const auto& a, const auto& b) { return a.second.used < b.second.used; }));
+    }
+  };
+  forget(cache_, kMostTraced);
+  forget(grazing_, kMostTraced);
 }
 
-void EchoSource::findGraze(const std::vector<NamedParameters>& mechanisms) {
-  const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
-  std::vector<NamedParameters> smooth;
+const EchoSource::Graze& EchoSource::grazing(const std::vector<NamedParameters>& mechanisms,
+                                             const std::vector<int>& poses) {
+  // What is put beside others leaves what they graze as it is.
+  std::vector<NamedParameters> moving, smooth;
+  for (const NamedParameters& m : geometryOf(mechanisms)) {
+    if (!addsToOthers(editOf(m))) moving.push_back(m);
+  }
+  Grazing& entry = grazing_[keyOf(moving)];
+  entry.used = std::max(entry.used, calls_);
+  entry.by_pose.resize(data_.poses.size());
+  std::vector<std::size_t> missing;
+  for (int i : poses) {
+    if (!entry.by_pose[static_cast<std::size_t>(i)]) missing.push_back(static_cast<std::size_t>(i));
+  }
+  if (missing.empty()) return entry.by_pose;
   for (const NamedParameters& m : mechanisms) {
     if (m.mechanism != "diffuse") smooth.push_back(m);  // its many points fade in and out one by one
   }
   const Twin twin = base_.changed(smooth);
-  graze_.assign(data_.poses.size(), {});
-  tbb::parallel_for(std::size_t{0}, data_.poses.size(), [&](std::size_t i) {
-    const Eigen::Isometry3d& here = data_.poses[i].pose.T_map_radar;
-    const std::vector<PathRecord> at = twin.trace(here);
-    const std::vector<double> none;
-    EchoCollector collector(base_.radar(), accuracy_.path_angle_rad, data_.poses[i].beams, none);
-    const auto compare = [&](const std::vector<PathRecord>& from, const std::vector<PathRecord>& to) {
-      for (const PathRecord& r : from) {
-        const auto same = std::find_if(to.begin(), to.end(),
-                                       [&](const PathRecord& o) { return o.event == r.event && o.facets == r.facets; });
-        const double other = same == to.end() ? 0 : same->amplitude;
-        if (r.amplitude <= other || r.amplitude == 0) continue;
-        const double lost = (r.amplitude - other) / r.amplitude;
-        if (lost > kSteady) collector.addGraze(r, 0.5 * lost * lost);
-      }
-    };
-    // One standard deviation in all three, turned from pose to pose so that no direction is preferred.
-    const double turn = 2.4 * static_cast<double>(i);
+  tbb::parallel_for(std::size_t{0}, missing.size(),
+                    [&](std::size_t j) { entry.by_pose[missing[j]] = grazeAt(twin, missing[j]); });
+  return entry.by_pose;
+}
+
+std::shared_ptr<const EchoSource::Groups> EchoSource::grazeAt(const Twin& twin, std::size_t i) const {
+  const Eigen::Isometry3d& here = data_.poses[i].pose.T_map_radar;
+  std::map<PerInteraction<int>, std::vector<PathRecord>> uncertain;
+  double strongest = 0;  // amplitude
+  const auto compare = [&](const std::vector<PathRecord>& from, const std::vector<PathRecord>& to, double weight) {
+    for (const PathRecord& r : from) {
+      const auto same = std::find_if(to.begin(), to.end(),
+                                     [&](const PathRecord& o) { return o.event == r.event && o.facets == r.facets; });
+      const double other = same == to.end() ? 0 : same->amplitude;
+      if (r.amplitude <= other || r.amplitude == 0) continue;
+      const double lost = (r.amplitude - other) / r.amplitude;
+      if (lost <= kSteady || lost * r.amplitude < kFaint * strongest) continue;
+      uncertain[actorsOf(r)].push_back(r);
+      scaleRecord(std::sqrt(weight) * lost, uncertain[actorsOf(r)].back());
+    }
+  };
+  std::vector<PathRecord> at;
+  try {
+    at = twin.trace(here);
+  } catch (const InputError&) {
+    return std::make_shared<Groups>();  // what is tried stands where the radar stood
+  }
+  strongest = std::sqrt(strongestPower(at));
+  // Turned from pose to pose so that no direction is preferred.
+  for (const Offset& offset : kOffsets) {
+    const double turn = 2.4 * static_cast<double>(i) + offset.direction_rad;
     const Eigen::Vector3d error =
-        accuracy_.position_m * Eigen::Vector3d(std::sqrt(2.0) * std::cos(turn), std::sqrt(2.0) * std::sin(turn), 1);
+        accuracy_.position_m * offset.sigma * Eigen::Vector3d(std::cos(turn), std::sin(turn), 1 / std::sqrt(2.0));
     for (const double sign : {-1.0, 1.0}) {
       Eigen::Isometry3d T = here;
       T.translation() += sign * error;
       try {
         const std::vector<PathRecord> there = twin.trace(T);
-        compare(at, there);
-        compare(there, at);
+        compare(at, there, offset.weight);
+        compare(there, at, offset.weight);
       } catch (const InputError&) {
         // The shifted pose lies inside something; the pose itself does not.
       }
     }
-    graze_[i] = collector.take();
-  });
+  }
+  const std::vector<double> none;
+  EchoCollector collector(base_.radar(), accuracy_.path_angle_rad, data_.poses[i].beams, none);
+  for (const auto& [actors, records] : uncertain) {
+    std::vector<const PathRecord*> members;
+    for (const PathRecord& r : records) members.push_back(&r);
+    collector.addTones(members, strongest * strongest);
+  }
+  return std::make_shared<Groups>(collector.take());
 }
 
 std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& mechanisms,
@@ -443,6 +485,8 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
   std::size_t alike = std::hash<std::string>()(weights.toYaml());
   boost::hash_range(alike, actor_range_m.begin(), actor_range_m.end());
 
+  static const Graze kNone;
+  const Graze& graze = settled_.empty() ? kNone : grazing(mechanisms, poses);
   std::vector<PoseEchoes> result(poses.size());
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
     const std::size_t i = static_cast<std::size_t>(poses[j]);
@@ -456,10 +500,7 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
         boost::hash_combine(own.signature, own.paths.back().get());
       }
     }
-    if (!graze_.empty()) {
-      result[j].graze = graze_[i].graze;
-      result[j].graze_beams = graze_[i].graze_beams;
-    }
+    if (!graze.empty() && graze[i]) result[j].grazing = *graze[i];
     std::array<KeptPose, 2>& kept = kept_poses_[i];
     if (!kept[1].groups.empty() && kept[1].signature == own.signature) std::swap(kept[0], kept[1]);
     if (!kept[0].groups.empty() && kept[0].signature == own.signature) {
@@ -499,7 +540,7 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
       addTones(*without_mixing, all, strongest);
       mixture.addTo(collector);
     }
-    result[j].groups = collector.take().groups;
+    result[j].groups = collector.take();
     if (without_mixing) return;
     own.groups = result[j].groups;
     (kept[0].groups.empty() ? kept[0] : kept[1]) = std::move(own);
@@ -539,7 +580,13 @@ void EchoSource::settle(const std::vector<NamedParameters>& mechanisms) {
   std::vector<std::string> wanted;
   for (const NamedParameters& m : mechanisms)
     wanted.push_back(geometry + keyOf(lookedAt(m, mechanisms)) + tracedKey(m));
-  if (wanted != settled_) findGraze(mechanisms);
+  if (wanted != settled_) {
+    grazing_.clear();
+    std::vector<int> all(data_.poses.size());
+    std::iota(all.begin(), all.end(), 0);
+    grazing(mechanisms, all);
+    grazing_.begin()->second.used = std::numeric_limits<std::size_t>::max();  // never forgotten
+  }
   settled_ = wanted;
   for (auto at = cache_.begin(); at != cache_.end();) {
     at = std::find(wanted.begin(), wanted.end(), at->first) == wanted.end() ? cache_.erase(at) : std::next(at);

@@ -92,7 +92,12 @@ class EchoSource {
   /// Adds records as their tones, those that meet the same actors together; what is the same as before is not collected
   /// again.
   void addGroups(std::size_t pose, const std::vector<PathRecord>& records, double strongest, EchoCollector& to);
-  void findGraze(const std::vector<NamedParameters>& mechanisms);
+  using Groups = std::vector<std::shared_ptr<const EchoGroup>>;
+  /// PoseEchoes::grazing by pose; null where not looked for.
+  using Graze = std::vector<std::shared_ptr<const Groups>>;
+  /// The geometry's own; where it is the one that was settled on, with what was settled on, else with `mechanisms`.
+  const Graze& grazing(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
+  std::shared_ptr<const Groups> grazeAt(const Twin& twin, std::size_t pose) const;
 
   const Twin& base_;
   const ChannelData& data_;
@@ -118,7 +123,11 @@ class EchoSource {
   };
   std::vector<std::array<KeptPose, 2>> kept_poses_;
   std::vector<ReceiverMixture::Cache> mixed_;  // by pose
-  std::vector<PoseEchoes> graze_;              // by pose; nothing but graze
+  struct Grazing {
+    Graze by_pose;
+    std::size_t used = 0;  // when, in calls
+  };
+  std::map<std::string, Grazing> grazing_;  // by what moves actors or the radar
   std::vector<std::string> settled_;
   enum class Geometry { kSame, kMoreScreens, kOther };
   struct Edit {

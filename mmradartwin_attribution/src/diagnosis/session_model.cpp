@@ -165,7 +165,11 @@ void SessionModel::addRelative(const Nuisance& n, int cell, PackedHermitian& to)
 std::vector<SessionModel::GroupLevel> SessionModel::levels(const PoseEchoes& echoes, const Nuisance& n) const {
   std::vector<GroupLevel> levels;
   const double gain = std::exp(n.log_gain);
-  for (const auto& group : echoes.groups) levels.push_back({gain * groupGain(*group, n), groupShift_m(*group, n)});
+  const double grazing = std::exp(n.log_graze);
+  for (std::size_t i = 0; i < echoes.all(); ++i) {
+    const EchoGroup& group = echoes.at(i);
+    levels.push_back({gain * groupGain(group, n) * (echoes.grazes(i) ? grazing : 1), groupShift_m(group, n)});
+  }
   return levels;
 }
 
@@ -180,8 +184,8 @@ PackedHermitian SessionModel::sigma(const PoseEchoes& echoes, const std::vector<
   PackedTurn turn;
   const double gain = std::exp(n.log_gain);
   const double range_variance = rangeVariance_m2(n);
-  for (std::size_t i = 0; i < echoes.groups.size(); ++i) {
-    const EchoGroup& g = *echoes.groups[i];
+  for (std::size_t i = 0; i < echoes.all(); ++i) {
+    const EchoGroup& g = echoes.at(i);
     const EchoGroup::Fields& f = isBeam(cell) ? g.beams : g.bins;
     const auto *power = f.power.at(at, size_), *bend = f.bend.at(at, size_);
     if (power == nullptr && bend == nullptr) continue;
@@ -189,8 +193,6 @@ PackedHermitian SessionModel::sigma(const PoseEchoes& echoes, const std::vector<
     turn.set(apart_, turnOf(n.yaw_rad[pose], power, f.cosine.at(at, size_)));
     s.addTurned({power, f.shift.at(at, size_), bend}, {u, u * shift, u * (shift * shift + range_variance)}, turn);
   }
-  const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
-  if (const auto* p = graze.at(at, size_)) s.add(p, gain * std::exp(n.log_graze));
   // At least a share of the mean power everywhere keeps the matrix definite where the first-order terms would not.
   if (s.trace() > 0) addRelative(n, cell, s);
   addApart(cell, noiseOf(pose, cell), s);
@@ -311,8 +313,8 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     const PackedHermitian inverse = basis.factor.inverse();
     out.log_likelihood += -basis.factor.logDeterminant() - (channels_ + kTail) * std::log1p(q / kTail);
 
-    for (std::size_t i = 0; i < echoes.groups.size(); ++i) {
-      const EchoGroup& g = *echoes.groups[i];
+    for (std::size_t i = 0; i < echoes.all(); ++i) {
+      const EchoGroup& g = echoes.at(i);
       const EchoGroup::Fields& fields = isBeam(cell) ? g.beams : g.bins;
       const auto *power = fields.power.at(at, size_), *shift = fields.shift.at(at, size_),
                  *bend = fields.bend.at(at, size_);
@@ -329,12 +331,11 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
         touch(kActors + a).add(own, 1);
         touch(kActors + errors_ + a).addTurned({nullptr, shift, bend}, {0, f, 2 * f * moved}, turn);
       }
+      if (echoes.grazes(i)) touch(kGraze).add(own, 1);
       if (bend != nullptr) touch(kRange).addTurned({bend, nullptr, nullptr}, {f * range_variance, 0, 0}, turn);
       const double by_yaw = turnOf(1, power, cosine);
       if (by_yaw != 0) touch(heading).addTurnDerivative(own, by_yaw, apart_);
     }
-    const BinCovariance& graze = isBeam(cell) ? echoes.graze_beams : echoes.graze;
-    if (const auto* p = graze.at(at, size_)) touch(kGraze).add(p, gain * std::exp(n.log_graze));
     for (int j : active) {  // a heading's trace is 0
       if (j != heading) addRelative(n, cell, raw[j]);
     }

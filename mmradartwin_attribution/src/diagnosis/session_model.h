@@ -18,7 +18,7 @@ struct Nuisance {
   double log_floor = 0;                 ///< clutter's power in a cell over PoseChannels::clutter
   std::array<double, 6> floor_shape{};  ///< departs from that at ranges, even in their logarithm; linear between
   double log_relative = -8;             ///< what differs from channel to channel of an echo, of its power
-  double log_graze = 0;                 ///< factor of PoseEchoes::graze
+  double log_graze = 0;                 ///< factor of PoseEchoes::grazing
   double log_range = 0;                 ///< factor of the variance of a path's own range
   std::vector<double> actor_gain;       ///< as errorOf() has it: natural logarithm of power, per interaction
   std::vector<double> actor_range_m;    ///< the same: added one-way range, per interaction
@@ -73,7 +73,7 @@ struct Basis {
 
 /// Likelihood of a session's channels under expected echoes. Every bin's channels are complex t-distributed (4 degrees
 /// of freedom in their complex form) about zero, with the covariance
-///   gain * (echoes + range errors + graze + relative) + clutter + noise,
+///   gain * (echoes + grazing echoes + range errors + relative) + clutter + noise,
 /// and so are every beam's bins (EchoBeam). Cells are the bins and, after them, the beams. Neighbouring bins overlap
 /// through the window and beams are formed of them, so that each counts half (composite likelihood).
 class SessionModel {
