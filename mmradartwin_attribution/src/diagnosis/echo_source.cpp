@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/functional/hash.hpp>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <tuple>
