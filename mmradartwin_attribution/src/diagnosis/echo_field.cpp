@@ -17,8 +17,8 @@ constexpr int kFarSkirt =
     32;  ///< and the strongest: at -60 to -100 dB, but where no clutter stands that is above the noise
 // Where a path passes from one of these to the next, its likelihood jumps: where a strong path's skirt ended near, at
 // -30 dB, that was worth 100 nats and looked like a law over range; where it began at -20 dB, 4 nats at a pose, and an
-// attenuation's interval at 154 poses ended short of the truth.
-constexpr double kWeak = 1e-6, kStrong = 0.001;  ///< of the pose's strongest path's power
+// attenuation's interval at 154 poses ended short of the truth. At -30 dB 154 poses took more than 2 GiB.
+constexpr double kWeak = 1e-6, kStrong = 0.003;  ///< of the pose's strongest path's power
 constexpr double kLeastResponse = 1e-7;          ///< of the strongest bin of what a receiver made of a path
 constexpr std::size_t kMostBeamBins = 16;
 constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;  ///< of a path's power: a beam that takes less does not see it

@@ -18,7 +18,8 @@ namespace {
 
 // A path whose amplitude changes by less than this share within the pose's accuracy does not graze anything.
 constexpr double kSteady = 0.02;
-constexpr double kFaint = 1e-4;  ///< of the pose's strongest amplitude: what changes by less is below the clutter
+constexpr double kNoFarSkirt = 1e3;  ///< times the strongest power: no echo is strong beside that
+constexpr double kFaint = 1e-3;      ///< of the pose's strongest amplitude: less is below the clutter
 // How far off a pose may be, to both sides: by what is usual, and across that by what one pose in a hundred is.
 struct Offset {
   double direction_rad, sigma, weight;
@@ -325,9 +326,10 @@ std::shared_ptr<const EchoSource::Groups> EchoSource::grazeAt(const Twin& twin, 
       const double other = same == to.end() ? 0 : same->amplitude;
       if (r.amplitude <= other || r.amplitude == 0) continue;
       const double lost = (r.amplitude - other) / r.amplitude;
-      if (lost <= kSteady || lost * r.amplitude < kFaint * strongest) continue;
+      const double share = std::sqrt(weight) * lost;
+      if (lost <= kSteady || share * r.amplitude < kFaint * strongest) continue;
       uncertain[actorsOf(r)].push_back(r);
-      scaleRecord(std::sqrt(weight) * lost, uncertain[actorsOf(r)].back());
+      scaleRecord(share, uncertain[actorsOf(r)].back());
     }
   };
   std::vector<PathRecord> at;
@@ -359,7 +361,7 @@ std::shared_ptr<const EchoSource::Groups> EchoSource::grazeAt(const Twin& twin, 
   for (const auto& [actors, records] : uncertain) {
     std::vector<const PathRecord*> members;
     for (const PathRecord& r : records) members.push_back(&r);
-    collector.addTones(members, strongest * strongest);
+    collector.addTones(members, kNoFarSkirt * strongest * strongest);
   }
   return std::make_shared<Groups>(collector.take());
 }
