@@ -37,6 +37,14 @@ class CabinetScene : public ::testing::Test {
     }
     obj << "f 9 10 11 12\nf 13 14 15 16\nf 9 10 14 13\nf 10 11 15 14\nf 11 12 16 15\nf 12 9 13 16\n";
   }
+  /// Of radars at such a place and heading.
+  static ChannelData atPoses(const std::vector<Eigen::Isometry3d>& T_map_radar) {
+    ChannelData data;
+    data.radar = paperRadar();
+    for (const Eigen::Isometry3d& T : T_map_radar) data.poses.emplace_back().pose.T_map_radar = T;
+    return data;
+  }
+  Twin twinFor(const ChannelData& data) const { return Twin(loadTwin("", folder_ + "/scene.yaml", data.radar)); }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
   std::string folder_;
@@ -63,16 +71,11 @@ double power(const PoseEchoes& echoes, int channels, std::optional<int> bin = st
 
 // Paths are traced one mechanism at a time, but an edge that a specular return holds is no path of the whole twin.
 TEST_F(CabinetScene, ExpectsOfEdgesWhatTheWholeTwinHas) {
-  ChannelData data;
-  data.radar = paperRadar();
-  const auto addPose = [&](double x, double y, double yaw_rad) {
-    PoseChannels p;
-    p.pose.T_map_radar = Eigen::Translation3d(x, y, 0) * Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ());
-    data.poses.push_back(p);
-  };
-  addPose(1, 0, 0);               // the front is square on and holds both of its edges
-  addPose(1, -2.5, 0.25 * M_PI);  // no face is
-  const Twin twin(loadTwin("", folder_ + "/scene.yaml", data.radar));
+  // The front is square on and holds both of its edges; then no face is.
+  const ChannelData data =
+      atPoses({Eigen::Isometry3d(Eigen::Translation3d(1, 0, 0)),
+               Eigen::Translation3d(1, -2.5, 0) * Eigen::AngleAxisd(0.25 * M_PI, Eigen::Vector3d::UnitZ())});
+  const Twin twin = twinFor(data);
   EchoSource source(twin, data, PoseAccuracy());
   const NamedParameters specular = defaultMechanism("specular"), edges = defaultMechanism("edge_diffraction");
   const std::vector<PoseEchoes> without = source.echoes({specular}), with = source.echoes({specular, edges});
@@ -95,12 +98,8 @@ TEST_F(CabinetScene, ExpectsOfEdgesWhatTheWholeTwinHas) {
 
 // The echo of each of two objects is its own, whatever one hides of the other and of the room.
 TEST_F(CabinetScene, ExpectsOfTwoObjectsWhatTheWholeTwinHas) {
-  ChannelData data;
-  data.radar = paperRadar();
-  PoseChannels pose;
-  pose.pose.T_map_radar = Eigen::Isometry3d::Identity();
-  data.poses.push_back(pose);
-  const Twin twin(loadTwin("", folder_ + "/scene.yaml", data.radar));
+  const ChannelData data = atPoses({Eigen::Isometry3d::Identity()});
+  const Twin twin = twinFor(data);
   const NamedParameters specular = defaultMechanism("specular");
   const auto object = [](double x_m, double y_m, const std::string& shape) {
     NamedParameters m = defaultMechanism("actor_unmodelled");
@@ -120,10 +119,11 @@ TEST_F(CabinetScene, ExpectsOfTwoObjectsWhatTheWholeTwinHas) {
     all.push_back(specular);
     EchoSource source(twin, data, PoseAccuracy());
     double expected = 0;
-    for (const PathRecord& r : twin.changed(all).trace(pose.pose.T_map_radar)) expected += r.amplitude * r.amplitude;
+    for (const PathRecord& r : twin.changed(all).trace(data.poses[0].pose.T_map_radar))
+      expected += r.amplitude * r.amplitude;
     // The window's power in a cell is the same for all paths.
     double alone = 0;
-    for (const PathRecord& r : twin.changed({specular}).trace(pose.pose.T_map_radar))
+    for (const PathRecord& r : twin.changed({specular}).trace(data.poses[0].pose.T_map_radar))
       alone += r.amplitude * r.amplitude;
     const double cell = power(source.echoes({specular})[0], 8) / alone;
     EXPECT_NEAR(power(source.echoes(all)[0], 8) / (cell * expected), 1, 0.02);
@@ -133,12 +133,8 @@ TEST_F(CabinetScene, ExpectsOfTwoObjectsWhatTheWholeTwinHas) {
 // An edge that the radar stands before within the accuracy of its pose makes an echo uncertain, wherever it is that
 // a hypothesis puts the radar.
 TEST_F(CabinetScene, ExpectsEchoesThatAPosesErrorMayBring) {
-  ChannelData data;
-  data.radar = paperRadar();
-  PoseChannels pose;
-  pose.pose.T_map_radar = Eigen::Isometry3d::Identity();
-  data.poses.push_back(pose);
-  const Twin twin(loadTwin("", folder_ + "/scene.yaml", data.radar));
+  const ChannelData data = atPoses({Eigen::Isometry3d::Identity()});
+  const Twin twin = twinFor(data);
   const NamedParameters specular = defaultMechanism("specular");
   EchoSource source(twin, data, PoseAccuracy());
   source.settle({specular});
@@ -158,19 +154,15 @@ TEST_F(CabinetScene, ExpectsEchoesThatAPosesErrorMayBring) {
 // A square law makes echoes of two at the sum of their ranges, four times as strong as those of each at twice its own.
 TEST_F(CabinetScene, ExpectsWhatAReceiverMakesOfTwoEchoesTogether) {
   addLocker();
-  ChannelData data;
-  data.radar = paperRadar();
-  PoseChannels pose;
-  pose.pose.T_map_radar = Eigen::AngleAxisd(0.25 * M_PI, Eigen::Vector3d::UnitZ());
-  data.poses.push_back(pose);
-  Twin twin(loadTwin("", folder_ + "/scene.yaml", data.radar));
+  const ChannelData data = atPoses({Eigen::Isometry3d(Eigen::AngleAxisd(0.25 * M_PI, Eigen::Vector3d::UnitZ()))});
+  Twin twin = twinFor(data);
   twin.setStrongestAmplitude(1e-4);
   EchoSource source(twin, data, PoseAccuracy());
   NamedParameters specular = defaultMechanism("specular"), harmonic = defaultMechanism("second_harmonic");
   specular.values.set("max_bounces", 1.0);
   harmonic.values.set("level_db", -20.0);
   const std::vector<NamedParameters> mixing = {specular, harmonic};
-  const Simulation whole = twin.changed(mixing).simulate(pose.pose.T_map_radar);
+  const Simulation whole = twin.changed(mixing).simulate(data.poses[0].pose.T_map_radar);
   const Eigen::MatrixXcd spectra = SignalChain(data.radar).rangeSpectra(whole.grid.x) / (0.5 * whole.grid.x.cols());
   const std::vector<PoseEchoes> first = source.echoes(mixing);
   for (double range_m : {2.0, 3.0, 4.0, 5.0, 6.0}) {

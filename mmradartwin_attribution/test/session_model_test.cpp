@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
 #include <random>
 
 #include "../src/diagnosis/echo_beam.h"
+#include "../src/diagnosis/effective_scores.h"
 #include "mmradartwin_dsp/paper_radar.h"
 
 namespace mmradartwin {
@@ -160,14 +163,7 @@ TEST_F(ThreeActors, ScoresOfAMechanismAreTheLikelihoodsSlopes) {
   const SessionModel model(data_, 3, known);
   const double step = 0.01;
   const auto at = [&](double share) { return model.covariance(echoes(share), nuisance_, {0, 1}); };
-  SessionCovariance direction = at(1.5);
-  const SessionCovariance down = at(0.5);
-  for (std::size_t i = 0; i < direction.size(); ++i) {
-    for (std::size_t j = 0; j < direction[i].size(); ++j) {
-      direction[i][j] = direction[i][j] - down[i][j];
-    }
-  }
-  const Scores scores = model.scores(model.basis(echoes(), nuisance_), {direction}, {0, 1});
+  const Scores scores = model.scores(model.basis(echoes(), nuisance_), {difference(at(1.5), at(0.5), 1)}, {0, 1});
   const double want =
       (model.logLikelihood(echoes(1 + step), nuisance_) - model.logLikelihood(echoes(1 - step), nuisance_)) /
       (2 * step);
