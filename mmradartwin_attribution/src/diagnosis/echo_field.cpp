@@ -231,7 +231,7 @@ void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g
                                                 static_cast<float>(slope * slope), static_cast<float>(w * w * cosine)};
     open_fields.add(bin, packed.data(), size_, factors);
   }
-  addToBeams(record.c.data(), place, 1, weak ? kOffBeamWeak : kOffBeam, &g.beams.power, &g.beams.shift, &g.beams.bend);
+  addToBeams(record.c.data(), place, weak ? kOffBeamWeak : kOffBeam, g.beams);
 }
 
 void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, const Eigen::MatrixXcd& slope) {
@@ -273,8 +273,8 @@ void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, con
   }
 }
 
-void EchoCollector::addToBeams(const std::complex<double>* c, double place, double share, double off,
-                               BinCovariance* power, BinCovariance* shift, BinCovariance* bend) const {
+void EchoCollector::addToBeams(const std::complex<double>* c, double place, double off,
+                               EchoGroup::Fields& beams) const {
   std::array<double, kMostBeamBins> w, slope;
   double all = 0;
   for (int k = 0; k < channels_; ++k) all += std::norm(c[k]);
@@ -285,24 +285,23 @@ void EchoCollector::addToBeams(const std::complex<double>* c, double place, doub
     if (middle < -kLobe || middle > channels_ - 1 + kLobe) continue;
     std::complex<double> formed = 0;
     for (int k = 0; k < channels_; ++k) formed += std::conj(beam.weights[k]) * c[k];
-    const double level = share * std::norm(formed);
-    if (level < share * off * all) continue;
+    const double level = std::norm(formed);
+    if (level < off * all) continue;
     for (int i = 0; i < channels_; ++i) {
       const auto [response, per_bin] = kHann.at(i - middle);
       w[static_cast<std::size_t>(i)] = response;
       slope[static_cast<std::size_t>(i)] = -per_bin / bin_m_;
     }
-    const auto add = [&](BinCovariance* field, auto value) {
-      if (field == nullptr) return;
-      cover(*field, at, at, size_);
-      std::complex<float>* to = field->at(at, size_);
+    const auto add = [&](BinCovariance& field, auto value) {
+      cover(field, at, at, size_);
+      std::complex<float>* to = field.at(at, size_);
       for (int i = 0; i < channels_; ++i) {
         for (int j = 0; j <= i; ++j) *to++ += static_cast<float>(level * value(i, j));
       }
     };
-    add(power, [&](int i, int j) { return w[i] * w[j]; });
-    add(shift, [&](int i, int j) { return w[i] * slope[j] + slope[i] * w[j]; });
-    add(bend, [&](int i, int j) { return slope[i] * slope[j]; });
+    add(beams.power, [&](int i, int j) { return w[i] * w[j]; });
+    add(beams.shift, [&](int i, int j) { return w[i] * slope[j] + slope[i] * w[j]; });
+    add(beams.bend, [&](int i, int j) { return slope[i] * slope[j]; });
   }
 }
 

@@ -77,10 +77,9 @@ class EchoCollector {
   void addTone(const PathRecord& record, double share, EchoGroup& group);
   void outer(const std::complex<double>* c, double cosine, std::vector<std::complex<float>>& packed) const;
 
-  /// Adds factor |b^H c|^2 times outer products of the responses over a beam's bins; null where not wanted.
-  /// A beam that takes less than `off` of the path's power is passed over.
-  void addToBeams(const std::complex<double>* c, double place, double share, double off, BinCovariance* power,
-                  BinCovariance* shift, BinCovariance* bend) const;
+  /// Adds |b^H c|^2 times outer products of the responses over a beam's bins. A beam that takes less than `off` of the
+  /// path's power is passed over.
+  void addToBeams(const std::complex<double>* c, double place, double off, EchoGroup::Fields& beams) const;
 
   const RadarConfig& radar_;
   const std::vector<EchoBeam>& beams_;

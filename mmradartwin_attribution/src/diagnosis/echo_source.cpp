@@ -81,6 +81,13 @@ double strongestPower(const std::vector<PathRecord>& records) {
   return strongest;
 }
 
+/// Paths by what they meet.
+std::map<PerInteraction<int>, std::vector<const PathRecord*>> byActors(const std::vector<PathRecord>& records) {
+  std::map<PerInteraction<int>, std::vector<const PathRecord*>> groups;
+  for (const PathRecord& r : records) groups[actorsOf(r)].push_back(&r);
+  return groups;
+}
+
 using PathKey = std::tuple<const std::string*, PerInteraction<int>>;
 
 /// Paths of `there` that `here` has, too, and those of `here` that `there` lacks. Scatter points of one facet are many
@@ -279,6 +286,12 @@ const EchoSource::Traced& EchoSource::traced(const std::vector<NamedParameters>&
   return entry.paths;
 }
 
+std::vector<int> EchoSource::everyPose() const {
+  std::vector<int> all(data_.poses.size());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
 void EchoSource::forgetLongUnused() {
   ++calls_;
   const auto forget = [](auto& known, std::size_t most) {
@@ -317,8 +330,14 @@ const EchoSource::Graze& EchoSource::grazing(const std::vector<NamedParameters>&
 
 std::shared_ptr<const EchoSource::Groups> EchoSource::grazeAt(const Twin& twin, std::size_t i) const {
   const Eigen::Isometry3d& here = data_.poses[i].pose.T_map_radar;
-  std::map<PerInteraction<int>, std::vector<PathRecord>> uncertain;
-  double strongest = 0;  // amplitude
+  std::vector<PathRecord> at;
+  try {
+    at = twin.trace(here);
+  } catch (const InputError&) {
+    return std::make_shared<Groups>();  // what is tried stands where the radar stood
+  }
+  const double strongest = std::sqrt(strongestPower(at));
+  std::vector<PathRecord> uncertain;
   const auto compare = [&](const std::vector<PathRecord>& from, const std::vector<PathRecord>& to, double weight) {
     for (const PathRecord& r : from) {
       const auto same = std::find_if(to.begin(), to.end(),
@@ -328,17 +347,10 @@ std::shared_ptr<const EchoSource::Groups> EchoSource::grazeAt(const Twin& twin, 
       const double lost = (r.amplitude - other) / r.amplitude;
       const double share = std::sqrt(weight) * lost;
       if (lost <= kSteady || share * r.amplitude < kFaint * strongest) continue;
-      uncertain[actorsOf(r)].push_back(r);
-      scaleRecord(share, uncertain[actorsOf(r)].back());
+      uncertain.push_back(r);
+      scaleRecord(share, uncertain.back());
     }
   };
-  std::vector<PathRecord> at;
-  try {
-    at = twin.trace(here);
-  } catch (const InputError&) {
-    return std::make_shared<Groups>();  // what is tried stands where the radar stood
-  }
-  strongest = std::sqrt(strongestPower(at));
   // Turned from pose to pose so that no direction is preferred.
   for (const Offset& offset : kOffsets) {
     const double turn = 2.4 * static_cast<double>(i) + offset.direction_rad;
@@ -358,9 +370,7 @@ std::shared_ptr<const EchoSource::Groups> EchoSource::grazeAt(const Twin& twin, 
   }
   const std::vector<double> none;
   EchoCollector collector(base_.radar(), accuracy_.path_angle_rad, data_.poses[i].beams, none);
-  for (const auto& [actors, records] : uncertain) {
-    std::vector<const PathRecord*> members;
-    for (const PathRecord& r : records) members.push_back(&r);
+  for (const auto& [actors, members] : byActors(uncertain)) {
     collector.addTones(members, kNoFarSkirt * strongest * strongest);
   }
   return std::make_shared<Groups>(collector.take());
@@ -372,7 +382,11 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
   std::vector<Part> parts;
   for (const NamedParameters& m : mechanisms) parts.push_back({&traced(geometry, m, mechanisms, poses)});
-  return collect(mechanisms, poses, actor_range_m, parts);
+  std::vector<PoseEchoes> result = collect(mechanisms, poses, actor_range_m, parts);
+  if (settled_.empty()) return result;
+  const Graze& by_pose = grazing(mechanisms, poses);
+  for (std::size_t j = 0; j < poses.size(); ++j) result[j].grazing = *by_pose[static_cast<std::size_t>(poses[j])];
+  return result;
 }
 
 std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters>& mechanisms,
@@ -445,9 +459,7 @@ EchoShift EchoSource::shift(const std::vector<NamedParameters>& mechanisms, cons
 
 void EchoSource::addGroups(std::size_t pose, const std::vector<PathRecord>& records, double strongest,
                            EchoCollector& to) {
-  std::map<PerInteraction<int>, std::vector<const PathRecord*>> groups;
-  for (const PathRecord& r : records) groups[actorsOf(r)].push_back(&r);
-  for (const auto& [actors, members] : groups) {
+  for (const auto& [actors, members] : byActors(records)) {
     std::size_t signature = 0;
     const auto sign = [&](double v) { boost::hash_combine(signature, v); };
     sign(strongest);
@@ -488,8 +500,6 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
   std::size_t alike = std::hash<std::string>()(weights.toYaml());
   boost::hash_range(alike, actor_range_m.begin(), actor_range_m.end());
 
-  static const Graze kNone;
-  const Graze& graze = settled_.empty() ? kNone : grazing(mechanisms, poses);
   std::vector<PoseEchoes> result(poses.size());
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
     const std::size_t i = static_cast<std::size_t>(poses[j]);
@@ -503,7 +513,6 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
         boost::hash_combine(own.signature, own.paths.back().get());
       }
     }
-    if (!graze.empty() && graze[i]) result[j].grazing = *graze[i];
     std::array<KeptPose, 2>& kept = kept_poses_[i];
     if (!kept[1].groups.empty() && kept[1].signature == own.signature) std::swap(kept[0], kept[1]);
     if (!kept[0].groups.empty() && kept[0].signature == own.signature) {
@@ -553,9 +562,7 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
 
 std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& mechanisms,
                                            const std::vector<double>& actor_range_m) {
-  std::vector<int> all(data_.poses.size());
-  std::iota(all.begin(), all.end(), 0);
-  return echoes(mechanisms, all, actor_range_m);
+  return echoes(mechanisms, everyPose(), actor_range_m);
 }
 
 void EchoSource::pointBeams(ChannelData& data, const std::vector<NamedParameters>& mechanisms, int first_bin) {
@@ -585,9 +592,7 @@ void EchoSource::settle(const std::vector<NamedParameters>& mechanisms) {
     wanted.push_back(geometry + keyOf(lookedAt(m, mechanisms)) + tracedKey(m));
   if (wanted != settled_) {
     grazing_.clear();
-    std::vector<int> all(data_.poses.size());
-    std::iota(all.begin(), all.end(), 0);
-    grazing(mechanisms, all);
+    grazing(mechanisms, everyPose());
     grazing_.begin()->second.used = std::numeric_limits<std::size_t>::max();  // never forgotten
   }
   settled_ = wanted;

@@ -51,7 +51,7 @@ class EchoSource {
   std::vector<PoseEchoes> echoes(const std::vector<NamedParameters>& mechanisms,
                                  const std::vector<double>& actor_range_m = {});
   /// The same a small step away from `from`, of the paths that both have: what comes or goes within the step says
-  /// nothing about the slope.
+  /// nothing about the slope, nor does what grazes, which is left out where the geometry is another.
   std::vector<PoseEchoes> echoesNear(const std::vector<NamedParameters>& mechanisms,
                                      const std::vector<NamedParameters>& from, const std::vector<int>& poses,
                                      const std::vector<double>& actor_range_m);
@@ -84,6 +84,7 @@ class EchoSource {
   /// True where its receiver makes of a path more than its tone in all channels (an image, a harmonic).
   bool mixesRanges(const NamedParameters& mechanism);
   std::shared_ptr<const Twin> twinOf(const std::vector<NamedParameters>& mechanisms);
+  std::vector<int> everyPose() const;
   /// Keeps memory bounded while one hypothesis' geometry is searched for.
   void forgetLongUnused();
   std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);

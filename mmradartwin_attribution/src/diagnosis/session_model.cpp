@@ -182,7 +182,6 @@ PackedHermitian SessionModel::sigma(const PoseEchoes& echoes, const std::vector<
   const int at = isBeam(cell) ? cell - samples_ : cell;
   PackedHermitian s(channels_);
   PackedTurn turn;
-  const double gain = std::exp(n.log_gain);
   const double range_variance = rangeVariance_m2(n);
   for (std::size_t i = 0; i < echoes.all(); ++i) {
     const EchoGroup& g = echoes.at(i);
@@ -279,7 +278,7 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
   out.information = Eigen::MatrixXd::Zero(globals + 1, globals + 1);
   out.log_likelihood = 0;
   out.bins.clear();
-  const double gain = std::exp(n.log_gain), relative = std::exp(n.log_relative);
+  const double relative = std::exp(n.log_relative);
   const double range_variance = rangeVariance_m2(n);
   // Only directions that do something in a bin enter its products.
   std::vector<int> active;
@@ -489,15 +488,9 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
   // Levels of errors are known roughly (a factor of 10 in power), so that none runs away where nothing shows it.
   const double rough = 1 / (2.3 * 2.3);
   const Nuisance usual;
-  s.information(kRelative, kRelative) += rough;
-  s.total[kRelative] -= rough * (n.log_relative - usual.log_relative);
-  s.information(kGraze, kGraze) += rough;
-  s.total[kGraze] -= rough * (n.log_graze - usual.log_graze);
-  s.information(kRange, kRange) += rough;
-  s.total[kRange] -= rough * (n.log_range - usual.log_range);
-  for (int j = 0; j < static_cast<int>(n.floor_shape.size()); ++j) {
-    s.information(kShape + j, kShape + j) += rough;
-    s.total[kShape + j] -= rough * n.floor_shape[static_cast<std::size_t>(j)];
+  for (int j = kRelative; j < kActors; ++j) {
+    s.information(j, j) += rough;
+    s.total[j] -= rough * (n.global(j) - usual.global(j));
   }
   // What stands at a limit and would go beyond it moves no more, and nothing else moves as if it did.
   for (int j = 0; j < globals; ++j) {
