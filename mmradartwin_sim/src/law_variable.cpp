@@ -30,14 +30,21 @@ double incidenceCosine(const LawVariable::Where& where, const PathRecord& record
   return std::min(1.0, std::abs(way.dot(facet.normal)) / std::max(1e-9, way.norm()));
 }
 
-/// Of the path's first point along its upright facet, from the middle of the facet's actor; nothing where it has none.
-LawVariable::Values foot(const LawVariable::Where& where, const PathRecord& record) {
-  if (record.facets.empty() || record.facets[0] < 0 || record.vertices.empty()) return {};
-  const Facet& facet = where.scene.facets[static_cast<std::size_t>(record.facets[0])];
+/// Of the path's first point, or its first on an actor, along its upright facet, from the middle of the facet's actor;
+/// nothing where it has none.
+LawVariable::Values foot(const LawVariable::Where& where, const PathRecord& record, int actor) {
+  std::size_t at = 0;
+  const std::size_t points = std::min(record.facets.size(), record.vertices.size());
+  const auto facetAt = [&](std::size_t i) -> const Facet& {
+    return where.scene.facets[static_cast<std::size_t>(record.facets[i])];
+  };
+  while (actor >= 0 && at < points && (record.facets[at] < 0 || facetAt(at).actor != actor)) ++at;
+  if (at >= points || record.facets[at] < 0) return {};
+  const Facet& facet = facetAt(at);
   const Eigen::Vector2d along = Eigen::Vector3d::UnitZ().cross(facet.normal).head<2>();
   if (along.norm() < 0.7 || facet.actor < 0 || facet.curved >= 0) return {};  // it lies, or has no length
   const Eigen::Vector3d middle = where.scene.actors[static_cast<std::size_t>(facet.actor)].bounds.center();
-  return {1, {along.normalized().dot((record.vertices[0] - middle).head<2>()), 0}};
+  return {1, {along.normalized().dot((record.vertices[at] - middle).head<2>()), 0}};
 }
 
 }  // namespace
@@ -45,7 +52,7 @@ LawVariable::Values foot(const LawVariable::Where& where, const PathRecord& reco
 const std::vector<std::string>& LawVariable::names() {
   static const std::vector<std::string> kNames = {"range_m",     "azimuth_deg", "incidence_deg", "height_m",
                                                   "heading_deg", "bearing_deg", "time_s",        "amplitude_db",
-                                                  "foot_m",      "standing_m",  "passing_m"};
+                                                  "foot_m",      "standing_m",  "passing_m",     "distance_m"};
   return kNames;
 }
 
@@ -54,14 +61,18 @@ std::string LawVariable::meaning() {
          "first reflection, or of the path on its scatter point; other paths stay as they are), height_m (of the radar "
          "in map), heading_deg (of the radar in map, -180 to 180), bearing_deg (of the arriving echo in map, -180 to "
          "180), time_s (after the session's first pose), amplitude_db (of the echo, 0 is the session's strongest), "
-         "foot_m (where the path meets its first upright face, along it, from the middle of the face's actor; other "
-         "paths stay as they are), standing_m (of the radar in the floor plan, from map's origin along bearing_deg) or "
-         "passing_m (at which the path passes x_m, y_m in the floor plan)";
+         "foot_m (where the path meets the law's actor, or else its first face, if upright, along it, from the middle "
+         "of "
+         "the face's actor; other paths stay as they are), standing_m (of the radar in the floor plan, from map's "
+         "origin "
+         "along bearing_deg), passing_m (at which the path passes x_m, y_m in the floor plan) or distance_m (of the "
+         "radar from x_m, y_m in the floor plan)";
 }
 
 LawVariable::LawVariable(const std::string& name, const About& about)
     : place_(about.x_m, about.y_m),
-      along_(std::cos(about.bearing_deg / kDegrees), std::sin(about.bearing_deg / kDegrees)) {
+      along_(std::cos(about.bearing_deg / kDegrees), std::sin(about.bearing_deg / kDegrees)),
+      actor_(about.actor) {
   const auto at = std::find(names().begin(), names().end(), name);
   if (at == names().end()) {
     std::string known;
@@ -93,9 +104,11 @@ LawVariable::Values LawVariable::of(const Where& where, const PathRecord& record
       if (!(where.strongest_amplitude > 0) || !(record.amplitude > 0)) return {};
       return {1, {20 * std::log10(record.amplitude / where.strongest_amplitude), 0}};
     case Kind::kFoot:
-      return foot(where, record);
+      return foot(where, record, actor_);
     case Kind::kStanding:
       return {1, {along_.dot(where.T_map_radar.translation().head<2>()), 0}};
+    case Kind::kDistance:
+      return {1, {(where.T_map_radar.translation().head<2>() - place_).norm(), 0}};
     case Kind::kPassing:
       break;
   }

@@ -513,9 +513,23 @@ TEST_F(Propagation, AnEmpiricalLawIsItsTable) {
   EXPECT_NEAR(turned.length_m[1] - turned.length_m[0], -paperRadar().rx_position_m[1].y() * std::sin(25 * kDegree),
               1e-5);
   EXPECT_EQ(look("  empirical_law: {variable: range_m, at: [0], gain_db: [-9], event: diffuse}\n").amplitude, base);
+  // Of two channels alone; the amplitude is the rms over all.
+  const PathRecord plain = look(""), second = look(
+                                         "  empirical_law: {variable: range_m, at: [2, 4], gain_db: [0, -12], "
+                                         "phase_deg: [0, 60], channels: [1, 5]}\n");
+  for (std::size_t k = 0; k < plain.c.size(); ++k) {
+    const Complex ratio = second.c[k] / plain.c[k];
+    const bool of_it = k == 1 || k == 5;
+    EXPECT_NEAR(db(std::abs(ratio)), of_it ? -6 : 0, 1e-9) << k;
+    EXPECT_NEAR(std::arg(ratio) / kDegree, of_it ? 30 : 0, 1e-9) << k;
+  }
+  EXPECT_NEAR(second.amplitude / base, std::sqrt((6 + 2 * std::pow(10, -0.6)) / 8), 1e-12);
   for (const char* bad :
        {"{variable: colour, at: [0], gain_db: [0]}", "{variable: range_m, at: [1, 1], gain_db: [0, 0]}",
-        "{variable: range_m, at: [0, 1], gain_db: [0]}", "{variable: range_m, at: [0]}"}) {
+        "{variable: range_m, at: [0, 1], gain_db: [0]}", "{variable: range_m, at: [0]}",
+        "{variable: range_m, at: [0], phase_deg: [1]}", "{variable: range_m, at: [0], delay_m: [0], channels: [1]}",
+        "{variable: range_m, at: [0], phase_deg: [1], channels: [8]}",
+        "{variable: range_m, at: [0], phase_deg: [1], channels: [0.5]}"}) {
     EXPECT_NE(errorOf([&] { look(std::string("  empirical_law: ") + bad + "\n"); }).find("empirical_law"),
               std::string::npos)
         << bad;
@@ -571,6 +585,7 @@ TEST_F(Propagation, LawVariablesReadPathAndSession) {
   EXPECT_NEAR(LawVariable("standing_m", {0, 0, 90}).of(where, record).of[0], 4, 1e-9);
   where.T_map_radar = Eigen::Isometry3d::Identity();
   EXPECT_NEAR(LawVariable("passing_m", {0, 3}).of(where, record).of[0], std::sqrt(4.5), 1e-9);
+  EXPECT_NEAR(LawVariable("distance_m", {3, -4}).of(where, record).of[0], 5, 1e-12);
   EXPECT_NE(errorOf([] { LawVariable("colour"); }).find("time_s"), std::string::npos);
 }
 

@@ -36,7 +36,7 @@ constexpr int kFolds = 5;
 constexpr double kFalseAlarm = 0.01;       ///< family-wise, per round
 constexpr std::size_t kFewestForLaws = 3;  ///< poses: of fewer only frames and channels are judged
 constexpr std::size_t kMostNames = 5;      ///< fits of one round
-constexpr std::size_t kMostLaws = 3;
+constexpr std::size_t kMostLaws = 4;
 constexpr double kWorthAFit = 4;  ///< nats promised
 constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kLonger[] = {1.5, 2};     ///< starts of a geometry
@@ -227,7 +227,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     tried.promised = s.promised;
     tried.gain = std::numeric_limits<double>::quiet_NaN();
     tried.round = round;
-    // A promise is a quadratic's and often far too small: names get several chances, laws without a name three.
+    // A promise is a quadratic's and often far too small: names get several chances, laws without a name four.
     const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
     const bool object = isObject(s.hypothesis);
     std::size_t& fitted = law ? laws_fitted : object ? objects_fitted : names_fitted;

@@ -9,10 +9,16 @@
 namespace mmradartwin {
 namespace {
 
-constexpr const char* kObservables[] = {"gain_db", "delay_m", "angle_deg"};
+constexpr const char* kObservables[] = {"gain_db", "delay_m", "angle_deg", "phase_deg"};
 constexpr std::size_t kMostInWords = 12;  ///< points of a law; of more, the extremes
 
 }  // namespace
+
+std::string channelsInWords(const NamedParameters& law) {
+  std::ostringstream out;
+  for (double k : law.values.numbers("channels")) out << (out.tellp() > 0 ? " " : " of channels ") << k;
+  return out.str();
+}
 
 std::string describeLaw(const Hypothesis& hypothesis, const NamedParameters& fitted) {
   std::ostringstream out;
@@ -30,11 +36,12 @@ std::string describeLaw(const Hypothesis& hypothesis, const NamedParameters& fit
     const std::vector<double>& values = fitted.values.numbers(observable);
     if (values.empty()) continue;
     out << observable << " of the echoes over " << variable;
-    if (variable == "passing_m") {
+    if (variable == "passing_m" || variable == "distance_m") {
       out << " from x_m " << fitted.values.number("x_m") << ", y_m " << fitted.values.number("y_m");
     }
     if (variable == "standing_m") out << " along bearing_deg " << fitted.values.number("bearing_deg");
     if (!fitted.values.text("actor").empty()) out << " of " << fitted.values.text("actor");
+    out << channelsInWords(fitted);
     if (!hypothesis.variant.empty()) out << " (" << hypothesis.variant << ")";
     if (values.size() > kMostInWords) {
       const auto [low, high] = std::minmax_element(values.begin(), values.end());

@@ -10,6 +10,8 @@ namespace mmradartwin {
 
 /// A fitted law in words and numbers; for a mechanism outside the catalogue its name and values.
 std::string describeLaw(const Hypothesis& hypothesis, const NamedParameters& fitted);
+/// " of channels 4 5", "" for an empirical_law of all of them.
+std::string channelsInWords(const NamedParameters& law);
 /// What to measure so that these candidates can be told apart.
 std::string experimentFor(const std::vector<CauseProbability>& candidates);
 

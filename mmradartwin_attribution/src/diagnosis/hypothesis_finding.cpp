@@ -64,8 +64,8 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   }
   FindingPlace place;
   if (scene.actorIndex(best.hypothesis.subject) >= 0) place.actors = {best.hypothesis.subject};
-  const bool of_place =
-      m.mechanism == "empirical_echo" || (m.mechanism == "empirical_law" && m.values.text("variable") == "passing_m");
+  const std::string variable = m.mechanism == "empirical_law" ? m.values.text("variable") : "";
+  const bool of_place = m.mechanism == "empirical_echo" || variable == "passing_m" || variable == "distance_m";
   if (f.cause == "actor_unmodelled" || of_place) {
     place.x_m = m.values.number("x_m");
     place.y_m = m.values.number("y_m");
@@ -121,7 +121,7 @@ bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure) {
   }
   if (name == "empirical_echo") return !explains_more;
   if (name == "echo_replica") return !explains_more && !fit.hypothesis.subject.empty();
-  return name == "transmission" && !sure;
+  return name == "transmission" && !sure && !fit.plain;
 }
 
 void believeAbsences(std::vector<HypothesisFit>& fits) {

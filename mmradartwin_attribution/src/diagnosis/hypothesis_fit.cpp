@@ -34,6 +34,8 @@ constexpr double kPrice = 5;  ///< nats per number, some inflation included: few
 
 // A law bends to all that a name leaves over, too: it takes the name's place where it explains half as much again.
 constexpr double kLawShare = 2.0 / 3;
+// One of channels bends to little else: with a single value it is an error of channels itself.
+constexpr double kChannelLawShare = 0.9;
 // Scenes are wrong by some 2 cm an actor: a move of less than three times that is no likely cause, and bends to much
 // that is another's (the corner with a wall that a cabinet stands too near to).
 constexpr double kLeastMove_m = 0.06;
@@ -77,8 +79,10 @@ std::size_t HypothesisFit::numbers() const {
 }
 
 double HypothesisFit::ranking() const {
-  const bool named = isCatalogued(hypothesis.mechanism.mechanism);
-  double nats = (named ? gain : kLawShare * gain) - kPrice * static_cast<double>(numbers());
+  const NamedParameters& m = hypothesis.mechanism;
+  const bool of_channels = m.mechanism == "empirical_law" && !m.values.numbers("channels").empty();
+  const double share = isCatalogued(m.mechanism) ? 1 : of_channels ? kChannelLawShare : kLawShare;
+  double nats = share * gain - kPrice * static_cast<double>(numbers());
   if (hypothesis.mechanism.mechanism == "actor_unmodelled") nats -= kSomewhere;
   if (hypothesis.mechanism.mechanism == "actor_moved" && moved_m() < kLeastMove_m) nats -= kPrice;
   return nats;

@@ -13,12 +13,14 @@
 #include <sstream>
 
 #include "echo_field.h"
+#include "empirical_hypothesis.h"
 #include "mmradartwin_sim/law_variable.h"
 
 namespace mmradartwin {
 namespace {
 
 constexpr double kDominant = 0.5;       ///< share of what a cell is expected to hold that a measured path has at least
+constexpr double kAlone = 0.7;          ///< the same of all that the channels hold, where these are compared
 constexpr double kLeastPower = 1e-5;    ///< of the pose's strongest path's
 constexpr double kFarthest_bins = 2.2;  ///< from where it is expected that a path is looked for
 constexpr double kHuber = 2;            ///< standard deviations from which on a path counts less
@@ -27,7 +29,9 @@ constexpr int kFine = 48;              ///< nodes of the finest table
 constexpr double kPricePerNumber = 4;  ///< nats, by which fewer numbers are preferred
 constexpr double kShortest = 3.5;      ///< fine steps in a ripple's period
 constexpr double kMostPeriods = 10;
-constexpr int kSectorStep = 2;  ///< fine steps between edges that are tried
+constexpr int kSectorStep = 2;       ///< fine steps between edges that are tried,
+constexpr double kFewestPlaces = 3;  ///< that tell of a sector or a bump
+constexpr int kNarrowestBump = 8;    ///< and between a bump's ends
 constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;
 constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4};
 constexpr int kBearings = 24;         ///< that half a turn is divided into
@@ -44,16 +48,42 @@ struct Observable {
   double floor;   ///< least scatter of a path that is believed
   bool constant;  ///< a constant of it is fitted along: the session's gain is free already
 };
-constexpr Observable kObservables[] = {{"gain_db", "dB", 2.0, 60, 10, 0.5, false},
-                                       {"delay_m", "m", 0.02, 1, 0.2, 0.003, true},
-                                       {"angle_deg", "deg", 1.0, 45, 10, 0.2, true}};
-constexpr int kKinds = 3;
+constexpr Observable kOfPaths[] = {{"gain_db", "dB", 2.0, 60, 10, 0.5, false},
+                                   {"delay_m", "m", 0.02, 1, 0.2, 0.003, true},
+                                   {"angle_deg", "deg", 1.0, 45, 10, 0.2, true}};
+// Of some channels against the others.
+constexpr Observable kOfChannels[] = {{"gain_db", "dB", 2.0, 60, 10, 0.2, true},
+                                      {"phase_deg", "deg", 10, 360, 60, 1, true}};
+enum Kind { kGain, kDelay, kAngle, kFirstOfChannels };
+const std::string kOfPlaces[] = {"passing_m", "distance_m"};
+const std::string kChannelVariables[] = {"range_m", "azimuth_deg", "time_s", "amplitude_db"};
+
+/// Channels that an error is likely to have in common: those of one transmitter, but the first one's, or one receiver.
+std::vector<std::vector<double>> channelGroups(const RadarConfig& radar) {
+  const int receivers = static_cast<int>(radar.rx_position_m.size());
+  std::vector<std::vector<double>> groups;
+  const auto add = [&](auto belongs) {
+    std::vector<double> group;
+    for (int k = 0; k < radar.channels(); ++k) {
+      if (belongs(k)) group.push_back(k);
+    }
+    if (static_cast<int>(group.size()) < radar.channels()) groups.push_back(std::move(group));
+  };
+  for (int t = 1; t * receivers < radar.channels(); ++t) {
+    add([=](int k) { return k / receivers == t; });
+  }
+  for (int r = 0; r < receivers; ++r) {
+    add([=](int k) { return k % receivers == r; });
+  }
+  return groups;
+}
 
 /// A path that stands out where it is expected, and how far off it is there.
 struct MeasuredPath {
-  PathRecord record;  ///< as received
-  double share = 1;   ///< of the cell's expected power: so much of a law on the path shows
-  double off[kKinds] = {0, 0, 0};
+  PathRecord record;        ///< as received
+  double share = 1;         ///< of the cell's expected power: so much of a law on the path shows
+  bool alone = false;       ///< its channels hold little else
+  std::vector<double> off;  ///< [kinds]
 };
 struct MeasuredPose {
   int location = 0;
@@ -63,7 +93,7 @@ struct MeasuredPose {
 
 /// One observable of all paths, in units of its scatter, robustly weighted.
 struct Sample {
-  Eigen::VectorXd off, weight;  // [P]
+  Eigen::VectorXd off, weight;  // [P], 0 where a path does not show it
   Eigen::MatrixXd latent;       // [P][G] a constant and the actors' errors
   Eigen::LDLT<Eigen::MatrixXd> latent_solver;
   Eigen::VectorXd latent_prior;  // [G] precision
@@ -73,6 +103,7 @@ struct Promise {
   double raw = 0;         ///< nats by which the law explains the paths
   double inflation = 1;   ///< of the scores' scatter over places
   Eigen::VectorXd value;  ///< of the directions, in the observable's unit
+  double constant = 0;    ///< beside them
 };
 
 class LawScreen {
@@ -84,9 +115,11 @@ class LawScreen {
     double bearing_deg = 0;            ///< of standing_m
   };
   std::optional<Screened> best(int kind, const Over& over) const;
+  int kinds() const { return static_cast<int>(kinds_.size()); }
   /// Over where the radar stands, along the direction that promises most.
   std::optional<Screened> bestBearing() const;
-  std::optional<Screened> bestPlace() const;
+  /// Over how near to a place paths pass, or the radar stands: the place that promises most.
+  std::optional<Screened> bestPlace(const std::string& variable) const;
   /// Actors of whom enough paths are measured for a law of their own.
   std::vector<std::string> oftenSeen() const;
 
@@ -101,14 +134,25 @@ class LawScreen {
   const SessionModel& model_;
   const ModelState& null_;
   std::vector<MeasuredPose> poses_;
-  std::vector<int> location_;    // [P]
-  std::vector<double> scatter_;  // [kKinds]
-  std::array<Sample, kKinds> samples_;
-  double whole_ = 1;  // poses of the session over those measured
+  std::vector<int> location_;  // [P]
+  struct KindOfLaw {
+    Observable observable;
+    std::vector<double> channels;  // all where none are given
+  };
+  std::vector<KindOfLaw> kinds_;
+  std::vector<double> scatter_;  // [kinds]
+  std::vector<Sample> samples_;  // [kinds]
+  double whole_ = 1;             // poses of the session over those measured
 };
 
 LawScreen::LawScreen(const Twin& base, const SessionModel& model, const ModelState& null, const std::vector<int>& poses)
-    : base_(base), model_(model), null_(null), scatter_(kKinds, 1.0) {
+    : base_(base), model_(model), null_(null) {
+  for (const Observable& o : kOfPaths) kinds_.push_back({o, {}});
+  for (const std::vector<double>& group : channelGroups(base.radar())) {
+    for (const Observable& o : kOfChannels) kinds_.push_back({o, group});
+  }
+  scatter_.assign(kinds_.size(), 1.0);
+  samples_.resize(kinds_.size());
   const Twin twin = base.changed(null.mechanisms);
   std::int64_t first_ns = model.data().poses.front().pose.stamp_ns;
   for (const PoseChannels& p : model.data().poses) first_ns = std::min(first_ns, p.pose.stamp_ns);
@@ -125,7 +169,7 @@ LawScreen::LawScreen(const Twin& base, const SessionModel& model, const ModelSta
   }
   for (MeasuredPose& p : poses_) p.where.strongest_amplitude = strongest_amplitude;
   whole_ = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
-  for (int kind = 0; kind < kKinds; ++kind) prepare(kind);
+  for (int kind = 0; kind < kinds(); ++kind) prepare(kind);
 }
 
 MeasuredPose LawScreen::measured(const Twin& twin, int pose, double session_s) const {
@@ -157,7 +201,9 @@ MeasuredPose LawScreen::measured(const Twin& twin, int pose, double session_s) c
     MeasuredPath path;
     path.share = std::min(1.0, own / all);
     if (path.share < kDominant) continue;
-    path.off[0] = 10 / std::log(10.0) * (std::log(std::norm(a.dot(data.y.col(bin))) / all) + path.share * latent);
+    path.alone = own >= kAlone * sigma.trace().real();
+    path.off.assign(kinds_.size(), 0.0);
+    path.off[kGain] = 10 / std::log(10.0) * (std::log(std::norm(a.dot(data.y.col(bin))) / all) + path.share * latent);
     // Where it peaks: of a Hann window's two highest bins the ratio tells.
     const auto height = [&](int k) { return k < 0 || k >= samples ? 0.0 : std::abs(a.dot(data.y.col(k))); };
     int peak = bin;
@@ -166,7 +212,7 @@ MeasuredPose LawScreen::measured(const Twin& twin, int pose, double session_s) c
     const double ratio = height(peak + side) / std::max(1e-30, height(peak));
     const double apart = peak + side * std::clamp((2 * ratio - 1) / (1 + ratio), -0.5, 0.5) - place;
     if (std::abs(apart) > kFarthest_bins) continue;
-    path.off[1] = apart * radar.range_bin_m();
+    path.off[kDelay] = apart * radar.range_bin_m();
     // And whence: phases between neighbours, turned back by what is expected.
     double turn = 0, information = 0;
     for (int k = 0; k + 1 < channels; ++k) {
@@ -176,7 +222,18 @@ MeasuredPose LawScreen::measured(const Twin& twin, int pose, double session_s) c
       information += span * span * std::abs(step);
     }
     const double cosine = std::max(0.2, std::hypot(r.departure.x(), r.departure.z()));
-    path.off[2] = information > 0 ? turn / information / cosine * 180 / M_PI : 0;
+    path.off[kAngle] = information > 0 ? turn / information / cosine * 180 / M_PI : 0;
+    for (int kind = kFirstOfChannels; kind < kinds(); kind += 2) {
+      const std::vector<double>& of = kinds_[static_cast<std::size_t>(kind)].channels;
+      std::complex<double> those = 0, others = 0;
+      for (int k = 0; k < channels; ++k) {
+        (std::count(of.begin(), of.end(), k) > 0 ? those : others) += data.y(k, peak) * std::conj(a[k]);
+      }
+      const double share_of = static_cast<double>(of.size()) / (channels - static_cast<double>(of.size()));
+      const std::complex<double> ratio = those * std::conj(others) / (share_of * std::norm(others) + 1e-300);
+      path.off[static_cast<std::size_t>(kind)] = 20 * std::log10(std::abs(ratio) + 1e-300);
+      path.off[static_cast<std::size_t>(kind) + 1] = std::arg(ratio) * 180 / M_PI;
+    }
     path.record = std::move(r);
     result.paths.push_back(std::move(path));
   }
@@ -184,30 +241,37 @@ MeasuredPose LawScreen::measured(const Twin& twin, int pose, double session_s) c
 }
 
 void LawScreen::prepare(int kind) {
-  const Observable& o = kObservables[kind];
+  const Observable& o = kinds_[static_cast<std::size_t>(kind)].observable;
   const Eigen::Index count = static_cast<Eigen::Index>(location_.size());
   const Eigen::Index actors = static_cast<Eigen::Index>(base_.scene().actors.size());
   Sample& s = samples_[static_cast<std::size_t>(kind)];
   s.off.resize(count);
+  Eigen::VectorXd shows(count);
   s.latent = Eigen::MatrixXd::Zero(count, 1 + actors);
   Eigen::Index at = 0;
   for (const MeasuredPose& pose : poses_) {
     for (const MeasuredPath& p : pose.paths) {
-      const double share = kind == 0 ? p.share : 1;
-      s.off[at] = p.off[kind];
+      const double share = kind == kGain ? p.share : 1;
+      s.off[at] = p.off[static_cast<std::size_t>(kind)];
+      shows[at] = kind < kAngle || p.alone ? 1 : 0;
       s.latent(at, 0) = share;
       for (int a : p.record.actors) {
-        if (a >= 0 && kind < 2) s.latent(at, 1 + a) += share;
+        if (a >= 0 && kind < kAngle) s.latent(at, 1 + a) += share;
       }
       ++at;
     }
   }
-  const double own = kind == 0 ? 10 / std::log(10.0) * model_.spread().actor_gain : model_.spread().actor_range_m;
-  s.weight = Eigen::VectorXd::Ones(count);
-  if (count == 0) return;
-  const auto median = [](Eigen::VectorXd v) {
-    std::nth_element(v.data(), v.data() + v.size() / 2, v.data() + v.size());
-    return v[v.size() / 2];
+  const double own = kind == kGain ? 10 / std::log(10.0) * model_.spread().actor_gain : model_.spread().actor_range_m;
+  s.weight = shows;
+  if (shows.sum() == 0) return;
+  const auto median = [&](const Eigen::VectorXd& of) {
+    std::vector<double> v;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      if (shows[i] > 0) v.push_back(of[i]);
+    }
+    const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
+    std::nth_element(v.begin(), middle, v.end());
+    return *middle;
   };
   double scatter = std::max(o.floor, 1.4826 * median((s.off.array() - median(s.off)).abs().matrix()));
   Eigen::MatrixXd information;
@@ -220,7 +284,7 @@ void LawScreen::prepare(int kind) {
     const Eigen::VectorXd rest =
         s.off - s.latent * s.latent_solver.solve(s.latent.transpose() * s.weight.cwiseProduct(s.off));
     scatter = std::max(o.floor, 1.4826 * median(rest.cwiseAbs()));
-    s.weight = (kHuber * scatter / rest.array().abs().max(1e-12)).min(1.0).matrix();
+    s.weight = shows.cwiseProduct((kHuber * scatter / rest.array().abs().max(1e-12)).min(1.0).matrix());
   }
   information = s.latent.transpose() * s.weight.asDiagonal() * s.latent;
   information.diagonal() += s.latent_prior;
@@ -231,12 +295,13 @@ void LawScreen::prepare(int kind) {
 Promise LawScreen::promise(int kind, const Eigen::MatrixXd& directions) const {
   const Sample& s = samples_[static_cast<std::size_t>(kind)];
   const double scatter = scatter_[static_cast<std::size_t>(kind)];
+  const double usual = kinds_[static_cast<std::size_t>(kind)].observable.usual;
   const Eigen::Index n = directions.cols();
   // Latents eliminated: what of a direction they cannot follow.
   const Eigen::MatrixXd weighted = s.weight.asDiagonal() * directions;
   const Eigen::MatrixXd follow = s.latent_solver.solve(s.latent.transpose() * weighted);  // [G][K]
   Eigen::MatrixXd information = directions.transpose() * weighted - (weighted.transpose() * s.latent) * follow;
-  information.diagonal().array() += std::pow(scatter / kObservables[kind].usual, 2);
+  information.diagonal().array() += std::pow(scatter / usual, 2);
   const Eigen::VectorXd latents = s.latent_solver.solve(s.latent.transpose() * s.weight.cwiseProduct(s.off));
   const Eigen::VectorXd before = s.off - s.latent * latents;
   const Eigen::VectorXd total = weighted.transpose() * before;
@@ -245,12 +310,12 @@ Promise LawScreen::promise(int kind, const Eigen::MatrixXd& directions) const {
   p.value = solver.solve(total);
   const Eigen::VectorXd latents_after = latents - follow * p.value;
   const Eigen::VectorXd after = s.off - s.latent * latents_after - directions * p.value;
+  p.constant = latents_after[0];
   const auto squares = [&](const Eigen::VectorXd& rest, const Eigen::VectorXd& latent) {
     return rest.dot(s.weight.cwiseProduct(rest)) + latent.cwiseProduct(s.latent_prior).dot(latent);
   };
   // The scatter is as free as the law: its likelihood's maximum.
-  const double left =
-      squares(after, latents_after) + std::pow(scatter / kObservables[kind].usual, 2) * p.value.squaredNorm();
+  const double left = squares(after, latents_after) + std::pow(scatter / usual, 2) * p.value.squaredNorm();
   p.raw = whole_ * 0.5 * s.weight.sum() * std::log(std::max(1.0, squares(before, latents) / left));
   const double locations = static_cast<double>(model_.data().locations.size());
   if (locations > 1) {
@@ -267,7 +332,7 @@ Promise LawScreen::promise(int kind, const Eigen::MatrixXd& directions) const {
 }
 
 Hypothesis LawScreen::law(int kind, const Over& over, const std::vector<double>& at) const {
-  const Observable& o = kObservables[kind];
+  const auto& [o, channels] = kinds_[static_cast<std::size_t>(kind)];
   Hypothesis h;
   h.mechanism = defaultMechanism("empirical_law");
   h.mechanism.values.set("variable", over.variable);
@@ -275,7 +340,9 @@ Hypothesis LawScreen::law(int kind, const Over& over, const std::vector<double>&
   h.mechanism.values.set(o.parameter, std::vector<double>(at.size(), 0.0));
   h.mechanism.values.set("actor", over.actor);
   h.mechanism.values.set("bearing_deg", over.bearing_deg);
-  h.subject = std::string(o.parameter) + " over " + over.variable + (over.actor.empty() ? "" : " of " + over.actor);
+  h.mechanism.values.set("channels", channels);
+  h.subject = std::string(o.parameter) + " over " + over.variable + (over.actor.empty() ? "" : " of " + over.actor) +
+              channelsInWords(h.mechanism);
   return h;
 }
 
@@ -320,9 +387,9 @@ std::vector<double> evenNodes(const std::vector<double>& sorted, int count) {
 
 std::optional<Screened> LawScreen::best(int kind, const Over& over) const {
   const std::string& variable = over.variable;
-  const LawVariable of(variable, {0, 0, over.bearing_deg});
   const int actor = base_.scene().actorIndex(over.actor);
-  const Observable& o = kObservables[kind];
+  const LawVariable of(variable, {0, 0, over.bearing_deg, actor});
+  const Observable& o = kinds_[static_cast<std::size_t>(kind)].observable;
   std::vector<LawVariable::Values> values;
   std::vector<double> all;
   for (const MeasuredPose& pose : poses_) {
@@ -370,7 +437,10 @@ std::optional<Screened> LawScreen::best(int kind, const Over& over) const {
     result.promised = p.raw / p.inflation - 0.5 * (numbers + searched);
     result.starts = {{}};
     for (std::size_t k = 0; k < result.hypothesis.coordinates.size(); ++k) {
-      result.starts.front().push_back(std::clamp(p.value[static_cast<Eigen::Index>(k)] / o.typical, -8.0, 8.0));
+      // Of a curve all values have the constant, of another shape the first one is it.
+      const bool has_constant = o.constant && (k == 0 || result.hypothesis.variant.empty());
+      const double value = p.value[static_cast<Eigen::Index>(k)] + (has_constant ? p.constant : 0);
+      result.starts.front().push_back(std::clamp(value / o.typical, -8.0, 8.0));
     }
   };
   // Curves of a few nodes.
@@ -414,6 +484,7 @@ std::optional<Screened> LawScreen::best(int kind, const Over& over) const {
     }
     return h;
   };
+  if (kind >= kFirstOfChannels) return best > 0 ? std::optional<Screened>(result) : std::nullopt;
   const std::vector<double> ones(kFine, 1.0);
   const auto columns = [&](const std::vector<std::vector<double>>& shapes) {
     Eigen::MatrixXd m(kFine, static_cast<Eigen::Index>(shapes.size()));
@@ -422,13 +493,12 @@ std::optional<Screened> LawScreen::best(int kind, const Over& over) const {
     }
     return m;
   };
-  // Ripples: over an azimuth in its sine, as interference at an aperture goes.
-  const bool in_sine = variable == "azimuth_deg";
-  const auto place = [&](double x) { return in_sine ? std::sin(x * M_PI / 180) : x; };
-  const double span = place(high) - place(low);
-  const double shortest =
-      std::max(kShortest * (high - low) / (kFine - 1) * (in_sine ? M_PI / 180 : 1), span / kMostPeriods);
-  if (!turns) {
+  // Ripples: over an azimuth in its sine, too, as interference at an aperture goes.
+  const auto ripples = [&](bool in_sine) {
+    const auto place = [&](double x) { return in_sine ? std::sin(x * M_PI / 180) : x; };
+    const double span = place(high) - place(low);
+    const double shortest =
+        std::max(kShortest * (high - low) / (kFine - 1) * (in_sine ? M_PI / 180 : 1), span / kMostPeriods);
     for (double periods = 1; span / periods > shortest; periods += 0.25) {
       std::vector<std::vector<double>> shapes;
       if (o.constant) shapes.push_back(ones);
@@ -444,22 +514,39 @@ std::optional<Screened> LawScreen::best(int kind, const Over& over) const {
         return shaped(fine, shapes, expression.str());
       });
     }
-  }
-  // Sectors, steps among them.
+  };
+  if (!turns) ripples(false);
+  if (variable == "azimuth_deg") ripples(true);
+  // How many places tell of a shape, each by its paths' share in it.
+  const auto places = [&](const std::vector<double>& shape) {
+    const Eigen::VectorXd direction = basis * Eigen::Map<const Eigen::VectorXd>(shape.data(), kFine);
+    Eigen::VectorXd by_location = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model_.data().locations.size()));
+    for (Eigen::Index i = 0; i < direction.size(); ++i) {
+      by_location[location_[static_cast<std::size_t>(i)]] += s.weight[i] * direction[i] * direction[i];
+    }
+    return std::pow(by_location.sum(), 2) / std::max(1e-300, by_location.squaredNorm());
+  };
+  // Sectors, steps among them, and bumps.
+  const auto between = [&](int from, int to, bool bump) {
+    std::vector<double> shape(kFine, 0.0);
+    for (int i = from; i < to; ++i) {
+      shape[static_cast<std::size_t>(i)] = bump ? 0.5 - 0.5 * std::cos(2 * M_PI * (i - from + 1) / (to - from + 1)) : 1;
+    }
+    if (places(shape) < kFewestPlaces) return;
+    std::vector<std::vector<double>> shapes;
+    if (o.constant) shapes.push_back(ones);
+    shapes.push_back(std::move(shape));
+    offer(columns(shapes), 1, from == 0 || to >= kFine ? 1 : 2, [&] {
+      std::ostringstream expression;
+      expression << std::setprecision(3) << (bump ? "a bump from " : "one value from ")
+                 << fine[static_cast<std::size_t>(from)] << " to " << fine[static_cast<std::size_t>(to - 1)];
+      return shaped(fine, shapes, expression.str());
+    });
+  };
   for (int from = 0; from < kFine; from += kSectorStep) {
     for (int to = from + kSectorStep; to <= kFine; to += kSectorStep) {
-      if (from == 0 && to >= kFine) continue;
-      std::vector<double> sector(kFine, 0.0);
-      std::fill(sector.begin() + from, sector.begin() + to, 1.0);
-      std::vector<std::vector<double>> shapes;
-      if (o.constant) shapes.push_back(ones);
-      shapes.push_back(sector);
-      offer(columns(shapes), 1, from == 0 || to >= kFine ? 1 : 2, [&] {
-        std::ostringstream expression;
-        expression << std::setprecision(3) << "one value from " << fine[static_cast<std::size_t>(from)] << " to "
-                   << fine[static_cast<std::size_t>(to - 1)];
-        return shaped(fine, shapes, expression.str());
-      });
+      if (from > 0 || to < kFine) between(from, to, false);
+      if (to - from >= kNarrowestBump) between(from, to, true);
     }
   }
   if (!(best > 0)) return std::nullopt;
@@ -485,7 +572,7 @@ std::vector<std::string> LawScreen::oftenSeen() const {
 std::optional<Screened> LawScreen::bestBearing() const {
   std::optional<Screened> best_of_all;
   for (int i = 0; i < kBearings; ++i) {
-    std::optional<Screened> s = best(0, {"standing_m", "", 180.0 * i / kBearings});
+    std::optional<Screened> s = best(kGain, {"standing_m", "", 180.0 * i / kBearings});
     if (s && (!best_of_all || s->promised > best_of_all->promised)) best_of_all = std::move(s);
   }
   if (best_of_all) {
@@ -495,17 +582,17 @@ std::optional<Screened> LawScreen::bestBearing() const {
   return best_of_all;
 }
 
-std::optional<Screened> LawScreen::bestPlace() const {
+std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const {
   if (location_.empty()) return std::nullopt;
   Eigen::AlignedBox3d bounds;
   for (const Actor& a : base_.scene().actors) bounds.extend(a.bounds);
-  const Observable& o = kObservables[0];
+  const Observable& o = kOfPaths[kGain];
   struct Spot {
     double x_m = 0, y_m = 0, radius_m = 0;
     Promise promise;
   };
   const auto spotAt = [&](double x_m, double y_m, double radius_m) {
-    const LawVariable passing("passing_m", {x_m, y_m});
+    const LawVariable passing(variable, {x_m, y_m});
     Eigen::MatrixXd direction(static_cast<Eigen::Index>(location_.size()), 1);
     Eigen::Index at = 0;
     for (const MeasuredPose& pose : poses_) {
@@ -514,7 +601,7 @@ std::optional<Screened> LawScreen::bestPlace() const {
         direction(at++, 0) = v.count > 0 ? p.share * std::max(0.0, 1 - v.of[0] / radius_m) : 0;
       }
     }
-    return Spot{x_m, y_m, radius_m, promise(0, direction)};
+    return Spot{x_m, y_m, radius_m, promise(kGain, direction)};
   };
   std::vector<Spot> spots;
   for (double x = bounds.min().x() + 0.5 * kPlanGrid_m; x < bounds.max().x(); x += kPlanGrid_m) {
@@ -546,7 +633,7 @@ std::optional<Screened> LawScreen::bestPlace() const {
   const double nats = best.promise.raw / best.promise.inflation;
   if (!(nats > kPricePerNumber * 4)) return std::nullopt;
   Screened result;
-  result.hypothesis = law(0, {"passing_m"}, {0, best.radius_m});
+  result.hypothesis = law(kGain, {variable}, {0, best.radius_m});
   result.hypothesis.mechanism.values.set("x_m", best.x_m);
   result.hypothesis.mechanism.values.set("y_m", best.y_m);
   result.hypothesis.coordinates = {{o.parameter, o.unit, 0, 0, o.typical, -o.limit, o.limit}};
@@ -566,17 +653,30 @@ std::vector<Screened> screenLaws(const Twin& base, const SessionModel& model, co
   }
   if (poses.empty()) return result;
   const LawScreen screen(base, model, null, poses);
-  for (int kind = 0; kind < kKinds; ++kind) {
+  for (int kind = 0; kind < kFirstOfChannels; ++kind) {
     for (const std::string& variable : LawVariable::names()) {
-      if (variable == "passing_m" || variable == "standing_m") continue;
+      if (variable == "standing_m" || std::count(std::begin(kOfPlaces), std::end(kOfPlaces), variable) > 0) continue;
       if (auto s = screen.best(kind, {variable})) result.push_back(std::move(*s));
     }
   }
+  // An error of directions looks like one of each channel: the best stands for all.
+  for (const std::string& variable : kChannelVariables) {
+    std::optional<Screened> best;
+    for (int kind = kFirstOfChannels; kind < screen.kinds(); ++kind) {
+      std::optional<Screened> s = screen.best(kind, {variable});
+      if (s && (!best || s->promised > best->promised)) best = std::move(s);
+    }
+    if (best) result.push_back(std::move(*best));
+  }
   for (const std::string& actor : screen.oftenSeen()) {
-    if (auto s = screen.best(0, {"foot_m", actor})) result.push_back(std::move(*s));
+    for (const char* variable : {"foot_m", "time_s"}) {
+      if (auto s = screen.best(kGain, {variable, actor})) result.push_back(std::move(*s));
+    }
   }
   if (auto s = screen.bestBearing()) result.push_back(std::move(*s));
-  if (auto s = screen.bestPlace()) result.push_back(std::move(*s));
+  for (const std::string& variable : kOfPlaces) {
+    if (auto s = screen.bestPlace(variable)) result.push_back(std::move(*s));
+  }
   std::stable_sort(result.begin(), result.end(),
                    [](const Screened& a, const Screened& b) { return a.promised > b.promised; });
   return result;

@@ -106,6 +106,7 @@ std::optional<Screened> namedSlope(const Screened& law, const Parameters& values
 std::optional<Screened> namedLike(const Screened& law, const std::vector<Hypothesis>& all) {
   if (law.hypothesis.mechanism.mechanism != "empirical_law" || law.starts.empty()) return std::nullopt;
   const Parameters values = law.hypothesis.at(law.starts.front()).values;
+  if (!values.numbers("channels").empty() || !values.text("actor").empty()) return std::nullopt;
   if (std::optional<Screened> slope = namedSlope(law, values, all)) return slope;
   const std::vector<double>&at = values.numbers("at"), &delay_m = values.numbers("delay_m");
   const std::string& variable = values.text("variable");

@@ -15,8 +15,9 @@ class LawVariable {
  public:
   /// What the variables that have a place or a direction are about.
   struct About {
-    double x_m = 0, y_m = 0;  ///< in map, of passing_m
+    double x_m = 0, y_m = 0;  ///< in map, of passing_m and distance_m
     double bearing_deg = 0;   ///< in map, of standing_m
+    int actor = -1;           ///< whose face foot_m is along, -1 for that of the first
   };
   /// Throws InputError for a name that is none of names().
   explicit LawVariable(const std::string& name, const About& about);
@@ -51,10 +52,12 @@ class LawVariable {
     kAmplitude,
     kFoot,
     kStanding,
-    kPassing
+    kPassing,
+    kDistance
   };
   Kind kind_;
   Eigen::Vector2d place_, along_;
+  int actor_;
 };
 
 }  // namespace mmradartwin

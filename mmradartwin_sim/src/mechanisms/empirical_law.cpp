@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <optional>
 
 #include "mmradartwin_dsp/input_error.h"
@@ -11,8 +12,8 @@ namespace {
 
 const std::string kName = "empirical_law";
 
-/// A law that was read off the data and has no name: gain, delay or angle of paths, tabulated over one variable.
-/// Between the table's points it is linear, beyond its ends constant.
+/// A law that was read off the data and has no name: gain, delay or angle of paths, or gain and phase of some virtual
+/// channels, tabulated over one variable. Between the table's points it is linear, beyond its ends constant.
 class EmpiricalLaw : public Mechanism {
  public:
   const std::string& name() const override { return kName; }
@@ -26,8 +27,11 @@ class EmpiricalLaw : public Mechanism {
         optionalNumbersSpec("gain_db", "dB", -200, 200, "of the echo, per point"),
         optionalNumbersSpec("delay_m", "m", -10, 10, "added to the one-way range, per point"),
         optionalNumbersSpec("angle_deg", "deg", -90, 90, "added to azimuths of departure and arrival, per point"),
-        numberSpec("x_m", "m", -1e4, 1e4, 0, "place in map that passing_m is about"),
-        numberSpec("y_m", "m", -1e4, 1e4, 0, "place in map that passing_m is about"),
+        optionalNumbersSpec("phase_deg", "deg", -1e4, 1e4, "of the echo in channels, per point"),
+        optionalNumbersSpec("channels", "1", 0, 1e4,
+                            "virtual channels that gain_db and phase_deg are of, from 0; all where none are given"),
+        numberSpec("x_m", "m", -1e4, 1e4, 0, "place in map that passing_m and distance_m are about"),
+        numberSpec("y_m", "m", -1e4, 1e4, 0, "place in map that passing_m and distance_m are about"),
         numberSpec("bearing_deg", "deg", -360, 360, 0, "direction in map that standing_m is along"),
         textSpec("actor", false, "", "only paths that meet this actor"),
         textSpec("material", false, "", "only paths that meet this material"),
@@ -35,9 +39,7 @@ class EmpiricalLaw : public Mechanism {
     for (ParameterSpec& s : all) s = weighing(s);
     return all;
   }
-  void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
-    variable_.emplace(values.text("variable"),
-                      LawVariable::About{values.number("x_m"), values.number("y_m"), values.number("bearing_deg")});
+  void configure(const Parameters& values, const Scene& scene, const RadarConfig& radar) override {
     by_amplitude_ = values.text("variable") == "amplitude_db";
     at_ = values.numbers("at");
     if (at_.empty() || std::adjacent_find(at_.begin(), at_.end(), std::greater_equal<double>()) != at_.end()) {
@@ -46,9 +48,26 @@ class EmpiricalLaw : public Mechanism {
     gain_db_ = column(values, "gain_db");
     delay_m_ = column(values, "delay_m");
     angle_deg_ = column(values, "angle_deg");
-    if (gain_db_.empty() && delay_m_.empty() && angle_deg_.empty()) {
+    phase_deg_ = column(values, "phase_deg");
+    if (gain_db_.empty() && delay_m_.empty() && angle_deg_.empty() && phase_deg_.empty()) {
       throw InputError(
-          "mechanism empirical_law: gives no law; add gain_db, delay_m or angle_deg, one number per point");
+          "mechanism empirical_law: gives no law; add gain_db, delay_m, angle_deg or, with channels, phase_deg, one "
+          "number per point");
+    }
+    channels_.clear();
+    for (double k : values.numbers("channels")) {
+      if (k != std::floor(k) || k >= radar.channels()) {
+        throw InputError("mechanism empirical_law: key channels: " + std::to_string(k) +
+                         " is no virtual channel; allowed: 0 to " + std::to_string(radar.channels() - 1));
+      }
+      channels_.push_back(static_cast<std::size_t>(k));
+    }
+    const bool of_channels = !gain_db_.empty() || !phase_deg_.empty(),
+               of_all = !delay_m_.empty() || !angle_deg_.empty();
+    if (channels_.empty() ? !phase_deg_.empty() : of_all || !of_channels) {
+      throw InputError(
+          "mechanism empirical_law: phase_deg needs channels, and channels take gain_db and phase_deg alone; give "
+          "delay_m and angle_deg as a law of their own");
     }
     event_ = values.text("event");
     affected_.clear();
@@ -58,6 +77,9 @@ class EmpiricalLaw : public Mechanism {
       affected_.assign(scene.actors.size(), false);
       affected_[requireActor(scene, kName, values.text("actor"))] = true;
     }
+    variable_.emplace(values.text("variable"),
+                      LawVariable::About{values.number("x_m"), values.number("y_m"), values.number("bearing_deg"),
+                                         scene.actorIndex(values.text("actor"))});
   }
   int rank() const override { return -1; }  // on geometry's lengths and angles
   void reweight(const PoseContext& context, PathRecord& record) const override {
@@ -70,7 +92,13 @@ class EmpiricalLaw : public Mechanism {
         {context.scene, context.T_map_radar, context.session_s, by_amplitude_ ? context.strongest_amplitude() : 0},
         record);
     if (x.count == 0) return;
-    if (!gain_db_.empty()) scaleRecord(std::pow(10.0, look(gain_db_, x) / 20), record);
+    if (!channels_.empty()) {
+      const double gain_db = gain_db_.empty() ? 0 : look(gain_db_, x);
+      const double phase_deg = phase_deg_.empty() ? 0 : look(phase_deg_, x);
+      scaleChannels(std::polar(std::pow(10.0, gain_db / 20), phase_deg * M_PI / 180), record);
+    } else if (!gain_db_.empty()) {
+      scaleRecord(std::pow(10.0, look(gain_db_, x) / 20), record);
+    }
     if (!angle_deg_.empty()) turn(context.radar, look(angle_deg_, x) * M_PI / 180, record);
     if (!delay_m_.empty()) lengthen(context.radar, 2 * look(delay_m_, x), record);
   }
@@ -100,6 +128,16 @@ class EmpiricalLaw : public Mechanism {
     return sum / x.count;
   }
 
+  /// The amplitude stays the rms over all channels.
+  void scaleChannels(std::complex<double> factor, PathRecord& record) const {
+    double before = 0, after = 0;
+    for (const auto& c : record.c) before += std::norm(c);
+    for (std::size_t k : channels_) record.c[k] *= factor;
+    for (const auto& c : record.c) after += std::norm(c);
+    if (before > 0) record.amplitude *= std::sqrt(after / before);
+    record.phase_rad = std::arg(record.c[0]);
+  }
+
   /// Turns both directions about the radar's z; the ways of the elements change as those of a plane wave do.
   static void turn(const RadarConfig& radar, double angle_rad, PathRecord& record) {
     const Eigen::AngleAxisd R(angle_rad, Eigen::Vector3d::UnitZ());
@@ -118,7 +156,8 @@ class EmpiricalLaw : public Mechanism {
   std::optional<LawVariable> variable_;
   bool by_amplitude_ = false;
   std::string event_;
-  std::vector<double> at_, gain_db_, delay_m_, angle_deg_;
+  std::vector<double> at_, gain_db_, delay_m_, angle_deg_, phase_deg_;
+  std::vector<std::size_t> channels_;
   std::vector<bool> affected_;
 };
 
