@@ -176,6 +176,29 @@ class HiddenEffects(unittest.TestCase):
         swing_db = max(law["gain_db"]) - min(law["gain_db"])
         self.assertAlmostEqual(swing_db, 2 * truth["swing_db"], delta=3, msg=f"seed {seed}")
 
+    def test_a_mount_that_settles_is_unknown(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "44"))
+        mechanism, truth = self.unknown(seed, {"settling_mount": {}})
+        law = mechanism["empirical_law"]
+        self.assertEqual(law["variable"], "time_s", msg=f"seed {seed}")
+        swing_deg = law["angle_deg"][-1] - law["angle_deg"][0]  # an echo seen from a radar turned left stands right
+        self.assertAlmostEqual(swing_deg, truth["turned_deg"], delta=1, msg=f"seed {seed}")
+
+    def test_a_transmitter_whose_phase_goes_with_range_is_unknown(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "45"))
+        mechanism, truth = self.unknown(seed, {"transmitter_skew": {}})
+        law = mechanism["empirical_law"]
+        self.assertEqual((law["variable"], law["channels"]), ("range_m", [4, 5, 6, 7]), msg=f"seed {seed}")
+        slope = (law["phase_deg"][-1] - law["phase_deg"][0]) / (law["at"][-1] - law["at"][0])
+        self.assertAlmostEqual(slope, truth["deg_per_m"], delta=1, msg=f"seed {seed}")
+
+    def test_a_wall_that_dries_is_unknown(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "46"))
+        mechanism, truth = self.unknown(seed, {"drying_wall": {"actor": "wall_west"}}, strength=1.4)
+        law = mechanism["empirical_law"]
+        self.assertEqual((law["variable"], law["actor"]), ("time_s", truth["actor"]), msg=f"seed {seed}")
+        self.assertAlmostEqual(law["gain_db"][-1] - law["gain_db"][0], truth["rise_db"], delta=4, msg=f"seed {seed}")
+
     def test_transmitters_that_are_heard_in_each_others_slots_are_unknown(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "43"))
         mechanism, truth = self.unknown(seed, {"slot_crosstalk": {}})

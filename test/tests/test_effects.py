@@ -466,6 +466,24 @@ class OutsideTheCatalogue(WithBaseline):
         for _, path, gain in self.gains("compression", strength=1.0, reference=abs(1e-5)):
             self.assertAlmostEqual(gain, -20 * math.log10(1 + abs(path.coefficient) / 1e-5), places=6)
 
+    def test_laws_of_time_and_channels(self):
+        measurement, pairs = self.echoes_of(make_effect("transmitter_skew", {"deg_per_m": 20.0}))
+        for ours, base in pairs:
+            phase_deg = 360 * (ours.lengths_m - base.lengths_m) / measurement.radar.wavelength_m
+            np.testing.assert_allclose(phase_deg[:, :4], 0, atol=1e-9)
+            np.testing.assert_allclose(phase_deg[:, 4:], np.tile(10 * base.lengths_m[:, :1], 4), rtol=1e-9)
+        measurement, _ = measure(make_effect("settling_mount", {"turned_deg": 3.0, "share_of_session": 1.0}))
+        plain = measure()[0]
+        for station, as_thought, share in ((0, 0, 1.0), (-1, -1, math.exp(-1))):
+            turned = plain.stations[as_thought].true.rotation.T @ measurement.stations[station].true.rotation
+            self.assertAlmostEqual(math.degrees(math.atan2(turned[1, 0], turned[0, 0])), 3 * share, places=6)
+        gains = list(self.gains("drying_wall", actor="wall_east", rise_db=8.0))
+        first, last = gains[0][0].stamp_ns, gains[-1][0].stamp_ns
+        for station, path, gain in gains:
+            along = (station.stamp_ns - first) / (last - first)
+            met = measurement.described_room.actor_index("wall_east") in path.actors
+            self.assertAlmostEqual(gain, 8 * (along - 0.5) if met else 0, places=6)
+
     def test_range_bump_is_a_parabola(self):
         inside = 0
         for _, path, gain in self.gains("range_bump", bump_db=5.0, center_m=3.0, half_width_m=1.5):

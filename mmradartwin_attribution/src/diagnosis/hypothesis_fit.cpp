@@ -34,8 +34,9 @@ constexpr double kPrice = 5;  ///< nats per number, some inflation included: few
 
 // A law bends to all that a name leaves over, too: it takes the name's place where it explains half as much again.
 constexpr double kLawShare = 2.0 / 3;
-// One of channels bends to little else: with a single value it is an error of channels itself.
-constexpr double kChannelLawShare = 0.9;
+// One of channels or of directions holds the name that looks like it as its constant: where that is the cause, it gains
+// little more.
+constexpr double kNestingLawShare = 0.9;
 // Scenes are wrong by some 2 cm an actor: a move of less than three times that is no likely cause, and bends to much
 // that is another's (the corner with a wall that a cabinet stands too near to).
 constexpr double kLeastMove_m = 0.06;
@@ -80,8 +81,9 @@ std::size_t HypothesisFit::numbers() const {
 
 double HypothesisFit::ranking() const {
   const NamedParameters& m = hypothesis.mechanism;
-  const bool of_channels = m.mechanism == "empirical_law" && !m.values.numbers("channels").empty();
-  const double share = isCatalogued(m.mechanism) ? 1 : of_channels ? kChannelLawShare : kLawShare;
+  const bool nests = m.mechanism == "empirical_law" &&
+                     !(m.values.numbers("channels").empty() && m.values.numbers("angle_deg").empty());
+  const double share = isCatalogued(m.mechanism) ? 1 : nests ? kNestingLawShare : kLawShare;
   double nats = share * gain - kPrice * static_cast<double>(numbers());
   if (hypothesis.mechanism.mechanism == "actor_unmodelled") nats -= kSomewhere;
   if (hypothesis.mechanism.mechanism == "actor_moved" && moved_m() < kLeastMove_m) nats -= kPrice;

@@ -29,9 +29,10 @@ constexpr int kFine = 48;              ///< nodes of the finest table
 constexpr double kPricePerNumber = 4;  ///< nats, by which fewer numbers are preferred
 constexpr double kShortest = 3.5;      ///< fine steps in a ripple's period
 constexpr double kMostPeriods = 10;
-constexpr int kSectorStep = 2;       ///< fine steps between edges that are tried,
-constexpr double kFewestPlaces = 3;  ///< that tell of a sector or a bump
-constexpr int kNarrowestBump = 8;    ///< and between a bump's ends
+constexpr double kSettling[] = {0.05, 0.1, 0.2, 0.4};  ///< of the variable's span, in which an exponential falls by e
+constexpr int kSectorStep = 2;                         ///< fine steps between edges that are tried,
+constexpr double kFewestPlaces = 3;                    ///< that tell of a sector or a bump
+constexpr int kNarrowestBump = 8;                      ///< and between a bump's ends
 constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;
 constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4};
 constexpr int kBearings = 24;         ///< that half a turn is divided into
@@ -50,11 +51,13 @@ struct Observable {
 };
 constexpr Observable kOfPaths[] = {{"gain_db", "dB", 2.0, 60, 10, 0.5, false},
                                    {"delay_m", "m", 0.02, 1, 0.2, 0.003, true},
-                                   {"angle_deg", "deg", 1.0, 45, 10, 0.2, true}};
+                                   {"angle_deg", "deg", 1.0, 45, 10, 0.2, true},
+                                   {"angle_deg", "deg", 1.0, 45, 10, 0.1, true}};
 // Of some channels against the others.
 constexpr Observable kOfChannels[] = {{"gain_db", "dB", 2.0, 60, 10, 0.2, true},
                                       {"phase_deg", "deg", 10, 360, 60, 1, true}};
-enum Kind { kGain, kDelay, kAngle, kFirstOfChannels };
+enum Kind { kGain, kDelay, kAngle, kAngleOfPose, kFirstOfChannels };
+const std::string kPoseVariables[] = {"time_s", "heading_deg", "height_m"};  ///< alike for all paths of a pose
 const std::string kOfPlaces[] = {"passing_m", "distance_m"};
 const std::string kChannelVariables[] = {"range_m", "azimuth_deg", "time_s", "amplitude_db"};
 
@@ -222,6 +225,7 @@ MeasuredPose LawScreen::measured(const Twin& twin, int pose, double session_s) c
       information += span * span * std::abs(step);
     }
     const double cosine = std::max(0.2, std::hypot(r.departure.x(), r.departure.z()));
+    path.off[kAngleOfPose] = -null_.nuisance.yaw_rad[static_cast<std::size_t>(pose)] * 180 / M_PI;
     path.off[kAngle] = information > 0 ? turn / information / cosine * 180 / M_PI : 0;
     for (int kind = kFirstOfChannels; kind < kinds(); kind += 2) {
       const std::vector<double>& of = kinds_[static_cast<std::size_t>(kind)].channels;
@@ -253,7 +257,8 @@ void LawScreen::prepare(int kind) {
     for (const MeasuredPath& p : pose.paths) {
       const double share = kind == kGain ? p.share : 1;
       s.off[at] = p.off[static_cast<std::size_t>(kind)];
-      shows[at] = kind < kAngle || p.alone ? 1 : 0;
+      // What a pose's likelihood has found of its heading is one number, however many paths it has.
+      shows[at] = kind == kAngleOfPose ? 1 / static_cast<double>(pose.paths.size()) : kind < kAngle || p.alone ? 1 : 0;
       s.latent(at, 0) = share;
       for (int a : p.record.actors) {
         if (a >= 0 && kind < kAngle) s.latent(at, 1 + a) += share;
@@ -517,6 +522,25 @@ std::optional<Screened> LawScreen::best(int kind, const Over& over) const {
   };
   if (!turns) ripples(false);
   if (variable == "azimuth_deg") ripples(true);
+  // What settles, or grows, exponentially.
+  for (double share : kSettling) {
+    for (bool grows : {false, true}) {
+      if (turns) break;
+      std::vector<double> shape;
+      for (int i = 0; i < kFine; ++i) {
+        shape.push_back(std::exp(-(grows ? kFine - 1 - i : i) / (share * (kFine - 1))));
+      }
+      std::vector<std::vector<double>> shapes;
+      if (o.constant) shapes.push_back(ones);
+      shapes.push_back(std::move(shape));
+      offer(columns(shapes), 1, 1, [&] {
+        std::ostringstream expression;
+        expression << std::setprecision(3) << "an exponential that " << (grows ? "grows" : "falls") << " by e in "
+                   << share * (high - low);
+        return shaped(fine, shapes, expression.str());
+      });
+    }
+  }
   // How many places tell of a shape, each by its paths' share in it.
   const auto places = [&](const std::vector<double>& shape) {
     const Eigen::VectorXd direction = basis * Eigen::Map<const Eigen::VectorXd>(shape.data(), kFine);
@@ -655,6 +679,8 @@ std::vector<Screened> screenLaws(const Twin& base, const SessionModel& model, co
   const LawScreen screen(base, model, null, poses);
   for (int kind = 0; kind < kFirstOfChannels; ++kind) {
     for (const std::string& variable : LawVariable::names()) {
+      const bool of_pose = std::count(std::begin(kPoseVariables), std::end(kPoseVariables), variable) > 0;
+      if ((kind == kAngle && of_pose) || (kind == kAngleOfPose && !of_pose)) continue;
       if (variable == "standing_m" || std::count(std::begin(kOfPlaces), std::end(kOfPlaces), variable) > 0) continue;
       if (auto s = screen.best(kind, {variable})) result.push_back(std::move(*s));
     }

@@ -13,7 +13,7 @@ VARIABLES = {
     "radar height": ("height",),
     "world direction": ("heading", "world_azimuth", "bearing", "world direction"),
     "place": ("place", "x_m", "region"),
-    "where the radar stands": ("standing_m", "location"),
+    "where the radar stands": ("standing_m", "distance_m", "location"),
     "range behind an echo": ("behind", "trailing", "excess"),
     "range behind a place": ("behind",),
     "transmitter": ("transmitter", "slot"),

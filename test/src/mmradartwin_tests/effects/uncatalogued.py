@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from mmradartwin_tests.campaign import rotation_from_vector
+from mmradartwin_tests.campaign import Pose, rotation_from_vector
 from mmradartwin_tests.effects.effect import Effect, uncatalogued
 from mmradartwin_tests.effects.objects import free_spot
 from mmradartwin_tests.tracing import Path
@@ -237,6 +237,69 @@ class DelayCreep(DelayLaw):
     def shift_m(self, measurement, station, azimuth_rad):
         first, last = measurement.stations[0].stamp_ns, measurement.stations[-1].stamp_ns
         return np.full(len(azimuth_rad), self.p["total_m"] * (station.stamp_ns - first) / max(1, last - first))
+
+
+@uncatalogued
+class SettlingMount(Effect):
+    """The radar stands turned when the campaign begins and settles."""
+    name, main = "settling_mount", "turned_deg"
+    defaults = {"turned_deg": 4.0, "share_of_session": 0.25}
+
+    def pose(self, measurement, station):
+        first, last = measurement.stations[0].stamp_ns, measurement.stations[-1].stamp_ns
+        along = (station.stamp_ns - first) / max(1, last - first) / self.p["share_of_session"]
+        turn = rotation_from_vector([0, 0, math.radians(self.p["turned_deg"]) * math.exp(-along)])
+        return Pose(station.true.position, station.true.rotation @ turn)
+
+    def truth(self, measurement):
+        return {**self.p, "variable": "time"}
+
+
+@uncatalogued
+class TransmitterSkew(Effect):
+    """The second transmitter's phase slips against the first one's with the delay."""
+    name, main = "transmitter_skew", "deg_per_m"
+    defaults = {"deg_per_m": 15.0}
+
+    def echoes(self, measurement, station, echoes):
+        radar = measurement.radar
+        receivers = len(radar.rx)
+
+        def skewed(lengths_m):
+            slip_m = radar.wavelength_m * self.p["deg_per_m"] / 360 * lengths_m[:, :1] / 2
+            slot = np.arange(lengths_m.shape[1]) // receivers
+            return lengths_m + slip_m * (slot == 1)
+
+        if len(echoes.paths):
+            echoes.lengths_m = skewed(echoes.lengths_m)
+        echoes.scatter.lengths_m = skewed(echoes.scatter.lengths_m)
+
+    def truth(self, measurement):
+        return {**self.p, "variable": "range"}
+
+
+@uncatalogued
+class DryingWall(Effect):
+    """One wall returns more and more while the campaign lasts."""
+    name, main = "drying_wall", "rise_db"
+    defaults = {"actor": None, "rise_db": 10.0}
+
+    def prepare(self, measurement):
+        walls = ["wall_north", "wall_south", "wall_east", "wall_west"]
+        self.p["actor"] = self.p["actor"] or str(measurement.rng(163).choice(walls))
+        self.index = measurement.described_room.actor_index(self.p["actor"])
+
+    def echoes(self, measurement, station, echoes):
+        first, last = measurement.stations[0].stamp_ns, measurement.stations[-1].stamp_ns
+        along = (station.stamp_ns - first) / max(1, last - first) - 0.5
+        factor = 10**(self.p["rise_db"] * along / 20)
+        met = np.array([self.index in p.actors for p in echoes.paths], bool)
+        echoes.coefficients = echoes.coefficients * np.where(met, factor, 1)
+        echoes.scatter_coefficients = echoes.scatter_coefficients * np.where(
+            echoes.scatter.actor == self.index, factor, 1)
+
+    def truth(self, measurement):
+        return {**self.p, "variable": "time"}
 
 
 @uncatalogued
