@@ -304,40 +304,40 @@ void EchoSource::forgetLongUnused() {
   forget(grazing_, kMostTraced);
 }
 
-const EchoSource::Graze& EchoSource::grazing(const std::vector<NamedParameters>& mechanisms,
-                                             const std::vector<int>& poses) {
+const EchoSource::Traced& EchoSource::grazing(const std::vector<NamedParameters>& mechanisms,
+                                              const std::vector<int>& poses) {
   // What is put beside others leaves what they graze as it is.
   std::vector<NamedParameters> moving, smooth;
   for (const NamedParameters& m : geometryOf(mechanisms)) {
     if (!addsToOthers(editOf(m))) moving.push_back(m);
   }
-  Grazing& entry = grazing_[keyOf(moving)];
+  Entry& entry = grazing_[keyOf(moving)];
   entry.used = std::max(entry.used, calls_);
-  entry.by_pose.resize(data_.poses.size());
+  entry.paths.resize(data_.poses.size());
   std::vector<std::size_t> missing;
   for (int i : poses) {
-    if (!entry.by_pose[static_cast<std::size_t>(i)]) missing.push_back(static_cast<std::size_t>(i));
+    if (!entry.paths[static_cast<std::size_t>(i)]) missing.push_back(static_cast<std::size_t>(i));
   }
-  if (missing.empty()) return entry.by_pose;
+  if (missing.empty()) return entry.paths;
   for (const NamedParameters& m : mechanisms) {
     if (m.mechanism != "diffuse") smooth.push_back(m);  // its many points fade in and out one by one
   }
   const Twin twin = base_.changed(smooth);
   tbb::parallel_for(std::size_t{0}, missing.size(),
-                    [&](std::size_t j) { entry.by_pose[missing[j]] = grazeAt(twin, missing[j]); });
-  return entry.by_pose;
+                    [&](std::size_t j) { entry.paths[missing[j]] = grazeAt(twin, missing[j]); });
+  return entry.paths;
 }
 
-std::shared_ptr<const EchoSource::Groups> EchoSource::grazeAt(const Twin& twin, std::size_t i) const {
+std::shared_ptr<const EchoSource::Paths> EchoSource::grazeAt(const Twin& twin, std::size_t i) const {
   const Eigen::Isometry3d& here = data_.poses[i].pose.T_map_radar;
   std::vector<PathRecord> at;
   try {
     at = twin.trace(here);
   } catch (const InputError&) {
-    return std::make_shared<Groups>();  // what is tried stands where the radar stood
+    return nothing;  // what is tried stands where the radar stood
   }
   const double strongest = std::sqrt(strongestPower(at));
-  std::vector<PathRecord> uncertain;
+  Paths uncertain;
   const auto compare = [&](const std::vector<PathRecord>& from, const std::vector<PathRecord>& to, double weight) {
     for (const PathRecord& r : from) {
       const auto same = std::find_if(to.begin(), to.end(),
@@ -368,12 +368,7 @@ std::shared_ptr<const EchoSource::Groups> EchoSource::grazeAt(const Twin& twin, 
       }
     }
   }
-  const std::vector<double> none;
-  EchoCollector collector(base_.radar(), accuracy_.path_angle_rad, data_.poses[i].beams, none);
-  for (const auto& [actors, members] : byActors(uncertain)) {
-    collector.addTones(members, kNoFarSkirt * strongest * strongest);
-  }
-  return std::make_shared<Groups>(collector.take());
+  return uncertain.empty() ? nothing : std::make_shared<const Paths>(std::move(uncertain));
 }
 
 std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& mechanisms,
@@ -382,11 +377,7 @@ std::vector<PoseEchoes> EchoSource::echoes(const std::vector<NamedParameters>& m
   const std::vector<NamedParameters> geometry = geometryOf(mechanisms);
   std::vector<Part> parts;
   for (const NamedParameters& m : mechanisms) parts.push_back({&traced(geometry, m, mechanisms, poses)});
-  std::vector<PoseEchoes> result = collect(mechanisms, poses, actor_range_m, parts);
-  if (settled_.empty()) return result;
-  const Graze& by_pose = grazing(mechanisms, poses);
-  for (std::size_t j = 0; j < poses.size(); ++j) result[j].grazing = *by_pose[static_cast<std::size_t>(poses[j])];
-  return result;
+  return collect(mechanisms, poses, actor_range_m, parts, settled_.empty() ? nullptr : &grazing(mechanisms, poses));
 }
 
 std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters>& mechanisms,
@@ -401,7 +392,7 @@ std::vector<PoseEchoes> EchoSource::echoesNear(const std::vector<NamedParameters
     const Traced& there = traced(geometry, mechanisms[k], mechanisms, poses);
     parts.push_back({&there, same == nullptr ? nullptr : &traced(geometry_from, *same, from, poses)});
   }
-  return collect(mechanisms, poses, actor_range_m, parts);
+  return collect(mechanisms, poses, actor_range_m, parts, nullptr);
 }
 
 std::vector<PathShift> EchoSource::pathShifts(const std::vector<NamedParameters>& mechanisms,
@@ -477,7 +468,7 @@ void EchoSource::addGroups(std::size_t pose, const std::vector<PathRecord>& reco
 
 std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& mechanisms,
                                             const std::vector<int>& poses, const std::vector<double>& actor_range_m,
-                                            const std::vector<Part>& parts) {
+                                            const std::vector<Part>& parts, const Traced* grazing) {
   const std::shared_ptr<const Twin> whole = twinOf(mechanisms);
   const Twin& twin = *whole;
   const RadarConfig& radar = base_.radar();
@@ -490,7 +481,7 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
   std::vector<NamedParameters> rest;
   TwinDescription mixing;
   for (const NamedParameters& m : mechanisms) (mixesRanges(m) ? mixing.mechanisms : rest).push_back(m);
-  const std::size_t receiver = std::hash<std::string>()(mixing.toYaml());
+  const std::size_t mixing_key = std::hash<std::string>()(mixing.toYaml());
   if (rest.size() < mechanisms.size()) without_mixing = twinOf(rest);
   // What a pose's echoes follow from beside its paths.
   TwinDescription weights;
@@ -513,10 +504,14 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
         boost::hash_combine(own.signature, own.paths.back().get());
       }
     }
+    if (grazing != nullptr) {
+      own.paths.push_back((*grazing)[i]);
+      boost::hash_combine(own.signature, own.paths.back().get());
+    }
     std::array<KeptPose, 2>& kept = kept_poses_[i];
-    if (!kept[1].groups.empty() && kept[1].signature == own.signature) std::swap(kept[0], kept[1]);
-    if (!kept[0].groups.empty() && kept[0].signature == own.signature) {
-      result[j].groups = kept[0].groups;
+    if (!kept[1].echoes.groups.empty() && kept[1].signature == own.signature) std::swap(kept[0], kept[1]);
+    if (!kept[0].echoes.groups.empty() && kept[0].signature == own.signature) {
+      result[j] = kept[0].echoes;
       return;
     }
     // Kept from pose to pose: most of the time went into the small vectors of records that were made and thrown away.
@@ -532,30 +527,39 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
       if (part.here != nullptr) addShared(*(*part.there)[i], *(*part.here)[i], all);
     }
     EchoCollector collector(radar, accuracy_.path_angle_rad, data_.poses[i].beams, actor_range_m);
-    const auto addTones = [&](const Twin& receiver, std::vector<PathRecord>& records, double strongest) {
-      std::optional<Eigen::MatrixXcd> matrix;
-      if (receiver.hasReceiveStage()) matrix = receiver.channelMatrix(pose.T_map_radar, pose.stamp_ns);
+    const Twin& receiver = without_mixing ? *without_mixing : twin;
+    std::optional<Eigen::MatrixXcd> matrix;
+    if (receiver.hasReceiveStage()) matrix = receiver.channelMatrix(pose.T_map_radar, pose.stamp_ns);
+    const auto receive = [&](std::vector<PathRecord>& records) {
       records = receiver.receivedPaths(pose.T_map_radar, std::move(records), pose.stamp_ns);
       for (PathRecord& r : records) {
         if (!matrix) break;
         Eigen::Map<Eigen::VectorXcd> c(r.c.data(), channels);
         c = *matrix * c.eval();
       }
-      addGroups(i, records, strongest > 0 ? strongest : strongestPower(records), collector);
     };
-    if (!without_mixing) {
-      addTones(twin, all, 0);
-    } else {
-      ReceiverMixture mixture(twin, *without_mixing, receiver, pose, mixed_[i], calls_);
-      const double strongest = strongestPower(all);
-      mixture.scaleTones(all, collector);
-      addTones(*without_mixing, all, strongest);
-      mixture.addTo(collector);
+    double strongest = without_mixing ? strongestPower(all) : 0;
+    std::optional<ReceiverMixture> mixture;
+    if (without_mixing) {
+      mixture.emplace(twin, *without_mixing, mixing_key, pose, mixed_[i], calls_);
+      mixture->scaleTones(all, collector);
     }
+    receive(all);
+    if (!without_mixing) strongest = strongestPower(all);
+    addGroups(i, all, strongest, collector);
+    if (mixture) mixture->addTo(collector);
     result[j].groups = collector.take();
+    if (grazing != nullptr) {
+      Paths uncertain = *(*grazing)[i];
+      receive(uncertain);
+      const std::vector<double> none;
+      EchoCollector of_grazing(radar, accuracy_.path_angle_rad, data_.poses[i].beams, none);
+      for (const auto& [actors, members] : byActors(uncertain)) of_grazing.addTones(members, kNoFarSkirt * strongest);
+      result[j].grazing = of_grazing.take();
+    }
     if (without_mixing) return;
-    own.groups = result[j].groups;
-    (kept[0].groups.empty() ? kept[0] : kept[1]) = std::move(own);
+    own.echoes = result[j];
+    (kept[0].echoes.groups.empty() ? kept[0] : kept[1]) = std::move(own);
   });
   return result;
 }

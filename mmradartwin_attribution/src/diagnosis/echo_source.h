@@ -88,17 +88,16 @@ class EchoSource {
   /// Keeps memory bounded while one hypothesis' geometry is searched for.
   void forgetLongUnused();
   std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);
+  /// grazing: of these paths, by pose; none where it is null.
   std::vector<PoseEchoes> collect(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
-                                  const std::vector<double>& actor_range_m, const std::vector<Part>& parts);
+                                  const std::vector<double>& actor_range_m, const std::vector<Part>& parts,
+                                  const Traced* grazing);
   /// Adds records as their tones, those that meet the same actors together; what is the same as before is not collected
   /// again.
   void addGroups(std::size_t pose, const std::vector<PathRecord>& records, double strongest, EchoCollector& to);
-  using Groups = std::vector<std::shared_ptr<const EchoGroup>>;
-  /// PoseEchoes::grazing by pose; null where not looked for.
-  using Graze = std::vector<std::shared_ptr<const Groups>>;
-  /// The geometry's own; where it is the one that was settled on, with what was settled on, else with `mechanisms`.
-  const Graze& grazing(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
-  std::shared_ptr<const Groups> grazeAt(const Twin& twin, std::size_t pose) const;
+  /// What of a geometry's paths is uncertain within the pose's accuracy.
+  const Traced& grazing(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
+  std::shared_ptr<const Paths> grazeAt(const Twin& twin, std::size_t pose) const;
 
   const Twin& base_;
   const ChannelData& data_;
@@ -120,15 +119,11 @@ class EchoSource {
   struct KeptPose {
     std::size_t signature = 0;
     std::vector<std::shared_ptr<const Paths>> paths;
-    std::vector<std::shared_ptr<const EchoGroup>> groups;
+    PoseEchoes echoes;
   };
   std::vector<std::array<KeptPose, 2>> kept_poses_;
   std::vector<ReceiverMixture::Cache> mixed_;  // by pose
-  struct Grazing {
-    Graze by_pose;
-    std::size_t used = 0;  // when, in calls
-  };
-  std::map<std::string, Grazing> grazing_;  // by what moves actors or the radar
+  std::map<std::string, Entry> grazing_;       // by what moves actors or the radar
   std::vector<std::string> settled_;
   enum class Geometry { kSame, kMoreScreens, kOther };
   struct Edit {
