@@ -409,7 +409,8 @@ std::optional<Screened> LawScreen::best(int kind, const Over& over) const {
       values.push_back(v);
     }
   }
-  if (all.empty()) return std::nullopt;
+  const Sample& s = samples_[static_cast<std::size_t>(kind)];
+  if (all.empty() || s.weight.sum() == 0) return std::nullopt;
   std::sort(all.begin(), all.end());
   double low = all.front(), high = all.back();
   if (!(high - low > 1e-3 * std::max(1.0, std::abs(high)))) return std::nullopt;
@@ -421,7 +422,6 @@ std::optional<Screened> LawScreen::best(int kind, const Over& over) const {
   std::vector<double> fine;
   for (int i = 0; i < kFine; ++i) fine.push_back(low + (high - low) * i / (kFine - 1));
   Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(values.size()), kFine);
-  const Sample& s = samples_[static_cast<std::size_t>(kind)];
   for (std::size_t p = 0; p < values.size(); ++p) {
     Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(kFine);
     for (int i = 0; i < values[p].count; ++i) {
