@@ -176,6 +176,14 @@ class HiddenEffects(unittest.TestCase):
         swing_db = max(law["gain_db"]) - min(law["gain_db"])
         self.assertAlmostEqual(swing_db, 2 * truth["swing_db"], delta=3, msg=f"seed {seed}")
 
+    def test_an_array_that_looks_aside_until_it_is_warm_is_unknown(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "44"))
+        mechanism, truth = self.unknown(seed, {"warm_up_squint": {}})
+        law = mechanism["empirical_law"]
+        self.assertEqual(law["variable"], "time_s", msg=f"seed {seed}")
+        self.assertAlmostEqual(law["angle_deg"][0] - law["angle_deg"][-1], truth["squint_deg"], delta=1,
+                               msg=f"seed {seed}")
+
     def test_a_transmitter_whose_phase_goes_with_range_is_unknown(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "45"))
         mechanism, truth = self.unknown(seed, {"transmitter_skew": {}})

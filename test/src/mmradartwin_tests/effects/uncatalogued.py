@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from mmradartwin_tests.campaign import Pose, rotation_from_vector
+from mmradartwin_tests.campaign import rotation_from_vector
 from mmradartwin_tests.effects.effect import Effect, uncatalogued
 from mmradartwin_tests.effects.objects import free_spot
 from mmradartwin_tests.tracing import Path
@@ -240,16 +240,36 @@ class DelayCreep(DelayLaw):
 
 
 @uncatalogued
-class SettlingMount(Effect):
-    """The radar stands turned when the campaign begins and settles."""
-    name, main = "settling_mount", "turned_deg"
-    defaults = {"turned_deg": 4.0, "share_of_session": 0.25}
+class WarmUpSquint(Effect):
+    """The array looks to the side when the campaign begins and settles: echoes seem to come from elsewhere."""
+    name, main = "warm_up_squint", "squint_deg"
+    defaults = {"squint_deg": 4.0, "share_of_session": 0.25}
 
-    def pose(self, measurement, station):
+    def squint_rad(self, measurement, station):
+        """Positive to the left."""
         first, last = measurement.stations[0].stamp_ns, measurement.stations[-1].stamp_ns
         along = (station.stamp_ns - first) / max(1, last - first) / self.p["share_of_session"]
-        turn = rotation_from_vector([0, 0, math.radians(self.p["turned_deg"]) * math.exp(-along)])
-        return Pose(station.true.position, station.true.rotation @ turn)
+        return math.radians(self.p["squint_deg"]) * math.exp(-along)
+
+    def turned(self, measurement, station, lengths_m, departure, arrival):
+        """Lengths [P, M] as of directions [P, 3] in radar_link that are turned about z."""
+        squint = self.squint_rad(measurement, station)
+        for directions, elements, other in ((departure, measurement.radar.tx, len(measurement.radar.rx)),
+                                            (arrival, measurement.radar.rx, len(measurement.radar.tx))):
+            change = directions @ rotation_from_vector([0, 0, squint]).T - directions
+            extra = -change @ elements.T
+            per_channel = np.repeat(extra, other, axis=1) if elements is measurement.radar.tx else np.tile(extra, other)
+            lengths_m = lengths_m + per_channel
+        return lengths_m
+
+    def echoes(self, measurement, station, echoes):
+        if len(echoes.paths):
+            legs = [station.true.to_radar(np.array([getattr(p, side) for p in echoes.paths]))
+                    for side in ("departure", "arrival")]
+            echoes.lengths_m = self.turned(measurement, station, echoes.lengths_m, *legs)
+        ray = echoes.scatter.points - station.true.position
+        ray = station.true.to_radar(ray / np.linalg.norm(ray, axis=1)[:, None])
+        echoes.scatter.lengths_m = self.turned(measurement, station, echoes.scatter.lengths_m, ray, ray)
 
     def truth(self, measurement):
         return {**self.p, "variable": "time"}
