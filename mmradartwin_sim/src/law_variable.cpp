@@ -56,16 +56,17 @@ const std::vector<std::string>& LawVariable::names() {
   return kNames;
 }
 
+bool LawVariable::isAboutPlace(const std::string& name) { return name == "passing_m" || name == "distance_m"; }
+
 std::string LawVariable::meaning() {
   return "range_m (half the path), azimuth_deg (of departure and of arrival, whose mean counts), incidence_deg (of the "
          "first reflection, or of the path on its scatter point; other paths stay as they are), height_m (of the radar "
          "in map), heading_deg (of the radar in map, -180 to 180), bearing_deg (of the arriving echo in map, -180 to "
          "180), time_s (after the session's first pose), amplitude_db (of the echo, 0 is the session's strongest), "
          "foot_m (where the path meets the law's actor, or else its first face, if upright, along it, from the middle "
-         "of "
-         "the face's actor; other paths stay as they are), standing_m (of the radar in the floor plan, from map's "
-         "origin "
-         "along bearing_deg), passing_m (at which the path passes x_m, y_m in the floor plan) or distance_m (of the "
+         "of the face's actor; other paths stay as they are), standing_m (of the radar in the floor plan, from map's "
+         "origin along bearing_deg), passing_m (at which the path passes x_m, y_m in the floor plan) or distance_m (of "
+         "the "
          "radar from x_m, y_m in the floor plan)";
 }
 

@@ -514,9 +514,9 @@ TEST_F(Propagation, AnEmpiricalLawIsItsTable) {
               1e-5);
   EXPECT_EQ(look("  empirical_law: {variable: range_m, at: [0], gain_db: [-9], event: diffuse}\n").amplitude, base);
   // Of two channels alone; the amplitude is the rms over all.
-  const PathRecord plain = look(""), second = look(
-                                         "  empirical_law: {variable: range_m, at: [2, 4], gain_db: [0, -12], "
-                                         "phase_deg: [0, 60], channels: [1, 5]}\n");
+  const PathRecord plain = look("");
+  const PathRecord second = look(
+      "  empirical_law: {variable: range_m, at: [2, 4], gain_db: [0, -12], phase_deg: [0, 60], channels: [1, 5]}\n");
   for (std::size_t k = 0; k < plain.c.size(); ++k) {
     const Complex ratio = second.c[k] / plain.c[k];
     const bool of_it = k == 1 || k == 5;

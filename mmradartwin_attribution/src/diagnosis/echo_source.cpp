@@ -538,14 +538,15 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
         c = *matrix * c.eval();
       }
     };
-    double strongest = without_mixing ? strongestPower(all) : 0;
     std::optional<ReceiverMixture> mixture;
+    double strongest = 0;
     if (without_mixing) {
       mixture.emplace(twin, *without_mixing, mixing_key, pose, mixed_[i], calls_);
+      strongest = strongestPower(all);  // tones that are mixed lose some of theirs
       mixture->scaleTones(all, collector);
     }
     receive(all);
-    if (!without_mixing) strongest = strongestPower(all);
+    if (!mixture) strongest = strongestPower(all);
     addGroups(i, all, strongest, collector);
     if (mixture) mixture->addTo(collector);
     result[j].groups = collector.take();
@@ -557,7 +558,7 @@ std::vector<PoseEchoes> EchoSource::collect(const std::vector<NamedParameters>& 
       for (const auto& [actors, members] : byActors(uncertain)) of_grazing.addTones(members, kNoFarSkirt * strongest);
       result[j].grazing = of_grazing.take();
     }
-    if (without_mixing) return;
+    if (mixture) return;
     own.echoes = result[j];
     (kept[0].echoes.groups.empty() ? kept[0] : kept[1]) = std::move(own);
   });

@@ -6,6 +6,8 @@
 #include <set>
 #include <sstream>
 
+#include "mmradartwin_sim/law_variable.h"
+
 namespace mmradartwin {
 namespace {
 
@@ -36,7 +38,7 @@ std::string describeLaw(const Hypothesis& hypothesis, const NamedParameters& fit
     const std::vector<double>& values = fitted.values.numbers(observable);
     if (values.empty()) continue;
     out << observable << " of the echoes over " << variable;
-    if (variable == "passing_m" || variable == "distance_m") {
+    if (LawVariable::isAboutPlace(variable)) {
       out << " from x_m " << fitted.values.number("x_m") << ", y_m " << fitted.values.number("y_m");
     }
     if (variable == "standing_m") out << " along bearing_deg " << fitted.values.number("bearing_deg");

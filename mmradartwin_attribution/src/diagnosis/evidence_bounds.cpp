@@ -53,8 +53,9 @@ double leastNats(const Hypothesis& hypothesis, bool traces, std::size_t poses) {
   if (name == "actor_unmodelled" || name == "empirical_echo") return std::max(kObject, kLawPerPose * n);
   const bool unnamed = !isCatalogued(name);
   const bool adds = !unnamed && causeDescription(name).residual_class == ResidualClass::kMissingMechanism;
-  if (name == "empirical_law" && hypothesis.mechanism.values.text("actor").empty())
+  if (name == "empirical_law" && hypothesis.mechanism.values.text("actor").empty()) {
     return std::max(kSubject, kLawPerPose * n);
+  }
   if (unnamed || !hypothesis.subject.empty()) return std::max(adds ? kSubjectOfMore : kSubject, kSubjectPerPose * n);
   if (adds) return std::max(kLawOfMore, kLawOfMorePerPose * n);
   return std::max(traces ? kTraces : kLaw, kLawPerPose * n);

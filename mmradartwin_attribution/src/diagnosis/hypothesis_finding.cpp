@@ -7,6 +7,7 @@
 
 #include "empirical_hypothesis.h"
 #include "fitted_parameters.h"
+#include "mmradartwin_sim/law_variable.h"
 
 namespace mmradartwin {
 namespace {
@@ -64,8 +65,8 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   }
   FindingPlace place;
   if (scene.actorIndex(best.hypothesis.subject) >= 0) place.actors = {best.hypothesis.subject};
-  const std::string variable = m.mechanism == "empirical_law" ? m.values.text("variable") : "";
-  const bool of_place = m.mechanism == "empirical_echo" || variable == "passing_m" || variable == "distance_m";
+  const bool of_place = m.mechanism == "empirical_echo" ||
+                        (m.mechanism == "empirical_law" && LawVariable::isAboutPlace(m.values.text("variable")));
   if (f.cause == "actor_unmodelled" || of_place) {
     place.x_m = m.values.number("x_m");
     place.y_m = m.values.number("y_m");

@@ -15,7 +15,7 @@ class LawVariable {
  public:
   /// What the variables that have a place or a direction are about.
   struct About {
-    double x_m = 0, y_m = 0;  ///< in map, of passing_m and distance_m
+    double x_m = 0, y_m = 0;  ///< in map, where isAboutPlace()
     double bearing_deg = 0;   ///< in map, of standing_m
     int actor = -1;           ///< whose face foot_m is along, -1 for that of the first
   };
@@ -23,6 +23,8 @@ class LawVariable {
   explicit LawVariable(const std::string& name, const About& about);
   explicit LawVariable(const std::string& name) : LawVariable(name, About()) {}
   static const std::vector<std::string>& names();
+  /// True for those that have a place x_m, y_m.
+  static bool isAboutPlace(const std::string& name);
   /// names() in a line, each with what it means.
   static std::string meaning();
 
