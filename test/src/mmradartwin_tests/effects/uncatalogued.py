@@ -22,17 +22,32 @@ class EchoLaw(Effect):
 
     def echoes(self, measurement, station, echoes):
         if len(echoes.paths):
-            legs = [station.true.to_radar(np.array([getattr(p, side) for p in echoes.paths]))
-                    for side in ("departure", "arrival")]
+            legs = path_directions(station, echoes.paths)
             factor = self.factor(measurement, station, *legs, echoes.lengths_m[:, 0], np.abs(echoes.coefficients))
             echoes.coefficients = echoes.coefficients * factor
-        ray = echoes.scatter.points - station.true.position
-        ray = station.true.to_radar(ray / np.linalg.norm(ray, axis=1)[:, None])
+        ray = scatter_directions(station, echoes.scatter)
         echoes.scatter_coefficients = echoes.scatter_coefficients * self.factor(
             measurement, station, ray, ray, echoes.scatter.lengths_m[:, 0], np.abs(echoes.scatter_coefficients))
 
     def truth(self, measurement):
         return {**self.p, "variable": self.variable}
+
+
+def along_session(measurement, station):
+    """When a pose was taken, 0 for the first and 1 for the last."""
+    first, last = measurement.stations[0].stamp_ns, measurement.stations[-1].stamp_ns
+    return (station.stamp_ns - first) / max(1, last - first)
+
+
+def path_directions(station, paths):
+    """Departures and arrivals, [P, 3] each, unit vectors in radar_link."""
+    return [station.true.to_radar(np.array([getattr(p, side) for p in paths])) for side in ("departure", "arrival")]
+
+
+def scatter_directions(station, scatter):
+    """[S, 3] unit vectors in radar_link."""
+    ray = scatter.points - station.true.position
+    return station.true.to_radar(ray / np.linalg.norm(ray, axis=1)[:, None])
 
 
 def azimuth(directions):
@@ -207,8 +222,7 @@ class DelayLaw(Effect):
 
     def echoes(self, measurement, station, echoes):
         if len(echoes.paths):
-            legs = [azimuth(station.true.to_radar(np.array([getattr(p, side) for p in echoes.paths])))
-                    for side in ("departure", "arrival")]
+            legs = [azimuth(d) for d in path_directions(station, echoes.paths)]
             echoes.lengths_m = echoes.lengths_m + 2 * self.shift_m(measurement, station, sum(legs) / 2)[:, None]
         ray = station.true.to_radar(echoes.scatter.points - station.true.position)
         shift = self.shift_m(measurement, station, azimuth(ray))
@@ -235,8 +249,7 @@ class DelayCreep(DelayLaw):
     defaults = {"total_m": 0.12}
 
     def shift_m(self, measurement, station, azimuth_rad):
-        first, last = measurement.stations[0].stamp_ns, measurement.stations[-1].stamp_ns
-        return np.full(len(azimuth_rad), self.p["total_m"] * (station.stamp_ns - first) / max(1, last - first))
+        return np.full(len(azimuth_rad), self.p["total_m"] * along_session(measurement, station))
 
 
 @uncatalogued
@@ -245,30 +258,19 @@ class WarmUpSquint(Effect):
     name, main = "warm_up_squint", "squint_deg"
     defaults = {"squint_deg": 4.0, "share_of_session": 0.25}
 
-    def squint_rad(self, measurement, station):
-        """Positive to the left."""
-        first, last = measurement.stations[0].stamp_ns, measurement.stations[-1].stamp_ns
-        along = (station.stamp_ns - first) / max(1, last - first) / self.p["share_of_session"]
-        return math.radians(self.p["squint_deg"]) * math.exp(-along)
-
     def turned(self, measurement, station, lengths_m, departure, arrival):
-        """Lengths [P, M] as of directions [P, 3] in radar_link that are turned about z."""
-        squint = self.squint_rad(measurement, station)
-        for directions, elements, other in ((departure, measurement.radar.tx, len(measurement.radar.rx)),
-                                            (arrival, measurement.radar.rx, len(measurement.radar.tx))):
-            change = directions @ rotation_from_vector([0, 0, squint]).T - directions
-            extra = -change @ elements.T
-            per_channel = np.repeat(extra, other, axis=1) if elements is measurement.radar.tx else np.tile(extra, other)
-            lengths_m = lengths_m + per_channel
-        return lengths_m
+        """Lengths [P, M] as of directions [P, 3] in radar_link that are turned to the left."""
+        along = along_session(measurement, station) / self.p["share_of_session"]
+        turn = rotation_from_vector([0, 0, math.radians(self.p["squint_deg"]) * math.exp(-along)])
+        of_tx = (departure - departure @ turn.T) @ measurement.radar.tx.T
+        of_rx = (arrival - arrival @ turn.T) @ measurement.radar.rx.T
+        return lengths_m + (of_tx[:, :, None] + of_rx[:, None, :]).reshape(len(lengths_m), -1)
 
     def echoes(self, measurement, station, echoes):
         if len(echoes.paths):
-            legs = [station.true.to_radar(np.array([getattr(p, side) for p in echoes.paths]))
-                    for side in ("departure", "arrival")]
+            legs = path_directions(station, echoes.paths)
             echoes.lengths_m = self.turned(measurement, station, echoes.lengths_m, *legs)
-        ray = echoes.scatter.points - station.true.position
-        ray = station.true.to_radar(ray / np.linalg.norm(ray, axis=1)[:, None])
+        ray = scatter_directions(station, echoes.scatter)
         echoes.scatter.lengths_m = self.turned(measurement, station, echoes.scatter.lengths_m, ray, ray)
 
     def truth(self, measurement):
@@ -310,9 +312,7 @@ class DryingWall(Effect):
         self.index = measurement.described_room.actor_index(self.p["actor"])
 
     def echoes(self, measurement, station, echoes):
-        first, last = measurement.stations[0].stamp_ns, measurement.stations[-1].stamp_ns
-        along = (station.stamp_ns - first) / max(1, last - first) - 0.5
-        factor = 10**(self.p["rise_db"] * along / 20)
+        factor = 10**(self.p["rise_db"] * (along_session(measurement, station) - 0.5) / 20)
         met = np.array([self.index in p.actors for p in echoes.paths], bool)
         echoes.coefficients = echoes.coefficients * np.where(met, factor, 1)
         echoes.scatter_coefficients = echoes.scatter_coefficients * np.where(
