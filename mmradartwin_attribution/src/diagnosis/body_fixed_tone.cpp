@@ -41,12 +41,28 @@ class FirstBins {
     const int samples = data.radar.samples_per_chirp;
     if (2 * last + 1 >= samples) return;
     for (int r = behind ? -last : 0; r <= last; ++r) bins_.push_back((r + samples) % samples);
+    for (int bin : bins_) {
+      Bin b{Eigen::MatrixXcd(channels(), static_cast<Eigen::Index>(poses())), {}};
+      for (std::size_t p = 0; p < poses(); ++p) b.y.col(static_cast<Eigen::Index>(p)) = data.poses[p].y.col(bin);
+      b.power = b.y.colwise().squaredNorm().transpose();
+      of_bins_.push_back(std::move(b));
+    }
   }
+  /// One bin of all poses.
+  struct Bin {
+    Eigen::MatrixXcd y;     ///< [channels][poses]
+    Eigen::VectorXd power;  ///< [poses], of all channels
+    /// Power that a tone's channels, times its kernel there, leave. [poses]
+    Eigen::VectorXd left(const std::complex<double>& kernel, const Eigen::VectorXcd& tone) const {
+      const Eigen::VectorXcd seen = y.transpose() * (std::conj(kernel) * tone.conjugate());
+      return ((power - 2 * seen.real()).array() + std::norm(kernel) * tone.squaredNorm()).max(0.0);
+    }
+  };
   const std::vector<int>& bins() const { return bins_; }
   double reach_m() const { return reach_m_; }
   Eigen::Index channels() const { return data_.poses.front().y.rows(); }
   std::size_t poses() const { return data_.poses.size(); }
-  auto at(std::size_t pose, std::size_t bin) const { return data_.poses[pose].y.col(bins_[bin]); }
+  const Bin& of(std::size_t bin) const { return of_bins_[bin]; }
 
   /// What a tone of amplitude 1 gives in each bin.
   Eigen::VectorXcd kernel(double range_m) const {
@@ -63,6 +79,7 @@ class FirstBins {
   SignalChain chain_;
   double reach_m_ = 0;
   std::vector<int> bins_;
+  std::vector<Bin> of_bins_;
 };
 
 struct ToneFit {
@@ -72,42 +89,32 @@ struct ToneFit {
 
 /// Vector over channels (zero where `with` is false) and scale of each bin, by expectation-maximisation of the t.
 ToneFit fitTone(const FirstBins& data, const Eigen::VectorXcd& kernel, bool with) {
-  const std::size_t bins = data.bins().size(), poses = data.poses();
-  const double m = static_cast<double>(data.channels());
+  const std::size_t bins = data.bins().size();
+  const double poses = static_cast<double>(data.poses()), m = static_cast<double>(data.channels());
   ToneFit fit{Eigen::VectorXcd::Zero(data.channels()), 0};
-  Eigen::VectorXd scale = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(bins));
+  Eigen::VectorXd scale(static_cast<Eigen::Index>(bins));
   for (std::size_t r = 0; r < bins; ++r) {
-    std::vector<double> power;
-    for (std::size_t p = 0; p < poses; ++p) power.push_back(data.at(p, r).squaredNorm() / m);
-    std::nth_element(power.begin(), power.begin() + static_cast<std::ptrdiff_t>(power.size() / 2), power.end());
+    Eigen::VectorXd power = data.of(r).power / m;
+    std::nth_element(power.begin(), power.begin() + power.size() / 2, power.end());
     scale[static_cast<Eigen::Index>(r)] = std::max(power[power.size() / 2], 1e-30);
   }
-  const auto residual = [&](std::size_t p, std::size_t r) -> Eigen::VectorXcd {
-    return data.at(p, r) - kernel[static_cast<Eigen::Index>(r)] * fit.channels;
-  };
   for (int round = 0; round < kRounds; ++round) {
     Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(data.channels());
     double total = 0;
-    Eigen::VectorXd spread = Eigen::VectorXd::Zero(scale.size());
-    for (std::size_t p = 0; p < poses; ++p) {
-      for (std::size_t r = 0; r < bins; ++r) {
-        const auto i = static_cast<Eigen::Index>(r);
-        const double e2 = residual(p, r).squaredNorm();
-        const double w = (m + kTail) / (kTail + e2 / scale[i]);
-        sum += w / scale[i] * std::conj(kernel[i]) * data.at(p, r);
-        total += w / scale[i] * std::norm(kernel[i]);
-        spread[i] += w * e2;
-      }
+    for (std::size_t r = 0; r < bins; ++r) {
+      const auto i = static_cast<Eigen::Index>(r);
+      const Eigen::VectorXd left = data.of(r).left(kernel[i], fit.channels);
+      const Eigen::VectorXd w = ((m + kTail) / (kTail + left.array() / scale[i])).matrix();
+      sum += std::conj(kernel[i]) / scale[i] * (data.of(r).y * w);
+      total += w.sum() / scale[i] * std::norm(kernel[i]);
+      scale[i] = std::max(w.dot(left) / (m * poses), 1e-30);
     }
-    scale = (spread / (m * static_cast<double>(poses))).cwiseMax(1e-30);
     if (with) fit.channels = sum / total;
   }
-  for (std::size_t p = 0; p < poses; ++p) {
-    for (std::size_t r = 0; r < bins; ++r) {
-      const double s = scale[static_cast<Eigen::Index>(r)];
-      fit.log_likelihood +=
-          kShare * (-m * std::log(s) - (m + kTail) * std::log1p(residual(p, r).squaredNorm() / s / kTail));
-    }
+  for (std::size_t r = 0; r < bins; ++r) {
+    const auto i = static_cast<Eigen::Index>(r);
+    const Eigen::ArrayXd off = data.of(r).left(kernel[i], fit.channels).array() / (scale[i] * kTail);
+    fit.log_likelihood += kShare * (-m * poses * std::log(scale[i]) - (m + kTail) * off.log1p().sum());
   }
   return fit;
 }
@@ -117,8 +124,8 @@ ToneFit fitOnlyPose(const FirstBins& data, const Eigen::VectorXcd& kernel) {
   ToneFit fit{Eigen::VectorXcd::Zero(data.channels()), 0};
   double all = 0;
   for (std::size_t r = 0; r < data.bins().size(); ++r) {
-    fit.channels += std::conj(kernel[static_cast<Eigen::Index>(r)]) * data.at(0, r);
-    all += data.at(0, r).squaredNorm();
+    fit.channels += std::conj(kernel[static_cast<Eigen::Index>(r)]) * data.of(r).y.col(0);
+    all += data.of(r).power[0];
   }
   const double norm = kernel.squaredNorm();
   fit.channels /= norm;
@@ -156,7 +163,7 @@ BodyFixedTone findBodyFixedTone(const ChannelData& data, bool behind) {
     // Channels are off by some 10 degrees and 1 dB: so much of an echo's power is no array response, and not more.
     const double beyond = (1 - best.array_share) / kEchoErrors;
     double all = 0, strongest = 0;
-    for (std::size_t r = 0; r < first.bins().size(); ++r) all += first.at(0, r).squaredNorm();
+    for (std::size_t r = 0; r < first.bins().size(); ++r) all += first.of(r).power[0];
     for (Eigen::Index r = 0; r < data.poses[0].y.cols(); ++r) {
       strongest = std::max(strongest, data.poses[0].y.col(r).squaredNorm());
     }

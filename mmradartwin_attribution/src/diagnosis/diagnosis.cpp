@@ -42,6 +42,7 @@ constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kLonger[] = {1.5, 2};     ///< starts of a geometry
 constexpr double kWorthABox = 15;          ///< nats of a round one there,
 constexpr double kShareWorthABox = 0.3;    ///< and so much of what the best other fit brings
+constexpr double kNoRival = 1 / 40.0;      ///< of what a plain name brings: who promises less waits for the next round
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
 constexpr double kMostLost = 0.01;         ///< of the explained power, by what the likelihood plainly gains of;
 // unless it is worth leastNats(), inflation taken off, and is not like clutter.
@@ -219,7 +220,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   family_ = all.size() + static_cast<std::size_t>(kLawFamily);
   std::vector<HypothesisFit> fits;
   std::size_t names_fitted = 0, laws_fitted = 0, objects_fitted = 0;
-  double best_object = 0;  // nats
+  double best_object = 0, plain_name = 0;  // nats
   for (std::size_t i = 0; i < screened.size(); ++i) {
     Screened s = screened[i];
     TriedHypothesis tried;
@@ -243,7 +244,11 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
                              : object ? kMostObjects
                              : moved  ? kMostNames + kMostOutOfPlace
                                       : kMostNames;
-    if (s.promised > worth && (box || fitted < most)) {
+    // Geometry and places promise too little for what they bring.
+    const bool waits =
+        !s.hypothesis.isGeometry() && !moved && !isPlaced(s.hypothesis) && s.promised < kNoRival * plain_name;
+    if (waits) tried.verdict = "promises little beside what is plain";
+    if (!waits && s.promised > worth && (box || fitted < most)) {
       ++fitted;
       if (s.hypothesis.isGeometry()) {
         // Latents stand in for a part of it only, as much as their own spread lets them.
@@ -259,6 +264,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
       const bool around = moved || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
       fits.push_back(around ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
       source_->settle(mechanisms_);
+      if (!law && fitter_->isPlain(fits.back())) plain_name = std::max(plain_name, fits.back().gain);
       if (object && !box && fits.back().broad_gain > std::max(kWorthABox, best_object)) {
         best_object = fits.back().broad_gain;
         if (isUnmodelledBox(screened.back().hypothesis)) screened.pop_back();
@@ -270,11 +276,11 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
         state_ = std::move(*better);
         // Where that is much, it is one place's, and what the others gain beside it is seen by fits from there alone.
         for (HypothesisFit& earlier : fits) {
-          if (nats > kWorthAFit) {
+          if (nats > kWorthAFit && &earlier != &fits.back()) {
             earlier = fitter_->fit(state_, earlier.hypothesis, {earlier.scaled}, 4);
             source_->settle(mechanisms_);
           } else {
-            earlier.loseGain(nats);
+            fitter_->gainOver(state_, earlier);
           }
         }
       }

@@ -25,6 +25,7 @@ constexpr double kClimb = 4;                 ///< steps like the last within whi
 constexpr double kWorthASearch = 25;         ///< nats gained by slopes, before a rough likelihood is searched
 constexpr double kSearched[] = {0.3, 0.15};  ///< of the scale, around where slopes end
 constexpr double kImprovement = 0.5;         ///< nats by which latents have to be better to be taken over
+constexpr double kSameTop = 1;               ///< nats: latents no further from the null's than that climb to its top
 // Nats a pose without the best place: seven clean sessions of 66 to 154 poses brought at most 1.9 by any hypothesis. At
 // few places the scatter of a rough likelihood's slopes hides gains ten times that.
 constexpr double kPlain = 5, kPlainFalseAlarm = 0.01;
@@ -101,12 +102,6 @@ double HypothesisFit::size_m() const {
   return hypothesis.at(scaled).values.number("size_m");
 }
 
-void HypothesisFit::loseGain(double nats) {
-  gain -= nats;
-  broad_gain -= nats;
-  held_out_gain -= nats;
-}
-
 /// Scores of the hypothesis' own directions with the nuisance's part taken out.
 HypothesisFitter::HypothesisFitter(EchoSource& source, const SessionModel& model, int folds)
     : source_(source), model_(model), folds_(folds) {}
@@ -130,7 +125,11 @@ ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanism
 }
 
 std::optional<ModelState> HypothesisFitter::improved(const ModelState& null, const Nuisance& latents) {
-  Nuisance other = latents;
+  Nuisance other = latents, own = null.nuisance;
+  Eigen::VectorXd apart(own.globals());
+  for (int j = 0; j < own.globals(); ++j) apart[j] = other.global(j) - own.global(j);
+  const Eigen::MatrixXd information = model_.scores(null.basis, {}, everyPose(null)).information;
+  if (0.5 * apart.dot(information * apart) < kSameTop) return std::nullopt;
   const auto echoes = source_.echoes(null.mechanisms, other.actor_range_m);
   model_.fit(echoes, other, 3);
   if (model_.logLikelihood(echoes, other) < null.log_likelihood + kImprovement) return std::nullopt;
@@ -390,8 +389,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
   f.scaled = std::move(o.scaled);
   f.state = std::move(o.state);
   const Scores& scores = o.scores;
-  f.gain = f.state.log_likelihood - null.log_likelihood;
-  f.broad_gain = broadGain(null, f.state);
+  gainOver(null, f);
   const std::vector<double> gain_at = gainByLocation(null, f.state);
 
   // Scatter over places: of the scores at the fit where there is a number, else of the gain itself.
@@ -424,7 +422,6 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
     f.fold_scaled.assign(static_cast<std::size_t>(folds_), {});
     f.inflation = inflationOfPresence(f.gain, gain_at);
   }
-  f.held_out_gain += f.gain;
   return f;
 }
 
@@ -451,9 +448,20 @@ void HypothesisFitter::settleFolds(const ModelState& null, HypothesisFit& f) {
   source_.settle(null.mechanisms);
 }
 
+void HypothesisFitter::gainOver(const ModelState& null, HypothesisFit& f) const {
+  const double before = f.gain;
+  f.gain = f.state.log_likelihood - null.log_likelihood;
+  f.broad_gain = broadGain(null, f.state);
+  f.held_out_gain += f.gain - before;
+}
+
+bool HypothesisFitter::isPlain(const HypothesisFit& f) const {
+  return f.broad_gain > kPlain * static_cast<double>(model_.data().poses.size());
+}
+
 void HypothesisFitter::judge(HypothesisFit& f, std::size_t family) const {
   f.false_alarm_rate = falseAlarmRate(f.broad_gain / f.inflation, f.hypothesis, f.numbers(), family);
-  f.plain = f.broad_gain > kPlain * static_cast<double>(model_.data().poses.size());
+  f.plain = isPlain(f);
   if (f.plain) f.false_alarm_rate = std::min(f.false_alarm_rate, kPlainFalseAlarm);
 }
 

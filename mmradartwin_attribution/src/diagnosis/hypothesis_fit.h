@@ -44,7 +44,6 @@ struct HypothesisFit {
   double ranking() const;       ///< gain less a price per number; of a law without a name, part of it
   double moved_m() const;       ///< how far it moves an actor; 0 of all others
   double size_m() const;        ///< of an object that the twin lacks; 0 of all others
-  void loseGain(double nats);   ///< that the state without it has gained since
 };
 
 /// Several hypotheses, fitted together.
@@ -84,7 +83,11 @@ class HypothesisFitter {
   /// Shortens the step to each fold's values until they are no worse than the fit's on the places that the fold is
   /// fitted to: where the likelihood is rough, scores of one place lead far away.
   void settleFolds(const ModelState& null, HypothesisFit& fit);
-  /// Sets false_alarm_rate for a family of that many hypotheses.
+  /// Gains of a fit beside a null that has become better since.
+  void gainOver(const ModelState& null, HypothesisFit& fit) const;
+  /// True where it brings far more than clean sessions do, whatever its scatter over places.
+  bool isPlain(const HypothesisFit& fit) const;
+  /// Sets false_alarm_rate and plain for a family of that many hypotheses.
   void judge(HypothesisFit& fit, std::size_t family) const;
   /// Of a gain in nats, inflation taken off, by that many numbers (coordinates, and what was searched for): chance that
   /// one of a family comes by it.

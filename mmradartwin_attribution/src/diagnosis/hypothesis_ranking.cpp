@@ -43,11 +43,12 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   const auto some = [&](const Hypothesis& h) {
     return spread(std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
   };
+  const auto isOutOfPlace = [&](const Hypothesis& h) {
+    return h.mechanism.mechanism == "actor_moved" && out_of_place.count(twin_.scene().actorIndex(h.subject)) > 0;
+  };
   const auto look = [&](const Hypothesis& h, const std::vector<int>& poses) {
-    const int actor = twin_.scene().actorIndex(h.subject);
-    return out_of_place.count(actor) > 0 && h.mechanism.mechanism == "actor_moved"
-               ? screen_.around(state, h, actor, poses)
-               : screen_.screen(state, h, poses);
+    return isOutOfPlace(h) ? screen_.around(state, h, twin_.scene().actorIndex(h.subject), poses)
+                           : screen_.screen(state, h, poses);
   };
   const auto lookAtSome = [&](const Hypothesis& h) { return look(h, spread(kScreenPoses)); };
   const auto better = [](const Screened& a, const Screened& b) { return a.promised > b.promised; };
@@ -104,7 +105,8 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
     const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
     const std::vector<int> poses = spread(numbers > 3 ? kScreenPoses : data_.poses.size());
     if (looked_at[s.hypothesis.label()] < poses.size()) {
-      s = look(s.hypothesis, poses);
+      const int actor = twin_.scene().actorIndex(s.hypothesis.subject);
+      s = isOutOfPlace(s.hypothesis) ? screen_.again(state, s, actor, poses) : look(s.hypothesis, poses);
       s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
       source_.settle(state.mechanisms);
     }
@@ -127,9 +129,11 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
     if (std::optional<Screened> named = namedLike(s, all)) suggest(std::move(*named));
     screened.push_back(std::move(s));
   }
+  report_("replicas of echoes", 0);
   for (Screened& s : screenReplicas(twin_, model_, state, spread(kLawPoses), kWorthALaw, lookAtSome)) {
     screened.push_back(std::move(s));
   }
+  report_("errors that poses and actors share", 0);
   for (Screened& s : sharedLatents(source_, state, model_.spread(), accuracy_, all, spread(kScreenPoses))) {
     suggest(std::move(s));
   }

@@ -100,6 +100,12 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
   return result;
 }
 
+Screened HypothesisScreen::again(const ModelState& null, Screened found, int actor, const std::vector<int>& poses) {
+  const Nuisance nuisance = withoutErrors(null.nuisance, actor);
+  found.promised = std::max(0.0, valueAt(null, found.hypothesis, found.starts.front(), poses, nuisance).second);
+  return found;
+}
+
 Screened HypothesisScreen::directly(const ModelState& null, const Hypothesis& hypothesis,
                                     const std::vector<int>& poses) {
   std::vector<double> start(hypothesis.coordinates.size(), kLittle);

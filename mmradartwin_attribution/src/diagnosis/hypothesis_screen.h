@@ -22,6 +22,8 @@ class HypothesisScreen {
   /// Of an actor whose place is free, by the first two coordinates: the likelihood at places around it, farther away
   /// than slopes reach.
   Screened around(const ModelState& null, const Hypothesis& hypothesis, int actor, const std::vector<int>& poses);
+  /// The place that around() has found, on other poses.
+  Screened again(const ModelState& null, Screened found, int actor, const std::vector<int>& poses);
 
  private:
   /// Gain in nats over the poses named, and what it promises for all with its inflation taken off.

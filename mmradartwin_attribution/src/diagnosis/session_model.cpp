@@ -298,6 +298,7 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
   const std::vector<GroupLevel> of_groups = levels(echoes, n);
   std::vector<double> products(static_cast<std::size_t>((globals + 1) * (globals + 1)));
   BinBasis basis;
+  Eigen::MatrixXd whitened(numbers, globals + 1);  // of the active ones, in its first columns
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
     for (int j : active) is_active[j] = 0;
     active.clear();
@@ -350,10 +351,8 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
     const double mean = level.trace() / channels_ / (1 + relative + (isBeam(cell) ? kBeamShare : 0));
     addApart(cell, relative * mean, touch(kRelative));
     basis.active = active;
-    basis.whitened.resize(numbers, static_cast<Eigen::Index>(active.size()));
-    for (std::size_t a = 0; a < active.size(); ++a) {
-      basis.factor.whiten(raw[active[a]], basis.whitened.col(static_cast<Eigen::Index>(a)).data());
-    }
+    const int count = static_cast<int>(active.size());
+    for (int a = 0; a < count; ++a) basis.factor.whiten(raw[active[a]], whitened.col(a).data());
     // Data in the same numbers: w y y^H - I.
     basis.data.resize(numbers);
     int i = 0;
@@ -365,13 +364,12 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
         basis.data[i++] = M_SQRT2 * v.imag();
       }
     }
-    const Eigen::VectorXd score = basis.whitened.transpose() * basis.data;
-    const int count = static_cast<int>(active.size());
-    pairProducts(basis.whitened.data(), numbers, count, products.data());
-    basis.traces.resize(static_cast<Eigen::Index>(active.size()));
+    const Eigen::VectorXd score = whitened.leftCols(count).transpose() * basis.data;
+    pairProducts(whitened.data(), numbers, count, products.data());
+    basis.traces.resize(count);
     for (std::size_t a = 0; a < active.size(); ++a) {
       const Eigen::Index ia = static_cast<Eigen::Index>(a);
-      basis.traces[ia] = traceOfWhitened(basis.whitened.col(ia).data(), channels_);
+      basis.traces[ia] = traceOfWhitened(whitened.col(ia).data(), channels_);
       out.score[active[a]] += weight() * score[ia];
       for (std::size_t b = 0; b <= a; ++b) {
         const Eigen::Index ib = static_cast<Eigen::Index>(b);
@@ -380,7 +378,9 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
         if (a != b) out.information(active[b], active[a]) += v;
       }
     }
-    if (keep) out.bins.push_back(basis);
+    if (!keep) continue;
+    basis.whitened = whitened.leftCols(count).cast<float>();
+    out.bins.push_back(std::move(basis));
   }
   out.log_likelihood *= weight();
 }
@@ -438,7 +438,8 @@ Scores SessionModel::scores(const Basis& basis, const std::vector<SessionCovaria
       }
       for (int h : active) {
         own.score[globals + h] += weight() * v.col(h).dot(bin.data);
-        const Eigen::VectorXd products = bin.whitened.transpose() * v.col(h);
+        const Eigen::VectorXf single = v.col(h).cast<float>();
+        const Eigen::VectorXf products = bin.whitened.transpose() * single;
         for (std::size_t a = 0; a < bin.active.size(); ++a) {
           const int g = bin.active[a] == globals ? all : bin.active[a];
           const Eigen::Index ia = static_cast<Eigen::Index>(a);

@@ -57,7 +57,7 @@ struct BinBasis {
   int cell = 0;
   InverseFactor factor;
   std::vector<int> active;   ///< directions that do something here; the heading is the last of all
-  Eigen::MatrixXd whitened;  ///< [M^2][active]
+  Eigen::MatrixXf whitened;  ///< [M^2][active]; kept in single precision: half of a long session's memory
   Eigen::VectorXd data, traces;
 };
 struct PoseBasis {
