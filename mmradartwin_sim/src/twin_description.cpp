@@ -193,7 +193,7 @@ TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::
   YamlMap yaml = YamlMap::load(twin_file);
   if (yaml.has("scene")) twin.scene_file = resolvePath(yaml.text("scene"), twin_file);
   if (twin.scene_file.empty())
-    yaml.fail("scene", "is missing, and the session names no scene either; give the path of a scene.yaml");
+    yaml.fail("scene", "is missing, and no session names one; give the path of a scene.yaml");
   if (yaml.has("radar")) {
     twin.radar_file = resolvePath(yaml.text("radar"), twin_file);
     twin.radar = loadRadarConfig(twin.radar_file);

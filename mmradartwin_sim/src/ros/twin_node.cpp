@@ -153,7 +153,12 @@ void TwinNode::rebuild() {
     use(makeTwin(twin_file));
   } catch (const std::exception& error) {
     problem_ = error.what();
-    ROS_ERROR("no twin: %s", error.what());
+    // A bag's radar/config comes before the session that names the scene: until then the twin waits.
+    if (session_ || !scene_file_.empty()) {
+      ROS_ERROR("no twin: %s", error.what());
+    } else {
+      ROS_INFO("no twin yet: %s", error.what());
+    }
   }
 }
 
