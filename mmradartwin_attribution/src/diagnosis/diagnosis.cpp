@@ -244,9 +244,8 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
                              : object ? kMostObjects
                              : moved  ? kMostNames + kMostOutOfPlace
                                       : kMostNames;
-    // Geometry and places promise too little for what they bring.
-    const bool waits =
-        !s.hypothesis.isGeometry() && !moved && !isPlaced(s.hypothesis) && s.promised < kNoRival * plain_name;
+    // Geometry, places and what paths promise of a law is too little for what these bring.
+    const bool waits = !law && !s.hypothesis.isGeometry() && !moved && !object && s.promised < kNoRival * plain_name;
     if (waits) tried.verdict = "promises little beside what is plain";
     if (!waits && s.promised > worth && (box || fitted < most)) {
       ++fitted;

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -28,7 +29,8 @@ constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4};
 constexpr int kBearings = 24;  ///< that half a turn is divided into
 constexpr int kOften = 12;     ///< paths of an actor
 constexpr double kMaxInflation = 50;
-constexpr double kWeakest_db = -45;  ///< echoes below this are one for a law over amplitudes
+constexpr double kScattersLess = 0.7;  ///< of the scatter before a law, from where on its size is judged by it anew
+constexpr double kWeakest_db = -45;    ///< echoes below this are one for a law over amplitudes
 
 /// One observable of all paths, robustly weighted.
 struct Sample {
@@ -112,6 +114,14 @@ LawScreen::LawScreen(const Twin& base, const SessionModel& model, const ModelSta
   for (std::size_t kind = 0; kind < of.size(); ++kind) samples_.push_back(sampleOf(of[kind], kind));
 }
 
+/// Phases in degrees, each within half a turn of their mean direction: a law may lead beyond 180 degrees.
+void wrapAround(const Eigen::VectorXd& weight, Eigen::VectorXd& phase_deg) {
+  std::complex<double> sum = 0;
+  for (Eigen::Index i = 0; i < phase_deg.size(); ++i) sum += std::polar(weight[i], phase_deg[i] * M_PI / 180);
+  const double mean_deg = std::arg(sum) * 180 / M_PI;
+  for (double& v : phase_deg) v = mean_deg + std::remainder(v - mean_deg, 360);
+}
+
 Sample LawScreen::sampleOf(const Observable& o, std::size_t kind) const {
   using Kind = Observable::Kind;
   const Eigen::Index count = static_cast<Eigen::Index>(location_.size());
@@ -138,6 +148,7 @@ Sample LawScreen::sampleOf(const Observable& o, std::size_t kind) const {
       ++at;
     }
   }
+  if (o.kind == Kind::kChannelPhase) wrapAround(shows, s.off);
   const double own = of_gain ? 10 / std::log(10.0) * model_.spread().actor_gain : model_.spread().actor_range_m;
   s.weight = shows;
   if (shows.sum() == 0) return s;
@@ -170,22 +181,33 @@ Sample LawScreen::sampleOf(const Observable& o, std::size_t kind) const {
 }
 
 Promise LawScreen::promise(const Sample& s, const Eigen::MatrixXd& directions) const {
-  const double prior = std::pow(s.scatter / s.observable.usual, 2);
   const Eigen::Index n = directions.cols();
   // Latents eliminated: what of a direction they cannot follow.
   const Eigen::MatrixXd weighted = s.weight.asDiagonal() * directions;
   const Eigen::MatrixXd follow = s.latent_solver.solve(s.latent.transpose() * weighted);  // [G][K]
-  Eigen::MatrixXd information = directions.transpose() * weighted - (weighted.transpose() * s.latent) * follow;
-  information.diagonal().array() += prior;
+  const Eigen::MatrixXd seen_by_paths = directions.transpose() * weighted - (weighted.transpose() * s.latent) * follow;
   const Eigen::VectorXd total = weighted.transpose() * s.rest;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(information);
   Promise p;
-  p.value = solver.solve(total);
-  const Eigen::VectorXd latents_after = s.latents - follow * p.value;
-  const Eigen::VectorXd after = s.off - s.latent * latents_after - directions * p.value;
+  Eigen::LDLT<Eigen::MatrixXd> solver;
+  Eigen::VectorXd latents_after, after;
+  double left = 0, scatter = s.scatter;
+  while (true) {
+    const double prior = std::pow(scatter / s.observable.usual, 2);
+    Eigen::MatrixXd information = seen_by_paths;
+    information.diagonal().array() += prior;
+    solver.compute(information);
+    p.value = solver.solve(total);
+    latents_after = s.latents - follow * p.value;
+    after = s.off - s.latent * latents_after - directions * p.value;
+    const double squares = s.squares(after, latents_after);
+    left = squares + prior * p.value.squaredNorm();
+    // What a law of many times the usual size leaves scatters far less than all that it explains did.
+    const double own = std::max(s.observable.floor, std::sqrt(squares / std::max(1.0, s.weight.sum())));
+    if (own > kScattersLess * scatter) break;
+    scatter = own;
+  }
   p.constant = latents_after[0];
   // The scatter is as free as the law: its likelihood's maximum.
-  const double left = s.squares(after, latents_after) + prior * p.value.squaredNorm();
   p.raw = whole_ * 0.5 * s.weight.sum() * std::log(std::max(1.0, s.squares(s.rest, s.latents) / left));
   const double locations = static_cast<double>(model_.data().locations.size());
   if (locations > 1) {
