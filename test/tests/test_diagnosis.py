@@ -186,7 +186,8 @@ class HiddenEffects(unittest.TestCase):
 
     def test_a_transmitter_whose_phase_goes_with_range_is_unknown(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "45"))
-        mechanism, truth = self.unknown(seed, {"transmitter_skew": {}})
+        # So steep that the phases of far echoes pass 180 degrees.
+        mechanism, truth = self.unknown(seed, {"transmitter_skew": {"deg_per_m": 20.0}})
         law = mechanism["empirical_law"]
         self.assertEqual((law["variable"], law["channels"]), ("range_m", [4, 5, 6, 7]), msg=f"seed {seed}")
         slope = (law["phase_deg"][-1] - law["phase_deg"][0]) / (law["at"][-1] - law["at"][0])
