@@ -102,7 +102,6 @@ double HypothesisFit::size_m() const {
   return hypothesis.at(scaled).values.number("size_m");
 }
 
-/// Scores of the hypothesis' own directions with the nuisance's part taken out.
 HypothesisFitter::HypothesisFitter(EchoSource& source, const SessionModel& model, int folds)
     : source_(source), model_(model), folds_(folds) {}
 
@@ -125,9 +124,9 @@ ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanism
 }
 
 std::optional<ModelState> HypothesisFitter::improved(const ModelState& null, const Nuisance& latents) {
-  Nuisance other = latents, own = null.nuisance;
-  Eigen::VectorXd apart(own.globals());
-  for (int j = 0; j < own.globals(); ++j) apart[j] = other.global(j) - own.global(j);
+  Nuisance other = latents;
+  Eigen::VectorXd apart(latents.globals());
+  for (int j = 0; j < latents.globals(); ++j) apart[j] = latents.global(j) - null.nuisance.global(j);
   const Eigen::MatrixXd information = model_.scores(null.basis, {}, everyPose(null)).information;
   if (0.5 * apart.dot(information * apart) < kSameTop) return std::nullopt;
   const auto echoes = source_.echoes(null.mechanisms, other.actor_range_m);
