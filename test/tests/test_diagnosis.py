@@ -351,6 +351,16 @@ class HiddenEffects(unittest.TestCase):
                 for name in ("dx_m", "dy_m"):
                     self.assertAlmostEqual(told[name]["value"], truth[0]["parameters"][name], delta=0.05)
 
+    def test_a_radar_that_stands_aside_is_no_range_bias(self):
+        # The actors' range errors hide the offset: it promised 0.2 nats beside the 11 of a range bias, and was not tried.
+        truth = trials.hide(draws.Trial("single", "office", 139, 0, poses=24), self.at("session"))[0]["parameters"]
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["radar_position_offset"], msg=str(findings))
+        for name, value in truth.items():
+            low, high = findings["findings"][0]["parameters"][name]["ci95"]
+            self.assertTrue(low < value < high, msg=f"{name} {value}: {low} to {high}")
+
     def test_errors_that_look_like_a_registration_are_none(self):
         # Here 13 mm of registration let paths through that gain 129 nats and 0.035 of the measured power; actors and
         # poses of this tier have errors of 20 mm and 0.3 deg.

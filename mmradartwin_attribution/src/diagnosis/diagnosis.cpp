@@ -70,6 +70,13 @@ class Session {
   void judgeTone();
   void judgeNoise();
   bool judgeChannels(int round);
+  /// Of one round: what is worth a fit, most promising first, and what fits have come to, best first.
+  struct Round {
+    std::vector<Screened> screened;
+    std::vector<HypothesisFit> fits;
+    double best_object = 0, plain_name = 0;  ///< nats of the best fits of these kinds
+  };
+  void fitOne(Screened screened, Round& round);
   std::vector<HypothesisFit> fitBest(int round);
   TriedHypothesis& triedAs(const HypothesisFit& fit, int round);
   void refitTogether();
@@ -214,15 +221,57 @@ void Session::judgeNoise() {
   result_.findings.findings.push_back(std::move(*f));
 }
 
+void Session::fitOne(Screened s, Round& round) {
+  const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism), box = isUnmodelledBox(s.hypothesis);
+  std::vector<HypothesisFit>& fits = round.fits;
+  if (s.hypothesis.isGeometry()) {
+    // Latents stand in for a part of it only, as much as their own spread lets them.
+    const std::vector<std::vector<double>> starts = s.starts;
+    for (double longer : kLonger) {
+      for (std::vector<double> start : starts) {
+        for (double& scaled : start) scaled *= longer;
+        s.starts.push_back(std::move(start));
+      }
+    }
+  }
+  report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
+  const bool around = isMove(s.hypothesis) || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
+  fits.push_back(around ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
+  source_->settle(mechanisms_);
+  if (!law && fitter_->isPlain(fits.back())) round.plain_name = std::max(round.plain_name, fits.back().gain);
+  if (isObject(s.hypothesis) && !box && fits.back().broad_gain > std::max(kWorthABox, round.best_object)) {
+    round.best_object = fits.back().broad_gain;
+    if (isUnmodelledBox(round.screened.back().hypothesis)) round.screened.pop_back();
+    round.screened.push_back(asBox(data_, state_, fits.back()));  // last: the slowest of all fits
+  }
+  // What latents bring that the fit has found, and the twin as it is had not, is nobody's gain.
+  if (std::optional<ModelState> better = fitter_->improved(state_, fits.back().state.nuisance)) {
+    const double nats = better->log_likelihood - state_.log_likelihood;
+    state_ = std::move(*better);
+    // Where that is much, it is one place's, and what the others gain beside it is seen by fits from there alone.
+    for (HypothesisFit& earlier : fits) {
+      if (nats > kWorthAFit && &earlier != &fits.back()) {
+        earlier = fitter_->fit(state_, earlier.hypothesis, {earlier.scaled}, 4);
+        source_->settle(mechanisms_);
+      } else {
+        fitter_->gainOver(state_, earlier);
+      }
+    }
+  }
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](const HypothesisFit& a, const HypothesisFit& b) { return a.ranking() > b.ranking(); });
+}
+
 std::vector<HypothesisFit> Session::fitBest(int round) {
   const std::vector<Hypothesis> all = hypotheses(twin_, extended_);
-  std::vector<Screened> screened = ranking_->rank(all, state_);
+  Round own;
+  own.screened = ranking_->rank(all, state_);
   family_ = all.size() + static_cast<std::size_t>(kLawFamily);
-  std::vector<HypothesisFit> fits;
+  const std::vector<Screened>& screened = own.screened;
+  std::vector<HypothesisFit>& fits = own.fits;
   std::size_t names_fitted = 0, laws_fitted = 0, objects_fitted = 0;
-  double best_object = 0, plain_name = 0;  // nats
   for (std::size_t i = 0; i < screened.size(); ++i) {
-    Screened s = screened[i];
+    Screened s = screened[i];  // a copy: more may be put behind it
     TriedHypothesis tried;
     tried.label = s.hypothesis.label();
     tried.promised = s.promised;
@@ -245,48 +294,20 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
                              : moved  ? kMostNames + kMostOutOfPlace
                                       : kMostNames;
     // Geometry, places and what paths promise of a law is too little for what these bring.
-    const bool waits = !law && !s.hypothesis.isGeometry() && !moved && !object && s.promised < kNoRival * plain_name;
+    const bool waits =
+        !law && !s.hypothesis.isGeometry() && !moved && !object && s.promised < kNoRival * own.plain_name;
     if (waits) tried.verdict = "promises little beside what is plain";
     if (!waits && s.promised > worth && (box || fitted < most)) {
       ++fitted;
-      if (s.hypothesis.isGeometry()) {
-        // Latents stand in for a part of it only, as much as their own spread lets them.
-        const std::vector<std::vector<double>> starts = s.starts;
-        for (double longer : kLonger) {
-          for (std::vector<double> start : starts) {
-            for (double& scaled : start) scaled *= longer;
-            s.starts.push_back(std::move(start));
-          }
-        }
-      }
-      report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
-      const bool around = moved || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
-      fits.push_back(around ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
-      source_->settle(mechanisms_);
-      if (!law && fitter_->isPlain(fits.back())) plain_name = std::max(plain_name, fits.back().gain);
-      if (object && !box && fits.back().broad_gain > std::max(kWorthABox, best_object)) {
-        best_object = fits.back().broad_gain;
-        if (isUnmodelledBox(screened.back().hypothesis)) screened.pop_back();
-        screened.push_back(asBox(data_, state_, fits.back()));  // last: the slowest of all fits
-      }
-      // What latents bring that the fit has found, and the twin as it is had not, is nobody's gain.
-      if (std::optional<ModelState> better = fitter_->improved(state_, fits.back().state.nuisance)) {
-        const double nats = better->log_likelihood - state_.log_likelihood;
-        state_ = std::move(*better);
-        // Where that is much, it is one place's, and what the others gain beside it is seen by fits from there alone.
-        for (HypothesisFit& earlier : fits) {
-          if (nats > kWorthAFit && &earlier != &fits.back()) {
-            earlier = fitter_->fit(state_, earlier.hypothesis, {earlier.scaled}, 4);
-            source_->settle(mechanisms_);
-          } else {
-            fitter_->gainOver(state_, earlier);
-          }
-        }
-      }
-      std::stable_sort(fits.begin(), fits.end(),
-                       [](const HypothesisFit& a, const HypothesisFit& b) { return a.ranking() > b.ranking(); });
+      fitOne(std::move(s), own);
     }
     result_.tried.push_back(tried);
+  }
+  // Where a geometry explains most, latents may hide that another one explains more: each is fitted then.
+  const bool geometry = !fits.empty() && fits.front().hypothesis.isGeometry() && fits.front().ranking() > 0;
+  for (const Screened& s : screened) {
+    const auto fitted = [&](const HypothesisFit& f) { return f.hypothesis.label() == s.hypothesis.label(); };
+    if (geometry && s.hypothesis.isGeometry() && std::none_of(fits.begin(), fits.end(), fitted)) fitOne(s, own);
   }
   for (HypothesisFit& f : fits) {
     fitter_->judge(f, family_ + static_cast<std::size_t>(isPlaced(f.hypothesis) ? kObjectPlaces : 0));
@@ -301,7 +322,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
       t.fitted += (i ? "; " : "") + c.parameter + " " + number(c.value(f.scaled[i]));
     }
   }
-  return fits;
+  return std::move(own.fits);
 }
 
 TriedHypothesis& Session::triedAs(const HypothesisFit& fit, int round) {

@@ -63,7 +63,9 @@ std::vector<Screened> sharedLatents(EchoSource& source, const ModelState& null, 
     if (!h.isGeometry()) continue;
     const double numbers = static_cast<double>(h.coordinates.size());
     Screened s = sharedGeometry(source, h, null, spread, accuracy, poses);
-    if (s.promised > 0.5 * kSharedLatent * kSharedLatent * numbers) screened.push_back(std::move(s));
+    if (!(s.promised > 0)) continue;
+    if (s.promised < 0.5 * kSharedLatent * kSharedLatent * numbers) s.promised = 0;
+    screened.push_back(std::move(s));
   }
   // Levels of one material's actors, or of one actor, further off than such errors are: the same for them.
   for (const Hypothesis& h : all) {

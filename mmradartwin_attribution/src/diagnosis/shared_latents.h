@@ -9,6 +9,7 @@ namespace mmradartwin {
 
 /// Hypotheses that the latents have stood in for: what all headings and ranges, or the levels of one material's actors
 /// have in common beyond what such errors are. Each with the start that the latents give; poses: looked at for slopes.
+/// A geometry that they have no more of than that promises nothing, but its start is told.
 std::vector<Screened> sharedLatents(EchoSource& source, const ModelState& null, const LatentSpread& spread,
                                     const PoseAccuracy& accuracy, const std::vector<Hypothesis>& all,
                                     const std::vector<int>& poses);
