@@ -361,6 +361,15 @@ class HiddenEffects(unittest.TestCase):
             low, high = findings["findings"][0]["parameters"][name]["ci95"]
             self.assertTrue(low < value < high, msg=f"{name} {value}: {low} to {high}")
 
+    def test_of_two_names_for_one_thing_the_likelier_is_told(self):
+        # A filter gained 53 nats and an attenuation of -0.7 dB/m 38; its slopes scattered more, so that it was chance.
+        truth = trials.hide(draws.Trial("single", "office", 139, 26, poses=24), self.at("session"))[0]["parameters"]
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["if_highpass"], msg=str(findings))
+        low, high = findings["findings"][0]["parameters"]["corner_hz"]["ci95"]
+        self.assertTrue(low < truth["corner_hz"] < high, msg=f"{truth}: {low} to {high}")
+
     def test_errors_that_look_like_a_registration_are_none(self):
         # Here 13 mm of registration let paths through that gain 129 nats and 0.035 of the measured power; actors and
         # poses of this tier have errors of 20 mm and 0.3 deg.

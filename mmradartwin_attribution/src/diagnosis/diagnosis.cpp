@@ -484,6 +484,7 @@ void Session::restate() {
 bool Session::judgeChannels(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
   believeAbsences(fits);
+  believeBetterNames(fits, state_);
   bool refused = false;
   for (HypothesisFit& f : fits) {
     std::string& verdict = triedAs(f, round).verdict;

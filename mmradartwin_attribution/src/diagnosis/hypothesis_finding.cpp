@@ -19,6 +19,7 @@ constexpr double kMostScattering = 0.98;    ///< no surface mirrors nothing: wha
 constexpr double kStrongScattering = 0.35;  ///< an eighth of what is reflected is no clutter
 constexpr double kFurniture_m = 0.1;        ///< smaller than this is what lies about
 constexpr double kLeastLoss_db = 0.5;       ///< of a crossing: what lets all through is not there, or not the cause
+constexpr double kSameLaw = 0.7;            ///< correlation over poses of what two names gain that explain the same
 constexpr double kPerson_m = 0.3, kWalk_m = 0.6;  ///< size, and how far from the middle of a walk
 
 }  // namespace
@@ -133,6 +134,27 @@ void believeAbsences(std::vector<HypothesisFit>& fits) {
           moved.hypothesis.subject == gone.hypothesis.subject && gone.ranking() >= moved.ranking()) {
         gone.false_alarm_rate = std::min(gone.false_alarm_rate, moved.false_alarm_rate);
       }
+    }
+  }
+}
+
+void believeBetterNames(std::vector<HypothesisFit>& fits, const ModelState& before) {
+  const auto ofAllEchoes = [](const HypothesisFit& f) {
+    return f.hypothesis.subject.empty() && isCatalogued(f.hypothesis.mechanism.mechanism);
+  };
+  const auto gained = [&](const HypothesisFit& f) {
+    Eigen::VectorXd gain(static_cast<Eigen::Index>(before.by_pose.size()));
+    for (std::size_t i = 0; i < before.by_pose.size(); ++i) {
+      gain[static_cast<Eigen::Index>(i)] = f.state.by_pose[i] - before.by_pose[i];
+    }
+    return Eigen::VectorXd(gain.array() - gain.mean());
+  };
+  for (HypothesisFit& better : fits) {
+    for (const HypothesisFit& sure : fits) {
+      if (!ofAllEchoes(better) || !ofAllEchoes(sure) || better.ranking() <= sure.ranking()) continue;
+      const Eigen::VectorXd a = gained(better), b = gained(sure);
+      if (a.dot(b) < kSameLaw * a.norm() * b.norm()) continue;
+      better.false_alarm_rate = std::min(better.false_alarm_rate, sure.false_alarm_rate);
     }
   }
 }

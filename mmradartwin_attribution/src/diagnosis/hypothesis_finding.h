@@ -32,4 +32,8 @@ std::string number(double value, int digits = 3);
 /// is then as sure.
 void believeAbsences(std::vector<HypothesisFit>& fits);
 
+/// That something is wrong with all echoes is as sure as the surest name for it; which name, its likelihood says: where
+/// two gain alike over poses, the likelier one is as sure as the other.
+void believeBetterNames(std::vector<HypothesisFit>& fits, const ModelState& before);
+
 }  // namespace mmradartwin
