@@ -66,8 +66,7 @@ std::string LawVariable::meaning() {
          "foot_m (where the path meets the law's actor, or else its first face, if upright, along it, from the middle "
          "of the face's actor; other paths stay as they are), standing_m (of the radar in the floor plan, from map's "
          "origin along bearing_deg), passing_m (at which the path passes x_m, y_m in the floor plan) or distance_m (of "
-         "the "
-         "radar from x_m, y_m in the floor plan)";
+         "the radar from x_m, y_m in the floor plan)";
 }
 
 LawVariable::LawVariable(const std::string& name, const About& about)

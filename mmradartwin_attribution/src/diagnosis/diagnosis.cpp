@@ -277,29 +277,29 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     tried.promised = s.promised;
     tried.gain = std::numeric_limits<double>::quiet_NaN();
     tried.round = round;
-    // A promise is a quadratic's and often far too small: names get several chances, laws without a name four.
+    // A promise is a quadratic's and often far too small, most so of geometry, of places and of laws, which paths
+    // promise: names get several chances, laws without a name four.
     const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
     const bool object = isObject(s.hypothesis);
     std::size_t& fitted = law ? laws_fitted : object ? objects_fitted : names_fitted;
     const bool moved = isMove(s.hypothesis);
     const bool box = isUnmodelledBox(s.hypothesis);
+    const double rival = kNoRival * own.plain_name;
     const double worth = box                                  ? kShareWorthABox * fits.front().gain
                          : object                             ? kWorthAnObject
                          : law                                ? kWorthALaw
                          : s.hypothesis.isGeometry() || moved ? kWorthAFitOfGeometry
-                                                              : kWorthAFit;
+                                                              : std::max(kWorthAFit, rival);
     // Where an actor went is known by the fit alone: what little the quadratic promises does not rank it.
     const std::size_t most = law      ? kMostLaws
                              : object ? kMostObjects
                              : moved  ? kMostNames + kMostOutOfPlace
                                       : kMostNames;
-    // Geometry, places and what paths promise of a law is too little for what these bring.
-    const bool waits =
-        !law && !s.hypothesis.isGeometry() && !moved && !object && s.promised < kNoRival * own.plain_name;
-    if (waits) tried.verdict = "promises little beside what is plain";
-    if (!waits && s.promised > worth && (box || fitted < most)) {
+    if (s.promised > worth && (box || fitted < most)) {
       ++fitted;
       fitOne(std::move(s), own);
+    } else if (worth == rival && s.promised > kWorthAFit && s.promised <= rival) {
+      tried.verdict = "promises little beside what is plain";
     }
     result_.tried.push_back(tried);
   }

@@ -142,18 +142,20 @@ void believeBetterNames(std::vector<HypothesisFit>& fits, const ModelState& befo
   const auto ofAllEchoes = [](const HypothesisFit& f) {
     return f.hypothesis.subject.empty() && isCatalogued(f.hypothesis.mechanism.mechanism);
   };
-  const auto gained = [&](const HypothesisFit& f) {
+  std::vector<Eigen::VectorXd> gained;  // by fit and pose, about its mean
+  for (const HypothesisFit& f : fits) {
     Eigen::VectorXd gain(static_cast<Eigen::Index>(before.by_pose.size()));
     for (std::size_t i = 0; i < before.by_pose.size(); ++i) {
       gain[static_cast<Eigen::Index>(i)] = f.state.by_pose[i] - before.by_pose[i];
     }
-    return Eigen::VectorXd(gain.array() - gain.mean());
-  };
-  for (HypothesisFit& better : fits) {
-    for (const HypothesisFit& sure : fits) {
+    gained.emplace_back(gain.array() - gain.mean());
+  }
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    for (std::size_t j = 0; j < fits.size(); ++j) {
+      HypothesisFit& better = fits[i];
+      const HypothesisFit& sure = fits[j];
       if (!ofAllEchoes(better) || !ofAllEchoes(sure) || better.ranking() <= sure.ranking()) continue;
-      const Eigen::VectorXd a = gained(better), b = gained(sure);
-      if (a.dot(b) < kSameLaw * a.norm() * b.norm()) continue;
+      if (gained[i].dot(gained[j]) < kSameLaw * gained[i].norm() * gained[j].norm()) continue;
       better.false_alarm_rate = std::min(better.false_alarm_rate, sure.false_alarm_rate);
     }
   }

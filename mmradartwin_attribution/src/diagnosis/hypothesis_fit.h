@@ -83,7 +83,7 @@ class HypothesisFitter {
   /// Shortens the step to each fold's values until they are no worse than the fit's on the places that the fold is
   /// fitted to: where the likelihood is rough, scores of one place lead far away.
   void settleFolds(const ModelState& null, HypothesisFit& fit);
-  /// Gains of a fit beside a null that has become better since.
+  /// Sets a fit's gains to those over this null, which may have become better since.
   void gainOver(const ModelState& null, HypothesisFit& fit) const;
   /// True where it brings far more than clean sessions do, whatever its scatter over places.
   bool isPlain(const HypothesisFit& fit) const;

@@ -43,12 +43,14 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   const auto some = [&](const Hypothesis& h) {
     return spread(std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
   };
-  const auto isOutOfPlace = [&](const Hypothesis& h) {
-    return h.mechanism.mechanism == "actor_moved" && out_of_place.count(twin_.scene().actorIndex(h.subject)) > 0;
+  /// Whom it moves, where that one is looked for elsewhere; -1 of all others.
+  const auto outOfPlace = [&](const Hypothesis& h) {
+    const int actor = twin_.scene().actorIndex(h.subject);
+    return h.mechanism.mechanism == "actor_moved" && out_of_place.count(actor) > 0 ? actor : -1;
   };
   const auto look = [&](const Hypothesis& h, const std::vector<int>& poses) {
-    return isOutOfPlace(h) ? screen_.around(state, h, twin_.scene().actorIndex(h.subject), poses)
-                           : screen_.screen(state, h, poses);
+    const int actor = outOfPlace(h);
+    return actor >= 0 ? screen_.around(state, h, actor, poses) : screen_.screen(state, h, poses);
   };
   const auto lookAtSome = [&](const Hypothesis& h) { return look(h, spread(kScreenPoses)); };
   const auto better = [](const Screened& a, const Screened& b) { return a.promised > b.promised; };
@@ -105,8 +107,8 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
     const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
     const std::vector<int> poses = spread(numbers > 3 ? kScreenPoses : data_.poses.size());
     if (looked_at[s.hypothesis.label()] < poses.size()) {
-      const int actor = twin_.scene().actorIndex(s.hypothesis.subject);
-      s = isOutOfPlace(s.hypothesis) ? screen_.again(state, s, actor, poses) : look(s.hypothesis, poses);
+      const int actor = outOfPlace(s.hypothesis);
+      s = actor >= 0 ? screen_.again(state, s, actor, poses) : screen_.screen(state, s.hypothesis, poses);
       s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
       source_.settle(state.mechanisms);
     }
