@@ -28,21 +28,23 @@ if [ -z "${DISPLAY:-}" ]; then
   say "no display: rviz runs on a virtual one (:$n)"
 fi
 rviz_window() { xwininfo -root -tree 2>/dev/null | awk '/ - RViz"/ {print $1; exit}'; }
-# picture FILE: what rviz shows now; fails where there is no rviz before or after, as while it starts or ends.
+# picture FILE: what rviz shows now; fails where there is no rviz yet.
 picture() {
   local id
   id=$(rviz_window)
   [ -n "$id" ] || return 1
   [ -n "$xvfb" ] && id=root
-  import -window "$id" "$1" 2>/dev/null && [ -n "$(rviz_window)" ]
+  import -window "$id" "$1" 2>/dev/null
 }
 
-# watch FILE: waits for the launch; the last picture taken while it runs is the one that stays.
+# watch PLAYER FILE: waits for the launch. The last picture taken while its node PLAYER runs is the one that stays: that
+# node's end ends the launch, and what rviz shows then is on its way out.
 watch() {
   while kill -0 "$launch" 2>/dev/null; do
     sleep 3
-    picture "$out/.rviz.png" && mv -f "$out/.rviz.png" "$1" || true
+    picture "$out/.rviz.png" && pgrep -P "$launch" -f "__name:=$1" >/dev/null && mv -f "$out/.rviz.png" "$2" || true
   done
+  rm -f "$out/.rviz.png"
   wait "$launch" || true
   launch=
 }
@@ -64,7 +66,7 @@ say "2/5 playing it over UDP at the real pace: driver, signal chain, twin, attri
 roslaunch -p "$port" mmradartwin_launch demo.launch session:="$out/session" bag:="$out/demo.bag" \
   average_frames:="$frames" ${DEMO_ARGS:-} &
 launch=$!
-watch "$out/rviz.png"
+watch session_player "$out/rviz.png"
 say "the session was played to its end (roslaunch calls that the death of session_player; all is well)"
 
 bag=$out/demo.bag
@@ -82,7 +84,7 @@ extended=$out/diagnosis/twin.extended.yaml
 roslaunch -p "$port" mmradartwin_launch replay.launch bag:="$bag" twin:="$extended" average_frames:="$frames" \
   diagnosis:=false ${DEMO_ARGS:-} &
 launch=$!
-watch "$out/rviz_extended.png"
+watch player "$out/rviz_extended.png"
 if [ -f "$out/rviz.png" ] && [ -f "$out/rviz_extended.png" ]; then
   convert "$out/rviz.png" "$out/rviz_extended.png" -append "$out/rviz_before_after.png"
 fi

@@ -112,15 +112,16 @@ class Simulated(unittest.TestCase):
         with open(os.path.join(other, "session.yaml"), encoding="ascii") as file:
             gain_db = float(re.search(r"gain_db: *(\S+)", file.read()).group(1))
         measurement = self.measurements["exact"]
-        errors = []
+        worst = {}
         for station in measurement.stations:
             x = measurement.radar.grid(*path_arrays(measurement.tracer.specular(station.true), 8))
             raw = np.fromfile(os.path.join(other, "captures", station.name + ".bin"), "<i2").astype(float)
             raw = raw.reshape(2, 64, 2, 4)
             y = (raw[:, :, 0, :] + 1j * raw[:, :, 1, :]).transpose(0, 2, 1).reshape(8, 64) / 32768 / 10**(gain_db / 20)
-            errors.append(float(np.linalg.norm(y - x) / np.linalg.norm(x)))
-        # One pose may hang on a grazing ray; quantisation and the mesh's 0.1 um leave a per cent.
-        self.assertLess(sorted(errors)[-2], 0.03, msg=f"seed {self.seed}: {errors}")
+            error = float(np.linalg.norm(y - x) / np.linalg.norm(x))
+            worst[station.location] = max(worst.get(station.location, 0.0), error)
+        # One place, with all its headings, may hang on a grazing ray; quantisation and the mesh's 0.1 um leave 1 %.
+        self.assertLess(sorted(worst.values())[-2], 0.03, msg=f"seed {self.seed}: {worst}")
 
 
 if __name__ == "__main__":
