@@ -50,7 +50,6 @@ constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of acto
 constexpr double kFarAway_m = 0.12;    ///< six times what a scene's actors err by
 constexpr double kObjectPlaces = 500;  ///< places of an 8 by 6 m room that a session resolves, as a family
 
-bool isMove(const Hypothesis& h) { return h.mechanism.mechanism == "actor_moved"; }
 bool isObject(const Hypothesis& h) { return h.mechanism.mechanism == "actor_unmodelled"; }
 bool isPlaced(const Hypothesis& h) { return isObject(h) || h.mechanism.mechanism == "empirical_echo"; }
 
@@ -235,7 +234,7 @@ void Session::fitOne(Screened s, Round& round) {
     }
   }
   report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
-  const bool around = isMove(s.hypothesis) || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
+  const bool around = s.hypothesis.isMove() || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
   fits.push_back(around ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
   source_->settle(mechanisms_);
   if (!law && fitter_->isPlain(fits.back())) round.plain_name = std::max(round.plain_name, fits.back().gain);
@@ -282,7 +281,7 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
     const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
     const bool object = isObject(s.hypothesis);
     std::size_t& fitted = law ? laws_fitted : object ? objects_fitted : names_fitted;
-    const bool moved = isMove(s.hypothesis);
+    const bool moved = s.hypothesis.isMove();
     const bool box = isUnmodelledBox(s.hypothesis);
     const double rival = kNoRival * own.plain_name;
     const double worth = box                                  ? kShareWorthABox * fits.front().gain
@@ -443,7 +442,7 @@ void Session::profileFound() {
 bool Session::isWithinErrors(const HypothesisFit& f) const {
   const Hypothesis& h = f.hypothesis;
   const auto a = acceptedAs(h);
-  if (a == accepted_.end() || !(isMove(h) || (h.isGeometry() && !f.plain))) return false;
+  if (a == accepted_.end() || !(h.isMove() || (h.isGeometry() && !f.plain))) return false;
   if (f.plain && f.moved_m() > kFarAway_m) return false;  // an interval may be wide where the likelihood is rough
   const double nats = natsFromNothing(h, a->scaled, a->standard_error);
   return fitter_->falseAlarmRate(nats, h, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
@@ -546,7 +545,7 @@ bool Session::judgeChannels(int round) {
       restate();
       state_.nuisance = latents;
       source_->settle(mechanisms_);
-      refused = refused || !stands || !isMove(f.hypothesis);
+      refused = refused || !stands || !f.hypothesis.isMove();
       verdict = stands ? "no larger than what errors of actors and poses look like" : "worth nothing beside the rest";
       report("taken back: " + f.hypothesis.label(), 1);
       continue;

@@ -163,6 +163,8 @@ bool Hypothesis::isGeometry() const {
          causeDescription(mechanism.mechanism).residual_class == ResidualClass::kShiftedResponse;
 }
 
+bool Hypothesis::isMove() const { return mechanism.mechanism == "actor_moved"; }
+
 std::vector<NamedParameters> mechanismsWith(std::vector<NamedParameters> base, const std::vector<Hypothesis>& parts,
                                             const std::vector<double>& scaled) {
   auto from = scaled.begin();

@@ -42,6 +42,8 @@ struct Hypothesis {
   bool isOneSided() const;
   /// True for a named error of all ranges or directions in a few numbers.
   bool isGeometry() const;
+  /// True for an actor that stands elsewhere.
+  bool isMove() const;
 };
 
 /// `base` and behind it the parts, their coordinates in a row.

@@ -130,8 +130,8 @@ void believeAbsences(std::vector<HypothesisFit>& fits) {
   for (HypothesisFit& gone : fits) {
     if (gone.hypothesis.mechanism.mechanism != "actor_absent") continue;
     for (const HypothesisFit& moved : fits) {
-      if (moved.hypothesis.mechanism.mechanism == "actor_moved" &&
-          moved.hypothesis.subject == gone.hypothesis.subject && gone.ranking() >= moved.ranking()) {
+      if (moved.hypothesis.isMove() && moved.hypothesis.subject == gone.hypothesis.subject &&
+          gone.ranking() >= moved.ranking()) {
         gone.false_alarm_rate = std::min(gone.false_alarm_rate, moved.false_alarm_rate);
       }
     }

@@ -87,12 +87,12 @@ double HypothesisFit::ranking() const {
   const double share = isCatalogued(m.mechanism) ? 1 : nests ? kNestingLawShare : kLawShare;
   double nats = share * gain - kPrice * static_cast<double>(numbers());
   if (hypothesis.mechanism.mechanism == "actor_unmodelled") nats -= kSomewhere;
-  if (hypothesis.mechanism.mechanism == "actor_moved" && moved_m() < kLeastMove_m) nats -= kPrice;
+  if (hypothesis.isMove() && moved_m() < kLeastMove_m) nats -= kPrice;
   return nats;
 }
 
 double HypothesisFit::moved_m() const {
-  if (hypothesis.mechanism.mechanism != "actor_moved") return 0;
+  if (!hypothesis.isMove()) return 0;
   const NamedParameters m = hypothesis.at(scaled);
   return std::hypot(m.values.number("dx_m"), m.values.number("dy_m"));
 }

@@ -46,7 +46,7 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   /// Whom it moves, where that one is looked for elsewhere; -1 of all others.
   const auto outOfPlace = [&](const Hypothesis& h) {
     const int actor = twin_.scene().actorIndex(h.subject);
-    return h.mechanism.mechanism == "actor_moved" && out_of_place.count(actor) > 0 ? actor : -1;
+    return h.isMove() && out_of_place.count(actor) > 0 ? actor : -1;
   };
   const auto look = [&](const Hypothesis& h, const std::vector<int>& poses) {
     const int actor = outOfPlace(h);
