@@ -27,11 +27,10 @@ if [ -z "${DISPLAY:-}" ]; then
   export DISPLAY=:$n LIBGL_ALWAYS_SOFTWARE=1
   say "no display: rviz runs on a virtual one (:$n)"
 fi
-rviz_window() { xwininfo -root -tree 2>/dev/null | awk '/ - RViz"/ {print $1; exit}'; }
 # picture FILE: what rviz shows now; fails where there is no rviz yet.
 picture() {
   local id
-  id=$(rviz_window)
+  id=$(xwininfo -root -tree 2>/dev/null | awk '/ - RViz"/ {print $1; exit}')
   [ -n "$id" ] || return 1
   [ -n "$xvfb" ] && id=root
   import -window "$id" "$1" 2>/dev/null

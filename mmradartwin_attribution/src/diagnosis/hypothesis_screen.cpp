@@ -76,9 +76,10 @@ std::pair<double, double> HypothesisScreen::valueAt(const ModelState& null, cons
     by_location[static_cast<std::size_t>(model_.data().poses[pose].location)] += v;
   }
   const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
-  // What is there or not, or elsewhere, gains at the few places that see it.
-  const bool seen_by_few = hypothesis.isOneSided() || hypothesis.isMove();
-  return {gain, whole * gain / (seen_by_few ? inflationOfPresence(gain, by_location) : inflationOf(gain, by_location))};
+  // All places see what a geometry does; what is there or not, or elsewhere, gains at the few that see it.
+  const double inflation =
+      hypothesis.isGeometry() ? inflationOf(gain, by_location) : inflationOfPresence(gain, by_location);
+  return {gain, whole * gain / inflation};
 }
 
 Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypothesis, int actor,
