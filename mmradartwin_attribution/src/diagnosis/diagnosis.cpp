@@ -43,6 +43,7 @@ constexpr double kLonger[] = {1.5, 2};     ///< starts of a geometry
 constexpr double kWorthABox = 15;          ///< nats of a round one there,
 constexpr double kShareWorthABox = 0.3;    ///< and so much of what the best other fit brings
 constexpr double kNoRival = 1 / 40.0;      ///< of what a plain name brings: who promises less waits for the next round
+constexpr double kShareOfPlain = 0.25;     ///< of the same: who will not bring as much is not fitted to the end
 constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
 constexpr double kMostLost = 0.015;        ///< of the explained power, by what the likelihood plainly gains of;
 // unless it is worth leastNats(), inflation taken off, and is not like clutter.
@@ -235,7 +236,9 @@ void Session::fitOne(Screened s, Round& round) {
   }
   report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
   const bool around = s.hypothesis.isMove() || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
-  fits.push_back(around ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, 4));
+  // A geometry climbs slowly at first.
+  const double least_nats = s.hypothesis.isGeometry() ? 0 : kShareOfPlain * round.plain_name;
+  fits.push_back(around ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, least_nats));
   source_->settle(mechanisms_);
   if (!law && fitter_->isPlain(fits.back())) round.plain_name = std::max(round.plain_name, fits.back().gain);
   if (isObject(s.hypothesis) && !box && fits.back().broad_gain > std::max(kWorthABox, round.best_object)) {
@@ -250,7 +253,7 @@ void Session::fitOne(Screened s, Round& round) {
     // Where that is much, it is one place's, and what the others gain beside it is seen by fits from there alone.
     for (HypothesisFit& earlier : fits) {
       if (nats > kWorthAFit && &earlier != &fits.back()) {
-        earlier = fitter_->fit(state_, earlier.hypothesis, {earlier.scaled}, 4);
+        earlier = fitter_->fit(state_, earlier.hypothesis, {earlier.scaled});
         source_->settle(mechanisms_);
       } else {
         fitter_->gainOver(state_, earlier);

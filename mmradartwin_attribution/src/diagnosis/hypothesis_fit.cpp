@@ -18,6 +18,7 @@
 namespace mmradartwin {
 namespace {
 
+constexpr int kSteps = 4, kStepsTogether = 3;
 constexpr int kSettling = 3;                 ///< steps of the latents at each of several starts
 constexpr double kEnough = 0.2;              ///< nats: a further step promises less
 constexpr double kRising = 5;                ///< nats of the last step that are worth going on for
@@ -139,8 +140,9 @@ std::optional<ModelState> HypothesisFitter::improved(const ModelState& null, con
 
 HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
                                                      const std::vector<Hypothesis>& parts,
-                                                     const std::vector<std::vector<double>>& starts, int iterations,
-                                                     const ModelState* null, const HypothesisFit* known) {
+                                                     const std::vector<std::vector<double>>& starts, int steps,
+                                                     const ModelState* null, double least_nats,
+                                                     const HypothesisFit* known) {
   std::vector<Coordinate> coordinates;
   for (const Hypothesis& h : parts) coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
   const int globals = nuisance.globals();
@@ -217,7 +219,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   const std::vector<int> everyone = everyPose(o.state);
   const auto derivatives = [&](const ModelState& s, const std::vector<double>& scaled) {
     std::vector<SessionCovariance> directions;
-    const SessionCovariance here = model_.covariance(s.echoes, s.nuisance, everyone);
+    SessionCovariance here;
     for (Eigen::Index j = 0; j < n; ++j) {
       const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
       const double step =
@@ -230,8 +232,12 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
       };
       // The channels of one strong path are a narrow ridge: a secant to one side climbs out of it with the square of a
       // turn or of a gain, which hides the slope and makes the information many times too large.
-      directions.push_back(c.oneSided() ? difference(covarianceAt(step), here, everyone, step)
-                                        : difference(covarianceAt(step), covarianceAt(-step), 2 * step));
+      if (!c.oneSided()) {
+        directions.push_back(difference(covarianceAt(step), covarianceAt(-step), 2 * step));
+        continue;
+      }
+      if (here.empty()) here = model_.covariance(s.echoes, s.nuisance, everyone);
+      directions.push_back(difference(covarianceAt(step), here, everyone, step));
     }
     return model_.scores(model_.basis(s.echoes, s.nuisance), directions, everyone);
   };
@@ -243,8 +249,8 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
     const double promised = 0.5 * o.scores.total.dot(step);
     const bool hopeless =
         null != nullptr && i >= 2 &&
-        o.state.log_likelihood + kClimb * std::max(risen, promised) < null->log_likelihood + kWorthASearch;
-    if (i >= (risen > kRising ? 4 * iterations : iterations) || promised < kEnough || hopeless) break;
+        o.state.log_likelihood + kClimb * std::max(risen, promised) < null->log_likelihood + least_nats;
+    if (i >= (risen > kRising ? 4 * steps : steps) || promised < kEnough || hopeless) break;
     bool better = false;
     for (double share : {1.0, 0.4, 0.1}) {
       std::vector<double> next = o.scaled;
@@ -352,7 +358,7 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
                                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start) {
   std::vector<double> from;
   for (const std::vector<double>& s : start) from.insert(from.end(), s.begin(), s.end());
-  Optimum o = maximise(base, nuisance, parts, {from}, 3, nullptr);
+  Optimum o = maximise(base, nuisance, parts, {from}, kStepsTogether, nullptr, 0, nullptr);
   const EffectiveScores e = effectiveScores(o.scores, nuisance.globals());
   const Eigen::MatrixXd covariance = e.information.inverse(), robust = robustCovariance(e);
   JointFit fit;
@@ -377,14 +383,14 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
 }
 
 HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hypothesis,
-                                    const std::vector<std::vector<double>>& starts, int iterations,
+                                    const std::vector<std::vector<double>>& starts, double least_nats,
                                     const HypothesisFit* known) {
   HypothesisFit f;
   f.hypothesis = hypothesis;
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());
   Optimum o = maximise(null.mechanisms, known != nullptr ? known->state.nuisance : null.nuisance, {hypothesis}, starts,
-                       iterations, &null, known);
+                       kSteps, &null, std::max(kWorthASearch, least_nats), known);
   f.scaled = std::move(o.scaled);
   f.state = std::move(o.state);
   const Scores& scores = o.scores;

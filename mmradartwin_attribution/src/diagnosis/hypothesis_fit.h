@@ -70,9 +70,10 @@ class HypothesisFitter {
   /// The same mechanisms with latents that are better than its own, looked for from latents that a fit has found.
   std::optional<ModelState> improved(const ModelState& null, const Nuisance& latents);
   /// Maximum likelihood of the coordinates from the best of `starts`, the nuisance refitted along from the null's.
-  /// known: a fit of the same from whose latents it starts instead; what climbs to its top again is not searched.
+  /// least_nats: of a gain that matters; a climb that will not get there is given up. known: a fit of the same from
+  /// whose latents it starts instead; what climbs to its top again is not searched.
   HypothesisFit fit(const ModelState& null, const Hypothesis& hypothesis,
-                    const std::vector<std::vector<double>>& starts, int iterations,
+                    const std::vector<std::vector<double>>& starts, double least_nats = 0,
                     const HypothesisFit* known = nullptr);
   /// Maximum likelihood of several hypotheses at once over `base`, which holds none of them.
   JointFit refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
@@ -108,10 +109,10 @@ class HypothesisFitter {
   double worthOf(const Hypothesis& hypothesis, const Eigen::VectorXd& scaled, const Eigen::MatrixXd& covariance,
                  const Eigen::MatrixXd& robust) const;
   /// null: what a geometry has to be well above at more than one place before it is searched without slopes; null
-  /// pointer: it is. known: as of fit().
+  /// pointer: it is. least_nats, known: as of fit().
   Optimum maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
-                   const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& starts, int iterations,
-                   const ModelState* null, const HypothesisFit* known = nullptr);
+                   const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& starts, int steps,
+                   const ModelState* null, double least_nats, const HypothesisFit* known);
   std::vector<double> gainByLocation(const ModelState& null, const ModelState& state) const;
   /// Beyond the null, without the place that gains most.
   double broadGain(const ModelState& null, const ModelState& state) const;

@@ -16,9 +16,10 @@ namespace {
 constexpr std::size_t kScreenPoses = 44;  ///< a part of the session ranks hypotheses well enough
 constexpr std::size_t kFewestPoses = 12;
 constexpr std::size_t kLawPoses = 66;   ///< whose paths are scored for laws without a name
-constexpr std::size_t kSecondLook = 9;  ///< hypotheses that are looked at on all poses
-constexpr std::size_t kSuspects = 6;    ///< actors whose geometry is tried
-constexpr double kOutOfPlace = 1.2;     ///< nats of an actor's own errors from which on it is looked for elsewhere
+constexpr std::size_t kSecondLook = 9;  ///< hypotheses that are looked at on more poses, geometries on all
+constexpr std::size_t kSecondLookPoses = 66;
+constexpr std::size_t kSuspects = 6;  ///< actors whose geometry is tried
+constexpr double kOutOfPlace = 1.2;   ///< nats of an actor's own errors from which on it is looked for elsewhere
 
 }  // namespace
 
@@ -86,8 +87,9 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
     // nothing else.
     const bool costly = of_actor && suspicious.count(all[i].subject) == 0 && source_.altersGeometry(all[i].at(typical));
     if (costly && (!all[i].isOneSided() || no_use_.count(all[i].label()) > 0)) continue;
-    const std::vector<int> poses = costly ? spread(kFewestPoses) : some(all[i]);
+    std::vector<int> poses = costly ? spread(kFewestPoses) : some(all[i]);
     Screened s = look(all[i], poses);
+    if (outOfPlace(all[i]) >= 0) poses = spread(data_.poses.size());  // what it promises is of all
     if (costly && !(s.promised > 0)) no_use_.insert(all[i].label());
     // What chance promises: half a nat per number on the poses looked at, scaled up like the rest.
     s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
@@ -105,10 +107,11 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   for (Screened& s : screened) {
     report_("looking again at " + s.hypothesis.label(), 0);
     const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
-    const std::vector<int> poses = spread(numbers > 3 ? kScreenPoses : data_.poses.size());
+    const std::vector<int> poses = spread(numbers > 3                 ? kScreenPoses
+                                          : s.hypothesis.isGeometry() ? data_.poses.size()
+                                                                      : kSecondLookPoses);
     if (looked_at[s.hypothesis.label()] < poses.size()) {
-      const int actor = outOfPlace(s.hypothesis);
-      s = actor >= 0 ? screen_.again(state, s, actor, poses) : screen_.screen(state, s.hypothesis, poses);
+      s = screen_.screen(state, s.hypothesis, poses);
       s.promised -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
       source_.settle(state.mechanisms);
     }

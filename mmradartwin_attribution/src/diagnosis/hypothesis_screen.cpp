@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "effective_scores.h"
 
@@ -15,6 +16,8 @@ constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents 
 constexpr double kStoodIn = 1;                 ///< nats of theirs
 constexpr double kRadii[] = {1, 2, 4, 7};      ///< of the scale, about a place where an object may have stood before
 constexpr int kDirections = 8;
+constexpr double kNearlyAsLikely = 10;  ///< nats that a place may be less likely, before latents settle there
+constexpr int kSettling = 3;            ///< steps of theirs
 
 /// Without gains of their own of the actors of a material; and nats of what is known of those beforehand.
 std::pair<Nuisance, double> withoutGains(Nuisance nuisance, const Scene& scene, const std::string& material,
@@ -67,6 +70,12 @@ std::pair<double, double> HypothesisScreen::valueAt(const ModelState& null, cons
   for (int i : changed) changed_poses.push_back(poses[static_cast<std::size_t>(i)]);
   const std::vector<double> values = model_.byPose(changed_echoes, nuisance, changed_poses);
   for (std::size_t i = 0; i < changed.size(); ++i) there[static_cast<std::size_t>(changed[i])] = values[i];
+  return promiseOf(null, hypothesis, there, poses);
+}
+
+std::pair<double, double> HypothesisScreen::promiseOf(const ModelState& null, const Hypothesis& hypothesis,
+                                                      const std::vector<double>& there,
+                                                      const std::vector<int>& poses) const {
   std::vector<double> by_location(model_.data().locations.size(), 0.0);
   double gain = 0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -86,25 +95,46 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
                                   const std::vector<int>& poses) {
   Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 0.0)}};
   const Nuisance nuisance = withoutErrors(null.nuisance, actor);  // they have stood in for the move
+  double gained = -kNearlyAsLikely, promised = 0;
+  std::vector<double> likeliest, most_promising;
   for (double radius : kRadii) {
     for (int k = 0; k < kDirections; ++k) {
       std::vector<double> at(hypothesis.coordinates.size(), 0.0);
       at[0] = radius * std::cos(2 * M_PI * k / kDirections);
       at[1] = radius * std::sin(2 * M_PI * k / kDirections);
-      const double promised = valueAt(null, hypothesis, at, poses, nuisance).second;
+      const auto [gain, promise] = valueAt(null, hypothesis, at, poses, nuisance);
       source_.settle(null.mechanisms);
-      if (promised <= result.promised) continue;
-      result.promised = promised;
-      result.starts.front() = at;
+      if (gain > gained) {
+        gained = gain;
+        likeliest = at;
+      }
+      if (promise > promised) {
+        promised = promise;
+        most_promising = at;
+      }
     }
+  }
+  if (most_promising == likeliest) most_promising.clear();
+  for (const std::vector<double>& at : {likeliest, most_promising}) {
+    if (at.empty()) continue;
+    // Latents have covered with wide errors what is wrong where the actor is not: they settle before it is judged.
+    const double settled = settledAt(null, hypothesis, at, nuisance);
+    source_.settle(null.mechanisms);
+    if (settled <= result.promised) continue;
+    result.promised = settled;
+    result.starts.front() = at;
   }
   return result;
 }
 
-Screened HypothesisScreen::again(const ModelState& null, Screened found, int actor, const std::vector<int>& poses) {
-  const Nuisance nuisance = withoutErrors(null.nuisance, actor);
-  found.promised = std::max(0.0, valueAt(null, found.hypothesis, found.starts.front(), poses, nuisance).second);
-  return found;
+double HypothesisScreen::settledAt(const ModelState& null, const Hypothesis& hypothesis,
+                                   const std::vector<double>& scaled, Nuisance nuisance) {
+  std::vector<int> all(null.echoes.size());
+  std::iota(all.begin(), all.end(), 0);
+  const auto echoes =
+      source_.echoes(mechanismsWith(null.mechanisms, {hypothesis}, scaled), all, nuisance.actor_range_m);
+  model_.fit(echoes, nuisance, kSettling);
+  return promiseOf(null, hypothesis, model_.byPose(echoes, nuisance, all), all).second;
 }
 
 Screened HypothesisScreen::directly(const ModelState& null, const Hypothesis& hypothesis,

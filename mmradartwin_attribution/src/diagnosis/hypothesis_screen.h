@@ -20,16 +20,20 @@ class HypothesisScreen {
   /// Of all others a score test.
   Screened screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
   /// Of an actor whose place is free, by the first two coordinates: the likelihood at places around it, farther away
-  /// than slopes reach.
+  /// than slopes reach; of the best of them over all poses, with the latents settled there.
   Screened around(const ModelState& null, const Hypothesis& hypothesis, int actor, const std::vector<int>& poses);
-  /// The place that around() has found, on other poses.
-  Screened again(const ModelState& null, Screened found, int actor, const std::vector<int>& poses);
 
  private:
   /// Gain in nats over the poses named, and what it promises for all with its inflation taken off.
   std::pair<double, double> valueAt(const ModelState& null, const Hypothesis& hypothesis,
                                     const std::vector<double>& scaled, const std::vector<int>& poses,
                                     const Nuisance& nuisance);
+  /// The same of log-likelihoods of those poses.
+  std::pair<double, double> promiseOf(const ModelState& null, const Hypothesis& hypothesis,
+                                      const std::vector<double>& there, const std::vector<int>& poses) const;
+  /// What it promises over all poses once the latents, from those given, have settled on it.
+  double settledAt(const ModelState& null, const Hypothesis& hypothesis, const std::vector<double>& scaled,
+                   Nuisance nuisance);
   Screened directly(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
 
   EchoSource& source_;

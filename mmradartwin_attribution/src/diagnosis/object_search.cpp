@@ -104,9 +104,9 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
 
 HypothesisFit fitObject(HypothesisFitter& fitter, const ModelState& null, const Screened& object) {
   const Hypothesis& h = object.hypothesis;
-  HypothesisFit best = fitter.fit(null, h, object.starts, 4);
+  HypothesisFit best = fitter.fit(null, h, object.starts);
   for (int i = 0; i < kSweeps && best.broad_gain > kWorthSweeps; ++i) {
-    HypothesisFit other = fitter.fit(null, h, isUnmodelledBox(h) ? boxesAround(best) : placesAround(best), 4, &best);
+    HypothesisFit other = fitter.fit(null, h, isUnmodelledBox(h) ? boxesAround(best) : placesAround(best), 0, &best);
     const double higher = other.gain - best.gain;
     if (higher > 0) best = std::move(other);
     if (higher < kHigher) break;
