@@ -3,8 +3,13 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
+#include <numeric>
 #include <optional>
+
+#include "effective_scores.h"
 
 namespace mmradartwin {
 namespace {
@@ -14,6 +19,8 @@ constexpr double kNearest_bins = 1.75;  ///< from an echo: nearer ones are its o
 constexpr double kFarthest_m = 3;
 constexpr double kStep_bins = 0.125;
 constexpr double kTypical_db = -15;
+constexpr double kLevels_db[] = {-20, -12, -5};  ///< that distances are looked for by
+constexpr std::size_t kLevels = std::size(kLevels_db);
 constexpr std::ptrdiff_t kApart_steps = 8;  ///< between distances that are looked at
 constexpr std::size_t kLooks = 4;
 
@@ -35,15 +42,14 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
     distances_m.push_back(d);
   }
   const std::size_t targets = 1 + base.scene().actors.size();  // all, and each actor's
-  const auto locations = static_cast<Eigen::Index>(data.locations.size());
-  const double places = static_cast<double>(locations) / std::max(1.0, static_cast<double>(locations) - 1);
   const Twin twin = base.changed(null.mechanisms);
 
-  using PerPose = std::vector<std::pair<double, double>>;  // [targets][distances] score and information
-  std::vector<PerPose> sums(poses.size());
+  // A strong replica is far from what slopes about nothing reach: the likelihood itself, of each echo's alone.
+  using Gains = std::array<double, kLevels>;           // nats
+  std::vector<std::vector<Gains>> sums(poses.size());  // [poses][targets][distances]
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
-    PerPose& sum = sums[j];
-    sum.assign(targets * distances_m.size(), {0, 0});
+    std::vector<Gains>& sum = sums[j];
+    sum.assign(targets * distances_m.size(), Gains{});
     const auto pose = static_cast<std::size_t>(poses[j]);
     const PoseChannels& p = data.poses[pose];
     const Eigen::Isometry3d& T = p.pose.T_map_radar;
@@ -51,7 +57,7 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
     const std::vector<SessionModel::Whitened> cells = model.whitened(null.echoes[pose], null.nuisance, poses[j]);
     double strongest = 0;
     for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude);
-    Eigen::VectorXd score(samples), noise(samples);
+    Eigen::VectorXd found(samples), noise(samples);
     for (const PathRecord& r : records) {
       if (r.bounces == 0 || r.amplitude * r.amplitude < kLeastPower * strongest * strongest) continue;
       double own = gain;
@@ -60,25 +66,29 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
       for (int bin = 0; bin < samples; ++bin) {
         const SessionModel::Whitened& cell = cells[static_cast<std::size_t>(bin)];
         noise[bin] = c.dot(cell.inverse * c).real();
-        score[bin] = cell.weight * std::norm(c.dot(cell.solved)) - noise[bin];
+        found[bin] = std::norm(c.dot(cell.solved));
       }
       for (std::size_t d = 0; d < distances_m.size(); ++d) {
         const double place = (0.5 * meanLength_m(r) + distances_m[d]) / bin_m;
         const int first = std::max(model.firstBin(), static_cast<int>(std::ceil(place - 1)));
         const int last = std::min(samples - 1, static_cast<int>(std::floor(place + 1)));
+        Gains gains{};
         for (int bin = first; bin <= last; ++bin) {
           const double w = hannResponse(bin - place), power = own * w * w;
-          const auto add = [&](std::size_t target) {
-            auto& [s, information] = sum[target * distances_m.size() + d];
-            s += power * score[bin];
-            information += power * noise[bin] * power * noise[bin];
-          };
-          add(0);
-          for (std::size_t i = 0; i < r.actors.size(); ++i) {
-            const bool again = std::find(r.actors.begin(), r.actors.begin() + static_cast<std::ptrdiff_t>(i),
-                                         r.actors[i]) != r.actors.begin() + static_cast<std::ptrdiff_t>(i);
-            if (r.actors[i] >= 0 && !again) add(1 + static_cast<std::size_t>(r.actors[i]));
+          for (std::size_t level = 0; level < kLevels; ++level) {
+            gains[level] += model.gainOfPoint(cells[static_cast<std::size_t>(bin)],
+                                              power * std::pow(10, kLevels_db[level] / 10), noise[bin], found[bin]);
           }
+        }
+        const auto add = [&](std::size_t target) {
+          Gains& to = sum[target * distances_m.size() + d];
+          for (std::size_t level = 0; level < kLevels; ++level) to[level] += gains[level];
+        };
+        add(0);
+        for (std::size_t i = 0; i < r.actors.size(); ++i) {
+          const bool again = std::find(r.actors.begin(), r.actors.begin() + static_cast<std::ptrdiff_t>(i),
+                                       r.actors[i]) != r.actors.begin() + static_cast<std::ptrdiff_t>(i);
+          if (r.actors[i] >= 0 && !again) add(1 + static_cast<std::size_t>(r.actors[i]));
         }
       }
     }
@@ -103,18 +113,15 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
   const auto peaksOf = [&](std::size_t target) {
     std::vector<double> promised(distances_m.size(), 0);
     for (std::size_t d = 0; d < distances_m.size(); ++d) {
-      Eigen::VectorXd score = Eigen::VectorXd::Zero(locations), information = score;
-      for (std::size_t j = 0; j < poses.size(); ++j) {
-        const auto& [s, i] = sums[j][target * distances_m.size() + d];
-        const int location = data.poses[static_cast<std::size_t>(poses[j])].location;
-        score[location] += model.weight() * s;
-        information[location] += model.weight() * i;
+      for (std::size_t level = 0; level < kLevels; ++level) {
+        std::vector<double> by_location(data.locations.size(), 0.0);
+        for (std::size_t j = 0; j < poses.size(); ++j) {
+          const int location = data.poses[static_cast<std::size_t>(poses[j])].location;
+          by_location[static_cast<std::size_t>(location)] += sums[j][target * distances_m.size() + d][level];
+        }
+        const double gain = std::accumulate(by_location.begin(), by_location.end(), 0.0);
+        promised[d] = std::max(promised[d], gain / inflationOfPresence(gain, by_location));
       }
-      const double total = score.sum(), all = information.sum();
-      if (!(total > 0) || !(all > 0)) continue;
-      // How far places scatter about one level.
-      const double scatter = (score - total / all * information).squaredNorm() / all;
-      promised[d] = 0.5 * total * total / all / std::max(1.0, scatter * places);
     }
     std::vector<Peak> peaks;
     const auto count = static_cast<std::ptrdiff_t>(distances_m.size());
@@ -128,7 +135,7 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
     }
     return peaks;
   };
-  // A quadratic about nothing says little of the level and not all of the distance: the likelihood is asked itself.
+  // Of one level and of echoes by themselves, that says little of all together: the whole likelihood is asked.
   const auto bestOf = [&](std::vector<Peak> peaks) -> std::optional<Screened> {
     std::sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) { return a.promised > b.promised; });
     if (peaks.size() > kLooks) peaks.resize(kLooks);
