@@ -496,6 +496,7 @@ void Session::restate() {
 bool Session::judgeChannels(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
   believeAbsences(fits);
+  believeMoves(fits, twin_.scene());
   believeBetterNames(fits, state_);
   bool refused = false;
   for (HypothesisFit& f : fits) {

@@ -20,6 +20,8 @@ constexpr double kStrongScattering = 0.35;  ///< an eighth of what is reflected 
 constexpr double kFurniture_m = 0.1;        ///< smaller than this is what lies about
 constexpr double kLeastLoss_db = 0.5;       ///< of a crossing: what lets all through is not there, or not the cause
 constexpr double kSameLaw = 0.7;            ///< correlation over poses of what two names gain that explain the same
+constexpr double kMovesAlike = 0.8;         ///< of what an object gains, by a move of what then stands there
+constexpr double kStandsThere_m = 0.1;
 constexpr double kPerson_m = 0.3, kWalk_m = 0.6;  ///< size, and how far from the middle of a walk
 
 }  // namespace
@@ -43,7 +45,8 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   std::vector<std::pair<std::string, double>> alike;
   for (const HypothesisFit& other : fits) {
     const double behind = (best.ranking() - other.ranking()) / best.inflation;
-    if (behind > kAlike || behind < 0 || !(other.gain > 0)) continue;  // those ahead were refused
+    if (behind > kAlike || behind < 0 || !(other.gain > 0))
+      continue;  // those ahead were refused, or are the same thing
     const std::string& name = other.hypothesis.mechanism.mechanism;
     const double weight = std::exp(-behind);
     const std::string cause = isCatalogued(name) ? name : "unknown";
@@ -134,6 +137,25 @@ void believeAbsences(std::vector<HypothesisFit>& fits) {
           gone.ranking() >= moved.ranking()) {
         gone.false_alarm_rate = std::min(gone.false_alarm_rate, moved.false_alarm_rate);
       }
+    }
+  }
+}
+
+void believeMoves(std::vector<HypothesisFit>& fits, const Scene& scene) {
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    const NamedParameters object = fits[i].hypothesis.at(fits[i].scaled);
+    if (object.mechanism != "actor_unmodelled") continue;
+    const Eigen::Vector2d at(object.values.number("x_m"), object.values.number("y_m"));
+    for (std::size_t j = i + 1; j < fits.size(); ++j) {
+      if (!fits[j].hypothesis.isMove() || fits[j].gain < kMovesAlike * fits[i].gain) continue;
+      const NamedParameters move = fits[j].hypothesis.at(fits[j].scaled);
+      const Actor& actor = scene.actors[static_cast<std::size_t>(scene.actorIndex(fits[j].hypothesis.subject))];
+      const Eigen::Vector2d by(move.values.number("dx_m"), move.values.number("dy_m"));
+      const Eigen::AlignedBox2d plan(actor.bounds.min().head<2>(), actor.bounds.max().head<2>());
+      if (plan.exteriorDistance(at - by) > kStandsThere_m) continue;
+      std::rotate(fits.begin() + static_cast<std::ptrdiff_t>(i), fits.begin() + static_cast<std::ptrdiff_t>(j),
+                  fits.begin() + static_cast<std::ptrdiff_t>(j) + 1);
+      break;
     }
   }
 }

@@ -31,6 +31,9 @@ std::string number(double value, int digits = 3);
 /// An actor that is gone explains as much as the same one moved away, without a number: that something is wrong with it
 /// is then as sure.
 void believeAbsences(std::vector<HypothesisFit>& fits);
+/// Of an object that the scene lacks and an actor that moved to its place and explains nearly as much, the actor comes
+/// first: a box of any size at any angle bends to more, and who stands where it stood would have lost its echoes there.
+void believeMoves(std::vector<HypothesisFit>& fits, const Scene& scene);
 
 /// That something is wrong with all echoes is as sure as the surest name for it; which name, its likelihood says: where
 /// two gain alike over poses, the likelier one is as sure as the other.
