@@ -84,10 +84,12 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
   }
   if (spec("actors") != specs.end()) {
     for (std::size_t i = 0; i < scene.actors.size(); ++i) {
+      const Actor& a = scene.actors[i];
+      if (!a.present || mirrorArea_m2(scene, a) == 0) continue;
+      with("actors", std::vector<std::string>{a.name}, a.name);  // an alcove's own
       for (std::size_t j = i + 1; j < scene.actors.size(); ++j) {
-        const Actor &a = scene.actors[i], &b = scene.actors[j];
-        if (!a.present || !b.present || a.bounds.exteriorDistance(b.bounds) > kNear_m) continue;
-        if (mirrorArea_m2(scene, a) == 0 || mirrorArea_m2(scene, b) == 0) continue;
+        const Actor& b = scene.actors[j];
+        if (!b.present || a.bounds.exteriorDistance(b.bounds) > kNear_m || mirrorArea_m2(scene, b) == 0) continue;
         with("actors", std::vector<std::string>{a.name, b.name}, a.name + ";" + b.name);
       }
     }
@@ -207,7 +209,9 @@ std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedPara
                                      [&](const NamedParameters& m) { return excludeEachOther(m, h.mechanism); });
       if (there) continue;
       try {  // what the scene or the radar does not allow is no hypothesis
-        twin.changed({h.at(std::vector<double>(h.coordinates.size(), 1.0))});
+        const Twin with = twin.changed({h.at(std::vector<double>(h.coordinates.size(), 1.0))});
+        // Of what is there or not a note says that it is not.
+        if (h.coordinates.empty() && !with.notes().empty()) continue;
         result.push_back(std::move(h));
       } catch (const InputError&) {
       }
