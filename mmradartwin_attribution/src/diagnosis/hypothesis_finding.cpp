@@ -45,8 +45,8 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   std::vector<std::pair<std::string, double>> alike;
   for (const HypothesisFit& other : fits) {
     const double behind = (best.ranking() - other.ranking()) / best.inflation;
-    if (behind > kAlike || behind < 0 || !(other.gain > 0))
-      continue;  // those ahead were refused, or are the same thing
+    // Those ahead were refused, or are the same thing.
+    if (behind > kAlike || behind < 0 || !(other.gain > 0)) continue;
     const std::string& name = other.hypothesis.mechanism.mechanism;
     const double weight = std::exp(-behind);
     const std::string cause = isCatalogued(name) ? name : "unknown";

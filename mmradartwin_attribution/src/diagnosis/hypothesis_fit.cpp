@@ -19,7 +19,6 @@ namespace mmradartwin {
 namespace {
 
 constexpr int kSteps = 4, kStepsTogether = 3;
-constexpr int kSettling = 3;                 ///< steps of the latents at each of several starts
 constexpr double kEnough = 0.2;              ///< nats: a further step promises less
 constexpr double kRising = 5;                ///< nats of the last step that are worth going on for
 constexpr double kClimb = 4;                 ///< steps like the last within which a climb has to get somewhere
@@ -44,12 +43,6 @@ constexpr double kNestingLawShare = 0.9;
 constexpr double kLeastMove_m = 0.06;
 
 constexpr double kSomewhere = 10;  ///< nats more for an object: it is the best of some 500 places of a room
-
-std::vector<int> everyPose(const ModelState& state) {
-  std::vector<int> poses(state.echoes.size());
-  std::iota(poses.begin(), poses.end(), 0);
-  return poses;
-}
 
 /// Calls `value` at places that lead to its maximum (BOBYQA, Powell 2009: no slopes).
 void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector<double> scaled, double initial_step,
@@ -76,6 +69,12 @@ void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector
 }
 
 }  // namespace
+
+std::vector<int> everyPose(const ModelState& state) {
+  std::vector<int> poses(state.echoes.size());
+  std::iota(poses.begin(), poses.end(), 0);
+  return poses;
+}
 
 std::size_t HypothesisFit::numbers() const {
   return std::max<std::size_t>(1, hypothesis.coordinates.size()) + static_cast<std::size_t>(hypothesis.searched);

@@ -55,6 +55,11 @@ struct JointFit {
   Nuisance nuisance;
 };
 
+constexpr int kSettling = 3;  ///< steps of the latents where one of several starts or places is judged
+
+/// Indices of all poses of the session.
+std::vector<int> everyPose(const ModelState& state);
+
 struct Screened {
   Hypothesis hypothesis;
   double promised = 0;                      ///< nats with little or nothing refitted, inflation taken off

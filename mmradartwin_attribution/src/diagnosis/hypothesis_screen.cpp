@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "effective_scores.h"
 
@@ -17,7 +16,6 @@ constexpr double kStoodIn = 1;                 ///< nats of theirs
 constexpr double kRadii[] = {1, 2, 4, 7};      ///< of the scale, about a place where an object may have stood before
 constexpr int kDirections = 8;
 constexpr double kNearlyAsLikely = 10;  ///< nats that a place may be less likely, before latents settle there
-constexpr int kSettling = 3;            ///< steps of theirs
 
 /// Without gains of their own of the actors of a material; and nats of what is known of those beforehand.
 std::pair<Nuisance, double> withoutGains(Nuisance nuisance, const Scene& scene, const std::string& material,
@@ -129,8 +127,7 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
 
 double HypothesisScreen::settledAt(const ModelState& null, const Hypothesis& hypothesis,
                                    const std::vector<double>& scaled, Nuisance nuisance) {
-  std::vector<int> all(null.echoes.size());
-  std::iota(all.begin(), all.end(), 0);
+  const std::vector<int> all = everyPose(null);
   const auto echoes =
       source_.echoes(mechanismsWith(null.mechanisms, {hypothesis}, scaled), all, nuisance.actor_range_m);
   model_.fit(echoes, nuisance, kSettling);

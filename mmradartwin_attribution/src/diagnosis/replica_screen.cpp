@@ -45,7 +45,10 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
   const Twin twin = base.changed(null.mechanisms);
 
   // A strong replica is far from what slopes about nothing reach: the likelihood itself, of each echo's alone.
-  using Gains = std::array<double, kLevels>;           // nats
+  using Gains = std::array<double, kLevels>;  // nats
+  std::array<double, kLevels> levels;         // of power
+  std::transform(std::begin(kLevels_db), std::end(kLevels_db), levels.begin(),
+                 [](double db) { return std::pow(10, db / 10); });
   std::vector<std::vector<Gains>> sums(poses.size());  // [poses][targets][distances]
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
     std::vector<Gains>& sum = sums[j];
@@ -76,8 +79,8 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
         for (int bin = first; bin <= last; ++bin) {
           const double w = hannResponse(bin - place), power = own * w * w;
           for (std::size_t level = 0; level < kLevels; ++level) {
-            gains[level] += model.gainOfPoint(cells[static_cast<std::size_t>(bin)],
-                                              power * std::pow(10, kLevels_db[level] / 10), noise[bin], found[bin]);
+            gains[level] +=
+                model.gainOfPoint(cells[static_cast<std::size_t>(bin)], power * levels[level], noise[bin], found[bin]);
           }
         }
         const auto add = [&](std::size_t target) {
