@@ -14,8 +14,8 @@ from mmradartwin_tests import effects
 from mmradartwin_tests.blind import draws, recordings
 from mmradartwin_tests.session import Measurement, Settings
 
-# What frames and converters do no map expects; of leakage and gains over time the truth tells a part.
-UNTOLD = ("tx_rx_leakage", "dc_offset", "gain_drift", "adc_saturation", "noise_floor", "moving_target", "interference",
+# What frames and converters do no map expects; of leakage the truth tells a part.
+UNTOLD = ("tx_rx_leakage", "dc_offset", "adc_saturation", "noise_floor", "moving_target", "interference",
           "phase_drift", "packet_loss", "packet_misalignment", "iq_conjugation", "channel_conjugation",
           "channel_permutation")
 KEPT = ("cause", "parameters", "candidates", "evidence", "mechanism", "where", "description")
