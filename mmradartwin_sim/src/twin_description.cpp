@@ -185,15 +185,13 @@ TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::
   twin.scene_file = default_scene.value_or("");
   if (twin_file.empty()) {
     if (twin.scene_file.empty())
-      throw InputError(
+      throw MissingScene(
           "no scene to simulate: the session names none and there is no twin.yaml; add a line scene: to session.yaml");
     twin.mechanisms = baseMechanisms();
     return twin;
   }
   YamlMap yaml = YamlMap::load(twin_file);
   if (yaml.has("scene")) twin.scene_file = resolvePath(yaml.text("scene"), twin_file);
-  if (twin.scene_file.empty())
-    yaml.fail("scene", "is missing, and no session names one; give the path of a scene.yaml");
   if (yaml.has("radar")) {
     twin.radar_file = resolvePath(yaml.text("radar"), twin_file);
     twin.radar = loadRadarConfig(twin.radar_file);
@@ -231,6 +229,9 @@ TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::
     }
   }
   yaml.rejectUnknownKeys();
+  if (twin.scene_file.empty()) {
+    throw MissingScene(twin_file + ": key scene: is missing, and no session names one; give the path of a scene.yaml");
+  }
   return twin;
 }
 

@@ -186,47 +186,63 @@ TEST_F(TwinNodeTest, ActorsMoveWithTheirFrames) {
   EXPECT_GE(counted("grids with a moved actor"), 3);
 }
 
+/// A node that is given a twin, and scene and radar by none yet; with what it logs.
+class TwinNodeWithoutSceneTest : public TwinNodeTest {
+ protected:
+  void TearDown() override {
+    ros::NodeHandle("~").deleteParam("twin");
+    TwinNodeTest::TearDown();
+  }
+  void start(const std::string& twin_yaml) {
+    node_.reset();
+    write("twin.yaml", twin_yaml);
+    ros::NodeHandle node_private("~");
+    node_private.setCallbackQueue(&queue_);
+    node_private.deleteParam("scene");
+    node_private.deleteParam("radar");
+    node_private.setParam("twin", path("twin.yaml"));
+    log_in_ = nh_.subscribe<rosgraph_msgs::Log>(
+        "/rosout", 100, [this](const rosgraph_msgs::Log::ConstPtr& log) { said_.push_back(*log); });
+    ASSERT_TRUE(waitFor([this] { return log_in_.getNumPublishers() > 0; }));
+    node_ = std::make_unique<TwinNode>(node_handle_, node_private);
+    config_out_ = nh_.advertise<mmradartwin_msgs::RadarConfig>("radar/config", 1, true);
+    config_out_.publish(toMsg(paperRadar()));
+  }
+  bool hasSaid(int level, const std::string& text) const {
+    return std::any_of(said_.begin(), said_.end(),
+                       [&](const auto& log) { return log.level == level && log.msg.find(text) != std::string::npos; });
+  }
+
+  std::vector<rosgraph_msgs::Log> said_;
+  ros::Subscriber log_in_;
+  ros::Publisher config_out_;
+};
+
+// What no session can mend is said before one comes.
+TEST_F(TwinNodeWithoutSceneTest, SaysAtOnceWhatIsWrongWithItsTwin) {
+  start("mechanisms:\n  speculer: {}\n");
+  EXPECT_TRUE(waitFor([this] { return hasSaid(rosgraph_msgs::Log::ERROR, "speculer"); }));
+}
+
 // As a bag has it that is replayed with another twin: radar/config comes before the session that names the scene.
-TEST_F(TwinNodeTest, WaitsForTheSessionThatNamesItsScene) {
-  node_.reset();
-  write("twin.yaml", "mechanisms:\n  specular: {}\n");
+TEST_F(TwinNodeWithoutSceneTest, WaitsForTheSessionThatNamesIt) {
   write("session.yaml", "format: mmradartwin_session/1\nradar: radar.yaml\nscene: scene.yaml\nposes: poses.csv\n");
   write("poses.csv", "pose,location,stamp,x,y,z,qx,qy,qz,qw\n000,0,1,0,0,0,0,0,0,1\n");
-  ros::NodeHandle node_private("~");
-  node_private.setCallbackQueue(&queue_);
-  node_private.deleteParam("scene");
-  node_private.deleteParam("radar");
-  node_private.setParam("twin", path("twin.yaml"));
-  std::vector<rosgraph_msgs::Log> said;
-  const ros::Subscriber log_in = nh_.subscribe<rosgraph_msgs::Log>(
-      "/rosout", 100, [&](const rosgraph_msgs::Log::ConstPtr& log) { said.push_back(*log); });
   mmradartwin_msgs::Scene::ConstPtr scene;
   const ros::Subscriber scene_in = nh_.subscribe<mmradartwin_msgs::Scene>(
       "twin/scene", 1, [&](const mmradartwin_msgs::Scene::ConstPtr& s) { scene = s; });
-  ASSERT_TRUE(waitFor([&] { return log_in.getNumPublishers() > 0; }));
-  node_ = std::make_unique<TwinNode>(node_handle_, node_private);
+  start("mechanisms:\n  specular: {}\n");
   scene.reset();  // of the other node, latched
-  ros::Publisher config_out = nh_.advertise<mmradartwin_msgs::RadarConfig>("radar/config", 1, true);
-  config_out.publish(toMsg(paperRadar()));
-  const auto hasSaid = [&](const std::string& text) {
-    return std::any_of(said.begin(), said.end(),
-                       [&](const auto& log) { return log.msg.find(text) != std::string::npos; });
-  };
-  ASSERT_TRUE(waitFor([&] { return hasSaid("no twin yet"); }));
+  ASSERT_TRUE(waitFor([this] { return hasSaid(rosgraph_msgs::Log::INFO, "no twin yet"); }));
   EXPECT_FALSE(scene);
   mmradartwin_msgs::Session session;
-  for (const StoredFile& f : gatherSessionFiles(path("session.yaml"))) {
-    mmradartwin_msgs::SessionFile file;
-    file.name = f.name;
-    file.data.assign(f.bytes.begin(), f.bytes.end());
-    session.files.push_back(file);
-  }
+  for (const StoredFile& f : gatherSessionFiles(path("session.yaml"))) session.files.push_back(toMsg(f));
   session.capture_sha256 = {""};
   ros::Publisher session_out = nh_.advertise<mmradartwin_msgs::Session>("session", 1, true);
   session_out.publish(session);
   ASSERT_TRUE(waitFor([&] { return scene != nullptr; }));
   EXPECT_NE(scene->twin_yaml.find("specular"), std::string::npos);
-  for (const rosgraph_msgs::Log& log : said) EXPECT_LT(log.level, rosgraph_msgs::Log::ERROR) << log.msg;
+  for (const rosgraph_msgs::Log& log : said_) EXPECT_LT(log.level, rosgraph_msgs::Log::ERROR) << log.msg;
 }
 
 }  // namespace

@@ -74,15 +74,9 @@ mmradartwin_msgs::Session liveSessionMessage(const std::string& session, const s
   message.name = fs::weakly_canonical(fs::absolute(file)).parent_path().filename().string();
   bool restamped = false;
   for (const StoredFile& stored : gatherSessionFiles(session)) {
-    mmradartwin_msgs::SessionFile entry;
-    entry.name = stored.name;
-    std::string bytes = stored.bytes;
-    if (stored.name == poses_name) {
-      bytes = restamp(bytes, poses);
-      restamped = true;
-    }
-    entry.data.assign(bytes.begin(), bytes.end());
-    message.files.push_back(std::move(entry));
+    const bool of_poses = stored.name == poses_name;
+    message.files.push_back(toMsg(of_poses ? StoredFile{stored.name, restamp(stored.bytes, poses)} : stored));
+    restamped = restamped || of_poses;
   }
   if (!restamped) {
     throw InputError(file.string() + ": key poses: " + poses_reference +

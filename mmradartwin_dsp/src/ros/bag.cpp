@@ -291,11 +291,7 @@ CubesByPose assignByPlace(const BagContents& bag, std::vector<Pose>& poses) {
 }
 
 Recording fromSessionMessage(BagContents& bag, const std::string& folder, CubesByPose& assigned) {
-  std::vector<StoredFile> files;
-  for (const mmradartwin_msgs::SessionFile& file : bag.session->files) {
-    files.push_back({file.name, std::string(file.data.begin(), file.data.end())});
-  }
-  restoreSessionFiles(files, folder);
+  restoreSessionFiles(storedFiles(*bag.session), folder);
   SessionOptions options;
   options.need_captures = false;
   options.exclude_duplicates = false;

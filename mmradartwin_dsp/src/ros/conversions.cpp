@@ -258,4 +258,19 @@ RangeAngleMap fromMsg(const mmradartwin_msgs::RangeAngleMap& msg) {
   return map;
 }
 
+mmradartwin_msgs::SessionFile toMsg(const StoredFile& file) {
+  mmradartwin_msgs::SessionFile msg;
+  msg.name = file.name;
+  msg.data.assign(file.bytes.begin(), file.bytes.end());
+  return msg;
+}
+
+std::vector<StoredFile> storedFiles(const mmradartwin_msgs::Session& session) {
+  std::vector<StoredFile> files;
+  for (const mmradartwin_msgs::SessionFile& f : session.files) {
+    files.push_back({f.name, std::string(f.data.begin(), f.data.end())});
+  }
+  return files;
+}
+
 }  // namespace mmradartwin

@@ -158,10 +158,7 @@ std::string writeFrames(const Recording& recording, const Pose& pose, const std:
 
 void restoreSession(const mmradartwin_msgs::Session& message, const std::string& bag, const std::string& directory,
                     const PoseProgress& progress) {
-  std::vector<StoredFile> files;
-  for (const mmradartwin_msgs::SessionFile& file : message.files) {
-    files.push_back({file.name, std::string(file.data.begin(), file.data.end())});
-  }
+  const std::vector<StoredFile> files = storedFiles(message);
   const auto has_file = [&files](const std::string& name) {
     return std::any_of(files.begin(), files.end(), [&](const StoredFile& file) { return file.name == name; });
   };
@@ -248,11 +245,7 @@ void sessionToBag(const std::string& session, const std::string& bag_file, const
   message.name = recording.name;
   const std::vector<StoredFile> files = gatherSessionFiles(session);
   const std::string stored_pattern = storedCapturePattern(files.front().bytes);
-  for (const StoredFile& file : files) {
-    message.files.emplace_back();
-    message.files.back().name = file.name;
-    message.files.back().data.assign(file.bytes.begin(), file.bytes.end());
-  }
+  for (const StoredFile& file : files) message.files.push_back(toMsg(file));
 
   const std::string unfinished = bag_file + ".active";
   rosbag::Bag bag;

@@ -10,6 +10,7 @@
 
 #include "mmradartwin_dsp/adc_cube.h"
 #include "mmradartwin_dsp/channel_correction.h"
+#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
 #include "mmradartwin_dsp/session.h"
@@ -43,8 +44,14 @@ struct TwinDescription {
   std::string toYaml() const;               ///< resolved: all parameters with their values
 };
 
+/// Neither twin.yaml nor its caller names a scene; nothing else is wrong.
+class MissingScene : public InputError {
+ public:
+  using InputError::InputError;
+};
+
 /// Reads twin.yaml strictly; scene and radar default to the given ones. twin_file empty: base mechanisms.
-/// Throws InputError (unknown mechanism or parameter, value out of range, no scene at all).
+/// Throws InputError (unknown mechanism or parameter, value out of range), MissingScene.
 TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::string>& default_scene,
                          const RadarConfig& default_radar);
 

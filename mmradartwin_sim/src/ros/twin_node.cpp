@@ -85,8 +85,6 @@ void TwinNode::onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& config) {
 void TwinNode::onSession(const mmradartwin_msgs::Session::ConstPtr& session) {
   if (!scene_file_.empty()) return;
   try {
-    std::vector<StoredFile> files;
-    for (const auto& f : session->files) files.push_back({f.name, std::string(f.data.begin(), f.data.end())});
     if (session_ && session_->files == session->files) return;  // once more, of a master that was restarted
     if (session_ && applied_twin_) {
       ROS_WARN("another session: the twin of %s is no longer applied", applied_twin_->c_str());
@@ -94,7 +92,7 @@ void TwinNode::onSession(const mmradartwin_msgs::Session::ConstPtr& session) {
     }
     session_ = session;
     session_folder_ = std::make_unique<TemporaryFolder>();
-    restoreSessionFiles(files, session_folder_->path());
+    restoreSessionFiles(storedFiles(*session), session_folder_->path());
     SessionOptions options;
     options.need_captures = false;
     const Recording recording = openSession(session_folder_->path(), options);
@@ -151,14 +149,17 @@ void TwinNode::rebuild() {
   if (!radar_ || (!sceneFile() && twin_file.empty())) return;
   try {
     use(makeTwin(twin_file));
-  } catch (const std::exception& error) {
+  } catch (const MissingScene& error) {
     problem_ = error.what();
     // A bag's radar/config comes before the session that names the scene: until then the twin waits.
-    if (session_ || !scene_file_.empty()) {
+    if (session_) {
       ROS_ERROR("no twin: %s", error.what());
     } else {
       ROS_INFO("no twin yet: %s", error.what());
     }
+  } catch (const std::exception& error) {
+    problem_ = error.what();
+    ROS_ERROR("no twin: %s", error.what());
   }
 }
 

@@ -5,13 +5,16 @@
 #include <mmradartwin_msgs/RadarConfig.h>
 #include <mmradartwin_msgs/RangeAngleMap.h>
 #include <mmradartwin_msgs/ReceiveGrid.h>
+#include <mmradartwin_msgs/Session.h>
 
 #include <cstdint>
+#include <vector>
 
 #include "mmradartwin_dsp/adc_cube.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_dsp/receive_grid.h"
+#include "mmradartwin_dsp/session_files.h"
 
 namespace mmradartwin {
 
@@ -33,5 +36,9 @@ mmradartwin_msgs::ReceiveGrid toMsg(const ReceiveGrid& grid, std::uint64_t radar
 ReceiveGrid fromMsg(const mmradartwin_msgs::ReceiveGrid& msg);
 mmradartwin_msgs::RangeAngleMap toMsg(const RangeAngleMap& map, std::uint64_t radar_hash);
 RangeAngleMap fromMsg(const mmradartwin_msgs::RangeAngleMap& msg);
+
+mmradartwin_msgs::SessionFile toMsg(const StoredFile& file);
+/// The files that a session message carries.
+std::vector<StoredFile> storedFiles(const mmradartwin_msgs::Session& session);
 
 }  // namespace mmradartwin
