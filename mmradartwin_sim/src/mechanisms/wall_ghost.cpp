@@ -24,7 +24,8 @@ bool enclosesRoom(const Scene& scene, const Actor& actor) {
 }
 
 /// Radar - wall - object - radar and its reverse, for the rough surfaces and the exposed edges of what stands in the
-/// room: not for what encloses it, whose rough faces see each other everywhere.
+/// room: not for what encloses it, whose rough faces see each other everywhere. How much of either there is, is for the
+/// data to say.
 /// A patch scatters sideways by its Lambertian law with |Gamma| the geometric mean of both legs' (which is reciprocal
 /// and goes over into the monostatic form), and with the phase that its direct echo has.
 class WallGhost : public Mechanism {
@@ -32,16 +33,18 @@ class WallGhost : public Mechanism {
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
-    return {textsSpec("walls", "names of the actors that mirror"),
-            numberSpec("spacing_m", "m", 0.005, 5, 0.2, "mean distance of scatter points"),
-            tried(numberSpec("gain_db", "dB", -60, 60, 0, "how much more than its law a scatterer sends sideways"), -60,
-                  0)};
+    return {
+        textsSpec("walls", "names of the actors that mirror"),
+        numberSpec("spacing_m", "m", 0.005, 5, 0.2, "mean distance of scatter points"),
+        tried(numberSpec("gain_db", "dB", -60, 60, 0, "how much more than its law a scatterer sends sideways"), -60, 0),
+        tried(numberSpec("edge_level", "", 0, 10, 1, "what edges send sideways, in multiples of UTD"), 0, 1)};
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
     if (values.texts("walls").empty()) throw InputError("mechanism wall_ghost: key walls: names no actor");
     for (const std::string& wall : values.texts("walls")) walls_.insert(requireActor(scene, kName, wall));
     spacing_m_ = values.number("spacing_m");
     gain_ = std::pow(10.0, values.number("gain_db") / 20);
+    edge_level_ = values.number("edge_level");
   }
   void build(const Scene& scene, const RadarConfig& radar) override {
     mirrors_.clear();
@@ -57,6 +60,7 @@ class WallGhost : public Mechanism {
     points_ = makeScatterPoints(scene, spacing_m_, radar.center_frequency_hz(), kName,
                                 [&](const Facet& f) { return objects.count(f.actor) > 0; });
     edges_.clear();
+    if (edge_level_ == 0) return;
     for (const DiffractingEdge& e : findDiffractingEdges(scene)) {
       if (objects.count(scene.facets[e.a].actor) > 0) edges_.push_back(e);
     }
@@ -155,9 +159,7 @@ class WallGhost : public Mechanism {
     const Facet &a = context.scene.facets[edge.a], &other = context.scene.facets[edge.b];
     const double lift = std::max(1e-3, a.flatness_m + other.flatness_m);
     if (!free(context, elements.p, wall, b, x + lift * edge.outward, 0)) return;
-    // An edge sends what its law says: a gain is for what a scatterer's law leaves open.
-    const std::complex<double> coefficient =
-        std::min(1.0, gain_) * context.radar.wavelength_m() / (4 * M_PI) * found->factor;
+    const std::complex<double> coefficient = edge_level_ * context.radar.wavelength_m() / (4 * M_PI) * found->factor;
     addPair(
         context, elements, wall, b, x, a.actor, a.id, std::conj(coefficient),
         [&](const Eigen::Vector3d& t, const Eigen::Vector3d& r) { return lengthOverEdge(edge, t, r); }, records);
@@ -198,7 +200,7 @@ class WallGhost : public Mechanism {
   }
 
   std::set<int> walls_;
-  double spacing_m_ = 0.2, gain_ = 1;
+  double spacing_m_ = 0.2, gain_ = 1, edge_level_ = 1;
   std::vector<int> mirrors_;
   std::vector<ScatterPoint> points_;
   std::vector<DiffractingEdge> edges_;
