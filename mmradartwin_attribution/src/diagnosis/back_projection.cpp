@@ -193,18 +193,19 @@ void freePlace(const ChannelData& data, Screened& object) {
   }
 }
 
-int nearestObject(const Scene& scene, double x_m, double y_m) {
-  int nearest = -1;
-  double least_m = kNearby_m;
+std::vector<int> objectsNear(const Scene& scene, double x_m, double y_m) {
+  std::vector<std::pair<double, int>> near;
   for (std::size_t a = 0; a < scene.actors.size(); ++a) {
     const Actor& actor = scene.actors[a];
     const Eigen::AlignedBox2d plan(actor.bounds.min().head<2>(), actor.bounds.max().head<2>());
     const double apart_m = plan.exteriorDistance(Eigen::Vector2d(x_m, y_m));
-    if (!actor.present || plan.diagonal().norm() > kLargest_m || apart_m >= least_m) continue;
-    least_m = apart_m;
-    nearest = static_cast<int>(a);
+    if (!actor.present || plan.diagonal().norm() > kLargest_m || apart_m >= kNearby_m) continue;
+    near.emplace_back(apart_m, static_cast<int>(a));
   }
-  return nearest;
+  std::sort(near.begin(), near.end());
+  std::vector<int> actors;
+  for (const auto& [apart_m, actor] : near) actors.push_back(actor);
+  return actors;
 }
 
 }  // namespace mmradartwin

@@ -30,8 +30,7 @@ Hypothesis lateEchoAt(const ProjectedPlace& place);
 /// Lets the place of objectAt() be fitted, too, from where it is and from behind it, as seen from where the radar was;
 /// of lateEchoAt() place and distance.
 void freePlace(const ChannelData& data, Screened& object);
-/// Of the actors that can be moved at all, by their size, the index of the one that stands nearest to a place; -1 where
-/// none stands near.
-int nearestObject(const Scene& scene, double x_m, double y_m);
+/// Indices of the actors that can be moved at all, by their size, and stand near a place, the nearest first.
+std::vector<int> objectsNear(const Scene& scene, double x_m, double y_m);
 
 }  // namespace mmradartwin

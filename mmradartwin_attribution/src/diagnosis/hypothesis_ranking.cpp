@@ -18,8 +18,9 @@ constexpr std::size_t kFewestPoses = 12;
 constexpr std::size_t kLawPoses = 66;   ///< whose paths are scored for laws without a name
 constexpr std::size_t kSecondLook = 9;  ///< hypotheses that are looked at on more poses, geometries on all
 constexpr std::size_t kSecondLookPoses = 66;
-constexpr std::size_t kSuspects = 6;  ///< actors whose geometry is tried
-constexpr double kOutOfPlace = 1.2;   ///< nats of an actor's own errors from which on it is looked for elsewhere
+constexpr std::size_t kSuspects = 6;    ///< actors whose geometry is tried
+constexpr std::size_t kNeighbours = 2;  ///< of a place where an object seems to stand, that may be the object
+constexpr double kOutOfPlace = 1.2;     ///< nats of an actor's own errors from which on it is looked for elsewhere
 
 }  // namespace
 
@@ -68,13 +69,13 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   const std::size_t objects = placed.size();
   for (Screened& s : bestOf(1, projectLateBack(twin_, model_, state), lateEchoAt)) placed.push_back(std::move(s));
   source_.settle(state.mechanisms);
-  if (objects > 0 && placed.front().promised > kWorthAnObject) {
+  for (std::size_t i = 0; i < objects && placed[i].promised > (i == 0 ? kWorthAnObject : kWorthALaw); ++i) {
     // It may be one of the scene's that stands elsewhere.
-    const NamedParameters& m = placed.front().hypothesis.mechanism;
-    if (const int actor = nearestObject(twin_.scene(), m.values.number("x_m"), m.values.number("y_m")); actor >= 0) {
-      suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(actor)].name);
-      out_of_place.insert(actor);
-    }
+    const NamedParameters& m = placed[i].hypothesis.mechanism;
+    std::vector<int> near = objectsNear(twin_.scene(), m.values.number("x_m"), m.values.number("y_m"));
+    near.resize(std::min(near.size(), kNeighbours));
+    for (int actor : near) suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(actor)].name);
+    out_of_place.insert(near.begin(), near.end());
   }
   std::vector<Screened> screened;
   std::map<std::string, std::size_t> looked_at;  // poses
