@@ -526,7 +526,7 @@ bool Session::judgeChannels(int round) {
         continue;
       }
       const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled));
-      const double least_nats = leastNats(f.hypothesis, traces, data_.poses.size());
+      const double least_nats = leastNats(f.hypothesis, f.scaled, traces, data_.poses.size());
       const bool plainly_worse = explained[1] < 0;
       const bool in_nats = !plainly_worse && f.broad_gain / f.inflation > least_nats;
       // Maps of echoes that are many points' differ from what is expected of them by as much as they hold.

@@ -15,9 +15,11 @@ namespace {
 constexpr double kLaw = 18;
 // Edges, and ways over floor and ceiling: what is left of an object that was found, or of wood that is rough, was worth
 // 69 to 86 and 143 as edges at 24 and 44 poses; edges of UTD's size are worth 370 to 460 at 44, ways over the floor
-// 700.
+// 700. Of 75 sessions of another generator that hide something else (26 poses) edges were worth 13 at most, with levels
+// of 0.4 to 0.7 of UTD's in most of those where they gained at all; edges of 1.3 of it were worth 60 and 82 at 24.
 constexpr double kLawOfMore = 25, kLawOfMorePerPose = 4;
-constexpr double kSubject = 24;  ///< and laws without a name
+constexpr double kTypical = 0.75, kTypicalLawOfMorePerPose = 2;  ///< of the size that theory gives it
+constexpr double kSubject = 24;                                  ///< and laws without a name
 constexpr double kSubjectOfMore = 45;
 constexpr double kTraces = 30;                            ///< the likelihood is rough there
 constexpr double kObject = 70;                            ///< it has the whole room to choose from
@@ -47,7 +49,7 @@ UsualScatter usualScatter(const Hypothesis& hypothesis) {
   return isOfLevels(hypothesis) ? kScatterOfLevels : UsualScatter{};
 }
 
-double leastNats(const Hypothesis& hypothesis, bool traces, std::size_t poses) {
+double leastNats(const Hypothesis& hypothesis, const std::vector<double>& scaled, bool traces, std::size_t poses) {
   const double n = static_cast<double>(poses);
   const std::string& name = hypothesis.mechanism.mechanism;
   if (name == "actor_unmodelled" || name == "empirical_echo") return std::max(kObject, kLawPerPose * n);
@@ -57,7 +59,10 @@ double leastNats(const Hypothesis& hypothesis, bool traces, std::size_t poses) {
     return std::max(kSubject, kLawPerPose * n);
   }
   if (unnamed || !hypothesis.subject.empty()) return std::max(adds ? kSubjectOfMore : kSubject, kSubjectPerPose * n);
-  if (adds) return std::max(kLawOfMore, kLawOfMorePerPose * n);
+  if (adds) {
+    const bool typical = std::all_of(scaled.begin(), scaled.end(), [](double v) { return v > kTypical; });
+    return std::max(kLawOfMore, (typical ? kTypicalLawOfMorePerPose : kLawOfMorePerPose) * n);
+  }
   return std::max(traces ? kTraces : kLaw, kLawPerPose * n);
 }
 

@@ -1,14 +1,15 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include "hypothesis.h"
 
 namespace mmradartwin {
 
-/// Nats, inflation taken off, from which on a hypothesis stands though no map gains by it. traces: it moves echoes in
-/// the room. Set by sessions with nothing hidden: see evidence_bounds.cpp.
-double leastNats(const Hypothesis& hypothesis, bool traces, std::size_t poses);
+/// Nats, inflation taken off, from which on a hypothesis with such values (scaled) stands though no map gains by it.
+/// traces: it moves echoes in the room. Set by sessions with nothing hidden: see evidence_bounds.cpp.
+double leastNats(const Hypothesis& hypothesis, const std::vector<double>& scaled, bool traces, std::size_t poses);
 
 /// How far scores scatter over places beyond what the likelihood expects, in sessions with nothing hidden, and how many
 /// places' scatter it is worth to know that; 0 where it differs from session to session.
