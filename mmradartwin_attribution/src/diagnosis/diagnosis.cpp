@@ -44,7 +44,7 @@ constexpr double kWorthABox = 15;          ///< nats of a round one there,
 constexpr double kShareWorthABox = 0.3;    ///< and so much of what the best other fit brings
 constexpr double kNoRival = 1 / 40.0;      ///< of what a plain name brings: who promises less waits for the next round
 constexpr double kShareOfPlain = 0.25;     ///< of the same: who will not bring as much is not fitted to the end
-constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding,
+constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding, and no loss,
 constexpr double kMostLost = 0.015;        ///< of the explained power, by what the likelihood plainly gains of;
 // unless it is worth leastNats(), inflation taken off, and is not like clutter.
 constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
@@ -527,7 +527,7 @@ bool Session::judgeChannels(int round) {
       }
       const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled));
       const double least_nats = leastNats(f.hypothesis, f.scaled, traces, data_.poses.size());
-      const bool plainly_worse = explained[1] < 0;
+      const bool plainly_worse = explained[1] < 0 && by < -kLeastExplained;
       const bool in_nats = !plainly_worse && f.broad_gain / f.inflation > least_nats;
       // Maps of echoes that are many points' differ from what is expected of them by as much as they hold.
       const bool much = likelier && ((f.plain && (by > -kMostLost || !plainly_worse)) || in_nats);
