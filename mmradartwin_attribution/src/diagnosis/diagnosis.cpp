@@ -39,14 +39,15 @@ constexpr std::size_t kMostNames = 5;      ///< fits of one round
 constexpr std::size_t kMostLaws = 4;
 constexpr double kWorthAFit = 4;  ///< nats promised
 constexpr double kWorthAFitOfGeometry = 0.5;
-constexpr double kLonger[] = {1.5, 2};     ///< starts of a geometry
-constexpr double kWorthABox = 15;          ///< nats of a round one there,
-constexpr double kShareWorthABox = 0.3;    ///< and so much of what the best other fit brings
-constexpr double kNoRival = 1 / 40.0;      ///< of what a plain name brings: who promises less waits for the next round
-constexpr double kShareOfPlain = 0.25;     ///< of the same: who will not bring as much is not fitted to the end
-constexpr double kLeastExplained = 0.002;  ///< of the measured power: what less explains is no finding, and no loss,
-constexpr double kMostLost = 0.015;        ///< of the explained power, by what the likelihood plainly gains of;
-// unless it is worth leastNats(), inflation taken off, and is not like clutter.
+constexpr double kLonger[] = {1.5, 2};   ///< starts of a geometry
+constexpr double kWorthABox = 15;        ///< nats of a round one there,
+constexpr double kShareWorthABox = 0.3;  ///< and so much of what the best other fit brings
+constexpr double kNoRival = 1 / 40.0;    ///< of what a plain name brings: who promises less waits for the next round
+constexpr double kShareOfPlain = 0.25;   ///< of the same: who will not bring as much is not fitted to the end
+// Of the measured power: what explains less is no finding, unless it is worth leastNats(), inflation taken off, and is
+// not like clutter; and to explain less by less than that is no loss.
+constexpr double kLeastExplained = 0.002;
+constexpr double kMostLost = 0.015;    ///< of the explained power, by what the likelihood plainly gains of
 constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
 constexpr double kFarAway_m = 0.12;    ///< six times what a scene's actors err by
 constexpr double kTogether_m = 0.005;  ///< what sixteen of them err by together
