@@ -26,10 +26,11 @@ std_msgs::ColorRGBA rgba(double r, double g, double b, double a = 1) {
 const std_msgs::ColorRGBA kWhite = rgba(1, 1, 1), kMagenta = rgba(1, 0, 1), kGrey = rgba(0.62, 0.62, 0.62),
                           kNoData = rgba(0.22, 0.22, 0.22);
 
-// Okabe and Ito: vermillion, orange, reddish purple, sky blue, bluish green.
+// Okabe and Ito's vermillion, orange, reddish purple, sky blue and bluish green, halfway to white, the last brighter
+// still: as they are, thin letters cannot be read on viridis.
 std_msgs::ColorRGBA classColor(ResidualClass c) {
-  static const std_msgs::ColorRGBA colors[] = {rgba(0.835, 0.369, 0), rgba(0.902, 0.624, 0), rgba(0.8, 0.475, 0.655),
-                                               rgba(0.337, 0.706, 0.914), rgba(0, 0.62, 0.451)};
+  static const std_msgs::ColorRGBA colors[] = {rgba(0.918, 0.685, 0.5), rgba(0.951, 0.812, 0.5),
+                                               rgba(0.9, 0.738, 0.828), rgba(0.669, 0.853, 0.957), rgba(0.7, 1, 0.87)};
   return colors[static_cast<int>(c) - 1];
 }
 
