@@ -409,8 +409,8 @@ TEST_F(DiffuseTest, HasADirectiveLobe) {
   const double rows[][3] = {{1, 4.7124, 4.2523}, {4, 2.4348, 2.1591}, {10, 1.1419, 1.0965}, {30, .4054, .4049}};
   const double s = std::sqrt(0.5);
   // So small that it is nothing where in it its one point lies.
-  const double half = 0.001;
-  addWall("patch", "RoughMetal", {3 - half * s, -half * s}, {3 + half * s, half * s}, -half, half);
+  const double half_m = 0.001;
+  addWall("patch", "RoughMetal", {3 - half_m * s, -half_m * s}, {3 + half_m * s, half_m * s}, -half_m, half_m);
   const std::string turned = writeScene("turned");
   const auto turnedLevel = [&](const std::string& lobe) {
     return makeTwin(turned, "  diffuse: {lobe: " + lobe + "}\n", radarAt77GHz())
