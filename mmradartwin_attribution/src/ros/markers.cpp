@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 
+#include "mmradartwin_attribution/pose_picture.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 
 namespace mmradartwin {
@@ -26,12 +27,12 @@ std_msgs::ColorRGBA rgba(double r, double g, double b, double a = 1) {
 const std_msgs::ColorRGBA kWhite = rgba(1, 1, 1), kMagenta = rgba(1, 0, 1), kGrey = rgba(0.62, 0.62, 0.62),
                           kNoData = rgba(0.22, 0.22, 0.22);
 
-// Okabe and Ito's vermillion, orange, reddish purple, sky blue and bluish green, halfway to white, the last brighter
-// still: as they are, thin letters cannot be read on viridis.
-std_msgs::ColorRGBA classColor(ResidualClass c) {
-  static const std_msgs::ColorRGBA colors[] = {rgba(0.918, 0.685, 0.5), rgba(0.951, 0.812, 0.5),
-                                               rgba(0.9, 0.738, 0.828), rgba(0.669, 0.853, 0.957), rgba(0.7, 1, 0.87)};
-  return colors[static_cast<int>(c) - 1];
+/// The hue that classes have in pictures at full brightness, halfway to white: thin letters of that hue itself cannot
+/// be read on viridis.
+std_msgs::ColorRGBA letterColor(ResidualClass c) {
+  const cv::Scalar bgr = classColor_bgr(c);
+  const double most = std::max({bgr[0], bgr[1], bgr[2]});
+  return rgba(0.5 + 0.5 * bgr[2] / most, 0.5 + 0.5 * bgr[1] / most, 0.5 + 0.5 * bgr[0] / most);
 }
 
 std_msgs::ColorRGBA eventColor(const std::string& event) {
@@ -259,7 +260,7 @@ void MarkerBuilder::addLabels(const PoseAttribution& pose, Array& out) {
   for (const Residual& r : pose.residuals) {
     add(className(r.residual_class), r.measured_stronger ? frames_.measured : frames_.simulated,
         polar(r.range_m + field_.halfRange_m(field_.config().tight) + 0.35, r.azimuth_rad, 0.2), label(r),
-        classColor(r.residual_class));
+        letterColor(r.residual_class));
   }
   for (const ResponseRegion& r : pose.regions) {
     if (r.field != Field::kCentral || !r.measured_strong || !r.simulated_strong) continue;
