@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <filesystem>
 #include <iomanip>
 #include <iostream>
 #include <sstream>
@@ -12,6 +13,7 @@
 #include "mmradartwin_attribution/diagnosis_report.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/ros/conversions.h"
 #include "recording_arguments.h"
 
 namespace {
@@ -92,10 +94,13 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
       diagnosis = diagnose(recording, twin, options);
     }
   }
-  if (twin_file.empty() && scene == recording.scene_file) {
-    // Scene and radar are the recording's wherever it is read from: a bag's stand in a temporary folder.
-    diagnosis.extended.scene_file.clear();
+  // Scene and radar are the recording's wherever it is read from: a bag's stand in a temporary folder.
+  TwinDescription& extended = diagnosis.extended;
+  if (recording.scene_file && std::filesystem::path(extended.scene_file).lexically_normal() ==
+                                  std::filesystem::path(*recording.scene_file).lexically_normal()) {
+    extended.scene_file.clear();
   }
+  if (radarHash(extended.radar) == radarHash(recording.radar)) extended.radar_file.clear();
   report.write(diagnosis, command);
   for (const PoseProblem& problem : diagnosis.problems) std::cerr << "error: " << problem.message << '\n';
   std::cout << diagnosisText(diagnosis) << "Findings: " << arguments.output << "/findings.json\n"

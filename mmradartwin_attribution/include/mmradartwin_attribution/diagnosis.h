@@ -82,7 +82,6 @@ struct Diagnosis {
   double explained_power = 0;  ///< of the twin as given, all poses
   std::vector<ComparedTwin> compared;
   SurveyPlan plan;
-  bool nothing_matches = false;  ///< scene and measurement have nothing in common
 };
 
 /// Finds what the twin gets wrong about a recording, names it and measures on held-out places what saying so gains

@@ -78,9 +78,6 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
       channels.unsteadiness = seen.unsteadiness;
       channels.shots = std::max(1, seen.shots);
       transformGrid(chain, channels);
-      const auto at = std::find(data.locations.begin(), data.locations.end(), pose.location);
-      channels.location = static_cast<int>(at - data.locations.begin());
-      if (at == data.locations.end()) data.locations.push_back(pose.location);
       data.poses.push_back(std::move(channels));
     } catch (const InputError& error) {
       const std::string message = error.what();
@@ -93,7 +90,17 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
     throw InputError(recording.source + ": no pose can be used" +
                      (data.problems.empty() ? "" : "; the first problem: " + data.problems.front().message));
   }
+  numberLocations(data);
   return data;
+}
+
+void numberLocations(ChannelData& data) {
+  data.locations.clear();
+  for (PoseChannels& p : data.poses) {
+    const auto at = std::find(data.locations.begin(), data.locations.end(), p.pose.location);
+    p.location = static_cast<int>(at - data.locations.begin());
+    if (at == data.locations.end()) data.locations.push_back(p.pose.location);
+  }
 }
 
 }  // namespace mmradartwin

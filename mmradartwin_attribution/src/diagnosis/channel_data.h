@@ -44,6 +44,9 @@ using ReadingProgress = std::function<void(std::size_t done, std::size_t all)>;
 ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, const ReadingProgress& on_progress,
                          const std::function<void(AdcCube&)>& repair = {});
 
+/// Numbers the places of the poses that there are, in order of appearance, and keeps the names of these alone.
+void numberLocations(ChannelData& data);
+
 struct Scene;
 /// Throws InputError where a pose stands so far outside the scene that units or origin must differ. source: of the
 /// poses.

@@ -51,7 +51,40 @@ constexpr double kMostLost = 0.015;    ///< of the explained power, by what the 
 constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
 constexpr double kFarAway_m = 0.12;    ///< six times what a scene's actors err by
 constexpr double kTogether_m = 0.005;  ///< what sixteen of them err by together
+constexpr double kNoMatch = 0.05;      ///< of the measured power, beyond what chance explains
+constexpr double kElsewhere_m = 0.3, kElsewhere_rad = 20 * M_PI / 180;
 constexpr double kObjectPlaces = 500;  ///< places of an 8 by 6 m room that a session resolves, as a family
+
+/// A twin may have another radar than the recording, but neither other channels nor other range bins.
+void requireSameGrid(const Twin& twin, const RadarConfig& recorded) {
+  const RadarConfig& r = twin.radar();
+  if (r.channels() == recorded.channels() && r.samples_per_chirp == recorded.samples_per_chirp) return;
+  const auto grid = [](const RadarConfig& radar) {
+    return std::to_string(radar.channels()) + " virtual channels of " + std::to_string(radar.samples_per_chirp) +
+           " samples";
+  };
+  const TwinDescription& d = twin.description();
+  throw InputError((d.radar_file.empty() ? d.file : d.radar_file) + ": has " + grid(r) + ", the recording has " +
+                   grid(recorded) + "; give the twin the radar that was recorded");
+}
+
+/// What these expectations explain, each at a pose that stands or looks elsewhere: what chance does. Nothing where all
+/// poses see the same.
+std::optional<double> explainedByChance(const ChannelData& data, const std::vector<PoseEchoes>& echoes) {
+  const std::size_t n = echoes.size();
+  std::vector<PoseEchoes> elsewhere(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto differs = [&](std::size_t j) {
+      const Eigen::Isometry3d by = data.poses[i].pose.T_map_radar.inverse() * data.poses[j].pose.T_map_radar;
+      return by.translation().norm() > kElsewhere_m || Eigen::AngleAxisd(by.linear()).angle() > kElsewhere_rad;
+    };
+    std::size_t k = 0;
+    while (k < n && !differs((i + n / 2 + k) % n)) ++k;
+    if (k == n) return std::nullopt;
+    elsewhere[i] = echoes[(i + n / 2 + k) % n];
+  }
+  return explainedPower(cellPowers(data, elsewhere));
+}
 
 bool isObject(const Hypothesis& h) { return h.mechanism.mechanism == "actor_unmodelled"; }
 bool isPlaced(const Hypothesis& h) { return isObject(h) || h.mechanism.mechanism == "empirical_echo"; }
@@ -68,7 +101,6 @@ class Session {
   }
   /// Undoes what convention of delivery fits far better than the one stated; its name.
   std::optional<std::string> judgeDelivery();
-  void takeBackDelivery(const std::string& convention);
   void judgeTone();
   void judgeNoise();
   bool judgeChannels(int round);
@@ -96,7 +128,7 @@ class Session {
   const Recording& recording_;
   Twin& twin_;
   const DiagnosisOptions& options_;
-  const bool few_;  ///< poses: too few for laws over them
+  bool few_;  ///< poses: too few for laws over them
   ReceivedSession received_;
   ChannelData& data_;
   PoseAccuracy accuracy_;
@@ -142,6 +174,7 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
                      " virtual channels; a diagnosis takes up to " + std::to_string(kMaxChannels) +
                      ", record with fewer transmitters or receivers");
   }
+  requireSameGrid(twin_, data_.radar);
   requirePlacesNear(twin_.scene(), data_, recording.source);
   // Levels relative to the strongest echo refer to this session's; poses inside something are left out here.
   std::vector<PoseChannels> usable;
@@ -157,6 +190,8 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
   }
   data_.poses = std::move(usable);
   if (data_.poses.empty()) throw InputError(recording.source + ": " + data_.problems.back().message);
+  numberLocations(data_);
+  few_ = few_ || data_.poses.size() < kFewestForLaws;
   if (strongest_amplitude_ == 0) {
     throw InputError(recording.source + ": the twin has no echo at any pose; check that poses.csv and scene " +
                      twin.description().scene_file + " share one map, in metres");
@@ -182,18 +217,6 @@ std::optional<std::string> Session::judgeDelivery() {
   extended_.push_back(*f.mechanism);
   result_.findings.findings.push_back(f);
   return f.cause;
-}
-
-/// A convention that lets nothing match is no convention: one of several does best by chance.
-void Session::takeBackDelivery(const std::string& convention) {
-  std::vector<Finding>& findings = result_.findings.findings;
-  findings.erase(
-      std::remove_if(findings.begin(), findings.end(), [&](const Finding& f) { return f.cause == convention; }),
-      findings.end());
-  // The last of that name: the twin may have had one before.
-  const auto last = std::find_if(extended_.rbegin(), extended_.rend(),
-                                 [&](const NamedParameters& m) { return m.mechanism == convention; });
-  if (last != extended_.rend()) extended_.erase(std::next(last).base());
 }
 
 void Session::judgeTone() {
@@ -344,7 +367,7 @@ std::vector<PoseEchoes> Session::heldOutEchoes(const HypothesisFit& fit, const s
     }
     if (poses.empty()) continue;
     std::vector<NamedParameters> mechanisms = mechanisms_;
-    mechanisms.push_back(fit.hypothesis.at(fit.fold_scaled[static_cast<std::size_t>(k)]));
+    putIn(fit.hypothesis.at(fit.fold_scaled[static_cast<std::size_t>(k)]), mechanisms);
     std::vector<PoseEchoes> part = source_->echoes(mechanisms, poses, actor_range_m);
     for (std::size_t j = 0; j < poses.size(); ++j) echoes[static_cast<std::size_t>(poses[j])] = std::move(part[j]);
   }
@@ -373,7 +396,7 @@ void Session::addMetrics(const HypothesisFit& fit, FindingGain& gain) const {
   std::vector<std::vector<NamedParameters>> after;
   for (int k = 0; k < kFolds; ++k) {
     after.push_back(extended_);
-    after.back().push_back(fit.hypothesis.at(fit.fold_scaled[static_cast<std::size_t>(k)]));
+    putIn(fit.hypothesis.at(fit.fold_scaled[static_cast<std::size_t>(k)]), after.back());
   }
   EvaluationOptions options;
   options.config = options_.config;
@@ -490,8 +513,8 @@ void Session::restate() {
       place.x_m = f.mechanism->values.number("x_m");
       place.y_m = f.mechanism->values.number("y_m");
     }
-    mechanisms_.push_back(*f.mechanism);
-    extended_.push_back(*f.mechanism);
+    putIn(*f.mechanism, mechanisms_);
+    putIn(*f.mechanism, extended_);
   }
 }
 
@@ -577,7 +600,8 @@ bool Session::judgeChannels(int round) {
 
 Diagnosis Session::run() {
   const auto add = [&](Finding finding) {
-    addOnce(*finding.mechanism, extended_);
+    if (!isNews(finding, twin_.description().mechanisms)) return;
+    putIn(*finding.mechanism, extended_);
     result_.findings.findings.push_back(std::move(finding));
   };
   for (const FrameFinding& f : received_.frames) add(findingOf(f));
@@ -609,28 +633,30 @@ Diagnosis Session::run() {
                                 explainedPower(cellPowers(data_, source_->echoes(t.mechanisms)))});
   }
   source_->settle(mechanisms_);
-  std::vector<PoseEchoes> elsewhere = source_->echoes(mechanisms_);
-  result_.explained_power = explainedPower(cellPowers(data_, elsewhere));
-  // The same expectations, each at another pose's place: what chance explains.
-  std::rotate(elsewhere.begin(), elsewhere.begin() + static_cast<std::ptrdiff_t>(elsewhere.size() / 2),
-              elsewhere.end());
-  const double by_chance = explainedPower(cellPowers(data_, elsewhere));
-  result_.nothing_matches = data_.poses.size() > 4 && result_.explained_power - by_chance < 0.05;
+  const std::vector<PoseEchoes> echoes = source_->echoes(mechanisms_);
+  result_.explained_power = explainedPower(cellPowers(data_, echoes));
+  const std::optional<double> by_chance = few_ ? std::nullopt : explainedByChance(data_, echoes);
   Findings& findings = result_.findings;
   findings.poses = static_cast<int>(data_.poses.size());
   findings.locations = static_cast<int>(data_.locations.size());
   findings.held_out = few_ ? "nothing: of fewer than 3 poses only frames and channels are judged"
                       : data_.locations.size() > 1 ? std::to_string(kFolds) + "-fold by location"
                                                    : "nothing: one location";
-  if (result_.nothing_matches) {
-    if (convention) takeBackDelivery(*convention);
+  if (by_chance && result_.explained_power - *by_chance < kNoMatch) {
     Finding f;
     f.cause = "unknown";
     f.candidates = {{"unknown", 1.0}};
     f.description = "nothing matches: the twin explains " + number(result_.explained_power) +
-                    " of the measured power, and " + number(by_chance) +
+                    " of the measured power, and " + number(*by_chance) +
                     " with its poses exchanged; check that scene, poses and captures belong together";
-    findings.findings.push_back(std::move(f));
+    // A convention that lets nothing match is none: one of several does best by chance.
+    std::string alone;
+    for (const Finding& other : findings.findings) {
+      if (other.cause != convention) alone += (alone.empty() ? "" : ", ") + other.cause;
+    }
+    if (!alone.empty()) *f.description += ". What needs no scene, told without one: " + alone;
+    findings.findings = {std::move(f)};
+    extended_ = twin_.description().mechanisms;
   } else {
     before_rounds_ = mechanisms_;
     extended_before_rounds_ = extended_;
@@ -642,7 +668,7 @@ Diagnosis Session::run() {
       referToStrongestHost(twin_.changed(mechanisms_), data_, state_.nuisance.log_gain, strongest_amplitude_, f);
       replaceBy(*f.mechanism, extended_);
     }
-    addUnexplained(received_.unexplained, data_, findings, extended_);
+    addUnexplained(received_.unexplained, data_, twin_.description().mechanisms, findings, extended_);
   }
   result_.extended = twin_.description();
   result_.extended.mechanisms = extended_;

@@ -92,6 +92,13 @@ std::vector<GainRow> gainRows(const FindingGain& g) {
           {"C5", &g.classes[4]}};
 }
 
+/// A field of a CSV line (RFC 4180).
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (char c : text) out += c == '"' ? "\"\"" : std::string(1, c);
+  return out + "\"";
+}
+
 void save(const std::string& file, const std::string& text) {
   std::ofstream out(file);
   out << text;
@@ -171,14 +178,14 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
   tried << "round,hypothesis,promised_nats,gain_nats,gain_without_best_place_nats,inflation,held_out_nats,false_alarm_"
            "rate,fitted,verdict\n";
   for (const TriedHypothesis& t : diagnosis.tried) {
-    tried << t.round << ",\"" << t.label << "\"," << shown(t.promised, 6) << ",";
+    tried << t.round << "," << quoted(t.label) << "," << shown(t.promised, 6) << ",";
     if (std::isnan(t.gain)) {
       tried << ",,,,,,";
     } else {
       tried << shown(t.gain, 6) << "," << shown(t.broad_gain, 6) << "," << shown(t.inflation, 4) << ","
-            << shown(t.held_out_gain, 6) << "," << shown(t.false_alarm_rate, 3) << ",\"" << t.fitted << "\",";
+            << shown(t.held_out_gain, 6) << "," << shown(t.false_alarm_rate, 3) << "," << quoted(t.fitted) << ",";
     }
-    tried << t.verdict << "\n";
+    tried << (t.verdict.empty() ? "" : quoted(t.verdict)) << "\n";
   }
   save(directory_ + "/tried.csv", tried.str());
 
@@ -190,9 +197,12 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
           "border-bottom:1px solid #ddd}td:first-child,th:first-child{text-align:left}h2{margin-top:1.5em}"
           ".bar{background:#48c;height:.8em;display:inline-block}</style><h1>What the simulation gets wrong</h1>";
   html << "<p>Verdict <b>" << findings.verdict() << "</b>; " << findings.poses << " poses at " << findings.locations
-       << " locations; held out: " << escaped(findings.held_out) << ". The twin as given explains "
-       << shown(diagnosis.explained_power) << " of the measured power. "
-       << "<a href=\"twin.extended.yaml\">twin.extended.yaml</a>, <a href=\"findings.json\">findings.json</a></p>";
+       << " locations; held out: " << escaped(findings.held_out) << ". ";
+  if (diagnosis.has_twin) {
+    html << "The twin as given explains " << shown(diagnosis.explained_power) << " of the measured power. "
+         << "<a href=\"twin.extended.yaml\">twin.extended.yaml</a>, ";
+  }
+  html << "<a href=\"findings.json\">findings.json</a></p>";
   int i = 0;
   for (const Finding& f : findings.findings) {
     const CauseDescription& cause = causeDescription(f.cause);

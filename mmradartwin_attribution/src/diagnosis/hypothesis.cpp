@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
 #include <set>
 
 #include "echo_source.h"
@@ -113,6 +115,36 @@ void addSteps(const Hypothesis& bare, const std::vector<ParameterSpec>& specs, s
   }
 }
 
+/// The same about the values that the twin states; nothing where zero of the scale would not be these.
+std::optional<Hypothesis> aboutStated(Hypothesis h, const NamedParameters& stated) {
+  h.stated = true;
+  std::map<std::string, std::size_t> lengths;
+  for (const Coordinate& c : h.coordinates) {
+    if (c.logarithmic() || c.reciprocal()) return std::nullopt;
+    if (c.element >= 0) lengths[c.parameter] = h.mechanism.values.numbers(c.parameter).size();
+  }
+  if (h.coordinates.empty()) return std::nullopt;
+  h.mechanism = stated;
+  for (const auto& [parameter, length] : lengths) {
+    std::vector<double> list = stated.values.numbers(parameter);
+    if (!h.variant.empty() && list.size() != length) return std::nullopt;  // steps at other times
+    list.resize(length, 0.0);
+    h.mechanism.values.set(parameter, std::move(list));
+  }
+  for (Coordinate& c : h.coordinates) {
+    const double value = c.element < 0 ? stated.values.number(c.parameter)
+                                       : h.mechanism.values.numbers(c.parameter)[static_cast<std::size_t>(c.element)];
+    const double step = c.typical - c.neutral;
+    c.neutral = value;
+    c.typical = value + step > c.max || value + step < c.min ? value - step : value + step;
+  }
+  return h;
+}
+
+bool isSame(const NamedParameters& a, const NamedParameters& b) {
+  return a.mechanism == b.mechanism && a.values.all() == b.values.all();
+}
+
 }  // namespace
 
 double Coordinate::value(double scaled) const {
@@ -167,12 +199,22 @@ bool Hypothesis::isGeometry() const {
 
 bool Hypothesis::isMove() const { return mechanism.mechanism == "actor_moved"; }
 
+void putIn(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms) {
+  const auto at = std::find_if(mechanisms.begin(), mechanisms.end(),
+                               [&](const NamedParameters& m) { return excludeEachOther(m, mechanism); });
+  if (at == mechanisms.end()) {
+    mechanisms.push_back(mechanism);
+  } else {
+    *at = mechanism;
+  }
+}
+
 std::vector<NamedParameters> mechanismsWith(std::vector<NamedParameters> base, const std::vector<Hypothesis>& parts,
                                             const std::vector<double>& scaled) {
   auto from = scaled.begin();
   for (const Hypothesis& h : parts) {
     const auto to = from + static_cast<std::ptrdiff_t>(h.coordinates.size());
-    base.push_back(h.at({from, to}));
+    putIn(h.at({from, to}), base);
     from = to;
   }
   return base;
@@ -205,9 +247,16 @@ std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedPara
     addSubjects(twin, bare, specs, all);
     addSteps(bare, specs, all);
     for (Hypothesis& h : all) {
-      const bool there = std::any_of(present.begin(), present.end(),
-                                     [&](const NamedParameters& m) { return excludeEachOther(m, h.mechanism); });
-      if (there) continue;
+      const auto there = std::find_if(present.begin(), present.end(),
+                                      [&](const NamedParameters& m) { return excludeEachOther(m, h.mechanism); });
+      if (there != present.end()) {
+        const std::vector<NamedParameters>& given = twin.description().mechanisms;
+        const bool is_stated =
+            std::any_of(given.begin(), given.end(), [&](const NamedParameters& m) { return isSame(m, *there); });
+        std::optional<Hypothesis> other = is_stated ? aboutStated(std::move(h), *there) : std::nullopt;
+        if (!other) continue;
+        h = std::move(*other);
+      }
       try {  // what the scene or the radar does not allow is no hypothesis
         const Twin with = twin.changed({h.at(std::vector<double>(h.coordinates.size(), 1.0))});
         // Of what is there or not a note says that it is not.

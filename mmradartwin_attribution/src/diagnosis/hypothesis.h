@@ -35,6 +35,7 @@ struct Hypothesis {
   std::string subject;                  ///< actor or material it is about, "" for none
   std::string variant;                  ///< what tells it from others of that mechanism and subject, "" for nothing
   int searched = 0;                     ///< further numbers (edges, a period) that were looked for, not fitted
+  bool stated = false;                  ///< the twin as given has it: neutral values are those that it states
 
   NamedParameters at(const std::vector<double>& scaled) const;
   std::string label() const;
@@ -46,12 +47,15 @@ struct Hypothesis {
   bool isMove() const;
 };
 
-/// `base` and behind it the parts, their coordinates in a row.
+/// Puts it in place of what it excludes, else behind all.
+void putIn(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms);
+/// `base` with the parts, their coordinates in a row: behind it, or in place of what the twin states.
 std::vector<NamedParameters> mechanismsWith(std::vector<NamedParameters> base, const std::vector<Hypothesis>& parts,
                                             const std::vector<double>& scaled);
 
 /// Every registered mechanism that says how to try it, once per actor or material where it concerns one, and those that
-/// are there or not. Mechanisms that the twin has already are left out unless they concern another subject.
+/// are there or not. Of those in `present` that the twin as given states, other values than it states; levels that may
+/// be nothing, corner frequencies, what is there or not, and all else in `present` are left out.
 std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedParameters>& present);
 
 }  // namespace mmradartwin

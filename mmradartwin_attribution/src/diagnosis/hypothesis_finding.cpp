@@ -61,7 +61,8 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   f.evidence.log_likelihood_gain = best.gain;
   f.evidence.false_alarm_rate = best.false_alarm_rate;
   for (const HypothesisFit& other : fits) {
-    if (other.hypothesis.mechanism.mechanism == m.mechanism) continue;
+    // Those ahead were refused.
+    if (other.hypothesis.mechanism.mechanism == m.mechanism || other.ranking() > best.ranking()) continue;
     const std::string& name = other.hypothesis.mechanism.mechanism;
     f.evidence.runner_up = isCatalogued(name) ? name : "unknown";
     f.evidence.margin = best.gain - std::max(0.0, other.gain);
@@ -84,6 +85,13 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
     place.poses.push_back(poses[i].second);
   }
   f.where.push_back(std::move(place));
+  if (best.hypothesis.stated) {
+    std::string states;
+    for (const Coordinate& c : best.hypothesis.coordinates) {
+      states += (states.empty() ? "" : ", ") + c.parameter + " " + number(c.neutral);
+    }
+    f.description = "instead of what the twin states: " + states;
+  }
   if (!named) {
     f.description = "no cause of the catalogue explains this; what it looks like: " + describeLaw(best.hypothesis, m) +
                     "; " + number(best.gain, 4) + " nats over " + std::to_string(data.poses.size()) + " poses";

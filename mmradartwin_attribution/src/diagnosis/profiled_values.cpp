@@ -108,7 +108,7 @@ struct Step {
 
 }  // namespace
 
-ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std::vector<NamedParameters>& mechanisms,
+ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std::vector<NamedParameters>& base,
                         const Nuisance& nuisance, const PoseAccuracy& accuracy, const std::vector<Hypothesis>& parts,
                         const ProfiledValues& fit, int again) {
   std::vector<Coordinate> coordinates;
@@ -118,8 +118,6 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
     traces.resize(coordinates.size(), source.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0))));
   }
   const bool rough = std::count(traces.begin(), traces.end(), 1) > 0;
-  const std::vector<NamedParameters> base(mechanisms.begin(),
-                                          mechanisms.end() - static_cast<std::ptrdiff_t>(parts.size()));
   const ChannelData& data = model.data();
   const LatentSpread spread = model.spread();
   const Eigen::Index locations = static_cast<Eigen::Index>(data.locations.size());
@@ -236,7 +234,7 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
   for (std::size_t k = 0; k < coordinates.size(); ++k) {
     std::vector<double> at = scaled;
     at[k] += kSmallChange;
-    by_coordinate.push_back(source.pathShifts(mechanismsAt(at), mechanisms, everyone));
+    by_coordinate.push_back(source.pathShifts(mechanismsAt(at), mechanismsAt(scaled), everyone));
   }
   const Eigen::VectorXd geometric = geometricVariance(by_coordinate, static_cast<int>(nuisance.actor_gain.size()) - 1,
                                                       static_cast<int>(everyone.size()), accuracy, spread);
@@ -246,7 +244,7 @@ ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std
   // A slope so long was no top, and its steps tell no width.
   const bool further = (to_top.cwiseAbs().array() > widths.array()).any();
   if (result.scaled != scaled && (further || result.scaled != top) && again > 0) {
-    return profiled(source, model, mechanisms, nuisance, accuracy, parts, result, again - 1);
+    return profiled(source, model, base, nuisance, accuracy, parts, result, again - 1);
   }
   for (Eigen::Index j = 0; j < n; ++j) {
     const std::size_t k = static_cast<std::size_t>(j);
@@ -275,7 +273,7 @@ void profileParts(EchoSource& source, const SessionModel& model, const std::vect
   for (const std::vector<std::size_t>& group : groups) {
     std::vector<NamedParameters> beside = base;
     for (std::size_t i = 0; i < parts.size(); ++i) {
-      if (std::find(group.begin(), group.end(), i) == group.end()) beside.push_back(parts[i].at(fits[i].scaled));
+      if (std::find(group.begin(), group.end(), i) == group.end()) putIn(parts[i].at(fits[i].scaled), beside);
     }
     std::vector<Hypothesis> members;
     ProfiledValues all;
@@ -284,7 +282,7 @@ void profileParts(EchoSource& source, const SessionModel& model, const std::vect
       all.scaled.insert(all.scaled.end(), fits[i].scaled.begin(), fits[i].scaled.end());
       all.standard_error.insert(all.standard_error.end(), fits[i].standard_error.begin(), fits[i].standard_error.end());
     }
-    all = profiled(source, model, mechanismsWith(beside, members, all.scaled), nuisance, accuracy, members, all);
+    all = profiled(source, model, beside, nuisance, accuracy, members, all);
     auto scaled = all.scaled.begin(), error = all.standard_error.begin();
     for (std::size_t i : group) {
       const auto count = static_cast<std::ptrdiff_t>(fits[i].scaled.size());

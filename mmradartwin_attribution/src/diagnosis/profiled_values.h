@@ -18,9 +18,9 @@ struct ProfiledValues {
 /// sides, and by how much its slope scatters over places. Slopes alone promise far too much where paths come and go
 /// within millimetres: steps are as wide as the likelihood takes to fall by some nats. The values move to the top of
 /// that fall where the likelihood gains by it.
-/// mechanisms: as fitted, the parts last; `fit`: their coordinates, with standard errors that steps begin with; again:
-/// how often it begins anew where the top lies beyond its steps. The source has to be settled on `mechanisms`.
-ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std::vector<NamedParameters>& mechanisms,
+/// `fit`: coordinates of the parts over `base`, with standard errors that steps begin with; again: how often it begins
+/// anew where the top lies beyond its steps. The source has to be settled on base with the parts as fitted.
+ProfiledValues profiled(EchoSource& source, const SessionModel& model, const std::vector<NamedParameters>& base,
                         const Nuisance& nuisance, const PoseAccuracy& accuracy, const std::vector<Hypothesis>& parts,
                         const ProfiledValues& fit, int again = 2);
 

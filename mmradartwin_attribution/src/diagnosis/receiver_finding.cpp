@@ -20,6 +20,8 @@ namespace mmradartwin {
 namespace {
 
 constexpr double kDbPerNeper = 8.685889638065035;
+constexpr double kSameValue = 1;                             ///< widths of an interval of 95 %
+constexpr double kSamePlace_m = 0.5;                         ///< of someone who walks
 constexpr double kLevelError_db = 0.3, kSharedError_db = 3;  ///< of an echo alone in its cell, and by the others there
 
 /// By bin, mean over the channels.
@@ -89,10 +91,31 @@ Finding findingOf(const FrameFinding& frames) {
   return f;
 }
 
-void addOnce(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms) {
-  const bool there = std::any_of(mechanisms.begin(), mechanisms.end(),
-                                 [&](const NamedParameters& m) { return excludeEachOther(m, mechanism); });
-  if (!there) mechanisms.push_back(mechanism);
+bool isNews(const Finding& f, const std::vector<NamedParameters>& stated) {
+  if (!f.mechanism) return true;
+  const Parameters& found = f.mechanism->values;
+  const bool placed = found.has("x_m") && found.has("y_m");
+  const auto differs = [](double is, const std::array<double, 2>& ci95, double states) {
+    return std::abs(is - states) > kSameValue * (ci95[1] - ci95[0]);
+  };
+  return std::none_of(stated.begin(), stated.end(), [&](const NamedParameters& m) {
+    if (placed && m.mechanism == f.mechanism->mechanism) {  // its numbers are of one walk and one session
+      return std::hypot(m.values.number("x_m") - found.number("x_m"), m.values.number("y_m") - found.number("y_m")) <
+             kSamePlace_m;
+    }
+    if (!excludeEachOther(m, *f.mechanism)) return false;
+    return std::none_of(f.parameters.begin(), f.parameters.end(), [&](const FindingParameter& p) {
+      if (p.ci95.empty() || !m.values.has(p.name)) return false;
+      if (const double* is = std::get_if<double>(&p.value)) return differs(*is, p.ci95[0], m.values.number(p.name));
+      const auto* list = std::get_if<std::vector<double>>(&p.value);
+      if (list == nullptr) return false;
+      const std::vector<double>& states = m.values.numbers(p.name);
+      for (std::size_t k = 0; k < list->size(); ++k) {
+        if (k >= states.size() || differs((*list)[k], p.ci95[k], states[k])) return true;
+      }
+      return false;
+    });
+  });
 }
 
 void replaceBy(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms) {
@@ -101,7 +124,8 @@ void replaceBy(const NamedParameters& mechanism, std::vector<NamedParameters>& m
       [&](const NamedParameters& m) { return m.mechanism == mechanism.mechanism; }, mechanism);
 }
 
-void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data, Findings& findings,
+void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data,
+                    const std::vector<NamedParameters>& stated, Findings& findings,
                     std::vector<NamedParameters>& extended) {
   for (const FrameFinding& frame : frames) {
     Finding f = findingOf(frame);
@@ -110,7 +134,8 @@ void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& 
       const double over_db = 20 * std::log10(32768 * strongestMeasured(data));
       f.mechanism->values.set("level_db", f.mechanism->values.number("level_db") - over_db);
     }
-    if (f.mechanism) addOnce(*f.mechanism, extended);
+    if (!isNews(f, stated)) continue;
+    if (f.mechanism) putIn(*f.mechanism, extended);
     if (!findings.findings.empty() && findings.findings.back().cause == "unknown") {
       std::optional<std::string>& said = findings.findings.back().description;
       said = said.value_or("") + "; besides: " + frame.description;
@@ -407,7 +432,7 @@ Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& o
     add(findingOf(tone, data));
   }
   if (const std::optional<ChannelErrors> errors = findChannelErrors(data)) add(findingOf(*errors));
-  addUnexplained(session.unexplained, data, result.findings, result.extended.mechanisms);
+  addUnexplained(session.unexplained, data, {}, result.findings, result.extended.mechanisms);
   result.findings.poses = static_cast<int>(data.poses.size());
   result.findings.locations = static_cast<int>(data.locations.size());
   result.findings.held_out = "nothing: without a scene only frames and channels are judged";

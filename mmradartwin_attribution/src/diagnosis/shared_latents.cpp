@@ -24,11 +24,7 @@ Screened sharedGeometry(EchoSource& source, const Hypothesis& h, const ModelStat
   for (std::size_t j = 0; j < poses.size(); ++j) {
     latents[actors + static_cast<Eigen::Index>(j)] = n.yaw_rad[poses[j]] / accuracy.heading_rad;
   }
-  const auto with = [&](std::vector<double> scaled) {
-    std::vector<NamedParameters> all = null.mechanisms;
-    all.push_back(h.at(scaled));
-    return all;
-  };
+  const auto with = [&](const std::vector<double>& scaled) { return mechanismsWith(null.mechanisms, {h}, scaled); };
   const std::vector<double> nothing(h.coordinates.size(), 0.0);
   Eigen::MatrixXd design(rows, columns);
   for (Eigen::Index c = 0; c < columns; ++c) {
