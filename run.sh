@@ -91,7 +91,7 @@ run_tests() {
   # run_tests returns 0 on failing tests and prints too much to find them in: the summary reads the XML files.
   local log=$ws/build/run_tests.log
   say "running the tests (log: $log)"
-  (cd "$ws" && catkin_make run_tests -j1 2>&1) | tee "$log" | awk '/^-- run_tests.py: execute|^\[ROSTEST\]/ {print; fflush()}' >&2 || true
+  (cd "$ws" && catkin_make run_tests -j1 2>&1) | tee "$log" | awk '/^-- run_tests.py: execute|^\[ROSTEST\]|^MMRADARTWIN_[A-Z_]*SEED=/ {print; fflush()}' >&2 || true
   python3 "$root/test/summarise_results.py" "$ws/build/test_results"
 }
 

@@ -11,6 +11,7 @@
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/message_filter.h>
 #include <tf2_ros/transform_listener.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <cstdlib>
 #include <ctime>
@@ -22,6 +23,7 @@
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/diagnosis_report.h"
 #include "mmradartwin_attribution/ros/conversions.h"
+#include "mmradartwin_attribution/ros/markers.h"
 #include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
@@ -106,6 +108,7 @@ class DiagnosisNode {
             nh_, "attribution/diagnose", [this](const Goal& goal) { execute(goal); }, false) {
     if (!settings_.config_file.empty()) config_ = loadAttributionConfig(settings_.config_file);
     findings_ = nh_.advertise<mmradartwin_msgs::Findings>("attribution/findings", 1, true);
+    finding_markers_ = nh_.advertise<visualization_msgs::MarkerArray>("attribution/finding_markers", 1, true);
     forget_ = nh_.advertiseService("attribution/forget_poses", &DiagnosisNode::onForget, this);
     // What feeds the spool has a queue of its own: it may wait there while goals and cancels go on.
     ros::NodeHandle spool_nh;
@@ -266,6 +269,7 @@ class DiagnosisNode {
       result.locations = static_cast<std::uint32_t>(written.locations);
       for (const PoseProblem& problem : diagnosis.problems) result.problems.push_back(problem.message);
       findings_.publish(result.findings);
+      finding_markers_.publish(findingMarkers(written, settings_.map_frame));
       const std::string text = diagnosisText(diagnosis);
       ROS_INFO("%sReport: %s", text.c_str(), result.report_file.c_str());
       server_.setSucceeded(result, text);
@@ -290,7 +294,7 @@ class DiagnosisNode {
   tf2_ros::MessageFilter<Cube> posed_frames_;
   ros::Time newest_;
   std::vector<ros::Subscriber> subscribers_;
-  ros::Publisher findings_;
+  ros::Publisher findings_, finding_markers_;
   ros::ServiceServer forget_;
   diagnostic_updater::Updater updater_;
   ros::WallTimer diagnostics_timer_;

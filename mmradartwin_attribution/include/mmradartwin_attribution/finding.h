@@ -104,6 +104,8 @@ struct Finding {
   std::shared_ptr<const FindingMaps> maps;  ///< for the figure; none where maps of averages do not show it
 
   const FindingParameter* parameter(const std::string& name) const;  ///< nullptr where it has none of that name
+  /// Half the 95 % intervals, along map's x and y, of where it is, or of by how much it moved; 0 where it has none.
+  std::array<double, 2> placeError_m() const;
 };
 
 /// findings.json.

@@ -51,7 +51,9 @@ constexpr double kMostLost = 0.015;    ///< of the explained power, by what the 
 constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
 constexpr double kFarAway_m = 0.12;    ///< six times what a scene's actors err by
 constexpr double kTogether_m = 0.005;  ///< what sixteen of them err by together
-constexpr double kNoMatch = 0.05;      ///< of the measured power, beyond what chance explains
+/// Of what an unknown gains: what its law leaves over looks like a little of many names.
+constexpr double kBesideUnknown = 0.25;
+constexpr double kNoMatch = 0.05;  ///< of the measured power, beyond what chance explains
 constexpr double kElsewhere_m = 0.3, kElsewhere_rad = 20 * M_PI / 180;
 constexpr double kObjectPlaces = 500;  ///< places of an 8 by 6 m room that a session resolves, as a family
 
@@ -152,6 +154,12 @@ class Session {
     return std::find_if(accepted_.begin(), accepted_.end(),
                         [&](const Accepted& a) { return a.hypothesis.label() == h.label(); });
   }
+  /// Nats of the unknown that was found; 0 where there is none.
+  double unknownNats() const {
+    const std::vector<Finding>& all = result_.findings.findings;
+    return accepted_.empty() || all.back().cause != "unknown" ? 0 : all.back().evidence.log_likelihood_gain;
+  }
+  void accept(const HypothesisFit& fit, Finding finding);
   /// mechanisms_ and extended_ without what rounds have found.
   std::vector<NamedParameters> before_rounds_, extended_before_rounds_;
   std::size_t family_ = 1;  ///< hypotheses of a round
@@ -293,6 +301,12 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
   const std::vector<Hypothesis> all = hypotheses(twin_, extended_);
   Round own;
   own.screened = ranking_->rank(all, state_);
+  if (unknownNats() > 0) {  // one stands for all
+    own.screened.erase(
+        std::remove_if(own.screened.begin(), own.screened.end(),
+                       [](const Screened& s) { return !isCatalogued(s.hypothesis.mechanism.mechanism); }),
+        own.screened.end());
+  }
   family_ = all.size() + static_cast<std::size_t>(kLawFamily);
   const std::vector<Screened>& screened = own.screened;
   std::vector<HypothesisFit>& fits = own.fits;
@@ -509,13 +523,23 @@ void Session::restate() {
     f.mechanism = a.hypothesis.at(a.scaled);
     f.parameters = fittedParameters(a.hypothesis, a.scaled, a.standard_error, f.cause, data_.locations.size());
     for (FindingPlace& place : f.where) {
-      if (!place.x_m) continue;
-      place.x_m = f.mechanism->values.number("x_m");
-      place.y_m = f.mechanism->values.number("y_m");
+      const std::optional<Eigen::Vector2d> at = placeOf(*f.mechanism, twin_.scene());
+      if (!place.x_m || !at) continue;
+      place.x_m = at->x();
+      place.y_m = at->y();
     }
     putIn(*f.mechanism, mechanisms_);
     putIn(*f.mechanism, extended_);
   }
+}
+
+/// A finding more; an unknown stays the last one.
+void Session::accept(const HypothesisFit& fit, Finding finding) {
+  std::vector<Finding>& all = result_.findings.findings;
+  const std::size_t at = all.size() - (unknownNats() > 0 ? 1 : 0);
+  for (Accepted& a : accepted_) a.finding += a.finding >= at ? 1 : 0;
+  accepted_.push_back({fit.hypothesis, fit.scaled, fit.standard_error, fit.plain, at});
+  all.insert(all.begin() + static_cast<std::ptrdiff_t>(at), std::move(finding));
 }
 
 bool Session::judgeChannels(int round) {
@@ -524,12 +548,14 @@ bool Session::judgeChannels(int round) {
   believeMoves(fits, twin_.scene());
   believeBetterNames(fits, state_);
   bool refused = false;
+  const double unknown_nats = unknownNats();
   for (HypothesisFit& f : fits) {
     std::string& verdict = triedAs(f, round).verdict;
-    verdict = f.ranking() <= 0                   ? "gains less than its numbers cost"
-              : f.false_alarm_rate > kFalseAlarm ? "chance could do as well"
-              : !(f.held_out_gain > 0)           ? "loses on places not fitted"
-                                                 : noFindingBecause(f, received_.frames);
+    verdict = f.ranking() <= 0                         ? "gains less than its numbers cost"
+              : f.false_alarm_rate > kFalseAlarm       ? "chance could do as well"
+              : !(f.held_out_gain > 0)                 ? "loses on places not fitted"
+              : f.gain < kBesideUnknown * unknown_nats ? "little beside what is unknown"
+                                                       : noFindingBecause(f, received_.frames);
     if (!verdict.empty()) continue;
     Finding finding = findingOf(f, fits, state_, twin_.scene(), data_);
     if (data_.locations.size() > 1) {
@@ -565,13 +591,11 @@ bool Session::judgeChannels(int round) {
     }
     verdict = "found";
     report("found " + f.hypothesis.label() + ", " + number(f.gain, 4) + " nats", 1);
-    const bool unknown = finding.cause == "unknown";
     const auto accepted = accepted_;
     const auto findings = result_.findings.findings;
     const Nuisance latents = state_.nuisance;
     if (source_->altersGeometry(*finding.mechanism)) ranking_->tryAllAgain();
-    accepted_.push_back({f.hypothesis, f.scaled, f.standard_error, f.plain, result_.findings.findings.size()});
-    result_.findings.findings.push_back(std::move(finding));
+    accept(f, std::move(finding));
     state_.nuisance = f.state.nuisance;
     restate();
     if (accepted_.size() > 1) refitTogether();
@@ -593,7 +617,7 @@ bool Session::judgeChannels(int round) {
     source_->settle(mechanisms_);
     const Nuisance nuisance = state_.nuisance;
     state_ = fitter_->state(mechanisms_, &nuisance);
-    return !unknown;  // an unknown stands last
+    return true;
   }
   return false;
 }
@@ -635,7 +659,8 @@ Diagnosis Session::run() {
   source_->settle(mechanisms_);
   const std::vector<PoseEchoes> echoes = source_->echoes(mechanisms_);
   result_.explained_power = explainedPower(cellPowers(data_, echoes));
-  const std::optional<double> by_chance = few_ ? std::nullopt : explainedByChance(data_, echoes);
+  std::optional<double> by_chance;
+  if (!few_) by_chance = explainedByChance(data_, echoes);
   Findings& findings = result_.findings;
   findings.poses = static_cast<int>(data_.poses.size());
   findings.locations = static_cast<int>(data_.locations.size());

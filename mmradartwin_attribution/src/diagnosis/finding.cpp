@@ -384,6 +384,15 @@ Finding readFinding(Entry e) {
 
 }  // namespace
 
+std::array<double, 2> Finding::placeError_m() const {
+  const auto half = [&](const std::string& axis) {
+    const FindingParameter* p = parameter(axis);
+    if (p == nullptr) p = parameter("d" + axis);
+    return p != nullptr && !p->ci95.empty() ? (p->ci95[0][1] - p->ci95[0][0]) / 2 : 0;
+  };
+  return {half("x_m"), half("y_m")};
+}
+
 const FindingParameter* Finding::parameter(const std::string& name) const {
   for (const FindingParameter& p : parameters) {
     if (p.name == name) return &p;

@@ -16,7 +16,7 @@ constexpr int kHeight_px = 470, kMargin_px = 34;
 constexpr double kUpright = 0.7;  ///< sine of a triangle's slope from which on a plan shows it
 constexpr double kLimit_db = 12;  ///< of the maps' colours
 const cv::Scalar kPaper(255, 255, 255), kInk(40, 40, 40), kSoft(205, 205, 205), kWall(150, 150, 150),
-    kBlue(200, 100, 20), kRed(30, 30, 220);
+    kBlue(200, 100, 20), kRed(30, 30, 220), kFaint(170, 170, 240);
 
 /// A part of map drawn upright, x to the right.
 class PlanView {
@@ -66,10 +66,11 @@ void drawGrid(PlanView& view, const Eigen::AlignedBox2d& shown) {
   }
 }
 
-/// Half the width of a coordinate's 95 % interval, 0 where it has none.
-double halfInterval_m(const Finding& f, const char* name) {
-  const FindingParameter* p = f.parameter(name);
-  return p != nullptr && !p->ci95.empty() ? (p->ci95[0][1] - p->ci95[0][0]) / 2 : 0;
+/// How a finding says that its actor moved, in the floor plane about `to_m`, where its middle then is.
+Eigen::Isometry2d moveOf(const NamedParameters& moved, const Eigen::Vector2d& to_m) {
+  const Eigen::Vector2d by_m(moved.values.number("dx_m"), moved.values.number("dy_m"));
+  return Eigen::Translation2d(to_m) * Eigen::Rotation2Dd(moved.values.number("dyaw_deg") * M_PI / 180) *
+         Eigen::Translation2d(by_m - to_m);
 }
 
 std::set<std::string> actorsOf(const Finding& f) {
@@ -94,8 +95,13 @@ cv::Mat drawPlan(const Finding& f, const SurveyPlan& plan) {
   PlanView view(shown);
   drawGrid(view, shown);
   for (const SurveyPlan::Wall& w : plan.walls) view.line(w.from_m, w.to_m, kWall, 1);
+  const bool moved = f.cause == "actor_moved" && f.mechanism && places.size() == 1;
   for (const SurveyPlan::Wall& w : plan.walls) {
-    if (actors.count(w.actor) > 0) view.line(w.from_m, w.to_m, kRed, 2);
+    if (actors.count(w.actor) == 0) continue;
+    view.line(w.from_m, w.to_m, moved ? kFaint : kRed, 2);
+    if (!moved) continue;
+    const Eigen::Isometry2d move = moveOf(*f.mechanism, places.front());
+    view.line(move * w.from_m, move * w.to_m, kRed, 2);
   }
   for (const SurveyPlan::Station& s : plan.stations) {
     const bool carries = poses.count(s.pose) > 0;
@@ -105,13 +111,16 @@ cv::Mat drawPlan(const Finding& f, const SurveyPlan& plan) {
   }
   for (const Eigen::Vector2d& p : places) {
     cv::drawMarker(view.picture(), view.at(p), kRed, cv::MARKER_TILTED_CROSS, 14, 2, cv::LINE_AA);
-    const double x = view.px_per_m() * halfInterval_m(f, "x_m"), y = view.px_per_m() * halfInterval_m(f, "y_m");
+    const auto [x_m, y_m] = f.placeError_m();
+    const double x = view.px_per_m() * x_m, y = view.px_per_m() * y_m;
     if (places.size() > 1 || !(x > 0) || !(y > 0) || std::max(x, y) > kHeight_px) continue;
     cv::ellipse(view.picture(), view.at(p), cv::Size(static_cast<int>(x) + 1, static_cast<int>(y) + 1), 0, 0, 360, kRed,
                 1, cv::LINE_AA);
   }
   view.text(std::string("map [m]") + (poses.empty() ? "" : "; blue: poses that carry it most") +
-                (actors.empty() && places.empty() ? "" : "; red: what it is about"),
+                (moved                              ? "; red: where it stands"
+                 : actors.empty() && places.empty() ? ""
+                                                    : "; red: what it is about"),
             {kMargin_px, 18}, kInk);
   return view.picture();
 }

@@ -73,7 +73,7 @@ struct FrameExaminer::State {
   }
   FrameFinding saturation() const;
   FrameFinding packetLoss() const;
-  FrameFinding misalignment() const;
+  std::vector<FrameFinding> misalignments() const;  ///< one a pose
   FrameFinding interference() const;
   FrameFinding drift() const;
   FrameFinding frameGain() const;
@@ -182,19 +182,20 @@ FrameFinding FrameExaminer::State::packetLoss() const {
   return f;
 }
 
-FrameFinding FrameExaminer::State::misalignment() const {
-  FrameFinding f;
-  f.cause = "packet_misalignment";
+std::vector<FrameFinding> FrameExaminer::State::misalignments() const {
+  std::vector<FrameFinding> all;
   for (const PoseJudgement& p : judged) {
     if (p.slip_gain <= 0) continue;
-    f.poses.push_back(p.pose);
-    f.log_likelihood_gain += p.slip_gain;
+    FrameFinding f;
+    f.cause = "packet_misalignment";
+    f.poses = {p.pose};
+    f.log_likelihood_gain = p.slip_gain;
+    f.false_alarm_rate = kFalseAlarm;
+    f.parameters = {{"pose", "", p.pose, {}}};
+    f.description = "packets are missing and were not filled: from there on samples belong to other channels and times";
+    all.push_back(std::move(f));
   }
-  if (f.poses.empty()) return f;
-  f.false_alarm_rate = kFalseAlarm;
-  f.parameters = {{"pose", "", f.poses.front(), {}}};
-  f.description = "packets are missing and were not filled: from there on samples belong to other channels and times";
-  return f;
+  return all;
 }
 
 FrameFinding FrameExaminer::State::saturation() const {
@@ -403,7 +404,9 @@ bool standsWithin(const FrameFinding& f, const std::set<std::string>& poses) {
 
 std::vector<FrameFinding> FrameExaminer::findings() const {
   const State& s = *state_;
-  std::vector<FrameFinding> all = {s.saturation(), s.packetLoss(), s.misalignment()};
+  std::vector<FrameFinding> all = s.misalignments();
+  all.push_back(s.saturation());
+  all.push_back(s.packetLoss());
   // What moves, bursts and turns are told from a radar that is the same in all frames.
   const bool steady = s.unsteadiness().poses.empty();
   if (steady) {

@@ -70,11 +70,9 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   }
   FindingPlace place;
   if (scene.actorIndex(best.hypothesis.subject) >= 0) place.actors = {best.hypothesis.subject};
-  const bool of_place = m.mechanism == "empirical_echo" ||
-                        (m.mechanism == "empirical_law" && LawVariable::isAboutPlace(m.values.text("variable")));
-  if (f.cause == "actor_unmodelled" || of_place) {
-    place.x_m = m.values.number("x_m");
-    place.y_m = m.values.number("y_m");
+  if (const std::optional<Eigen::Vector2d> at = placeOf(m, scene)) {
+    place.x_m = at->x();
+    place.y_m = at->y();
   }
   std::vector<std::pair<double, std::string>> poses;
   for (std::size_t i = 0; i < before.by_pose.size(); ++i) {
@@ -97,6 +95,18 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
                     "; " + number(best.gain, 4) + " nats over " + std::to_string(data.poses.size()) + " poses";
   }
   return f;
+}
+
+std::optional<Eigen::Vector2d> placeOf(const NamedParameters& m, const Scene& scene) {
+  const bool of_place = m.mechanism == "actor_unmodelled" || m.mechanism == "empirical_echo" ||
+                        (m.mechanism == "empirical_law" && LawVariable::isAboutPlace(m.values.text("variable")));
+  if (of_place) return Eigen::Vector2d(m.values.number("x_m"), m.values.number("y_m"));
+  const bool moved = m.mechanism == "actor_moved";
+  if (!moved && m.mechanism != "actor_absent") return std::nullopt;
+  const int actor = scene.actorIndex(m.values.text("actor"));
+  if (actor < 0) return std::nullopt;
+  const Eigen::Vector2d middle = scene.actors[static_cast<std::size_t>(actor)].bounds.center().head<2>();
+  return moved ? middle + Eigen::Vector2d(m.values.number("dx_m"), m.values.number("dy_m")) : middle;
 }
 
 std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers) {

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "channel_data.h"
@@ -13,6 +16,10 @@ namespace mmradartwin {
 /// `before`: what the twin without it came to.
 Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
                   const Scene& scene, const ChannelData& data);
+
+/// Where in map a mechanism says that something is: an object, a place, the middle of an actor that moved (where it
+/// then stands) or is gone; nothing of all others.
+std::optional<Eigen::Vector2d> placeOf(const NamedParameters& mechanism, const Scene& scene);
 
 /// Why something fitted is nothing found, "" where it may be: an object or a scattering that clutter is as large as, a
 /// panel that lets all through, an object where one of the `walkers` (other causes are passed over) walks, whose echo

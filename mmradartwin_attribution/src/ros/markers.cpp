@@ -386,4 +386,46 @@ visualization_msgs::MarkerArray sceneMarkers(const Scene& scene, const std::stri
   return out;
 }
 
+visualization_msgs::MarkerArray findingMarkers(const Findings& findings, const std::string& map_frame) {
+  constexpr double kLeastRadius_m = 0.15, kAbove_m = 2.2;
+  constexpr int kCorners = 36;
+  const std_msgs::ColorRGBA color = rgba(0.95, 0.25, 0.25, 1);
+  visualization_msgs::MarkerArray out;
+  Marker m;
+  m.header.frame_id = map_frame;
+  m.action = Marker::DELETEALL;
+  out.markers.push_back(m);
+  m.action = Marker::ADD;
+  m.frame_locked = true;
+  m.pose.orientation.w = 1;
+  m.color = color;
+  for (const Finding& f : findings.findings) {
+    const auto [x_m, y_m] = f.placeError_m();
+    for (const FindingPlace& place : f.where) {
+      if (!place.x_m || !place.y_m) continue;
+      m.id += 1;
+      m.ns = "rings";
+      m.type = Marker::LINE_STRIP;
+      m.scale.x = 0.04;
+      m.points.clear();
+      for (int k = 0; k <= kCorners; ++k) {
+        const double angle = 2 * M_PI * k / kCorners;
+        m.points.push_back(point(*place.x_m + std::max(kLeastRadius_m, x_m) * std::cos(angle),
+                                 *place.y_m + std::max(kLeastRadius_m, y_m) * std::sin(angle), kAbove_m));
+      }
+      out.markers.push_back(m);
+      Marker label = m;
+      label.ns = "causes";
+      label.type = Marker::TEXT_VIEW_FACING;
+      label.points.clear();
+      label.scale.x = label.scale.y = 1;
+      label.scale.z = 0.3;
+      label.pose.position = point(*place.x_m, *place.y_m + 0.4, kAbove_m);
+      label.text = f.cause + (place.actors.empty() ? "" : " " + place.actors.front());
+      out.markers.push_back(label);
+    }
+  }
+  return out;
+}
+
 }  // namespace mmradartwin

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_attribution/residual.h"
 
 namespace mmradartwin {
@@ -49,7 +50,12 @@ class MarkerBuilder {
 };
 
 /// The scene: one TRIANGLE_LIST per material of its upright surfaces, nearly opaque, and one of its level ones, lighter
-/// and more transparent, so that fans above the floor stand out. The namespace is the material, with " level" for those.
+/// and more transparent, so that fans above the floor stand out. The namespace is the material, with " level" for
+/// those.
 visualization_msgs::MarkerArray sceneMarkers(const Scene& scene, const std::string& map_frame);
+
+/// Where in the room findings are, in place of all that were shown before: a ring as wide as the place's 95 % interval,
+/// and cause and actor at it. Nothing of findings without a place.
+visualization_msgs::MarkerArray findingMarkers(const Findings& findings, const std::string& map_frame);
 
 }  // namespace mmradartwin
