@@ -75,7 +75,7 @@ say "3/5 evaluating the recording"
 status=0
 rosrun mmradartwin_attribution evaluate "$bag" --output "$out/report" || status=$?
 
-say "4/5 what does the twin get wrong? (the answer is in $out/truth.json, which nothing here reads)"
+say "4/5 what does the twin get wrong? (the answer is in $out/truth.json, which nothing before the end reads)"
 rosrun mmradartwin_attribution diagnose "$out/session" --output "$out/diagnosis" || status=$?
 
 say "5/5 the recording again, with the extended twin: rviz, then the report"
@@ -89,7 +89,22 @@ if [ -f "$out/rviz.png" ] && [ -f "$out/rviz_extended.png" ]; then
 fi
 rosrun mmradartwin_attribution evaluate "$bag" --twin "$extended" --output "$out/report_extended" --no-bag || status=$?
 
+answer=$(python3 - "$out/truth.json" "$out/diagnosis/findings.json" <<'PYTHON' || true
+import json, sys
+
+def told(causes):
+    numbers = lambda v: f"{v:.3g}" if isinstance(v, float) else str(v)
+    return "; ".join(c["cause"] + "".join(f", {k} {numbers(v)}" for k, v in c["parameters"].items()) for c in causes) or "nothing"
+
+hidden = json.load(open(sys.argv[1]))["effects"]
+found = json.load(open(sys.argv[2]))["findings"]
+for f in found:
+    f["parameters"] = {k: p["value"] for k, p in f["parameters"].items()}
+print(f"   hidden         {told(hidden)}\n   found          {told(found)}")
+PYTHON
+)
 cat >&2 <<TEXT
+$answer
    report         $out/report/index.html
    diagnosis      $out/diagnosis/index.html
    after it       $out/report_extended/index.html

@@ -52,6 +52,7 @@ class DemoLoop(unittest.TestCase):
         with open(self.path("diagnosis", "findings.json")) as file:
             self.assertEqual(json.load(file)["poses"]["count"], POSES)
         self.assertTrue(os.path.exists(self.path("report_extended", "index.html")))
+        self.assertRegex(self.demo.stderr, r"hidden +element_pattern, cos_exponent [0-9.]+\n +found +[a-z]")
 
     def test_every_frame_of_the_session_came_through_udp_bit_for_bit(self):
         with open(self.path("session", "poses.csv")) as file:

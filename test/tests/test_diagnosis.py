@@ -528,6 +528,8 @@ class BadInput(unittest.TestCase):
         self.assertEqual(status, 2, msg=errors)
         self.assertEqual((findings["poses"]["count"], findings["poses"]["locations"]), (1, 1))
         self.assertIn("fewer than 3 poses", findings["poses"]["held_out"])
+        with open(os.path.join(self.output, "index.html"), encoding="utf-8") as page:
+            self.assertEqual(page.read().count("all its samples are zero"), 2)
 
     def test_a_twin_of_another_array_is_refused(self):
         with open(os.path.join(self.session, "radar.yaml"), encoding="ascii") as text:

@@ -203,6 +203,11 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
          << "<a href=\"twin.extended.yaml\">twin.extended.yaml</a>, ";
   }
   html << "<a href=\"findings.json\">findings.json</a></p>";
+  if (!diagnosis.problems.empty()) {
+    html << "<p>Left out:</p><ul>";
+    for (const PoseProblem& problem : diagnosis.problems) html << "<li>" << escaped(problem.message) << "</li>";
+    html << "</ul>";
+  }
   int i = 0;
   for (const Finding& f : findings.findings) {
     const CauseDescription& cause = causeDescription(f.cause);
