@@ -76,7 +76,8 @@ std::vector<Screened> sharedLatents(EchoSource& source, const ModelState& null, 
     const double z = count > 0 ? sum / (spread.actor_gain * std::sqrt(count)) : 0;
     if (std::abs(z) < kSharedLatent) continue;
     const double delta_db = 10 / std::log(10.0) * sum / count;
-    screened.push_back({h, 0.5 * z * z, {{h.coordinates.front().scaled(delta_db)}}});
+    const Coordinate& c = h.coordinates.front();
+    screened.push_back({h, 0.5 * z * z, {{c.scaled(c.neutral + delta_db)}}});
   }
   return screened;
 }
@@ -93,8 +94,10 @@ std::optional<Screened> namedSlope(const Screened& law, const Parameters& values
   const double value = over_range ? -slope : 3600 * slope;
   for (const Hypothesis& h : all) {
     if (h.mechanism.mechanism != (over_range ? "excess_attenuation" : "gain_drift") || !h.variant.empty()) continue;
-    if (h.coordinates.size() != 1 || !(value > h.coordinates[0].min && value < h.coordinates[0].max)) continue;
-    return Screened{h, law.promised, {{h.coordinates[0].scaled(value)}}};
+    if (h.coordinates.size() != 1) continue;
+    const Coordinate& c = h.coordinates[0];
+    if (!(c.neutral + value > c.min && c.neutral + value < c.max)) continue;
+    return Screened{h, law.promised, {{c.scaled(c.neutral + value)}}};
   }
   return std::nullopt;
 }
@@ -130,7 +133,7 @@ std::optional<Screened> namedLike(const Screened& law, const std::vector<Hypothe
   std::vector<double> start;
   for (const Coordinate& c : named->coordinates) {
     const bool first = c.parameter == "forward_m" || c.parameter == "x_m";
-    start.push_back(c.unit == "m" ? c.scaled(offset_m[first ? 0 : 1]) : 0.0);
+    start.push_back(c.unit == "m" ? c.scaled(c.neutral + offset_m[first ? 0 : 1]) : 0.0);
   }
   return Screened{*named, law.promised, {start}};
 }

@@ -389,7 +389,7 @@ visualization_msgs::MarkerArray sceneMarkers(const Scene& scene, const std::stri
 visualization_msgs::MarkerArray findingMarkers(const Findings& findings, const std::string& map_frame) {
   constexpr double kLeastRadius_m = 0.15, kAbove_m = 2.2;
   constexpr int kCorners = 36;
-  const std_msgs::ColorRGBA color = rgba(0.95, 0.25, 0.25, 1);
+  const std_msgs::ColorRGBA color = rgba(1, 0.45, 0.45, 1);
   visualization_msgs::MarkerArray out;
   Marker m;
   m.header.frame_id = map_frame;
@@ -406,7 +406,7 @@ visualization_msgs::MarkerArray findingMarkers(const Findings& findings, const s
       m.id += 1;
       m.ns = "rings";
       m.type = Marker::LINE_STRIP;
-      m.scale.x = 0.04;
+      m.scale.x = 0.08;
       m.points.clear();
       for (int k = 0; k <= kCorners; ++k) {
         const double angle = 2 * M_PI * k / kCorners;
@@ -419,8 +419,8 @@ visualization_msgs::MarkerArray findingMarkers(const Findings& findings, const s
       label.type = Marker::TEXT_VIEW_FACING;
       label.points.clear();
       label.scale.x = label.scale.y = 1;
-      label.scale.z = 0.3;
-      label.pose.position = point(*place.x_m, *place.y_m + 0.4, kAbove_m);
+      label.scale.z = 0.55;
+      label.pose.position = point(*place.x_m, *place.y_m + 0.5, kAbove_m);
       label.text = f.cause + (place.actors.empty() ? "" : " " + place.actors.front());
       out.markers.push_back(label);
     }
