@@ -52,6 +52,31 @@ TEST(FindingFigure, PlacesAndPosesStandWhereTheyAreInMap) {
   EXPECT_NEAR((place.y - pose.y) / px_per_m, 3, 0.1);
 }
 
+TEST(FindingFigure, WhatMovedIsRedWhereItStands) {
+  Finding f;
+  f.cause = "actor_moved";
+  f.where.emplace_back();
+  f.where[0].actors = {"cabinet"};
+  const auto movedBy = [&](double dx_m) {
+    Parameters values;
+    values.set("actor", std::string("cabinet"));
+    values.set("dx_m", dx_m);
+    values.set("dy_m", 0.0);
+    values.set("dyaw_deg", 90.0);
+    f.mechanism = NamedParameters{"actor_moved", values};
+    f.where[0].x_m = 7 + dx_m;
+    f.where[0].y_m = 3.5;
+    return middleOf(drawFinding(f, room()), kRed);
+  };
+  const cv::Point2d one = movedBy(-1), three = movedBy(-3);
+  f.where[0].poses = {"001"};
+  const double south_px = middleOf(drawFinding(f, room()), kBlue).y;
+  f.where[0].poses = {"002"};
+  const double px_per_m = (south_px - middleOf(drawFinding(f, room()), kBlue).y) / 4;
+  EXPECT_NEAR((one.x - three.x) / px_per_m, 2, 0.05);
+  EXPECT_NEAR(one.y, three.y, 1);
+}
+
 TEST(FindingFigure, WhatItIsAboutIsRed) {
   Finding f;
   f.cause = "actor_absent";

@@ -10,6 +10,7 @@
 #include <functional>
 #include <iostream>
 #include <random>
+#include <set>
 
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/input_error.h"
@@ -224,6 +225,18 @@ TEST_F(FrameEvidenceTest, MissingPackets) {
                      }).findings();
   ASSERT_EQ(causes(found), std::vector<std::string>{"packet_misalignment"});
   EXPECT_EQ(std::get<std::string>(found[0].parameters[0].value), "p3");
+}
+
+TEST_F(FrameEvidenceTest, EachMisalignedPoseIsAFinding) {
+  const auto found = examine(12000, {}, [&](const Pose& pose, std::vector<std::uint8_t>& payload) {
+                       if (pose.name != "p1" && pose.name != "p3") return;
+                       payload.erase(payload.begin() + 7 * 1456, payload.begin() + 8 * 1456);
+                       payload.resize(payload.size() + 1456, 77);
+                     }).findings();
+  ASSERT_EQ(causes(found), (std::vector<std::string>{"packet_misalignment", "packet_misalignment"}));
+  const std::set<std::string> poses{std::get<std::string>(found[0].parameters[0].value),
+                                    std::get<std::string>(found[1].parameters[0].value)};
+  EXPECT_EQ(poses, (std::set<std::string>{"p1", "p3"}));
 }
 
 TEST_F(FrameEvidenceTest, Bursts) {
