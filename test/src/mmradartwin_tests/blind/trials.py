@@ -108,7 +108,8 @@ def told(program, session, truth, folder, limit_s, jobs):
     causes are mechanisms of the same name and parameters. {"explained_power", "nats", "nats_ci95" over places}."""
     output, log = os.path.join(folder, "told"), os.path.join(folder, "told.log")
     shutil.rmtree(output, ignore_errors=True)
-    parameters = json.loads(json.dumps(truth["parameters"]))   # YAML knows no numbers of numpy
+    # YAML knows no numbers of numpy.
+    parameters = json.loads(json.dumps({**truth["parameters"], **truth.get("beside", {})}))
     twins = []
     for name, mechanisms in (("untold", {}), ("told", {truth["cause"]: parameters})):
         twins.append(os.path.join(session, name + ".yaml"))

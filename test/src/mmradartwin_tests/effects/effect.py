@@ -96,6 +96,10 @@ class Effect:
         """Parameters as a finding should name them."""
         return dict(self.p)
 
+    def beside(self):
+        """What simulating it needs beside these."""
+        return {}
+
 
 def make_effect(name, parameters=None, strength=None):
     """An effect by its name. ValueError with the known names for an unknown one."""

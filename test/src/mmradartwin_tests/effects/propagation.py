@@ -202,6 +202,10 @@ class WallGhost(Effect):
     def scale(self, strength):
         self.p["gain_db"] += 20 * math.log10(strength)
 
+    def beside(self):
+        """No edge sends anything sideways here."""
+        return {"gain_db": self.p["gain_db"], "edge_level": 0.0}
+
     def names(self):
         """The walls."""
         value = self.p["walls"]
