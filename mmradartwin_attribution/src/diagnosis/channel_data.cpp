@@ -4,10 +4,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "hypothesis_finding.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/range_angle.h"
-#include "mmradartwin_sim/scene.h"
 
 namespace mmradartwin {
 namespace {
@@ -19,20 +17,6 @@ double sum(const std::vector<double>& values) { return std::accumulate(values.be
 void transformGrid(const SignalChain& chain, PoseChannels& pose) {
   const double window = sum(hannWindow(chain.radar().samples_per_chirp));
   pose.y = chain.rangeSpectra(pose.grid.x) / (window * pose.grid.full_scale);
-}
-
-void requirePlacesNear(const Scene& scene, const ChannelData& data, const std::string& source) {
-  Eigen::AlignedBox3d room;
-  for (const Actor& a : scene.actors) room.extend(a.bounds);
-  const double reach = 2 * room.diagonal().norm();
-  for (const PoseChannels& p : data.poses) {
-    const double apart = room.exteriorDistance(p.pose.T_map_radar.translation());
-    if (apart > reach) {
-      throw InputError(source + ": pose '" + p.pose.name + "' stands " + number(apart) +
-                       " m outside the scene, whose diagonal is " + number(reach / 2) +
-                       " m; poses are in metres in the scene's map: check units and origin");
-    }
-  }
 }
 
 ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, const ReadingProgress& on_progress,

@@ -47,11 +47,6 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
 /// Numbers the places of the poses that there are, in order of appearance, and keeps the names of these alone.
 void numberLocations(ChannelData& data);
 
-struct Scene;
-/// Throws InputError where a pose stands so far outside the scene that units or origin must differ. source: of the
-/// poses.
-void requirePlacesNear(const Scene& scene, const ChannelData& data, const std::string& source);
-
 class SignalChain;
 /// Fills y of a pose from its grid (again, after the grid was changed).
 void transformGrid(const SignalChain& chain, PoseChannels& pose);

@@ -1,14 +1,10 @@
 #include "mmradartwin_attribution/diagnosis.h"
 
 #include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
-#include <sstream>
 
 #include "body_fixed_tone.h"
 #include "channel_data.h"
@@ -17,6 +13,7 @@
 #include "empirical_hypothesis.h"
 #include "evidence_bounds.h"
 #include "finding_figure.h"
+#include "fit_round.h"
 #include "fitted_parameters.h"
 #include "held_out_gain.h"
 #include "hypothesis_finding.h"
@@ -24,9 +21,9 @@
 #include "hypothesis_ranking.h"
 #include "law_screen.h"
 #include "mmradartwin_dsp/input_error.h"
-#include "object_search.h"
 #include "profiled_values.h"
 #include "receiver_finding.h"
+#include "scene_match.h"
 #include "session_model.h"
 
 namespace mmradartwin {
@@ -35,15 +32,6 @@ namespace {
 constexpr int kFolds = 5;
 constexpr double kFalseAlarm = 0.01;       ///< family-wise, per round
 constexpr std::size_t kFewestForLaws = 3;  ///< poses: of fewer only frames and channels are judged
-constexpr std::size_t kMostNames = 5;      ///< fits of one round
-constexpr std::size_t kMostLaws = 4;
-constexpr double kWorthAFit = 4;  ///< nats promised
-constexpr double kWorthAFitOfGeometry = 0.5;
-constexpr double kLonger[] = {1.5, 2};   ///< starts of a geometry
-constexpr double kWorthABox = 15;        ///< nats of a round one there,
-constexpr double kShareWorthABox = 0.3;  ///< and so much of what the best other fit brings
-constexpr double kNoRival = 1 / 40.0;    ///< of what a plain name brings: who promises less waits for the next round
-constexpr double kShareOfPlain = 0.25;   ///< of the same: who will not bring as much is not fitted to the end
 // Of the measured power: what explains less is no finding, unless it is worth leastNats(), inflation taken off, and is
 // not like clutter; and to explain less by less than that is no loss.
 constexpr double kLeastExplained = 0.002;
@@ -53,43 +41,6 @@ constexpr double kFarAway_m = 0.12;    ///< six times what a scene's actors err 
 constexpr double kTogether_m = 0.005;  ///< what sixteen of them err by together
 /// Of what an unknown gains: what its law leaves over looks like a little of many names.
 constexpr double kBesideUnknown = 0.25;
-constexpr double kNoMatch = 0.05;  ///< of the measured power, beyond what chance explains
-constexpr double kElsewhere_m = 0.3, kElsewhere_rad = 20 * M_PI / 180;
-constexpr double kObjectPlaces = 500;  ///< places of an 8 by 6 m room that a session resolves, as a family
-
-/// A twin may have another radar than the recording, but neither other channels nor other range bins.
-void requireSameGrid(const Twin& twin, const RadarConfig& recorded) {
-  const RadarConfig& r = twin.radar();
-  if (r.channels() == recorded.channels() && r.samples_per_chirp == recorded.samples_per_chirp) return;
-  const auto grid = [](const RadarConfig& radar) {
-    return std::to_string(radar.channels()) + " virtual channels of " + std::to_string(radar.samples_per_chirp) +
-           " samples";
-  };
-  const TwinDescription& d = twin.description();
-  throw InputError((d.radar_file.empty() ? d.file : d.radar_file) + ": has " + grid(r) + ", the recording has " +
-                   grid(recorded) + "; give the twin the radar that was recorded");
-}
-
-/// What these expectations explain, each at a pose that stands or looks elsewhere: what chance does. Nothing where all
-/// poses see the same.
-std::optional<double> explainedByChance(const ChannelData& data, const std::vector<PoseEchoes>& echoes) {
-  const std::size_t n = echoes.size();
-  std::vector<PoseEchoes> elsewhere(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const auto differs = [&](std::size_t j) {
-      const Eigen::Isometry3d by = data.poses[i].pose.T_map_radar.inverse() * data.poses[j].pose.T_map_radar;
-      return by.translation().norm() > kElsewhere_m || Eigen::AngleAxisd(by.linear()).angle() > kElsewhere_rad;
-    };
-    std::size_t k = 0;
-    while (k < n && !differs((i + n / 2 + k) % n)) ++k;
-    if (k == n) return std::nullopt;
-    elsewhere[i] = echoes[(i + n / 2 + k) % n];
-  }
-  return explainedPower(cellPowers(data, elsewhere));
-}
-
-bool isObject(const Hypothesis& h) { return h.mechanism.mechanism == "actor_unmodelled"; }
-bool isPlaced(const Hypothesis& h) { return isObject(h) || h.mechanism.mechanism == "empirical_echo"; }
 
 class Session {
  public:
@@ -106,15 +57,7 @@ class Session {
   void judgeTone();
   void judgeNoise();
   bool judgeChannels(int round);
-  /// Of one round: what is worth a fit, most promising first, and what fits have come to, best first.
-  struct Round {
-    std::vector<Screened> screened;
-    std::vector<HypothesisFit> fits;
-    double best_object = 0, plain_name = 0;  ///< nats of the best fits of these kinds
-  };
-  void fitOne(Screened screened, Round& round);
   std::vector<HypothesisFit> fitBest(int round);
-  TriedHypothesis& triedAs(const HypothesisFit& fit, int round);
   void refitTogether();
   void profileFound();
   void takeOutImage();
@@ -250,126 +193,22 @@ void Session::judgeNoise() {
   if (stated == mechanisms_.end()) return;
   std::optional<Finding> f = noiseFloorFinding(data_, *stated);
   if (!f) return;
-  replaceBy(*f->mechanism, extended_);
+  putIn(*f->mechanism, extended_);
   result_.findings.findings.push_back(std::move(*f));
-}
-
-void Session::fitOne(Screened s, Round& round) {
-  const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism), box = isUnmodelledBox(s.hypothesis);
-  std::vector<HypothesisFit>& fits = round.fits;
-  if (s.hypothesis.isGeometry()) {
-    // Latents stand in for a part of it only, as much as their own spread lets them.
-    const std::vector<std::vector<double>> starts = s.starts;
-    for (double longer : kLonger) {
-      for (std::vector<double> start : starts) {
-        for (double& scaled : start) scaled *= longer;
-        s.starts.push_back(std::move(start));
-      }
-    }
-  }
-  report("fitting " + s.hypothesis.label(), static_cast<double>(fits.size()) / (kMostNames + kMostLaws));
-  const bool around = s.hypothesis.isMove() || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
-  // A geometry climbs slowly at first.
-  const double least_nats = s.hypothesis.isGeometry() ? 0 : kShareOfPlain * round.plain_name;
-  fits.push_back(around ? fitObject(*fitter_, state_, s) : fitter_->fit(state_, s.hypothesis, s.starts, least_nats));
-  source_->settle(mechanisms_);
-  if (!law && fitter_->isPlain(fits.back())) round.plain_name = std::max(round.plain_name, fits.back().gain);
-  if (isObject(s.hypothesis) && !box && fits.back().broad_gain > std::max(kWorthABox, round.best_object)) {
-    round.best_object = fits.back().broad_gain;
-    if (isUnmodelledBox(round.screened.back().hypothesis)) round.screened.pop_back();
-    round.screened.push_back(asBox(data_, state_, fits.back()));  // last: the slowest of all fits
-  }
-  // What latents bring that the fit has found, and the twin as it is had not, is nobody's gain.
-  if (std::optional<ModelState> better = fitter_->improved(state_, fits.back().state.nuisance)) {
-    const double nats = better->log_likelihood - state_.log_likelihood;
-    state_ = std::move(*better);
-    // Where that is much, it is one place's, and what the others gain beside it is seen by fits from there alone.
-    for (HypothesisFit& earlier : fits) {
-      if (nats > kWorthAFit && &earlier != &fits.back()) {
-        earlier = fitter_->fit(state_, earlier.hypothesis, {earlier.scaled});
-        source_->settle(mechanisms_);
-      } else {
-        fitter_->gainOver(state_, earlier);
-      }
-    }
-  }
-  std::stable_sort(fits.begin(), fits.end(),
-                   [](const HypothesisFit& a, const HypothesisFit& b) { return a.ranking() > b.ranking(); });
 }
 
 std::vector<HypothesisFit> Session::fitBest(int round) {
   const std::vector<Hypothesis> all = hypotheses(twin_, extended_);
-  Round own;
-  own.screened = ranking_->rank(all, state_);
+  std::vector<Screened> screened = ranking_->rank(all, state_);
   if (unknownNats() > 0) {  // one stands for all
-    own.screened.erase(
-        std::remove_if(own.screened.begin(), own.screened.end(),
-                       [](const Screened& s) { return !isCatalogued(s.hypothesis.mechanism.mechanism); }),
-        own.screened.end());
+    screened.erase(std::remove_if(screened.begin(), screened.end(),
+                                  [](const Screened& s) { return !isCatalogued(s.hypothesis.mechanism.mechanism); }),
+                   screened.end());
   }
   family_ = all.size() + static_cast<std::size_t>(kLawFamily);
-  const std::vector<Screened>& screened = own.screened;
-  std::vector<HypothesisFit>& fits = own.fits;
-  std::size_t names_fitted = 0, geometries_fitted = 0, laws_fitted = 0, objects_fitted = 0;
-  for (std::size_t i = 0; i < screened.size(); ++i) {
-    Screened s = screened[i];  // a copy: more may be put behind it
-    TriedHypothesis tried;
-    tried.label = s.hypothesis.label();
-    tried.promised = s.promised;
-    tried.gain = std::numeric_limits<double>::quiet_NaN();
-    tried.round = round;
-    // A promise is a quadratic's and often far too small, most so of geometry, of places and of laws, which paths
-    // promise: names get several chances, laws without a name four. A geometry that latents have covered promises less
-    // than what they leave over (7 cm of position 10 nats, of 1400).
-    const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
-    const bool object = isObject(s.hypothesis), geometry = s.hypothesis.isGeometry();
-    std::size_t& fitted = law ? laws_fitted : object ? objects_fitted : geometry ? geometries_fitted : names_fitted;
-    const bool moved = s.hypothesis.isMove();
-    const bool box = isUnmodelledBox(s.hypothesis);
-    const double rival = kNoRival * own.plain_name;
-    const double worth = box                 ? kShareWorthABox * fits.front().gain
-                         : object            ? kWorthAnObject
-                         : law               ? kWorthALaw
-                         : geometry || moved ? kWorthAFitOfGeometry
-                                             : std::max(kWorthAFit, rival);
-    // Where an actor went is known by the fit alone: what little the quadratic promises does not rank it.
-    const std::size_t most = law      ? kMostLaws
-                             : object ? kMostObjects
-                             : moved  ? kMostNames + kMostOutOfPlace
-                                      : kMostNames;
-    if (s.promised > worth && (box || fitted < most)) {
-      ++fitted;
-      fitOne(std::move(s), own);
-    } else if (worth == rival && s.promised > kWorthAFit && s.promised <= rival) {
-      tried.verdict = "promises little beside what is plain";
-    }
-    result_.tried.push_back(tried);
-  }
-  // Where a geometry explains most, latents may hide that another one explains more: each is fitted then.
-  const bool leads = !fits.empty() && fits.front().hypothesis.isGeometry() && fits.front().ranking() > 0;
-  for (const Screened& s : screened) {
-    const auto fitted = [&](const HypothesisFit& f) { return f.hypothesis.label() == s.hypothesis.label(); };
-    if (leads && s.hypothesis.isGeometry() && std::none_of(fits.begin(), fits.end(), fitted)) fitOne(s, own);
-  }
-  for (HypothesisFit& f : fits) {
-    fitter_->judge(f, family_ + static_cast<std::size_t>(isPlaced(f.hypothesis) ? kObjectPlaces : 0));
-    TriedHypothesis& t = triedAs(f, round);
-    t.gain = f.gain;
-    t.broad_gain = f.broad_gain;
-    t.inflation = f.inflation;
-    t.held_out_gain = f.held_out_gain;
-    t.false_alarm_rate = f.false_alarm_rate;
-    for (std::size_t i = 0; i < f.scaled.size(); ++i) {
-      const Coordinate& c = f.hypothesis.coordinates[i];
-      t.fitted += (i ? "; " : "") + c.parameter + " " + number(c.value(f.scaled[i]));
-    }
-  }
-  return std::move(own.fits);
-}
-
-TriedHypothesis& Session::triedAs(const HypothesisFit& fit, int round) {
-  return *std::find_if(result_.tried.begin(), result_.tried.end(),
-                       [&](const TriedHypothesis& t) { return t.round == round && t.label == fit.hypothesis.label(); });
+  FitRound fits(*source_, *fitter_, data_, state_,
+                [this](const std::string& stage, double share) { report(stage, share); });
+  return fits.fit(std::move(screened), family_, round, result_.tried);
 }
 
 std::vector<PoseEchoes> Session::heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m) {
@@ -550,7 +389,7 @@ bool Session::judgeChannels(int round) {
   bool refused = false;
   const double unknown_nats = unknownNats();
   for (HypothesisFit& f : fits) {
-    std::string& verdict = triedAs(f, round).verdict;
+    std::string& verdict = triedAs(f, round, result_.tried).verdict;
     verdict = f.ranking() <= 0                         ? "gains less than its numbers cost"
               : f.false_alarm_rate > kFalseAlarm       ? "chance could do as well"
               : !(f.held_out_gain > 0)                 ? "loses on places not fitted"
@@ -644,7 +483,7 @@ Diagnosis Session::run() {
   for (Finding& f : result_.findings.findings) {
     if (f.cause != "tx_rx_leakage" && f.cause != "dc_offset") continue;
     referToStrongestEcho(twin_.changed(mechanisms_), data_, f);
-    replaceBy(*f.mechanism, extended_);
+    putIn(*f.mechanism, extended_);
   }
   for (const TwinDescription& t : options_.compared) {
     const ModelState other = fitter_->state(t.mechanisms, &state_.nuisance);
@@ -659,28 +498,22 @@ Diagnosis Session::run() {
   source_->settle(mechanisms_);
   const std::vector<PoseEchoes> echoes = source_->echoes(mechanisms_);
   result_.explained_power = explainedPower(cellPowers(data_, echoes));
-  std::optional<double> by_chance;
-  if (!few_) by_chance = explainedByChance(data_, echoes);
+  std::optional<Finding> mismatch;
+  if (!few_) mismatch = nothingMatches(data_, echoes, result_.explained_power);
   Findings& findings = result_.findings;
   findings.poses = static_cast<int>(data_.poses.size());
   findings.locations = static_cast<int>(data_.locations.size());
   findings.held_out = few_ ? "nothing: of fewer than 3 poses only frames and channels are judged"
                       : data_.locations.size() > 1 ? std::to_string(kFolds) + "-fold by location"
                                                    : "nothing: one location";
-  if (by_chance && result_.explained_power - *by_chance < kNoMatch) {
-    Finding f;
-    f.cause = "unknown";
-    f.candidates = {{"unknown", 1.0}};
-    f.description = "nothing matches: the twin explains " + number(result_.explained_power) +
-                    " of the measured power, and " + number(*by_chance) +
-                    " with its poses exchanged; check that scene, poses and captures belong together";
+  if (mismatch) {
     // A convention that lets nothing match is none: one of several does best by chance.
     std::string alone;
     for (const Finding& other : findings.findings) {
       if (other.cause != convention) alone += (alone.empty() ? "" : ", ") + other.cause;
     }
-    if (!alone.empty()) *f.description += ". What needs no scene, told without one: " + alone;
-    findings.findings = {std::move(f)};
+    if (!alone.empty()) *mismatch->description += ". What needs no scene, told without one: " + alone;
+    findings.findings = {std::move(*mismatch)};
     extended_ = twin_.description().mechanisms;
   } else {
     before_rounds_ = mechanisms_;
@@ -691,7 +524,7 @@ Diagnosis Session::run() {
     for (Finding& f : findings.findings) {
       if (f.cause != "second_harmonic") continue;
       referToStrongestHost(twin_.changed(mechanisms_), data_, state_.nuisance.log_gain, strongest_amplitude_, f);
-      replaceBy(*f.mechanism, extended_);
+      putIn(*f.mechanism, extended_);
     }
     addUnexplained(received_.unexplained, data_, twin_.description().mechanisms, findings, extended_);
   }

@@ -118,12 +118,6 @@ bool isNews(const Finding& f, const std::vector<NamedParameters>& stated) {
   });
 }
 
-void replaceBy(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms) {
-  std::replace_if(
-      mechanisms.begin(), mechanisms.end(),
-      [&](const NamedParameters& m) { return m.mechanism == mechanism.mechanism; }, mechanism);
-}
-
 void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data,
                     const std::vector<NamedParameters>& stated, Findings& findings,
                     std::vector<NamedParameters>& extended) {

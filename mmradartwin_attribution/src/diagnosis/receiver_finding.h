@@ -28,8 +28,6 @@ Finding findingOf(const FrameFinding& frames);
 /// False where a mechanism of the twin says the same: for the same thing, or for a place near by, and no value
 /// farther from the finding's than its interval is wide.
 bool isNews(const Finding& f, const std::vector<NamedParameters>& stated);
-/// Puts it in place of those of its name.
-void replaceBy(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms);
 /// What frames show and neither a cause nor the twin explains, as the `unknown` that stands last, and its terms for the
 /// extended twin. Its gain is one in nats per pose: maps of averages do not show it.
 void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data,

@@ -1,0 +1,75 @@
+#include "scene_match.h"
+
+#include <Eigen/Geometry>
+
+#include "held_out_gain.h"
+#include "hypothesis_finding.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/scene.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kNoMatch = 0.05;  ///< of the measured power, beyond what chance explains
+constexpr double kElsewhere_m = 0.3, kElsewhere_rad = 20 * M_PI / 180;
+
+/// What these expectations explain, each at a pose that stands or looks elsewhere: what chance does. Nothing where all
+/// poses see the same.
+std::optional<double> explainedByChance(const ChannelData& data, const std::vector<PoseEchoes>& echoes) {
+  const std::size_t n = echoes.size();
+  std::vector<PoseEchoes> elsewhere(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto differs = [&](std::size_t j) {
+      const Eigen::Isometry3d by = data.poses[i].pose.T_map_radar.inverse() * data.poses[j].pose.T_map_radar;
+      return by.translation().norm() > kElsewhere_m || Eigen::AngleAxisd(by.linear()).angle() > kElsewhere_rad;
+    };
+    std::size_t k = 0;
+    while (k < n && !differs((i + n / 2 + k) % n)) ++k;
+    if (k == n) return std::nullopt;
+    elsewhere[i] = echoes[(i + n / 2 + k) % n];
+  }
+  return explainedPower(cellPowers(data, elsewhere));
+}
+
+}  // namespace
+
+void requireSameGrid(const Twin& twin, const RadarConfig& recorded) {
+  const RadarConfig& r = twin.radar();
+  if (r.channels() == recorded.channels() && r.samples_per_chirp == recorded.samples_per_chirp) return;
+  const auto grid = [](const RadarConfig& radar) {
+    return std::to_string(radar.channels()) + " virtual channels of " + std::to_string(radar.samples_per_chirp) +
+           " samples";
+  };
+  const TwinDescription& d = twin.description();
+  throw InputError((d.radar_file.empty() ? d.file : d.radar_file) + ": has " + grid(r) + ", the recording has " +
+                   grid(recorded) + "; give the twin the radar that was recorded");
+}
+
+void requirePlacesNear(const Scene& scene, const ChannelData& data, const std::string& source) {
+  Eigen::AlignedBox3d room;
+  for (const Actor& a : scene.actors) room.extend(a.bounds);
+  const double reach = 2 * room.diagonal().norm();
+  for (const PoseChannels& p : data.poses) {
+    const double apart = room.exteriorDistance(p.pose.T_map_radar.translation());
+    if (apart > reach) {
+      throw InputError(source + ": pose '" + p.pose.name + "' stands " + number(apart) +
+                       " m outside the scene, whose diagonal is " + number(reach / 2) +
+                       " m; poses are in metres in the scene's map: check units and origin");
+    }
+  }
+}
+
+std::optional<Finding> nothingMatches(const ChannelData& data, const std::vector<PoseEchoes>& echoes,
+                                      double explained_power) {
+  const std::optional<double> by_chance = explainedByChance(data, echoes);
+  if (!by_chance || explained_power - *by_chance >= kNoMatch) return std::nullopt;
+  Finding f;
+  f.cause = "unknown";
+  f.candidates = {{"unknown", 1.0}};
+  f.description = "nothing matches: the twin explains " + number(explained_power) + " of the measured power, and " +
+                  number(*by_chance) +
+                  " with its poses exchanged; check that scene, poses and captures belong together";
+  return f;
+}
+
+}  // namespace mmradartwin
