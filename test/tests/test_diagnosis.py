@@ -56,8 +56,7 @@ class HiddenEffects(unittest.TestCase):
     def write_twin(self, mechanisms):
         """twin.yaml beside the session: its scene, the base and these mechanisms."""
         with open(self.at("twin.yaml"), "w", encoding="ascii") as out:
-            yaml.safe_dump({"scene": self.at("session/scene.yaml"), "mechanisms": {
-                "specular": {"max_bounces": 3}, "corner": {}, "diffuse": {}, **mechanisms}}, out)
+            yaml.safe_dump({"scene": self.at("session/scene.yaml"), "mechanisms": {**effects.BASE, **mechanisms}}, out)
 
     def found(self, seed, hidden, headings=7, tier="default"):
         """First finding of a session that hides the effects, and their true parameters."""

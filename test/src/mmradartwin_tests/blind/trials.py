@@ -114,7 +114,7 @@ def told(program, session, truth, folder, limit_s, jobs):
     for name, mechanisms in (("untold", {}), ("told", {truth["cause"]: parameters})):
         twins.append(os.path.join(session, name + ".yaml"))
         with open(twins[-1], "w", encoding="ascii") as out:
-            yaml.safe_dump({"mechanisms": {"specular": {"max_bounces": 3}, "corner": {}, "diffuse": {}, **mechanisms}}, out)
+            yaml.safe_dump({"mechanisms": {**effects.BASE, **mechanisms}}, out)
     status, *_ = run_measured([program, session, "--twin", twins[0], "--compare", twins[1], "--findings", "0",
                                "--output", output, "--jobs", str(jobs)], limit_s, log)
     for twin in twins:

@@ -5,6 +5,6 @@ Those of the table EFFECTS bear the binding names, parameters and units of the c
 # Importing a module enters its effects into the tables.
 from mmradartwin_tests.effects import array, frames, mounting, objects  # noqa: F401
 from mmradartwin_tests.effects import propagation, receiver, surfaces, uncatalogued  # noqa: F401
-from mmradartwin_tests.effects.effect import EFFECTS, UNCATALOGUED, Effect, make_effect
+from mmradartwin_tests.effects.effect import BASE, EFFECTS, UNCATALOGUED, Effect, make_effect
 
-__all__ = ["Effect", "EFFECTS", "UNCATALOGUED", "make_effect"]
+__all__ = ["BASE", "Effect", "EFFECTS", "UNCATALOGUED", "make_effect"]

@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 
+BASE = {"specular": {"max_bounces": 3}, "corner": {}, "diffuse": {}}   # mechanisms of a twin without a twin.yaml
 EFFECTS = {}        # of the catalogue, by the binding name
 UNCATALOGUED = {}   # everything else
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from scipy.signal import butter, freqs
 
-from mmradartwin_tests.effects.effect import Effect, effect
+from mmradartwin_tests.effects.effect import BASE, Effect, effect
 
 
 class BeatLaw(Effect):
@@ -204,5 +204,4 @@ class NoiseFloor(Effect):
         measurement.noise_rms *= 10**(self.p["delta_db"] / 20)
 
     def described_mechanisms(self, measurement, mechanisms):
-        return {**(mechanisms or {"specular": {"max_bounces": 3}, "corner": {}, "diffuse": {}}),
-                "noise_floor": {"level_dbfs": self.stated_dbfs}}
+        return {**(mechanisms or BASE), "noise_floor": {"level_dbfs": self.stated_dbfs}}
