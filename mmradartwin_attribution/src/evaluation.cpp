@@ -40,7 +40,7 @@ SimulatedBranch simulatedBySession(const Recording& session) {
 }
 
 Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated, const Scene& scene,
-                    const RayCaster& rays, const EvaluationOptions& options) {
+                    const RayCaster& rays, const EvaluationOptions& options, const MeasuredBranch& measured) {
   const SignalChain chain(recording.radar);
   const EvaluationField field(options.config, recording.radar, chain.axes());
   const RegionModel regions(scene, rays, field, recording.radar);
@@ -56,14 +56,16 @@ Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated
     out.index = i;
     out.pose = recording.poses[i];
     try {
-      RangeAngleMap measured;
-      {
+      RangeAngleMap map;
+      if (measured) {
+        map = measured(out.pose);
+      } else {
         const std::lock_guard<std::mutex> lock(reading);
-        measured = averagedMap(recording, chain, out.pose);
+        map = averagedMap(recording, chain, out.pose);
       }
-      out.frames = measured.frames;
+      out.frames = map.frames;
       SimulatedPose other = simulated(out.pose);
-      out.attribution = compareMaps(field, measured, other.map, regions.regions(out.pose.T_map_radar), other.records);
+      out.attribution = compareMaps(field, map, other.map, regions.regions(out.pose.T_map_radar), other.records);
       for (const Residual& residual : out.attribution.residuals) {
         for (int index : residual.records) out.residual_records.emplace(index, other.records[index]);
       }

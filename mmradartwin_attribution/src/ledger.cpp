@@ -20,15 +20,19 @@ std::string fixed(double value, int digits) {
   return s.str();
 }
 
-}  // namespace
-
-double quantile(std::vector<double> values, double probability) {
+double quantileOfSorted(const std::vector<double>& values, double probability) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::sort(values.begin(), values.end());
   const double position = probability * static_cast<double>(values.size() - 1);
   const std::size_t below = static_cast<std::size_t>(position);
   const std::size_t above = std::min(below + 1, values.size() - 1);
   return values[below] + (position - static_cast<double>(below)) * (values[above] - values[below]);
+}
+
+}  // namespace
+
+double quantile(std::vector<double> values, double probability) {
+  std::sort(values.begin(), values.end());
+  return quantileOfSorted(values, probability);
 }
 
 void Ledger::add(const FieldMetrics& pose) {
@@ -59,8 +63,10 @@ LedgerSummary Ledger::summary() const {
     s.top[i] = share(top_hits_[i], top_count_[i]);
   }
   s.q3_cells = static_cast<int>(q3_db_.size());
-  s.q3_median_db = quantile(q3_db_, 0.5);
-  s.q3_iqr_db = quantile(q3_db_, 0.75) - quantile(q3_db_, 0.25);
+  std::vector<double> q3_db = q3_db_;
+  std::sort(q3_db.begin(), q3_db.end());
+  s.q3_median_db = quantileOfSorted(q3_db, 0.5);
+  s.q3_iqr_db = quantileOfSorted(q3_db, 0.75) - quantileOfSorted(q3_db, 0.25);
   s.q1_energy = share(q1_sum_, poses_);
   s.q2_energy = share(q2_sum_, poses_);
   s.q4_mae_db = share(q4_sum_db_, static_cast<double>(q4_cells_));

@@ -287,7 +287,7 @@ TEST_F(FrameEvidenceTest, ToneOfTheRadarIsNoWalkerAndNoSlip) {
     EXPECT_NEAR(tone.mechanism->values.number("beat_hz"), 2.9 / (2 * M_PI) * radar_.sample_rate_hz, 0.2 * bin_hz);
     EXPECT_NEAR(tone.mechanism->values.number("level_db"), 20 * std::log10(level), 1.5);
     EXPECT_NEAR(tone.mechanism->values.number("azimuth_deg"), 0, 1);
-    for (const auto& [pose, nats] : tone.held_out_nats) EXPECT_GT(nats, 10) << pose;
+    for (const auto& [pose, nats] : tone.nats_by_pose) EXPECT_GT(nats, 10) << pose;
   }
 }
 
@@ -303,7 +303,7 @@ TEST_F(FrameEvidenceTest, GainThatSettlesIsSaidWhateverItsSize) {
     const double frames = static_cast<double>(gain_db.size());
     EXPECT_NEAR(gain_db.front() - gain_db.back(), -loss_db * (1 - std::exp(-(frames - 1) / 8)), 0.02 + 0.05 * loss_db);
     double nats = 0;
-    for (const auto& [pose, own] : gain.held_out_nats) nats += own;
+    for (const auto& [pose, own] : gain.nats_by_pose) nats += own;
     EXPECT_GT(nats, 0);
   }
 }

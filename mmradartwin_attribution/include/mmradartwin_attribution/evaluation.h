@@ -62,8 +62,12 @@ struct Evaluation {
   int conjugated_better = 0;          ///< poses whose conjugated measurement agrees better
 };
 
-/// Compares every pose of a recording with its simulated side. The scene gives the expected regions.
+/// Gives the measured map of a pose, as SimulatedBranch the simulated one.
+using MeasuredBranch = std::function<RangeAngleMap(const Pose&)>;
+
+/// Compares every pose of a recording with its simulated side. The scene gives the expected regions. `measured` empty:
+/// the recording's captures are read and averaged.
 Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated, const Scene& scene,
-                    const RayCaster& rays, const EvaluationOptions& options);
+                    const RayCaster& rays, const EvaluationOptions& options, const MeasuredBranch& measured = {});
 
 }  // namespace mmradartwin

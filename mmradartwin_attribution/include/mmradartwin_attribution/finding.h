@@ -89,6 +89,18 @@ struct FindingMaps {
   RealGrid before_db, after_db;  ///< [N][64]
 };
 
+/// Where a path record lies in a pose's maps, and its amplitude (20 log10 of DESIGN section 4's).
+struct RecordState {
+  double amplitude_db = 0, range_m = 0, azimuth_deg = 0;
+};
+/// A path record of the simulation that a finding changes, before and after; without the one it adds it, without the
+/// other it takes it away.
+struct ChangedRecord {
+  std::string pose, event;  ///< event: the mechanism that made it
+  std::vector<std::string> actors;
+  std::optional<RecordState> before, after;
+};
+
 /// One entry of findings.json (DESIGN section 5). Class and action follow from the cause.
 struct Finding {
   std::string cause;  ///< a binding name or "unknown"
@@ -102,6 +114,7 @@ struct Finding {
   std::optional<std::string> figure;        ///< relative to findings.json
   std::optional<std::string> description;   ///< in words and numbers; `unknown` has one
   std::shared_ptr<const FindingMaps> maps;  ///< for the figure; none where maps of averages do not show it
+  std::vector<ChangedRecord> records;       ///< that it changes, at the poses that carry it; for the report
 
   const FindingParameter* parameter(const std::string& name) const;  ///< nullptr where it has none of that name
   /// Half the 95 % intervals, along map's x and y, of where it is, or of by how much it moved; 0 where it has none.

@@ -25,10 +25,11 @@ struct FrameFinding {
   std::vector<std::string> poses;            ///< that carry it
   std::vector<FindingPlace> where;
   std::string description;  ///< in words and numbers
-  /// Among FrameExaminer::unexplained(): the twin's term for it where there is one (level_db over one ADC count), and
-  /// the nats that it explains at each pose, by its name, as the poses of other locations tell the term.
+  /// Among FrameExaminer::unexplained(): the twin's term for it where there is one (level_db over one ADC count).
   std::optional<NamedParameters> mechanism;
-  std::map<std::string, double> held_out_nats;
+  /// Where it is told pose by pose, the nats that it explains at each, by its name; of a term of unexplained() as the
+  /// poses of other locations tell it.
+  std::map<std::string, double> nats_by_pose;
 };
 
 /// Channels of an echo that moves, by range and Doppler, of a radar with many loops per frame.
@@ -43,7 +44,8 @@ struct MovingCell {
 struct PoseFrames {
   std::string pose;
   /// Average in ADC counts [M][N], as CoherentAverage's, without lost, clipped and disturbed samples, slips closed and
-  /// frames turned back. Zero where a sample was never fit for use.
+  /// frames turned back. Zero where a sample was never fit for use; as delivered
+  /// where it was always clipped.
   ReceiveGrid mean;
   /// Thermal noise [M]: variance of one complex sample of one shot in counts^2, robust against what moves; rounding
   /// leaves at least 1/6. The mean carries this over `shots`.

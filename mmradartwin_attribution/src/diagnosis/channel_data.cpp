@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/range_angle.h"
 
@@ -43,14 +44,18 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
       });
       if (silent) throw InputError("all its samples are zero; check the capture");
       examiner.addPose(pose, frames);
+      CoherentAverage plain(recording.radar, 0);
+      for (const AdcCube& cube : frames) plain.add(cube);
       const PoseFrames& seen = examiner.poses().back();
       PoseChannels channels;
       channels.pose = pose;
       channels.grid = seen.mean;
       channels.moving = seen.moving;
+      if (plain.complete()) channels.plain = plain.grid();
       std::vector<double> noise = seen.noise_variance;
       if (recording.channels) {
         correctChannels(*recording.channels, channels.grid.x);
+        if (plain.complete()) correctChannels(*recording.channels, channels.plain.x);
         for (std::size_t k = 0; k < noise.size(); ++k) {
           noise[k] /= std::norm(recording.channels->error(k));
           for (MovingCell& cell : channels.moving) {

@@ -3,10 +3,13 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <memory>
 #include <optional>
 
 #include "body_fixed_tone.h"
+#include "changed_records.h"
 #include "channel_data.h"
 #include "clutter_field.h"
 #include "delivery.h"
@@ -20,7 +23,9 @@
 #include "hypothesis_fit.h"
 #include "hypothesis_ranking.h"
 #include "law_screen.h"
+#include "map_metrics.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/range_angle.h"
 #include "profiled_values.h"
 #include "receiver_finding.h"
 #include "scene_match.h"
@@ -35,10 +40,12 @@ constexpr std::size_t kFewestForLaws = 3;  ///< poses: of fewer only frames and 
 // Of the measured power: what explains less is no finding, unless it is worth leastNats(), inflation taken off, and is
 // not like clutter; and to explain less by less than that is no loss.
 constexpr double kLeastExplained = 0.002;
-constexpr double kMostLost = 0.015;    ///< of the explained power, by what the likelihood plainly gains of
-constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
-constexpr double kFarAway_m = 0.12;    ///< six times what a scene's actors err by
-constexpr double kTogether_m = 0.005;  ///< what sixteen of them err by together
+constexpr double kMostLost = 0.015;     ///< of the explained power, by what the likelihood plainly gains of
+constexpr std::size_t kWaysToErr = 4;   ///< geometries that alike errors of actors and poses look like
+constexpr double kExplainsSame = 0.5;   ///< correlation over poses of what two fits gain
+constexpr double kFarAway_m = 0.12;     ///< six times what a scene's actors err by,
+constexpr double kOutOfPlace_m = 0.08;  ///< and four times: of some twenty actors none is farther away by chance
+constexpr double kTogether_m = 0.005;   ///< what sixteen of them err by together
 /// Of what an unknown gains: what its law leaves over looks like a little of many names.
 constexpr double kBesideUnknown = 0.25;
 
@@ -52,6 +59,7 @@ class Session {
     if (options_.cancelled && options_.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
     if (options_.on_progress) options_.on_progress({stage, share});
   }
+  void measureFrameGain();
   /// Undoes what convention of delivery fits far better than the one stated; its name.
   std::optional<std::string> judgeDelivery();
   void judgeTone();
@@ -67,6 +75,7 @@ class Session {
   std::vector<PoseEchoes> heldOutEchoes(const HypothesisFit& fit, const std::vector<double>& actor_range_m);
   void measureGain(HypothesisFit& fit, Finding& f);
   void addMetrics(const HypothesisFit& fit, FindingGain& gain) const;
+  EvaluationOptions evaluationOptions() const;
   void measureGain(const ChannelData& before_data, const std::vector<NamedParameters>& before,
                    const ChannelData& after_data, const std::vector<NamedParameters>& after, Finding& f);
 
@@ -91,6 +100,7 @@ class Session {
     std::vector<double> scaled, standard_error;
     bool plain;
     std::size_t finding;
+    std::vector<std::string> beside;  ///< labels of those that it was found beside
   };
   std::vector<Accepted> accepted_;
   std::vector<Accepted>::const_iterator acceptedAs(const Hypothesis& h) const {
@@ -103,6 +113,9 @@ class Session {
     return accepted_.empty() || all.back().cause != "unknown" ? 0 : all.back().evidence.log_likelihood_gain;
   }
   void accept(const HypothesisFit& fit, Finding finding);
+  void orderByGain();
+  void measureAgain(const Accepted& a);
+  void tellChanges();
   /// mechanisms_ and extended_ without what rounds have found.
   std::vector<NamedParameters> before_rounds_, extended_before_rounds_;
   std::size_t family_ = 1;  ///< hypotheses of a round
@@ -157,6 +170,21 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
       twin_, *source_, *model_, accuracy_, [this](const std::string& stage, double share) { report(stage, share); });
 }
 
+/// What leaving damaged samples out gains. That of several findings cannot be told apart: one average lacks all of
+/// them.
+void Session::measureFrameGain() {
+  std::vector<Finding>& found = result_.findings.findings;
+  if (few_ || found.size() != 1 || received_.frames.size() != 1) return;
+  ChannelData recorded = data_;
+  const SignalChain chain(data_.radar);
+  for (PoseChannels& p : recorded.poses) {
+    if (p.plain.x.size() == 0) continue;
+    p.grid = p.plain;
+    transformGrid(chain, p);
+  }
+  measureGain(recorded, mechanisms_, data_, mechanisms_, found.front());
+}
+
 std::optional<std::string> Session::judgeDelivery() {
   report("conventions", 0);
   const std::optional<Delivery> delivery = findDelivery(twin_, data_);
@@ -165,6 +193,7 @@ std::optional<std::string> Session::judgeDelivery() {
   undoDelivery(*delivery, data_);
   Finding f = findingOf(*delivery, data_.radar);
   measureGain(recorded, mechanisms_, data_, mechanisms_, f);
+  addGainInNats(data_, {}, f);
   extended_.push_back(*f.mechanism);
   result_.findings.findings.push_back(f);
   return f.cause;
@@ -183,6 +212,7 @@ void Session::judgeTone() {
   std::vector<NamedParameters> with = mechanisms_;
   with.push_back(*f.mechanism);
   measureGain(recorded, mechanisms_, recorded, with, f);
+  addGainInNats(data_, {}, f);
   extended_.push_back(*f.mechanism);
   result_.findings.findings.push_back(std::move(f));
 }
@@ -193,6 +223,7 @@ void Session::judgeNoise() {
   if (stated == mechanisms_.end()) return;
   std::optional<Finding> f = noiseFloorFinding(data_, *stated);
   if (!f) return;
+  addGainInNats(data_, {}, *f);
   putIn(*f->mechanism, extended_);
   result_.findings.findings.push_back(std::move(*f));
 }
@@ -251,12 +282,16 @@ void Session::addMetrics(const HypothesisFit& fit, FindingGain& gain) const {
     after.push_back(extended_);
     putIn(fit.hypothesis.at(fit.fold_scaled[static_cast<std::size_t>(k)]), after.back());
   }
+  addMapMetrics(
+      recording_, twin_, data_, {extended_}, after, [&](int location) { return fitter_->fold(location); },
+      evaluationOptions(), gain);
+}
+
+EvaluationOptions Session::evaluationOptions() const {
   EvaluationOptions options;
   options.config = options_.config;
   options.jobs = options_.jobs;
-  addMapMetrics(
-      recording_, twin_, data_, {extended_}, after, [&](int location) { return fitter_->fold(location); }, options,
-      gain);
+  return options;
 }
 
 /// All that rounds have found, fitted at once; what is then worth nothing beside the rest is taken back.
@@ -326,6 +361,14 @@ bool Session::isWithinErrors(const HypothesisFit& f) const {
   const Hypothesis& h = f.hypothesis;
   const auto a = acceptedAs(h);
   if (a == accepted_.end() || !(h.isMove() || h.isGeometry())) return false;
+  if (h.isMove()) {
+    const NamedParameters move = h.at(a->scaled);
+    const Actor& actor = twin_.scene().actors[static_cast<std::size_t>(twin_.scene().actorIndex(h.subject))];
+    const double reach_m = actor.bounds.sizes().head<2>().norm() / 2;
+    const double farthest_m = std::hypot(move.values.number("dx_m"), move.values.number("dy_m")) +
+                              std::abs(move.values.number("dyaw_deg")) * M_PI / 180 * reach_m;
+    if (farthest_m < kOutOfPlace_m) return true;
+  }
   if (f.plain && f.moved_m() > kFarAway_m) return false;  // an interval may be wide where the likelihood is rough
   std::vector<double> errors = a->standard_error;
   bool shifts = false;
@@ -377,8 +420,79 @@ void Session::accept(const HypothesisFit& fit, Finding finding) {
   std::vector<Finding>& all = result_.findings.findings;
   const std::size_t at = all.size() - (unknownNats() > 0 ? 1 : 0);
   for (Accepted& a : accepted_) a.finding += a.finding >= at ? 1 : 0;
-  accepted_.push_back({fit.hypothesis, fit.scaled, fit.standard_error, fit.plain, at});
+  std::vector<std::string> beside;
+  for (const Accepted& a : accepted_) beside.push_back(a.hypothesis.label());
+  accepted_.push_back({fit.hypothesis, fit.scaled, fit.standard_error, fit.plain, at, std::move(beside)});
   all.insert(all.begin() + static_cast<std::ptrdiff_t>(at), std::move(finding));
+}
+
+/// Findings of rounds by falling gain, an unknown last; gains that were measured beside others than those that now
+/// stand before them are measured again.
+void Session::orderByGain() {
+  std::vector<Finding>& all = result_.findings.findings;
+  std::vector<std::size_t> places;
+  for (const Accepted& a : accepted_) places.push_back(a.finding);
+  std::sort(places.begin(), places.end());
+  std::stable_sort(accepted_.begin(), accepted_.end(), [&](const Accepted& a, const Accepted& b) {
+    const Finding &x = all[a.finding], &y = all[b.finding];
+    if ((x.cause == "unknown") != (y.cause == "unknown")) return y.cause == "unknown";
+    return x.evidence.log_likelihood_gain > y.evidence.log_likelihood_gain;
+  });
+  std::vector<Finding> ordered;
+  for (const Accepted& a : accepted_) ordered.push_back(std::move(all[a.finding]));
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    all[places[i]] = std::move(ordered[i]);
+    accepted_[i].finding = places[i];
+  }
+  const Nuisance found = state_.nuisance;
+  mechanisms_ = before_rounds_;
+  extended_ = extended_before_rounds_;
+  std::vector<std::string> before;
+  for (const Accepted& a : accepted_) {
+    if (!std::is_permutation(a.beside.begin(), a.beside.end(), before.begin(), before.end())) measureAgain(a);
+    before.push_back(a.hypothesis.label());
+    putIn(a.hypothesis.at(a.scaled), mechanisms_);
+    putIn(a.hypothesis.at(a.scaled), extended_);
+  }
+  state_.nuisance = found;
+}
+
+/// A finding's gain over mechanisms_, in nats, maps and metrics.
+void Session::measureAgain(const Accepted& a) {
+  report("gain of " + a.hypothesis.label() + " beside those before it", 0);
+  Finding& f = result_.findings.findings[a.finding];
+  source_->settle(mechanisms_);
+  const Nuisance nuisance = state_.nuisance;
+  state_ = fitter_->state(mechanisms_, &nuisance);
+  HypothesisFit fit = fitter_->fit(state_, a.hypothesis, {a.scaled});
+  fitter_->judge(fit, family_);
+  tellGain(fit, state_, data_, f);
+  if (!f.gain) return;  // one location
+  f.where.front().range_m = f.where.front().azimuth_deg = std::nullopt;
+  measureGain(fit, f);
+  addMetrics(fit, *f.gain);
+}
+
+/// What every finding changes of the paths of the twin with those before it, and of the paper's metrics where its round
+/// has not told.
+void Session::tellChanges() {
+  std::vector<NamedParameters> mechanisms = twin_.description().mechanisms;
+  for (Finding& f : result_.findings.findings) {
+    if (!f.mechanism) continue;
+    report("what " + f.cause + " changes", 0);
+    std::vector<NamedParameters> with = mechanisms;
+    putIn(*f.mechanism, with);
+    const bool of_frames = std::any_of(received_.frames.begin(), received_.frames.end(),
+                                       [&](const FrameFinding& frames) { return frames.cause == f.cause; });
+    if (f.maps && f.gain && std::isnan(f.gain->recall.after) && !of_frames) {
+      addMapMetrics(
+          recording_, twin_, data_, {mechanisms}, {with}, [](int) { return 0; }, evaluationOptions(), *f.gain);
+    }
+    std::vector<std::string> poses;
+    for (const FindingPlace& place : f.where) poses.insert(poses.end(), place.poses.begin(), place.poses.end());
+    f.records = changedRecords(twin_, data_, poses, mechanisms, with);
+    mechanisms = std::move(with);
+  }
 }
 
 bool Session::judgeChannels(int round) {
@@ -386,7 +500,11 @@ bool Session::judgeChannels(int round) {
   believeAbsences(fits);
   believeMoves(fits, twin_.scene());
   believeBetterNames(fits, state_);
-  bool refused = false;
+  struct Refused {
+    Eigen::VectorXd gain;  // by pose
+    bool of_one_actor;
+  };
+  std::vector<Refused> refused;
   const double unknown_nats = unknownNats();
   for (HypothesisFit& f : fits) {
     std::string& verdict = triedAs(f, round, result_.tried).verdict;
@@ -420,9 +538,15 @@ bool Session::judgeChannels(int round) {
       const bool in_nats = !plainly_worse && f.broad_gain / f.inflation > least_nats;
       // Maps of echoes that are many points' differ from what is expected of them by as much as they hold.
       const bool much = likelier && ((f.plain && (by > -kMostLost || !plainly_worse)) || in_nats);
-      // What explains the same less well is no name for what a better one was refused for.
-      if (!in_maps && (!much || refused)) {
-        refused = refused || likelier;
+      // What explains less well what a better one was refused for is no name for it. Beside that, a law without a name
+      // may be the cause of something else, and what one actor's place explains leaves other names as they are.
+      const Eigen::VectorXd explains = gainByPose(f, state_);
+      const bool named = isCatalogued(f.hypothesis.mechanism.mechanism);
+      const bool again = std::any_of(refused.begin(), refused.end(), [&](const auto& other) {
+        return (named && !other.of_one_actor) || correlation(explains, other.gain) > kExplainsSame;
+      });
+      if (!in_maps && (!much || again)) {
+        if (likelier) refused.push_back({explains, false});
         refuse("the maps gain nothing");
         continue;
       }
@@ -447,7 +571,7 @@ bool Session::judgeChannels(int round) {
       restate();
       state_.nuisance = latents;
       source_->settle(mechanisms_);
-      refused = refused || !stands || !f.hypothesis.isMove();
+      refused.push_back({gainByPose(f, state_), stands && f.hypothesis.isMove()});
       verdict = stands ? "no larger than what errors of actors and poses look like" : "worth nothing beside the rest";
       report("taken back: " + f.hypothesis.label(), 1);
       continue;
@@ -462,12 +586,14 @@ bool Session::judgeChannels(int round) {
 }
 
 Diagnosis Session::run() {
-  const auto add = [&](Finding finding) {
+  const auto add = [&](Finding finding, const std::map<std::string, double>& nats_by_pose = {}) {
     if (!isNews(finding, twin_.description().mechanisms)) return;
+    addGainInNats(data_, nats_by_pose, finding);
     putIn(*finding.mechanism, extended_);
     result_.findings.findings.push_back(std::move(finding));
   };
-  for (const FrameFinding& f : received_.frames) add(findingOf(f));
+  for (const FrameFinding& f : received_.frames) add(findingOf(f), f.nats_by_pose);
+  measureFrameGain();
   for (const Delivery& d : received_.deliveries) add(findingOf(d, data_.radar));
   const std::optional<std::string> convention = few_ ? std::nullopt : judgeDelivery();
   source_->settle(mechanisms_);
@@ -521,6 +647,7 @@ Diagnosis Session::run() {
     for (int round = 0; round < (few_ ? 0 : options_.most_findings); ++round) {
       if (!judgeChannels(round)) break;
     }
+    orderByGain();
     for (Finding& f : findings.findings) {
       if (f.cause != "second_harmonic") continue;
       referToStrongestHost(twin_.changed(mechanisms_), data_, state_.nuisance.log_gain, strongest_amplitude_, f);
@@ -528,6 +655,7 @@ Diagnosis Session::run() {
     }
     addUnexplained(received_.unexplained, data_, twin_.description().mechanisms, findings, extended_);
   }
+  tellChanges();
   result_.extended = twin_.description();
   result_.extended.mechanisms = extended_;
   result_.problems = data_.problems;

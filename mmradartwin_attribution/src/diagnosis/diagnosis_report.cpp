@@ -1,5 +1,6 @@
 #include "mmradartwin_attribution/diagnosis_report.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -99,6 +100,50 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
+std::string joined(const std::vector<std::string>& names) {
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ";") + name;
+  return all;
+}
+
+/// Level, range and azimuth of a record, separated by `between`; empty fields where there is none.
+std::string shown(const std::optional<RecordState>& s, const std::string& between) {
+  if (!s) return between + between;
+  return shown(s->amplitude_db, 4) + between + shown(s->range_m, 4) + between + shown(s->azimuth_deg, 4);
+}
+
+std::string recordsCsv(const std::vector<ChangedRecord>& records) {
+  std::string csv =
+      "pose,event,actors,amplitude_before_db,range_before_m,azimuth_before_deg,amplitude_after_db,range_after_m,"
+      "azimuth_"
+      "after_deg\n";
+  for (const ChangedRecord& r : records) {
+    csv += quoted(r.pose) + "," + r.event + "," + quoted(joined(r.actors)) + "," + shown(r.before, ",") + "," +
+           shown(r.after, ",") + "\n";
+  }
+  return csv;
+}
+
+std::string recordsTable(std::vector<ChangedRecord> records) {
+  constexpr std::size_t kShown = 10;
+  const auto level_db = [](const ChangedRecord& r) {
+    return std::max(r.before ? r.before->amplitude_db : -INFINITY, r.after ? r.after->amplitude_db : -INFINITY);
+  };
+  std::stable_sort(records.begin(), records.end(),
+                   [&](const ChangedRecord& a, const ChangedRecord& b) { return level_db(a) > level_db(b); });
+  std::ostringstream html;
+  html << "<table><tr><th>strongest paths that it changes</th><th>pose</th><th>dB "
+          "before</th><th>m</th><th>deg</th><th>dB "
+          "after</th><th>m</th><th>deg</th></tr>";
+  for (std::size_t i = 0; i < std::min(kShown, records.size()); ++i) {
+    const ChangedRecord& r = records[i];
+    html << "<tr><td>" << r.event << ", " << escaped(joined(r.actors)) << "</td><td>" << escaped(r.pose) << "</td><td>"
+         << shown(r.before, "</td><td>") << "</td><td>" << shown(r.after, "</td><td>") << "</td></tr>";
+  }
+  html << "</table>";
+  return html.str();
+}
+
 void save(const std::string& file, const std::string& text) {
   std::ofstream out(file);
   out << text;
@@ -164,10 +209,15 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
   Findings findings = diagnosis.findings;
   if (!findings.findings.empty()) makeFolder(directory_ + "/figures");
   std::map<std::string, int> times;
+  std::vector<std::string> names;  // of a finding's files
   for (Finding& f : findings.findings) {
     const int time = ++times[f.cause];
-    f.figure = "figures/" + f.cause + (time > 1 ? "_" + std::to_string(time) : "") + ".png";
+    names.push_back(f.cause + (time > 1 ? "_" + std::to_string(time) : ""));
+    f.figure = "figures/" + names.back() + ".png";
     writePicture(drawFinding(f, diagnosis.plan), directory_ + "/" + *f.figure);
+    if (f.records.empty()) continue;
+    makeFolder(directory_ + "/records");
+    save(directory_ + "/records/" + names.back() + ".csv", recordsCsv(f.records));
   }
   if (diagnosis.has_twin) {
     findings.extended_twin = "twin.extended.yaml";
@@ -233,6 +283,10 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
       if (place.x_m && place.y_m) {
         html << "<p>At x = " << shown(*place.x_m) << " m, y = " << shown(*place.y_m) << " m in map</p>";
       }
+      if (place.range_m && place.azimuth_deg) {
+        html << "<p>Cells that carry it: " << shown((*place.range_m)[0]) << " to " << shown((*place.range_m)[1])
+             << " m, " << shown((*place.azimuth_deg)[0]) << " to " << shown((*place.azimuth_deg)[1]) << " deg</p>";
+      }
       if (!place.actors.empty()) html << "<p>Actor: " << escaped(place.actors.front()) << "</p>";
       if (!place.poses.empty()) {
         html << "<p>Poses that carry it most:";
@@ -254,6 +308,10 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
         html << "</td></tr>";
       }
       html << "</table>";
+    }
+    if (!f.records.empty()) {
+      const std::string file = "records/" + names[static_cast<std::size_t>(i) - 1] + ".csv";
+      html << recordsTable(f.records) << "<p>All of them: <a href=\"" << file << "\">" << file << "</a></p>";
     }
   }
   html << "<h2>Hypotheses</h2><p>Nats that the score test promised, and those that were "

@@ -20,8 +20,10 @@ constexpr double kLaw = 18;
 constexpr double kLawOfMore = 25, kLawOfMorePerPose = 4;
 constexpr double kTypical = 0.75, kTypicalLawOfMorePerPose = 2;  ///< of the size that theory gives it
 constexpr double kSubject = 24;                                  ///< and laws without a name
+// One actor's law without a name: walls that dry were worth 18 and 22.
+constexpr double kLawOfActor = 16, kLawOfActorPerPose = 0.6;
 constexpr double kSubjectOfMore = 45;
-constexpr double kTraces = 30;                            ///< the likelihood is rough there
+constexpr double kTraces = 40;                            ///< the likelihood is rough there
 constexpr double kObject = 70;                            ///< it has the whole room to choose from
 constexpr double kLawPerPose = 0.4, kSubjectPerPose = 1;  ///< a twin's own errors add up
 
@@ -58,6 +60,7 @@ double leastNats(const Hypothesis& hypothesis, const std::vector<double>& scaled
   if (name == "empirical_law" && hypothesis.mechanism.values.text("actor").empty()) {
     return std::max(kSubject, kLawPerPose * n);
   }
+  if (name == "empirical_law") return std::max(kLawOfActor, kLawOfActorPerPose * n);
   if (unnamed || !hypothesis.subject.empty()) return std::max(adds ? kSubjectOfMore : kSubject, kSubjectPerPose * n);
   if (adds) {
     const bool typical = std::all_of(scaled.begin(), scaled.end(), [](double v) { return v > kTypical; });

@@ -122,6 +122,7 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
 
   judged.rails = countRails(stack);
   ClippedValues clipped = clippedValues(judged.rails, stack);
+  const std::map<std::size_t, Complex> clipped_means = clippedMeans(clipped, stack);
   const double turn = s.examiner.commonTurn(stack);
   turnFrames(-turn, stack);
   std::vector<Complex> average = medianShot(stack);
@@ -132,6 +133,10 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   judged.bursts = bursts;
 
   average = meanShot(stack);
+  // What is clipped in every shot is nearer to the truth than nothing at all.
+  for (const auto& [place, mean] : clipped_means) {
+    if (average[place] == Complex(0)) average[place] = mean;
+  }
   ShotResiduals residuals = s.examiner.examine(stack, average);
   judged.turn_rad_per_frame = turn + residuals.turn_rad_per_frame;
   judged.turn_variance = residuals.turn_variance;
@@ -170,6 +175,7 @@ FrameFinding FrameExaminer::State::packetLoss() const {
     packets += p.packets.packets;
     lost += p.packets.lost;
     f.log_likelihood_gain += p.packets.log_likelihood_gain;
+    f.nats_by_pose[p.pose] = p.packets.log_likelihood_gain;
     if (p.packets.lost > 0) f.poses.push_back(p.pose);
   }
   if (lost == 0) return f;
@@ -190,6 +196,7 @@ std::vector<FrameFinding> FrameExaminer::State::misalignments() const {
     f.cause = "packet_misalignment";
     f.poses = {p.pose};
     f.log_likelihood_gain = p.slip_gain;
+    f.nats_by_pose = {{p.pose, p.slip_gain}};
     f.false_alarm_rate = kFalseAlarm;
     f.parameters = {{"pose", "", p.pose, {}}};
     f.description = "packets are missing and were not filled: from there on samples belong to other channels and times";
@@ -246,6 +253,7 @@ FrameFinding FrameExaminer::State::interference() const {
     frames += p.bursts.frames;
     hit += p.bursts.hit_frames;
     f.log_likelihood_gain += p.bursts.log_likelihood_gain;
+    f.nats_by_pose[p.pose] = p.bursts.log_likelihood_gain;
     if (p.bursts.hit_frames > 0) f.poses.push_back(p.pose);
   }
   if (hit == 0) return f;
@@ -363,7 +371,7 @@ FrameFinding FrameExaminer::State::frameGain() const {
   f.mechanism = NamedParameters{"empirical_frame_gain", {}};
   f.mechanism->values.set("gain_db", middle_db);
   for (std::size_t i = 0; i < judged.size(); ++i) {
-    double& nats = f.held_out_nats[judged[i].pose];
+    double& nats = f.nats_by_pose[judged[i].pose];
     for (std::size_t j = 0; j < judged[i].frame_gain_db.size(); ++j) {
       const std::vector<double> others = levelsOf_db(j, motion[i].pose.location);
       if (others.empty()) continue;

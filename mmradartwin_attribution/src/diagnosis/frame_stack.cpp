@@ -120,6 +120,18 @@ ClippedValues clippedValues(const Rails& rails, const FrameStack& s) {
   return clipped;
 }
 
+std::map<std::size_t, Complex> clippedMeans(const ClippedValues& clipped, const FrameStack& s) {
+  std::map<std::size_t, std::pair<std::complex<double>, int>> sums;
+  for (const auto& [at, count] : clipped.at) {
+    auto& [sum, times] = sums[at % s.values()];
+    sum += std::complex<double>(s.x[at]);
+    ++times;
+  }
+  std::map<std::size_t, Complex> means;
+  for (const auto& [place, sum] : sums) means[place] = Complex(sum.first / static_cast<double>(sum.second));
+  return means;
+}
+
 void dropStandingClipped(const ClippedValues& clipped, const std::vector<Complex>& average, FrameStack& s) {
   for (const auto& [at, count] : clipped.at) {
     // The average of what is clipped now and then stays below the limit.

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <complex>
 #include <cstdint>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -75,6 +76,8 @@ struct ClippedValues {
   double limit = 0;                                      ///< the nearer of both codes, as a size
 };
 ClippedValues clippedValues(const Rails& rails, const FrameStack& stack);
+/// By place in a shot: mean over the shots in which it is clipped, as it was delivered.
+std::map<std::size_t, std::complex<float>> clippedMeans(const ClippedValues& clipped, const FrameStack& stack);
 /// Takes clipped values out of use where the average comes to the limit too.
 void dropStandingClipped(const ClippedValues& clipped, const std::vector<std::complex<float>>& average,
                          FrameStack& stack);

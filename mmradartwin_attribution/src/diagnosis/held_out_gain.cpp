@@ -4,33 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <numeric>
-#include <random>
+#include <limits>
 
-#include "mmradartwin_attribution/ledger.h"
+#include "location_bootstrap.h"
 #include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin {
 namespace {
 
-constexpr int kDraws = 1000;
-constexpr double kLeastDrawn = 3e-4;  ///< of the strongest cell's power
+constexpr double kLeastDrawn = 3e-4;   ///< of the strongest cell's power
+constexpr double kBesideCells = 0.05;  ///< of what changes, beyond either end of the cells that are told
 constexpr double kMinRange_m = 0.16, kMaxAzimuth_rad = M_PI / 3;
-
-/// 95 % interval of a statistic over locations drawn with replacement. The same draws every time.
-std::array<double, 2> bootstrap(std::size_t locations,
-                                const std::function<double(const std::vector<int>&)>& statistic) {
-  std::mt19937 random(1);
-  std::vector<double> values;
-  std::vector<int> times(locations);
-  for (int i = 0; i < kDraws; ++i) {
-    std::fill(times.begin(), times.end(), 0);
-    for (std::size_t l = 0; l < locations; ++l) ++times[random() % locations];
-    values.push_back(statistic(times));
-  }
-  return {quantile(values, 0.025), quantile(values, 0.975)};
-}
 
 struct Sums {
   double missed = 0, measured = 0;
@@ -146,7 +130,7 @@ GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPow
   GainMetric m;
   m.before = explained(b, nullptr);
   m.after = explained(a, nullptr);
-  m.difference_ci95 = bootstrap(data.locations.size(), [&](const std::vector<int>& times) {
+  m.difference_ci95 = intervalOverLocations(data.locations.size(), [&](const std::vector<int>& times) {
     return explained(a, &times) - explained(b, &times);
   });
   return m;
@@ -182,6 +166,53 @@ RealGrid differences_db(const RangeAngleAxes& axes, const std::vector<CellPowers
   return grid;
 }
 
+/// From where to where `weights` of falling or rising `axis` hold all but 5 % at either end.
+std::array<double, 2> middle(std::vector<std::pair<double, double>> weights) {
+  std::sort(weights.begin(), weights.end());
+  double all = 0, below = 0;
+  for (const auto& [at, weight] : weights) all += weight;
+  std::array<double, 2> ends = {weights.front().first, weights.back().first};
+  bool begun = false;
+  for (const auto& [at, weight] : weights) {
+    below += weight;
+    if (!begun && below >= kBesideCells * all) {
+      ends[0] = at;
+      begun = true;
+    }
+    if (below >= (1 - kBesideCells) * all) {
+      ends[1] = at;
+      break;
+    }
+  }
+  return ends;
+}
+
+/// The cells that hold nine tenths, in range and in azimuth, of what a change does to amplitudes, all poses taken
+/// together. Nothing where it does nothing to them.
+void placeInMaps(const RangeAngleAxes& axes, const std::vector<CellPowers>& before,
+                 const std::vector<CellPowers>& after, FindingPlace& place) {
+  std::vector<std::pair<double, double>> by_range, by_azimuth;
+  double all = 0;
+  std::size_t j = 0;
+  for (double range_m : axes.range_m) {
+    if (range_m <= kMinRange_m) continue;
+    for (double azimuth_rad : axes.azimuth_rad) {
+      if (!(std::abs(azimuth_rad) <= kMaxAzimuth_rad)) continue;
+      double change = 0;
+      for (std::size_t i = 0; i < before.size(); ++i) {
+        change += std::pow(std::sqrt(after[i].expected[j]) - std::sqrt(before[i].expected[j]), 2);
+      }
+      by_range.emplace_back(range_m, change);
+      by_azimuth.emplace_back(azimuth_rad * 180 / M_PI, change);
+      all += change;
+      ++j;
+    }
+  }
+  if (!(all > 0)) return;
+  place.range_m = middle(std::move(by_range));
+  place.azimuth_deg = middle(std::move(by_azimuth));
+}
+
 }  // namespace
 
 void compareMaps(const ChannelData& data, const std::vector<CellPowers>& before, const std::vector<CellPowers>& after,
@@ -189,6 +220,7 @@ void compareMaps(const ChannelData& data, const std::vector<CellPowers>& before,
   if (!f.gain) f.gain.emplace();
   f.gain->explained_power = explainedPowerGain(data, before, after);
   const RangeAngleAxes axes = SignalChain(data.radar).axes();
+  if (f.where.size() == 1 && !f.where.front().range_m) placeInMaps(axes, before, after, f.where.front());
   f.maps = std::make_shared<FindingMaps>(FindingMaps{axes, differences_db(axes, before), differences_db(axes, after)});
 }
 
@@ -204,7 +236,7 @@ GainMetric likelihoodGain(const ChannelData& data, const std::vector<double>& be
     m.before += before[i] / static_cast<double>(before.size());
     m.after += after[i] / static_cast<double>(before.size());
   }
-  m.difference_ci95 = bootstrap(data.locations.size(), [&](const std::vector<int>& times) {
+  m.difference_ci95 = intervalOverLocations(data.locations.size(), [&](const std::vector<int>& times) {
     double sum = 0, n = 0;
     for (std::size_t l = 0; l < times.size(); ++l) {
       sum += times[l] * by_location[l];
@@ -213,36 +245,6 @@ GainMetric likelihoodGain(const ChannelData& data, const std::vector<double>& be
     return n > 0 ? sum / n : 0.0;
   });
   return m;
-}
-
-void addMapMetrics(const Recording& recording, const Twin& twin, const ChannelData& data,
-                   const std::vector<std::vector<NamedParameters>>& before,
-                   const std::vector<std::vector<NamedParameters>>& after, const std::function<int(int)>& fold_of,
-                   const EvaluationOptions& options, FindingGain& gain) {
-  Recording used = recording;
-  used.poses.clear();
-  for (const PoseChannels& p : data.poses) used.poses.push_back(p.pose);
-  const auto summary = [&](const std::vector<std::vector<NamedParameters>>& folds) {
-    std::vector<Twin> twins;
-    for (const auto& mechanisms : folds) twins.push_back(twin.changed(mechanisms));
-    std::vector<SimulatedBranch> branches;
-    for (const Twin& t : twins) branches.push_back(simulatedByTwin(t));
-    const SimulatedBranch simulated = [&](const Pose& pose) {
-      const auto at = std::find_if(data.poses.begin(), data.poses.end(),
-                                   [&](const PoseChannels& p) { return p.pose.name == pose.name; });
-      const std::size_t fold = static_cast<std::size_t>(fold_of(at->location)) % branches.size();
-      return branches[fold](pose);
-    };
-    return evaluate(used, simulated, twin.scene(), twin.rays(), options).central;
-  };
-  const LedgerSummary b = summary(before), a = summary(after);
-  const auto set = [](GainMetric& m, double from, double to) { m = {from, to, {}}; };
-  set(gain.recall, b.recall, a.recall);
-  for (std::size_t i = 0; i < 3; ++i) set(gain.recall_band[i], b.recall_band[i], a.recall_band[i]);
-  set(gain.q1, b.q1_energy, a.q1_energy);
-  set(gain.q2, b.q2_energy, a.q2_energy);
-  set(gain.q3_median_db, b.q3_median_db, a.q3_median_db);
-  for (std::size_t i = 0; i < 5; ++i) set(gain.classes[i], b.class_count[i], a.class_count[i]);
 }
 
 }  // namespace mmradartwin

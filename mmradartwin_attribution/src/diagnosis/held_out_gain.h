@@ -1,14 +1,10 @@
 #pragma once
 
-#include <array>
-#include <functional>
 #include <vector>
 
 #include "channel_data.h"
 #include "echo_field.h"
-#include "mmradartwin_attribution/evaluation.h"
 #include "mmradartwin_attribution/finding.h"
-#include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
 
@@ -25,18 +21,12 @@ double explainedPower(const std::vector<CellPowers>& poses);
 GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPowers>& before,
                               const std::vector<CellPowers>& after);
 
-/// A finding's explained power before and after, held out where `after` is, and the maps for its figure.
+/// A finding's explained power before and after, held out where `after` is, the maps for its figure, and the cells that
+/// carry it where it has no place in the maps yet.
 void compareMaps(const ChannelData& data, const std::vector<CellPowers>& before, const std::vector<CellPowers>& after,
                  Finding& f);
 
 /// Mean difference per pose with its 95 % interval by bootstrap over locations.
 GainMetric likelihoodGain(const ChannelData& data, const std::vector<double>& before, const std::vector<double>& after);
-
-/// The paper's metrics of the poses in `data` (recall by band, Q1, Q2, Q3, C1 to C5) before and after: mechanisms by
-/// fold, or one list for all. `fold_of` a location.
-void addMapMetrics(const Recording& recording, const Twin& twin, const ChannelData& data,
-                   const std::vector<std::vector<NamedParameters>>& before,
-                   const std::vector<std::vector<NamedParameters>>& after, const std::function<int(int)>& fold_of,
-                   const EvaluationOptions& options, FindingGain& gain);
 
 }  // namespace mmradartwin

@@ -58,8 +58,6 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   }
   for (const auto& [cause, weight] : alike) f.candidates.push_back({cause, weight / sum});
   if (f.candidates.size() > 1) f.experiment = experimentFor(f.candidates);
-  f.evidence.log_likelihood_gain = best.gain;
-  f.evidence.false_alarm_rate = best.false_alarm_rate;
   for (const HypothesisFit& other : fits) {
     // Those ahead were refused.
     if (other.hypothesis.mechanism.mechanism == m.mechanism || other.ranking() > best.ranking()) continue;
@@ -74,14 +72,6 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
     place.x_m = at->x();
     place.y_m = at->y();
   }
-  std::vector<std::pair<double, std::string>> poses;
-  for (std::size_t i = 0; i < before.by_pose.size(); ++i) {
-    poses.emplace_back(best.state.by_pose[i] - before.by_pose[i], data.poses[i].pose.name);
-  }
-  std::stable_sort(poses.begin(), poses.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-  for (std::size_t i = 0; i < std::min<std::size_t>(10, poses.size()) && poses[i].first > 1; ++i) {
-    place.poses.push_back(poses[i].second);
-  }
   f.where.push_back(std::move(place));
   if (best.hypothesis.stated) {
     std::string states;
@@ -90,11 +80,27 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
     }
     f.description = "instead of what the twin states: " + states;
   }
-  if (!named) {
-    f.description = "no cause of the catalogue explains this; what it looks like: " + describeLaw(best.hypothesis, m) +
-                    "; " + number(best.gain, 4) + " nats over " + std::to_string(data.poses.size()) + " poses";
-  }
+  tellGain(best, before, data, f);
   return f;
+}
+
+void tellGain(const HypothesisFit& fit, const ModelState& before, const ChannelData& data, Finding& f) {
+  f.evidence.log_likelihood_gain = fit.gain;
+  f.evidence.false_alarm_rate = fit.false_alarm_rate;
+  std::vector<std::pair<double, std::string>> poses;
+  for (std::size_t i = 0; i < before.by_pose.size(); ++i) {
+    poses.emplace_back(fit.state.by_pose[i] - before.by_pose[i], data.poses[i].pose.name);
+  }
+  std::stable_sort(poses.begin(), poses.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  f.where.front().poses.clear();
+  for (std::size_t i = 0; i < std::min<std::size_t>(10, poses.size()) && poses[i].first > 1; ++i) {
+    f.where.front().poses.push_back(poses[i].second);
+  }
+  if (f.cause == "unknown") {
+    f.description =
+        "no cause of the catalogue explains this; what it looks like: " + describeLaw(fit.hypothesis, *f.mechanism) +
+        "; " + number(fit.gain, 4) + " nats over " + std::to_string(data.poses.size()) + " poses";
+  }
 }
 
 std::optional<Eigen::Vector2d> placeOf(const NamedParameters& m, const Scene& scene) {
@@ -178,24 +184,31 @@ void believeMoves(std::vector<HypothesisFit>& fits, const Scene& scene) {
   }
 }
 
+Eigen::VectorXd gainByPose(const HypothesisFit& fit, const ModelState& before) {
+  Eigen::VectorXd gain(static_cast<Eigen::Index>(before.by_pose.size()));
+  for (std::size_t i = 0; i < before.by_pose.size(); ++i) {
+    gain[static_cast<Eigen::Index>(i)] = fit.state.by_pose[i] - before.by_pose[i];
+  }
+  return gain;
+}
+
+double correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  const Eigen::VectorXd x = a.array() - a.mean(), y = b.array() - b.mean();
+  return x.dot(y) / std::max(1e-300, x.norm() * y.norm());
+}
+
 void believeBetterNames(std::vector<HypothesisFit>& fits, const ModelState& before) {
   const auto ofAllEchoes = [](const HypothesisFit& f) {
     return f.hypothesis.subject.empty() && isCatalogued(f.hypothesis.mechanism.mechanism);
   };
-  std::vector<Eigen::VectorXd> gained;  // by fit and pose, about its mean
-  for (const HypothesisFit& f : fits) {
-    Eigen::VectorXd gain(static_cast<Eigen::Index>(before.by_pose.size()));
-    for (std::size_t i = 0; i < before.by_pose.size(); ++i) {
-      gain[static_cast<Eigen::Index>(i)] = f.state.by_pose[i] - before.by_pose[i];
-    }
-    gained.emplace_back(gain.array() - gain.mean());
-  }
+  std::vector<Eigen::VectorXd> gained;
+  for (const HypothesisFit& f : fits) gained.push_back(gainByPose(f, before));
   for (std::size_t i = 0; i < fits.size(); ++i) {
     for (std::size_t j = 0; j < fits.size(); ++j) {
       HypothesisFit& better = fits[i];
       const HypothesisFit& sure = fits[j];
       if (!ofAllEchoes(better) || !ofAllEchoes(sure) || better.ranking() <= sure.ranking()) continue;
-      if (gained[i].dot(gained[j]) < kSameLaw * gained[i].norm() * gained[j].norm()) continue;
+      if (correlation(gained[i], gained[j]) < kSameLaw) continue;
       better.false_alarm_rate = std::min(better.false_alarm_rate, sure.false_alarm_rate);
     }
   }

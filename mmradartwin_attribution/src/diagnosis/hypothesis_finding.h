@@ -17,6 +17,10 @@ namespace mmradartwin {
 Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
                   const Scene& scene, const ChannelData& data);
 
+/// Sets what of a finding its fit says over `before`: evidence but for its rival, the poses that carry it most, an
+/// unknown's description.
+void tellGain(const HypothesisFit& fit, const ModelState& before, const ChannelData& data, Finding& f);
+
 /// Where in map a mechanism says that something is: an object, a place, the middle of an actor that moved (where it
 /// then stands) or is gone; nothing of all others.
 std::optional<Eigen::Vector2d> placeOf(const NamedParameters& mechanism, const Scene& scene);
@@ -41,6 +45,11 @@ void believeAbsences(std::vector<HypothesisFit>& fits);
 /// Of an object that the scene lacks and an actor that moved to its place and explains nearly as much, the actor comes
 /// first: a box of any size at any angle bends to more, and who stands where it stood would have lost its echoes there.
 void believeMoves(std::vector<HypothesisFit>& fits, const Scene& scene);
+
+/// Nats by which a fit explains each pose better [poses].
+Eigen::VectorXd gainByPose(const HypothesisFit& fit, const ModelState& before);
+/// Pearson's, of two gains: near 1 where they explain the same.
+double correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
 
 /// That something is wrong with all echoes is as sure as the surest name for it; which name, its likelihood says: where
 /// two gain alike over poses, the likelier one is as sure as the other.

@@ -118,6 +118,22 @@ bool isNews(const Finding& f, const std::vector<NamedParameters>& stated) {
   });
 }
 
+void addGainInNats(const ChannelData& data, const std::map<std::string, double>& by_pose, Finding& f) {
+  if (data.locations.size() < 2) return;
+  if (!f.gain) f.gain.emplace();
+  if (by_pose.empty()) {
+    const double poses = static_cast<double>(data.poses.size());
+    f.gain->log_likelihood_per_pose = {0, f.evidence.log_likelihood_gain / poses, {}};
+    return;
+  }
+  std::vector<double> nats;
+  for (const PoseChannels& p : data.poses) {
+    const auto at = by_pose.find(p.pose.name);
+    nats.push_back(at == by_pose.end() ? 0 : at->second);
+  }
+  f.gain->log_likelihood_per_pose = likelihoodGain(data, std::vector<double>(nats.size(), 0.0), nats);
+}
+
 void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data,
                     const std::vector<NamedParameters>& stated, Findings& findings,
                     std::vector<NamedParameters>& extended) {
@@ -135,15 +151,7 @@ void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& 
       said = said.value_or("") + "; besides: " + frame.description;
       continue;
     }
-    if (data.locations.size() > 1 && !frame.held_out_nats.empty()) {
-      std::vector<double> nats;
-      for (const PoseChannels& p : data.poses) {
-        const auto at = frame.held_out_nats.find(p.pose.name);
-        nats.push_back(at == frame.held_out_nats.end() ? 0 : at->second);
-      }
-      f.gain.emplace();
-      f.gain->log_likelihood_per_pose = likelihoodGain(data, std::vector<double>(nats.size(), 0.0), nats);
-    }
+    addGainInNats(data, frame.nats_by_pose, f);
     findings.findings.push_back(std::move(f));
   }
 }
@@ -415,11 +423,12 @@ Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& o
   });
   ChannelData& data = session.data;
   Diagnosis result;
-  const auto add = [&](Finding finding) {
+  const auto add = [&](Finding finding, const std::map<std::string, double>& nats_by_pose = {}) {
+    addGainInNats(data, nats_by_pose, finding);
     result.extended.mechanisms.push_back(*finding.mechanism);
     result.findings.findings.push_back(std::move(finding));
   };
-  for (const FrameFinding& f : session.frames) add(findingOf(f));
+  for (const FrameFinding& f : session.frames) add(findingOf(f), f.nats_by_pose);
   for (const Delivery& d : session.deliveries) add(findingOf(d, data.radar));
   if (const BodyFixedTone tone = findBodyFixedTone(data); isPlain(tone)) {
     subtractTone(tone, data);

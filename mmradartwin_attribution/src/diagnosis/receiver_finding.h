@@ -1,6 +1,8 @@
 #pragma once
 
+#include <map>
 #include <optional>
+#include <string>
 
 #include "body_fixed_tone.h"
 #include "channel_data.h"
@@ -12,7 +14,7 @@
 
 namespace mmradartwin {
 
-// What is wrong with frames and the receiver, as findings; their gain on held-out places is left open.
+// What is wrong with frames and the receiver, as findings; their gain in maps is left open.
 
 /// A recording that was read, and how it was delivered as far as leakage and echoes tell that without a scene: then
 /// data are as they ought to have been.
@@ -25,6 +27,9 @@ struct ReceivedSession {
 ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const ReadingProgress& on_progress);
 
 Finding findingOf(const FrameFinding& frames);
+/// Sets a finding's gain in nats per pose, over nothing, from those by pose where there are any, else from its
+/// evidence; nothing with fewer than two locations.
+void addGainInNats(const ChannelData& data, const std::map<std::string, double>& by_pose, Finding& f);
 /// False where a mechanism of the twin says the same: for the same thing, or for a place near by, and no value
 /// farther from the finding's than its interval is wide.
 bool isNews(const Finding& f, const std::vector<NamedParameters>& stated);

@@ -184,7 +184,7 @@ class Search {
     for (const PoseMotion& p : poses_) {
       int at_bin = 0, at_beam = 0;
       const bool told = strongestCell(at_bin, at_beam, p.pose.location) > 0 && p.evidence.size() > 0;
-      f.held_out_nats[p.pose.name] = told ? p.evidence(at_bin, at_beam) : 0;
+      f.nats_by_pose[p.pose.name] = told ? p.evidence(at_bin, at_beam) : 0;
     }
     text << "frames disagree at one beat frequency (" << f.mechanism->values.number("beat_hz") / 1e6 << " MHz, range "
          << range_m << " m) at " << f.poses.size() << " of " << poses_.size()
