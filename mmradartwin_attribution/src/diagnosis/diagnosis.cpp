@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "body_fixed_tone.h"
 #include "changed_records.h"
@@ -46,6 +47,8 @@ constexpr double kExplainsSame = 0.5;   ///< correlation over poses of what two 
 constexpr double kFarAway_m = 0.12;     ///< six times what a scene's actors err by,
 constexpr double kOutOfPlace_m = 0.08;  ///< and four times: of some twenty actors none is farther away by chance
 constexpr double kTogether_m = 0.005;   ///< what sixteen of them err by together
+constexpr double kRival = 0.7;          ///< of a finding's gain, by a name that may be the right one
+constexpr std::size_t kMostRivals = 2;
 /// Of what an unknown gains: what its law leaves over looks like a little of many names.
 constexpr double kBesideUnknown = 0.25;
 
@@ -100,7 +103,10 @@ class Session {
     std::vector<double> scaled, standard_error;
     bool plain;
     std::size_t finding;
-    std::vector<std::string> beside;  ///< labels of those that it was found beside
+    /// Labels of those beside which its gain was measured; none where it was not.
+    std::optional<std::vector<std::string>> beside;
+    /// Other names that explained nearly as much in its round, with their numbers.
+    std::vector<std::pair<Hypothesis, std::vector<double>>> rivals;
   };
   std::vector<Accepted> accepted_;
   std::vector<Accepted>::const_iterator acceptedAs(const Hypothesis& h) const {
@@ -112,7 +118,8 @@ class Session {
     const std::vector<Finding>& all = result_.findings.findings;
     return accepted_.empty() || all.back().cause != "unknown" ? 0 : all.back().evidence.log_likelihood_gain;
   }
-  void accept(const HypothesisFit& fit, Finding finding);
+  void accept(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding);
+  void exchangeNames();
   void orderByGain();
   void measureAgain(const Accepted& a);
   void tellChanges();
@@ -415,15 +422,76 @@ void Session::restate() {
   }
 }
 
-/// A finding more; an unknown stays the last one.
-void Session::accept(const HypothesisFit& fit, Finding finding) {
+/// A finding more; an unknown stays the last one. `fits`: all of its round.
+void Session::accept(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding) {
   std::vector<Finding>& all = result_.findings.findings;
   const std::size_t at = all.size() - (unknownNats() > 0 ? 1 : 0);
   for (Accepted& a : accepted_) a.finding += a.finding >= at ? 1 : 0;
   std::vector<std::string> beside;
   for (const Accepted& a : accepted_) beside.push_back(a.hypothesis.label());
-  accepted_.push_back({fit.hypothesis, fit.scaled, fit.standard_error, fit.plain, at, std::move(beside)});
+  accepted_.push_back({fit.hypothesis, fit.scaled, fit.standard_error, fit.plain, at, std::move(beside), {}});
+  for (const HypothesisFit& other : fits) {
+    const bool rival = other.hypothesis.label() != fit.hypothesis.label() && other.gain > kRival * fit.gain &&
+                       isCatalogued(other.hypothesis.mechanism.mechanism);
+    if (rival && accepted_.back().rivals.size() < kMostRivals) {
+      accepted_.back().rivals.emplace_back(other.hypothesis, other.scaled);
+    }
+  }
   all.insert(all.begin() + static_cast<std::ptrdiff_t>(at), std::move(finding));
+}
+
+/// What a cause was taken for while others were not known yet may be explained as well by a simpler name beside them
+/// (a transmitter's error and a turned mount look like an error of every channel): of each finding but the last, the
+/// rivals of its round are fitted anew.
+void Session::exchangeNames() {
+  bool exchanged = false;
+  for (std::size_t i = 0; i + 1 < accepted_.size(); ++i) {
+    Accepted& a = accepted_[i];
+    std::vector<NamedParameters> others = before_rounds_;
+    for (const Accepted& other : accepted_) {
+      if (&other != &a) putIn(other.hypothesis.at(other.scaled), others);
+    }
+    std::optional<ModelState> null;
+    std::optional<HypothesisFit> own, best;
+    for (const auto& [rival, scaled] : a.rivals) {
+      const bool free = std::none_of(accepted_.begin(), accepted_.end(), [&](const Accepted& other) {
+        return &other != &a && excludeEachOther(rival.mechanism, other.hypothesis.mechanism);
+      });
+      if (!free) continue;
+      if (!null) {
+        report("names beside what was found since", 0);
+        source_->settle(others);
+        null = fitter_->state(others, &state_.nuisance);
+        own = fitter_->fit(*null, a.hypothesis, {a.scaled});
+      }
+      HypothesisFit f = fitter_->fit(*null, rival, {scaled});
+      fitter_->judge(f, family_);
+      if (f.false_alarm_rate > kFalseAlarm || f.ranking() <= (best ? *best : *own).ranking()) continue;
+      best = std::move(f);
+    }
+    if (!best) continue;
+    const std::string was = a.hypothesis.label();
+    report("found " + best->hypothesis.label() + " instead of " + was, 1);
+    for (TriedHypothesis& t : result_.tried) {
+      if (t.label == was && t.verdict == "found") t.verdict = "found, later called " + best->hypothesis.label();
+    }
+    Finding& f = result_.findings.findings[a.finding];
+    f = findingOf(*best, {*best, *own}, *null, twin_.scene(), data_);
+    if (data_.locations.size() > 1) f.gain.emplace();
+    a.hypothesis = best->hypothesis;
+    a.scaled = best->scaled;
+    a.standard_error = best->standard_error;
+    a.plain = best->plain;
+    a.beside.reset();
+    a.rivals.clear();
+    state_.nuisance = best->state.nuisance;
+    exchanged = true;
+  }
+  if (!exchanged) return;
+  restate();
+  refitTogether();
+  source_->settle(mechanisms_);
+  profileFound();
 }
 
 /// Findings of rounds by falling gain, an unknown last; gains that were measured beside others than those that now
@@ -449,7 +517,9 @@ void Session::orderByGain() {
   extended_ = extended_before_rounds_;
   std::vector<std::string> before;
   for (const Accepted& a : accepted_) {
-    if (!std::is_permutation(a.beside.begin(), a.beside.end(), before.begin(), before.end())) measureAgain(a);
+    if (!a.beside || !std::is_permutation(a.beside->begin(), a.beside->end(), before.begin(), before.end())) {
+      measureAgain(a);
+    }
     before.push_back(a.hypothesis.label());
     putIn(a.hypothesis.at(a.scaled), mechanisms_);
     putIn(a.hypothesis.at(a.scaled), extended_);
@@ -558,7 +628,7 @@ bool Session::judgeChannels(int round) {
     const auto findings = result_.findings.findings;
     const Nuisance latents = state_.nuisance;
     if (source_->altersGeometry(*finding.mechanism)) ranking_->tryAllAgain();
-    accept(f, std::move(finding));
+    accept(f, fits, std::move(finding));
     state_.nuisance = f.state.nuisance;
     restate();
     if (accepted_.size() > 1) refitTogether();
@@ -576,6 +646,7 @@ bool Session::judgeChannels(int round) {
       report("taken back: " + f.hypothesis.label(), 1);
       continue;
     }
+    exchangeNames();
     takeOutImage();
     source_->settle(mechanisms_);
     const Nuisance nuisance = state_.nuisance;
