@@ -209,6 +209,23 @@ TEST_F(FrameEvidenceTest, ClippedSamples) {
   EXPECT_LT(value(found[0], "clipped_fraction"), 0.2);
 }
 
+TEST_F(FrameEvidenceTest, WhatAlwaysClipsStaysAsDelivered) {
+  const FrameExaminer whole = examine(30000), clipped = examine(45000);
+  int at_limit = 0;
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    const ComplexGrid &is = clipped.poses()[i].mean.x, ought = 1.5 * whole.poses()[i].mean.x;
+    for (Eigen::Index k = 0; k < is.rows(); ++k) {
+      for (Eigen::Index n = 0; n < is.cols(); ++n) {
+        const bool beyond = std::max(std::abs(ought(k, n).real()), std::abs(ought(k, n).imag())) > 33500;
+        if (!beyond) continue;
+        ++at_limit;
+        EXPECT_GT(std::abs(is(k, n)), 0.7 * std::abs(ought(k, n))) << i << " " << k << " " << n;
+      }
+    }
+  }
+  EXPECT_GT(at_limit, 10);
+}
+
 TEST_F(FrameEvidenceTest, ZeroedPackets) {
   long long lost = 0, packets = 0;
   const auto found = examine(12000, {}, loss(lost, packets)).findings();

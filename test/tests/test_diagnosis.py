@@ -1,4 +1,5 @@
 """Hides effects in measured sessions and requires the diagnosis to find them, or nothing where nothing is hidden."""
+import csv
 import json
 import math
 import os
@@ -88,6 +89,30 @@ class HiddenEffects(unittest.TestCase):
         self.assertLess(told["nats_ci95"][0], told["nats"])
         self.assertGreater(told["nats_ci95"][1], told["nats"])
         self.assertAlmostEqual(told["explained_power"], gain["after"] - gain["before"], delta=0.02)
+        self.assert_the_rest_is_told(first)
+
+    def assert_the_rest_is_told(self, first):
+        """Of an element pattern: intervals of the paper's metrics, the cells that carry it, the paths it changes."""
+        for metric in (first["gain"]["recall"], first["gain"]["q1"], first["gain"]["q2"],
+                       first["gain"]["q3_median_db"], first["gain"]["classes"]["C2"]):
+            low, high = metric["difference_ci95"]
+            self.assertLessEqual(low, metric["after"] - metric["before"])
+            self.assertGreaterEqual(high, metric["after"] - metric["before"])
+        place = first["where"][0]
+        self.assertLess(place["range_m"][0], place["range_m"][1])
+        # Beside boresight, on both sides of it, and nowhere beyond the evaluated field.
+        self.assertTrue(-60 <= place["azimuth_deg"][0] < -20 and 20 < place["azimuth_deg"][1] <= 60, msg=place)
+        exponent = first["parameters"]["cos_exponent"]["value"]
+        with open(self.at("out/records/element_pattern.csv"), encoding="utf-8") as text:
+            records = list(csv.DictReader(text))
+        specular = [r for r in records if r["event"] == "specular"]
+        self.assertGreater(len(specular), 3)
+        self.assertEqual({r["pose"] for r in records}, set(place["poses"]))
+        one_bounce = [r for r in specular if ";" not in r["actors"]]
+        for r in one_bounce:  # there and back the same way: n times 20 lg cos in amplitude squared
+            wanted_db = exponent * 20 * math.log10(math.cos(math.radians(float(r["azimuth_after_deg"]))))
+            self.assertAlmostEqual(float(r["amplitude_after_db"]) - float(r["amplitude_before_db"]), wanted_db, delta=0.2)
+        self.assertTrue(one_bounce)
 
     def test_leakage_is_named_with_place_and_level(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "32"))
@@ -326,6 +351,30 @@ class HiddenEffects(unittest.TestCase):
         self.assertEqual(first["parameters"]["material"]["value"], truth["material"], msg=f"seed {seed}")
         self.assertAlmostEqual(first["parameters"]["roughness_rms_m"]["value"], truth["roughness_rms_m"], delta=8e-5,
                                msg=f"seed {seed}")
+
+    def test_a_transmitter_and_a_turned_mount_are_no_error_of_every_channel(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "48"))
+        self.measured(seed, {"radar_yaw_offset": {"yaw_deg": 3.0}, "tx_imbalance": {"phase_deg": 20, "gain_db": 1.0}},
+                      headings=2)
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        found = {f["cause"]: f for f in findings["findings"]}
+        self.assertEqual(set(found), {"radar_yaw_offset", "tx_imbalance"}, msg=f"seed {seed}")
+        self.assertAlmostEqual(found["radar_yaw_offset"]["parameters"]["yaw_deg"]["value"], 3, delta=0.4)
+        self.assertAlmostEqual(found["tx_imbalance"]["parameters"]["phase_deg"]["value"], 20, delta=1)
+        nats = [f["evidence"]["log_likelihood_gain"] for f in findings["findings"]]
+        self.assertEqual(nats, sorted(nats, reverse=True), msg=f"seed {seed}")
+        # Each on top of those before it.
+        powers = [f["gain"]["explained_power"] for f in findings["findings"]]
+        self.assertAlmostEqual(powers[1]["before"], powers[0]["after"], delta=0.01)
+
+    def test_lost_packets_say_what_leaving_them_out_gains(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "49"))
+        _, first, _ = self.found(seed, {"packet_loss": {"lost_fraction": 0.05}}, headings=2)
+        self.assertGreater(first["gain"]["log_likelihood_per_pose"]["difference_ci95"][0], 0, msg=f"seed {seed}")
+        # Five samples of a hundred, whose places differ from frame to frame, hardly show in an average.
+        power = first["gain"]["explained_power"]
+        self.assertAlmostEqual(power["after"], power["before"], delta=0.01, msg=f"seed {seed}")
 
     def test_what_the_twin_states_is_fitted_anew(self):
         # As after a calibration, when the mount was bumped: the heading is not what the twin says, the transmitter is.
