@@ -20,7 +20,9 @@ constexpr std::size_t kSecondLook = 9;  ///< hypotheses that are looked at on mo
 constexpr std::size_t kSecondLookPoses = 66;
 constexpr std::size_t kSuspects = 6;    ///< actors whose geometry is tried
 constexpr std::size_t kNeighbours = 2;  ///< of a place where an object seems to stand, that may be the object
-constexpr double kOutOfPlace = 1.2;     ///< nats of an actor's own errors from which on it is looked for elsewhere
+constexpr double kElsewhere = 5;        ///< nats of its echoes nearer or farther away, from which on the same
+constexpr std::size_t kMostElsewhere = 2;
+constexpr double kOutOfPlace = 1.2;  ///< nats of an actor's own errors from which on it is looked for elsewhere
 
 }  // namespace
 
@@ -64,6 +66,13 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
     best.resize(std::min(most, best.size()));
     return best;
   };
+  report_("actors that stand elsewhere", 0);
+  std::size_t elsewhere = 0;
+  for (const auto& [actor, nats] : screen_.nearerOrFarther(state, spread(kScreenPoses))) {
+    if (nats < kElsewhere || ++elsewhere > kMostElsewhere) break;
+    suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(actor)].name);
+    out_of_place.insert(actor);
+  }
   report_("objects that the twin lacks", 0);
   std::vector<Screened> placed = bestOf(kMostObjects, projectBack(twin_, model_, state), objectAt);
   const std::size_t objects = placed.size();

@@ -13,7 +13,9 @@ constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what ris
 constexpr double kMore[] = {4, 16};            ///< of the scale, as long as that gains
 constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents have stood in for it
 constexpr double kStoodIn = 1;                 ///< nats of theirs
-constexpr double kRadii[] = {1, 2, 4, 7};      ///< of the scale, about a place where an object may have stood before
+constexpr double kShifts_m[] = {-0.3, -0.16, -0.08, 0.08, 0.16, 0.3};
+constexpr double kRadii[] = {1, 2, 4, 7};  ///< of the scale, about a place where an object may have stood before
+constexpr double kFiner[] = {0.35, 0.18};  ///< of the distance of the best of them
 constexpr int kDirections = 8;
 constexpr double kNearlyAsLikely = 10;  ///< nats that a place may be less likely, before latents settle there
 
@@ -38,6 +40,37 @@ std::vector<std::pair<int, double>> HypothesisScreen::suspects(const ModelState&
     const double gain = null.nuisance.actor_gain[a] / spread.actor_gain;
     const double range = null.nuisance.actor_range_m[a] / spread.actor_range_m;
     result.emplace_back(static_cast<int>(a), 0.5 * (gain * gain + range * range));
+  }
+  std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  return result;
+}
+
+std::vector<std::pair<int, double>> HypothesisScreen::nearerOrFarther(const ModelState& null,
+                                                                      const std::vector<int>& poses) {
+  std::vector<std::pair<int, double>> result;
+  for (std::size_t a = 0; a + 1 < null.nuisance.actor_range_m.size(); ++a) {  // the last is of no actor
+    double best = 0;
+    for (double shift_m : kShifts_m) {
+      Nuisance nuisance = withoutErrors(null.nuisance, static_cast<int>(a));
+      nuisance.actor_range_m[a] += shift_m;
+      std::vector<double> about_m = null.actor_range_m;
+      about_m[a] = nuisance.actor_range_m[a];
+      const auto echoes = source_.echoes(null.mechanisms, poses, about_m);
+      std::vector<int> changed;
+      std::vector<PoseEchoes> changed_echoes;
+      for (std::size_t i = 0; i < poses.size(); ++i) {
+        if (echoes[i].groups == null.echoes[static_cast<std::size_t>(poses[i])].groups) continue;
+        changed.push_back(poses[i]);
+        changed_echoes.push_back(echoes[i]);
+      }
+      const std::vector<double> there = model_.byPose(changed_echoes, nuisance, changed);
+      double gain = 0;
+      for (std::size_t i = 0; i < changed.size(); ++i) {
+        gain += there[i] - null.by_pose[static_cast<std::size_t>(changed[i])];
+      }
+      best = std::max(best, gain);
+    }
+    result.emplace_back(static_cast<int>(a), best);
   }
   std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
   return result;
@@ -93,13 +126,13 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
                                   const std::vector<int>& poses) {
   Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 0.0)}};
   const Nuisance nuisance = withoutErrors(null.nuisance, actor);  // they have stood in for the move
-  double gained = -kNearlyAsLikely, promised = 0;
-  std::vector<double> likeliest, most_promising;
-  for (double radius : kRadii) {
+  double gained = -INFINITY, promised = 0;
+  std::vector<double> likeliest(hypothesis.coordinates.size(), 0.0), most_promising;
+  const auto tryAbout = [&](std::vector<double> middle, double radius) {
     for (int k = 0; k < kDirections; ++k) {
-      std::vector<double> at(hypothesis.coordinates.size(), 0.0);
-      at[0] = radius * std::cos(2 * M_PI * k / kDirections);
-      at[1] = radius * std::sin(2 * M_PI * k / kDirections);
+      std::vector<double> at = middle;
+      at[0] += radius * std::cos(2 * M_PI * k / kDirections);
+      at[1] += radius * std::sin(2 * M_PI * k / kDirections);
       const auto [gain, promise] = valueAt(null, hypothesis, at, poses, nuisance);
       source_.settle(null.mechanisms);
       if (gain > gained) {
@@ -111,7 +144,11 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
         most_promising = at;
       }
     }
-  }
+  };
+  for (double radius : kRadii) tryAbout(std::vector<double>(hypothesis.coordinates.size(), 0.0), radius);
+  // Echoes stand within centimetres of the right place, and these places are farther from each other.
+  for (double share : kFiner) tryAbout(likeliest, share * std::hypot(likeliest[0], likeliest[1]));
+  if (gained <= -kNearlyAsLikely) likeliest.clear();
   if (most_promising == likeliest) most_promising.clear();
   for (const std::vector<double>& at : {likeliest, most_promising}) {
     if (at.empty()) continue;

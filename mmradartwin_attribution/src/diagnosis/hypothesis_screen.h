@@ -16,6 +16,9 @@ class HypothesisScreen {
   /// Actors by how far their echoes' level and range are from where the twin has them, the priors of their errors
   /// included: most suspicious first, with nats (inflation taken off).
   std::vector<std::pair<int, double>> suspects(const ModelState& null) const;
+  /// Actors by what the likelihood of the poses named gains where all their echoes are nearer or farther away by one
+  /// length of several, first who gains most. Traces nothing.
+  std::vector<std::pair<int, double>> nearerOrFarther(const ModelState& null, const std::vector<int>& poses);
   /// Of what is there or not, more or less, the likelihood at some values: a quadratic about nothing says little of it.
   /// Of all others a score test.
   Screened screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
