@@ -1,0 +1,323 @@
+#include "selection.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fitted_parameters.h"
+#include "hypothesis_finding.h"
+#include "profiled_values.h"
+#include "receiver_finding.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr std::size_t kWaysToErr = 4;   ///< geometries that alike errors of actors and poses look like
+constexpr double kFarAway_m = 0.12;     ///< six times what a scene's actors err by,
+constexpr double kOutOfPlace_m = 0.08;  ///< and four times: of some twenty actors none is farther away by chance
+constexpr double kTogether_m = 0.005;   ///< what sixteen of them err by together
+constexpr double kRival = 0.7;          ///< of a finding's gain, by a name that may be the right one
+constexpr std::size_t kMostRivals = 2;
+
+}  // namespace
+
+Selection::Selection(const Twin& twin, ChannelData& data, EchoSource& source, const SessionModel& model,
+                     HypothesisFitter& fitter, GainMeasurement& gains, const PoseAccuracy& accuracy,
+                     std::vector<Finding>& findings, std::vector<TriedHypothesis>& tried, Report report)
+    : twin_(twin),
+      data_(data),
+      source_(source),
+      model_(model),
+      fitter_(fitter),
+      gains_(gains),
+      accuracy_(accuracy),
+      findings_(findings),
+      tried_(tried),
+      report_(std::move(report)) {}
+
+void Selection::begin(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& extended,
+                      ModelState state) {
+  mechanisms_ = before_rounds_ = mechanisms;
+  extended_ = extended_before_rounds_ = extended;
+  state_ = std::move(state);
+}
+
+std::vector<Selection::Accepted>::const_iterator Selection::acceptedAs(const Hypothesis& h) const {
+  return std::find_if(accepted_.begin(), accepted_.end(),
+                      [&](const Accepted& a) { return a.hypothesis.label() == h.label(); });
+}
+
+double Selection::unknownNats() const {
+  return accepted_.empty() || findings_.back().cause != "unknown" ? 0 : findings_.back().evidence.log_likelihood_gain;
+}
+
+std::string Selection::take(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding,
+                            std::size_t family) {
+  const auto accepted = accepted_;
+  const auto findings = findings_;
+  const Nuisance latents = state_.nuisance;
+  family_ = family;
+  accept(fit, fits, std::move(finding));
+  state_.nuisance = fit.state.nuisance;
+  restate();
+  if (accepted_.size() > 1) refitTogether();
+  source_.settle(mechanisms_);
+  const bool stands = acceptedAs(fit.hypothesis) != accepted_.end();
+  if (stands) profileFound();
+  if (!stands || isWithinErrors(fit)) {
+    accepted_ = accepted;
+    findings_ = findings;
+    restate();
+    state_.nuisance = latents;
+    source_.settle(mechanisms_);
+    return stands ? "no larger than what errors of actors and poses look like" : "worth nothing beside the rest";
+  }
+  exchangeNames();
+  takeOutImage();
+  source_.settle(mechanisms_);
+  const Nuisance nuisance = state_.nuisance;
+  state_ = fitter_.state(mechanisms_, &nuisance);
+  return "";
+}
+
+/// All that rounds have found, fitted at once; what is then worth nothing beside the rest is taken back.
+void Selection::refitTogether() {
+  while (true) {
+    report_("fitting all findings together", 0);
+    std::vector<Hypothesis> parts;
+    std::vector<std::vector<double>> start;
+    for (const Accepted& a : accepted_) {
+      parts.push_back(a.hypothesis);
+      start.push_back(a.scaled);
+    }
+    const JointFit fit = fitter_.refit(before_rounds_, state_.nuisance, parts, start);
+    state_.nuisance = fit.nuisance;
+    std::size_t weakest = 0;
+    double weakest_rate = -1;
+    for (std::size_t i = 0; i < accepted_.size(); ++i) {
+      Accepted& a = accepted_[i];
+      a.scaled = fit.scaled[i];
+      a.standard_error = fit.standard_error[i];
+      const std::size_t numbers = a.hypothesis.coordinates.size();
+      // There or not, or plain whatever its scatter: its own round has judged it.
+      if (numbers == 0 || a.plain) continue;
+      const double rate = fitter_.falseAlarmRate(fit.worth[i], a.hypothesis, numbers, family_);
+      if (rate > weakest_rate) {
+        weakest = i;
+        weakest_rate = rate;
+      }
+    }
+    if (weakest_rate <= kFalseAlarm || accepted_.size() < 2) break;
+    const Accepted gone = accepted_[weakest];
+    report_("taken back: " + gone.hypothesis.label(), 1);
+    findings_.erase(findings_.begin() + static_cast<std::ptrdiff_t>(gone.finding));
+    accepted_.erase(accepted_.begin() + static_cast<std::ptrdiff_t>(weakest));
+    for (Accepted& a : accepted_) a.finding -= a.finding > gone.finding ? 1 : 0;
+  }
+  restate();
+}
+
+/// Values and intervals of all that rounds have found, on the likelihood that is settled on them.
+void Selection::profileFound() {
+  report_("errors of what was found", 0);
+  std::vector<Hypothesis> parts;
+  std::vector<ProfiledValues> fits;
+  for (const Accepted& a : accepted_) {
+    parts.push_back(a.hypothesis);
+    fits.push_back({a.scaled, a.standard_error});
+  }
+  profileParts(source_, model_, before_rounds_, state_.nuisance, accuracy_, parts, fits);
+  for (std::size_t i = 0; i < accepted_.size(); ++i) {
+    Accepted& a = accepted_[i];
+    a.scaled = fits[i].scaled;
+    a.standard_error = fits[i].standard_error;
+    if (a.hypothesis.mechanism.mechanism == "channel_phase_error") {
+      widenGains(data_, a.hypothesis, a.standard_error);
+    }
+  }
+  restate();
+}
+
+/// Where paths come and go with every millimetre, the likelihood may gain much by a geometry whose numbers are no
+/// larger than the actors' and poses' own errors make them (1.6 and 2 cm of registration, 255 and 269 nats, in a
+/// corridor of doors and niches); an actor that is no farther away than that has not moved, whatever its likelihood
+/// gains.
+bool Selection::isWithinErrors(const HypothesisFit& f) const {
+  const Hypothesis& h = f.hypothesis;
+  const auto a = acceptedAs(h);
+  if (a == accepted_.end() || !(h.isMove() || h.isGeometry())) return false;
+  if (h.isMove()) {
+    const NamedParameters move = h.at(a->scaled);
+    const Actor& actor = twin_.scene().actors[static_cast<std::size_t>(twin_.scene().actorIndex(h.subject))];
+    const double reach_m = actor.bounds.sizes().head<2>().norm() / 2;
+    const double farthest_m = std::hypot(move.values.number("dx_m"), move.values.number("dy_m")) +
+                              std::abs(move.values.number("dyaw_deg")) * M_PI / 180 * reach_m;
+    if (farthest_m < kOutOfPlace_m) return true;
+  }
+  if (f.plain && f.moved_m() > kFarAway_m) return false;  // an interval may be wide where the likelihood is rough
+  std::vector<double> errors = a->standard_error;
+  bool shifts = false;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (h.coordinates[i].unit != "m") continue;
+    shifts = true;
+    errors[i] = std::max(errors[i], kTogether_m);
+  }
+  if (f.plain && !shifts) return false;
+  const double nats = natsFromNothing(h, a->scaled, errors);
+  return fitter_.falseAlarmRate(nats, h, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
+}
+
+/// An image, once found, is measured against its hosts and taken out: as a power it would be 2 dB high, and what that
+/// leaves beside it looks like echoes.
+void Selection::takeOutImage() {
+  const auto image = std::find_if(accepted_.begin(), accepted_.end(),
+                                  [](const Accepted& a) { return a.hypothesis.mechanism.mechanism == "iq_imbalance"; });
+  if (image == accepted_.end()) return;
+  Finding& f = findings_[image->finding];
+  if (!measureImage(data_, f)) return;
+  subtractImage(*f.mechanism, data_);
+  extended_before_rounds_.push_back(*f.mechanism);
+  accepted_.erase(image);
+  restate();
+}
+
+/// The values of what rounds have found, wherever they stand.
+void Selection::restate() {
+  mechanisms_ = before_rounds_;
+  extended_ = extended_before_rounds_;
+  for (const Accepted& a : accepted_) {
+    Finding& f = findings_[a.finding];
+    f.mechanism = a.hypothesis.at(a.scaled);
+    f.parameters = fittedParameters(a.hypothesis, a.scaled, a.standard_error, f.cause, data_.locations.size());
+    for (FindingPlace& place : f.where) {
+      const std::optional<Eigen::Vector2d> at = placeOf(*f.mechanism, twin_.scene());
+      if (!place.x_m || !at) continue;
+      place.x_m = at->x();
+      place.y_m = at->y();
+    }
+    putIn(*f.mechanism, mechanisms_);
+    putIn(*f.mechanism, extended_);
+  }
+}
+
+/// A finding more; an unknown stays the last one. `fits`: all of its round.
+void Selection::accept(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding) {
+  const std::size_t at = findings_.size() - (unknownNats() > 0 ? 1 : 0);
+  for (Accepted& a : accepted_) a.finding += a.finding >= at ? 1 : 0;
+  std::vector<std::string> beside;
+  for (const Accepted& a : accepted_) beside.push_back(a.hypothesis.label());
+  accepted_.push_back({fit.hypothesis, fit.scaled, fit.standard_error, fit.plain, at, std::move(beside), {}});
+  for (const HypothesisFit& other : fits) {
+    const bool rival = other.hypothesis.label() != fit.hypothesis.label() && other.gain > kRival * fit.gain &&
+                       isCatalogued(other.hypothesis.mechanism.mechanism);
+    if (rival && accepted_.back().rivals.size() < kMostRivals) {
+      accepted_.back().rivals.emplace_back(other.hypothesis, other.scaled);
+    }
+  }
+  findings_.insert(findings_.begin() + static_cast<std::ptrdiff_t>(at), std::move(finding));
+}
+
+/// Of the rivals of its round the one that explains more beside all others than it does itself; nothing where none
+/// does. The finding is then told by it.
+std::optional<HypothesisFit> Selection::betterName(const Accepted& a) {
+  std::vector<NamedParameters> others = before_rounds_;
+  for (const Accepted& other : accepted_) {
+    if (&other != &a) putIn(other.hypothesis.at(other.scaled), others);
+  }
+  std::optional<ModelState> null;
+  std::optional<HypothesisFit> own, best;
+  for (const auto& [rival, scaled] : a.rivals) {
+    const bool free = std::none_of(accepted_.begin(), accepted_.end(), [&, &r = rival](const Accepted& other) {
+      return &other != &a && excludeEachOther(r.mechanism, other.hypothesis.mechanism);
+    });
+    if (!free) continue;
+    if (!null) {
+      report_("names beside what was found since", 0);
+      source_.settle(others);
+      null = fitter_.state(others, &state_.nuisance);
+      own = fitter_.fit(*null, a.hypothesis, {a.scaled});
+    }
+    HypothesisFit f = fitter_.fit(*null, rival, {scaled});
+    fitter_.judge(f, family_);
+    if (f.false_alarm_rate > kFalseAlarm || f.ranking() <= (best ? *best : *own).ranking()) continue;
+    best = std::move(f);
+  }
+  if (!best) return best;
+  Finding& f = findings_[a.finding];
+  f = findingOf(*best, {*best, *own}, *null, twin_.scene(), data_);
+  if (data_.locations.size() > 1) f.gain.emplace();
+  return best;
+}
+
+/// What a cause was taken for while others were not known yet may be explained as well by a simpler name beside them
+/// (a transmitter's error and a turned mount look like an error of every channel): of each finding but the last, the
+/// rivals of its round are fitted anew.
+void Selection::exchangeNames() {
+  bool exchanged = false;
+  for (std::size_t i = 0; i + 1 < accepted_.size(); ++i) {
+    Accepted& a = accepted_[i];
+    const std::optional<HypothesisFit> better = betterName(a);
+    if (!better) continue;
+    const std::string was = a.hypothesis.label(), is = better->hypothesis.label();
+    report_("found " + is + " instead of " + was, 1);
+    for (TriedHypothesis& t : tried_) {
+      if (t.label == was && t.verdict == "found") t.verdict = "found, later called " + is;
+    }
+    a = {better->hypothesis, better->scaled, better->standard_error, better->plain, a.finding, {}, {}};
+    state_.nuisance = better->state.nuisance;
+    exchanged = true;
+  }
+  if (!exchanged) return;
+  restate();
+  refitTogether();
+  source_.settle(mechanisms_);
+  profileFound();
+}
+
+void Selection::orderByGain() {
+  std::vector<Finding>& all = findings_;
+  std::vector<std::size_t> places;
+  for (const Accepted& a : accepted_) places.push_back(a.finding);
+  std::sort(places.begin(), places.end());
+  std::stable_sort(accepted_.begin(), accepted_.end(), [&](const Accepted& a, const Accepted& b) {
+    const Finding &x = all[a.finding], &y = all[b.finding];
+    if ((x.cause == "unknown") != (y.cause == "unknown")) return y.cause == "unknown";
+    return x.evidence.log_likelihood_gain > y.evidence.log_likelihood_gain;
+  });
+  std::vector<Finding> ordered;
+  for (const Accepted& a : accepted_) ordered.push_back(std::move(all[a.finding]));
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    all[places[i]] = std::move(ordered[i]);
+    accepted_[i].finding = places[i];
+  }
+  const Nuisance found = state_.nuisance;
+  mechanisms_ = before_rounds_;
+  extended_ = extended_before_rounds_;
+  std::vector<std::string> before;
+  for (const Accepted& a : accepted_) {
+    if (!a.beside || !std::is_permutation(a.beside->begin(), a.beside->end(), before.begin(), before.end())) {
+      measureAgain(a);
+    }
+    before.push_back(a.hypothesis.label());
+    putIn(a.hypothesis.at(a.scaled), mechanisms_);
+    putIn(a.hypothesis.at(a.scaled), extended_);
+  }
+  state_.nuisance = found;
+}
+
+/// A finding's gain over mechanisms_, in nats, maps and metrics.
+void Selection::measureAgain(const Accepted& a) {
+  report_("gain of " + a.hypothesis.label() + " beside those before it", 0);
+  Finding& f = findings_[a.finding];
+  source_.settle(mechanisms_);
+  const Nuisance nuisance = state_.nuisance;
+  state_ = fitter_.state(mechanisms_, &nuisance);
+  HypothesisFit fit = fitter_.fit(state_, a.hypothesis, {a.scaled});
+  fitter_.judge(fit, family_);
+  tellGain(fit, state_, data_, f);
+  if (!f.gain) return;  // one location
+  f.where.front().range_m = f.where.front().azimuth_deg = std::nullopt;
+  gains_.ofFit(state_, fit, f);
+  gains_.addMetrics(extended_, fit, *f.gain);
+}
+
+}  // namespace mmradartwin
