@@ -234,11 +234,7 @@ bool Session::judgeChannels(int round) {
   believeAbsences(fits);
   believeMoves(fits, twin_.scene());
   believeBetterNames(fits, state);
-  struct Refused {
-    Eigen::VectorXd gain;  // by pose
-    bool of_one_actor;
-  };
-  std::vector<Refused> refused;
+  std::vector<Eigen::VectorXd> refused;  // what it explains, by pose
   const double unknown_nats = selection_->unknownNats();
   for (HypothesisFit& f : fits) {
     std::string& verdict = triedAs(f, round, result_.tried).verdict;
@@ -273,15 +269,15 @@ bool Session::judgeChannels(int round) {
       const bool in_nats = !plainly_worse && f.broad_gain / f.inflation > least_nats;
       // Maps of echoes that are many points' differ from what is expected of them by as much as they hold.
       const bool much = likelier && ((f.plain && (by > -kMostLost || !plainly_worse)) || in_nats);
-      // What explains less well what a better one was refused for is no name for it. Beside that, a law without a name
-      // may be the cause of something else, and what one actor's place explains leaves other names as they are.
+      // What explains less well what a better one was refused for is no name for it; a law without a name may be the
+      // cause of something else beside it.
       const Eigen::VectorXd explains = gainByPose(f, state);
       const bool named = isCatalogued(f.hypothesis.mechanism.mechanism);
-      const bool again = std::any_of(refused.begin(), refused.end(), [&](const auto& other) {
-        return (named && !other.of_one_actor) || correlation(explains, other.gain) > kExplainsSame;
+      const bool again = std::any_of(refused.begin(), refused.end(), [&](const Eigen::VectorXd& other) {
+        return named || correlation(explains, other) > kExplainsSame;
       });
       if (!in_maps && (!much || again)) {
-        if (likelier) refused.push_back({explains, false});
+        if (likelier) refused.push_back(explains);
         refuse("the maps gain nothing");
         continue;
       }
@@ -295,7 +291,8 @@ bool Session::judgeChannels(int round) {
       return true;
     }
     report("taken back: " + f.hypothesis.label(), 1);
-    refused.push_back({gainByPose(f, state), f.hypothesis.isMove()});
+    // What an actor's own error does may be done by something else in truth.
+    if (!f.hypothesis.isMove()) refused.push_back(gainByPose(f, state));
   }
   return false;
 }

@@ -17,6 +17,7 @@ constexpr double kLeastSize_m = 0.05;       ///< of an object: any room is full 
 constexpr double kLeastScattering = 0.15;   ///< S: less lies under the clutter of any room, whose law is not its own
 constexpr double kMostScattering = 0.98;    ///< no surface mirrors nothing: what wants all is clutter beside its actors
 constexpr double kStrongScattering = 0.35;  ///< an eighth of what is reflected is no clutter
+constexpr double kLeastGhost_db = -25;      ///< over what its scatterers send by their law
 constexpr double kFurniture_m = 0.1;        ///< smaller than this is what lies about
 constexpr double kLeastLoss_db = 0.5;       ///< of a crossing: what lets all through is not there, or not the cause
 constexpr double kSameLaw = 0.7;            ///< correlation over poses of what two names gain that explain the same
@@ -126,6 +127,9 @@ std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFi
   }
   if (name == "transmission" && values.number("one_way_db") > -kLeastLoss_db) {
     return "no panel lets all through: " + number(values.number("one_way_db")) + " dB";
+  }
+  if (name == "wall_ghost" && values.number("gain_db") < kLeastGhost_db) {
+    return "no ghost has edges and nothing else: " + number(values.number("gain_db")) + " dB";
   }
   if (name != "actor_unmodelled") return "";
   const double size_m = values.number("size_m"), x_m = values.number("x_m"), y_m = values.number("y_m");

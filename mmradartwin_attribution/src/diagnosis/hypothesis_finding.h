@@ -26,8 +26,8 @@ void tellGain(const HypothesisFit& fit, const ModelState& before, const ChannelD
 std::optional<Eigen::Vector2d> placeOf(const NamedParameters& mechanism, const Scene& scene);
 
 /// Why something fitted is nothing found, "" where it may be: an object or a scattering that clutter is as large as, a
-/// panel that lets all through, an object where one of the `walkers` (other causes are passed over) walks, whose echo
-/// does not average out over a pose's frames.
+/// panel that lets all through, a ghost of edges alone, an object where one of the `walkers` (other causes are passed
+/// over) walks, whose echo does not average out over a pose's frames.
 std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers);
 
 /// True where the likelihood may have gained by what stands about in any room and no scene has: an object, a late echo
