@@ -368,6 +368,12 @@ class HiddenEffects(unittest.TestCase):
         powers = [f["gain"]["explained_power"] for f in findings["findings"]]
         self.assertAlmostEqual(powers[1]["before"], powers[0]["after"], delta=0.01)
 
+    def test_a_corner_that_the_twin_lacks_is_no_move_of_a_few_centimetres(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "50"))
+        _, first, truth = self.found(seed, {"corner_reflection": {"actors": "bookshelf;wall_east"}}, headings=2,
+                                     tier="office")
+        self.assertEqual(set(first["parameters"]["actors"]["value"]), set(truth["actors"]), msg=f"seed {seed}")
+
     def test_lost_packets_say_what_leaving_them_out_gains(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "49"))
         _, first, _ = self.found(seed, {"packet_loss": {"lost_fraction": 0.05}}, headings=2)

@@ -15,7 +15,7 @@ constexpr std::size_t kWaysToErr = 4;   ///< geometries that alike errors of act
 constexpr double kFarAway_m = 0.12;     ///< six times what a scene's actors err by,
 constexpr double kOutOfPlace_m = 0.08;  ///< and four times: of some twenty actors none is farther away by chance
 constexpr double kTogether_m = 0.005;   ///< what sixteen of them err by together
-constexpr double kRival = 0.7;          ///< of a finding's gain, by a name that may be the right one
+constexpr double kRival = 0.7;          ///< of a finding's gain, by a simpler name that may be the right one
 constexpr std::size_t kMostRivals = 2;
 
 }  // namespace
@@ -207,8 +207,9 @@ void Selection::accept(const HypothesisFit& fit, const std::vector<HypothesisFit
   for (const Accepted& a : accepted_) beside.push_back(a.hypothesis.label());
   accepted_.push_back({fit.hypothesis, fit.scaled, fit.standard_error, fit.plain, at, std::move(beside), {}});
   for (const HypothesisFit& other : fits) {
-    const bool rival = other.hypothesis.label() != fit.hypothesis.label() && other.gain > kRival * fit.gain &&
-                       isCatalogued(other.hypothesis.mechanism.mechanism);
+    // Those ahead were refused.
+    const bool rival = other.ranking() < fit.ranking() && other.numbers() < fit.numbers() &&
+                       other.gain > kRival * fit.gain && isCatalogued(other.hypothesis.mechanism.mechanism);
     if (rival && accepted_.back().rivals.size() < kMostRivals) {
       accepted_.back().rivals.emplace_back(other.hypothesis, other.scaled);
     }
@@ -238,7 +239,8 @@ std::optional<HypothesisFit> Selection::betterName(const Accepted& a) {
     }
     HypothesisFit f = fitter_.fit(*null, rival, {scaled});
     fitter_.judge(f, family_);
-    if (f.false_alarm_rate > kFalseAlarm || f.ranking() <= (best ? *best : *own).ranking()) continue;
+    const bool stands = f.false_alarm_rate <= kFalseAlarm && noFindingBecause(f, {}).empty();
+    if (!stands || f.ranking() <= (best ? *best : *own).ranking()) continue;
     best = std::move(f);
   }
   if (!best) return best;

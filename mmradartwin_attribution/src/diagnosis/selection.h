@@ -56,7 +56,7 @@ class Selection {
     std::size_t finding;
     /// Labels of those beside which its gain was measured; none where it was not.
     std::optional<std::vector<std::string>> beside;
-    /// Other names that explained nearly as much in its round, with their numbers.
+    /// Simpler names that explained nearly as much in its round, with their numbers.
     std::vector<std::pair<Hypothesis, std::vector<double>>> rivals;
   };
   std::vector<Accepted>::const_iterator acceptedAs(const Hypothesis& h) const;
