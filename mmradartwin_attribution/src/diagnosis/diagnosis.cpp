@@ -59,6 +59,7 @@ class Session {
   std::optional<std::string> judgeDelivery();
   void judgeTone();
   void judgeNoise();
+  std::string refusedByMaps(const HypothesisFit& f, const FindingGain& gain, std::vector<Eigen::VectorXd>& refused);
   bool judgeChannels(int round);
   std::vector<HypothesisFit> fitBest(int round);
   void tellChanges();
@@ -228,13 +229,49 @@ void Session::tellChanges() {
   }
 }
 
+/// Why a fit that its likelihood speaks for is no finding by what the maps gain of it, "" where it is one. Adds to
+/// `refused`, by pose, what is explained by those that are likelier and no finding.
+std::string Session::refusedByMaps(const HypothesisFit& f, const FindingGain& gain,
+                                   std::vector<Eigen::VectorXd>& refused) {
+  // Where the likelihood gains little and the maps nothing, it is the likelihood's own shortcomings that were fitted:
+  // what a pose's error does at edges looks like a little of many things. Much of it may be real though no map shows it
+  // (an image at -26 dB), unless the maps get plainly worse.
+  const auto explained = *gain.explained_power.difference_ci95;
+  const double by = gain.explained_power.after - gain.explained_power.before;
+  const std::string by_how_much =
+      ": " + number(by, 2) + " (" + number(explained[0], 2) + " to " + number(explained[1], 2) + ")";
+  const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
+  const bool likelier = (*gain.log_likelihood_per_pose.difference_ci95)[0] > 0;
+  const bool sure = explained[0] > 0 && likelier;
+  if (!(in_maps && likelier) && isLikeClutter(f, by >= kLeastExplained, sure)) {
+    return "clutter is like that, by what the maps gain" + by_how_much;
+  }
+  if (in_maps) return "";
+  const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled));
+  const double least_nats = leastNats(f.hypothesis, f.scaled, traces, data_.poses.size());
+  const bool plainly_worse = explained[1] < 0 && by < -kLeastExplained;
+  const bool in_nats = !plainly_worse && f.broad_gain / f.inflation > least_nats;
+  // Maps of echoes that are many points' differ from what is expected of them by as much as they hold.
+  const bool much = likelier && ((f.plain && (by > -kMostLost || !plainly_worse)) || in_nats);
+  // What explains less well what a better one was refused for is no name for it; a law without a name may be the cause
+  // of something else beside it.
+  const Eigen::VectorXd explains = gainByPose(f, selection_->state());
+  const bool named = isCatalogued(f.hypothesis.mechanism.mechanism);
+  const bool again = std::any_of(refused.begin(), refused.end(), [&](const Eigen::VectorXd& other) {
+    return named || correlation(explains, other) > kExplainsSame;
+  });
+  if (much && !again) return "";
+  if (likelier) refused.push_back(explains);
+  return "the maps gain nothing" + by_how_much;
+}
+
 bool Session::judgeChannels(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
   const ModelState& state = selection_->state();
   believeAbsences(fits);
   believeMoves(fits, twin_.scene());
   believeBetterNames(fits, state);
-  std::vector<Eigen::VectorXd> refused;  // what it explains, by pose
+  std::vector<Eigen::VectorXd> refused;
   const double unknown_nats = selection_->unknownNats();
   for (HypothesisFit& f : fits) {
     std::string& verdict = triedAs(f, round, result_.tried).verdict;
@@ -248,39 +285,8 @@ bool Session::judgeChannels(int round) {
     if (data_.locations.size() > 1) {
       report("gain on held-out places", 0);
       gains_->ofFit(state, f, finding);
-      // Where the likelihood gains little and the maps nothing, it is the likelihood's own shortcomings that were
-      // fitted: what a pose's error does at edges looks like a little of many things. Much of it may be real though no
-      // map shows it (an image at -26 dB), unless the maps get plainly worse.
-      const auto explained = *finding.gain->explained_power.difference_ci95;
-      const double by = finding.gain->explained_power.after - finding.gain->explained_power.before;
-      const bool in_maps = explained[0] > 0 && by >= kLeastExplained;
-      const bool likelier = (*finding.gain->log_likelihood_per_pose.difference_ci95)[0] > 0;
-      const auto refuse = [&](const std::string& why) {
-        verdict = why + ": " + number(by, 2) + " (" + number(explained[0], 2) + " to " + number(explained[1], 2) + ")";
-      };
-      const bool sure = explained[0] > 0 && likelier;
-      if (!(in_maps && likelier) && isLikeClutter(f, by >= kLeastExplained, sure)) {
-        refuse("clutter is like that, by what the maps gain");
-        continue;
-      }
-      const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled));
-      const double least_nats = leastNats(f.hypothesis, f.scaled, traces, data_.poses.size());
-      const bool plainly_worse = explained[1] < 0 && by < -kLeastExplained;
-      const bool in_nats = !plainly_worse && f.broad_gain / f.inflation > least_nats;
-      // Maps of echoes that are many points' differ from what is expected of them by as much as they hold.
-      const bool much = likelier && ((f.plain && (by > -kMostLost || !plainly_worse)) || in_nats);
-      // What explains less well what a better one was refused for is no name for it; a law without a name may be the
-      // cause of something else beside it.
-      const Eigen::VectorXd explains = gainByPose(f, state);
-      const bool named = isCatalogued(f.hypothesis.mechanism.mechanism);
-      const bool again = std::any_of(refused.begin(), refused.end(), [&](const Eigen::VectorXd& other) {
-        return named || correlation(explains, other) > kExplainsSame;
-      });
-      if (!in_maps && (!much || again)) {
-        if (likelier) refused.push_back(explains);
-        refuse("the maps gain nothing");
-        continue;
-      }
+      verdict = refusedByMaps(f, *finding.gain, refused);
+      if (!verdict.empty()) continue;
       gains_->addMetrics(selection_->extended(), f, *finding.gain);
     }
     report("found " + f.hypothesis.label() + ", " + number(f.gain, 4) + " nats", 1);
