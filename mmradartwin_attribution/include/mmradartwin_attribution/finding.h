@@ -99,6 +99,7 @@ struct ChangedRecord {
   std::string pose, event;  ///< event: the mechanism that made it
   std::vector<std::string> actors;
   std::optional<RecordState> before, after;
+  double strongest_db() const;  ///< of both
 };
 
 /// One entry of findings.json (DESIGN section 5). Class and action follow from the cause.

@@ -44,8 +44,7 @@ struct MovingCell {
 struct PoseFrames {
   std::string pose;
   /// Average in ADC counts [M][N], as CoherentAverage's, without lost, clipped and disturbed samples, slips closed and
-  /// frames turned back. Zero where a sample was never fit for use; as delivered
-  /// where it was always clipped.
+  /// frames turned back. Zero where a sample was never fit for use; as delivered where it was always clipped.
   ReceiveGrid mean;
   /// Thermal noise [M]: variance of one complex sample of one shot in counts^2, robust against what moves; rounding
   /// leaves at least 1/6. The mean carries this over `shots`.

@@ -47,10 +47,6 @@ bool differ(const ChangedRecord& c) {
          std::abs(c.after->azimuth_deg - c.before->azimuth_deg) > kSameAzimuth_deg;
 }
 
-double strength_db(const ChangedRecord& c) {
-  return std::max(c.before ? c.before->amplitude_db : -INFINITY, c.after ? c.after->amplitude_db : -INFINITY);
-}
-
 std::vector<ChangedRecord> changedAt(const Twin& before, const Twin& after, const Pose& pose) {
   const Bundles b = bundles(before, pose), a = bundles(after, pose);
   std::map<Key, ChangedRecord> all;
@@ -65,7 +61,7 @@ std::vector<ChangedRecord> changedAt(const Twin& before, const Twin& after, cons
     changed.push_back(std::move(record));
   }
   std::stable_sort(changed.begin(), changed.end(),
-                   [](const ChangedRecord& x, const ChangedRecord& y) { return strength_db(x) > strength_db(y); });
+                   [](const ChangedRecord& x, const ChangedRecord& y) { return x.strongest_db() > y.strongest_db(); });
   if (changed.size() > kMostPerPose) changed.resize(kMostPerPose);
   return changed;
 }

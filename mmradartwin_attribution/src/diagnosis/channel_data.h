@@ -19,8 +19,8 @@ struct PoseChannels {
   Pose pose;
   int location = 0;  ///< index of its place, for what is held out
   ReceiveGrid grid;  ///< the average itself, of what is whole
-  ReceiveGrid
-      plain;  ///< the average of all frames as they came, which other programs show; empty where a slot has none
+  /// The average of all frames as they came, which other programs show; empty where a slot has none.
+  ReceiveGrid plain;
   Eigen::MatrixXcd y;  ///< [M][N] range spectra over the window's sum and full scale: a tone's own amplitude
   int shots = 1;       ///< frames times loops behind the average
   std::vector<EchoBeam> beams;

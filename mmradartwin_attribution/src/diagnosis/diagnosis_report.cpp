@@ -126,11 +126,8 @@ std::string recordsCsv(const std::vector<ChangedRecord>& records) {
 
 std::string recordsTable(std::vector<ChangedRecord> records) {
   constexpr std::size_t kShown = 10;
-  const auto level_db = [](const ChangedRecord& r) {
-    return std::max(r.before ? r.before->amplitude_db : -INFINITY, r.after ? r.after->amplitude_db : -INFINITY);
-  };
   std::stable_sort(records.begin(), records.end(),
-                   [&](const ChangedRecord& a, const ChangedRecord& b) { return level_db(a) > level_db(b); });
+                   [](const ChangedRecord& a, const ChangedRecord& b) { return a.strongest_db() > b.strongest_db(); });
   std::ostringstream html;
   html << "<table><tr><th>strongest paths that it changes</th><th>pose</th><th>dB "
           "before</th><th>m</th><th>deg</th><th>dB "

@@ -1,5 +1,6 @@
 #include "mmradartwin_attribution/finding.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -391,6 +392,10 @@ std::array<double, 2> Finding::placeError_m() const {
     return p != nullptr && !p->ci95.empty() ? (p->ci95[0][1] - p->ci95[0][0]) / 2 : 0;
   };
   return {half("x_m"), half("y_m")};
+}
+
+double ChangedRecord::strongest_db() const {
+  return std::max(before ? before->amplitude_db : -INFINITY, after ? after->amplitude_db : -INFINITY);
 }
 
 const FindingParameter* Finding::parameter(const std::string& name) const {

@@ -56,14 +56,14 @@ void GainMeasurement::addMetrics(const std::vector<NamedParameters>& before, con
     putIn(fit.hypothesis.at(scaled), after.back());
   }
   addMapMetrics(
-      recording_, twin_, data_, {before}, after, [&](int location) { return fitter_.fold(location); },
+      recording_, twin_, data_, before, after, [&](int location) { return fitter_.fold(location); },
       evaluationOptions(), gain);
 }
 
 void GainMeasurement::addMetrics(const std::vector<NamedParameters>& before, const std::vector<NamedParameters>& after,
                                  FindingGain& gain) const {
   addMapMetrics(
-      recording_, twin_, data_, {before}, {after}, [](int) { return 0; }, evaluationOptions(), gain);
+      recording_, twin_, data_, before, {after}, [](int) { return 0; }, evaluationOptions(), gain);
 }
 
 }  // namespace mmradartwin

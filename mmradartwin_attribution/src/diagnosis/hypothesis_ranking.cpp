@@ -18,11 +18,11 @@ constexpr std::size_t kFewestPoses = 12;
 constexpr std::size_t kLawPoses = 66;   ///< whose paths are scored for laws without a name
 constexpr std::size_t kSecondLook = 9;  ///< hypotheses that are looked at on more poses, geometries on all
 constexpr std::size_t kSecondLookPoses = 66;
-constexpr std::size_t kSuspects = 6;    ///< actors whose geometry is tried
-constexpr std::size_t kNeighbours = 2;  ///< of a place where an object seems to stand, that may be the object
-constexpr double kElsewhere = 5;        ///< nats of its echoes nearer or farther away, from which on the same
-constexpr std::size_t kMostElsewhere = 2;
-constexpr double kOutOfPlace = 1.2;  ///< nats of an actor's own errors from which on it is looked for elsewhere
+constexpr std::size_t kSuspects = 6;       ///< actors whose geometry is tried
+constexpr std::size_t kNeighbours = 2;     ///< of a place where an object seems to stand, that may be the object
+constexpr double kOutOfPlace = 1.2;        ///< nats of an actor's own errors from which on it is looked for elsewhere
+constexpr double kElsewhere = 5;           ///< the same of its echoes nearer or farther away,
+constexpr std::size_t kMostElsewhere = 2;  ///< and how many are by that
 
 }  // namespace
 

@@ -13,7 +13,7 @@ constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what ris
 constexpr double kMore[] = {4, 16};            ///< of the scale, as long as that gains
 constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents have stood in for it
 constexpr double kStoodIn = 1;                 ///< nats of theirs
-constexpr double kShifts_m[] = {-0.3, -0.16, -0.08, 0.08, 0.16, 0.3};
+constexpr double kShifts_m[] = {-0.3, -0.16, -0.08, 0.08, 0.16, 0.3};  ///< of all of an actor's echoes
 constexpr double kRadii[] = {1, 2, 4, 7};  ///< of the scale, about a place where an object may have stood before
 constexpr double kFiner[] = {0.35, 0.18};  ///< of the distance of the best of them
 constexpr int kDirections = 8;
@@ -50,24 +50,15 @@ std::vector<std::pair<int, double>> HypothesisScreen::nearerOrFarther(const Mode
   std::vector<std::pair<int, double>> result;
   for (std::size_t a = 0; a + 1 < null.nuisance.actor_range_m.size(); ++a) {  // the last is of no actor
     double best = 0;
+    Nuisance nuisance = withoutErrors(null.nuisance, static_cast<int>(a));
+    std::vector<double> about_m = null.actor_range_m;
     for (double shift_m : kShifts_m) {
-      Nuisance nuisance = withoutErrors(null.nuisance, static_cast<int>(a));
-      nuisance.actor_range_m[a] += shift_m;
-      std::vector<double> about_m = null.actor_range_m;
-      about_m[a] = nuisance.actor_range_m[a];
-      const auto echoes = source_.echoes(null.mechanisms, poses, about_m);
-      std::vector<int> changed;
-      std::vector<PoseEchoes> changed_echoes;
-      for (std::size_t i = 0; i < poses.size(); ++i) {
-        if (echoes[i].groups == null.echoes[static_cast<std::size_t>(poses[i])].groups) continue;
-        changed.push_back(poses[i]);
-        changed_echoes.push_back(echoes[i]);
-      }
-      const std::vector<double> there = model_.byPose(changed_echoes, nuisance, changed);
+      about_m[a] = nuisance.actor_range_m[a] = shift_m;
+      const std::vector<double> there =
+          byPose(null, source_.echoes(null.mechanisms, poses, about_m), nuisance, poses, true);
       double gain = 0;
-      for (std::size_t i = 0; i < changed.size(); ++i) {
-        gain += there[i] - null.by_pose[static_cast<std::size_t>(changed[i])];
-      }
+      for (std::size_t i = 0; i < poses.size(); ++i)
+        gain += there[i] - null.by_pose[static_cast<std::size_t>(poses[i])];
       best = std::max(best, gain);
     }
     result.emplace_back(static_cast<int>(a), best);
@@ -85,15 +76,22 @@ std::pair<double, double> HypothesisScreen::valueAt(const ModelState& null, cons
   for (std::size_t a = 0; a < about_m.size(); ++a) {
     if (nuisance.actor_range_m[a] != null.nuisance.actor_range_m[a]) about_m[a] = nuisance.actor_range_m[a];
   }
-  auto echoes = source_.echoes(mechanismsWith(null.mechanisms, {hypothesis}, scaled), poses, about_m);
-  // Of poses whose echoes stay the value is known.
+  std::vector<PoseEchoes> echoes =
+      source_.echoes(mechanismsWith(null.mechanisms, {hypothesis}, scaled), poses, about_m);
+  return promiseOf(null, hypothesis, byPose(null, std::move(echoes), nuisance, poses, &nuisance == &null.nuisance),
+                   poses);
+}
+
+std::vector<double> HypothesisScreen::byPose(const ModelState& null, std::vector<PoseEchoes> echoes,
+                                             const Nuisance& nuisance, const std::vector<int>& poses,
+                                             bool known_where_same) const {
   std::vector<double> there;
   std::vector<int> changed;
   std::vector<PoseEchoes> changed_echoes;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const std::size_t pose = static_cast<std::size_t>(poses[i]);
     there.push_back(null.by_pose[pose]);
-    if (&nuisance == &null.nuisance && echoes[i].groups == null.echoes[pose].groups) continue;
+    if (known_where_same && echoes[i].groups == null.echoes[pose].groups) continue;
     changed.push_back(static_cast<int>(i));
     changed_echoes.push_back(std::move(echoes[i]));
   }
@@ -101,7 +99,7 @@ std::pair<double, double> HypothesisScreen::valueAt(const ModelState& null, cons
   for (int i : changed) changed_poses.push_back(poses[static_cast<std::size_t>(i)]);
   const std::vector<double> values = model_.byPose(changed_echoes, nuisance, changed_poses);
   for (std::size_t i = 0; i < changed.size(); ++i) there[static_cast<std::size_t>(changed[i])] = values[i];
-  return promiseOf(null, hypothesis, there, poses);
+  return there;
 }
 
 std::pair<double, double> HypothesisScreen::promiseOf(const ModelState& null, const Hypothesis& hypothesis,

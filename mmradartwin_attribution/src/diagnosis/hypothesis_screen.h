@@ -31,7 +31,11 @@ class HypothesisScreen {
   std::pair<double, double> valueAt(const ModelState& null, const Hypothesis& hypothesis,
                                     const std::vector<double>& scaled, const std::vector<int>& poses,
                                     const Nuisance& nuisance);
-  /// The same of log-likelihoods of those poses.
+  /// Log-likelihoods of the poses named with these echoes of theirs and these latents. known_where_same: that of a pose
+  /// whose echoes are the null's is the null's, since latents differ from it in what other echoes have alone.
+  std::vector<double> byPose(const ModelState& null, std::vector<PoseEchoes> echoes, const Nuisance& nuisance,
+                             const std::vector<int>& poses, bool known_where_same) const;
+  /// The same as valueAt() of log-likelihoods of those poses.
   std::pair<double, double> promiseOf(const ModelState& null, const Hypothesis& hypothesis,
                                       const std::vector<double>& there, const std::vector<int>& poses) const;
   /// What it promises over all poses once the latents, from those given, have settled on it.

@@ -39,9 +39,8 @@ std::vector<double> valuesOf(const FieldsByLocation& fields, const std::vector<i
 }  // namespace
 
 void addMapMetrics(const Recording& recording, const Twin& twin, const ChannelData& data,
-                   const std::vector<std::vector<NamedParameters>>& before,
-                   const std::vector<std::vector<NamedParameters>>& after, const std::function<int(int)>& fold_of,
-                   const EvaluationOptions& options, FindingGain& gain) {
+                   const std::vector<NamedParameters>& before, const std::vector<std::vector<NamedParameters>>& after,
+                   const std::function<int(int)>& fold_of, const EvaluationOptions& options, FindingGain& gain) {
   const SignalChain chain(data.radar);
   std::map<std::string, const PoseChannels*> by_name;
   Recording used = recording;
@@ -67,7 +66,7 @@ void addMapMetrics(const Recording& recording, const Twin& twin, const ChannelDa
     }
     return all;
   };
-  const FieldsByLocation b = fields(before), a = fields(after);
+  const FieldsByLocation b = fields({before}), a = fields(after);
   const std::vector<int> once(data.locations.size(), 1);
   const std::vector<double> from = valuesOf(b, once), to = valuesOf(a, once);
   const auto intervals = intervalsOverLocations(data.locations.size(), [&](const std::vector<int>& times) {

@@ -11,11 +11,10 @@
 namespace mmradartwin {
 
 /// The paper's metrics of the poses in `data` (recall by band, Q1, Q2, Q3, C1 to C5) before and after, and their
-/// differences' 95 % intervals by bootstrap over locations: mechanisms by fold, or one list for all. `fold_of` a
+/// differences' 95 % intervals by bootstrap over locations. After: mechanisms by fold, or one list for all; `fold_of` a
 /// location. Poses without a plain average are left out.
 void addMapMetrics(const Recording& recording, const Twin& twin, const ChannelData& data,
-                   const std::vector<std::vector<NamedParameters>>& before,
-                   const std::vector<std::vector<NamedParameters>>& after, const std::function<int(int)>& fold_of,
-                   const EvaluationOptions& options, FindingGain& gain);
+                   const std::vector<NamedParameters>& before, const std::vector<std::vector<NamedParameters>>& after,
+                   const std::function<int(int)>& fold_of, const EvaluationOptions& options, FindingGain& gain);
 
 }  // namespace mmradartwin

@@ -276,19 +276,18 @@ void Selection::exchangeNames() {
 }
 
 void Selection::orderByGain() {
-  std::vector<Finding>& all = findings_;
   std::vector<std::size_t> places;
   for (const Accepted& a : accepted_) places.push_back(a.finding);
   std::sort(places.begin(), places.end());
   std::stable_sort(accepted_.begin(), accepted_.end(), [&](const Accepted& a, const Accepted& b) {
-    const Finding &x = all[a.finding], &y = all[b.finding];
+    const Finding &x = findings_[a.finding], &y = findings_[b.finding];
     if ((x.cause == "unknown") != (y.cause == "unknown")) return y.cause == "unknown";
     return x.evidence.log_likelihood_gain > y.evidence.log_likelihood_gain;
   });
   std::vector<Finding> ordered;
-  for (const Accepted& a : accepted_) ordered.push_back(std::move(all[a.finding]));
+  for (const Accepted& a : accepted_) ordered.push_back(std::move(findings_[a.finding]));
   for (std::size_t i = 0; i < places.size(); ++i) {
-    all[places[i]] = std::move(ordered[i]);
+    findings_[places[i]] = std::move(ordered[i]);
     accepted_[i].finding = places[i];
   }
   const Nuisance found = state_.nuisance;
