@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kSides_m[] = {0.25, 0.45};
 constexpr double kTurned_deg = 15, kSquare_deg = 90;  // ways in which it may stand, and when they are the same again
-constexpr std::size_t kFacing = 3;                    // poses that a side of it may face
+constexpr std::size_t kFacing = 5;                    // poses that a side of it may face
 constexpr double kGrown[] = {0.6, 0.8, 1.25, 1.6};    // of a side
 constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1}, kTurns_deg[] = {-8, -3, 3, 8};
 constexpr int kSweeps = 4;
@@ -79,25 +79,25 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
                    {"y_m", "m", -1, axis.y(), axis.y() + 0.1, -1000, 1000, {}},
                    {"size_m", "m", -1, 0, kSides_m[0], 0.02, 5, {}},
                    {"yaw_deg", "deg", -1, 0, kTurned_deg, -360, 360, {}}};
-  std::vector<double> yaws_deg;
-  for (double yaw_deg = 0; yaw_deg < kSquare_deg; yaw_deg += kTurned_deg) yaws_deg.push_back(yaw_deg);
+  const double radius_m = 0.5 * h.mechanism.values.number("size_m");
+  // The cylinder's front stands where sides shine, half a side before the middle of the box.
+  const auto startBehind = [&](const Eigen::Vector2d& toward_radar, double yaw_deg) {
+    for (double side_m : kSides_m) {
+      const Eigen::Vector2d center = axis + (radius_m - 0.5 * side_m) * toward_radar;
+      box.starts.push_back({h.coordinates[0].scaled(center.x()), h.coordinates[1].scaled(center.y()),
+                            h.coordinates[2].scaled(side_m), h.coordinates[3].scaled(yaw_deg)});
+    }
+  };
+  const Eigen::Vector2d toward_most = -awayFromRadar(data, axis);
+  for (double yaw_deg = 0; yaw_deg < kSquare_deg; yaw_deg += kTurned_deg) startBehind(toward_most, yaw_deg);
   // Poses that see most of it may be those that a side faces.
   std::vector<std::pair<double, std::size_t>> seen;
   for (std::size_t i = 0; i < data.poses.size(); ++i) seen.emplace_back(null.by_pose[i] - cylinder.state.by_pose[i], i);
   std::sort(seen.begin(), seen.end());
   seen.resize(std::min(kFacing, seen.size()));
   for (const auto& [gain, i] : seen) {
-    const Eigen::Vector2d way = data.poses[i].pose.T_map_radar.translation().head<2>() - axis;
-    yaws_deg.push_back(std::fmod(std::atan2(way.y(), way.x()) * 180 / M_PI + 360, kSquare_deg));
-  }
-  const Eigen::Vector2d away = awayFromRadar(data, axis);
-  const double radius_m = 0.5 * h.mechanism.values.number("size_m");
-  for (double side_m : kSides_m) {
-    const Eigen::Vector2d center = axis + (0.5 * side_m - radius_m) * away;
-    for (double yaw_deg : yaws_deg) {
-      box.starts.push_back({h.coordinates[0].scaled(center.x()), h.coordinates[1].scaled(center.y()),
-                            h.coordinates[2].scaled(side_m), h.coordinates[3].scaled(yaw_deg)});
-    }
+    const Eigen::Vector2d way = (data.poses[i].pose.T_map_radar.translation().head<2>() - axis).normalized();
+    startBehind(way, std::fmod(std::atan2(way.y(), way.x()) * 180 / M_PI + 360, kSquare_deg));
   }
   return box;
 }
