@@ -44,6 +44,12 @@ constexpr double kExplainsSame = 0.5;  ///< correlation over poses of what two f
 /// Of what an unknown gains: what its law leaves over looks like a little of many names.
 constexpr double kBesideUnknown = 0.25;
 
+/// What a fit would have explained that is no finding.
+struct Refused {
+  Eigen::VectorXd gain_by_pose;
+  bool by_maps;  ///< else by what is known of the session's own errors
+};
+
 class Session {
  public:
   Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options);
@@ -59,7 +65,7 @@ class Session {
   std::optional<std::string> judgeDelivery();
   void judgeTone();
   void judgeNoise();
-  std::string refusedByMaps(const HypothesisFit& f, const FindingGain& gain, std::vector<Eigen::VectorXd>& refused);
+  std::string refusedByMaps(const HypothesisFit& f, const FindingGain& gain, std::vector<Refused>& refused);
   bool judgeChannels(int round);
   std::vector<HypothesisFit> fitBest(int round);
   void tellChanges();
@@ -231,8 +237,7 @@ void Session::tellChanges() {
 
 /// Why a fit that its likelihood speaks for is no finding by what the maps gain of it, "" where it is one. Adds to
 /// `refused`, by pose, what is explained by those that are likelier and no finding.
-std::string Session::refusedByMaps(const HypothesisFit& f, const FindingGain& gain,
-                                   std::vector<Eigen::VectorXd>& refused) {
+std::string Session::refusedByMaps(const HypothesisFit& f, const FindingGain& gain, std::vector<Refused>& refused) {
   // Where the likelihood gains little and the maps nothing, it is the likelihood's own shortcomings that were fitted:
   // what a pose's error does at edges looks like a little of many things. Much of it may be real though no map shows it
   // (an image at -26 dB), unless the maps get plainly worse.
@@ -252,16 +257,17 @@ std::string Session::refusedByMaps(const HypothesisFit& f, const FindingGain& ga
   const bool plainly_worse = explained[1] < 0 && by < -kLeastExplained;
   const bool in_nats = !plainly_worse && f.broad_gain / f.inflation > least_nats;
   // Maps of echoes that are many points' differ from what is expected of them by as much as they hold.
-  const bool much = likelier && ((f.plain && (by > -kMostLost || !plainly_worse)) || in_nats);
+  // Few places see an actor: drawn without the best of them, little is left of what it gains.
+  const bool much = (likelier || f.isFarAway()) && ((f.plain && (by > -kMostLost || !plainly_worse)) || in_nats);
   // What explains less well what a better one was refused for is no name for it; a law without a name may be the cause
-  // of something else beside it.
+  // of something else beside it, and so may a name beside what is as wrong as the session's own errors.
   const Eigen::VectorXd explains = gainByPose(f, selection_->state());
   const bool named = isCatalogued(f.hypothesis.mechanism.mechanism);
-  const bool again = std::any_of(refused.begin(), refused.end(), [&](const Eigen::VectorXd& other) {
-    return named || correlation(explains, other) > kExplainsSame;
+  const bool again = std::any_of(refused.begin(), refused.end(), [&](const Refused& other) {
+    return (named && other.by_maps) || correlation(explains, other.gain_by_pose) > kExplainsSame;
   });
   if (much && !again) return "";
-  if (likelier) refused.push_back(explains);
+  if (likelier) refused.push_back({explains, true});
   return "the maps gain nothing" + by_how_much;
 }
 
@@ -271,7 +277,7 @@ bool Session::judgeChannels(int round) {
   believeAbsences(fits);
   believeMoves(fits, twin_.scene());
   believeBetterNames(fits, state);
-  std::vector<Eigen::VectorXd> refused;
+  std::vector<Refused> refused;
   const double unknown_nats = selection_->unknownNats();
   for (HypothesisFit& f : fits) {
     std::string& verdict = triedAs(f, round, result_.tried).verdict;
@@ -298,7 +304,7 @@ bool Session::judgeChannels(int round) {
     }
     report("taken back: " + f.hypothesis.label(), 1);
     // What an actor's own error does may be done by something else in truth.
-    if (!f.hypothesis.isMove()) refused.push_back(gainByPose(f, state));
+    if (!f.hypothesis.isMove()) refused.push_back({gainByPose(f, state), false});
   }
   return false;
 }

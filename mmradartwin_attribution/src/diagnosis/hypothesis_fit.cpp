@@ -42,6 +42,9 @@ constexpr double kNestingLawShare = 0.9;
 // that is another's (the corner with a wall that a cabinet stands too near to).
 constexpr double kLeastMove_m = 0.06;
 
+// Six times what a scene's actors err by. Of 30 sessions with nothing hidden none had one there for more than 3 nats.
+constexpr double kFarAway_m = 0.12, kFarAway = 60;
+
 constexpr double kSomewhere = 10;  ///< nats more for an object: it is the best of some 500 places of a room
 
 /// Calls `value` at places that lead to its maximum (BOBYQA, Powell 2009: no slopes).
@@ -96,6 +99,8 @@ double HypothesisFit::moved_m() const {
   const NamedParameters m = hypothesis.at(scaled);
   return std::hypot(m.values.number("dx_m"), m.values.number("dy_m"));
 }
+
+bool HypothesisFit::isFarAway() const { return moved_m() > kFarAway_m && (plain || broad_gain / inflation > kFarAway); }
 
 double HypothesisFit::size_m() const {
   if (hypothesis.mechanism.mechanism != "actor_unmodelled") return 0;

@@ -17,6 +17,7 @@ constexpr double kShifts_m[] = {-0.3, -0.16, -0.08, 0.08, 0.16, 0.3};  ///< of a
 constexpr double kRadii[] = {1, 2, 4, 7};  ///< of the scale, about a place where an object may have stood before
 constexpr double kFiner[] = {0.35, 0.18};  ///< of the distance of the best of them
 constexpr int kDirections = 8;
+constexpr double kTurns_deg[] = {-8, -5, -3, 3, 5, 8};  ///< of that object about itself
 constexpr double kNearlyAsLikely = 10;  ///< nats that a place may be less likely, before latents settle there
 
 /// Without gains of their own of the actors of a material; and nats of what is known of those beforehand.
@@ -126,26 +127,48 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
   const Nuisance nuisance = withoutErrors(null.nuisance, actor);  // they have stood in for the move
   double gained = -INFINITY, promised = 0;
   std::vector<double> likeliest(hypothesis.coordinates.size(), 0.0), most_promising;
+  const auto tryAt = [&](const std::vector<double>& at) {
+    const auto [gain, promise] = valueAt(null, hypothesis, at, poses, nuisance);
+    source_.settle(null.mechanisms);
+    if (gain > gained) {
+      gained = gain;
+      likeliest = at;
+    }
+    if (promise > promised) {
+      promised = promise;
+      most_promising = at;
+    }
+  };
   const auto tryAbout = [&](std::vector<double> middle, double radius) {
     for (int k = 0; k < kDirections; ++k) {
       std::vector<double> at = middle;
       at[0] += radius * std::cos(2 * M_PI * k / kDirections);
       at[1] += radius * std::sin(2 * M_PI * k / kDirections);
-      const auto [gain, promise] = valueAt(null, hypothesis, at, poses, nuisance);
-      source_.settle(null.mechanisms);
-      if (gain > gained) {
-        gained = gain;
-        likeliest = at;
-      }
-      if (promise > promised) {
-        promised = promise;
-        most_promising = at;
+      tryAt(at);
+    }
+  };
+  // A wide side shows elsewhere once it is turned by some degrees, wherever it stands.
+  const auto tryTurned = [&](const std::vector<double>& middle, double share) {
+    for (std::size_t j = 2; j < hypothesis.coordinates.size(); ++j) {
+      for (double turn_deg : kTurns_deg) {
+        std::vector<double> at = middle;
+        at[j] += hypothesis.coordinates[j].scaled(share * turn_deg);
+        tryAt(at);
       }
     }
   };
-  for (double radius : kRadii) tryAbout(std::vector<double>(hypothesis.coordinates.size(), 0.0), radius);
+  const std::vector<double> here(hypothesis.coordinates.size(), 0.0);
+  for (double radius : kRadii) tryAbout(here, radius);
+  tryTurned(here, 1);
+  if (likeliest[0] == 0 && likeliest[1] == 0) {
+    const std::vector<double> turned = likeliest;
+    for (double radius : kRadii) tryAbout(turned, radius);
+  }
   // Echoes stand within centimetres of the right place, and these places are farther from each other.
-  for (double share : kFiner) tryAbout(likeliest, share * std::hypot(likeliest[0], likeliest[1]));
+  for (double share : kFiner) {
+    tryAbout(likeliest, share * std::max(kRadii[0], std::hypot(likeliest[0], likeliest[1])));
+    tryTurned(likeliest, share);
+  }
   if (gained <= -kNearlyAsLikely) likeliest.clear();
   if (most_promising == likeliest) most_promising.clear();
   for (const std::vector<double>& at : {likeliest, most_promising}) {

@@ -25,7 +25,7 @@ constexpr int kReweighings = 3;
 constexpr double kPricePerNumber = 4;  ///< nats, by which fewer numbers are preferred
 constexpr double kFewestPlaces = 3;    ///< that tell of a law with nothing outside a part of its variable
 constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;
-constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4};
+constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};
 constexpr int kBearings = 24;  ///< that half a turn is divided into
 constexpr int kOften = 12;     ///< paths of an actor
 constexpr double kMaxInflation = 50;

@@ -11,11 +11,11 @@
 namespace mmradartwin {
 namespace {
 
-constexpr std::size_t kWaysToErr = 4;   ///< geometries that alike errors of actors and poses look like
-constexpr double kFarAway_m = 0.12;     ///< six times what a scene's actors err by,
-constexpr double kOutOfPlace_m = 0.08;  ///< and four times: of some twenty actors none is farther away by chance
-constexpr double kTogether_m = 0.005;   ///< what sixteen of them err by together
-constexpr double kRival = 0.7;          ///< of a finding's gain, by a simpler name that may be the right one
+constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
+constexpr double kOutOfPlace_m =
+    0.08;                              ///< four times what a scene's actors err by: of some twenty none is farther away
+constexpr double kTogether_m = 0.005;  ///< what sixteen of them err by together
+constexpr double kRival = 0.7;         ///< of a finding's gain, by a simpler name that may be the right one
 constexpr std::size_t kMostRivals = 2;
 
 }  // namespace
@@ -153,7 +153,7 @@ bool Selection::isWithinErrors(const HypothesisFit& f) const {
                               std::abs(move.values.number("dyaw_deg")) * M_PI / 180 * reach_m;
     if (farthest_m < kOutOfPlace_m) return true;
   }
-  if (f.plain && f.moved_m() > kFarAway_m) return false;  // an interval may be wide where the likelihood is rough
+  if (f.isFarAway()) return false;  // an interval may be wide where the likelihood is rough
   std::vector<double> errors = a->standard_error;
   bool shifts = false;
   for (std::size_t i = 0; i < errors.size(); ++i) {
