@@ -10,7 +10,7 @@
 namespace mmradartwin {
 
 constexpr std::size_t kMostOutOfPlace = 4;  ///< actors that are looked for elsewhere
-constexpr double kWorthALaw = 12;           ///< nats promised
+constexpr double kWorthALaw = 8;            ///< nats promised
 constexpr double kWorthAnObject = 3;        ///< at the best of all places
 constexpr std::size_t kMostObjects = 4;     ///< what is wide or turned promises less than a point elsewhere
 

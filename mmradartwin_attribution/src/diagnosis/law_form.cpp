@@ -8,14 +8,15 @@
 namespace mmradartwin {
 namespace {
 
-constexpr int kFine = 48;          ///< nodes of the finest table
-constexpr int kMostNodes = 8;      ///< of a curve
-constexpr double kShortest = 3.5;  ///< fine steps in a ripple's period
-constexpr double kMostPeriods = 10;
-constexpr double kSettling[] = {0.05, 0.1, 0.2, 0.4};  ///< of the variable's span, in which an exponential falls by e
-constexpr int kSectorStep = 2;                         ///< fine steps between edges that are tried,
-constexpr int kNarrowestBump = 8;                      ///< and between a bump's ends
-constexpr double kLeastShare = 0.02;                   ///< of the paths that lie beyond a table's first and last node
+constexpr int kFine = 48, kFinest = 128;  ///< nodes of the finest table, and where ranges span a hall
+constexpr double kFineRange_m = 0.2;
+constexpr int kMostNodes = 8;                            ///< of a curve
+constexpr double kShortest = 3.5;                        ///< fine steps in a ripple's period
+constexpr double kMostPeriods = 10, kShortest_m = 0.85;  ///< of range: what ten are in a room
+constexpr double kSettling[] = {0.05, 0.1, 0.2, 0.4};    ///< of the variable's span, in which an exponential falls by e
+constexpr int kSectors = 24;                             ///< parts of the variable's span whose edges are tried,
+constexpr int kNarrowestBump = 4;                        ///< and parts between a bump's ends
+constexpr double kLeastShare = 0.02;                     ///< of the paths that lie beyond a table's first and last node
 
 std::string threeDigits(double value) {
   std::ostringstream out;
@@ -68,11 +69,14 @@ LawForms::LawForms(const std::string& variable, std::vector<double> values, bool
     : constant_(constant),
       turns_(variable == "heading_deg" || variable == "bearing_deg"),
       of_azimuth_(variable == "azimuth_deg"),
+      of_range_(variable == "range_m"),
       sorted_(std::move(values)) {
   std::sort(sorted_.begin(), sorted_.end());
   low_ = turns_ ? -180 : sorted_.front();
   high_ = turns_ ? 180 : sorted_.back();
-  for (int i = 0; i < kFine; ++i) fine_.push_back(low_ + (high_ - low_) * i / (kFine - 1));
+  const int count =
+      of_range_ ? std::clamp(static_cast<int>(std::ceil((high_ - low_) / kFineRange_m)), kFine, kFinest) : kFine;
+  for (int i = 0; i < count; ++i) fine_.push_back(low_ + (high_ - low_) * i / (count - 1));
 }
 
 bool LawForms::varies() const {
@@ -116,9 +120,10 @@ LawForm LawForms::shaped(const std::vector<std::vector<double>>& shapes, int sea
   f.searched = searched;
   f.words = words;
   const Eigen::Index first = constant_ ? 1 : 0;
-  f.shapes = Eigen::MatrixXd::Ones(kFine, first + static_cast<Eigen::Index>(shapes.size()));
+  const Eigen::Index nodes = static_cast<Eigen::Index>(fine_.size());
+  f.shapes = Eigen::MatrixXd::Ones(nodes, first + static_cast<Eigen::Index>(shapes.size()));
   for (std::size_t k = 0; k < shapes.size(); ++k) {
-    f.shapes.col(first + static_cast<Eigen::Index>(k)) = Eigen::Map<const Eigen::VectorXd>(shapes[k].data(), kFine);
+    f.shapes.col(first + static_cast<Eigen::Index>(k)) = Eigen::Map<const Eigen::VectorXd>(shapes[k].data(), nodes);
   }
   return f;
 }
@@ -126,8 +131,8 @@ LawForm LawForms::shaped(const std::vector<std::vector<double>>& shapes, int sea
 void LawForms::addRipples(bool in_sine, std::vector<LawForm>& to) const {
   const auto place = [&](double x) { return in_sine ? std::sin(x * M_PI / 180) : x; };
   const double span = place(high_) - place(low_);
-  const double shortest =
-      std::max(kShortest * (high_ - low_) / (kFine - 1) * (in_sine ? M_PI / 180 : 1), span / kMostPeriods);
+  const double shortest = std::max(kShortest * (fine_[1] - fine_[0]) * (in_sine ? M_PI / 180 : 1),
+                                   of_range_ ? std::min(kShortest_m, span / kMostPeriods) : span / kMostPeriods);
   for (double periods = 1; span / periods > shortest; periods += 0.25) {
     std::vector<std::vector<double>> shapes(2);
     for (int quarter : {0, 1}) {
@@ -142,11 +147,11 @@ void LawForms::addRipples(bool in_sine, std::vector<LawForm>& to) const {
 }
 
 LawForm LawForms::between(int from, int to, bool bump) const {
-  std::vector<double> shape(kFine, 0.0);
+  std::vector<double> shape(fine_.size(), 0.0);
   for (int i = from; i < to; ++i) {
     shape[static_cast<std::size_t>(i)] = bump ? 0.5 - 0.5 * std::cos(2 * M_PI * (i - from + 1) / (to - from + 1)) : 1;
   }
-  LawForm f = shaped({shape}, from == 0 || to >= kFine ? 1 : 2,
+  LawForm f = shaped({shape}, from == 0 || to >= static_cast<int>(fine_.size()) ? 1 : 2,
                      (bump ? "a bump from " : "one value from ") + threeDigits(fine_[static_cast<std::size_t>(from)]) +
                          " to " + threeDigits(fine_[static_cast<std::size_t>(to - 1)]));
   f.local = true;
@@ -155,22 +160,24 @@ LawForm LawForms::between(int from, int to, bool bump) const {
 
 std::vector<LawForm> LawForms::others() const {
   std::vector<LawForm> forms;
+  const int count = static_cast<int>(fine_.size());
   if (!turns_) addRipples(false, forms);
   if (of_azimuth_) addRipples(true, forms);  // as interference at an aperture goes
   for (double share : kSettling) {
     for (bool grows : {false, true}) {
       if (turns_) break;
       std::vector<double> shape;
-      for (int i = 0; i < kFine; ++i) shape.push_back(std::exp(-(grows ? kFine - 1 - i : i) / (share * (kFine - 1))));
+      for (int i = 0; i < count; ++i) shape.push_back(std::exp(-(grows ? count - 1 - i : i) / (share * (count - 1))));
       forms.push_back(shaped({shape}, 1,
                              std::string("an exponential that ") + (grows ? "grows" : "falls") + " by e in " +
                                  threeDigits(share * (high_ - low_))));
     }
   }
-  for (int from = 0; from < kFine; from += kSectorStep) {
-    for (int to = from + kSectorStep; to <= kFine; to += kSectorStep) {
-      if (from > 0 || to < kFine) forms.push_back(between(from, to, false));
-      if (to - from >= kNarrowestBump) forms.push_back(between(from, to, true));
+  const auto edge = [&](int part) { return part * count / kSectors; };
+  for (int from = 0; from < kSectors; ++from) {
+    for (int to = from + 1; to <= kSectors; ++to) {
+      if (from > 0 || to < kSectors) forms.push_back(between(edge(from), edge(to), false));
+      if (to - from >= kNarrowestBump) forms.push_back(between(edge(from), edge(to), true));
     }
   }
   return forms;

@@ -45,7 +45,7 @@ class LawForms {
   void addRipples(bool in_sine, std::vector<LawForm>& to) const;
 
   bool constant_, turns_;  ///< turns: both ends are one direction
-  bool of_azimuth_;
+  bool of_azimuth_, of_range_;
   std::vector<double> sorted_, fine_;
   double low_, high_;
 };

@@ -22,7 +22,8 @@ namespace {
 
 constexpr double kHuber = 2;  ///< standard deviations from which on a path counts less
 constexpr int kReweighings = 3;
-constexpr double kPricePerNumber = 4;  ///< nats, by which fewer numbers are preferred
+constexpr double kPricePerNumber = 4;  ///< nats, by which fewer numbers are preferred,
+constexpr double kLeastWorth = -2;     ///< and that may be missing: a fit finds some times what paths alone show
 constexpr double kFewestPlaces = 3;    ///< that tell of a law with nothing outside a part of its variable
 constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;
 constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};
@@ -297,7 +298,7 @@ std::optional<Screened> LawScreen::best(const Sample& s, const Over& over) const
     std::vector<LawForm> others = forms.others();
     std::move(others.begin(), others.end(), std::back_inserter(tried));
   }
-  double most = 0;
+  double most = kLeastWorth;
   const LawForm* best = nullptr;
   Promise of_best;
   for (const LawForm& form : tried) {
