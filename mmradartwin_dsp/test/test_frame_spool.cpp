@@ -102,6 +102,14 @@ TEST(FrameSpool, WhatComesLaterDoesNotShowAndWhatCameBeforeStays) {
   EXPECT_EQ(samplesOf(late, 1).size(), 6u);
   EXPECT_EQ(samplesOf(late, 2).size(), 6u);
   EXPECT_EQ(samplesOf(early, 0), samplesOf(late, 0));
+  // Read once more by another time of tf, beside a spool that goes on.
+  ASSERT_EQ(early.track.size(), 8u);
+  EXPECT_EQ(early.track[7].stamp_ns, toNanoseconds(stream.cubes[7]->header.stamp));
+  std::vector<std::int64_t> stamps_ns;
+  early.forEachFrameBetween(early.track[5].stamp_ns, early.track[6].stamp_ns,
+                            [&](const AdcCube& cube) { stamps_ns.push_back(cube.stamp_ns); });
+  EXPECT_EQ(stamps_ns, (std::vector<std::int64_t>{early.track[5].stamp_ns, early.track[6].stamp_ns}));
+  EXPECT_EQ(samplesOf(early.withPoseLag(0), 2), samplesOf(late, 2));
   spool.forget();
   EXPECT_EQ(samplesOf(late, 2).size(), 6u);
   EXPECT_TRUE(saysInOneLine(inputError([&] { spool.recording(); }), "no frames", "radar/adc"));

@@ -13,7 +13,47 @@ namespace {
 
 double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
+constexpr double kMovesMore = 4, kMoves = 1e-4;  ///< change of a frame of a radar that still moves: of the usual, least
+constexpr double kMostMoving = 0.4;              ///< of a pose's frames, at either end
+
+/// Without the frames at either end that differ from those in the middle: a radar is taken to stand while it is within
+/// 2 cm, which is five wavelengths, of where it comes to rest.
+void leaveOutMoving(const SignalChain& chain, std::vector<AdcCube>& frames) {
+  std::vector<ComplexGrid> spectra;
+  for (const AdcCube& frame : frames) {
+    CoherentAverage average(chain.radar(), 1);
+    average.add(frame);
+    spectra.push_back(average.complete() ? chain.rangeSpectra(average.grid().x) : ComplexGrid());
+  }
+  const std::size_t quarter = frames.size() / 4;
+  ComplexGrid middle;
+  int count = 0;
+  for (std::size_t i = quarter; i < frames.size() - quarter; ++i) {
+    if (spectra[i].size() == 0) continue;
+    middle = count == 0 ? spectra[i] : ComplexGrid(middle + spectra[i]);
+    ++count;
+  }
+  if (count == 0) return;
+  middle /= count;
+  std::vector<double> change;
+  for (const ComplexGrid& s : spectra) change.push_back(s.size() > 0 ? changeBetween(s, middle) : 0);
+  std::vector<double> sorted = change;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  const double least = std::max(kMoves, kMovesMore * sorted[sorted.size() / 2]);
+  const std::size_t most = static_cast<std::size_t>(kMostMoving * static_cast<double>(frames.size()));
+  std::size_t first = 0, last = frames.size();
+  while (first < most && change[first] > least) ++first;
+  while (frames.size() - last < most && change[last - 1] > least) --last;
+  frames = std::vector<AdcCube>(frames.begin() + static_cast<std::ptrdiff_t>(first),
+                                frames.begin() + static_cast<std::ptrdiff_t>(last));
+}
+
 }  // namespace
+
+double changeBetween(const ComplexGrid& a, const ComplexGrid& b) {
+  const double power = a.squaredNorm() + b.squaredNorm();
+  return power > 0 ? (a - b).squaredNorm() / power : 0;
+}
 
 void transformGrid(const SignalChain& chain, PoseChannels& pose) {
   const double window = sum(hannWindow(chain.radar().samples_per_chirp));
@@ -39,6 +79,7 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
         if (repair) repair(frames.back());
       });
       if (frames.empty()) throw InputError("its capture holds no frame; record it again");
+      if (!recording.track.empty()) leaveOutMoving(chain, frames);
       const bool silent = std::all_of(frames.begin(), frames.end(), [](const AdcCube& cube) {
         return std::all_of(cube.data.begin(), cube.data.end(), [](std::int16_t v) { return v == 0; });
       });

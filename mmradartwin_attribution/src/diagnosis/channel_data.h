@@ -49,6 +49,10 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
 /// Numbers the places of the poses that there are, in order of appearance, and keeps the names of these alone.
 void numberLocations(ChannelData& data);
 
+/// How much two of a radar's spectra differ: |a - b|^2 / (|a|^2 + |b|^2), 0 where they are the same, about 1 where they
+/// have nothing in common.
+double changeBetween(const ComplexGrid& a, const ComplexGrid& b);
+
 class SignalChain;
 /// Fills y of a pose from its grid (again, after the grid was changed).
 void transformGrid(const SignalChain& chain, PoseChannels& pose);

@@ -26,6 +26,7 @@
 #include "law_screen.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "pose_time_lag.h"
 #include "receiver_finding.h"
 #include "scene_match.h"
 #include "selection.h"
@@ -52,7 +53,8 @@ struct Refused {
 
 class Session {
  public:
-  Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options);
+  /// lag: how it was brought in time.
+  Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options, std::optional<FrameFinding> lag);
   Diagnosis run();
 
  private:
@@ -73,6 +75,7 @@ class Session {
   const Recording& recording_;
   Twin& twin_;
   const DiagnosisOptions& options_;
+  std::optional<FrameFinding> lag_;
   bool few_;  ///< poses: too few for laws over them
   ReceivedSession received_;
   ChannelData& data_;
@@ -90,10 +93,12 @@ class Session {
   Diagnosis result_;
 };
 
-Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options)
+Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options,
+                 std::optional<FrameFinding> lag)
     : recording_(recording),
       twin_(twin),
       options_(options),
+      lag_(std::move(lag)),
       few_(recording.poses.size() < kFewestForLaws),
       received_(receiveSession(recording, few_,
                                [&](std::size_t done, std::size_t all) {
@@ -316,6 +321,7 @@ Diagnosis Session::run() {
     putIn(*finding.mechanism, extended_);
     result_.findings.findings.push_back(std::move(finding));
   };
+  if (lag_) add(findingOf(*lag_));
   for (const FrameFinding& f : received_.frames) add(findingOf(f), f.nats_by_pose);
   measureFrameGain();
   for (const Delivery& d : received_.deliveries) add(findingOf(d, data_.radar));
@@ -397,7 +403,13 @@ Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOption
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                   static_cast<std::size_t>(options.jobs));
   }
-  return Session(recording, twin, options).run();
+  const TimedRecording timed = inTime(recording, twin.description().mechanisms, [&](std::size_t done, std::size_t all) {
+    if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
+    if (options.on_progress) {
+      options.on_progress({"frames on the way", static_cast<double>(done) / static_cast<double>(all)});
+    }
+  });
+  return Session(timed.recording, twin, options, timed.finding).run();
 }
 
 }  // namespace mmradartwin

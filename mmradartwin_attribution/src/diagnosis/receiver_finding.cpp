@@ -15,6 +15,7 @@
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/ledger.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "pose_time_lag.h"
 
 namespace mmradartwin {
 namespace {
@@ -415,12 +416,14 @@ std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedPar
 }
 
 Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& options) {
-  ReceivedSession session = receiveSession(recording, true, [&](std::size_t done, std::size_t all) {
-    if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
-    if (options.on_progress) {
-      options.on_progress({"reading captures", static_cast<double>(done) / static_cast<double>(all)});
-    }
-  });
+  const auto telling = [&options](const std::string& stage) {
+    return [&options, stage](std::size_t done, std::size_t all) {
+      if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
+      if (options.on_progress) options.on_progress({stage, static_cast<double>(done) / static_cast<double>(all)});
+    };
+  };
+  const TimedRecording timed = inTime(recording, {}, telling("frames on the way"));
+  ReceivedSession session = receiveSession(timed.recording, true, telling("reading captures"));
   ChannelData& data = session.data;
   Diagnosis result;
   const auto add = [&](Finding finding, const std::map<std::string, double>& nats_by_pose = {}) {
@@ -428,6 +431,7 @@ Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& o
     result.extended.mechanisms.push_back(*finding.mechanism);
     result.findings.findings.push_back(std::move(finding));
   };
+  if (timed.finding) add(findingOf(*timed.finding));
   for (const FrameFinding& f : session.frames) add(findingOf(f), f.nats_by_pose);
   for (const Delivery& d : session.deliveries) add(findingOf(d, data.radar));
   if (const BodyFixedTone tone = findBodyFixedTone(data); isPlain(tone)) {
@@ -442,7 +446,7 @@ Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& o
   result.has_twin = false;
   result.extended.radar = recording.radar;
   result.problems = data.problems;
-  result.plan = surveyPlan(nullptr, recording.poses);
+  result.plan = surveyPlan(nullptr, timed.recording.poses);
   return result;
 }
 

@@ -20,6 +20,12 @@ struct Pose {
   Eigen::Isometry3d T_map_radar = Eigen::Isometry3d::Identity();
 };
 
+/// Where the radar was at one frame.
+struct StampedTransform {
+  std::int64_t stamp_ns = 0;
+  Eigen::Isometry3d T_map_radar = Eigen::Isometry3d::Identity();
+};
+
 /// What was left out or is wrong with one pose; the others go on.
 struct PoseProblem {
   std::string pose;
@@ -43,6 +49,13 @@ struct Recording {
   std::string capture_pattern;                   ///< path of a capture, {pose} for the name; "" without files
   /// Visits the frames of a pose in order. Throws InputError where its capture is missing or damaged.
   std::function<void(const Pose&, const std::function<void(const AdcCube&)>&)> forEachFrame;
+  /// Of a bag, of every frame in order of time, on the way from pose to pose, too; else empty, and so are the next two.
+  std::vector<StampedTransform> track;
+  /// Visits the frames stamped from first_ns to last_ns, on the way or not, in order.
+  std::function<void(std::int64_t first_ns, std::int64_t last_ns, const std::function<void(const AdcCube&)>&)>
+      forEachFrameBetween;
+  /// The same recording with each frame's pose looked up by so much later than its stamp, beyond what it was before.
+  std::function<Recording(double lag_s)> withPoseLag;
 };
 
 /// Reads a session directory (or its session.yaml). Throws InputError for what makes the whole session unusable

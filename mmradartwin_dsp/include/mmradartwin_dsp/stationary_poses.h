@@ -8,12 +8,6 @@
 
 namespace mmradartwin {
 
-/// Where the radar was at one frame.
-struct StampedTransform {
-  std::int64_t stamp_ns = 0;
-  Eigen::Isometry3d T_map_radar = Eigen::Isometry3d::Identity();
-};
-
 /// True within 2 cm and 1 deg: the radar stands still.
 bool standsStill(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double distance_m = 0.02,
                  double angle_rad = M_PI / 180);

@@ -9,6 +9,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include <algorithm>
+#include <cmath>
 #include <deque>
 #include <filesystem>
 #include <fstream>
@@ -211,18 +212,19 @@ class BagContents {
   void settle(const tf2::BufferCore& buffer, std::deque<CubeIndex>& waiting, bool last) {
     while (!waiting.empty()) {
       CubeIndex& cube = waiting.front();
+      const std::int64_t reported_ns = cube.stamp_ns + std::llround(options_.pose_lag_s * 1e9);
       try {
         const geometry_msgs::TransformStamped T =
-            buffer.lookupTransform(options_.map_frame, options_.radar_frame, toRosTime(cube.stamp_ns));
+            buffer.lookupTransform(options_.map_frame, options_.radar_frame, toRosTime(reported_ns));
         const auto& p = T.transform.translation;
         const auto& q = T.transform.rotation;
         cube.on_the_way =
-            !record_.whyNotBetween(cube.stamp_ns, options_.map_frame, options_.radar_frame, TransformLimits()).empty();
+            !record_.whyNotBetween(reported_ns, options_.map_frame, options_.radar_frame, TransformLimits()).empty();
         if (!cube.on_the_way) {
           cube.T_map_radar = Eigen::Translation3d(p.x, p.y, p.z) * Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized();
         }
       } catch (const tf2::TransformException&) {
-        const bool late = newest_tf_ns_ > cube.stamp_ns + static_cast<std::int64_t>(kTfPatience_s * 1e9);
+        const bool late = newest_tf_ns_ > reported_ns + static_cast<std::int64_t>(kTfPatience_s * 1e9);
         if (!last && !late) return;
       }
       cubes.push_back(cube);
@@ -259,12 +261,16 @@ CubesByPose assignByStamp(const std::vector<Pose>& poses, const std::vector<Cube
   return assigned;
 }
 
-std::vector<Stretch> stretchesOf(const BagContents& bag) {
+std::vector<StampedTransform> trackOf(const BagContents& bag) {
   std::vector<StampedTransform> frames;
   for (const CubeIndex& cube : bag.cubes) {
     if (cube.T_map_radar) frames.push_back({cube.stamp_ns, *cube.T_map_radar});
   }
-  return findStationaryPoses(frames, bag.radar.frame_offset_ns(1));
+  return frames;
+}
+
+std::vector<Stretch> stretchesOf(const BagContents& bag) {
+  return findStationaryPoses(trackOf(bag), bag.radar.frame_offset_ns(1));
 }
 
 std::vector<CubeIndex> cubesOf(const Stretch& stretch, const std::vector<CubeIndex>& cubes) {
@@ -369,6 +375,20 @@ Recording openBag(const std::string& file, const BagOptions& options) {
     if (fs::exists(captureOf(pattern, pose.name))) return from_files(pose, visit);
     throw InputError(file + ": pose '" + pose.name +
                      "': bag holds no frames of it; its capture was missing or its time was cut out");
+  };
+  recording.track = trackOf(*bag);
+  recording.forEachFrameBetween = [bag](std::int64_t first_ns, std::int64_t last_ns,
+                                        const std::function<void(const AdcCube&)>& visit) {
+    std::vector<CubeIndex> cubes;
+    for (const CubeIndex& cube : bag->cubes) {
+      if (cube.stamp_ns >= first_ns && cube.stamp_ns <= last_ns) cubes.push_back(cube);
+    }
+    if (!cubes.empty()) bag->forEachFrame("on the way", cubes, visit);
+  };
+  recording.withPoseLag = [file, options](double lag_s) {
+    BagOptions later = options;
+    later.pose_lag_s += lag_s;
+    return openBag(file, later);
   };
   return recording;
 }

@@ -181,7 +181,7 @@ void FrameSpool::keep(const mmradartwin_msgs::AdcCube& cube, const Eigen::Isomet
   state_.bytes += bytes;
 }
 
-Recording FrameSpool::recording() {
+Recording FrameSpool::recording(double pose_lag_s) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!radar_) throw InputError("no radar/config came yet: start the driver, or the replay of a bag that holds it");
   if (state_.frames == 0) {
@@ -190,6 +190,7 @@ Recording FrameSpool::recording() {
   }
   BagOptions options;
   options.seen_only = true;
+  options.pose_lag_s = pose_lag_s;
   // Closed, the bag has an index; a reader takes that in when it opens the file, and the chunks that it points to stay
   // where they are when more are appended behind them.
   try {
@@ -204,6 +205,8 @@ Recording FrameSpool::recording() {
     bag_.open(file_, rosbag::bagmode::Append);
     if (!recording) throw InputError(refused);
     recording->source = "poses seen so far";
+    // Its bag is written to in between: an index is there while this holds the lock alone.
+    recording->withPoseLag = [this, pose_lag_s](double lag_s) { return this->recording(pose_lag_s + lag_s); };
     return *recording;
   } catch (const rosbag::BagException& error) {
     throw std::runtime_error(file_ + ": the frames kept so far cannot be read again (" + error.what() + ")");

@@ -6,7 +6,8 @@ namespace {
 const std::string kName = "pose_time_lag";
 
 /// Poses are stamped later than they were true: while the radar moves it is ahead of its reported pose by what it goes
-/// within the lag. A standing radar shows nothing of it, and averaged poses are of standing radars: no hypothesis.
+/// within the lag. A standing radar shows nothing of it, and averaged poses are of standing radars: no hypothesis about
+/// paths; frames on the way tell it.
 class PoseTimeLag : public Mechanism {
  public:
   const std::string& name() const override { return kName; }

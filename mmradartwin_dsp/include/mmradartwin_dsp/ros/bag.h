@@ -19,6 +19,8 @@ struct BagOptions {
   /// Of the session message's poses only those of which the bag holds frames; the others are otherwise errors where
   /// they are read.
   bool seen_only = false;
+  /// By which tf is stamped later than the truth: a frame's pose is looked up so much later than its stamp.
+  double pose_lag_s = 0;
 };
 
 /// Opens a bag as a Recording. With a `session` message its poses.csv defines the poses; otherwise a pose is a stretch

@@ -52,8 +52,9 @@ class FrameSpool {
   void forget();
 
   /// The poses seen so far. What comes later does not show in it, and it can be read as long as it is there. Throws
-  /// InputError where there is no radar configuration, frame or pose yet.
-  Recording recording();
+  /// InputError where there is no radar configuration, frame or pose yet. pose_lag_s as in BagOptions. Its withPoseLag
+  /// needs the spool.
+  Recording recording(double pose_lag_s = 0);
   std::optional<mmradartwin_msgs::Session> session() const;
   std::optional<mmradartwin_msgs::Scene> scene() const;
   FrameSpoolState state() const;
