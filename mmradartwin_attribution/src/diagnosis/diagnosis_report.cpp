@@ -154,6 +154,24 @@ void makeFolder(const std::string& directory) {
   if (error) throw InputError(directory + ": cannot be created (" + error.message() + "); choose another --output");
 }
 
+/// Takes away the figures and lists of an earlier diagnosis, which its findings.json names: beside a new one they would
+/// tell of what was not found.
+void removeEarlier(const fs::path& directory) {
+  Findings earlier;
+  try {
+    earlier = readFindings((directory / "findings.json").string());
+  } catch (const InputError&) {
+    return;  // there is none, or it is someone else's
+  }
+  for (const Finding& f : earlier.findings) {
+    const fs::path figure = f.figure.value_or("");
+    if (figure.parent_path() != "figures") continue;
+    std::error_code ignored;
+    fs::remove(directory / figure, ignored);
+    fs::remove(directory / "records" / figure.stem().concat(".csv"), ignored);
+  }
+}
+
 }  // namespace
 
 DiagnosisReport::DiagnosisReport(const std::string& directory) : directory_(directory) { makeFolder(directory); }
@@ -203,6 +221,7 @@ std::string diagnosisText(const Diagnosis& d) {
 }
 
 void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::string>& command) const {
+  removeEarlier(directory_);
   Findings findings = diagnosis.findings;
   if (!findings.findings.empty()) makeFolder(directory_ + "/figures");
   std::map<std::string, int> times;
