@@ -7,6 +7,7 @@
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/stationary_poses.h"
 
 namespace mmradartwin {
 namespace {
@@ -14,11 +15,27 @@ namespace {
 double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
 constexpr double kMovesMore = 4, kMoves = 1e-4;  ///< change of a frame of a radar that still moves: of the usual, least
-constexpr double kMostMoving = 0.4;              ///< of a pose's frames, at either end
+constexpr std::int64_t kStarts_ns = 500'000'000;   ///< from either end of a stop, how long it may still move,
+constexpr std::int64_t kBeside_ns = 1000'000'000;  ///< where tf has it elsewhere so shortly before or after
 
-/// Without the frames at either end that differ from those in the middle: a radar is taken to stand while it is within
-/// 2 cm, which is five wavelengths, of where it comes to rest.
-void leaveOutMoving(const SignalChain& chain, std::vector<AdcCube>& frames) {
+/// True where tf has the radar elsewhere than at the pose between two times.
+bool standsElsewhere(const std::vector<StampedTransform>& track, const Pose& pose, std::int64_t from_ns,
+                     std::int64_t to_ns) {
+  const auto at = [](const StampedTransform& t, std::int64_t stamp_ns) { return t.stamp_ns < stamp_ns; };
+  return std::any_of(std::lower_bound(track.begin(), track.end(), from_ns, at),
+                     std::lower_bound(track.begin(), track.end(), to_ns, at),
+                     [&](const StampedTransform& t) { return !standsStill(t.T_map_radar, pose.T_map_radar); });
+}
+
+/// Without the frames at either end of a stop that differ from those in its middle: a radar is taken to stand while it
+/// is within 2 cm, which is five wavelengths, of where it comes to rest.
+void leaveOutMoving(const SignalChain& chain, const std::vector<StampedTransform>& track, const Pose& pose,
+                    std::vector<AdcCube>& frames) {
+  if (track.empty()) return;
+  const std::int64_t begin_ns = frames.front().stamp_ns, end_ns = frames.back().stamp_ns;
+  const bool came = standsElsewhere(track, pose, begin_ns - kBeside_ns, begin_ns);
+  const bool goes = standsElsewhere(track, pose, end_ns, end_ns + kBeside_ns);
+  if (!came && !goes) return;
   std::vector<ComplexGrid> spectra;
   for (const AdcCube& frame : frames) {
     CoherentAverage average(chain.radar(), 1);
@@ -40,10 +57,12 @@ void leaveOutMoving(const SignalChain& chain, std::vector<AdcCube>& frames) {
   std::vector<double> sorted = change;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
   const double least = std::max(kMoves, kMovesMore * sorted[sorted.size() / 2]);
-  const std::size_t most = static_cast<std::size_t>(kMostMoving * static_cast<double>(frames.size()));
   std::size_t first = 0, last = frames.size();
-  while (first < most && change[first] > least) ++first;
-  while (frames.size() - last < most && change[last - 1] > least) --last;
+  while (came && first < quarter && change[first] > least && frames[first].stamp_ns < begin_ns + kStarts_ns) ++first;
+  while (goes && frames.size() - last < quarter && change[last - 1] > least &&
+         frames[last - 1].stamp_ns > end_ns - kStarts_ns) {
+    --last;
+  }
   frames = std::vector<AdcCube>(frames.begin() + static_cast<std::ptrdiff_t>(first),
                                 frames.begin() + static_cast<std::ptrdiff_t>(last));
 }
@@ -79,7 +98,7 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
         if (repair) repair(frames.back());
       });
       if (frames.empty()) throw InputError("its capture holds no frame; record it again");
-      if (!recording.track.empty()) leaveOutMoving(chain, frames);
+      leaveOutMoving(chain, recording.track, pose, frames);
       const bool silent = std::all_of(frames.begin(), frames.end(), [](const AdcCube& cube) {
         return std::all_of(cube.data.begin(), cube.data.end(), [](std::int16_t v) { return v == 0; });
       });
