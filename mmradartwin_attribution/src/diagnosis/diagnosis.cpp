@@ -40,7 +40,9 @@ constexpr std::size_t kFewestForLaws = 3;  ///< poses: of fewer only frames and 
 // Of the measured power: what explains less is no finding, unless it is worth leastNats(), inflation taken off, and is
 // not like clutter; and to explain less by less than that is no loss.
 constexpr double kLeastExplained = 0.002;
-constexpr double kMostLost = 0.015;    ///< of the explained power, by what the likelihood plainly gains of
+// Of the explained power, by what the likelihood plainly gains of; maps do not fit the actors' errors of 1.5 dB beside
+// a law of levels.
+constexpr double kMostLost = 0.015, kMostLostOfLevels = 0.05;
 constexpr double kExplainsSame = 0.5;  ///< correlation over poses of what two fits gain
 /// Of what an unknown gains: what its law leaves over looks like a little of many names.
 constexpr double kBesideUnknown = 0.25;
@@ -261,9 +263,10 @@ std::string Session::refusedByMaps(const HypothesisFit& f, const FindingGain& ga
   const double least_nats = leastNats(f.hypothesis, f.scaled, traces, data_.poses.size());
   const bool plainly_worse = explained[1] < 0 && by < -kLeastExplained;
   const bool in_nats = !plainly_worse && f.broad_gain / f.inflation > least_nats;
+  const double most_lost = isOfLevels(f.hypothesis) ? kMostLostOfLevels : kMostLost;
   // Maps of echoes that are many points' differ from what is expected of them by as much as they hold.
   // Few places see an actor: drawn without the best of them, little is left of what it gains.
-  const bool much = (likelier || f.isFarAway()) && ((f.plain && (by > -kMostLost || !plainly_worse)) || in_nats);
+  const bool much = (likelier || f.isFarAway()) && ((f.plain && (by > -most_lost || !plainly_worse)) || in_nats);
   // What explains less well what a better one was refused for is no name for it; a law without a name may be the cause
   // of something else beside it, and so may a name beside what is as wrong as the session's own errors.
   const Eigen::VectorXd explains = gainByPose(f, selection_->state());

@@ -34,7 +34,8 @@ constexpr double kLawPerPose = 0.4, kSubjectPerPose = 1;  ///< a twin's own erro
 // places, what adds echoes anything from 0.4 to 22.
 constexpr UsualScatter kScatterOfLevels = {1.4, 12};
 
-/// What makes echoes stronger or weaker by a law: neither adds any nor moves them.
+}  // namespace
+
 bool isOfLevels(const Hypothesis& h) {
   const auto adds = [](const Coordinate& c) { return c.oneSided(); };
   if (h.coordinates.empty() || std::any_of(h.coordinates.begin(), h.coordinates.end(), adds)) return false;
@@ -44,8 +45,6 @@ bool isOfLevels(const Hypothesis& h) {
   }
   return std::all_of(h.coordinates.begin(), h.coordinates.end(), [](const Coordinate& c) { return c.unit == "dB"; });
 }
-
-}  // namespace
 
 UsualScatter usualScatter(const Hypothesis& hypothesis) {
   return isOfLevels(hypothesis) ? kScatterOfLevels : UsualScatter{};

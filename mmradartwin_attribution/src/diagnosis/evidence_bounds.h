@@ -11,6 +11,9 @@ namespace mmradartwin {
 /// traces: it moves echoes in the room. Set by sessions with nothing hidden: see evidence_bounds.cpp.
 double leastNats(const Hypothesis& hypothesis, const std::vector<double>& scaled, bool traces, std::size_t poses);
 
+/// True of what makes echoes stronger or weaker by a law: neither adds any nor moves them.
+bool isOfLevels(const Hypothesis& hypothesis);
+
 /// How far scores scatter over places beyond what the likelihood expects, in sessions with nothing hidden, and how many
 /// places' scatter it is worth to know that; 0 where it differs from session to session.
 struct UsualScatter {
