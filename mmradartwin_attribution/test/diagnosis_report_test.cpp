@@ -23,6 +23,8 @@ Diagnosis withAbsence() {
   f.where.emplace_back();
   f.records = {{"001", "specular", {"cabinet"}, RecordState{-80, 2, 10}, std::nullopt}};
   d.findings.findings = {f};
+  d.plan.walls = {{"cabinet", {3, 1}, {3, 2}}};
+  d.plan.stations = {{"001", {1, 1}, {1, 0}}, {"002", {1, 3}, {1, 0}}};
   return d;
 }
 
