@@ -37,11 +37,7 @@ void leaveOutMoving(const SignalChain& chain, const std::vector<StampedTransform
   const bool goes = standsElsewhere(track, pose, end_ns, end_ns + kBeside_ns);
   if (!came && !goes) return;
   std::vector<ComplexGrid> spectra;
-  for (const AdcCube& frame : frames) {
-    CoherentAverage average(chain.radar(), 1);
-    average.add(frame);
-    spectra.push_back(average.complete() ? chain.rangeSpectra(average.grid().x) : ComplexGrid());
-  }
+  for (const AdcCube& frame : frames) spectra.push_back(frameSpectra(chain, frame));
   const std::size_t quarter = frames.size() / 4;
   ComplexGrid middle;
   int count = 0;
@@ -54,24 +50,34 @@ void leaveOutMoving(const SignalChain& chain, const std::vector<StampedTransform
   middle /= count;
   std::vector<double> change;
   for (const ComplexGrid& s : spectra) change.push_back(s.size() > 0 ? changeBetween(s, middle) : 0);
-  std::vector<double> sorted = change;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  const double least = std::max(kMoves, kMovesMore * sorted[sorted.size() / 2]);
+  const double least = std::max(kMoves, kMovesMore * upperMedian(change));
   std::size_t first = 0, last = frames.size();
   while (came && first < quarter && change[first] > least && frames[first].stamp_ns < begin_ns + kStarts_ns) ++first;
   while (goes && frames.size() - last < quarter && change[last - 1] > least &&
          frames[last - 1].stamp_ns > end_ns - kStarts_ns) {
     --last;
   }
-  frames = std::vector<AdcCube>(frames.begin() + static_cast<std::ptrdiff_t>(first),
-                                frames.begin() + static_cast<std::ptrdiff_t>(last));
+  frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(last), frames.end());
+  frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
 }  // namespace
 
+ComplexGrid frameSpectra(const SignalChain& chain, const AdcCube& frame) {
+  CoherentAverage average(chain.radar(), 1);
+  average.add(frame);
+  return average.complete() ? chain.rangeSpectra(average.grid().x) : ComplexGrid();
+}
+
 double changeBetween(const ComplexGrid& a, const ComplexGrid& b) {
   const double power = a.squaredNorm() + b.squaredNorm();
   return power > 0 ? (a - b).squaredNorm() / power : 0;
+}
+
+double upperMedian(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 void transformGrid(const SignalChain& chain, PoseChannels& pose) {

@@ -49,11 +49,15 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
 /// Numbers the places of the poses that there are, in order of appearance, and keeps the names of these alone.
 void numberLocations(ChannelData& data);
 
+class SignalChain;
+/// Windowed range spectra [M][N] of one frame's average over its loops, in ADC counts; empty where a slot has no valid
+/// chirp. Throws InputError where it has not the radar's shape.
+ComplexGrid frameSpectra(const SignalChain& chain, const AdcCube& frame);
 /// How much two of a radar's spectra differ: |a - b|^2 / (|a|^2 + |b|^2), 0 where they are the same, about 1 where they
 /// have nothing in common.
 double changeBetween(const ComplexGrid& a, const ComplexGrid& b);
-
-class SignalChain;
+/// The middle one of the values, of an even number the greater of the two; at least one.
+double upperMedian(std::vector<double> values);
 /// Fills y of a pose from its grid (again, after the grid was changed).
 void transformGrid(const SignalChain& chain, PoseChannels& pose);
 

@@ -102,10 +102,7 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
       options_(options),
       lag_(std::move(lag)),
       few_(recording.poses.size() < kFewestForLaws),
-      received_(receiveSession(recording, few_,
-                               [&](std::size_t done, std::size_t all) {
-                                 report("reading captures", static_cast<double>(done) / static_cast<double>(all));
-                               })),
+      received_(receiveSession(recording, few_, readingProgress(options, "reading captures"))),
       data_(received_.data) {
   twin_.setSession(recording.poses);
   if (data_.radar.channels() > kMaxChannels) {
@@ -406,12 +403,8 @@ Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOption
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                   static_cast<std::size_t>(options.jobs));
   }
-  const TimedRecording timed = inTime(recording, twin.description().mechanisms, [&](std::size_t done, std::size_t all) {
-    if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
-    if (options.on_progress) {
-      options.on_progress({"frames on the way", static_cast<double>(done) / static_cast<double>(all)});
-    }
-  });
+  const TimedRecording timed =
+      inTime(recording, twin.description().mechanisms, readingProgress(options, "frames on the way"));
   return Session(timed.recording, twin, options, timed.finding).run();
 }
 

@@ -9,7 +9,6 @@
 #include <sstream>
 #include <utility>
 
-#include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin {
@@ -67,12 +66,6 @@ class Way {
   std::vector<Eigen::Vector3d> place_;
 };
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// How long after its stamp a frame's middle is. What the chirps last at least, where radar.yaml does not say how long.
 double halfFrame_s(const RadarConfig& radar) {
   const double sampled_s = radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
@@ -90,10 +83,8 @@ std::vector<FrameChange> changesBetween(const Recording& recording, std::int64_t
   double before_s = 0;
   const auto stamp_ns = [&](double t_s) { return zero_ns + std::llround(1e9 * t_s); };
   recording.forEachFrameBetween(stamp_ns(from_s), stamp_ns(to_s), [&](const AdcCube& cube) {
-    CoherentAverage frame(recording.radar, 1);
-    frame.add(cube);
-    if (!frame.complete()) return;
-    const ComplexGrid spectra = chain.rangeSpectra(frame.grid().x);
+    const ComplexGrid spectra = frameSpectra(chain, cube);
+    if (spectra.size() == 0) return;
     ComplexGrid now = spectra.rightCols(spectra.cols() - first);
     const double now_s = secondsSince(zero_ns, cube.stamp_ns);
     if (before.size() > 0 && now_s > before_s && now_s - before_s < kFarthest_s) {
@@ -172,7 +163,7 @@ std::optional<PoseTimeLag> findPoseTimeLag(const std::vector<StampedTransform>& 
     }
   }
   if (standing.empty() || moving.empty()) return std::nullopt;
-  const double still = median(standing), more = median(moving) - still;
+  const double still = upperMedian(standing), more = upperMedian(moving) - still;
   if (more < kTellingChange) return std::nullopt;
 
   // On the way it is now more and now less: any change that a radar at rest does not show is one.
@@ -214,11 +205,11 @@ std::optional<PoseTimeLag> findPoseTimeLag(const std::vector<StampedTransform>& 
   }
   const double n = static_cast<double>(telling.size());
   if (telling.size() < kFewestMotions) return std::nullopt;
-  result.lag_s = median(result.by_motion_s);
+  result.lag_s = upperMedian(result.by_motion_s);
   std::vector<double> off;
   for (double lag_s : result.by_motion_s) off.push_back(std::abs(lag_s - result.lag_s));
   // A median's error is 1.25 of a mean's. Two edges, each within a frame period, know no better than that.
-  const double scatter_s = std::max(1.4826 * median(off), period_s / std::sqrt(24.0));
+  const double scatter_s = std::max(1.4826 * upperMedian(off), period_s / std::sqrt(24.0));
   result.standard_error_s = 1.25 * scatter_s / std::sqrt(n);
   for (std::size_t g : telling) {
     const double without = misfit(changes[g], 0, slow_m_per_s);

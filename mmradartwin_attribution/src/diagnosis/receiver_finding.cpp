@@ -12,7 +12,6 @@
 #include "finding_figure.h"
 #include "held_out_gain.h"
 #include "hypothesis_fit.h"
-#include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/ledger.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "pose_time_lag.h"
@@ -46,6 +45,13 @@ double strongestMeasured(const ChannelData& data) {
 }
 
 }  // namespace
+
+ReadingProgress readingProgress(const DiagnosisOptions& options, const std::string& stage) {
+  return [&options, stage](std::size_t done, std::size_t all) {
+    if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
+    if (options.on_progress) options.on_progress({stage, static_cast<double>(done) / static_cast<double>(all)});
+  };
+}
 
 ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const ReadingProgress& on_progress) {
   ReceivedSession session;
@@ -416,14 +422,8 @@ std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedPar
 }
 
 Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& options) {
-  const auto telling = [&options](const std::string& stage) {
-    return [&options, stage](std::size_t done, std::size_t all) {
-      if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
-      if (options.on_progress) options.on_progress({stage, static_cast<double>(done) / static_cast<double>(all)});
-    };
-  };
-  const TimedRecording timed = inTime(recording, {}, telling("frames on the way"));
-  ReceivedSession session = receiveSession(timed.recording, true, telling("reading captures"));
+  const TimedRecording timed = inTime(recording, {}, readingProgress(options, "frames on the way"));
+  ReceivedSession session = receiveSession(timed.recording, true, readingProgress(options, "reading captures"));
   ChannelData& data = session.data;
   Diagnosis result;
   const auto add = [&](Finding finding, const std::map<std::string, double>& nats_by_pose = {}) {

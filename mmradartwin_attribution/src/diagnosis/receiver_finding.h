@@ -9,6 +9,7 @@
 #include "channel_errors.h"
 #include "delivery.h"
 #include "hypothesis_fit.h"
+#include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_attribution/frame_evidence.h"
 
@@ -23,6 +24,8 @@ struct ReceivedSession {
   std::vector<FrameFinding> frames, unexplained;
   std::vector<Delivery> deliveries;
 };
+/// Tells options.on_progress of a stage as long as options are there; throws DiagnosisCancelled where they say so.
+ReadingProgress readingProgress(const DiagnosisOptions& options, const std::string& stage);
 /// `by_echoes`: looks how it was delivered. Throws InputError where no pose is left.
 ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const ReadingProgress& on_progress);
 
