@@ -234,6 +234,7 @@ Twin::Twin(Twin&&) noexcept = default;
 const TwinDescription& Twin::description() const { return impl_->description; }
 const RadarConfig& Twin::radar() const { return impl_->description.radar; }
 const Scene& Twin::scene() const { return impl_->scene; }
+const Scene& Twin::tracedScene() const { return impl_->model(); }
 const RayCaster& Twin::rays() const { return *impl_->rays; }
 void Twin::setStrongestAmplitude(double amplitude) { impl_->strongest = amplitude; }
 

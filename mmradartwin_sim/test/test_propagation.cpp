@@ -549,6 +549,33 @@ TEST_F(Propagation, ALateEchoIsAPointFartherAway) {
   EXPECT_TRUE(of(run("  empirical_echo: {x_m: 9, y_m: 0, height_m: 0, rcs_dbsm: 0}\n"), "empirical_echo").empty());
 }
 
+TEST_F(Propagation, FacetsOfAPathAreThoseOfTheEditedScene) {
+  addWall("side", "Metal", {0.5, 2.5}, {6, 2.5}, -2, 2);
+  addWall("wall", "Metal", {4, -3}, {4, 3}, -2, 2);
+  writeScene();
+  const Twin twin =
+      makeTwin(path("scene.yaml"),
+               "  specular: {max_bounces: 2}\n  actor_absent: {actor: side}\n"
+               "  actor_unmodelled: {shape: box, x_m: 2.2, y_m: 0, size_m: 0.4, bottom_m: -1, height_m: 2}\n");
+  const Eigen::Isometry3d T_map_radar = radarPose(0, 0, 0);
+  const Scene& scene = twin.tracedScene();
+  int box = 0;
+  for (const PathRecord& r : twin.trace(T_map_radar)) {
+    for (std::size_t i = 0; i < r.facets.size(); ++i) {
+      if (r.facets[i] < 0) continue;
+      ASSERT_LT(r.facets[i], static_cast<int>(scene.facets.size()));
+      const int actor = scene.facets[static_cast<std::size_t>(r.facets[i])].actor;
+      EXPECT_EQ(actor < static_cast<int>(twin.scene().actors.size()) ? actor : -1, r.actors[i]);
+      box += r.actors[i] < 0;
+    }
+    EXPECT_LE(LawVariable("foot_m").of({scene, T_map_radar, 0, 1}, r).count, 1);
+  }
+  EXPECT_GT(box, 0);
+  EXPECT_NE(&scene, &twin.scene());
+  const Twin plain = makeTwin(path("scene.yaml"), "  specular: {max_bounces: 2}\n");
+  EXPECT_EQ(&plain.tracedScene(), &plain.scene());
+}
+
 TEST_F(Propagation, LawVariablesReadPathAndSession) {
   Scene scene;
   Facet facet;

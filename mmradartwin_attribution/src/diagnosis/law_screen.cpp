@@ -85,6 +85,7 @@ class LawScreen {
   Hypothesis law(const Observable& o, const Over& over, const std::vector<double>& at) const;
 
   const Twin& base_;
+  const Twin twin_;  ///< with the state's mechanisms: paths are of its scene
   const SessionModel& model_;
   std::vector<MeasuredPose> poses_;
   std::vector<int> location_;  // [P]
@@ -93,16 +94,15 @@ class LawScreen {
 };
 
 LawScreen::LawScreen(const Twin& base, const SessionModel& model, const ModelState& null, const std::vector<int>& poses)
-    : base_(base), model_(model) {
+    : base_(base), twin_(base.changed(null.mechanisms)), model_(model) {
   const std::vector<Observable> of = observables(base.radar());
-  const Twin twin = base.changed(null.mechanisms);
   std::int64_t first_ns = model.data().poses.front().pose.stamp_ns;
   for (const PoseChannels& p : model.data().poses) first_ns = std::min(first_ns, p.pose.stamp_ns);
   std::vector<std::optional<MeasuredPose>> each(poses.size());
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
     const std::int64_t stamp_ns = model.data().poses[static_cast<std::size_t>(poses[j])].pose.stamp_ns;
     const double session_s = 1e-9 * static_cast<double>(stamp_ns - first_ns);
-    each[j].emplace(measurePaths(base, twin, model, null, poses[j], session_s, of));
+    each[j].emplace(measurePaths(twin_, model, null, poses[j], session_s, of));
   });
   double strongest_amplitude = 0;
   for (std::optional<MeasuredPose>& p : each) {

@@ -68,15 +68,15 @@ std::vector<Observable> observables(const RadarConfig& radar) {
   return all;
 }
 
-MeasuredPose measurePaths(const Twin& base, const Twin& twin, const SessionModel& model, const ModelState& state,
-                          int pose, double session_s, const std::vector<Observable>& of) {
+MeasuredPose measurePaths(const Twin& twin, const SessionModel& model, const ModelState& state, int pose,
+                          double session_s, const std::vector<Observable>& of) {
   const PoseChannels& data = model.data().poses[static_cast<std::size_t>(pose)];
-  const RadarConfig& radar = base.radar();
+  const RadarConfig& radar = twin.radar();
   const Eigen::Isometry3d& T = data.pose.T_map_radar;
   std::vector<PathRecord> records = twin.receivedPaths(T, twin.trace(T, data.pose.stamp_ns), data.pose.stamp_ns);
   double most = 0;
   for (const PathRecord& r : records) most = std::max(most, r.amplitude);
-  MeasuredPose result{data.location, {base.scene(), T, session_s, most}, {}};
+  MeasuredPose result{data.location, {twin.tracedScene(), T, session_s, most}, {}};
   const int channels = radar.channels(), samples = radar.samples_per_chirp;
   const double gain = std::exp(state.nuisance.log_gain), wave = 2 * M_PI / radar.wavelength_m();
   std::map<int, Eigen::MatrixXcd> expected;  // by bin

@@ -40,8 +40,8 @@ struct MeasuredPose {
 };
 
 /// Measures the paths of one pose, each by itself: level, range, azimuth and channels against what the state expects.
-/// twin: base with the state's mechanisms. What is returned refers to base's scene.
-MeasuredPose measurePaths(const Twin& base, const Twin& twin, const SessionModel& model, const ModelState& state,
-                          int pose, double session_s, const std::vector<Observable>& of);
+/// twin: with the state's mechanisms. What is returned refers to its scene.
+MeasuredPose measurePaths(const Twin& twin, const SessionModel& model, const ModelState& state, int pose,
+                          double session_s, const std::vector<Observable>& of);
 
 }  // namespace mmradartwin

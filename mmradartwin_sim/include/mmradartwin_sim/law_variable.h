@@ -30,7 +30,7 @@ class LawVariable {
 
   /// All that a variable needs beside the path.
   struct Where {
-    const Scene& scene;
+    const Scene& scene;  ///< that the path was traced in
     Eigen::Isometry3d T_map_radar;
     double session_s = 0;            ///< after the session's first pose
     double strongest_amplitude = 0;  ///< of the session's echoes

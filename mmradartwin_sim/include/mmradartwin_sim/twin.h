@@ -88,9 +88,11 @@ class Twin {
 
   const TwinDescription& description() const;
   const RadarConfig& radar() const;
-  /// The scene as described, before mechanisms edited it: what expected regions come from. Records index scene(), and
-  /// mechanisms that remove an actor keep the indices.
+  /// The scene as described, before mechanisms edited it: what expected regions come from. Records' actors index
+  /// scene(), and mechanisms that remove an actor keep the indices.
   const Scene& scene() const;
+  /// The scene as mechanisms edited it, scene() where none does: what PathRecord::facets index.
+  const Scene& tracedScene() const;
   const RayCaster& rays() const;  ///< of scene()
   /// A twin of the same scene and radar with other mechanisms; reads no mesh again. What setStrongestAmplitude() and
   /// setSession() said holds on. Throws InputError as the constructor does.
