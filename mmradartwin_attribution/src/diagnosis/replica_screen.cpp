@@ -8,6 +8,7 @@
 #include <iterator>
 #include <numeric>
 #include <optional>
+#include <set>
 
 #include "effective_scores.h"
 
@@ -23,6 +24,9 @@ constexpr double kLevels_db[] = {-20, -12, -5};  ///< that distances are looked 
 constexpr std::size_t kLevels = std::size(kLevels_db);
 constexpr std::ptrdiff_t kApart_steps = 8;  ///< between distances that are looked at
 constexpr std::size_t kLooks = 4;
+/// A second face within the main lobe shows in how wide the echoes of an actor are, which no bin tells by itself.
+constexpr double kSecondFace_bins = 0.6;
+constexpr std::size_t kFaces = 16;  ///< actors with most power, of which one is looked for
 
 }  // namespace
 
@@ -49,10 +53,12 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
   std::array<double, kLevels> levels;         // of power
   std::transform(std::begin(kLevels_db), std::end(kLevels_db), levels.begin(),
                  [](double db) { return std::pow(10, db / 10); });
-  std::vector<std::vector<Gains>> sums(poses.size());  // [poses][targets][distances]
+  std::vector<std::vector<Gains>> sums(poses.size());       // [poses][targets][distances]
+  std::vector<std::vector<double>> received(poses.size());  // [poses][targets], of the strongest echo's power
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
     std::vector<Gains>& sum = sums[j];
     sum.assign(targets * distances_m.size(), Gains{});
+    received[j].assign(targets, 0.0);
     const auto pose = static_cast<std::size_t>(poses[j]);
     const PoseChannels& p = data.poses[pose];
     const Eigen::Isometry3d& T = p.pose.T_map_radar;
@@ -65,6 +71,11 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
       if (r.bounces == 0 || r.amplitude * r.amplitude < kLeastPower * strongest * strongest) continue;
       double own = gain;
       for (int a : r.actors) own *= std::exp(null.nuisance.actor_gain[errorOf(a, null.nuisance.actor_gain.size())]);
+      std::set<std::size_t> met = {0};
+      for (int a : r.actors) {
+        if (a >= 0) met.insert(1 + static_cast<std::size_t>(a));
+      }
+      for (std::size_t target : met) received[j][target] += std::pow(r.amplitude / strongest, 2);
       const Eigen::Map<const Eigen::VectorXcd> c(r.c.data(), channels);
       for (int bin = 0; bin < samples; ++bin) {
         const SessionModel::Whitened& cell = cells[static_cast<std::size_t>(bin)];
@@ -83,15 +94,9 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
                 model.gainOfPoint(cells[static_cast<std::size_t>(bin)], power * levels[level], noise[bin], found[bin]);
           }
         }
-        const auto add = [&](std::size_t target) {
+        for (std::size_t target : met) {
           Gains& to = sum[target * distances_m.size() + d];
           for (std::size_t level = 0; level < kLevels; ++level) to[level] += gains[level];
-        };
-        add(0);
-        for (std::size_t i = 0; i < r.actors.size(); ++i) {
-          const bool again = std::find(r.actors.begin(), r.actors.begin() + static_cast<std::ptrdiff_t>(i),
-                                       r.actors[i]) != r.actors.begin() + static_cast<std::ptrdiff_t>(i);
-          if (r.actors[i] >= 0 && !again) add(1 + static_cast<std::size_t>(r.actors[i]));
         }
       }
     }
@@ -139,9 +144,9 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
     return peaks;
   };
   // Of one level and of echoes by themselves, that says little of all together: the whole likelihood is asked.
-  const auto bestOf = [&](std::vector<Peak> peaks) -> std::optional<Screened> {
+  const auto bestOf = [&](std::vector<Peak> peaks, std::size_t looks) -> std::optional<Screened> {
     std::sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) { return a.promised > b.promised; });
-    if (peaks.size() > kLooks) peaks.resize(kLooks);
+    if (peaks.size() > looks) peaks.resize(looks);
     std::optional<Screened> best;
     double behind_m = 0;
     for (const Peak& p : peaks) {
@@ -157,12 +162,19 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
     return best;
   };
   std::vector<Screened> result;
-  if (auto of_all = bestOf(peaksOf(0))) result.push_back(std::move(*of_all));
+  if (auto of_all = bestOf(peaksOf(0), kLooks)) result.push_back(std::move(*of_all));
   std::vector<Peak> peaks;
   for (std::size_t target = 1; target < targets; ++target) {
     for (const Peak& p : peaksOf(target)) peaks.push_back(p);
   }
-  if (auto of_one = bestOf(std::move(peaks))) result.push_back(std::move(*of_one));
+  if (auto of_one = bestOf(std::move(peaks), kLooks)) result.push_back(std::move(*of_one));
+  std::vector<Peak> faces;
+  for (std::size_t target = 1; target < targets; ++target) {
+    const double power = std::accumulate(received.begin(), received.end(), 0.0,
+                                         [&](double sum, const auto& of_pose) { return sum + of_pose[target]; });
+    if (power > 0) faces.push_back({target, kSecondFace_bins * bin_m, power});
+  }
+  if (auto face = bestOf(std::move(faces), kFaces)) result.push_back(std::move(*face));
   return result;
 }
 
