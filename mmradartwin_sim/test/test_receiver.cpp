@@ -265,11 +265,17 @@ TEST_F(ReceiverTest, GainDriftsWithTimeOrBySteps) {
     return gains;
   };
   const auto ramp = gains("  gain_drift: {db_per_hour: 3}\n"), steps = gains("  gain_drift: {steps_db: [2, -1]}\n");
-  const std::vector<double> after_steps = {0, 0, 2, 2, 1};
+  const auto at_times = gains("  gain_drift: {steps_db: [2, -3], steps_s: [900, 6000]}\n");
+  const std::vector<double> after_steps = {0, 0, 2, 2, 1}, after_times = {0, 2, 2, 2, -1};
   for (std::size_t i = 0; i < 5; ++i) {
     EXPECT_NEAR(ramp[i], 1.5 * static_cast<double>(i), 1e-9);
     EXPECT_NEAR(steps[i], after_steps[i], 1e-9);
+    EXPECT_NEAR(at_times[i], after_times[i], 1e-9);
   }
+  EXPECT_NE(errorOf([&] { look("  gain_drift: {steps_db: [2], steps_s: [1, 2]}\n"); }).find("one time for each"),
+            std::string::npos);
+  EXPECT_NE(errorOf([&] { look("  gain_drift: {steps_db: [2, 1], steps_s: [2, 1]}\n"); }).find("has to rise"),
+            std::string::npos);
   EXPECT_NE(errorOf([&] { look("  gain_drift: {steps_db: [2], db_per_hour: 1}\n"); }).find("not both"),
             std::string::npos);
 }

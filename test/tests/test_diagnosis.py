@@ -180,6 +180,18 @@ class HiddenEffects(unittest.TestCase):
         self.assertAlmostEqual(first["mechanism"]["echo_replica"]["behind_m"], 0.7, delta=0.05, msg=f"seed {seed}")
         self.assertGreater(first["gain"]["explained_power"]["difference_ci95"][0], 0, msg=f"seed {seed}")
 
+    def test_a_second_face_half_a_bin_behind_a_wall_is_unknown(self):
+        # It widens the echoes of one actor, which maps do not show and no bin tells by itself.
+        truth = trials.hide(draws.Trial("outside", "office", 161, 1, poses=24), self.at("session"))
+        self.assertEqual(truth[0]["cause"], "layered_panel")
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["unknown"], msg=str(findings))
+        told, hidden = findings["findings"][0]["mechanism"]["echo_replica"], truth[0]["parameters"]
+        self.assertEqual(told["actor"], hidden["actor"])
+        self.assertAlmostEqual(told["behind_m"], hidden["depth_m"], delta=0.02)
+        self.assertAlmostEqual(told["level_db"], 20 * math.log10(hidden["level"]), delta=3)
+
     def unknown(self, seed, hidden, strength=None):
         """The mechanism of the one finding, `unknown`, of a session that hides an effect of no name, and the truth."""
         truth = self.measured(seed, hidden, headings=2, strength=strength)
@@ -334,6 +346,17 @@ class HiddenEffects(unittest.TestCase):
         _, first, _ = self.found(seed, {"gain_drift": {"steps_db": [-4.0]}}, headings=2)
         steps_db = first["parameters"]["steps_db"]["value"]
         self.assertAlmostEqual(sum(steps_db), -4.0, delta=2.0, msg=f"seed {seed}: {steps_db}")
+
+    def test_steps_of_the_gain_are_found_when_they_happened(self):
+        seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "53"))
+        # The campaign lasts some 600 s: neither is at equal parts.
+        findings, first, truth = self.found(seed, {"gain_drift": {"steps_db": [-4.0, 6.0], "steps_s": [90.0, 330.0]}},
+                                            headings=2, tier="office")
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["gain_drift"], msg=f"seed {seed}")
+        for told, step in zip(first["parameters"]["steps_db"]["value"], truth["steps_db"], strict=True):
+            self.assertAlmostEqual(told, step, delta=1.5, msg=f"seed {seed}")
+        for told, time_s in zip(first["mechanism"]["gain_drift"]["steps_s"], truth["steps_s"], strict=True):
+            self.assertAlmostEqual(told, time_s, delta=40, msg=f"seed {seed}")
 
     def test_a_weak_step_of_the_gain_is_seen_from_few_places(self):
         # 3 dB at nine places with all errors of rooms and poses; by the scatter of nine places alone chance made as much

@@ -42,15 +42,19 @@ std::string shown(const FindingParameter& p) {
   return out.str();
 }
 
-/// What its mechanism needs beyond the cause's parameters: the shape of an object and so on. Lists of laws are left to
-/// findings.json.
+/// What its mechanism needs beyond the cause's parameters: the shape of an object, when a gain steps and so on. Lists
+/// of laws are left to findings.json.
 std::vector<std::string> shownBesides(const Finding& f) {
   std::vector<std::string> words;
   if (!f.mechanism || f.cause == "unknown") return words;
-  for (const auto& [name, value] : f.mechanism->values.all()) {
-    if (f.parameter(name) != nullptr) continue;
-    if (const auto* number = std::get_if<double>(&value)) words.push_back(name + " = " + shown(*number, 4));
-    if (const auto* text = std::get_if<std::string>(&value)) words.push_back(name + " = " + *text);
+  const std::vector<CauseParameter>& own = causeDescription(f.cause).parameters;
+  for (const auto& item : f.mechanism->values.all()) {
+    const auto is_own = [&](const CauseParameter& p) { return p.name == item.first; };
+    if (std::any_of(own.begin(), own.end(), is_own)) continue;  // told, or another one stands for it
+    const auto* numbers = std::get_if<std::vector<double>>(&item.second);
+    const auto* texts = std::get_if<std::vector<std::string>>(&item.second);
+    if ((numbers && numbers->empty()) || (texts && texts->empty())) continue;
+    words.push_back(shown(FindingParameter{item.first, "1", item.second, {}}));
   }
   return words;
 }

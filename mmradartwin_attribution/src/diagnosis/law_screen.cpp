@@ -24,7 +24,8 @@ constexpr double kHuber = 2;  ///< standard deviations from which on a path coun
 constexpr int kReweighings = 3;
 constexpr double kPricePerNumber = 4;  ///< nats, by which fewer numbers are preferred,
 constexpr double kLeastWorth = -2;     ///< and that may be missing: a fit finds some times what paths alone show
-constexpr double kFewestPlaces = 3;    ///< that tell of a law with nothing outside a part of its variable
+constexpr std::size_t kMostSteps = 3;
+constexpr double kFewestPlaces = 3;  ///< that tell of a law with nothing outside a part of its variable
 constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;
 constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};
 constexpr int kBearings = 24;  ///< that half a turn is divided into
@@ -73,6 +74,8 @@ class LawScreen {
   std::optional<Screened> bestBearing() const;
   /// Over how near to a place paths pass, or the radar stands: the place that promises most.
   std::optional<Screened> bestPlace(const std::string& variable) const;
+  /// Steps of all levels, at the times between poses that promise most.
+  std::optional<Screened> bestSteps() const;
   /// Actors of whom enough paths are measured for a law of their own.
   std::vector<std::string> oftenSeen() const;
 
@@ -423,6 +426,73 @@ std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const 
 
 }  // namespace
 
+std::optional<Screened> LawScreen::bestSteps() const {
+  const Sample& s = gain();
+  std::vector<double> time_s;  // [P]
+  std::set<double> stamps_s;
+  for (const MeasuredPose& pose : poses_) {
+    time_s.insert(time_s.end(), pose.paths.size(), pose.where.session_s);
+    stamps_s.insert(pose.where.session_s);
+  }
+  if (stamps_s.size() < 2 || s.weight.sum() == 0) return std::nullopt;
+  std::vector<double> between_s;
+  for (auto stamp = std::next(stamps_s.begin()); stamp != stamps_s.end(); ++stamp) {
+    between_s.push_back(0.5 * (*std::prev(stamp) + *stamp));
+  }
+  const auto of = [&](const std::vector<double>& steps_s) {
+    Eigen::MatrixXd after(static_cast<Eigen::Index>(time_s.size()), static_cast<Eigen::Index>(steps_s.size()));
+    for (Eigen::Index p = 0; p < after.rows(); ++p) {
+      for (Eigen::Index k = 0; k < after.cols(); ++k) {
+        const bool later = time_s[static_cast<std::size_t>(p)] > steps_s[static_cast<std::size_t>(k)];
+        after(p, k) = later ? s.latent(p, 0) : 0;
+      }
+    }
+    return promise(s, after);
+  };
+  /// The time of one step that promises most beside the others.
+  const auto moved = [&](std::vector<double> steps_s, std::size_t which) {
+    std::vector<double> best = steps_s;
+    double most = -INFINITY;
+    for (double t : between_s) {
+      if (std::count(steps_s.begin(), steps_s.end(), t) > (steps_s[which] == t ? 1 : 0)) continue;
+      steps_s[which] = t;
+      const Promise p = of(steps_s);
+      if (p.raw / p.inflation <= most) continue;
+      most = p.raw / p.inflation;
+      best = steps_s;
+    }
+    return best;
+  };
+  std::vector<double> steps_s;
+  std::optional<Screened> result;
+  double most = kLeastWorth;
+  while (steps_s.size() < std::min(kMostSteps, between_s.size())) {
+    steps_s.push_back(-1);
+    for (std::size_t which = steps_s.size(); which-- > 0;) steps_s = moved(steps_s, which);
+    std::vector<double> sorted_s = steps_s;
+    std::sort(sorted_s.begin(), sorted_s.end());
+    const Promise p = of(sorted_s);
+    const double count = static_cast<double>(steps_s.size()), nats = p.raw / p.inflation;
+    if (nats - kPricePerNumber * 2 * count <= most) continue;
+    most = nats - kPricePerNumber * 2 * count;
+    result.emplace();
+    Hypothesis& h = result->hypothesis;
+    h.mechanism = defaultMechanism("gain_drift");
+    h.mechanism.values.set("steps_db", std::vector<double>(sorted_s.size(), 0.0));
+    h.mechanism.values.set("steps_s", sorted_s);
+    h.variant =
+        std::to_string(sorted_s.size()) + (sorted_s.size() > 1 ? " steps where they show" : " step where it shows");
+    h.searched = static_cast<int>(sorted_s.size());  // when
+    result->promised = nats - 0.5 * 2 * count;
+    result->starts = {{}};
+    for (std::size_t k = 0; k < sorted_s.size(); ++k) {
+      h.coordinates.push_back({"steps_db", "dB", static_cast<int>(k), 0, 1, -100, 100});
+      result->starts.front().push_back(std::clamp(p.value[static_cast<Eigen::Index>(k)], -8.0, 8.0));
+    }
+  }
+  return result;
+}
+
 std::vector<Screened> screenLaws(const Twin& base, const SessionModel& model, const ModelState& null,
                                  const std::vector<int>& poses) {
   std::vector<Screened> result;
@@ -450,6 +520,8 @@ std::vector<Screened> screenLaws(const Twin& base, const SessionModel& model, co
   for (const std::string& actor : screen.oftenSeen()) {
     for (const char* variable : {"foot_m", "time_s"}) add(screen.best(screen.gain(), {variable, actor}));
   }
+  const auto drifts = [](const NamedParameters& m) { return m.mechanism == "gain_drift"; };
+  if (std::none_of(null.mechanisms.begin(), null.mechanisms.end(), drifts)) add(screen.bestSteps());
   add(screen.bestBearing());
   for (const std::string& variable : LawVariable::names()) {
     if (LawVariable::isAboutPlace(variable)) add(screen.bestPlace(variable));

@@ -13,7 +13,7 @@ namespace mmradartwin {
 /// of these over the variable, robust and beside the errors that actors have of their own. Forms are curves of a few
 /// nodes, ripples, sectors (steps among them) and, over the floor plan, spots; the one that explains most for its
 /// numbers is taken. Promises are what it takes off the paths' scatter, in nats, over how much more than by chance
-/// places scatter.
+/// places scatter. Steps of all levels between poses have a name and stand among them: gain_drift.
 std::vector<Screened> screenLaws(const Twin& base, const SessionModel& model, const ModelState& null,
                                  const std::vector<int>& poses);
 

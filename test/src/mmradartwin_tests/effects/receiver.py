@@ -108,22 +108,26 @@ class ExcessAttenuation(Effect):
 class GainDrift(Effect):
     """Gain that changes with time: a rate, or steps_db at equal parts of the session."""
     name, main, rank = "gain_drift", "db_per_hour", 2
-    defaults = {"db_per_hour": 4.0, "steps_db": None}
+    defaults = {"db_per_hour": 4.0, "steps_db": None, "steps_s": None}
 
     def gain_db(self, measurement, index):
         """At one pose, 0 at the first."""
-        if self.p["steps_db"] is not None:
-            steps = [0.0] + list(np.atleast_1d(self.p["steps_db"]))
-            return sum(steps[:1 + index * len(steps) // len(measurement.stations)])
         stations = measurement.stations
-        return self.p["db_per_hour"] * (stations[index].stamp_ns - stations[0].stamp_ns) / 3.6e12
+        after_s = (stations[index].stamp_ns - stations[0].stamp_ns) / 1e9
+        if self.p["steps_db"] is None:
+            return self.p["db_per_hour"] * after_s / 3600
+        steps = np.atleast_1d(self.p["steps_db"])
+        if self.p["steps_s"] is not None:
+            return float(steps[np.atleast_1d(self.p["steps_s"]) < after_s].sum())
+        return float(steps[:index * (len(steps) + 1) // len(stations)].sum())
 
     def receive(self, measurement, index, station, x):
         return x * 10**(self.gain_db(measurement, index) / 20)
 
     def truth(self, measurement):
-        key = "steps_db" if self.p["steps_db"] is not None else "db_per_hour"
-        return {key: self.p[key]}
+        if self.p["steps_db"] is None:
+            return {"db_per_hour": self.p["db_per_hour"]}
+        return {key: self.p[key] for key in ("steps_db", "steps_s") if self.p[key] is not None}
 
 
 @effect
