@@ -93,7 +93,9 @@ def print_table(output, results, sealed):
         parts += [f"### {tier} tier, {poses} poses of {frames} frames, {len(records)} trials",
                   table.markdown(table.HEAD, scores.table()),
                   table.markdown(("row", "hidden", "right", "first finding"), scores.by_cause()),
-                  table.markdown(("parameter", "95 % intervals that hold the truth", "values"), scores.by_parameter())]
+                  table.markdown(("parameter", "95 % intervals that hold the truth", "values"), scores.by_parameter()),
+                  table.markdown(("name, where nothing is hidden", "fitted", "most nats", "trial"),
+                                 scores.by_name_where_nothing_is())]
         if len(scores.coverage()) >= 5:
             with open(os.path.join(output, f"quantiles_{tier}_{poses}.svg"), "w", encoding="utf-8") as out:
                 out.write(table.quantile_plot(scores.coverage()))

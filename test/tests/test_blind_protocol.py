@@ -491,6 +491,20 @@ class Table(InFolder):
         self.assertEqual(told["wall time of one diagnosis, median and longest"], ("13 s, 16 s", 7))
         self.assertEqual(told["CPU time of one diagnosis, median and longest"], ("11 s, 14 s", 7))
 
+    def test_what_names_are_worth_where_nothing_is_hidden(self):
+        with open(self.at("tried.csv"), "w", encoding="utf-8") as out:
+            out.write("round,hypothesis,promised_nats,gain_nats,gain_without_best_place_nats,inflation,verdict\n"
+                      '0,"actor_unmodelled, at 1.0, 2.0 m",5,60,40,2,"no larger than clutter is"\n'
+                      '0,"actor_unmodelled, a box at 1.0, 2.0 m",5,60,45,1.5,""\n'
+                      '0,"echo_replica of sofa",9,30,-7,1,""\n0,"range_bias",-1,,,,""\n')
+        most = trials.most_nats(self.at("tried.csv"))
+        self.assertEqual(most, {"actor_unmodelled": 30.0, "echo_replica": -7.0})
+        scores = self.scores([("clean", [], [], "ok")] * 2)
+        for (record, _, _), nats in zip(scores.rows["clean"], (most, {"actor_unmodelled": 12.5}), strict=True):
+            record["most_nats"] = nats
+        self.assertEqual(scores.by_name_where_nothing_is(), [("actor_unmodelled", "2", "30.0", "0"),
+                                                             ("echo_replica", "1", "-7.0", "0")])
+
     def test_strength_is_told_in_limits_of_the_matched_test(self):
         def strength(nats):
             return table.strength_over_limit({"told": {"nats": nats, "nats_ci95": [0, nats], "explained_power": 0.1}})

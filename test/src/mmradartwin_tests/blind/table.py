@@ -161,6 +161,15 @@ class Scores:
                          ", ".join(f"{name} {n}" if n > 1 else name for name, n in said.most_common())))
         return rows
 
+    def by_name_where_nothing_is(self):
+        """Rows of text over the clean sessions: name, how often it was fitted, most nats (trials.most_nats), where."""
+        best = collections.defaultdict(list)
+        for record, _, _ in self.rows["clean"]:
+            for name, nats in record.get("most_nats", {}).items():
+                best[name].append((nats, record["key"]))
+        rows = [(name, str(len(all_of)), f"{max(all_of)[0]:.1f}", max(all_of)[1]) for name, all_of in best.items()]
+        return sorted(rows, key=lambda row: -float(row[2]))
+
     def by_parameter(self):
         """Rows of text: parameter, covered, bounds."""
         groups = collections.defaultdict(list)

@@ -1,4 +1,5 @@
 """Runs one blind trial: hide, seal, diagnose, open, keep what came out. And keeps results, so that none runs twice."""
+import csv
 import json
 import os
 import re
@@ -103,6 +104,20 @@ def answer(program, session, folder, limit_s, jobs):
     return record
 
 
+def most_nats(file):
+    """{name: nats} of a diagnosis's tried.csv: the most that a name gains without its best place, over the inflation of
+    its scatter, of those that were fitted. Bounds of the diagnosis stand above what this comes to where nothing is
+    hidden."""
+    most = {}
+    with open(file, encoding="utf-8", newline="") as text:
+        for row in csv.DictReader(text):
+            if row["gain_nats"]:
+                name = re.split("[ ,]", row["hypothesis"])[0]
+                nats = round(float(row["gain_without_best_place_nats"]) / float(row["inflation"]), 2)
+                most[name] = max(nats, most.get(name, nats))
+    return most
+
+
 def told(program, session, truth, folder, limit_s, jobs):
     """What a twin that is told the effect explains more than the session's own, None where it cannot be told all of it:
     causes are mechanisms of the same name and parameters. {"explained_power", "nats", "nats_ci95" over places}."""
@@ -153,6 +168,9 @@ def run_trial(trial, ledger, program, limit_s=600.0, jobs=1):
         ledger.seal(trial.key(), {"key": trial.key(), "effects": truths})
         made_s = time.monotonic() - start
         record = answer(program, session, folder, limit_s, jobs)
+        tried = os.path.join(folder, "out", "tried.csv")
+        if trial.row == "clean" and os.path.exists(tried):
+            record["most_nats"] = most_nats(tried)
         if trial.row in ("single", "faint") and truths[0]["cause"] not in UNTOLD:
             record["told"] = told(program, session, truths[0], folder, limit_s, jobs)
         if trial.row == "recording":
