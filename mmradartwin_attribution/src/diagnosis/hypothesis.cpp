@@ -15,8 +15,6 @@ namespace {
 
 // Pairs of actors are tried as a corner where their bounds come this near.
 constexpr double kNear_m = 0.1;
-// Steps of a gain over a session are tried up to this number.
-constexpr int kMostSteps = 3;
 // A face has to be this large to mirror a room.
 constexpr double kMirrorArea_m2 = 0.5;
 

@@ -28,6 +28,9 @@ struct Coordinate {
   double slope(double scaled) const;
 };
 
+/// Steps of a gain over a session are tried up to this number.
+constexpr int kMostSteps = 3;
+
 /// A change of the twin that data may support: one mechanism with what is free in it.
 struct Hypothesis {
   NamedParameters mechanism;            ///< texts set, numbers at their neutral values

@@ -24,8 +24,7 @@ constexpr double kHuber = 2;  ///< standard deviations from which on a path coun
 constexpr int kReweighings = 3;
 constexpr double kPricePerNumber = 4;  ///< nats, by which fewer numbers are preferred,
 constexpr double kLeastWorth = -2;     ///< and that may be missing: a fit finds some times what paths alone show
-constexpr std::size_t kMostSteps = 3;
-constexpr double kFewestPlaces = 3;  ///< that tell of a law with nothing outside a part of its variable
+constexpr double kFewestPlaces = 3;    ///< that tell of a law with nothing outside a part of its variable
 constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;
 constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};
 constexpr int kBearings = 24;  ///< that half a turn is divided into
@@ -466,7 +465,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
   std::vector<double> steps_s;
   std::optional<Screened> result;
   double most = kLeastWorth;
-  while (steps_s.size() < std::min(kMostSteps, between_s.size())) {
+  while (steps_s.size() < std::min<std::size_t>(kMostSteps, between_s.size())) {
     steps_s.push_back(-1);
     for (std::size_t which = steps_s.size(); which-- > 0;) steps_s = moved(steps_s, which);
     std::vector<double> sorted_s = steps_s;
