@@ -50,7 +50,7 @@ std::vector<std::string> shownBesides(const Finding& f) {
   const std::vector<CauseParameter>& own = causeDescription(f.cause).parameters;
   for (const auto& item : f.mechanism->values.all()) {
     const auto is_own = [&](const CauseParameter& p) { return p.name == item.first; };
-    if (std::any_of(own.begin(), own.end(), is_own)) continue;  // told, or another one stands for it
+    if (f.parameter(item.first) != nullptr || std::any_of(own.begin(), own.end(), is_own)) continue;  // told, or not it
     const auto* numbers = std::get_if<std::vector<double>>(&item.second);
     const auto* texts = std::get_if<std::vector<std::string>>(&item.second);
     if ((numbers && numbers->empty()) || (texts && texts->empty())) continue;

@@ -97,22 +97,6 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
   if (!material && !actor && spec("walls") == specs.end() && spec("actors") == specs.end()) out.push_back(bare);
 }
 
-/// A gain may change at once instead of at a rate: lists of steps, whose length says where they are.
-void addSteps(const Hypothesis& bare, const std::vector<ParameterSpec>& specs, std::vector<Hypothesis>& out) {
-  const auto spec =
-      std::find_if(specs.begin(), specs.end(), [](const ParameterSpec& s) { return s.name == "steps_db"; });
-  if (spec == specs.end()) return;
-  for (int steps = 1; steps <= kMostSteps; ++steps) {
-    Hypothesis h = bare;
-    h.coordinates.clear();
-    h.mechanism.values.set(spec->name, std::vector<double>(static_cast<std::size_t>(steps), 0.0));
-    for (int k = 0; k < steps; ++k)
-      h.coordinates.push_back({spec->name, spec->unit, k, 0, 1, spec->min, spec->max, {}});
-    h.variant = std::to_string(steps) + (steps > 1 ? " steps" : " step");
-    out.push_back(std::move(h));
-  }
-}
-
 /// The same about the values that the twin states; nothing where zero of the scale would not be these.
 std::optional<Hypothesis> aboutStated(Hypothesis h, const NamedParameters& stated) {
   h.stated = true;
@@ -218,6 +202,18 @@ std::vector<NamedParameters> mechanismsWith(std::vector<NamedParameters> base, c
   return base;
 }
 
+std::optional<Hypothesis> withSteps(Hypothesis h, int steps) {
+  const std::vector<ParameterSpec> specs = MechanismRegistry::instance().create(h.mechanism.mechanism)->parameters();
+  const auto spec =
+      std::find_if(specs.begin(), specs.end(), [](const ParameterSpec& s) { return s.name == "steps_db"; });
+  if (spec == specs.end()) return std::nullopt;
+  h.coordinates.clear();
+  h.mechanism.values.set(spec->name, std::vector<double>(static_cast<std::size_t>(steps), 0.0));
+  for (int k = 0; k < steps; ++k) h.coordinates.push_back({spec->name, spec->unit, k, 0, 1, spec->min, spec->max, {}});
+  h.variant = std::to_string(steps) + (steps > 1 ? " steps" : " step");
+  return h;
+}
+
 std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedParameters>& present) {
   std::vector<Hypothesis> result;
   const MechanismRegistry& registry = MechanismRegistry::instance();
@@ -243,7 +239,9 @@ std::vector<Hypothesis> hypotheses(const Twin& twin, const std::vector<NamedPara
     }
     std::vector<Hypothesis> all;
     addSubjects(twin, bare, specs, all);
-    addSteps(bare, specs, all);
+    for (int steps = 1; steps <= kMostSteps; ++steps) {
+      if (std::optional<Hypothesis> stepped = withSteps(bare, steps)) all.push_back(std::move(*stepped));
+    }
     for (Hypothesis& h : all) {
       const auto there = std::find_if(present.begin(), present.end(),
                                       [&](const NamedParameters& m) { return excludeEachOther(m, h.mechanism); });

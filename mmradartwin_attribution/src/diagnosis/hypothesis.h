@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,9 +29,6 @@ struct Coordinate {
   double slope(double scaled) const;
 };
 
-/// Steps of a gain over a session are tried up to this number.
-constexpr int kMostSteps = 3;
-
 /// A change of the twin that data may support: one mechanism with what is free in it.
 struct Hypothesis {
   NamedParameters mechanism;            ///< texts set, numbers at their neutral values
@@ -49,6 +47,12 @@ struct Hypothesis {
   /// True for an actor that stands elsewhere.
   bool isMove() const;
 };
+
+/// Steps of a gain over a session are tried up to this number.
+constexpr int kMostSteps = 3;
+/// A gain may change at once instead of at a rate: the same with so many steps (steps_db) in place of all other
+/// numbers, at equal parts of the session; nothing where its mechanism has no steps.
+std::optional<Hypothesis> withSteps(Hypothesis h, int steps);
 
 /// Puts it in place of what it excludes, else behind all.
 void putIn(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms);

@@ -31,9 +31,9 @@ std::optional<Eigen::Vector2d> placeOf(const NamedParameters& mechanism, const S
 std::string noFindingBecause(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers);
 
 /// True where the likelihood may have gained by what stands about in any room and no scene has: an object, a late echo
-/// or one actor's weak replica that explains no more of the measured power (explains_more), or a small object, a material
-/// that scatters somewhat and what shines through a panel of which it is not `sure` that they explain more, by however
-/// little.
+/// or one actor's weak replica that explains no more of the measured power (explains_more), or a small object, a
+/// material that scatters somewhat and what shines through a panel of which it is not `sure` that they explain more, by
+/// however little.
 bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure);
 
 /// To so many digits.

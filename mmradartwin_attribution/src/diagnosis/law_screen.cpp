@@ -423,8 +423,6 @@ std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const 
   return result;
 }
 
-}  // namespace
-
 std::optional<Screened> LawScreen::bestSteps() const {
   const Sample& s = gain();
   std::vector<double> time_s;  // [P]
@@ -448,7 +446,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
     }
     return promise(s, after);
   };
-  /// The time of one step that promises most beside the others.
+  // One step at the time that promises most beside the others.
   const auto moved = [&](std::vector<double> steps_s, std::size_t which) {
     std::vector<double> best = steps_s;
     double most = -INFINITY;
@@ -475,22 +473,21 @@ std::optional<Screened> LawScreen::bestSteps() const {
     if (nats - kPricePerNumber * 2 * count <= most) continue;
     most = nats - kPricePerNumber * 2 * count;
     result.emplace();
+    const int steps = static_cast<int>(sorted_s.size());
     Hypothesis& h = result->hypothesis;
     h.mechanism = defaultMechanism("gain_drift");
-    h.mechanism.values.set("steps_db", std::vector<double>(sorted_s.size(), 0.0));
+    h = withSteps(std::move(h), steps).value();
     h.mechanism.values.set("steps_s", sorted_s);
-    h.variant =
-        std::to_string(sorted_s.size()) + (sorted_s.size() > 1 ? " steps where they show" : " step where it shows");
-    h.searched = static_cast<int>(sorted_s.size());  // when
+    h.variant += steps > 1 ? " where they show" : " where it shows";
+    h.searched = steps;  // when
     result->promised = nats - 0.5 * 2 * count;
     result->starts = {{}};
-    for (std::size_t k = 0; k < sorted_s.size(); ++k) {
-      h.coordinates.push_back({"steps_db", "dB", static_cast<int>(k), 0, 1, -100, 100});
-      result->starts.front().push_back(std::clamp(p.value[static_cast<Eigen::Index>(k)], -8.0, 8.0));
-    }
+    for (double step_db : p.value) result->starts.front().push_back(std::clamp(step_db, -8.0, 8.0));
   }
   return result;
 }
+
+}  // namespace
 
 std::vector<Screened> screenLaws(const Twin& base, const SessionModel& model, const ModelState& null,
                                  const std::vector<int>& poses) {

@@ -117,7 +117,8 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
   };
   struct Peak {
     std::size_t target;
-    double behind_m, promised;
+    double behind_m;
+    double rank;  ///< nats promised; of second faces the power received: the highest are looked at
   };
   const auto peaksOf = [&](std::size_t target) {
     std::vector<double> promised(distances_m.size(), 0);
@@ -146,7 +147,7 @@ std::vector<Screened> screenReplicas(const Twin& base, const SessionModel& model
   };
   // Of one level and of echoes by themselves, that says little of all together: the whole likelihood is asked.
   const auto bestOf = [&](std::vector<Peak> peaks, std::size_t looks) -> std::optional<Screened> {
-    std::sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) { return a.promised > b.promised; });
+    std::sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) { return a.rank > b.rank; });
     if (peaks.size() > looks) peaks.resize(looks);
     std::optional<Screened> best;
     double behind_m = 0;

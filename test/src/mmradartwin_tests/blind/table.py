@@ -167,8 +167,8 @@ class Scores:
         for record, _, _ in self.rows["clean"]:
             for name, nats in record.get("most_nats", {}).items():
                 best[name].append((nats, record["key"]))
-        rows = [(name, str(len(all_of)), f"{max(all_of)[0]:.1f}", max(all_of)[1]) for name, all_of in best.items()]
-        return sorted(rows, key=lambda row: -float(row[2]))
+        most = sorted(((*max(all_of), len(all_of), name) for name, all_of in best.items()), reverse=True)
+        return [(name, str(fitted), f"{nats:.1f}", key) for nats, key, fitted, name in most]
 
     def by_parameter(self):
         """Rows of text: parameter, covered, bounds."""

@@ -106,7 +106,7 @@ class ExcessAttenuation(Effect):
 
 @effect
 class GainDrift(Effect):
-    """Gain that changes with time: a rate, or steps_db at equal parts of the session."""
+    """Gain that changes with time: a rate, or steps_db at steps_s after the first pose, else at equal parts."""
     name, main, rank = "gain_drift", "db_per_hour", 2
     defaults = {"db_per_hour": 4.0, "steps_db": None, "steps_s": None}
 
