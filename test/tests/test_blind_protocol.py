@@ -288,6 +288,20 @@ class ProtocolProgram(WithProgram):
 
 
 class Draws(unittest.TestCase):
+    def test_absent_effects_are_weak_and_are_told_as_hidden_ones_are(self):
+        clean = draws.Trial("clean", "office", 3, 1, poses=2, frames=2)
+        drawn = draws.absent(clean)
+        self.assertEqual(drawn, draws.absent(clean))
+        self.assertEqual(len({name for name, _ in drawn}), draws.ABSENT)
+        self.assertEqual(draws.draw(clean), [])
+        for name, parameters in drawn:
+            truth, = trials.measurement_of(clean, [(name, parameters, None)], None).hidden()
+            self.assertEqual(truth["cause"], name)
+            self.assertEqual(json.loads(json.dumps(truth["parameters"])), truth["parameters"])
+        bias = [abs(p["range_m"]) for i in range(60)
+                for name, p in draws.absent(draws.Trial("clean", "office", 3, i)) if name == "range_bias"]
+        self.assertTrue(0.0003 <= min(bias) and max(bias) <= 0.03, msg=bias)
+
     def test_every_effect_of_the_catalogue_is_drawn_once_a_round(self):
         names = [draws.draw(draws.Trial("single", "office", 3, i))[0][0] for i in range(2 * len(draws.SINGLE))]
         half = len(draws.SINGLE)
@@ -512,6 +526,36 @@ class Table(InFolder):
         self.assertIsNone(table.strength_over_limit({"told": None}))
         self.assertAlmostEqual(strength(4 * table.MATCHED_NATS), 2)
         self.assertEqual(strength(-3.0), 0)
+
+    def test_the_limit_by_chance_is_where_an_exponential_tail_reaches_the_level(self):
+        rng = np.random.default_rng(8)
+        for mean in (1.0, 4.0):
+            nats = np.concatenate([rng.exponential(mean, 1000), -rng.exponential(500, 1000)])
+            expected = mean * math.log(0.5 / table.MATCHED_LEVEL)
+            self.assertLess(abs(table.limit_by_chance(list(nats)) / expected - 1), 0.2)
+        self.assertIsNone(table.limit_by_chance([1.0] * 99))
+
+    def test_strength_is_told_in_the_limit_that_absent_effects_set(self):
+        told = self.measured(self.scores([("clean", [], [], "ok")]))
+        row, = [name for name in told if "which are not there" in name]
+        self.assertTrue(row.endswith("none of fewer than 100"), msg=row)
+        self.assertEqual(told[row], ("not run", 0))
+        rng, rows = np.random.default_rng(9), [("clean", [], [], "ok")] * 50
+        strengths = np.exp(rng.uniform(-2, 2, 200))
+        named = rng.random(200) < 1 / (1 + (1.4 / strengths) ** 4)
+        scores = self.scores(rows + [("faint", [BIAS], [finding("range_bias")] * int(n), "ok") for n in named])
+        for record, _, _ in scores.rows["clean"]:
+            record["told_absent"] = [{"cause": "range_bias", "nats": v} for v in rng.exponential(4.0, 8)]
+        limit = table.limit_by_chance([a["nats"] for r, _, _ in scores.rows["clean"] for a in r["told_absent"]])
+        for (record, _, _), strength in zip(scores.rows["faint"], strengths, strict=True):
+            nats = strength ** 2 * limit
+            record["told"] = {"nats": nats, "nats_ci95": [nats, nats], "explained_power": 0.1}
+        told = self.measured(scores)
+        row, = [name for name in told if "which are not there" in name]
+        self.assertIn("400 effects", row)
+        self.assertIn(f"{limit:.1f} nats", row)
+        self.assertEqual(told[row][1], 200)
+        self.assertLess(abs(float(told[row][0].split()[0]) - 1.4), 0.25)
 
     def test_strength_can_do_without_what_the_likelihood_scatters_over_places(self):
         def strength(nats, deviation):

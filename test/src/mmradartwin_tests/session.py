@@ -251,12 +251,15 @@ class Measurement:
                 json.dump(self.truth(), out, indent=1)
         return received, path_lists
 
+    def hidden(self):
+        """[{"cause", "parameters", "beside"}] of the effects."""
+        return [{"cause": e.name, "parameters": e.truth(self), "beside": e.beside()} for e in self.settings.effects]
+
     def truth(self):
         """What a diagnosis must not see."""
         return {
             "seed": self.settings.seed, "speckle_seed": self.speckle_seed, "tier": self.settings.tier,
-            "effects": [{"cause": e.name, "parameters": e.truth(self), "beside": e.beside()}
-                        for e in self.settings.effects],
+            "effects": self.hidden(),
             "gain_db": 20 * math.log10(self.gain), "noise_rms": self.noise_rms, "strongest_amplitude": self.strongest,
             "poses": {s.name: {"position_m": list(s.true.position),
                                "quaternion_xyzw": list(campaign.quaternion(s.true.rotation))}

@@ -212,6 +212,8 @@ FAINT = {"range_bias": ("range_m",), "range_scale": ("scale",), "carrier_scale":
          "element_pattern": ("cos_exponent",), "material_reflectivity": ("delta_db",), "iq_imbalance": ("image_db",),
          "edge_diffraction": ("level",), "actor_moved": ("distance_m", "dyaw_deg")}
 LEAST_STRENGTH = 0.03   # of the row single's
+ABSENT = 8              # effects that the matched test is told on a clean session
+ABSENT_STRENGTH = (0.01, 0.3)   # of the row single's: about where the matched test has its limit
 # Causes that a room may hold for several things at once, with the parameter that tells them apart.
 TWICE = {"actor_absent": ("actor", MOVABLE), "actor_moved": ("actor", FURNITURE), "actor_unmodelled": None,
          "material_reflectivity": ("material", MATERIALS)}
@@ -230,6 +232,22 @@ def outside_strength(rng):
     return float(rng.uniform(1.0, 1.6))
 
 
+def weakened(name, rng, trial, least, most):
+    """Parameters of an effect of the table FAINT at a share of its usual strength."""
+    values, strength = SINGLE[name](rng, trial), math.exp(rng.uniform(math.log(least), math.log(most)))
+    for parameter in FAINT[name]:
+        values[parameter] = (values[parameter] + 20 * math.log10(strength) if parameter == "image_db"
+                             else values[parameter] * strength)
+    return values
+
+
+def absent(trial):
+    """[(effect's name, parameters)] that are not in a clean session and that the matched test is told of."""
+    rng = np.random.default_rng([trial.session_seed(), 78])
+    return [(str(name), weakened(name, rng, trial, *ABSENT_STRENGTH))
+            for name in rng.choice(list(FAINT), ABSENT, replace=False)]
+
+
 def draw(trial):
     """[(effect's name, parameters, strength or None)] of a trial on a generated session."""
     rng = trial.rng()
@@ -245,11 +263,7 @@ def draw(trial):
         return [(shuffled(OUTSIDE, trial), {}, outside_strength(rng))]
     if trial.row == "faint":
         name = shuffled(FAINT, trial)
-        values, strength = SINGLE[name](rng, trial), math.exp(rng.uniform(math.log(LEAST_STRENGTH), 0))
-        for parameter in FAINT[name]:
-            values[parameter] = (values[parameter] + 20 * math.log10(strength) if parameter == "image_db"
-                                 else values[parameter] * strength)
-        return [(name, values, None)]
+        return [(name, weakened(name, rng, trial, LEAST_STRENGTH, 1), None)]
     if trial.row == "twice":
         name = shuffled(TWICE, trial)
         hidden = [(name, SINGLE[name](rng, trial), None) for _ in range(2)]

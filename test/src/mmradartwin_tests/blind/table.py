@@ -28,13 +28,24 @@ def share(values):
     return f"{100 * count / n:.1f} % ({100 * low:.1f} to {100 * high:.1f})", n
 
 
-def strength_over_limit(record, at_its_word=True):
+def limit_by_chance(nats):
+    """Limit in nats that the matched test passes by chance as seldom as it is meant to (MATCHED_LEVEL), of what it made
+    of effects that are not there: an exponential tail beyond the best tenth. None of fewer than 100."""
+    if len(nats) < 100:
+        return None
+    beyond = np.quantile(nats, 0.9)
+    above = [v - beyond for v in nats if v > beyond]
+    return float(beyond + np.mean(above) * math.log(len(above) / len(nats) / MATCHED_LEVEL))
+
+
+def strength_over_limit(record, at_its_word=True, limit_nats=None):
     """Strength of a hidden effect over the one at which the matched test, the likelihood of the twin that is told it,
     detects it; None where the twin cannot be told. Nats go by the square of small strengths.
 
-    At its word the likelihood knows all errors of rooms and poses: a matched test better than there is. Otherwise its
-    nats are divided by what they scatter over places more than they would then, twice their mean (variance of a
-    likelihood ratio of two simple hypotheses): a worse one where few places see the effect.
+    limit_nats: of the matched test, MATCHED_NATS where none is given. At its word the likelihood knows all errors of
+    rooms and poses: a matched test better than there is. Otherwise its nats are divided by what they scatter over
+    places more than they would then, twice their mean (variance of a likelihood ratio of two simple hypotheses): a
+    worse one where few places see the effect.
     """
     told = record.get("told")
     if not told:
@@ -43,7 +54,7 @@ def strength_over_limit(record, at_its_word=True):
     if not at_its_word and nats > 0:
         deviation = (told["nats_ci95"][1] - told["nats_ci95"][0]) / (2 * norm.ppf(0.975))
         nats /= max(1.0, deviation ** 2 / (2 * nats))
-    return math.sqrt(nats / MATCHED_NATS)
+    return math.sqrt(nats / (limit_nats or MATCHED_NATS))
 
 
 def half_power(strengths, named):
@@ -83,6 +94,13 @@ class Scores:
         """[(parameter, covered, quantile)] over all rows where truths are named."""
         return [c for row in self.rows.values() for _, _, s in row for c in s.get("coverage", [])]
 
+    def strength_of_half_power(self, **matched):
+        """Text and trials; `matched`: of strength_over_limit."""
+        faint = [(strength_over_limit(record, **matched), all(s["named"]))
+                 for record, _, s in self.rows["single"] + self.rows["faint"] if record.get("told")]
+        half = half_power(*zip(*faint)) if faint else None
+        return "{:.2f} ({:.2f} to {:.2f})".format(*half) if half else "not run", len(faint)
+
     def table(self):
         """Rows of text: figure, required, measured, trials."""
         named = self.each("pair", "named")
@@ -93,12 +111,10 @@ class Scores:
                   if (record.get("told") or {}).get("explained_power", 0) >= LEAST_TRUE_GAIN and s["gain"] is not None]
         strengths = [(strength_over_limit(record), s) for record, _, s in self.rows["single"]]
         strong = [s["first"] for strength, s in strengths if strength is None or strength >= 2]
-        halves = []
-        for at_its_word in (True, False):
-            faint = [(strength_over_limit(record, at_its_word), all(s["named"]))
-                     for record, _, s in self.rows["single"] + self.rows["faint"] if record.get("told")]
-            half = half_power(*zip(*faint)) if faint else None
-            halves.append(("{:.2f} ({:.2f} to {:.2f})".format(*half) if half else "not run", len(faint)))
+        by_chance = [a["nats"] for record, _, _ in self.rows["clean"] for a in record.get("told_absent", [])]
+        limit = limit_by_chance(by_chance)
+        halves = [self.strength_of_half_power(), self.strength_of_half_power(at_its_word=False),
+                  self.strength_of_half_power(limit_nats=limit) if limit else ("not run", 0)]
         rows = [
             ("false alarms on clean sessions", "≤ 1 %", *share(self.each("clean", "alarm", answered=True))),
             ("single effects: right name first", "≥ 92 %", *share(self.each("single", "first"))),
@@ -110,6 +126,8 @@ class Scores:
             ("effects of any strength: wrong with confidence", "≤ 2 %", *share(self.each("faint", "wrong"))),
             ("detection strength at 50 % power over that of the matched test", "≤ 1.5", *halves[0]),
             ("– with the scatter of its likelihood over places taken off", "≤ 1.5", *halves[1]),
+            (f"– with the limit that {len(by_chance)} effects which are not there set, "
+             + (f"{limit:.1f} nats" if limit else "none of fewer than 100"), "≤ 1.5", *halves[2]),
             ("actor, material, walls, pose or order right where the name is", "",
              *share([v for row in ("single", "pair", "twice") for s in self.each(row, "subjects") for v in s])),
             ("pairs: both named", "≥ 85 %", *share([all(n) for n in named])),
@@ -184,7 +202,8 @@ def markdown(head, rows):
     return "\n".join(lines + ["| " + " | ".join(str(c) for c in row) + " |" for row in rows])
 
 
-MATCHED_NATS = 9.2       # chance brings a likelihood ratio of e^9.2 once in 10,000 tests at most (Markov's inequality)
+MATCHED_LEVEL = 1e-4     # of one test: 1 % for some hundred hypotheses
+MATCHED_NATS = -math.log(MATCHED_LEVEL)   # chance brings as large a ratio as often at most (Markov's inequality)
 LEAST_TRUE_GAIN = 0.01   # of explained power: less is lost in the figures' rounding
 COLORS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#bcbd22", "#17becf")
 SIDE = 400    # of the plot's square, pixels

@@ -147,16 +147,32 @@ def told(program, session, truth, folder, limit_s, jobs):
             "nats_ci95": [float(other[3]), float(other[4])]}
 
 
+def measurement_of(trial, drawn, session):
+    """The campaign of a trial with some effects, of which nothing is measured or written yet."""
+    chosen = [effects.make_effect(name, parameters, strength) for name, parameters, strength in drawn]
+    return Measurement(Settings(output=session, seed=trial.session_seed(), poses=trial.poses,
+                                locations=draws.PLACES, headings=trial.headings(),
+                                frames=trial.frames, tier=trial.tier, effects=chosen, jobs=1))
+
+
 def hide(trial, session):
     """Writes the session of a trial; returns its truths."""
     if trial.row == "recording":
         return recordings.write_session(trial, session)
-    chosen = [effects.make_effect(name, parameters, strength) for name, parameters, strength in draws.draw(trial)]
-    measurement = Measurement(Settings(output=session, seed=trial.session_seed(), poses=trial.poses,
-                                       locations=draws.PLACES, headings=trial.headings(),
-                                       frames=trial.frames, tier=trial.tier, effects=chosen, jobs=1))
+    measurement = measurement_of(trial, draws.draw(trial), session)
     measurement.run()
-    return measurement.truth()["effects"]
+    return measurement.hidden()
+
+
+def told_absent(program, session, trial, folder, limit_s, jobs):
+    """[{"cause", "nats"}]: what the matched test makes of effects that a clean session does not hold."""
+    answers = []
+    for name, parameters in draws.absent(trial):
+        truth, = measurement_of(trial, [(name, parameters, None)], None).hidden()
+        made_of_it = told(program, session, truth, folder, limit_s, jobs)
+        if made_of_it:
+            answers.append({"cause": name, "nats": made_of_it["nats"]})
+    return answers
 
 
 def run_trial(trial, ledger, program, limit_s=600.0, jobs=1):
@@ -171,6 +187,7 @@ def run_trial(trial, ledger, program, limit_s=600.0, jobs=1):
         tried = os.path.join(folder, "out", "tried.csv")
         if trial.row == "clean" and os.path.exists(tried):
             record["most_nats"] = most_nats(tried)
+            record["told_absent"] = told_absent(program, session, trial, folder, limit_s, jobs)
         if trial.row in ("single", "faint") and truths[0]["cause"] not in UNTOLD:
             record["told"] = told(program, session, truths[0], folder, limit_s, jobs)
         if trial.row == "recording":
