@@ -130,7 +130,8 @@ std::vector<std::string> captureParts(const std::string& file) {
   return parts;
 }
 
-CaptureReader::CaptureReader(const RadarConfig& radar, const std::string& file) : radar_(radar), file_(file) {
+CaptureReader::CaptureReader(const RadarConfig& radar, const std::string& file, Rest rest)
+    : radar_(radar), file_(file) {
   std::size_t size = 0;
   for (const std::string& part : captureParts(file)) {
     const int descriptor = ::open(part.c_str(), O_RDONLY | O_CLOEXEC);
@@ -149,15 +150,18 @@ CaptureReader::CaptureReader(const RadarConfig& radar, const std::string& file) 
     parts_.push_back({owner, size, size + static_cast<std::size_t>(status.st_size)});
     size = parts_.back().end;
   }
-  const std::size_t whole = size / radar_.bytes_per_frame();
-  if (size == 0 || size % radar_.bytes_per_frame() != 0) {
-    throw InputError(file + ": capture is truncated or not from this radar: " + std::to_string(size) + " bytes " +
-                     (parts_.size() > 1 ? "in " + std::to_string(parts_.size()) + " parts " : "") + "are " +
-                     std::to_string(whole) + " whole frames of " + std::to_string(radar_.bytes_per_frame()) +
-                     " bytes and " + std::to_string(size % radar_.bytes_per_frame()) +
-                     " bytes over; cut it to whole frames, record it anew, or correct radar.yaml");
-  }
-  frames_ = static_cast<int>(whole);
+  frames_ = static_cast<int>(size / radar_.bytes_per_frame());
+  if (rest == Rest::kRefused || frames_ == 0) requireWholeFrames();
+}
+
+void CaptureReader::requireWholeFrames() const {
+  const std::size_t size = parts_.back().end, rest = size % radar_.bytes_per_frame();
+  if (frames_ > 0 && rest == 0) return;
+  throw TruncatedCapture(file_ + ": capture is truncated or not from this radar: " + std::to_string(size) + " bytes " +
+                         (parts_.size() > 1 ? "in " + std::to_string(parts_.size()) + " parts " : "") + "are " +
+                         std::to_string(frames_) + " whole frames of " + std::to_string(radar_.bytes_per_frame()) +
+                         " bytes and " + std::to_string(rest) +
+                         " bytes over; cut it to whole frames, record it anew, or correct radar.yaml");
 }
 
 int CaptureReader::frames() const { return frames_; }

@@ -127,8 +127,8 @@ std::string captureFile(const std::string& pattern, const std::string& pose) {
   return file.replace(file.find("{pose}"), 6, pose);
 }
 
-/// Whole frames a capture seems to hold; 0 where it is missing (reading it says so).
-std::int64_t framesBySize(const RadarConfig& radar, const std::string& file) {
+/// Bytes of a capture; 0 where it is missing (reading it says so).
+std::uintmax_t captureBytes(const std::string& file) {
   std::uintmax_t size = 0;
   try {
     for (const std::string& part : captureParts(file)) {
@@ -140,7 +140,15 @@ std::int64_t framesBySize(const RadarConfig& radar, const std::string& file) {
   } catch (const InputError&) {
     return 0;
   }
-  return static_cast<std::int64_t>(size / radar.bytes_per_frame());
+  return size;
+}
+
+/// Where most captures hold no whole number of frames, they are of another radar.
+bool mostAreOfWholeFrames(const Recording& recording, const std::string& pattern) {
+  const auto whole = std::count_if(recording.poses.begin(), recording.poses.end(), [&](const Pose& pose) {
+    return captureBytes(captureFile(pattern, pose.name)) % recording.radar.bytes_per_frame() == 0;
+  });
+  return 2 * static_cast<std::size_t>(whole) > recording.poses.size();
 }
 
 void rejectOverlap(const Recording& recording, const std::string& pattern, const std::string& poses_file) {
@@ -151,7 +159,8 @@ void rejectOverlap(const Recording& recording, const std::string& pattern, const
   for (std::size_t i = 0; i + 1 < by_time.size(); ++i) {
     const Pose& pose = *by_time[i];
     const Pose& next = *by_time[i + 1];
-    const std::int64_t frames = framesBySize(recording.radar, captureFile(pattern, pose.name));
+    const auto frames =
+        static_cast<std::int64_t>(captureBytes(captureFile(pattern, pose.name)) / recording.radar.bytes_per_frame());
     const std::int64_t end_ns = pose.stamp_ns + recording.radar.frame_offset_ns(frames);
     if (next.stamp_ns < end_ns - kOverlapTolerance_ns) {
       throw InputError(poses_file + ": poses '" + pose.name + "' and '" + next.name +
@@ -231,12 +240,17 @@ Recording openSession(const std::string& path, const SessionOptions& options) {
   if (options.need_captures) rejectOverlap(recording, pattern, poses_file);
   if (options.exclude_duplicates) excludeDuplicates(recording);
 
-  recording.forEachFrame = [radar = recording.radar, pattern, source = file.string()](
+  const auto rest = !pattern.empty() && mostAreOfWholeFrames(recording, pattern) ? CaptureReader::Rest::kLeftOut
+                                                                                 : CaptureReader::Rest::kRefused;
+  recording.forEachFrame = [radar = recording.radar, pattern, source = file.string(), rest](
                                const Pose& pose, const std::function<void(const AdcCube&)>& visit) {
     if (pattern.empty()) throw InputError(source + ": pose '" + pose.name + "': the session names no captures");
     try {
-      const CaptureReader reader(radar, captureFile(pattern, pose.name));
+      const CaptureReader reader(radar, captureFile(pattern, pose.name), rest);
       for (int i = 0; i < reader.frames(); ++i) visit(reader.frame(i, pose.stamp_ns));
+      reader.requireWholeFrames();
+    } catch (const TruncatedCapture& error) {
+      throw TruncatedCapture("pose '" + pose.name + "': " + error.what());
     } catch (const InputError& error) {
       throw InputError("pose '" + pose.name + "': " + error.what());
     }

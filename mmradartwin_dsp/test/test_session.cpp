@@ -72,6 +72,25 @@ TEST(Session, MissingAndTruncatedCapturesAreNamedWhenRead) {
       saysInOneLine(inputError([&] { framesOf(recording, recording.poses[2]); }), "pose '002'", "3 whole frames"));
 }
 
+TEST(Session, WholeFramesOfATruncatedCaptureAreVisitedWhereTheOthersAreWhole) {
+  const TestFolder folder;
+  writeSession(folder / "lab");
+  const auto visited = [&](const Recording& recording, std::size_t pose) {
+    int frames = 0;
+    EXPECT_THROW(recording.forEachFrame(recording.poses[pose], [&](const AdcCube&) { ++frames; }), TruncatedCapture);
+    return frames;
+  };
+  std::filesystem::resize_file(folder / "lab/captures/002.bin", 3 * 2048 + 7);
+  EXPECT_EQ(visited(openSession(folder / "lab"), 2), 3);
+  std::filesystem::resize_file(folder / "lab/captures/002.bin", 2047);
+  EXPECT_EQ(visited(openSession(folder / "lab"), 2), 0);
+  // Most of them: they are another radar's.
+  std::filesystem::resize_file(folder / "lab/captures/002.bin", 3 * 2048 + 7);
+  std::filesystem::resize_file(folder / "lab/captures/001.bin", 3 * 2048 + 7);
+  EXPECT_EQ(visited(openSession(folder / "lab"), 1), 0);
+  EXPECT_EQ(visited(openSession(folder / "lab"), 2), 0);
+}
+
 TEST(Session, OverlapInTimeIsAnError) {
   const TestFolder folder;
   writeSession(folder / "lab", "", 21);  // 21 frames last 1.05 s, the next pose comes after 1 s

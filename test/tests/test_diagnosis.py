@@ -671,6 +671,19 @@ class BadInput(unittest.TestCase):
         self.assertIn(self.captures()[1], errors)
         self.assertEqual(findings["poses"]["count"], 2)
 
+    def test_a_capture_that_packets_are_missing_in_is_read_and_named(self):
+        slipped = effects.make_effect("packet_misalignment", {"pose": "001"})
+        Measurement(Settings(output=self.session, seed=8, poses=6, frames=10, effects=[slipped])).run()
+        capture, = (c for c in self.captures() if c.endswith("001.bin"))
+        os.truncate(capture, os.path.getsize(capture) - 1456)      # as it is where nothing follows
+        status, findings, errors = diagnose(self.session, self.output)
+        self.assertEqual(status, 2)
+        self.assertIn(f"{capture}: capture is truncated", errors)
+        self.assertIn("packets are missing in it", errors)
+        self.assertEqual([(f["cause"], f["parameters"]["pose"]["value"]) for f in findings["findings"]],
+                         [("packet_misalignment", "001")])
+        self.assertEqual(findings["poses"]["count"], 6)
+
     def test_a_recording_that_is_not_there(self):
         status, _, errors = diagnose(os.path.join(self.folder.name, "nowhere"), self.output)
         self.assertEqual(status, 2)

@@ -4,10 +4,12 @@
 #include <cmath>
 #include <numeric>
 
+#include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_dsp/stationary_poses.h"
+#include "payload_defects.h"
 
 namespace mmradartwin {
 namespace {
@@ -61,6 +63,14 @@ void leaveOutMoving(const SignalChain& chain, const std::vector<StampedTransform
   frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
+/// True where packets were lost and not filled, which leaves a capture that is too short by them.
+bool missesPackets(const RadarConfig& radar, const std::vector<AdcCube>& frames) {
+  const std::vector<int> order = payloadOrder(radar);
+  Payload payload = toPayload(frames, order);
+  markZeroedPackets(payload, order);
+  return findSlip(payload).has_value();
+}
+
 }  // namespace
 
 ComplexGrid frameSpectra(const SignalChain& chain, const AdcCube& frame) {
@@ -99,10 +109,16 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
   for (const Pose& pose : recording.poses) {
     try {
       std::vector<AdcCube> frames;
-      recording.forEachFrame(pose, [&](const AdcCube& cube) {
-        frames.push_back(cube);
-        if (repair) repair(frames.back());
-      });
+      try {
+        recording.forEachFrame(pose, [&](const AdcCube& cube) {
+          frames.push_back(cube);
+          if (repair) repair(frames.back());
+        });
+      } catch (const TruncatedCapture& error) {
+        if (frames.empty() || !missesPackets(recording.radar, frames)) throw;
+        data.problems.push_back(
+            {pose.name, std::string(error.what()) + "; packets are missing in it, the rest was used"});
+      }
       if (frames.empty()) throw InputError("its capture holds no frame; record it again");
       leaveOutMoving(chain, recording.track, pose, frames);
       const bool silent = std::all_of(frames.begin(), frames.end(), [](const AdcCube& cube) {

@@ -95,9 +95,16 @@ double HypothesisFit::ranking() const {
 }
 
 double HypothesisFit::moved_m() const {
-  if (!hypothesis.isMove()) return 0;
-  const NamedParameters m = hypothesis.at(scaled);
-  return std::hypot(m.values.number("dx_m"), m.values.number("dy_m"));
+  if (hypothesis.isMove()) {
+    const NamedParameters m = hypothesis.at(scaled);
+    return std::hypot(m.values.number("dx_m"), m.values.number("dy_m"));
+  }
+  double all_by_m = 0;
+  for (std::size_t i = 0; hypothesis.isGeometry() && i < scaled.size(); ++i) {
+    const Coordinate& c = hypothesis.coordinates[i];
+    if (c.unit == "m") all_by_m = std::hypot(all_by_m, c.value(scaled[i]) - c.neutral);
+  }
+  return all_by_m;
 }
 
 bool HypothesisFit::isFarAway() const { return moved_m() > kFarAway_m && (plain || broad_gain / inflation > kFarAway); }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mmradartwin_dsp/adc_cube.h"
+#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/radar_config.h"
 
 namespace mmradartwin {
@@ -20,12 +21,21 @@ std::vector<std::uint8_t> encodeFrame(const RadarConfig& radar, const std::vecto
 /// one in between is missing.
 std::vector<std::string> captureParts(const std::string& file);
 
+/// A capture that holds no whole number of frames.
+class TruncatedCapture : public InputError {
+ public:
+  using InputError::InputError;
+};
+
 /// A capture file, or all that captureParts() names, one after the other: frames back to back, their number from the
 /// file's size. Reading is safe from several threads.
 class CaptureReader {
  public:
-  /// Throws InputError: missing file, or a size that is no whole number of frames (says how many whole ones there are).
-  CaptureReader(const RadarConfig& radar, const std::string& file);
+  enum class Rest { kRefused, kLeftOut };  ///< of bytes beyond the last whole frame
+  /// Throws InputError: missing file; TruncatedCapture: no whole frame or, where it is refused, a rest.
+  CaptureReader(const RadarConfig& radar, const std::string& file, Rest rest = Rest::kRefused);
+  /// Throws TruncatedCapture where bytes were left out; says how many whole frames there are.
+  void requireWholeFrames() const;
   int frames() const;
   /// Frame i with stamp first_stamp_ns + i*frame_period; all chirps valid.
   AdcCube frame(int i, std::int64_t first_stamp_ns) const;
@@ -40,7 +50,7 @@ class CaptureReader {
     std::size_t begin, end;  ///< of its bytes in the capture
   };
   std::vector<Part> parts_;
-  int frames_ = 0;
+  int frames_ = 0;  ///< whole ones
 };
 
 /// Writes cubes back to back in the radar's layout; lost chirps are written as the zeros they hold.

@@ -47,7 +47,8 @@ struct Recording {
   std::vector<PoseProblem> problems;             ///< poses that cannot be used (NaN, unreadable, ...)
   std::vector<std::string> pose_names;           ///< every pose that the session names, in its order
   std::string capture_pattern;                   ///< path of a capture, {pose} for the name; "" without files
-  /// Visits the frames of a pose in order. Throws InputError where its capture is missing or damaged.
+  /// Visits the frames of a pose in order. Throws InputError where its capture is missing or damaged; TruncatedCapture
+  /// where it holds no whole number of frames, after the whole ones where most captures of the session are whole.
   std::function<void(const Pose&, const std::function<void(const AdcCube&)>&)> forEachFrame;
   /// Of a bag, of every frame in order of time, on the way from pose to pose, too; else empty, and so are the next two.
   std::vector<StampedTransform> track;
