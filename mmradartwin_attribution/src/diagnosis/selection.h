@@ -63,6 +63,8 @@ class Selection {
   void accept(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding);
   void restate();
   void refitTogether();
+  void takeBack(std::size_t accepted);
+  void doubtBesideUnknown();
   void profileFound();
   bool isWithinErrors(const HypothesisFit& fit) const;
   std::optional<HypothesisFit> betterName(const Accepted& a);
