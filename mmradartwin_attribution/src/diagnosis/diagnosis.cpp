@@ -169,6 +169,11 @@ std::optional<std::string> Session::judgeDelivery() {
   undoDelivery(*delivery, data_);
   Finding f = findingOf(*delivery, data_.radar);
   gains_->ofChange(recorded, mechanisms_, data_, mechanisms_, f);
+  // By chance some convention does best where nothing matches; one that is true lets the twin explain more.
+  if (f.gain && f.gain->explained_power.after <= f.gain->explained_power.before) {
+    data_ = recorded;
+    return std::nullopt;
+  }
   addGainInNats(data_, {}, f);
   extended_.push_back(*f.mechanism);
   result_.findings.findings.push_back(f);
