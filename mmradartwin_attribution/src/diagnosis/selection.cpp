@@ -74,6 +74,11 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
     source_.settle(mechanisms_);
     return stands ? "no larger than what errors of actors and poses look like" : "worth nothing beside the rest";
   }
+  for (const Accepted& before : accepted) {
+    if (acceptedAs(before.hypothesis) == accepted_.end()) {
+      callOtherwise(before.hypothesis.label(), "found, taken back beside " + fit.hypothesis.label());
+    }
+  }
   exchangeNames();
   takeOutImage();
   source_.settle(mechanisms_);
@@ -139,18 +144,22 @@ void Selection::doubtBesideUnknown() {
   while (unknownNats() > 0) {
     const auto doubtful = std::find_if(accepted_.begin(), accepted_.end(), is_doubtful);
     if (doubtful == accepted_.end()) break;
-    const std::string label = doubtful->hypothesis.label();
     takeBack(static_cast<std::size_t>(doubtful - accepted_.begin()));
-    for (TriedHypothesis& t : tried_) {
-      if (t.label == label && t.verdict == "found") t.verdict = "found, later no larger than its errors";
-    }
     taken = true;
   }
-  if (!taken) return;
-  restate();
+  if (taken) refitAndProfile();
+}
+
+void Selection::refitAndProfile() {
   refitTogether();
   source_.settle(mechanisms_);
   profileFound();
+}
+
+void Selection::callOtherwise(const std::string& label, const std::string& verdict) {
+  for (TriedHypothesis& t : tried_) {
+    if (t.label == label && t.verdict == "found") t.verdict = verdict;
+  }
 }
 
 /// Values and intervals of all that rounds have found, on the likelihood that is settled on them.
@@ -298,18 +307,12 @@ void Selection::exchangeNames() {
     if (!better) continue;
     const std::string was = a.hypothesis.label(), is = better->hypothesis.label();
     report_("found " + is + " instead of " + was, 1);
-    for (TriedHypothesis& t : tried_) {
-      if (t.label == was && t.verdict == "found") t.verdict = "found, later called " + is;
-    }
+    callOtherwise(was, "found, later called " + is);
     a = {better->hypothesis, better->scaled, better->standard_error, better->plain, a.finding, {}, {}};
     state_.nuisance = better->state.nuisance;
     exchanged = true;
   }
-  if (!exchanged) return;
-  restate();
-  refitTogether();
-  source_.settle(mechanisms_);
-  profileFound();
+  if (exchanged) refitAndProfile();
 }
 
 void Selection::orderByGain() {

@@ -65,6 +65,8 @@ class Selection {
   void refitTogether();
   void takeBack(std::size_t accepted);
   void doubtBesideUnknown();
+  void refitAndProfile();
+  void callOtherwise(const std::string& label, const std::string& verdict);
   void profileFound();
   bool isWithinErrors(const HypothesisFit& fit) const;
   std::optional<HypothesisFit> betterName(const Accepted& a);
