@@ -82,8 +82,8 @@ class HiddenEffects(unittest.TestCase):
         self.assertAlmostEqual(extended["mechanisms"]["element_pattern"]["cos_exponent"],
                                first["parameters"]["cos_exponent"]["value"], places=6)
         # The extended twin makes the same channels likelier by what the finding says, but for later fits of the latents.
-        told = trials.told(PROGRAM, self.at("session"), {"cause": "element_pattern", "parameters": {
-            "cos_exponent": first["parameters"]["cos_exponent"]["value"]}}, self.folder.name, 300, 2)
+        told, = trials.told(PROGRAM, self.at("session"), [{"cause": "element_pattern", "parameters": {
+            "cos_exponent": first["parameters"]["cos_exponent"]["value"]}}], self.folder.name, 300, 2)
         self.assertIsNotNone(told, msg=f"seed {seed}")
         self.assertAlmostEqual(told["nats"] / first["evidence"]["log_likelihood_gain"], 1, delta=0.05)
         self.assertLess(told["nats_ci95"][0], told["nats"])

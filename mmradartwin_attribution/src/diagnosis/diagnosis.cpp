@@ -347,6 +347,7 @@ Diagnosis Session::run() {
     putIn(*f.mechanism, extended_);
   }
   for (const TwinDescription& t : options_.compared) {
+    source_->settle(mechanisms_);  // each from where the twin as given stands, whatever was compared before it
     const ModelState other = fitter_->state(t.mechanisms, &state.nuisance);
     auto [low, high] = *likelihoodGain(data_, state.by_pose, other.by_pose).difference_ci95;
     const double poses = static_cast<double>(data_.poses.size());

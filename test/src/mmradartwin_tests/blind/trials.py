@@ -118,33 +118,40 @@ def most_nats(file):
     return most
 
 
-def told(program, session, truth, folder, limit_s, jobs):
-    """What a twin that is told the effect explains more than the session's own, None where it cannot be told all of it:
-    causes are mechanisms of the same name and parameters. {"explained_power", "nats", "nats_ci95" over places}."""
+def told(program, session, truths, folder, limit_s, jobs):
+    """What twins that are each told one of the effects explain more than the session's own, one entry an effect, None
+    where it cannot be told all of it: causes are mechanisms of the same name and parameters. {"explained_power", "nats",
+    "nats_ci95" over places}."""
     output, log = os.path.join(folder, "told"), os.path.join(folder, "told.log")
     shutil.rmtree(output, ignore_errors=True)
-    # YAML knows no numbers of numpy.
-    parameters = json.loads(json.dumps({**truth["parameters"], **truth.get("beside", {})}))
-    twins = []
-    for name, mechanisms in (("untold", {}), ("told", {truth["cause"]: parameters})):
-        twins.append(os.path.join(session, name + ".yaml"))
-        with open(twins[-1], "w", encoding="ascii") as out:
-            yaml.safe_dump({"mechanisms": {**effects.BASE, **mechanisms}}, out)
-    status, *_ = run_measured([program, session, "--twin", twins[0], "--compare", twins[1], "--findings", "0",
-                               "--output", output, "--jobs", str(jobs)], limit_s, log)
+    mechanisms = [{}]
+    for truth in truths:
+        # YAML knows no numbers of numpy.
+        mechanisms.append({truth["cause"]: json.loads(json.dumps({**truth["parameters"], **truth.get("beside", {})}))})
+    twins = [os.path.join(session, f"told{i}.yaml") for i in range(len(mechanisms))]
+    for twin, told_of in zip(twins, mechanisms):
+        with open(twin, "w", encoding="ascii") as out:
+            yaml.safe_dump({"mechanisms": {**effects.BASE, **told_of}}, out)
+    compared = [word for twin in twins[1:] for word in ("--compare", twin)]
+    status, *_ = run_measured([program, session, "--twin", twins[0], *compared, "--findings", "0", "--output", output,
+                               "--jobs", str(jobs)], limit_s, log)
     for twin in twins:
         os.remove(twin)
     with open(log, encoding="utf-8", errors="replace") as text:
         said = text.read()
     number = r"(-?[0-9.]+(?:e[-+]?[0-9]+)?)"
     before = re.search("the twin as given explains " + number, said)
-    other = re.search(f"explains the same channels {number} nats (more|less) likely \\({number} to {number} more by "
-                      f"places\\) and {number} of", said)
-    if status != 0 or not before or not other:
-        return None
-    nats = float(other[1]) if other[2] == "more" else -float(other[1])
-    return {"explained_power": round(float(other[5]) - float(before[1]), 6), "nats": nats,
-            "nats_ci95": [float(other[3]), float(other[4])]}
+    answers = []
+    for twin in twins[1:]:
+        other = re.search(re.escape(twin) + f" explains the same channels {number} nats (more|less) likely "
+                          f"\\({number} to {number} more by places\\) and {number} of", said)
+        if status != 0 or not before or not other:
+            answers.append(None)
+            continue
+        nats = float(other[1]) if other[2] == "more" else -float(other[1])
+        answers.append({"explained_power": round(float(other[5]) - float(before[1]), 6), "nats": nats,
+                        "nats_ci95": [float(other[3]), float(other[4])]})
+    return answers
 
 
 def measurement_of(trial, drawn, session):
@@ -166,13 +173,11 @@ def hide(trial, session):
 
 def told_absent(program, session, trial, folder, limit_s, jobs):
     """[{"cause", "nats"}]: what the matched test makes of effects that a clean session does not hold."""
-    answers = []
-    for name, parameters in draws.absent(trial):
-        truth, = measurement_of(trial, [(name, parameters, None)], None).hidden()
-        made_of_it = told(program, session, truth, folder, limit_s, jobs)
-        if made_of_it:
-            answers.append({"cause": name, "nats": made_of_it["nats"]})
-    return answers
+    truths = [truth for name, parameters in draws.absent(trial)
+              for truth in measurement_of(trial, [(name, parameters, None)], None).hidden()]
+    return [{"cause": truth["cause"], "nats": answer_of_it["nats"]}
+            for truth, answer_of_it in zip(truths, told(program, session, truths, folder, limit_s, jobs))
+            if answer_of_it]
 
 
 def run_trial(trial, ledger, program, limit_s=600.0, jobs=1):
@@ -189,7 +194,7 @@ def run_trial(trial, ledger, program, limit_s=600.0, jobs=1):
             record["most_nats"] = most_nats(tried)
             record["told_absent"] = told_absent(program, session, trial, folder, limit_s, jobs)
         if trial.row in ("single", "faint") and truths[0]["cause"] not in UNTOLD:
-            record["told"] = told(program, session, truths[0], folder, limit_s, jobs)
+            record["told"], = told(program, session, truths[:1], folder, limit_s, jobs)
         if trial.row == "recording":
             plain = os.path.join(folder, "plain")
             recordings.write_untouched(plain)
