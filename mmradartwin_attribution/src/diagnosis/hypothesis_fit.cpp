@@ -410,6 +410,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
                        kSteps, &null, std::max(kWorthASearch, least_nats), known);
   f.scaled = std::move(o.scaled);
   f.state = std::move(o.state);
+  f.state.echoes = {};  // 80 MB and more a fit, of 154 poses
   const Scores& scores = o.scores;
   gainOver(null, f);
   const std::vector<double> gain_at = gainByLocation(null, f.state);

@@ -28,8 +28,8 @@ struct ModelState {
 /// One hypothesis, all else refitted.
 struct HypothesisFit {
   Hypothesis hypothesis;
-  std::vector<double> scaled;  ///< of its coordinates
-  ModelState state;
+  std::vector<double> scaled;          ///< of its coordinates
+  ModelState state;                    ///< without its echoes
   double gain = 0;                     ///< nats over the state without it
   double broad_gain = 0;               ///< the same without the place that gains most: a path that one place sees
                                        ///< and the twin hides by a hair is no cause
