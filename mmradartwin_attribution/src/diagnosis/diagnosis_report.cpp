@@ -8,6 +8,7 @@
 #include <map>
 #include <sstream>
 
+#include "echo_source.h"
 #include "finding_figure.h"
 #include "mmradartwin_attribution/report.h"
 #include "mmradartwin_dsp/input_error.h"
@@ -43,17 +44,20 @@ std::string shown(const FindingParameter& p) {
 }
 
 /// What its mechanism needs beyond the cause's parameters: the shape of an object, when a gain steps and so on. Lists
-/// of laws are left to findings.json.
+/// of laws are left to findings.json, what stands as it does without being said is left out.
 std::vector<std::string> shownBesides(const Finding& f) {
   std::vector<std::string> words;
   if (!f.mechanism || f.cause == "unknown") return words;
   const std::vector<CauseParameter>& own = causeDescription(f.cause).parameters;
+  const Parameters standard = defaultMechanism(f.mechanism->mechanism).values;
   for (const auto& item : f.mechanism->values.all()) {
     const auto is_own = [&](const CauseParameter& p) { return p.name == item.first; };
     if (f.parameter(item.first) != nullptr || std::any_of(own.begin(), own.end(), is_own)) continue;  // told, or not it
     const auto* numbers = std::get_if<std::vector<double>>(&item.second);
     const auto* texts = std::get_if<std::vector<std::string>>(&item.second);
     if ((numbers && numbers->empty()) || (texts && texts->empty())) continue;
+    const auto usual = standard.all().find(item.first);
+    if (usual != standard.all().end() && usual->second == item.second) continue;
     words.push_back(shown(FindingParameter{item.first, "1", item.second, {}}));
   }
   return words;
