@@ -24,36 +24,6 @@ int root(std::vector<int>& parent, int i) {
   return i;
 }
 
-/// Facets of an actor (by their place in Actor::facets) that gentle folds join.
-std::vector<std::vector<int>> smoothParts(const Scene& scene, const Actor& actor, const std::vector<int>& weld) {
-  const int first = actor.facets.front();
-  std::vector<std::array<int, 3>> sides;  // two vertices and the facet
-  for (std::size_t t = 0; t < actor.triangles.size(); ++t) {
-    if (actor.triangle_facet[t] < 0) continue;
-    for (int k = 0; k < 3; ++k) {
-      const int a = weld[actor.triangles[t][k]], b = weld[actor.triangles[t][(k + 1) % 3]];
-      sides.push_back({std::min(a, b), std::max(a, b), actor.triangle_facet[t] - first});
-    }
-  }
-  std::sort(sides.begin(), sides.end());
-  std::vector<int> parent(actor.facets.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const double cosine = std::cos(kLargestFold_deg * M_PI / 180);
-  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
-    const auto &p = sides[i], &q = sides[i + 1];
-    if (p[0] != q[0] || p[1] != q[1] || p[2] == q[2]) continue;
-    const Eigen::Vector3d &m = scene.facets[first + p[2]].normal, &n = scene.facets[first + q[2]].normal;
-    if (std::abs(m.dot(n)) > cosine) parent[root(parent, p[2])] = root(parent, q[2]);
-  }
-  std::map<int, std::vector<int>> parts;
-  for (std::size_t i = 0; i < parent.size(); ++i) parts[root(parent, static_cast<int>(i))].push_back(first + int(i));
-  std::vector<std::vector<int>> result;
-  for (auto& [r, part] : parts) {
-    if (part.size() >= kFewestSides) result.push_back(std::move(part));
-  }
-  return result;
-}
-
 /// Centre and radius of the sphere (d = 3) or circle (d = 2) nearest to some points, algebraically:
 /// |p|^2 = 2 c.p + (r^2 - |c|^2). False where they do not determine one or stray from it.
 template <int D>
@@ -140,6 +110,35 @@ std::optional<CurvedSurface> fit(const Scene& scene, const Actor& actor, const s
 }
 
 }  // namespace
+
+std::vector<std::vector<int>> smoothParts(const Scene& scene, const Actor& actor, const std::vector<int>& weld) {
+  const int first = actor.facets.front();
+  std::vector<std::array<int, 3>> sides;  // two vertices and the facet
+  for (std::size_t t = 0; t < actor.triangles.size(); ++t) {
+    if (actor.triangle_facet[t] < 0) continue;
+    for (int k = 0; k < 3; ++k) {
+      const int a = weld[actor.triangles[t][k]], b = weld[actor.triangles[t][(k + 1) % 3]];
+      sides.push_back({std::min(a, b), std::max(a, b), actor.triangle_facet[t] - first});
+    }
+  }
+  std::sort(sides.begin(), sides.end());
+  std::vector<int> parent(actor.facets.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const double cosine = std::cos(kLargestFold_deg * M_PI / 180);
+  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
+    const auto &p = sides[i], &q = sides[i + 1];
+    if (p[0] != q[0] || p[1] != q[1] || p[2] == q[2]) continue;
+    const Eigen::Vector3d &m = scene.facets[first + p[2]].normal, &n = scene.facets[first + q[2]].normal;
+    if (std::abs(m.dot(n)) > cosine) parent[root(parent, p[2])] = root(parent, q[2]);
+  }
+  std::map<int, std::vector<int>> parts;
+  for (std::size_t i = 0; i < parent.size(); ++i) parts[root(parent, static_cast<int>(i))].push_back(first + int(i));
+  std::vector<std::vector<int>> result;
+  for (auto& [r, part] : parts) {
+    if (part.size() >= kFewestSides) result.push_back(std::move(part));
+  }
+  return result;
+}
 
 void findCurvedSurfaces(Scene& scene, int index, const std::vector<int>& weld) {
   const Actor& actor = scene.actors[index];

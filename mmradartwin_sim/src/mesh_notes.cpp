@@ -7,6 +7,7 @@
 #include <optional>
 #include <sstream>
 
+#include "curved_surface.h"
 #include "vertex_weld.h"
 
 namespace mmradartwin {
@@ -14,6 +15,7 @@ namespace {
 
 constexpr std::size_t kMostNamed = 5;
 constexpr std::size_t kBody = 3;         ///< facets: fewer are sheets, a folded one among them
+constexpr std::size_t kFragments = 20;   ///< facets that gentle folds join, on no sphere nor cylinder
 constexpr double kInset = 0.02;          ///< of a triangle: its rim may touch its neighbours
 constexpr double kLeastLength_m = 2e-3;  ///< of a ray within a triangle: shorter ones see rounding
 
@@ -60,6 +62,15 @@ std::optional<Eigen::Vector3d> cut(const Scene& scene, const Actor& actor) {
   return std::nullopt;
 }
 
+/// Facets of the actor that gentle folds join though they stand for nothing round: a scan's noise breaks a wall so.
+std::size_t fragments(const Scene& scene, const Actor& actor) {
+  std::size_t most = 0;
+  for (const std::vector<int>& part : smoothParts(scene, actor, weldVertices(actor.vertices))) {
+    if (scene.facets[static_cast<std::size_t>(part.front())].curved < 0) most = std::max(most, part.size());
+  }
+  return most;
+}
+
 std::string listed(const std::vector<std::string>& names) {
   std::ostringstream out;
   for (std::size_t i = 0; i < std::min(kMostNamed, names.size()); ++i) out << (i ? ", " : "") << names[i];
@@ -70,10 +81,12 @@ std::string listed(const std::vector<std::string>& names) {
 }  // namespace
 
 std::vector<std::string> meshNotes(const Scene& scene) {
-  std::vector<std::string> open, crossed;
+  std::vector<std::string> open, crossed, broken;
   for (const Actor& actor : scene.actors) {
     const std::size_t edges = actor.facets.size() >= kBody ? openEdges(actor) : 0;
     if (edges > 0) open.push_back(actor.name + " (" + std::to_string(edges) + " open edges)");
+    const std::size_t pieces = fragments(scene, actor);
+    if (pieces >= kFragments) broken.push_back(actor.name + " (" + std::to_string(pieces) + " facets)");
     if (const auto at = cut(scene, actor)) {
       std::ostringstream text;
       text.precision(3);
@@ -93,6 +106,13 @@ std::vector<std::string> meshNotes(const Scene& scene) {
                     ": surfaces that cut through each other are traced as they are, and their parts inside "
                     "a body scatter nothing that shows; cut the meshes there: " +
                     listed(crossed));
+  }
+  if (!broken.empty()) {
+    std::ostringstream text;
+    text << scene.file << ": facets at small angles return each on its own; where they are a scan's noise on something "
+         << "flat, widen scene.yaml's facets: {angle_deg: " << scene.tolerance.angle_deg
+         << ", offset_m: " << scene.tolerance.offset_m << "}: " << listed(broken);
+    notes.push_back(text.str());
   }
   return notes;
 }

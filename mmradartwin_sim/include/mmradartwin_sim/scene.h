@@ -61,10 +61,11 @@ struct CurvedSurface {
   double sagitta_m = 0;  ///< how far the facets lie within the surface
 };
 
-/// When neighbouring triangles are one facet. Scans need wider limits than drawings.
+/// When neighbouring triangles are one facet: drawings, and meshes whose vertices are a few millimetres off at
+/// triangles of some decimetres. Scans need wider limits.
 struct FacetTolerance {
-  double angle_deg = 0.5;   ///< between a triangle's normal and the facet's
-  double offset_m = 0.001;  ///< of a vertex from the facet's plane
+  double angle_deg = 1.5;   ///< between a triangle's normal and the facet's
+  double offset_m = 0.005;  ///< of a vertex from the facet's plane
 };
 
 struct Scene {
