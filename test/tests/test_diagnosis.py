@@ -191,6 +191,8 @@ class HiddenEffects(unittest.TestCase):
         self.assertEqual(told["actor"], hidden["actor"])
         self.assertAlmostEqual(told["behind_m"], hidden["depth_m"], delta=0.02)
         self.assertAlmostEqual(told["level_db"], 20 * math.log10(hidden["level"]), delta=3)
+        place, = findings["findings"][0]["where"]
+        self.assertLess(math.dist((place["x_m"], place["y_m"]), (hidden["x_m"], hidden["y_m"])), 0.3)
 
     def unknown(self, seed, hidden, strength=None):
         """The mechanism of the one finding, `unknown`, of a session that hides an effect of no name, and the truth."""

@@ -112,7 +112,9 @@ std::optional<Eigen::Vector2d> placeOf(const NamedParameters& m, const Scene& sc
                         (m.mechanism == "empirical_law" && LawVariable::isAboutPlace(m.values.text("variable")));
   if (of_place) return Eigen::Vector2d(m.values.number("x_m"), m.values.number("y_m"));
   const bool moved = m.mechanism == "actor_moved";
-  if (!moved && m.mechanism != "actor_absent") return std::nullopt;
+  const bool of_actor =
+      moved || m.mechanism == "actor_absent" || m.mechanism == "echo_replica" || m.mechanism == "empirical_law";
+  if (!of_actor) return std::nullopt;
   const int actor = scene.actorIndex(m.values.text("actor"));
   if (actor < 0) return std::nullopt;
   const Eigen::Vector2d middle = scene.actors[static_cast<std::size_t>(actor)].bounds.center().head<2>();

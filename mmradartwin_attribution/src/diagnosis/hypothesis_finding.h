@@ -22,7 +22,7 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
 void tellGain(const HypothesisFit& fit, const ModelState& before, const ChannelData& data, Finding& f);
 
 /// Where in map a mechanism says that something is: an object, a place, the middle of an actor that moved (where it
-/// then stands) or is gone; nothing of all others.
+/// then stands), is gone or has a law of its own; nothing of all others.
 std::optional<Eigen::Vector2d> placeOf(const NamedParameters& mechanism, const Scene& scene);
 
 /// Why something fitted is nothing found, "" where it may be: an object or a scattering that clutter is as large as, a
