@@ -268,7 +268,8 @@ std::string Session::refusedByMaps(const HypothesisFit& f, const FindingGain& ga
   const double most_lost = isOfLevels(f.hypothesis) ? kMostLostOfLevels : kMostLost;
   // Maps of echoes that are many points' differ from what is expected of them by as much as they hold.
   // Few places see an actor: drawn without the best of them, little is left of what it gains.
-  const bool much = (likelier || f.isFarAway()) && ((f.plain && (by > -most_lost || !plainly_worse)) || in_nats);
+  const bool plain = f.plain && !isFaintAddition(f.hypothesis, f.scaled);
+  const bool much = (likelier || f.isFarAway()) && ((plain && (by > -most_lost || !plainly_worse)) || in_nats);
   // What explains less well what a better one was refused for is no name for it; a law without a name may be the cause
   // of something else beside it, and so may a name beside what is as wrong as the session's own errors.
   const Eigen::VectorXd explains = gainByPose(f, selection_->state());

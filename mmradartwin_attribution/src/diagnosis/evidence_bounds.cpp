@@ -46,6 +46,13 @@ bool isOfLevels(const Hypothesis& h) {
   return std::all_of(h.coordinates.begin(), h.coordinates.end(), [](const Coordinate& c) { return c.unit == "dB"; });
 }
 
+bool isFaintAddition(const Hypothesis& h, const std::vector<double>& scaled) {
+  const std::string& name = h.mechanism.mechanism;
+  return h.subject.empty() && isCatalogued(name) &&
+         causeDescription(name).residual_class == ResidualClass::kMissingMechanism &&
+         std::any_of(scaled.begin(), scaled.end(), [](double v) { return v <= kTypical; });
+}
+
 UsualScatter usualScatter(const Hypothesis& hypothesis) {
   return isOfLevels(hypothesis) ? kScatterOfLevels : UsualScatter{};
 }
@@ -62,8 +69,8 @@ double leastNats(const Hypothesis& hypothesis, const std::vector<double>& scaled
   if (name == "empirical_law") return std::max(kLawOfActor, kLawOfActorPerPose * n);
   if (unnamed || !hypothesis.subject.empty()) return std::max(adds ? kSubjectOfMore : kSubject, kSubjectPerPose * n);
   if (adds) {
-    const bool typical = std::all_of(scaled.begin(), scaled.end(), [](double v) { return v > kTypical; });
-    return std::max(kLawOfMore, (typical ? kTypicalLawOfMorePerPose : kLawOfMorePerPose) * n);
+    const double per_pose = isFaintAddition(hypothesis, scaled) ? kLawOfMorePerPose : kTypicalLawOfMorePerPose;
+    return std::max(kLawOfMore, per_pose * n);
   }
   return std::max(traces ? kTraces : kLaw, kLawPerPose * n);
 }

@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t kMostNames = 5;  ///< fits of one round
 constexpr std::size_t kMostLaws = 4;
+constexpr double kMostFits = 20;  ///< of a round, some six geometries and a box among them
 constexpr double kWorthAFit = 4;  ///< nats promised
 constexpr double kWorthAFitOfGeometry = 0.5;
 constexpr double kLonger[] = {1.5, 2};   ///< starts of a geometry
@@ -41,7 +42,7 @@ void FitRound::fitOne(Screened s) {
       }
     }
   }
-  report_("fitting " + s.hypothesis.label(), static_cast<double>(fits_.size()) / (kMostNames + kMostLaws));
+  report_("fitting " + s.hypothesis.label(), std::min(1.0, static_cast<double>(fits_.size()) / kMostFits));
   const bool around = s.hypothesis.isMove() || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
   // A geometry climbs slowly at first.
   const double least_nats = s.hypothesis.isGeometry() ? 0 : kShareOfPlain * plain_name_;
