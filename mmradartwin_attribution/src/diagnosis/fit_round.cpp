@@ -48,7 +48,7 @@ void FitRound::fitOne(Screened s) {
   const double least_nats = s.hypothesis.isGeometry() ? 0 : kShareOfPlain * plain_name_;
   fits_.push_back(around ? fitObject(fitter_, state_, s) : fitter_.fit(state_, s.hypothesis, s.starts, least_nats));
   source_.settle(state_.mechanisms);
-  if (!law && fitter_.isPlain(fits_.back())) plain_name_ = std::max(plain_name_, fits_.back().gain);
+  if (!law && fitter_.isPlain(fits_.back().broad_gain)) plain_name_ = std::max(plain_name_, fits_.back().gain);
   if (isObject(s.hypothesis) && !box && fits_.back().broad_gain > std::max(kWorthABox, best_object_)) {
     best_object_ = fits_.back().broad_gain;
     if (isUnmodelledBox(screened_.back().hypothesis)) screened_.pop_back();

@@ -267,7 +267,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
     const bool hopeless =
         null != nullptr && i >= 2 &&
         o.state.log_likelihood + kClimb * std::max(risen, promised) < null->log_likelihood + least_nats;
-    if (i >= (risen > kRising ? 4 * steps : steps) || promised < kEnough || hopeless) break;
+    if (i >= (risen > kRising ? 12 * steps : steps) || promised < kEnough || hopeless) break;
     bool better = false;
     for (double share : {1.0, 0.4, 0.1}) {
       std::vector<double> next = o.scaled;
@@ -352,23 +352,22 @@ Eigen::MatrixXd HypothesisFitter::robustCovariance(const EffectiveScores& e) con
   return robust;
 }
 
-double HypothesisFitter::worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
-                                         const Optimum& o, const EffectiveScores& e, Eigen::Index first,
-                                         Eigen::Index numbers) {
+Worth HypothesisFitter::worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
+                                        const Optimum& o, const EffectiveScores& e, Eigen::Index first,
+                                        Eigen::Index numbers) {
   std::vector<double> scaled = o.scaled;
   std::fill_n(scaled.begin() + first, numbers, 0.0);
   const double gain = broadGain(state(mechanismsWith(base, parts, scaled), &o.state.nuisance), o.state);
-  if (e.scatter.size() == 0) return gain;  // one place: nothing scatters
-  return gain / std::clamp(e.scatter(first, first) / e.information(first, first), 1.0, kMostInflation);
+  if (e.scatter.size() == 0) return {gain, 1};  // one place: nothing scatters
+  return {gain, std::clamp(e.scatter(first, first) / e.information(first, first), 1.0, kMostInflation)};
 }
 
-double HypothesisFitter::worthOf(const Hypothesis& hypothesis, const Eigen::VectorXd& scaled,
-                                 const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& robust) const {
+Worth HypothesisFitter::worthOf(const Hypothesis& hypothesis, const Eigen::VectorXd& scaled,
+                                const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& robust) const {
   const double by_likelihood = 0.5 * scaled.dot(covariance.ldlt().solve(scaled));
   const double by_scatter = 0.5 * scaled.dot(robust.ldlt().solve(scaled));
-  return by_scatter > 0
-             ? by_likelihood / moderated(by_likelihood / by_scatter, hypothesis, model_.data().locations.size())
-             : 0;
+  if (!(by_scatter > 0)) return {};
+  return {by_likelihood, moderated(by_likelihood / by_scatter, hypothesis, model_.data().locations.size())};
 }
 
 JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
@@ -390,7 +389,7 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
       errors.push_back(std::sqrt(robust(at + j, at + j)) * std::abs(c.slope(v[j])));
     }
     fit.standard_error.push_back(std::move(errors));
-    fit.worth.push_back(n == 0           ? 0
+    fit.worth.push_back(n == 0           ? Worth()
                         : h.isOneSided() ? worthOfPresence(base, parts, o, e, at, n)
                                          : worthOf(h, v, covariance.block(at, at, n, n), robust.block(at, at, n, n)));
     at += n;
@@ -478,13 +477,13 @@ void HypothesisFitter::gainOver(const ModelState& null, HypothesisFit& f) const 
   f.held_out_gain += f.gain - before;
 }
 
-bool HypothesisFitter::isPlain(const HypothesisFit& f) const {
-  return f.broad_gain > kPlain * static_cast<double>(model_.data().poses.size());
+bool HypothesisFitter::isPlain(double nats) const {
+  return nats > kPlain * static_cast<double>(model_.data().poses.size());
 }
 
 void HypothesisFitter::judge(HypothesisFit& f, std::size_t family) const {
   f.false_alarm_rate = falseAlarmRate(f.broad_gain / f.inflation, f.hypothesis, f.numbers(), family);
-  f.plain = isPlain(f);
+  f.plain = isPlain(f.broad_gain);
   if (f.plain) f.false_alarm_rate = std::min(f.false_alarm_rate, kPlainFalseAlarm);
 }
 

@@ -47,12 +47,17 @@ struct HypothesisFit {
   double size_m() const;        ///< of an object that the twin lacks; 0 of all others
 };
 
+/// Nats that values bring, and what their scatter over places takes off.
+struct Worth {
+  double nats = 0, inflation = 1;
+  double scattered() const { return nats / inflation; }
+};
+
 /// Several hypotheses, fitted together.
 struct JointFit {
   std::vector<std::vector<double>> scaled;          ///< by hypothesis, of its coordinates
   std::vector<std::vector<double>> standard_error;  ///< of the values (not scaled), by location
-  std::vector<double>
-      worth;  ///< nats that each is worth beside the others, by the scatter over places; 0 without number
+  std::vector<Worth> worth;                         ///< of each beside the others; nothing without number
   Nuisance nuisance;
 };
 
@@ -92,8 +97,8 @@ class HypothesisFitter {
   void settleFolds(const ModelState& null, HypothesisFit& fit);
   /// Sets a fit's gains to those over this null, which may have become better since.
   void gainOver(const ModelState& null, HypothesisFit& fit) const;
-  /// True where it brings far more than clean sessions do, whatever its scatter over places.
-  bool isPlain(const HypothesisFit& fit) const;
+  /// True of nats far beyond what clean sessions bring, whatever their scatter over places.
+  bool isPlain(double nats) const;
   /// Sets false_alarm_rate and plain for a family of that many hypotheses.
   void judge(HypothesisFit& fit, std::size_t family) const;
   /// Of a gain in nats, inflation taken off, by that many numbers (coordinates, and what was searched for): chance that
@@ -106,14 +111,14 @@ class HypothesisFitter {
     ModelState state;
     Scores scores;  ///< at the last derivative
   };
-  /// Nats that the numbers from `first` on, which rise from nothing, bring beside the others, without the place that
-  /// gains most, inflation taken off. Their square laws make what the errors at the fit say of that far too small.
-  double worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
-                         const Optimum& o, const EffectiveScores& e, Eigen::Index first, Eigen::Index numbers);
+  /// What the numbers from `first` on, which rise from nothing, bring beside the others, without the place that gains
+  /// most. Their square laws make what the errors at the fit say of that far too small.
+  Worth worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
+                        const Optimum& o, const EffectiveScores& e, Eigen::Index first, Eigen::Index numbers);
   Eigen::MatrixXd robustCovariance(const EffectiveScores& effective) const;
-  /// Nats that values are worth, far from nothing as they are by their errors.
-  double worthOf(const Hypothesis& hypothesis, const Eigen::VectorXd& scaled, const Eigen::MatrixXd& covariance,
-                 const Eigen::MatrixXd& robust) const;
+  /// What values are worth, far from nothing as they are by their errors.
+  Worth worthOf(const Hypothesis& hypothesis, const Eigen::VectorXd& scaled, const Eigen::MatrixXd& covariance,
+                const Eigen::MatrixXd& robust) const;
   /// null: what a geometry has to be well above at more than one place before it is searched without slopes; null
   /// pointer: it is. least_nats, known: as of fit().
   Optimum maximise(const std::vector<NamedParameters>& base, const Nuisance& nuisance,
