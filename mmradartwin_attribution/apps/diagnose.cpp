@@ -14,6 +14,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_sim/mesh_notes.h"
 #include "recording_arguments.h"
 
 namespace {
@@ -87,6 +88,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
       diagnosis = diagnoseReceiver(recording, options);
     } else {
       Twin twin(arguments.input.loadTwinOf(recording));
+      for (const std::string& note : meshNotes(twin.scene())) std::cerr << "note: " << note << "\n";
       for (const std::string& file : arguments.compared) {
         options.compared.push_back(arguments.input.loadTwinOf(recording, file));
         requireSameScene(options.compared.back(), twin.description());
