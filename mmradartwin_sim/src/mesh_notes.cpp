@@ -20,8 +20,7 @@ constexpr double kInset = 0.02;          ///< of a triangle: its rim may touch i
 constexpr double kLeastLength_m = 2e-3;  ///< of a ray within a triangle: shorter ones see rounding
 
 /// Edges that one triangle alone has.
-std::size_t openEdges(const Actor& actor) {
-  const std::vector<int> weld = weldVertices(actor.vertices);
+std::size_t openEdges(const Actor& actor, const std::vector<int>& weld) {
   std::map<std::pair<int, int>, int> count;
   for (std::size_t t = 0; t < actor.triangles.size(); ++t) {
     if (actor.triangle_facet[t] < 0) continue;
@@ -63,9 +62,9 @@ std::optional<Eigen::Vector3d> cut(const Scene& scene, const Actor& actor) {
 }
 
 /// Facets of the actor that gentle folds join though they stand for nothing round: a scan's noise breaks a wall so.
-std::size_t fragments(const Scene& scene, const Actor& actor) {
+std::size_t fragments(const Scene& scene, const Actor& actor, const std::vector<int>& weld) {
   std::size_t most = 0;
-  for (const std::vector<int>& part : smoothParts(scene, actor, weldVertices(actor.vertices))) {
+  for (const std::vector<int>& part : smoothParts(scene, actor, weld)) {
     if (scene.facets[static_cast<std::size_t>(part.front())].curved < 0) most = std::max(most, part.size());
   }
   return most;
@@ -83,9 +82,10 @@ std::string listed(const std::vector<std::string>& names) {
 std::vector<std::string> meshNotes(const Scene& scene) {
   std::vector<std::string> open, crossed, broken;
   for (const Actor& actor : scene.actors) {
-    const std::size_t edges = actor.facets.size() >= kBody ? openEdges(actor) : 0;
+    const std::vector<int> weld = weldVertices(actor.vertices);
+    const std::size_t edges = actor.facets.size() >= kBody ? openEdges(actor, weld) : 0;
     if (edges > 0) open.push_back(actor.name + " (" + std::to_string(edges) + " open edges)");
-    const std::size_t pieces = fragments(scene, actor);
+    const std::size_t pieces = fragments(scene, actor, weld);
     if (pieces >= kFragments) broken.push_back(actor.name + " (" + std::to_string(pieces) + " facets)");
     if (const auto at = cut(scene, actor)) {
       std::ostringstream text;

@@ -34,6 +34,10 @@ constexpr double kLawPerPose = 0.4, kSubjectPerPose = 1;  ///< a twin's own erro
 // places, what adds echoes anything from 0.4 to 22.
 constexpr UsualScatter kScatterOfLevels = {1.4, 12};
 
+bool isTypical(const std::vector<double>& scaled) {
+  return std::all_of(scaled.begin(), scaled.end(), [](double v) { return v > kTypical; });
+}
+
 }  // namespace
 
 bool isOfLevels(const Hypothesis& h) {
@@ -47,10 +51,7 @@ bool isOfLevels(const Hypothesis& h) {
 }
 
 bool isFaintAddition(const Hypothesis& h, const std::vector<double>& scaled) {
-  const std::string& name = h.mechanism.mechanism;
-  return h.subject.empty() && isCatalogued(name) &&
-         causeDescription(name).residual_class == ResidualClass::kMissingMechanism &&
-         std::any_of(scaled.begin(), scaled.end(), [](double v) { return v <= kTypical; });
+  return h.coordinates.size() == 1 && h.coordinates.front().parameter == "level" && !isTypical(scaled);
 }
 
 UsualScatter usualScatter(const Hypothesis& hypothesis) {
@@ -69,8 +70,7 @@ double leastNats(const Hypothesis& hypothesis, const std::vector<double>& scaled
   if (name == "empirical_law") return std::max(kLawOfActor, kLawOfActorPerPose * n);
   if (unnamed || !hypothesis.subject.empty()) return std::max(adds ? kSubjectOfMore : kSubject, kSubjectPerPose * n);
   if (adds) {
-    const double per_pose = isFaintAddition(hypothesis, scaled) ? kLawOfMorePerPose : kTypicalLawOfMorePerPose;
-    return std::max(kLawOfMore, per_pose * n);
+    return std::max(kLawOfMore, (isTypical(scaled) ? kTypicalLawOfMorePerPose : kLawOfMorePerPose) * n);
   }
   return std::max(traces ? kTraces : kLaw, kLawPerPose * n);
 }
