@@ -55,11 +55,11 @@ double power(const std::vector<std::shared_ptr<const EchoGroup>>& groups, int ch
              std::optional<int> bin = std::nullopt) {
   double sum = 0;
   for (const auto& group : groups) {
-    const BinCovariance& cells = group->bins.power;
+    const EchoGroup::Fields& bins = group->bins;
     const std::size_t size = static_cast<std::size_t>(channels * (channels + 1) / 2);
-    for (int b = cells.first; b < cells.first + cells.bins; ++b) {
+    for (int b = bins.first; b < bins.first + bins.cells; ++b) {
       if (bin && b != *bin) continue;
-      for (int k = 0; k < channels; ++k) sum += cells.at(b, size)[k * (k + 3) / 2].real();
+      for (int k = 0; k < channels; ++k) sum += bins.at(b, size)->power[k * (k + 3) / 2].real();
     }
   }
   return sum;

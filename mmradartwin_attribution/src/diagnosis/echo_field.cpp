@@ -23,22 +23,29 @@ constexpr double kLeastResponse = 1e-7;          ///< of the strongest bin of wh
 constexpr std::size_t kMostBeamBins = 16;
 constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;  ///< of a path's power: a beam that takes less does not see it
 
-/// Makes room for the bins from low to high.
-void cover(BinCovariance& field, int low, int high, std::size_t size) {
-  if (field.packed.empty()) field.first = low;
-  if (low < field.first) {
-    field.packed.insert(field.packed.begin(), static_cast<std::size_t>(field.first - low) * size, {});
-    field.first = low;
+using Fields = EchoGroup::Fields;
+
+/// What stands in a cell, for which room is made: [kOfCell][size].
+std::complex<float>* cover(Fields& fields, int cell, std::size_t size) {
+  const std::size_t of_cell = Fields::kOfCell * size;
+  if (fields.cells == 0) fields.first = cell;
+  if (cell < fields.first) {
+    const auto before = static_cast<std::size_t>(fields.first - cell);
+    fields.packed.insert(fields.packed.begin(), before * of_cell, {});
+    fields.cosine.insert(fields.cosine.begin(), before, 0.0f);
+    fields.first = cell;
   }
-  const std::size_t bins = static_cast<std::size_t>(high + 1 - field.first);
-  if (bins * size > field.packed.size()) field.packed.resize(bins * size);
-  field.bins = static_cast<int>(field.packed.size() / size);
+  const auto at = static_cast<std::size_t>(cell - fields.first);
+  if (at >= fields.cosine.size()) {
+    fields.packed.resize((at + 1) * of_cell);
+    fields.cosine.resize(at + 1);
+  }
+  fields.cells = static_cast<int>(fields.cosine.size());
+  return fields.packed.data() + at * of_cell;
 }
 
-void accumulate(BinCovariance& field, int bin, double factor, const std::vector<std::complex<float>>& packed) {
-  const float f = static_cast<float>(factor);
-  std::complex<float>* to = field.at(bin, packed.size());
-  for (std::size_t i = 0; i < packed.size(); ++i) to[i] += f * packed[i];
+void accumulate(float factor, const std::vector<std::complex<float>>& packed, std::complex<float>* to) {
+  for (std::size_t i = 0; i < packed.size(); ++i) to[i] += factor * packed[i];
 }
 
 double pathCosine(const PathRecord& record) {
@@ -157,41 +164,40 @@ void EchoCollector::outer(const std::complex<double>* c, double cosine,
 
 namespace {
 
-/// Fields of a group while its paths are added: [bin][field][real and imaginary parts], so that a path's outer product
-/// is read once for all of them. Kept from group to group, zero where nothing was added.
+/// Fields of a group while its paths are added, of all bins. Kept from group to group, zero where nothing was added.
 struct OpenFields {
-  std::vector<float> sums;
-  std::size_t stride = 0;  // of a bin
+  std::vector<std::complex<float>> sums;
+  std::vector<float> cosine;
+  std::size_t size = 0, of_bin = 0;
   int first = 0, last = -1;
 
-  void open(std::size_t size, int bins) {
-    stride = 2 * size * kFields;
-    if (sums.size() != stride * static_cast<std::size_t>(bins)) sums.assign(stride * static_cast<std::size_t>(bins), 0);
+  void open(std::size_t packed_size, int bins) {
+    size = packed_size;
+    of_bin = Fields::kOfCell * size;
+    if (sums.size() != of_bin * static_cast<std::size_t>(bins)) sums.assign(of_bin * static_cast<std::size_t>(bins), 0);
+    cosine.resize(static_cast<std::size_t>(bins));
     first = bins;
     last = -1;
   }
-  void add(int bin, const std::complex<float>* packed, std::size_t size, const float* factors) {
+  void add(int bin, const std::complex<float>* packed, const std::array<float, Fields::kOfCell>& factors,
+           double mean_cosine) {
     first = std::min(first, bin);
     last = std::max(last, bin);
-    addMultiples(packed, size, factors, kFields, sums.data() + static_cast<std::size_t>(bin) * stride);
+    const auto at = static_cast<std::size_t>(bin);
+    addMultiples(packed, size, factors.data(), factors.size(), sums.data() + at * of_bin);
+    cosine[at] += factors[0] * static_cast<float>(mean_cosine) * packed[0].real();
   }
-  void close(std::size_t size, const std::array<BinCovariance*, 4>& to) {
+  void close(Fields& to) {
     if (last < first) return;
-    for (std::size_t f = 0; f < to.size(); ++f) {
-      BinCovariance& field = *to[f];
-      field.first = first;
-      field.bins = last + 1 - first;
-      field.packed.reserve(static_cast<std::size_t>(field.bins) * size);
-      for (int bin = first; bin <= last; ++bin) {
-        const float* from = sums.data() + static_cast<std::size_t>(bin) * stride + 2 * size * f;
-        const auto* own = reinterpret_cast<const std::complex<float>*>(from);
-        field.packed.insert(field.packed.end(), own, own + size);
-      }
-    }
-    std::fill(sums.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(first) * stride),
-              sums.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(last + 1) * stride), 0.0f);
+    const auto from = sums.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(first) * of_bin),
+               end = sums.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(last + 1) * of_bin);
+    to.first = first;
+    to.cells = last + 1 - first;
+    to.packed.assign(from, end);
+    to.cosine.assign(cosine.begin() + first, cosine.begin() + last + 1);
+    std::fill(from, end, 0.0f);
+    std::fill(cosine.begin() + first, cosine.begin() + last + 1, 0.0f);
   }
-  static constexpr std::size_t kFields = 4;
 };
 
 thread_local OpenFields open_fields;
@@ -204,7 +210,7 @@ std::shared_ptr<const EchoGroup> EchoCollector::addTones(const std::vector<const
   EchoGroup& g = group(*records.front());
   open_fields.open(size_, samples_);
   for (const PathRecord* r : records) addTone(*r, r->amplitude * r->amplitude / strongest, g);
-  open_fields.close(size_, {&g.bins.power, &g.bins.shift, &g.bins.bend, &g.bins.cosine});
+  open_fields.close(g.bins);
   open_.clear();
   return groups_.back();
 }
@@ -227,9 +233,9 @@ void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g
     const int bin = (r + samples_) % samples_;
     const auto [w, per_bin] = kHann.at(r - place);
     const double slope = -per_bin / bin_m_;
-    const float factors[OpenFields::kFields] = {static_cast<float>(w * w), static_cast<float>(2 * w * slope),
-                                                static_cast<float>(slope * slope), static_cast<float>(w * w * cosine)};
-    open_fields.add(bin, packed.data(), size_, factors);
+    open_fields.add(bin, packed.data(),
+                    {static_cast<float>(w * w), static_cast<float>(2 * w * slope), static_cast<float>(slope * slope)},
+                    cosine);
   }
   addToBeams(record.c.data(), place, weak ? kOffBeamWeak : kOffBeam, g.beams);
 }
@@ -245,22 +251,18 @@ void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, con
   while (level[last] < least) --last;
   // Responses and their derivatives as one: what a shift makes of their outer products is then definite again.
   std::vector<std::complex<float>> packed;
-  const auto addProducts = [&](EchoGroup::Fields& f, int at, const Eigen::VectorXcd& c, const Eigen::VectorXcd& d,
-                               double turns) {
-    for (BinCovariance* field : {&f.power, &f.shift, &f.bend}) cover(*field, at, at, size_);
+  const auto addProducts = [&](Fields& f, int at, const Eigen::VectorXcd& c, const Eigen::VectorXcd& d, double turns) {
+    std::complex<float>*power = cover(f, at, size_), *shift = power + size_, *bend = shift + size_;
     outer(c.data(), turns, packed);
-    accumulate(f.power, at, 1, packed);
-    if (turns != 0) {
-      cover(f.cosine, at, at, size_);
-      accumulate(f.cosine, at, turns, packed);
-    }
-    accumulate(f.shift, at, -1, packed);
+    accumulate(1, packed, power);
+    f.cosine[static_cast<std::size_t>(at - f.first)] += static_cast<float>(turns) * packed[0].real();
+    accumulate(-1, packed, shift);
     outer(d.data(), turns, packed);
-    accumulate(f.shift, at, -1, packed);
-    accumulate(f.bend, at, 1, packed);
+    accumulate(-1, packed, shift);
+    accumulate(1, packed, bend);
     const Eigen::VectorXcd both = c + d;  // (c + d)(c + d)^H - c c^H - d d^H = c d^H + d c^H
     outer(both.data(), turns, packed);
-    accumulate(f.shift, at, 1, packed);
+    accumulate(1, packed, shift);
   };
   for (int r = first; r <= last; ++r) {
     if (level[r] >= least) addProducts(g.bins, r, y.col(r), slope.col(r), cosine);
@@ -273,14 +275,12 @@ void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, con
   }
 }
 
-void EchoCollector::addToBeams(const std::complex<double>* c, double place, double off,
-                               EchoGroup::Fields& beams) const {
+void EchoCollector::addToBeams(const std::complex<double>* c, double place, double off, Fields& beams) const {
   std::array<double, kMostBeamBins> w, slope;
   double all = 0;
   for (int k = 0; k < channels_; ++k) all += std::norm(c[k]);
   for (std::size_t b = 0; b < beams_.size(); ++b) {
     const EchoBeam& beam = beams_[b];
-    const int at = static_cast<int>(b);
     const double middle = place - beam.first_bin;
     if (middle < -kLobe || middle > channels_ - 1 + kLobe) continue;
     std::complex<double> formed = 0;
@@ -292,16 +292,15 @@ void EchoCollector::addToBeams(const std::complex<double>* c, double place, doub
       w[static_cast<std::size_t>(i)] = response;
       slope[static_cast<std::size_t>(i)] = -per_bin / bin_m_;
     }
-    const auto add = [&](BinCovariance& field, auto value) {
-      cover(field, at, at, size_);
-      std::complex<float>* to = field.at(at, size_);
+    std::complex<float>* to = cover(beams, static_cast<int>(b), size_);
+    const auto add = [&](auto value) {
       for (int i = 0; i < channels_; ++i) {
         for (int j = 0; j <= i; ++j) *to++ += static_cast<float>(level * value(i, j));
       }
     };
-    add(beams.power, [&](int i, int j) { return w[i] * w[j]; });
-    add(beams.shift, [&](int i, int j) { return w[i] * slope[j] + slope[i] * w[j]; });
-    add(beams.bend, [&](int i, int j) { return slope[i] * slope[j]; });
+    add([&](int i, int j) { return w[i] * w[j]; });
+    add([&](int i, int j) { return w[i] * slope[j] + slope[i] * w[j]; });
+    add([&](int i, int j) { return slope[i] * slope[j]; });
   }
 }
 

@@ -4,6 +4,7 @@
 #include <complex>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "channel_data.h"
@@ -15,11 +16,26 @@ namespace mmradartwin {
 /// Echoes that meet the same actors, summed as powers: the phase between separate paths carries nothing (DESIGN
 /// section 4), so that the channels of a range bin have the covariance sum |W|^2 c c^H over paths.
 struct EchoGroup {
+  /// Of one bin or beam, packed as BinCovariance.
+  struct Cell {
+    const std::complex<float>* power;  ///< |W|^2 c c^H
+    const std::complex<float>* shift;  ///< its derivative by the one-way range, per metre
+    const std::complex<float>* bend;   ///< W'^2 c c^H per m^2: half the second derivative, and what a random range adds
+    double cosine;                     ///< |W|^2 cos(azimuth) |c_0|^2: what a turn of the radar acts on; 0 of beams
+  };
+  /// Cells from `first` on. Those of a cell are read together and stand one behind the other.
   struct Fields {
-    BinCovariance power;   ///< |W|^2 c c^H
-    BinCovariance shift;   ///< its derivative by the one-way range, per metre
-    BinCovariance bend;    ///< W'^2 c c^H per m^2: half the second derivative, and what a random range adds
-    BinCovariance cosine;  ///< |W|^2 cos(azimuth) c c^H: what a turn of the radar acts on; not of beams
+    static constexpr std::size_t kOfCell = 3;  ///< power, shift and bend
+    int first = 0, cells = 0;
+    std::vector<std::complex<float>> packed;  ///< [cell][kOfCell][size]
+    std::vector<float> cosine;                ///< [cell]
+    /// size: of a packed matrix. None outside.
+    std::optional<Cell> at(int cell, std::size_t size) const {
+      if (cell < first || cell >= first + cells) return std::nullopt;
+      const auto i = static_cast<std::size_t>(cell - first);
+      const std::complex<float>* own = packed.data() + i * kOfCell * size;
+      return Cell{own, own + size, own + 2 * size, cosine[i]};
+    }
   };
   PerInteraction<int> actors;  ///< one per interaction, in order; empty where a path meets none
   double added_range_m = 0;    ///< one-way, that the actors' known errors have put into the fields

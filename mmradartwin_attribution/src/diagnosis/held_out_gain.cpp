@@ -47,11 +47,11 @@ std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<Po
       s.setZero();
       for (const auto& group : echoes[i].groups) {
         const EchoGroup& g = *group;
-        const auto* p = g.bins.power.at(bin, size);
-        if (p == nullptr) continue;
+        const auto own = g.bins.at(bin, size);
+        if (!own) continue;
         std::size_t j = 0;
         for (int k = 0; k < channels; ++k) {
-          for (int l = 0; l <= k; ++l) s(k, l) += std::complex<double>(p[j++]);
+          for (int l = 0; l <= k; ++l) s(k, l) += std::complex<double>(own->power[j++]);
         }
       }
       for (int k = 0; k < channels; ++k) {

@@ -373,8 +373,8 @@ double traceOfWhitened(const double* v, int channels) {
 }
 
 void addMultiples(const std::complex<float>* field, std::size_t size, const float* factors, std::size_t count,
-                  float* to) {
-  addMultiplesTo(numbers(field), 2 * size, factors, count, to);
+                  std::complex<float>* to) {
+  addMultiplesTo(numbers(field), 2 * size, factors, count, reinterpret_cast<float*>(to));
 }
 
 void pairProducts(const double* v, int rows, int columns, double* to) { pairProductsTo(v, rows, columns, to); }

@@ -76,7 +76,7 @@ class InverseFactor {
 
 /// Adds a field of `size` numbers times each of `count` factors to as many fields that stand one behind the other.
 void addMultiples(const std::complex<float>* field, std::size_t size, const float* factors, std::size_t count,
-                  float* to);
+                  std::complex<float>* to);
 
 /// Sum of the diagonal of what whiten() gives.
 double traceOfWhitened(const double* v, int channels);

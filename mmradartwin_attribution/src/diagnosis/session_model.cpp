@@ -54,9 +54,9 @@ Limits limitsOf(int global, int errors) {
 }
 
 /// A heading's error turns the mean direction of a group's echoes in a bin by so many radians of sine.
-double turnOf(double yaw_rad, const std::complex<float>* power, const std::complex<float>* cosine) {
-  if (yaw_rad == 0 || power == nullptr || cosine == nullptr || !(power[0].real() > 0)) return 0;
-  return yaw_rad * cosine[0].real() / power[0].real();
+double turnOf(double yaw_rad, const EchoGroup::Cell& cell) {
+  if (yaw_rad == 0 || cell.cosine == 0 || !(cell.power[0].real() > 0)) return 0;
+  return yaw_rad * cell.cosine / cell.power[0].real();
 }
 
 /// 2 pi y_k / lambda of the virtual elements.
@@ -185,12 +185,11 @@ PackedHermitian SessionModel::sigma(const PoseEchoes& echoes, const std::vector<
   const double range_variance = rangeVariance_m2(n);
   for (std::size_t i = 0; i < echoes.all(); ++i) {
     const EchoGroup& g = echoes.at(i);
-    const EchoGroup::Fields& f = isBeam(cell) ? g.beams : g.bins;
-    const auto *power = f.power.at(at, size_), *bend = f.bend.at(at, size_);
-    if (power == nullptr && bend == nullptr) continue;
+    const auto f = (isBeam(cell) ? g.beams : g.bins).at(at, size_);
+    if (!f) continue;
     const auto [u, shift] = levels[i];
-    turn.set(apart_, turnOf(n.yaw_rad[pose], power, f.cosine.at(at, size_)));
-    s.addTurned({power, f.shift.at(at, size_), bend}, {u, u * shift, u * (shift * shift + range_variance)}, turn);
+    turn.set(apart_, turnOf(n.yaw_rad[pose], *f));
+    s.addTurned({f->power, f->shift, f->bend}, {u, u * shift, u * (shift * shift + range_variance)}, turn);
   }
   // At least a share of the mean power everywhere keeps the matrix definite where the first-order terms would not.
   if (s.trace() > 0) addRelative(n, cell, s);
@@ -252,14 +251,13 @@ SessionCovariance SessionModel::covariance(const std::vector<PoseEchoes>& echoes
     for (const auto& group : echoes[i].groups) {
       const EchoGroup& g = *group;
       const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
-      for (const EchoGroup::Fields* f : {&g.bins, &g.beams}) {
-        for (int at = f->power.first; at < f->power.first + f->power.bins; ++at) {
-          const auto* power = f->power.at(at, size_);
-          turn.set(apart_, turnOf(n.yaw_rad[poses[i]], power, f->cosine.at(at, size_)));
+      for (const EchoGroup::Fields* fields : {&g.bins, &g.beams}) {
+        for (int at = fields->first; at < fields->first + fields->cells; ++at) {
+          const EchoGroup::Cell f = *fields->at(at, size_);
+          turn.set(apart_, turnOf(n.yaw_rad[poses[i]], f));
           own.setZero();
-          own.addTurned({power, f->shift.at(at, size_), f->bend.at(at, size_)},
-                        {u, u * shift, u * (shift * shift + range_variance)}, turn);
-          const int cell = f == &g.beams ? samples_ + at : at;
+          own.addTurned({f.power, f.shift, f.bend}, {u, u * shift, u * (shift * shift + range_variance)}, turn);
+          const int cell = fields == &g.beams ? samples_ + at : at;
           std::complex<float>* to = result[i].data() + static_cast<std::size_t>(cell) * size_;
           for (std::size_t j = 0; j < size_; ++j) {
             to[j] += std::complex<float>(static_cast<float>(own.re[j]), static_cast<float>(own.im[j]));
@@ -315,15 +313,13 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
 
     for (std::size_t i = 0; i < echoes.all(); ++i) {
       const EchoGroup& g = echoes.at(i);
-      const EchoGroup::Fields& fields = isBeam(cell) ? g.beams : g.bins;
-      const auto *power = fields.power.at(at, size_), *shift = fields.shift.at(at, size_),
-                 *bend = fields.bend.at(at, size_);
-      if (power == nullptr && bend == nullptr) continue;
-      const auto* cosine = fields.cosine.at(at, size_);
+      const auto fields = (isBeam(cell) ? g.beams : g.bins).at(at, size_);
+      if (!fields) continue;
+      const std::complex<float>*power = fields->power, *shift = fields->shift, *bend = fields->bend;
       const auto [f, moved] = of_groups[i];
       const double share = inverse.traceOfProduct(power) + kMoved_m * kMoved_m * inverse.traceOfProduct(bend);
       if (f * share < kNegligible) continue;
-      turn.set(apart_, turnOf(n.yaw_rad[pose], power, cosine));
+      turn.set(apart_, turnOf(n.yaw_rad[pose], *fields));
       own.setZero();
       own.addTurned({power, shift, bend}, {f, f * moved, f * (moved * moved + range_variance)}, turn);
       for (int actor : g.actors) {
@@ -332,8 +328,8 @@ void SessionModel::addBasis(const PoseEchoes& echoes, const Nuisance& n, int pos
         touch(kActors + errors_ + a).addTurned({nullptr, shift, bend}, {0, f, 2 * f * moved}, turn);
       }
       if (echoes.grazes(i)) touch(kGraze).add(own, 1);
-      if (bend != nullptr) touch(kRange).addTurned({bend, nullptr, nullptr}, {f * range_variance, 0, 0}, turn);
-      const double by_yaw = turnOf(1, power, cosine);
+      touch(kRange).addTurned({bend, nullptr, nullptr}, {f * range_variance, 0, 0}, turn);
+      const double by_yaw = turnOf(1, *fields);
       if (by_yaw != 0) touch(heading).addTurnDerivative(own, by_yaw, apart_);
     }
     for (int j : active) {  // a heading's trace is 0
@@ -566,9 +562,8 @@ Nuisance SessionModel::start(const std::vector<PoseEchoes>& echoes) const {
     double expected = 0;
     for (const auto& group : echoes[i].groups) {
       const EchoGroup& g = *group;
-      const BinCovariance& power = g.bins.power;
-      for (int bin = std::max(firstBin(), power.first); bin < power.first + power.bins; ++bin) {
-        const auto* p = power.at(bin, size_);
+      for (int bin = std::max(firstBin(), g.bins.first); bin < g.bins.first + g.bins.cells; ++bin) {
+        const auto* p = g.bins.at(bin, size_)->power;
         for (int k = 0; k < channels_; ++k) expected += p[static_cast<std::size_t>(k) * (k + 3) / 2].real();
       }
     }
