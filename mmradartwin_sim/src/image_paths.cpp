@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kInside_m = 1e-9;
 constexpr double kOnPlane_m = 1e-7;
+constexpr double kLength_m2 = 1e-6;  ///< that rounding may make of a way
 
 /// Gap at the ends of a leg: a merged facet of a scan lies off the triangles that Embree sees.
 double legGap(const Facet& facet, const Eigen::Vector3d& direction) {
@@ -180,25 +181,28 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
   for (const Mirror& m : mirrors_) {
     own.push_back({m.normal.dot(p) - m.offset_m, m.e1.dot(p) - m.first1_m, m.e2.dot(p) - m.first2_m});
   }
+  // How much the square of a way may grow from an image to the next: by 4 times the product of the point's and of the
+  // image's distances from the plane between them.
+  const auto left = [&](const Eigen::Vector3d& image) {
+    return limits.max_length_m * limits.max_length_m - (image - p).squaredNorm();
+  };
   // The last facet is tried by where the straight line from p to the image meets its plane, which is cheap. beyond_m:
-  // distance of the image before from the plane.
-  const auto meetsLast = [&](int b, double beyond_m, const Eigen::Vector3d& image_before) {
+  // distance of the image before from the plane; left_m2: left() of that image.
+  const auto meetsLast = [&](int b, double beyond_m, const Eigen::Vector3d& image_before, double left_m2) {
     const Mirror& m = mirrors_[static_cast<std::size_t>(b)];
     const Own& o = own[static_cast<std::size_t>(b)];
-    if (!(o.distance_m * beyond_m > 0)) return false;
+    const double product = o.distance_m * beyond_m;
+    if (!(product > 0) || 4 * product > left_m2 + kLength_m2) return false;
     const double share = o.distance_m / (o.distance_m + beyond_m);
     const double x = o.along1_m + share * (m.e1.dot(image_before) - m.first1_m - o.along1_m);
     if (!(x > -1e-6 && x < m.size1_m + 1e-6)) return false;
     const double y = o.along2_m + share * (m.e2.dot(image_before) - m.first2_m - o.along2_m);
     return y > -1e-6 && y < m.size2_m + 1e-6;
   };
-  // Where one actor alone is wanted: its facets, and those behind each side of each facet.
   const bool all_wanted = limits.only_actor < 0;
   std::vector<char> wanted(static_cast<std::size_t>(count), 1);
-  std::vector<int> few;
   for (int i = 0; !all_wanted && i < count; ++i) {
     wanted[i] = scene_.facets[static_cast<std::size_t>(reflectors_[i])].actor == limits.only_actor;
-    if (wanted[i]) few.push_back(i);
   }
   const auto beyond = [this](int b, const Eigen::Vector3d& image) {
     const Mirror& m = mirrors_[static_cast<std::size_t>(b)];
@@ -206,6 +210,13 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
   };
   std::vector<int> all;
   for (int i = 0; on_side_.empty() && i < count; ++i) all.push_back(i);
+  // Ways over one facet towards another, by the side of the other that they come to. A path of three bounces runs both
+  // ways: it is one of these from either end, in the middle.
+  struct Way {
+    int first;
+    Eigen::Vector3d image;  // of p in the first facet
+  };
+  std::vector<std::array<std::vector<Way>, 2>> ways_to(limits.max_order < 3 ? 0 : static_cast<std::size_t>(count));
   for (int a = 0; a < count; ++a) {
     if (!in_front[a]) continue;
     const Facet& fa = scene_.facets[reflectors_[a]];
@@ -215,31 +226,36 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
     if (limits.max_order < 2) continue;
     const Eigen::Vector3d image1 = mirror(p, fa);
     const Beam beam(image1, corners_[a].point);
+    const double left1_m2 = left(image1);
+    if (left1_m2 < -kLength_m2) continue;
     for (int b : on_side_.empty() ? all : on_side_[static_cast<std::size_t>(2 * a + (da > 0))]) {
       // Cheap tests first: few facets pass them where no third bounce follows.
       const double db = beyond(b, image1);
       if (b == a || std::abs(db) < kOnPlane_m) continue;
-      const bool last = min_order <= 2 && (wanted[a] || wanted[b]) && in_front[b] && meetsLast(b, db, image1);
+      const bool last = min_order <= 2 && (wanted[a] || wanted[b]) && in_front[b] && meetsLast(b, db, image1, left1_m2);
       if ((!last && limits.max_order < 3) || (on_side_.empty() && !faces(a, da > 0, b))) continue;
       if (!beam.meets(corners_[b].point)) continue;
       const Facet& fb = scene_.facets[reflectors_[b]];
       if (last && !perpendicular(fa, fb) && solve(p, {fa.id, fb.id}, rays, limits, path)) found.push_back(path);
-      if (limits.max_order < 3) continue;
-      const Eigen::Vector3d image2 = mirror(image1, fb);
-      // The way on from b stays on the side that it came from. A path runs both ways, so c is searched from a on.
-      const bool any = wanted[a] || wanted[b];
-      const std::vector<int>& thirds = any ? on_side_[static_cast<std::size_t>(2 * b + (db > 0))] : few;
-      for (auto third = std::lower_bound(thirds.begin(), thirds.end(), a); third != thirds.end(); ++third) {
-        const int c = *third;
-        if (!any &&
-            !(sides_[static_cast<std::size_t>(b) * static_cast<std::size_t>(count) + static_cast<std::size_t>(c)] &
-              (db > 0 ? 2 : 1))) {
-          continue;
+      if (limits.max_order >= 3) ways_to[static_cast<std::size_t>(b)][db > 0].push_back({a, image1});
+    }
+  }
+  for (std::size_t b = 0; b < ways_to.size(); ++b) {
+    const Facet& fb = scene_.facets[reflectors_[b]];
+    for (const std::vector<Way>& ways : ways_to[b]) {
+      for (std::size_t i = 0; i < ways.size(); ++i) {
+        const int a = ways[i].first;
+        const Facet& fa = scene_.facets[reflectors_[a]];
+        const Eigen::Vector3d image2 = mirror(ways[i].image, fb);
+        const double left2_m2 = left(image2);
+        if (left2_m2 < -kLength_m2) continue;
+        for (std::size_t j = i; j < ways.size(); ++j) {
+          const int c = ways[j].first;
+          if (!(wanted[a] || wanted[b] || wanted[c]) || !meetsLast(c, beyond(c, image2), image2, left2_m2)) continue;
+          const int fc = reflectors_[c];
+          if (solve(p, {fa.id, fb.id, fc}, rays, limits, path)) found.push_back(path);
+          if (c != a && solve(p, {fc, fb.id, fa.id}, rays, limits, path)) found.push_back(path);
         }
-        if (!in_front[c] || !meetsLast(c, beyond(c, image2), image2) || c == b) continue;
-        const int fc = reflectors_[c];
-        if (solve(p, {fa.id, fb.id, fc}, rays, limits, path)) found.push_back(path);
-        if (c != a && solve(p, {fc, fb.id, fa.id}, rays, limits, path)) found.push_back(path);
       }
     }
   }
