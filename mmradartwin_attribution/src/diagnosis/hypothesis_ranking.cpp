@@ -26,7 +26,24 @@ constexpr std::size_t kMostElsewhere = 2;  ///< and how many are by that
 
 }  // namespace
 
-std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all, const ModelState& state) {
+std::vector<int> HypothesisRanking::spread(std::size_t wanted) const {
+  const std::size_t count = data_.poses.size();
+  wanted = std::min(count, wanted);
+  std::vector<int> poses;
+  for (std::size_t i = 0; i < wanted; ++i) poses.push_back(static_cast<int>(i * count / wanted));
+  return poses;
+}
+
+std::vector<RangeShift> HypothesisRanking::shifted(const ModelState& state) {
+  report_("actors that stand elsewhere", 0);
+  std::vector<RangeShift> shifts = screen_.nearerOrFarther(state, spread(kScreenPoses));
+  const auto plain = [](const RangeShift& s) { return s.nats >= kElsewhere; };
+  shifts.erase(std::partition_point(shifts.begin(), shifts.end(), plain), shifts.end());
+  return shifts;
+}
+
+std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all, const ModelState& state,
+                                              const std::vector<RangeShift>& shifted) {
   const auto suspects = screen_.suspects(state);
   std::set<std::string> suspicious;
   for (std::size_t i = 0; i < std::min(kSuspects, suspects.size()); ++i) {
@@ -36,13 +53,6 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   for (const auto& [actor, nats] : suspects) {
     if (nats > kOutOfPlace && out_of_place.size() < kMostOutOfPlace) out_of_place.insert(actor);
   }
-  const auto spread = [&](std::size_t wanted) {
-    const std::size_t count = data_.poses.size();
-    wanted = std::min(count, wanted);
-    std::vector<int> poses;
-    for (std::size_t i = 0; i < wanted; ++i) poses.push_back(static_cast<int>(i * count / wanted));
-    return poses;
-  };
   // The more numbers a hypothesis has, the more evaluations, and the fewer poses rank it.
   const auto some = [&](const Hypothesis& h) {
     return spread(std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
@@ -66,12 +76,9 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
     best.resize(std::min(most, best.size()));
     return best;
   };
-  report_("actors that stand elsewhere", 0);
-  std::size_t elsewhere = 0;
-  for (const auto& [actor, nats] : screen_.nearerOrFarther(state, spread(kScreenPoses))) {
-    if (nats < kElsewhere || ++elsewhere > kMostElsewhere) break;
-    suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(actor)].name);
-    out_of_place.insert(actor);
+  for (std::size_t i = 0; i < std::min(kMostElsewhere, shifted.size()); ++i) {
+    suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(shifted[i].actor)].name);
+    out_of_place.insert(shifted[i].actor);
   }
   report_("objects that the twin lacks", 0);
   std::vector<Screened> placed = bestOf(kMostObjects, projectBack(twin_, model_, state), objectAt);

@@ -29,11 +29,17 @@ class HypothesisRanking {
         report_(std::move(report)) {}
 
   /// Names, and what they leave out: objects, late points, laws and replicas. Most nats promised first.
-  std::vector<Screened> rank(const std::vector<Hypothesis>& all, const ModelState& state);
+  /// shifted: actors that are looked for elsewhere, most suspicious first.
+  std::vector<Screened> rank(const std::vector<Hypothesis>& all, const ModelState& state,
+                             const std::vector<RangeShift>& shifted);
+  /// Actors whose echoes are plainly likelier nearer or farther away than their errors have them, most plainly first.
+  std::vector<RangeShift> shifted(const ModelState& state);
   /// The geometry has changed: what gained nothing before may gain now.
   void tryAllAgain() { no_use_.clear(); }
 
  private:
+  std::vector<int> spread(std::size_t wanted) const;  // of all poses, evenly
+
   Twin& twin_;
   EchoSource& source_;
   const SessionModel& model_;

@@ -13,7 +13,7 @@ constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what ris
 constexpr double kMore[] = {4, 16};            ///< of the scale, as long as that gains
 constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents have stood in for it
 constexpr double kStoodIn = 1;                 ///< nats of theirs
-constexpr double kShifts_m[] = {-0.3, -0.16, -0.08, 0.08, 0.16, 0.3};  ///< of all of an actor's echoes
+constexpr double kShifts_m[] = {-0.3, -0.14, -0.06, 0.06, 0.14, 0.3};  ///< of all of an actor's echoes
 constexpr double kRadii[] = {1, 2, 4, 7};  ///< of the scale, about a place where an object may have stood before
 constexpr double kFiner[] = {0.35, 0.18};  ///< of the distance of the best of them
 constexpr int kDirections = 8;
@@ -46,11 +46,10 @@ std::vector<std::pair<int, double>> HypothesisScreen::suspects(const ModelState&
   return result;
 }
 
-std::vector<std::pair<int, double>> HypothesisScreen::nearerOrFarther(const ModelState& null,
-                                                                      const std::vector<int>& poses) {
-  std::vector<std::pair<int, double>> result;
+std::vector<RangeShift> HypothesisScreen::nearerOrFarther(const ModelState& null, const std::vector<int>& poses) {
+  std::vector<RangeShift> result;
   for (std::size_t a = 0; a + 1 < null.nuisance.actor_range_m.size(); ++a) {  // the last is of no actor
-    double best = 0;
+    RangeShift best{static_cast<int>(a), 0, 0};
     Nuisance nuisance = withoutErrors(null.nuisance, static_cast<int>(a));
     std::vector<double> about_m = null.actor_range_m;
     for (double shift_m : kShifts_m) {
@@ -60,11 +59,12 @@ std::vector<std::pair<int, double>> HypothesisScreen::nearerOrFarther(const Mode
       double gain = 0;
       for (std::size_t i = 0; i < poses.size(); ++i)
         gain += there[i] - null.by_pose[static_cast<std::size_t>(poses[i])];
-      best = std::max(best, gain);
+      if (gain > best.nats) best = {best.actor, gain, shift_m};
     }
-    result.emplace_back(static_cast<int>(a), best);
+    result.push_back(best);
   }
-  std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::stable_sort(result.begin(), result.end(),
+                   [](const RangeShift& a, const RangeShift& b) { return a.nats > b.nats; });
   return result;
 }
 

@@ -7,6 +7,12 @@
 
 namespace mmradartwin {
 
+/// All echoes of an actor, farther away by shift_m (one-way), and what the likelihood gains.
+struct RangeShift {
+  int actor;
+  double nats, shift_m;
+};
+
 /// What hypotheses promise against a state, without a fit.
 class HypothesisScreen {
  public:
@@ -18,7 +24,7 @@ class HypothesisScreen {
   std::vector<std::pair<int, double>> suspects(const ModelState& null) const;
   /// Actors by what the likelihood of the poses named gains where all their echoes are nearer or farther away by one
   /// length of several, first who gains most. Traces nothing.
-  std::vector<std::pair<int, double>> nearerOrFarther(const ModelState& null, const std::vector<int>& poses);
+  std::vector<RangeShift> nearerOrFarther(const ModelState& null, const std::vector<int>& poses);
   /// Of what is there or not, more or less, the likelihood at some values: a quadratic about nothing says little of it.
   /// Of all others a score test.
   Screened screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);

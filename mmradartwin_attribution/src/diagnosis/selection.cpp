@@ -12,8 +12,6 @@ namespace mmradartwin {
 namespace {
 
 constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
-constexpr double kOutOfPlace_m =
-    0.08;                              ///< four times what a scene's actors err by: of some twenty none is farther away
 constexpr double kTogether_m = 0.005;  ///< what sixteen of them err by together
 constexpr double kRival = 0.7;         ///< of a finding's gain, by a simpler name that may be the right one
 constexpr std::size_t kMostRivals = 2;
@@ -198,7 +196,7 @@ bool Selection::isWithinErrors(const HypothesisFit& f) const {
     const double reach_m = actor.bounds.sizes().head<2>().norm() / 2;
     const double farthest_m = std::hypot(move.values.number("dx_m"), move.values.number("dy_m")) +
                               std::abs(move.values.number("dyaw_deg")) * M_PI / 180 * reach_m;
-    if (farthest_m < kOutOfPlace_m) return true;
+    if (farthest_m < kMostRangeError_m) return true;
   }
   if (f.isFarAway()) return false;  // an interval may be wide where the likelihood is rough
   std::vector<double> errors = a->standard_error;

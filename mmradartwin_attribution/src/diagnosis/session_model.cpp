@@ -38,7 +38,7 @@ struct Limits {
 };
 Limits limitsOf(int global, int errors) {
   constexpr double kAny = std::numeric_limits<double>::infinity();
-  if (global >= kActors + errors) return {-0.08, 0.08, 0.02};  // m
+  if (global >= kActors + errors) return {-kMostRangeError_m, kMostRangeError_m, 0.02};
   if (global >= kActors) return {-2, 2, 0.5};
   if (global >= kShape) return {-8, 8, 1};
   switch (global) {

@@ -35,6 +35,8 @@ struct LatentSpread {
   double actor_gain = 1.5 / 4.343;  ///< 1.5 dB of power
   double actor_range_m = 0.02;
 };
+/// Four times what a scene's actors err by: of some twenty none is farther away.
+constexpr double kMostRangeError_m = 0.08;
 
 /// Expected covariance of the channels in all bins of a pose, packed as BinCovariance.
 using PoseCovariance = std::vector<std::complex<float>>;
