@@ -516,6 +516,20 @@ class HiddenEffects(unittest.TestCase):
         self.assertEqual(status, 0, msg=errors)
         self.assertEqual(findings["findings"], [])
 
+    def test_a_range_error_of_three_standard_deviations_is_no_move(self):
+        # A screen 6.1 cm nearer, which the first order had not reached, was moved by 12 cm, worth 171 nats.
+        trials.hide(draws.Trial("clean", "office", 167, 46, poses=24), self.at("session"))
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual(findings["findings"], [])
+
+    def test_a_name_is_not_refused_for_what_it_does_not_explain(self):
+        # Edges of 0.55, which the maps refuse, gain at other poses than the step, and both were refused for them.
+        trials.hide(draws.Trial("pair", "office", 167, 4, poses=24), self.at("session"))
+        status, findings, errors = diagnose(self.at("session"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual([f["cause"] for f in findings["findings"]], ["gain_drift"])
+
     def test_nothing_hidden_is_none(self):
         # One seed, so that the one false alarm in a hundred that the threshold allows does not stop everybody's work;
         # many seeds belong to the protocol.

@@ -44,7 +44,9 @@ constexpr double kLeastExplained = 0.002;
 // a law of levels.
 constexpr double kMostLost = 0.015, kMostLostOfLevels = 0.05;
 constexpr std::size_t kMostRangeErrors = 4;  ///< of actors, that are looked for in a round
-constexpr double kExplainsSame = 0.5;        ///< correlation over poses of what two fits gain
+/// Correlation over poses of what two fits gain, from which on a name explains some of what a better one was refused
+/// for by the maps (edges that were no edges had hidden a step of the gain, at -0.16), and any the same.
+constexpr double kExplainsSome = 0.2, kExplainsSame = 0.5;
 /// Of what an unknown gains: what its law leaves over looks like a little of many names.
 constexpr double kBesideUnknown = 0.25;
 
@@ -295,7 +297,8 @@ std::string Session::refusedByMaps(const HypothesisFit& f, const FindingGain& ga
   const Eigen::VectorXd explains = gainByPose(f, selection_->state());
   const bool named = isCatalogued(f.hypothesis.mechanism.mechanism);
   const bool again = std::any_of(refused.begin(), refused.end(), [&](const Refused& other) {
-    return (named && other.by_maps) || correlation(explains, other.gain_by_pose) > kExplainsSame;
+    const double same = correlation(explains, other.gain_by_pose);
+    return same > (named && other.by_maps ? kExplainsSome : kExplainsSame);
   });
   if (much && !again) return "";
   if (likelier) refused.push_back({explains, true});
