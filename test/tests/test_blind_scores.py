@@ -232,6 +232,22 @@ class Table(InFolder):
         self.assertEqual(told[row][1], 200)
         self.assertLess(abs(float(told[row][0].split()[0]) - 1.4), 0.25)
 
+    def test_what_moves_echoes_and_what_does_not_have_limits_of_their_own(self):
+        scores = self.scores([("clean", [], [], "ok")] * 50)
+        rng = np.random.default_rng(10)
+        for record, _, _ in scores.rows["clean"]:
+            record["told_absent"] = [
+                {"cause": cause, "nats": v} for cause, mean in (("scene_registration", 20.0), ("edge_diffraction", 2.0),
+                                                                ("element_pattern", 0.1)) for v in
+                rng.exponential(mean, 4)]
+        limits, absent = scores.limits_by_chance()
+        self.assertEqual(absent, 600)
+        self.assertGreater(limits["what moves echoes"], 100)
+        self.assertLess(limits["what does not"], 40)
+        for record, _, _ in scores.rows["clean"]:
+            record["told_absent"] = [{"cause": "element_pattern", "nats": -5.0}] * 3
+        self.assertEqual(scores.limits_by_chance()[0], {"what does not": table.MATCHED_NATS})
+
     def test_strength_can_do_without_what_the_likelihood_scatters_over_places(self):
         def strength(nats, deviation):
             between = [nats - 1.96 * deviation, nats + 1.96 * deviation]
