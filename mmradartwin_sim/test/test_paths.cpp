@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <map>
+#include <random>
 #include <set>
 #include <tuple>
 
@@ -68,6 +69,56 @@ TEST_F(Paths, AreTheImagesOfABoxRoom) {
   EXPECT_EQ(lengths[1].size(), 6u);
   EXPECT_EQ(lengths[2].size(), 6u);
   EXPECT_EQ(lengths[3].size(), 30u) << "38 images less the 8 corners";
+}
+
+// Whatever the search leaves out early, it finds the sequences that solve() accepts of all that there are.
+TEST_F(Paths, AreThoseOfAllSequencesThatExist) {
+  std::mt19937 random(4);
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution<>(low, high)(random); };
+  addBox("room", "Metal", V::Zero(), V(7, 5, 3));
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Quaterniond turn =
+        Eigen::AngleAxisd(uniform(-M_PI, M_PI), V::UnitZ()) * Eigen::AngleAxisd(uniform(-0.2, 0.2), V::UnitY());
+    addRectangle("panel_" + std::to_string(i), "Metal", V(uniform(1, 6), uniform(1, 4), uniform(0.2, 1)),
+                 turn * V(0, uniform(0.5, 2), 0), turn * V(0, 0, uniform(0.5, 1.5)));
+  }
+  const Scene scene = loadScene(writeScene(), 77e9);
+  const RayCaster rays(scene);
+  const ImageSearch search(scene, true);
+  const std::vector<int>& all = search.reflectors();
+  std::size_t compared = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    const V p(uniform(0.3, 6.7), uniform(0.3, 4.7), uniform(0.8, 1.4));
+    ImageSearch::Limits limits;
+    const double yaw_rad = uniform(-M_PI, M_PI);
+    limits.forward = V(std::cos(yaw_rad), std::sin(yaw_rad), 0);
+    limits.in_view = [&](const V& d) { return d.dot(limits.forward) > 0; };
+    limits.max_length_m = trial % 3 == 0 ? 1e9 : 14;
+    limits.only_actor = trial % 2 == 0 ? -1 : scene.facets[static_cast<std::size_t>(all[all.size() / 2])].actor;
+    std::set<std::vector<int>> expected, found;
+    ImagePath path;
+    const auto tryOne = [&](const PerInteraction<int>& facets) {
+      const auto wanted = [&](int f) { return scene.facets[static_cast<std::size_t>(f)].actor == limits.only_actor; };
+      if (limits.only_actor >= 0 && std::none_of(facets.begin(), facets.end(), wanted)) return;
+      if (search.solve(p, facets, rays, limits, path)) expected.insert({facets.begin(), facets.end()});
+    };
+    for (int a : all) {
+      tryOne({a});
+      for (int b : all) {
+        if (b == a) continue;
+        if (!perpendicular(scene.facets[static_cast<std::size_t>(a)], scene.facets[static_cast<std::size_t>(b)])) {
+          tryOne({a, b});
+        }
+        for (int c : all) {
+          if (c != b) tryOne({a, b, c});
+        }
+      }
+    }
+    for (const ImagePath& f : search.find(p, rays, limits)) found.insert({f.facets.begin(), f.facets.end()});
+    EXPECT_EQ(found, expected) << "trial " << trial;
+    compared += expected.size();
+  }
+  EXPECT_GT(compared, 100u);
 }
 
 // simulation.md 4.3: exact monostatic 10 cm plate at normal incidence, near field included.
