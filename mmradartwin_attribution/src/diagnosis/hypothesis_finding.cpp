@@ -155,7 +155,8 @@ bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure) {
   const std::string& name = fit.hypothesis.mechanism.mechanism;
   if (name == "actor_unmodelled") return !explains_more || (!sure && fit.size_m() < kFurniture_m);
   if (name == "diffuse_scattering") {
-    return !sure && fit.hypothesis.at(fit.scaled).values.number("scattering_coefficient") < kStrongScattering;
+    return !sure && !fit.plain &&
+           fit.hypothesis.at(fit.scaled).values.number("scattering_coefficient") < kStrongScattering;
   }
   if (name == "empirical_echo") return !explains_more;
   if (name == "echo_replica") {
