@@ -10,7 +10,7 @@ import numpy as np
 from mmradartwin_tests import effects
 from mmradartwin_tests.blind import recordings
 from mmradartwin_tests.session import Measurement, Settings
-from test_diagnosis import PROGRAM, diagnose
+from diagnose_program import PROGRAM, diagnose
 
 WALL = """ply
 format ascii 1.0

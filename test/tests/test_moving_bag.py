@@ -8,7 +8,7 @@ import yaml
 
 from mmradartwin_tests.moving_bag import write_moving_bag
 from mmradartwin_tests.session import Settings
-from test_diagnosis import PROGRAM, diagnose
+from diagnose_program import PROGRAM, diagnose
 
 
 @unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")

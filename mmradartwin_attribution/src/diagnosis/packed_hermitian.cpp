@@ -267,7 +267,6 @@ void PackedHermitian::add(const PackedHermitian& other, double factor) {
 
 double PackedHermitian::traceOfProduct(const std::complex<float>* field) const {
   double all = 0, diagonals = 0;
-  if (field == nullptr) return 0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(size()); ++i) {
     all += re[i] * static_cast<double>(field[i].real()) + im[i] * static_cast<double>(field[i].imag());
   }

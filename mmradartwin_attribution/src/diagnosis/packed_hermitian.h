@@ -46,7 +46,7 @@ struct PackedHermitian {
                  const PackedTurn& turn);
   /// Adds the derivative of a turned matrix by its turn, times `by`: element (k, l) times j (phase[k] - phase[l]).
   void addTurnDerivative(const PackedHermitian& turned, double by, const PhasesApart& apart);
-  /// Trace of this times a field; 0 of none.
+  /// Trace of this times a field.
   double traceOfProduct(const std::complex<float>* field) const;
   /// w^H this w.
   double quadratic(const std::complex<double>* w) const;
