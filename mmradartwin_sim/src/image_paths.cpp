@@ -10,7 +10,6 @@ namespace {
 
 constexpr double kInside_m = 1e-9;
 constexpr double kOnPlane_m = 1e-7;
-constexpr double kLength_m2 = 1e-6;  ///< that rounding may make of a way
 
 /// Gap at the ends of a leg: a merged facet of a scan lies off the triangles that Embree sees.
 double legGap(const Facet& facet, const Eigen::Vector3d& direction) {
@@ -181,18 +180,12 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
   for (const Mirror& m : mirrors_) {
     own.push_back({m.normal.dot(p) - m.offset_m, m.e1.dot(p) - m.first1_m, m.e2.dot(p) - m.first2_m});
   }
-  // How much the square of a way may grow from an image to the next: by 4 times the product of the point's and of the
-  // image's distances from the plane between them.
-  const auto left = [&](const Eigen::Vector3d& image) {
-    return limits.max_length_m * limits.max_length_m - (image - p).squaredNorm();
-  };
   // The last facet is tried by where the straight line from p to the image meets its plane, which is cheap. beyond_m:
-  // distance of the image before from the plane; left_m2: left() of that image.
-  const auto meetsLast = [&](int b, double beyond_m, const Eigen::Vector3d& image_before, double left_m2) {
+  // distance of the image before from the plane.
+  const auto meetsLast = [&](int b, double beyond_m, const Eigen::Vector3d& image_before) {
     const Mirror& m = mirrors_[static_cast<std::size_t>(b)];
     const Own& o = own[static_cast<std::size_t>(b)];
-    const double product = o.distance_m * beyond_m;
-    if (!(product > 0) || 4 * product > left_m2 + kLength_m2) return false;
+    if (!(o.distance_m * beyond_m > 0)) return false;
     const double share = o.distance_m / (o.distance_m + beyond_m);
     const double x = o.along1_m + share * (m.e1.dot(image_before) - m.first1_m - o.along1_m);
     if (!(x > -1e-6 && x < m.size1_m + 1e-6)) return false;
@@ -226,13 +219,11 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
     if (limits.max_order < 2) continue;
     const Eigen::Vector3d image1 = mirror(p, fa);
     const Beam beam(image1, corners_[a].point);
-    const double left1_m2 = left(image1);
-    if (left1_m2 < -kLength_m2) continue;
     for (int b : on_side_.empty() ? all : on_side_[static_cast<std::size_t>(2 * a + (da > 0))]) {
       // Cheap tests first: few facets pass them where no third bounce follows.
       const double db = beyond(b, image1);
       if (b == a || std::abs(db) < kOnPlane_m) continue;
-      const bool last = min_order <= 2 && (wanted[a] || wanted[b]) && in_front[b] && meetsLast(b, db, image1, left1_m2);
+      const bool last = min_order <= 2 && (wanted[a] || wanted[b]) && in_front[b] && meetsLast(b, db, image1);
       if ((!last && limits.max_order < 3) || (on_side_.empty() && !faces(a, da > 0, b))) continue;
       if (!beam.meets(corners_[b].point)) continue;
       const Facet& fb = scene_.facets[reflectors_[b]];
@@ -247,11 +238,9 @@ std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCast
         const int a = ways[i].first;
         const Facet& fa = scene_.facets[reflectors_[a]];
         const Eigen::Vector3d image2 = mirror(ways[i].image, fb);
-        const double left2_m2 = left(image2);
-        if (left2_m2 < -kLength_m2) continue;
         for (std::size_t j = i; j < ways.size(); ++j) {
           const int c = ways[j].first;
-          if (!(wanted[a] || wanted[b] || wanted[c]) || !meetsLast(c, beyond(c, image2), image2, left2_m2)) continue;
+          if (!(wanted[a] || wanted[b] || wanted[c]) || !meetsLast(c, beyond(c, image2), image2)) continue;
           const int fc = reflectors_[c];
           if (solve(p, {fa.id, fb.id, fc}, rays, limits, path)) found.push_back(path);
           if (c != a && solve(p, {fc, fb.id, fa.id}, rays, limits, path)) found.push_back(path);
