@@ -92,7 +92,7 @@ std::vector<HypothesisFit> FitRound::fit(std::vector<Screened> screened, std::si
     const bool moved = s.hypothesis.isMove();
     const bool box = isUnmodelledBox(s.hypothesis);
     const double rival = kNoRival * plain_name_;
-    const double worth = box                 ? kShareWorthABox * fits_.front().gain
+    const double worth = box                 ? (fits_.empty() ? kWorthABox : kShareWorthABox * fits_.front().gain)
                          : object            ? kWorthAnObject
                          : law               ? kWorthALaw
                          : geometry || moved ? kWorthAFitOfGeometry

@@ -389,9 +389,15 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
       errors.push_back(std::sqrt(robust(at + j, at + j)) * std::abs(c.slope(v[j])));
     }
     fit.standard_error.push_back(std::move(errors));
-    fit.worth.push_back(n == 0           ? Worth()
-                        : h.isOneSided() ? worthOfPresence(base, parts, o, e, at, n)
-                                         : worthOf(h, v, covariance.block(at, at, n, n), robust.block(at, at, n, n)));
+    Worth worth;
+    if (n > 0 && !h.isOneSided()) worth = worthOf(h, v, covariance.block(at, at, n, n), robust.block(at, at, n, n));
+    // What a turn of the view lets in and out shows in no slope (5 degrees of pitch: 230 nats, 3 by the errors there).
+    const bool turns = h.isGeometry() && n == 1 && source_.altersGeometry(h.at({1.0}));
+    if (n > 0 && (h.isOneSided() || turns)) {
+      const Worth presence = worthOfPresence(base, parts, o, e, at, n);
+      if (h.isOneSided() || presence.scattered() > worth.scattered()) worth = presence;
+    }
+    fit.worth.push_back(worth);
     at += n;
   }
   fit.nuisance = std::move(o.state.nuisance);

@@ -111,8 +111,8 @@ class HypothesisFitter {
     ModelState state;
     Scores scores;  ///< at the last derivative
   };
-  /// What the numbers from `first` on, which rise from nothing, bring beside the others, without the place that gains
-  /// most. Their square laws make what the errors at the fit say of that far too small.
+  /// What the numbers from `first` on, which rise from nothing or turn the view, bring beside the others, without the
+  /// place that gains most. Their square laws make what the errors at the fit say of that far too small.
   Worth worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
                         const Optimum& o, const EffectiveScores& e, Eigen::Index first, Eigen::Index numbers);
   Eigen::MatrixXd robustCovariance(const EffectiveScores& effective) const;

@@ -149,6 +149,9 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   report_("laws without a name", 0);
   for (Screened& s : screenLaws(twin_, model_, state, spread(kLawPoses))) {
     if (std::optional<Screened> named = namedLike(s, all)) suggest(std::move(*named));
+    if (const std::optional<Screened> box = s.promised > kWorthALaw ? boxThatHides(s) : std::nullopt) {
+      screened.push_back(screen_.amongStarts(state, *box, spread(kScreenPoses)));
+    }
     screened.push_back(std::move(s));
   }
   report_("replicas of echoes", 0);

@@ -18,6 +18,7 @@ constexpr double kRadii[] = {1, 2, 4, 7};  ///< of the scale, about a place wher
 constexpr double kFiner[] = {0.35, 0.18};  ///< of the distance of the best of them
 constexpr int kDirections = 8;
 constexpr double kTurns_deg[] = {-8, -5, -3, 3, 5, 8};  ///< of that object about itself
+constexpr std::size_t kStartsKept = 6;
 constexpr double kNearlyAsLikely = 10;  ///< nats that a place may be less likely, before latents settle there
 
 /// Without gains of their own of the actors of a material; and nats of what is known of those beforehand.
@@ -181,6 +182,21 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
     result.starts.front() = at;
   }
   return result;
+}
+
+Screened HypothesisScreen::amongStarts(const ModelState& null, Screened of, const std::vector<int>& poses) {
+  std::vector<std::pair<double, std::vector<double>>> starts;  // by what they promise
+  for (std::vector<double>& at : of.starts) {
+    const double promised = valueAt(null, of.hypothesis, at, poses, null.nuisance).second;
+    starts.emplace_back(promised, std::move(at));
+    source_.settle(null.mechanisms);
+  }
+  std::sort(starts.rbegin(), starts.rend());
+  starts.resize(std::min(kStartsKept, starts.size()));
+  of.promised = starts.front().first;
+  of.starts.clear();
+  for (auto& [promised, at] : starts) of.starts.push_back(std::move(at));
+  return of;
 }
 
 double HypothesisScreen::settledAt(const ModelState& null, const Hypothesis& hypothesis,

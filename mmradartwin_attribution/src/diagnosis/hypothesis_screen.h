@@ -28,6 +28,8 @@ class HypothesisScreen {
   /// Of what is there or not, more or less, the likelihood at some values: a quadratic about nothing says little of it.
   /// Of all others a score test.
   Screened screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
+  /// Of several starts, the likelihood at each: the best few are kept, the best first, and what that one promises.
+  Screened amongStarts(const ModelState& null, Screened hypothesis, const std::vector<int>& poses);
   /// Of an actor whose place is free, by the first two coordinates: the likelihood at places around it, farther away
   /// than slopes reach; of the best of them over all poses, with the latents settled there.
   Screened around(const ModelState& null, const Hypothesis& hypothesis, int actor, const std::vector<int>& poses);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "back_projection.h"
+#include "hypothesis_finding.h"
 
 namespace mmradartwin {
 namespace {
@@ -13,11 +14,25 @@ constexpr double kTurned_deg = 15, kSquare_deg = 90;  // ways in which it may st
 constexpr std::size_t kFacing = 5;                    // poses that a side of it may face
 constexpr double kGrown[] = {0.6, 0.8, 1.25, 1.6};    // of a side
 constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1}, kTurns_deg[] = {-8, -3, 3, 8};
+constexpr double kHides_db = -6;               // of a law over paths that pass a place, at least
+constexpr double kAbout_m[] = {-0.1, 0, 0.1};  // of the place that paths pass which something hides
 constexpr int kSweeps = 4;
 constexpr double kHigher = 5;        // nats of a sweep that are worth another
 constexpr double kWorthSweeps = 15;  // nats of the fit
 
 enum Coordinates { kX, kY, kSide, kYaw };
+
+/// A box with that place for its middle, to start with.
+Hypothesis boxAt(const Eigen::Vector2d& middle) {
+  Hypothesis h;
+  h.mechanism = defaultMechanism("actor_unmodelled");
+  h.mechanism.values.set("shape", std::string("box"));
+  h.coordinates = {{"x_m", "m", -1, middle.x(), middle.x() + 0.1, -1000, 1000, {}},
+                   {"y_m", "m", -1, middle.y(), middle.y() + 0.1, -1000, 1000, {}},
+                   {"size_m", "m", -1, 0, kSides_m[0], 0.02, 5, {}},
+                   {"yaw_deg", "deg", -1, 0, kTurned_deg, -360, 360, {}}};
+  return h;
+}
 
 /// Boxes that share something with the one that was fitted, as scaled coordinates.
 std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
@@ -69,17 +84,12 @@ bool isUnmodelledBox(const Hypothesis& hypothesis) {
 }
 
 Screened asBox(const ChannelData& data, const ModelState& null, const HypothesisFit& cylinder) {
-  Screened box{cylinder.hypothesis, cylinder.gain, {}};
+  const NamedParameters fitted = cylinder.hypothesis.at(cylinder.scaled);
+  const Eigen::Vector2d axis(fitted.values.number("x_m"), fitted.values.number("y_m"));
+  Screened box{boxAt(axis), cylinder.gain, {}};
   Hypothesis& h = box.hypothesis;
-  h.mechanism = h.at(cylinder.scaled);
-  h.mechanism.values.set("shape", std::string("box"));
-  h.variant = "a box " + h.variant;
-  const Eigen::Vector2d axis(h.mechanism.values.number("x_m"), h.mechanism.values.number("y_m"));
-  h.coordinates = {{"x_m", "m", -1, axis.x(), axis.x() + 0.1, -1000, 1000, {}},
-                   {"y_m", "m", -1, axis.y(), axis.y() + 0.1, -1000, 1000, {}},
-                   {"size_m", "m", -1, 0, kSides_m[0], 0.02, 5, {}},
-                   {"yaw_deg", "deg", -1, 0, kTurned_deg, -360, 360, {}}};
-  const double radius_m = 0.5 * h.mechanism.values.number("size_m");
+  h.variant = "a box " + cylinder.hypothesis.variant;
+  const double radius_m = 0.5 * fitted.values.number("size_m");
   // The cylinder's front stands where sides shine, half a side before the middle of the box.
   const auto startBehind = [&](const Eigen::Vector2d& toward_radar, double yaw_deg) {
     for (double side_m : kSides_m) {
@@ -98,6 +108,29 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
   for (const auto& [gain, i] : seen) {
     const Eigen::Vector2d way = (data.poses[i].pose.T_map_radar.translation().head<2>() - axis).normalized();
     startBehind(way, std::fmod(std::atan2(way.y(), way.x()) * 180 / M_PI + 360, kSquare_deg));
+  }
+  return box;
+}
+
+std::optional<Screened> boxThatHides(const Screened& law) {
+  const NamedParameters& m = law.hypothesis.mechanism;
+  if (m.mechanism != "empirical_law" || m.values.text("variable") != "passing_m" ||
+      law.hypothesis.coordinates.front().value(law.starts.front().front()) > kHides_db) {
+    return std::nullopt;
+  }
+  const Eigen::Vector2d place(m.values.number("x_m"), m.values.number("y_m"));
+  Screened box{boxAt(place), 0, {}};
+  Hypothesis& h = box.hypothesis;
+  h.variant = "a box that hides what is behind it, about " + number(place.x(), 2) + ", " + number(place.y(), 2) + " m";
+  for (double side_m : kSides_m) {
+    for (double yaw_deg = 0; yaw_deg < kSquare_deg; yaw_deg += 2 * kTurned_deg) {
+      for (double dx_m : kAbout_m) {
+        for (double dy_m : kAbout_m) {
+          box.starts.push_back({h.coordinates[kX].scaled(place.x() + dx_m), h.coordinates[kY].scaled(place.y() + dy_m),
+                                h.coordinates[kSide].scaled(side_m), h.coordinates[kYaw].scaled(yaw_deg)});
+        }
+      }
+    }
   }
   return box;
 }
