@@ -41,7 +41,7 @@ struct HypothesisFit {
   std::vector<std::vector<double>> fold_scaled;  ///< coordinates without each fold of locations
   bool plain = false;  ///< broad_gain is far beyond what clean sessions bring, whatever the scatter over places
   std::size_t numbers() const;  ///< fitted or searched for, at least one
-  double ranking() const;       ///< gain less a price per number; of a law without a name, part of it
+  double ranking() const;       ///< gain less a price per number; of what bends to much, part of it
   double moved_m() const;       ///< how far it moves an actor, or all of them; 0 of what moves none
   bool isFarAway() const;       ///< moves much farther than an actor's place is wrong by, and gains by it
   double size_m() const;        ///< of an object that the twin lacks; 0 of all others
