@@ -289,6 +289,37 @@ TEST_F(FrameEvidenceTest, WalkerIsPutIntoTheMap) {
   EXPECT_GE(found[0].poses.size(), 4u);
 }
 
+TEST_F(FrameEvidenceTest, LimbsOfAWalkerThatBeatAreNoBursts) {
+  // Stronger than all that stands, and moving in every frame: frames differ by nothing but the walker.
+  std::normal_distribution<double> draw;
+  radar_.slope_hz_per_s *= 1.6;  // bins that tell limbs apart
+  const Eigen::Vector3d middle(0.3, -0.4, 1.0);
+  std::string pose_of_limbs;
+  std::vector<std::pair<Eigen::Vector3d, Complex>> limbs;
+  const FrameExaminer examiner = examine(3000, [&](const Pose& pose, int f, ComplexGrid& x) {
+    if (pose.name != pose_of_limbs) {
+      pose_of_limbs = pose.name;
+      limbs.resize(4);
+      for (auto& [where, weight] : limbs) {
+        where = middle + Eigen::Vector3d(0.1 * draw(random_), 0.1 * draw(random_), 0.2 * draw(random_));
+        weight = {draw(random_), draw(random_)};
+      }
+    }
+    const double way = 0.4 * (pose.stamp_ns * 1e-9 + f * radar_.frame_period_s);
+    const double along_m = 0.4 * (4 * std::abs(way - std::floor(way) - 0.5) - 1);
+    for (const auto& [where, weight] : limbs) {
+      ComplexGrid echo = ComplexGrid::Zero(x.rows(), x.cols());
+      addEcho(pose, where + along_m * Eigen::Vector3d::UnitX(), 1500, echo);
+      x += weight * echo;
+    }
+  });
+  for (const PoseFrames& p : examiner.poses()) EXPECT_EQ(p.shots, kFrames) << p.pose;
+  const auto found = examiner.findings();
+  ASSERT_EQ(causes(found), std::vector<std::string>{"moving_target"});
+  EXPECT_NEAR(value(found[0], "x_m"), middle.x(), 0.3);
+  EXPECT_NEAR(value(found[0], "y_m"), middle.y(), 0.3);
+}
+
 TEST_F(FrameEvidenceTest, ToneOfTheRadarIsNoWalkerAndNoSlip) {
   // A strong one turns all samples from frame to frame, which packets in another order may look like.
   for (double level : {300.0, 9000.0}) {

@@ -6,6 +6,10 @@
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <unsupported/Eigen/FFT>
+
+#include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin {
 namespace {
@@ -16,6 +20,10 @@ using Complex = std::complex<float>;
 constexpr int kLeastCodes = 256;
 // Codes inside of the outermost one that tell how often it should come.
 constexpr int kNeighbours = 16;
+
+// An echo that moves, with all of its limbs, holds a few neighbouring range bins; a burst sweeps over the whole band.
+constexpr int kEchoesOfBand = 8;        // one is an eighth of it at most
+constexpr double kShareOfEchoes = 0.8;  // of the power, by two of them
 
 float medianOf(std::vector<float>& values) {
   const auto middle = values.begin() + static_cast<long>(values.size() / 2);
@@ -217,22 +225,31 @@ std::vector<Complex> commonGains(const FrameStack& s, const std::vector<Complex>
 }
 
 double differenceVariance(const FrameStack& s) {
-  std::vector<float> means;
+  Eigen::FFT<float> fft(Eigen::FFT<float>::impl_type(), Eigen::FFT<float>::Unscaled);
+  const std::vector<double> window = hannWindow(s.samples);
+  std::vector<Complex> difference(static_cast<std::size_t>(s.samples)), spectrum(difference);
+  std::vector<float> power(difference.size()), variances;
   for (int shot = 1; shot < s.shots(); ++shot) {
     for (int k = 0; k < s.channels(); ++k) {
-      double sum = 0;
+      double window_power = 0;
       int count = 0;
       for (int n = 0; n < s.samples; ++n) {
-        const std::size_t now = s.at(shot, k, n), before = s.at(shot - 1, k, n);
-        if (!s.use[now] || !s.use[before]) continue;
-        sum += std::norm(s.x[now] - s.x[before]);
+        const std::size_t now = s.at(shot, k, n), before = s.at(shot - 1, k, n), i = static_cast<std::size_t>(n);
+        const bool used = s.use[now] && s.use[before];
+        difference[i] = used ? static_cast<float>(window[i]) * (s.x[now] - s.x[before]) : Complex(0);
+        if (!used) continue;
+        window_power += window[i] * window[i];
         ++count;
       }
-      if (2 * count >= s.samples) means.push_back(static_cast<float>(sum / count / 2));
+      if (2 * count < s.samples) continue;
+      fft.fwd(spectrum.data(), difference.data(), s.samples);
+      std::transform(spectrum.begin(), spectrum.end(), power.begin(), [](const Complex& v) { return std::norm(v); });
+      // The median of an exponential is ln 2 of its mean, and two shots differ by twice the noise of one.
+      variances.push_back(medianOf(power) / static_cast<float>(2 * std::log(2.0) * window_power));
     }
   }
   // Rounding of I and Q: 1/12 each.
-  return means.empty() ? 1.0 / 6 : std::max<double>(medianOf(means), 1.0 / 6);
+  return variances.empty() ? 1.0 / 6 : std::max<double>(medianOf(variances), 1.0 / 6);
 }
 
 void turnFrames(double rad_per_frame, FrameStack& s) {
@@ -242,6 +259,31 @@ void turnFrames(double rad_per_frame, FrameStack& s) {
     for (std::size_t i = 0; i < per_frame; ++i) s.x[static_cast<std::size_t>(f) * per_frame + i] *= turn;
   }
 }
+
+namespace {
+
+/// Whether most of a power by range bin lies in two groups of neighbouring ones.
+bool isOfEchoes(std::vector<float> power) {
+  const std::size_t bins = power.size(), wide = std::max<std::size_t>(1, bins / kEchoesOfBand);
+  double left = std::accumulate(power.begin(), power.end(), 0.0);
+  const double all = left;
+  for (int echo = 0; echo < 2; ++echo) {
+    double most = 0;
+    std::size_t first = 0;
+    for (std::size_t from = 0; from + wide <= bins; ++from) {
+      const auto begin = power.begin() + static_cast<std::ptrdiff_t>(from);
+      const double here = std::accumulate(begin, begin + static_cast<std::ptrdiff_t>(wide), 0.0);
+      if (here <= most) continue;
+      most = here;
+      first = from;
+    }
+    std::fill_n(power.begin() + static_cast<std::ptrdiff_t>(first), wide, 0.0f);
+    left -= most;
+  }
+  return left < (1 - kShareOfEchoes) * all;
+}
+
+}  // namespace
 
 Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, FrameStack& s) {
   // Where noise is less than rounding, differences from the median are flips by one code, whose variance is at most 1/4
@@ -261,6 +303,8 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
   std::vector<std::uint8_t> seen(static_cast<std::size_t>(s.frames), 0), hit(seen);
   std::vector<double> sum(static_cast<std::size_t>(s.samples) + 1, 0);
   std::vector<float> energy(static_cast<std::size_t>(s.samples)), sorted;
+  Eigen::FFT<float> fft(Eigen::FFT<float>::impl_type(), Eigen::FFT<float>::Unscaled);
+  std::vector<Complex> chirp(static_cast<std::size_t>(s.samples)), spectrum(chirp);
   for (int shot = 0; shot < s.shots(); ++shot) {
     for (int slot = 0; slot < s.slots; ++slot) {
       const Complex gain = gains[static_cast<std::size_t>(shot)];
@@ -284,7 +328,8 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
       // sum is distributed at most as noise is, one sample at each receiver alike: 16 times the median has a chance of
       // 2^-16 per sample, and thereby none in a window of several.
       const double level = std::max(1.0, static_cast<double>(medianOf(sorted)));
-      const double least = level > 1.5 ? 16 : 1;
+      const bool moves = level > 1.5;
+      const double least = moves ? 16 : 1;
       double best_gain = 0;
       int best_begin = 0, best_length = 0;
       for (std::size_t l = 0; l < lengths.size(); ++l) {
@@ -302,6 +347,18 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
         }
       }
       if (best_length == 0) continue;
+      if (moves) {  // limbs beat, and now and then all at once
+        std::vector<float> power(chirp.size(), 0.0f);
+        for (int r = 0; r < s.receivers; ++r) {
+          for (int n = 0; n < s.samples; ++n) {
+            const std::size_t at = s.at(shot, slot * s.receivers + r, n);
+            chirp[static_cast<std::size_t>(n)] = s.use[at] ? s.x[at] - gain * average[at % s.values()] : Complex(0);
+          }
+          fft.fwd(spectrum.data(), chirp.data(), s.samples);
+          for (std::size_t b = 0; b < power.size(); ++b) power[b] += std::norm(spectrum[b]);
+        }
+        if (isOfEchoes(std::move(power))) continue;
+      }
       // One wave at all receivers: one direction holds most of what is not noise.
       Eigen::MatrixXcd c = Eigen::MatrixXcd::Zero(s.receivers, s.receivers);
       Eigen::VectorXcd e(s.receivers);

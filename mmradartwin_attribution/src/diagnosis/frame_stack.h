@@ -53,8 +53,8 @@ std::vector<std::complex<float>> meanShot(const FrameStack& stack);
 /// complex sample). 1 where it does not.
 std::vector<std::complex<float>> commonGains(const FrameStack& stack, const std::vector<std::complex<float>>& average,
                                              double noise_variance);
-/// Variance of a complex sample by differences of successive shots: the median over shots and slots, never below what
-/// rounding leaves.
+/// Variance of a complex sample by differences of successive shots: the median over range bins, which what moves does
+/// not reach, shots and slots, never below what rounding leaves.
 double differenceVariance(const FrameStack& stack);
 
 /// Turns every frame by so much more than the one before.
@@ -66,8 +66,8 @@ struct Bursts {
   double log_likelihood_gain = 0;
   std::vector<std::uint8_t> hit;  ///< [shot][slot] chirps taken out of use
 };
-/// Finds energy that is confined to a part of one chirp, the same wave at all receivers, and takes the chirp out of
-/// use.
+/// Finds energy that is confined to a part of one chirp, the same wave at all receivers and no echo's few range bins,
+/// and takes the chirp out of use.
 Bursts dropBursts(const std::vector<std::complex<float>>& average, double noise_variance, FrameStack& stack);
 
 /// Values that stand at a code beyond which there is none, where that code comes far more often than its neighbours.
