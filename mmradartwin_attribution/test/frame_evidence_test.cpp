@@ -76,9 +76,9 @@ class FrameEvidenceTest : public ::testing::Test {
     const double largest = std::max(still.real().cwiseAbs().maxCoeff(), still.imag().cwiseAbs().maxCoeff());
     still *= peak / largest;
     std::normal_distribution<double> noise(0, noise_counts_);
-    std::vector<AdcCube> cubes(kFrames);
+    std::vector<AdcCube> cubes(static_cast<std::size_t>(frames_));
     std::vector<std::uint8_t> payload;
-    for (int f = 0; f < kFrames; ++f) {
+    for (int f = 0; f < frames_; ++f) {
       ComplexGrid x = still;
       if (effect) effect(pose, f, x);
       AdcCube& cube = cubes[static_cast<std::size_t>(f)];
@@ -102,8 +102,8 @@ class FrameEvidenceTest : public ::testing::Test {
       payload.insert(payload.end(), encoded.begin(), encoded.end());
     }
     if (bytes) bytes(pose, payload);
-    payload.resize(kFrames * radar_.bytes_per_frame());
-    for (int f = 0; f < kFrames; ++f) {
+    payload.resize(cubes.size() * radar_.bytes_per_frame());
+    for (int f = 0; f < frames_; ++f) {
       decodeFrame(radar_, &payload[static_cast<std::size_t>(f) * radar_.bytes_per_frame()],
                   cubes[static_cast<std::size_t>(f)].data);
     }
@@ -171,6 +171,7 @@ class FrameEvidenceTest : public ::testing::Test {
   std::vector<Pose> poses_;
   std::vector<Eigen::Vector3d> points_;
   double noise_counts_ = kNoise_counts;
+  int frames_ = kFrames;
 };
 
 TEST_F(FrameEvidenceTest, NothingOnCleanSessions) {
@@ -231,6 +232,24 @@ TEST_F(FrameEvidenceTest, ZeroedPackets) {
   const auto found = examine(12000, {}, loss(lost, packets)).findings();
   ASSERT_EQ(causes(found), std::vector<std::string>{"packet_loss"});
   EXPECT_NEAR(value(found[0], "lost_fraction"), static_cast<double>(lost) / static_cast<double>(packets), 1e-12);
+}
+
+TEST_F(FrameEvidenceTest, ZeroedPacketsOfFewFramesAmongWeakEchoes) {
+  // Most bins tell little of how frames turn, and a turn that is not there leaves what looks like bursts.
+  frames_ = 16;
+  noise_counts_ = 30;
+  std::uniform_real_distribution<double> place(-3, 3);
+  std::vector<Eigen::Vector3d> weak;
+  for (int i = 0; i < 60; ++i) weak.emplace_back(place(random_), place(random_), 1.0);
+  points_.resize(1);
+  long long lost = 0, packets = 0;
+  const FrameExaminer examiner = examine(
+      6500,
+      [&](const Pose& pose, int, ComplexGrid& x) {
+        for (const Eigen::Vector3d& point : weak) addEcho(pose, point, 12, x);
+      },
+      loss(lost, packets));
+  EXPECT_EQ(causes(examiner.findings()), std::vector<std::string>{"packet_loss"});
 }
 
 TEST_F(FrameEvidenceTest, MissingPackets) {

@@ -29,6 +29,25 @@ T medianOf(std::vector<T> values) {
   return *middle;
 }
 
+/// Of values with weights; 0 of none.
+double weightedMedian(std::vector<std::pair<double, double>>& values) {
+  std::sort(values.begin(), values.end());
+  double total = 0, sum = 0;
+  for (const auto& [value, weight] : values) total += weight;
+  for (const auto& [value, weight] : values) {
+    sum += weight;
+    if (2 * sum >= total) return value;
+  }
+  return values.empty() ? 0 : values.back().first;
+}
+
+/// Standard deviation of the median of values that scatter so about it, normally but for outliers.
+template <typename T>
+double errorOfMedian(std::vector<T> values, double median) {
+  for (T& v : values) v = std::abs(v - median);
+  return 1.25 * 1.48 * medianOf(values) / std::sqrt(static_cast<double>(values.size()));
+}
+
 Eigen::FFT<float>& fft() {
   thread_local Eigen::FFT<float> fft(Eigen::FFT<float>::impl_type(), Eigen::FFT<float>::Unscaled);
   return fft;
@@ -144,20 +163,37 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
       last = f;
     }
   }
-  // The median of angles about a middle: what bursts do to two steps each counts for no more than that.
+  // The median of angles about their middle: what bursts do to two steps each counts for no more than that.
+  struct Turn {
+    double rad, error_rad;
+  };
   const auto middle = [](const std::vector<std::complex<double>>& turns) {
     const std::complex<double> sum = std::accumulate(turns.begin(), turns.end(), std::complex<double>(0));
     std::vector<double> angles;
     for (const auto& z : turns) angles.push_back(std::arg(z * std::conj(sum)));
-    return std::arg(sum) + medianOf(angles);
+    const double beside = medianOf(angles);
+    return Turn{std::arg(sum) + beside, errorOfMedian(angles, beside)};
   };
-  std::vector<std::complex<double>> turns;
+  std::vector<Turn> of_bins;
+  std::vector<std::complex<double>> each;
   for (const auto& of_bin : steps) {
     // Half of the steps may be turned anyhow; noise's add up to a sixth of 40.
     const std::complex<double> sum = std::accumulate(of_bin.begin(), of_bin.end(), std::complex<double>(0));
-    if (std::abs(sum) > 0.5 * static_cast<double>(of_bin.size())) turns.push_back(std::polar(1.0, middle(of_bin)));
+    if (!(std::abs(sum) > 0.5 * static_cast<double>(of_bin.size()))) continue;
+    of_bins.push_back(middle(of_bin));
+    each.push_back(std::polar(1.0, of_bins.back().rad));
   }
-  return turns.empty() ? 0 : middle(turns);
+  if (of_bins.empty()) return 0;
+  const Turn common = middle(each);
+  // Most of these bins are weak. Those that know better tell how much it is, where they do not turn by themselves.
+  std::vector<std::pair<double, double>> weighed;
+  for (const Turn& t : of_bins) {
+    const double apart = std::remainder(t.rad - common.rad, 2 * M_PI);
+    const double variance = std::max(t.error_rad * t.error_rad, 1e-12);
+    if (apart * apart > 16 * (variance + common.error_rad * common.error_rad)) continue;
+    weighed.emplace_back(apart, 1 / variance);
+  }
+  return common.rad + weightedMedian(weighed);
 }
 
 void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotResiduals& result) const {
@@ -175,17 +211,6 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotResid
   };
   const auto varied = [&](std::size_t i, int b) { return Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels); };
   const auto beyondOne = [&](const std::vector<Cell>& cells) {
-    double total = 0;
-    for (const Cell& cell : cells) total += cell.power;
-    const auto weightedMedian = [total](std::vector<std::pair<double, double>>& values) {
-      std::sort(values.begin(), values.end());
-      double sum = 0;
-      for (const auto& [value, weight] : values) {
-        sum += weight;
-        if (2 * sum >= total) return value;
-      }
-      return values.empty() ? 0 : values.back().first;
-    };
     std::vector<std::complex<double>> beyond;
     std::vector<std::pair<double, double>> re(cells.size()), im(cells.size());
     for (std::size_t i = 0; i < s.shot.size(); ++i) {
