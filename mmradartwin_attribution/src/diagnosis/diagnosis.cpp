@@ -173,8 +173,9 @@ std::optional<std::string> Session::judgeDelivery() {
   undoDelivery(*delivery, data_);
   Finding f = findingOf(*delivery, data_.radar);
   gains_->ofChange(recorded, mechanisms_, data_, mechanisms_, f);
-  // By chance some convention does best where nothing matches; one that is true lets the twin explain more.
-  if (f.gain && f.gain->explained_power.after <= f.gain->explained_power.before) {
+  // By chance some convention does best where nothing matches, or beside a transmitter that is late; one that is true
+  // lets the twin explain more wherever it looks.
+  if (f.gain && f.gain->explained_power.difference_ci95 && (*f.gain->explained_power.difference_ci95)[0] <= 0) {
     data_ = recorded;
     return std::nullopt;
   }

@@ -147,8 +147,13 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
     }
   };
   report_("laws without a name", 0);
-  for (Screened& s : screenLaws(twin_, model_, state, spread(kLawPoses))) {
-    if (std::optional<Screened> named = namedLike(s, all)) suggest(std::move(*named));
+  ScreenedLaws laws = screenLaws(twin_, model_, state, spread(kLawPoses));
+  const auto isNoName = [&](const Screened& s) {
+    return s.hypothesis.mechanism.mechanism == "gain_drift" && !laws.gains_follow_time;
+  };
+  screened.erase(std::remove_if(screened.begin(), screened.end(), isNoName), screened.end());
+  for (Screened& s : laws.laws) {
+    if (std::optional<Screened> named = namedLike(s, all); named && !isNoName(*named)) suggest(std::move(*named));
     if (const std::optional<Screened> box = s.promised > kWorthALaw ? boxThatHides(s) : std::nullopt) {
       screened.push_back(screen_.amongStarts(state, *box, spread(kScreenPoses)));
     }

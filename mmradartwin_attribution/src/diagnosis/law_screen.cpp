@@ -30,6 +30,8 @@ constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};
 constexpr int kBearings = 24;  ///< that half a turn is divided into
 constexpr int kOften = 12;     ///< paths of an actor
 constexpr double kMaxInflation = 50;
+constexpr double kBeyondTime =
+    1.5;  ///< of what steps and slopes explain: what each pose by itself may, chance left off
 constexpr double kScattersLess = 0.7;  ///< of the scatter before a law, from where on its size is judged by it anew
 constexpr double kWeakest_db = -45;    ///< echoes below this are one for a law over amplitudes
 
@@ -75,6 +77,8 @@ class LawScreen {
   std::optional<Screened> bestPlace(const std::string& variable) const;
   /// Steps of all levels, at the times between poses that promise most.
   std::optional<Screened> bestSteps() const;
+  /// False where poses differ in gain by far more than these steps, or a slope over time, explain.
+  bool gainsFollowTime(const std::optional<Screened>& steps) const;
   /// Actors of whom enough paths are measured for a law of their own.
   std::vector<std::string> oftenSeen() const;
 
@@ -82,6 +86,10 @@ class LawScreen {
   Sample sampleOf(const Observable& observable, std::size_t kind) const;
   /// Of directions [P][K], beyond what a constant and the actors' own errors explain.
   Promise promise(const Sample& s, const Eigen::MatrixXd& directions) const;
+  /// Of numbers of each pose, one a column, as directions [P][K] of its paths' gains.
+  Eigen::MatrixXd alikeAtPose(const Eigen::MatrixXd& of_poses) const;
+  /// Of each pose and step, 1 after it.
+  Eigen::MatrixXd afterSteps(const std::vector<double>& steps_s) const;
   /// How many places tell of a direction, each by its paths' share in it.
   double places(const Sample& s, const Eigen::VectorXd& direction) const;
   Hypothesis law(const Observable& o, const Over& over, const std::vector<double>& at) const;
@@ -423,28 +431,68 @@ std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const 
   return result;
 }
 
+Eigen::MatrixXd LawScreen::alikeAtPose(const Eigen::MatrixXd& of_poses) const {
+  Eigen::MatrixXd of_paths(gain().off.size(), of_poses.cols());
+  Eigen::Index at = 0;
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    for (std::size_t k = 0; k < poses_[i].paths.size(); ++k, ++at) {
+      of_paths.row(at) = gain().latent(at, 0) * of_poses.row(static_cast<Eigen::Index>(i));
+    }
+  }
+  return of_paths;
+}
+
+Eigen::MatrixXd LawScreen::afterSteps(const std::vector<double>& steps_s) const {
+  Eigen::MatrixXd after(static_cast<Eigen::Index>(poses_.size()), static_cast<Eigen::Index>(steps_s.size()));
+  for (Eigen::Index i = 0; i < after.rows(); ++i) {
+    for (Eigen::Index k = 0; k < after.cols(); ++k) {
+      after(i, k) = poses_[static_cast<std::size_t>(i)].where.session_s > steps_s[static_cast<std::size_t>(k)] ? 1 : 0;
+    }
+  }
+  return after;
+}
+
+bool LawScreen::gainsFollowTime(const std::optional<Screened>& steps) const {
+  const Eigen::Index poses = static_cast<Eigen::Index>(poses_.size());
+  if (poses == 0 || gain().weight.sum() == 0) return true;
+  Eigen::MatrixXd time(poses, 1);
+  for (Eigen::Index i = 0; i < poses; ++i) time(i, 0) = poses_[static_cast<std::size_t>(i)].where.session_s;
+  time.array() /= std::max(1.0, time.maxCoeff());
+  double by_time = promise(gain(), alikeAtPose(time)).raw;
+  if (steps) {
+    const std::vector<double>& steps_s = steps->hypothesis.mechanism.values.numbers("steps_s");
+    by_time = std::max(by_time, promise(gain(), alikeAtPose(afterSteps(steps_s))).raw);
+  }
+  const double by_pose = promise(gain(), alikeAtPose(Eigen::MatrixXd::Identity(poses, poses))).raw;
+  const double by_chance = 0.5 * whole_ * static_cast<double>(poses);
+  return by_pose - by_chance < kBeyondTime * by_time + kPricePerNumber;
+}
+
 std::optional<Screened> LawScreen::bestSteps() const {
   const Sample& s = gain();
-  std::vector<double> time_s;  // [P]
   std::set<double> stamps_s;
+  std::set<int> places;
   for (const MeasuredPose& pose : poses_) {
-    time_s.insert(time_s.end(), pose.paths.size(), pose.where.session_s);
     stamps_s.insert(pose.where.session_s);
+    places.insert(pose.location);
   }
   if (stamps_s.size() < 2 || s.weight.sum() == 0) return std::nullopt;
   std::vector<double> between_s;
   for (auto stamp = std::next(stamps_s.begin()); stamp != stamps_s.end(); ++stamp) {
     between_s.push_back(0.5 * (*std::prev(stamp) + *stamp));
   }
-  const auto of = [&](const std::vector<double>& steps_s) {
-    Eigen::MatrixXd after(static_cast<Eigen::Index>(time_s.size()), static_cast<Eigen::Index>(steps_s.size()));
-    for (Eigen::Index p = 0; p < after.rows(); ++p) {
-      for (Eigen::Index k = 0; k < after.cols(); ++k) {
-        const bool later = time_s[static_cast<std::size_t>(p)] > steps_s[static_cast<std::size_t>(k)];
-        after(p, k) = later ? s.latent(p, 0) : 0;
-      }
+  const auto of = [&](const std::vector<double>& steps_s) { return promise(s, alikeAtPose(afterSteps(steps_s))); };
+  // Between two steps lie several places: what one alone sees may be that place's. -1 is no step yet.
+  const auto isTold = [&](std::vector<double> steps_s) {
+    std::sort(steps_s.begin(), steps_s.end());
+    std::vector<std::set<int>> between(steps_s.size() + 1);
+    for (const MeasuredPose& pose : poses_) {
+      const auto after = std::lower_bound(steps_s.begin(), steps_s.end(), pose.where.session_s) - steps_s.begin();
+      between[static_cast<std::size_t>(after)].insert(pose.location);
     }
-    return promise(s, after);
+    const std::size_t unset = static_cast<std::size_t>(std::count(steps_s.begin(), steps_s.end(), -1.0));
+    return std::all_of(between.begin() + static_cast<std::ptrdiff_t>(unset), between.end(),
+                       [&](const std::set<int>& of) { return of.size() >= std::min<std::size_t>(2, places.size()); });
   };
   // One step at the time that promises most beside the others.
   const auto moved = [&](std::vector<double> steps_s, std::size_t which) {
@@ -453,6 +501,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
     for (double t : between_s) {
       if (std::count(steps_s.begin(), steps_s.end(), t) > (steps_s[which] == t ? 1 : 0)) continue;
       steps_s[which] = t;
+      if (!isTold(steps_s)) continue;
       const Promise p = of(steps_s);
       if (p.raw / p.inflation <= most) continue;
       most = p.raw / p.inflation;
@@ -466,6 +515,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
   while (steps_s.size() < std::min<std::size_t>(kMostSteps, between_s.size())) {
     steps_s.push_back(-1);
     for (std::size_t which = steps_s.size(); which-- > 0;) steps_s = moved(steps_s, which);
+    if (std::count(steps_s.begin(), steps_s.end(), -1.0) > 0) break;
     std::vector<double> sorted_s = steps_s;
     std::sort(sorted_s.begin(), sorted_s.end());
     const Promise p = of(sorted_s);
@@ -489,16 +539,16 @@ std::optional<Screened> LawScreen::bestSteps() const {
 
 }  // namespace
 
-std::vector<Screened> screenLaws(const Twin& base, const SessionModel& model, const ModelState& null,
-                                 const std::vector<int>& poses) {
-  std::vector<Screened> result;
+ScreenedLaws screenLaws(const Twin& base, const SessionModel& model, const ModelState& null,
+                        const std::vector<int>& poses) {
+  ScreenedLaws result;
   for (const NamedParameters& m : null.mechanisms) {
     if (m.mechanism == "empirical_law") return result;  // what it leaves is of its own shape
   }
   if (poses.empty()) return result;
   const LawScreen screen(base, model, null, poses);
   const auto add = [&](std::optional<Screened> s) {
-    if (s) result.push_back(std::move(*s));
+    if (s) result.laws.push_back(std::move(*s));
   };
   // An error of directions looks like one of each channel: the best stands for all.
   std::map<std::string, std::optional<Screened>> of_channels;  // by variable
@@ -517,12 +567,16 @@ std::vector<Screened> screenLaws(const Twin& base, const SessionModel& model, co
     for (const char* variable : {"foot_m", "time_s"}) add(screen.best(screen.gain(), {variable, actor}));
   }
   const auto drifts = [](const NamedParameters& m) { return m.mechanism == "gain_drift"; };
-  if (std::none_of(null.mechanisms.begin(), null.mechanisms.end(), drifts)) add(screen.bestSteps());
+  if (std::none_of(null.mechanisms.begin(), null.mechanisms.end(), drifts)) {
+    std::optional<Screened> steps = screen.bestSteps();
+    result.gains_follow_time = screen.gainsFollowTime(steps);
+    if (result.gains_follow_time) add(std::move(steps));
+  }
   add(screen.bestBearing());
   for (const std::string& variable : LawVariable::names()) {
     if (LawVariable::isAboutPlace(variable)) add(screen.bestPlace(variable));
   }
-  std::stable_sort(result.begin(), result.end(),
+  std::stable_sort(result.laws.begin(), result.laws.end(),
                    [](const Screened& a, const Screened& b) { return a.promised > b.promised; });
   return result;
 }
