@@ -30,8 +30,7 @@ constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};
 constexpr int kBearings = 24;  ///< that half a turn is divided into
 constexpr int kOften = 12;     ///< paths of an actor
 constexpr double kMaxInflation = 50;
-constexpr double kBeyondTime =
-    1.5;  ///< of what steps and slopes explain: what each pose by itself may, chance left off
+constexpr double kBeyondTime = 1.5;    ///< of what time explains: what each pose by itself may, chance left off
 constexpr double kScattersLess = 0.7;  ///< of the scatter before a law, from where on its size is judged by it anew
 constexpr double kWeakest_db = -45;    ///< echoes below this are one for a law over amplitudes
 
