@@ -308,6 +308,9 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
   for (int shot = 0; shot < s.shots(); ++shot) {
     for (int slot = 0; slot < s.slots; ++slot) {
       const Complex gain = gains[static_cast<std::size_t>(shot)];
+      const auto residual = [&](std::size_t at) {
+        return s.use[at] ? s.x[at] - gain * average[at % s.values()] : Complex(0);
+      };
       sorted.clear();
       for (int n = 0; n < s.samples; ++n) {
         double e = 0;
@@ -315,7 +318,7 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
         for (int r = 0; r < s.receivers; ++r) {
           const std::size_t at = s.at(shot, slot * s.receivers + r, n);
           if (!s.use[at]) continue;
-          e += std::norm(s.x[at] - gain * average[at % s.values()]);
+          e += std::norm(residual(at));
           ++count;
         }
         energy[static_cast<std::size_t>(n)] = static_cast<float>(e / scale / s.receivers);
@@ -351,8 +354,7 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
         std::vector<float> power(chirp.size(), 0.0f);
         for (int r = 0; r < s.receivers; ++r) {
           for (int n = 0; n < s.samples; ++n) {
-            const std::size_t at = s.at(shot, slot * s.receivers + r, n);
-            chirp[static_cast<std::size_t>(n)] = s.use[at] ? s.x[at] - gain * average[at % s.values()] : Complex(0);
+            chirp[static_cast<std::size_t>(n)] = residual(s.at(shot, slot * s.receivers + r, n));
           }
           fft.fwd(spectrum.data(), chirp.data(), s.samples);
           for (std::size_t b = 0; b < power.size(); ++b) power[b] += std::norm(spectrum[b]);
@@ -364,8 +366,7 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
       Eigen::VectorXcd e(s.receivers);
       for (int n = best_begin; n < best_begin + best_length; ++n) {
         for (int r = 0; r < s.receivers; ++r) {
-          const std::size_t at = s.at(shot, slot * s.receivers + r, n);
-          e[r] = s.use[at] ? std::complex<double>(s.x[at] - gain * average[at % s.values()]) : 0.0;
+          e[r] = std::complex<double>(residual(s.at(shot, slot * s.receivers + r, n)));
         }
         c += e * e.adjoint();
       }

@@ -481,7 +481,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
     between_s.push_back(0.5 * (*std::prev(stamp) + *stamp));
   }
   const auto of = [&](const std::vector<double>& steps_s) { return promise(s, alikeAtPose(afterSteps(steps_s))); };
-  // Between two steps lie several places: what one alone sees may be that place's. -1 is no step yet.
+  // Between two steps lie several places: what one alone sees may be that place's.
   const auto isTold = [&](std::vector<double> steps_s) {
     std::sort(steps_s.begin(), steps_s.end());
     std::vector<std::set<int>> between(steps_s.size() + 1);
@@ -489,8 +489,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
       const auto after = std::lower_bound(steps_s.begin(), steps_s.end(), pose.where.session_s) - steps_s.begin();
       between[static_cast<std::size_t>(after)].insert(pose.location);
     }
-    const std::size_t unset = static_cast<std::size_t>(std::count(steps_s.begin(), steps_s.end(), -1.0));
-    return std::all_of(between.begin() + static_cast<std::ptrdiff_t>(unset), between.end(),
+    return std::all_of(between.begin(), between.end(),
                        [&](const std::set<int>& of) { return of.size() >= std::min<std::size_t>(2, places.size()); });
   };
   // One step at the time that promises most beside the others.
@@ -513,8 +512,9 @@ std::optional<Screened> LawScreen::bestSteps() const {
   double most = kLeastWorth;
   while (steps_s.size() < std::min<std::size_t>(kMostSteps, between_s.size())) {
     steps_s.push_back(-1);
-    for (std::size_t which = steps_s.size(); which-- > 0;) steps_s = moved(steps_s, which);
-    if (std::count(steps_s.begin(), steps_s.end(), -1.0) > 0) break;
+    steps_s = moved(steps_s, steps_s.size() - 1);
+    if (steps_s.back() < 0) break;  // there is no time for one more
+    for (std::size_t which = steps_s.size() - 1; which-- > 0;) steps_s = moved(steps_s, which);
     std::vector<double> sorted_s = steps_s;
     std::sort(sorted_s.begin(), sorted_s.end());
     const Promise p = of(sorted_s);
