@@ -18,6 +18,8 @@ constexpr double kRadii[] = {1, 2, 4, 7};  ///< of the scale, about a place wher
 constexpr double kFiner[] = {0.35, 0.18};  ///< of the distance of the best of them
 constexpr int kDirections = 8;
 constexpr double kTurns_deg[] = {-8, -5, -3, 3, 5, 8};  ///< of that object about itself
+constexpr std::size_t kLookedAtFirst = 3;               ///< every third pose,
+constexpr double kHopeless = 60;  ///< and nats, of all poses, that a value loses there to be looked at no more
 constexpr std::size_t kStartsKept = 6;
 constexpr double kNearlyAsLikely = 10;  ///< nats that a place may be less likely, before latents settle there
 
@@ -71,6 +73,21 @@ std::vector<RangeShift> HypothesisScreen::nearerOrFarther(const ModelState& null
 
 std::pair<double, double> HypothesisScreen::valueAt(const ModelState& null, const Hypothesis& hypothesis,
                                                     const std::vector<double>& scaled, const std::vector<int>& poses,
+                                                    const Nuisance& nuisance, double beside) {
+  std::vector<int> looked_at, rest;
+  for (std::size_t i = 0; i < poses.size(); ++i) (i % kLookedAtFirst == 0 ? looked_at : rest).push_back(poses[i]);
+  std::vector<double> there = likelihoodsAt(null, hypothesis, scaled, looked_at, nuisance);
+  auto [gain, promised] = promiseOf(null, hypothesis, there, looked_at);
+  gain *= static_cast<double>(poses.size()) / static_cast<double>(looked_at.size());
+  if (gain < beside - kHopeless) return {gain, promised};
+  const std::vector<double> more = likelihoodsAt(null, hypothesis, scaled, rest, nuisance);
+  there.insert(there.end(), more.begin(), more.end());
+  looked_at.insert(looked_at.end(), rest.begin(), rest.end());
+  return promiseOf(null, hypothesis, there, looked_at);
+}
+
+std::vector<double> HypothesisScreen::likelihoodsAt(const ModelState& null, const Hypothesis& hypothesis,
+                                                    const std::vector<double>& scaled, const std::vector<int>& poses,
                                                     const Nuisance& nuisance) {
   // About the same ranges as the null's, so that a hypothesis that does nothing gains nothing; but for an actor whose
   // own error was changed.
@@ -80,8 +97,7 @@ std::pair<double, double> HypothesisScreen::valueAt(const ModelState& null, cons
   }
   std::vector<PoseEchoes> echoes =
       source_.echoes(mechanismsWith(null.mechanisms, {hypothesis}, scaled), poses, about_m);
-  return promiseOf(null, hypothesis, byPose(null, std::move(echoes), nuisance, poses, &nuisance == &null.nuisance),
-                   poses);
+  return byPose(null, std::move(echoes), nuisance, poses, &nuisance == &null.nuisance);
 }
 
 std::vector<double> HypothesisScreen::byPose(const ModelState& null, std::vector<PoseEchoes> echoes,
@@ -129,7 +145,7 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
   double gained = -INFINITY, promised = 0;
   std::vector<double> likeliest(hypothesis.coordinates.size(), 0.0), most_promising;
   const auto tryAt = [&](const std::vector<double>& at) {
-    const auto [gain, promise] = valueAt(null, hypothesis, at, poses, nuisance);
+    const auto [gain, promise] = valueAt(null, hypothesis, at, poses, nuisance, std::min(gained, 0.0));
     source_.settle(null.mechanisms);
     if (gain > gained) {
       gained = gain;

@@ -35,8 +35,13 @@ class HypothesisScreen {
   Screened around(const ModelState& null, const Hypothesis& hypothesis, int actor, const std::vector<int>& poses);
 
  private:
-  /// Gain in nats over the poses named, and what it promises for all with its inflation taken off.
+  /// Gain in nats over the poses named, and what it promises for all with its inflation taken off. Where some of the
+  /// poses lose far more than that beside `beside` nats, both are theirs: most values are plainly wrong.
   std::pair<double, double> valueAt(const ModelState& null, const Hypothesis& hypothesis,
+                                    const std::vector<double>& scaled, const std::vector<int>& poses,
+                                    const Nuisance& nuisance, double beside = 0);
+  /// Log-likelihoods of the poses named with the hypothesis there.
+  std::vector<double> likelihoodsAt(const ModelState& null, const Hypothesis& hypothesis,
                                     const std::vector<double>& scaled, const std::vector<int>& poses,
                                     const Nuisance& nuisance);
   /// Log-likelihoods of the poses named with these echoes of theirs and these latents. known_where_same: that of a pose
