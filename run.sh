@@ -21,7 +21,7 @@ usage() {
   cat >&2 <<'U'
 usage: ./run.sh VERB
   demo [OUT]   install, build, then play a generated session through the whole loop; results in OUT (default demo_out)
-  test         install, build, run every test; the last line is "N passed, N failed, N skipped"
+  test         install, build, run the tests; the last line is "N passed, N failed, N skipped"
   setup        install the Debian packages that are missing
   build        build the workspace (.ws/)
   bench [OUT]  build, then run all benchmarks; JSON and a table in OUT (default bench_out). Its last part, the blind

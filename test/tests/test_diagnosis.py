@@ -13,6 +13,7 @@ from mmradartwin_tests.blind import draws, trials
 from mmradartwin_tests.session import Measurement, Settings
 from diagnose_program import PROGRAM, diagnose
 from in_folder import InFolder
+from share_of_sessions import NOT_TAKEN, is_taken
 
 
 @unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
@@ -20,8 +21,13 @@ class HiddenEffects(InFolder):
     """24 poses at nine places, or 17 with two headings at most, 20 frames each: the smallest campaign that tells laws
     over angle from materials.
 
-    MMRADARTWIN_DIAGNOSIS_SEED gives other sessions than the usual ones.
+    MMRADARTWIN_DIAGNOSIS_SEED gives other sessions than the usual ones. A run takes a share of the tests.
     """
+
+    def setUp(self):
+        super().setUp()
+        if not is_taken():
+            self.skipTest(NOT_TAKEN)
 
     def measured(self, seed, hidden, headings=7, strength=None, tier="default"):
         """Writes a session with these effects, {name: parameters} or pairs of both; the truth stays outside of it."""

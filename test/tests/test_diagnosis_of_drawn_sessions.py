@@ -1,19 +1,10 @@
-"""Sessions of the blind protocol that the diagnosis has been wrong about.
-
-They become more and more, so that a run takes a share of them: MMRADARTWIN_DRAWN_SESSIONS (0.25; 1: all), which ones
-by MMRADARTWIN_DRAWN_SEED.
-"""
-import os
-import random
-import sys
+"""Sessions of the blind protocol that the diagnosis has been wrong about. They become more: a run takes a share."""
 import unittest
 
 from mmradartwin_tests.blind import draws, trials
 from diagnose_program import PROGRAM, diagnose
 from in_folder import InFolder
-
-SHARE = float(os.environ.get("MMRADARTWIN_DRAWN_SESSIONS") or 0.25)
-SEED = int(os.environ.get("MMRADARTWIN_DRAWN_SEED") or int.from_bytes(os.urandom(3), "little"))
+from share_of_sessions import NOT_TAKEN, is_taken
 
 
 def causes(findings):
@@ -24,15 +15,11 @@ def causes(findings):
 class DrawnSessions(InFolder):
     """24 poses at 17 places, as the blind protocol draws them: each stands for something that was wrong once."""
 
-    @classmethod
-    def setUpClass(cls):
-        print(f"MMRADARTWIN_DRAWN_SEED={SEED}", file=sys.stderr, flush=True)
-
     def drawn(self, *sessions):
         """Those of sessions, (row, seed, trial, ...), that this run takes; without any of them the test is skipped."""
-        taken = [s for s in sessions if random.Random(f"{SEED} {s[:3]}").random() < SHARE]
+        taken = [s for s in sessions if is_taken()]
         if not taken:
-            self.skipTest(f"not drawn by MMRADARTWIN_DRAWN_SEED={SEED}; MMRADARTWIN_DRAWN_SESSIONS=1 takes all")
+            self.skipTest(NOT_TAKEN)
         return taken
 
     def diagnosed(self, row, seed, trial):
