@@ -88,9 +88,10 @@ run_tests() {
   source_workspace
   data_folder
   rm -rf "$ws/build/test_results"
-  # Side by side but for those that keep time; what failed is read from the XML files.
+  # Side by side but for those that keep time; seeds are shown as they are drawn. What failed is read from the XML files.
   say "running the tests (log: $ws/build/Testing/Temporary/LastTest.log)"
-  (cd "$ws/build" && ctest -j"$(jobs)" --timeout 5400) >&2 || true
+  (cd "$ws/build" && ctest -V -j"$(jobs)" --timeout 5400) |
+    awk '/^ *[0-9]+\/[0-9]+ Test|^ +Start|^[0-9]+: MMRADARTWIN_[A-Z_]*SEED=/ {print; fflush()}' >&2 || true
   python3 "$root/test/summarise_results.py" "$ws/build/test_results"
 }
 

@@ -43,10 +43,10 @@ class HiddenEffects(InFolder):
         with open(self.at("twin.yaml"), "w", encoding="ascii") as out:
             yaml.safe_dump({"scene": self.at("session/scene.yaml"), "mechanisms": {**effects.BASE, **mechanisms}}, out)
 
-    def found(self, seed, hidden, headings=7, tier="default", most=1):
-        """First finding of a session that hides the effects, and their true parameters; `most` rounds of channels."""
+    def found(self, seed, hidden, headings=7, tier="default", options=("--findings", "1")):
+        """First finding of a session that hides the effects, and their true parameters."""
         truth = self.measured(seed, hidden, headings, tier=tier)
-        status, findings, errors = diagnose(self.at("session"), self.at("out"), "--findings", str(most))
+        status, findings, errors = diagnose(self.at("session"), self.at("out"), *options)
         self.assertEqual(status, 0, msg=errors)
         self.assertEqual(findings["verdict"], "named", msg=f"seed {seed}: {findings}")
         first = findings["findings"][0]
@@ -315,7 +315,7 @@ class HiddenEffects(InFolder):
     def test_someone_who_walks_to_and_fro_leaves_no_object(self):
         # Whole walks last 1.5 s: within a pose of one second he turns once or twice.
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "81"))
-        findings, first, truth = self.found(seed, {"moving_target": {"speed_m_per_s": 0.8}}, headings=2, most=6)
+        findings, first, truth = self.found(seed, {"moving_target": {"speed_m_per_s": 0.8}}, headings=2, options=())
         self.assertEqual([f["cause"] for f in findings["findings"]], ["moving_target"], msg=f"seed {seed}")
         for name, delta in (("x_m", 0.2), ("y_m", 0.2), ("speed_m_per_s", 0.12)):
             self.assertAlmostEqual(first["parameters"][name]["value"], truth[name], delta=delta, msg=f"seed {seed}")
@@ -337,7 +337,7 @@ class HiddenEffects(InFolder):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "53"))
         # The campaign lasts some 600 s: neither is at equal parts.
         findings, first, truth = self.found(seed, {"gain_drift": {"steps_db": [-4.0, 6.0], "steps_s": [90.0, 330.0]}},
-                                            headings=2, tier="office", most=6)
+                                            headings=2, tier="office", options=())
         self.assertEqual([f["cause"] for f in findings["findings"]], ["gain_drift"], msg=f"seed {seed}")
         for told, step in zip(first["parameters"]["steps_db"]["value"], truth["steps_db"], strict=True):
             self.assertAlmostEqual(told, step, delta=1.5, msg=f"seed {seed}")
