@@ -84,7 +84,8 @@ data_folder() {
 
 run_tests() {
   build
-  build tests
+  # Configured again: ctest's environment has only the folders that were there, and the first build made the messages' one.
+  build tests --force-cmake
   source_workspace
   data_folder
   rm -rf "$ws/build/test_results"
