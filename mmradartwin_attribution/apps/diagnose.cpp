@@ -1,16 +1,12 @@
 // Finds what a twin gets wrong about a recording, names the cause, extends the twin by it and measures the gain.
 
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
-#include <chrono>
 #include <filesystem>
-#include <iomanip>
 #include <iostream>
-#include <sstream>
 
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/diagnosis_report.h"
+#include "mmradartwin_attribution/progress_line.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
 #include "mmradartwin_dsp/ros/conversions.h"
@@ -35,35 +31,6 @@ void requireSameScene(const TwinDescription& other, const TwinDescription& twin)
                    "; --compare takes twins of one scene, give the other as --twin in a run of its own");
 }
 
-/// One line on stderr that changes, gone when this goes; where nobody watches, a line now and then that stays.
-class ProgressLine {
- public:
-  ~ProgressLine() {
-    if (terminal_) std::cerr << '\r' << std::string(width_, ' ') << '\r' << std::flush;
-  }
-  void show(const DiagnosisProgress& progress) {
-    if (!terminal_) {
-      const auto now = std::chrono::steady_clock::now();
-      if (now - shown_ < std::chrono::seconds(5)) return;
-      shown_ = now;
-      std::cerr << progress.stage << ", " << static_cast<int>(100 * progress.share) << " %" << std::endl;
-      return;
-    }
-    std::ostringstream line;
-    line << '\r' << std::setw(3) << static_cast<int>(100 * progress.share) << " % " << progress.stage;
-    std::string text = line.str();
-    const std::size_t length = text.size();
-    if (length < width_) text.append(width_ - length, ' ');
-    width_ = length;
-    std::cerr << text << std::flush;
-  }
-
- private:
-  const bool terminal_ = isatty(STDERR_FILENO) == 1;
-  std::size_t width_ = 0;
-  std::chrono::steady_clock::time_point shown_{};
-};
-
 int run(const Arguments& arguments, const std::vector<std::string>& command) {
   const Recording recording = arguments.input.open();
   const std::optional<std::string> scene = arguments.input.sceneFile(recording);
@@ -77,7 +44,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   Diagnosis diagnosis;
   {
     ProgressLine line;
-    options.on_progress = [&line](const DiagnosisProgress& progress) { line.show(progress); };
+    options.on_progress = [&line](const DiagnosisProgress& progress) { line.show(progress.share, progress.stage); };
     if (!scene && twin_file.empty()) {
       if (!arguments.compared.empty()) {
         throw InputError(recording.source +

@@ -10,9 +10,10 @@
 #include <atomic>
 #include <csignal>
 #include <filesystem>
-#include <iomanip>
 #include <iostream>
 #include <thread>
+
+#include "mmradartwin_attribution/progress_line.h"
 
 namespace {
 
@@ -33,14 +34,6 @@ std::string absolute(const std::string& path) {
   return path.empty() ? path : std::filesystem::absolute(path).lexically_normal().string();
 }
 
-void showFeedback(const mmradartwin_msgs::DiagnoseFeedbackConstPtr& feedback) {
-  static std::size_t width = 0;
-  std::ostringstream line;
-  line << std::setw(3) << static_cast<int>(100 * feedback->share) << " % " << feedback->stage;
-  width = std::max(width, line.str().size());
-  std::cerr << '\r' << std::left << std::setw(static_cast<int>(width)) << line.str() << std::flush;
-}
-
 int apply(const std::string& twin_file) {
   mmradartwin_msgs::ApplyTwin call;
   call.request.file = twin_file;
@@ -59,6 +52,7 @@ int run(const Arguments& arguments) {
         << "error: /use_sim_time is set and no /clock comes: ask while the bag plays, or replay with stay:=true\n";
     return 2;
   }
+  mmradartwin::ProgressLine progress;
   Client client("attribution/diagnose", true);
   const ros::WallTime begin = ros::WallTime::now();
   while (!client.isServerConnected()) {
@@ -75,7 +69,8 @@ int run(const Arguments& arguments) {
   goal.twin = absolute(arguments.twin);
   std::atomic<bool> done{false};
   client.sendGoal(
-      goal, [&](const State&, const mmradartwin_msgs::DiagnoseResultConstPtr&) { done = true; }, {}, showFeedback);
+      goal, [&](const State&, const mmradartwin_msgs::DiagnoseResultConstPtr&) { done = true; }, {},
+      [&](const mmradartwin_msgs::DiagnoseFeedbackConstPtr& f) { progress.show(f->share, f->stage); });
   bool cancelled = false;
   while (!done) {
     if (interrupted && !cancelled) {
@@ -83,12 +78,14 @@ int run(const Arguments& arguments) {
       cancelled = true;
     }
     if (!ros::ok() || !client.isServerConnected()) {
-      std::cerr << "\nerror: diagnosis_node is gone; its messages say why\n";
+      client.stopTrackingGoal();
+      progress.clear();
+      std::cerr << "error: diagnosis_node is gone; its messages say why\n";
       return 1;
     }
     std::this_thread::sleep_for(kLook);
   }
-  std::cerr << '\n';
+  progress.clear();
   const State state = client.getState();
   const mmradartwin_msgs::DiagnoseResultConstPtr result = client.getResult();
   if (state != State::SUCCEEDED || !result) {
