@@ -80,8 +80,9 @@ class DrawnSessions(InFolder):
 
     def test_a_radar_that_stands_aside_is_found_under_what_actors_errors_hide(self):
         # They hide the offset: it promised 0.2 nats beside the 11 of a range bias, and 10 where six others, materials
-        # and panels, promised more, and was tried in neither.
-        for row, seed, trial in self.drawn(("single", 139, 0), ("single", 150, 23)):
+        # and panels, promised more, and was tried in neither. Of another one, worth 1427, paths that come and go at two
+        # places made the error so wide that it was held for theirs.
+        for row, seed, trial in self.drawn(("single", 139, 0), ("single", 150, 23), ("single", 172, 1)):
             with self.subTest(seed=seed):
                 found, truth = self.diagnosed(row, seed, trial)
                 self.assertEqual(causes(found), ["radar_position_offset"], msg=str(found))

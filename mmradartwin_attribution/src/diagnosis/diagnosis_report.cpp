@@ -211,7 +211,8 @@ std::string diagnosisText(const Diagnosis& d) {
       out << "   " << (in_maps ? "explained power" : "log-likelihood of the frames per pose") << " on held-out places "
           << shown(e.before) << " -> " << shown(e.after);
       if (e.difference_ci95) {
-        out << " (" << shown((*e.difference_ci95)[0]) << " to " << shown((*e.difference_ci95)[1]) << ")";
+        out << " (difference " << shown((*e.difference_ci95)[0]) << " to " << shown((*e.difference_ci95)[1])
+            << ", 95 %)";
       }
       if (!std::isnan(f.gain->recall.after)) {
         out << ", recall " << shown(f.gain->recall.before) << " -> " << shown(f.gain->recall.after);
