@@ -52,7 +52,7 @@ int run(const Arguments& arguments) {
         << "error: /use_sim_time is set and no /clock comes: ask while the bag plays, or replay with stay:=true\n";
     return 2;
   }
-  mmradartwin::ProgressLine progress;
+  mmradartwin::ProgressLine progress;  // outlives the client, whose callbacks show it
   Client client("attribution/diagnose", true);
   const ros::WallTime begin = ros::WallTime::now();
   while (!client.isServerConnected()) {
