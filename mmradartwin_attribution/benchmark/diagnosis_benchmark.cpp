@@ -7,12 +7,12 @@
 #include <Eigen/Cholesky>
 #include <random>
 
-#include "../src/diagnosis/clutter_field.h"
-#include "../src/diagnosis/hypothesis_fit.h"
-#include "../src/diagnosis/session_model.h"
+#include "diagnosis/fit/hypothesis_fit.h"
+#include "diagnosis/likelihood/channel_likelihood.h"
+#include "diagnosis/likelihood/clutter_field.h"
 #include "mmradartwin_dsp/range_angle.h"
 
-namespace mmradartwin {
+namespace mmradartwin::diagnosis {
 namespace {
 
 // The shipped office and radar at some poses; measured is what the twin expects, with noise.
@@ -41,10 +41,10 @@ struct Bench {
     }
     expectClutter(twin.scene(), data);
     mechanisms = twin.description().mechanisms;
-    source = std::make_unique<EchoSource>(twin, data, PoseAccuracy());
-    model = std::make_unique<SessionModel>(data, static_cast<int>(twin.scene().actors.size()), PoseAccuracy());
+    source = std::make_unique<ExpectedEchoes>(twin, data, PoseAccuracy());
+    model = std::make_unique<ChannelLikelihood>(data, static_cast<int>(twin.scene().actors.size()), PoseAccuracy());
     source->pointBeams(data, mechanisms, model->firstBin());
-    source->settle(mechanisms);
+    source->setBaseline(mechanisms);
     echoes = source->echoes(mechanisms);
     nuisance = model->start(echoes);
     model->fit(echoes, nuisance, 3);
@@ -63,10 +63,10 @@ struct Bench {
   std::vector<int> poses;
   std::vector<NamedParameters> mechanisms;
   NamedParameters moved;
-  std::unique_ptr<EchoSource> source;
-  std::unique_ptr<SessionModel> model;
+  std::unique_ptr<ExpectedEchoes> source;
+  std::unique_ptr<ChannelLikelihood> model;
   std::vector<PoseEchoes> echoes;
-  Nuisance nuisance;
+  SessionLatents nuisance;
 };
 
 Bench& bench() {
@@ -133,7 +133,7 @@ void BM_WeighedEchoes(benchmark::State& state) {
 BENCHMARK(BM_WeighedEchoes)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
-}  // namespace mmradartwin
+}  // namespace mmradartwin::diagnosis
 
 int main(int argc, char** argv) {
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);

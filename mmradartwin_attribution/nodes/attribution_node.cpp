@@ -129,11 +129,11 @@ class AttributionNode {
       while (own.size() > kMaxWaiting) own.erase(own.begin());
       return;
     }
-    const MapMsg::ConstPtr counterpart = match->second;
+    const MapMsg::ConstPtr sameInOtherList = match->second;
     other.erase(other.begin(), std::next(match));  // older ones will find no partner any more
-    last_measured_ = measured ? msg : counterpart;
+    last_measured_ = measured ? msg : sameInOtherList;
     try {
-      compare(measured ? *msg : *counterpart, measured ? *counterpart : *msg);
+      compare(measured ? *msg : *sameInOtherList, measured ? *sameInOtherList : *msg);
     } catch (const std::exception& error) {
       ROS_WARN_THROTTLE(5, "maps of %s: %s", formatStamp(stamp).c_str(), error.what());
     }

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "mmradartwin_attribution/diagnosis.h"
+#include "mmradartwin_attribution/diagnosis_result.h"
 
 namespace mmradartwin {
 

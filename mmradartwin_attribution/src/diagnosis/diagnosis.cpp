@@ -9,30 +9,38 @@
 #include <optional>
 #include <utility>
 
-#include "body_fixed_tone.h"
-#include "changed_records.h"
-#include "channel_data.h"
-#include "clutter_field.h"
-#include "delivery.h"
-#include "empirical_hypothesis.h"
-#include "evidence_bounds.h"
-#include "finding_figure.h"
-#include "fit_round.h"
-#include "gain_measurement.h"
-#include "held_out_gain.h"
-#include "hypothesis_finding.h"
-#include "hypothesis_fit.h"
-#include "hypothesis_ranking.h"
-#include "law_screen.h"
+#include "diagnosis/channels/channel_data.h"
+#include "diagnosis/channels/pose_time_lag.h"
+#include "diagnosis/fit/hypothesis_fit.h"
+#include "diagnosis/gain/changed_records.h"
+#include "diagnosis/gain/gain_measurement.h"
+#include "diagnosis/gain/held_out_gain.h"
+#include "diagnosis/hypotheses/evidence_bounds.h"
+#include "diagnosis/hypotheses/law_words.h"
+#include "diagnosis/likelihood/channel_likelihood.h"
+#include "diagnosis/likelihood/clutter_field.h"
+#include "diagnosis/numbers/number_text.h"
+#include "diagnosis/receiver/body_fixed_tone.h"
+#include "diagnosis/receiver/received_session.h"
+#include "diagnosis/receiver/receiver_findings.h"
+#include "diagnosis/receiver/receiver_noise.h"
+#include "diagnosis/receiver/sample_convention.h"
+#include "diagnosis/receiver/strongest_echo.h"
+#include "diagnosis/rounds/fit_round.h"
+#include "diagnosis/rounds/hypothesis_finding.h"
+#include "diagnosis/rounds/selection.h"
+#include "diagnosis/scene_match.h"
+#include "diagnosis/search/hypothesis_ranking.h"
+#include "diagnosis/search/law_screen.h"
+#include "diagnosis/survey_plan.h"
+#include "diagnosis/unexplained_frames.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/range_angle.h"
-#include "pose_time_lag.h"
-#include "receiver_finding.h"
-#include "scene_match.h"
-#include "selection.h"
-#include "session_model.h"
 
 namespace mmradartwin {
+
+using namespace diagnosis;
+
 namespace {
 
 constexpr int kFolds = 5;
@@ -56,10 +64,11 @@ struct Refused {
   bool by_maps;  ///< else by what is known of the session's own errors
 };
 
-class Session {
+class DiagnosisRun {
  public:
   /// lag: how it was brought in time.
-  Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options, std::optional<FrameFinding> lag);
+  DiagnosisRun(const Recording& recording, Twin& twin, const DiagnosisOptions& options,
+               std::optional<FrameFinding> lag);
   Diagnosis run();
 
  private:
@@ -76,7 +85,7 @@ class Session {
   bool judgeChannels(int round);
   std::vector<RangeShift> takeRangeErrors(ModelState& state);
   std::vector<HypothesisFit> fitBest(int round);
-  void tellChanges();
+  void recordChangedPaths();
 
   const Recording& recording_;
   Twin& twin_;
@@ -87,8 +96,8 @@ class Session {
   ChannelData& data_;
   PoseAccuracy accuracy_;
   double strongest_amplitude_ = 0;  ///< of the twin as given
-  std::unique_ptr<EchoSource> source_;
-  std::unique_ptr<SessionModel> model_;
+  std::unique_ptr<ExpectedEchoes> source_;
+  std::unique_ptr<ChannelLikelihood> model_;
   std::unique_ptr<HypothesisFitter> fitter_;
   std::unique_ptr<HypothesisRanking> ranking_;
   std::unique_ptr<GainMeasurement> gains_;
@@ -99,8 +108,8 @@ class Session {
   Diagnosis result_;
 };
 
-Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions& options,
-                 std::optional<FrameFinding> lag)
+DiagnosisRun::DiagnosisRun(const Recording& recording, Twin& twin, const DiagnosisOptions& options,
+                           std::optional<FrameFinding> lag)
     : recording_(recording),
       twin_(twin),
       options_(options),
@@ -139,8 +148,8 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
   twin_.setStrongestAmplitude(strongest_amplitude_);
   mechanisms_ = extended_ = twin_.description().mechanisms;
   expectClutter(twin_.scene(), data_);
-  source_ = std::make_unique<EchoSource>(twin_, data_, accuracy_);
-  model_ = std::make_unique<SessionModel>(data_, static_cast<int>(twin_.scene().actors.size()), accuracy_);
+  source_ = std::make_unique<ExpectedEchoes>(twin_, data_, accuracy_);
+  model_ = std::make_unique<ChannelLikelihood>(data_, static_cast<int>(twin_.scene().actors.size()), accuracy_);
   fitter_ = std::make_unique<HypothesisFitter>(*source_, *model_, kFolds);
   ranking_ = std::make_unique<HypothesisRanking>(
       twin_, *source_, *model_, accuracy_, [this](const std::string& stage, double share) { report(stage, share); });
@@ -152,7 +161,7 @@ Session::Session(const Recording& recording, Twin& twin, const DiagnosisOptions&
 
 /// What leaving damaged samples out gains. That of several findings cannot be told apart: one average lacks all of
 /// them.
-void Session::measureFrameGain() {
+void DiagnosisRun::measureFrameGain() {
   std::vector<Finding>& found = result_.findings.findings;
   if (few_ || found.size() != 1 || received_.frames.size() != 1) return;
   ChannelData recorded = data_;
@@ -165,12 +174,12 @@ void Session::measureFrameGain() {
   gains_->ofChange(recorded, mechanisms_, data_, mechanisms_, found.front());
 }
 
-std::optional<std::string> Session::judgeDelivery() {
+std::optional<std::string> DiagnosisRun::judgeDelivery() {
   report("conventions", 0);
-  const std::optional<Delivery> delivery = findDelivery(twin_, data_);
+  const std::optional<SampleConvention> delivery = findSampleConvention(twin_, data_);
   if (!delivery) return std::nullopt;
   const ChannelData recorded = data_;
-  undoDelivery(*delivery, data_);
+  undoSampleConvention(*delivery, data_);
   Finding f = findingOf(*delivery, data_.radar);
   gains_->ofChange(recorded, mechanisms_, data_, mechanisms_, f);
   // By chance some convention does best where nothing matches, or beside a transmitter that is late; one that is true
@@ -185,7 +194,7 @@ std::optional<std::string> Session::judgeDelivery() {
   return f.cause;
 }
 
-void Session::judgeTone() {
+void DiagnosisRun::judgeTone() {
   report("radar's own echo", 0);
   for (const NamedParameters& m : mechanisms_) {
     if (m.mechanism == "tx_rx_leakage" || m.mechanism == "dc_offset") return;  // the twin has it already
@@ -203,24 +212,24 @@ void Session::judgeTone() {
   result_.findings.findings.push_back(std::move(f));
 }
 
-void Session::judgeNoise() {
+void DiagnosisRun::judgeNoise() {
   const auto stated = std::find_if(mechanisms_.begin(), mechanisms_.end(),
                                    [](const NamedParameters& m) { return m.mechanism == "noise_floor"; });
   if (stated == mechanisms_.end()) return;
   std::optional<Finding> f = noiseFloorFinding(data_, *stated);
   if (!f) return;
   addGainInNats(data_, {}, *f);
-  putIn(*f->mechanism, extended_);
+  replaceOrAppend(*f->mechanism, extended_);
   result_.findings.findings.push_back(std::move(*f));
 }
 
 /// Of a range that is far off the likelihood may have a top that steps from none do not reach: a screen 6.1 cm nearer
 /// stood at 0.8 cm, and moved by 12 cm it gained 171 nats. Returns who seems shifted by more than such an error.
-std::vector<RangeShift> Session::takeRangeErrors(ModelState& state) {
+std::vector<RangeShift> DiagnosisRun::takeRangeErrors(ModelState& state) {
   std::vector<RangeShift> shifted = ranking_->shifted(state);
   const auto isError = [&](const RangeShift& s) {
     if (std::abs(s.shift_m) > kMostRangeError_m) return false;
-    Nuisance latents = withoutErrors(state.nuisance, s.actor);
+    SessionLatents latents = withoutErrors(state.nuisance, s.actor);
     latents.actor_range_m[static_cast<std::size_t>(s.actor)] = s.shift_m;
     std::optional<ModelState> better = fitter_->improved(state, latents);
     if (better) state = std::move(*better);
@@ -231,8 +240,8 @@ std::vector<RangeShift> Session::takeRangeErrors(ModelState& state) {
   return shifted;
 }
 
-std::vector<HypothesisFit> Session::fitBest(int round) {
-  const std::vector<Hypothesis> all = hypotheses(twin_, selection_->extended());
+std::vector<HypothesisFit> DiagnosisRun::fitBest(int round) {
+  const std::vector<Hypothesis> all = allHypotheses(twin_, selection_->extended());
   const std::vector<RangeShift> shifted = takeRangeErrors(selection_->state());
   std::vector<Screened> screened = ranking_->rank(all, selection_->state(), shifted);
   if (selection_->unknownNats() > 0) {  // one stands for all
@@ -248,13 +257,13 @@ std::vector<HypothesisFit> Session::fitBest(int round) {
 
 /// What every finding changes of the paths of the twin with those before it, and of the paper's metrics where its round
 /// has not told.
-void Session::tellChanges() {
+void DiagnosisRun::recordChangedPaths() {
   std::vector<NamedParameters> mechanisms = twin_.description().mechanisms;
   for (Finding& f : result_.findings.findings) {
     if (!f.mechanism) continue;
     report("what " + f.cause + " changes", 0);
     std::vector<NamedParameters> with = mechanisms;
-    putIn(*f.mechanism, with);
+    replaceOrAppend(*f.mechanism, with);
     const bool of_frames = std::any_of(received_.frames.begin(), received_.frames.end(),
                                        [&](const FrameFinding& frames) { return frames.cause == f.cause; });
     if (f.maps && f.gain && std::isnan(f.gain->recall.after) && !of_frames) {
@@ -269,7 +278,8 @@ void Session::tellChanges() {
 
 /// Why a fit that its likelihood speaks for is no finding by what the maps gain of it, "" where it is one. Adds to
 /// `refused`, by pose, what is explained by those that are likelier and no finding.
-std::string Session::refusedByMaps(const HypothesisFit& f, const FindingGain& gain, std::vector<Refused>& refused) {
+std::string DiagnosisRun::refusedByMaps(const HypothesisFit& f, const FindingGain& gain,
+                                        std::vector<Refused>& refused) {
   // Where the likelihood gains little and the maps nothing, it is the likelihood's own shortcomings that were fitted:
   // what a pose's error does at edges looks like a little of many things. Much of it may be real though no map shows it
   // (an image at -26 dB), unless the maps get plainly worse.
@@ -284,14 +294,14 @@ std::string Session::refusedByMaps(const HypothesisFit& f, const FindingGain& ga
     return "clutter is like that, by what the maps gain" + by_how_much;
   }
   if (in_maps) return "";
-  const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled));
-  const double least_nats = leastNats(f.hypothesis, f.scaled, traces, data_.poses.size());
+  const bool traces = source_->altersGeometry(f.hypothesis.at(f.scaled_values));
+  const double least_nats = leastNats(f.hypothesis, f.scaled_values, traces, data_.poses.size());
   const bool plainly_worse = explained[1] < 0 && by < -kLeastExplained;
-  const bool in_nats = !plainly_worse && f.broad_gain / f.inflation > least_nats;
+  const bool in_nats = !plainly_worse && f.gain_without_best_place / f.overdispersion > least_nats;
   const double most_lost = isOfLevels(f.hypothesis) ? kMostLostOfLevels : kMostLost;
   // Maps of echoes that are many points' differ from what is expected of them by as much as they hold.
   // Few places see an actor: drawn without the best of them, little is left of what it gains.
-  const bool plain = f.plain && !isFaintAddition(f.hypothesis, f.scaled);
+  const bool plain = f.plain && !isFaintAddition(f.hypothesis, f.scaled_values);
   const bool much = (likelier || f.isFarAway()) && ((plain && (by > -most_lost || !plainly_worse)) || in_nats);
   // What explains less well what a better one was refused for is no name for it; a law without a name may be the cause
   // of something else beside it, and so may a name beside what is as wrong as the session's own errors.
@@ -306,12 +316,12 @@ std::string Session::refusedByMaps(const HypothesisFit& f, const FindingGain& ga
   return "the maps gain nothing" + by_how_much;
 }
 
-bool Session::judgeChannels(int round) {
+bool DiagnosisRun::judgeChannels(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
   const ModelState& state = selection_->state();
-  believeAbsences(fits);
-  believeMoves(fits, twin_.scene());
-  believeBetterNames(fits, state);
+  preferAbsences(fits);
+  preferMoves(fits, twin_.scene());
+  preferBetterNames(fits, state);
   std::vector<Refused> refused;
   const double unknown_nats = selection_->unknownNats();
   for (HypothesisFit& f : fits) {
@@ -320,7 +330,7 @@ bool Session::judgeChannels(int round) {
               : f.false_alarm_rate > kFalseAlarm       ? "chance could do as well"
               : !(f.held_out_gain > 0)                 ? "loses on places not fitted"
               : f.gain < kBesideUnknown * unknown_nats ? "little beside what is unknown"
-                                                       : noFindingBecause(f, received_.frames);
+                                                       : rejectionReason(f, received_.frames);
     if (!verdict.empty()) continue;
     Finding finding = findingOf(f, fits, state, twin_.scene(), data_);
     if (data_.locations.size() > 1) {
@@ -344,19 +354,19 @@ bool Session::judgeChannels(int round) {
   return false;
 }
 
-Diagnosis Session::run() {
+Diagnosis DiagnosisRun::run() {
   const auto add = [&](Finding finding, const std::map<std::string, double>& nats_by_pose = {}) {
-    if (!isNews(finding, twin_.description().mechanisms)) return;
+    if (!differsFromStated(finding, twin_.description().mechanisms)) return;
     addGainInNats(data_, nats_by_pose, finding);
-    putIn(*finding.mechanism, extended_);
+    replaceOrAppend(*finding.mechanism, extended_);
     result_.findings.findings.push_back(std::move(finding));
   };
   if (lag_) add(findingOf(*lag_));
   for (const FrameFinding& f : received_.frames) add(findingOf(f), f.nats_by_pose);
   measureFrameGain();
-  for (const Delivery& d : received_.deliveries) add(findingOf(d, data_.radar));
+  for (const SampleConvention& d : received_.conventions) add(findingOf(d, data_.radar));
   const std::optional<std::string> convention = few_ ? std::nullopt : judgeDelivery();
-  source_->settle(mechanisms_);
+  source_->setBaseline(mechanisms_);
   judgeTone();
   judgeNoise();
   if (few_) {
@@ -364,27 +374,27 @@ Diagnosis Session::run() {
   }
   report("fitting the twin as it is", 0);
   source_->pointBeams(data_, mechanisms_, model_->firstBin());
-  source_->settle(mechanisms_);
+  source_->setBaseline(mechanisms_);
   ModelState state = fitter_->state(mechanisms_, nullptr);
   for (Finding& f : result_.findings.findings) {
     if (f.cause != "tx_rx_leakage" && f.cause != "dc_offset") continue;
     referToStrongestEcho(twin_.changed(mechanisms_), data_, f);
-    putIn(*f.mechanism, extended_);
+    replaceOrAppend(*f.mechanism, extended_);
   }
   if (!options_.compared.empty()) takeRangeErrors(state);
   for (const TwinDescription& t : options_.compared) {
-    source_->settle(mechanisms_);  // each from where the twin as given stands, whatever was compared before it
+    source_->setBaseline(mechanisms_);  // each from where the twin as given stands, whatever was compared before it
     ModelState other = fitter_->state(t.mechanisms, &state.nuisance);
     takeRangeErrors(other);
     auto [low, high] = *likelihoodGain(data_, state.by_pose, other.by_pose).difference_ci95;
     const double poses = static_cast<double>(data_.poses.size());
-    source_->settle(t.mechanisms);
+    source_->setBaseline(t.mechanisms);
     result_.compared.push_back({t.file,
                                 other.log_likelihood - state.log_likelihood,
                                 {poses * low, poses * high},
                                 explainedPower(cellPowers(data_, source_->echoes(t.mechanisms)))});
   }
-  source_->settle(mechanisms_);
+  source_->setBaseline(mechanisms_);
   const std::vector<PoseEchoes> echoes = source_->echoes(mechanisms_);
   result_.explained_power = explainedPower(cellPowers(data_, echoes));
   std::optional<Finding> mismatch;
@@ -416,11 +426,11 @@ Diagnosis Session::run() {
       if (f.cause != "second_harmonic") continue;
       referToStrongestHost(twin_.changed(mechanisms_), data_, selection_->state().nuisance.log_gain,
                            strongest_amplitude_, f);
-      putIn(*f.mechanism, extended_);
+      replaceOrAppend(*f.mechanism, extended_);
     }
     addUnexplained(received_.unexplained, data_, twin_.description().mechanisms, findings, extended_);
   }
-  tellChanges();
+  recordChangedPaths();
   result_.extended = twin_.description();
   result_.extended.mechanisms = extended_;
   result_.problems = data_.problems;
@@ -438,7 +448,7 @@ Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOption
   }
   const TimedRecording timed =
       inTime(recording, twin.description().mechanisms, readingProgress(options, "frames on the way"));
-  return Session(timed.recording, twin, options, timed.finding).run();
+  return DiagnosisRun(timed.recording, twin, options, timed.finding).run();
 }
 
 }  // namespace mmradartwin

@@ -1,13 +1,13 @@
-#include "scene_match.h"
+#include "diagnosis/scene_match.h"
 
 #include <Eigen/Geometry>
 
-#include "held_out_gain.h"
-#include "hypothesis_finding.h"
+#include "diagnosis/gain/held_out_gain.h"
+#include "diagnosis/numbers/number_text.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/scene.h"
 
-namespace mmradartwin {
+namespace mmradartwin::diagnosis {
 namespace {
 
 constexpr double kNoMatch = 0.05;  ///< of the measured power, beyond what chance explains
@@ -72,4 +72,4 @@ std::optional<Finding> nothingMatches(const ChannelData& data, const std::vector
   return f;
 }
 
-}  // namespace mmradartwin
+}  // namespace mmradartwin::diagnosis

@@ -4,12 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "channel_data.h"
-#include "echo_field.h"
+#include "diagnosis/channels/channel_data.h"
+#include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/rooms.h"
 #include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_sim/twin.h"
 
-namespace mmradartwin {
+namespace mmradartwin::diagnosis {
 
 // Whether a twin and a recording belong together at all.
 
@@ -26,4 +27,4 @@ void requirePlacesNear(const Scene& scene, const ChannelData& data, const std::s
 std::optional<Finding> nothingMatches(const ChannelData& data, const std::vector<PoseEchoes>& echoes,
                                       double explained_power);
 
-}  // namespace mmradartwin
+}  // namespace mmradartwin::diagnosis

@@ -1,0 +1,177 @@
+#include "diagnosis/channels/channel_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "diagnosis/frames/payload_defects.h"
+#include "mmradartwin_dsp/capture.h"
+#include "mmradartwin_dsp/coherent_average.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/stationary_poses.h"
+
+namespace mmradartwin::diagnosis::channels {
+namespace {
+
+double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
+
+constexpr double kMovesMore = 4, kMoves = 1e-4;  ///< change of a frame of a radar that still moves: of the usual, least
+constexpr std::int64_t kStarts_ns = 500'000'000;   ///< from either end of a stop, how long it may still move,
+constexpr std::int64_t kBeside_ns = 1000'000'000;  ///< where tf has it elsewhere so shortly before or after
+
+/// True where tf has the radar elsewhere than at the pose between two times.
+bool standsElsewhere(const std::vector<StampedTransform>& track, const Pose& pose, std::int64_t from_ns,
+                     std::int64_t to_ns) {
+  const auto at = [](const StampedTransform& t, std::int64_t stamp_ns) { return t.stamp_ns < stamp_ns; };
+  return std::any_of(std::lower_bound(track.begin(), track.end(), from_ns, at),
+                     std::lower_bound(track.begin(), track.end(), to_ns, at),
+                     [&](const StampedTransform& t) { return !standsStill(t.T_map_radar, pose.T_map_radar); });
+}
+
+/// Without the frames at either end of a stop that differ from those in its middle: a radar is taken to stand while it
+/// is within 2 cm, which is five wavelengths, of where it comes to rest.
+void leaveOutMoving(const SignalChain& chain, const std::vector<StampedTransform>& track, const Pose& pose,
+                    std::vector<AdcCube>& frames) {
+  if (track.empty()) return;
+  const std::int64_t begin_ns = frames.front().stamp_ns, end_ns = frames.back().stamp_ns;
+  const bool came = standsElsewhere(track, pose, begin_ns - kBeside_ns, begin_ns);
+  const bool goes = standsElsewhere(track, pose, end_ns, end_ns + kBeside_ns);
+  if (!came && !goes) return;
+  std::vector<ComplexGrid> spectra;
+  for (const AdcCube& frame : frames) spectra.push_back(frameSpectra(chain, frame));
+  const std::size_t quarter = frames.size() / 4;
+  ComplexGrid middle;
+  int count = 0;
+  for (std::size_t i = quarter; i < frames.size() - quarter; ++i) {
+    if (spectra[i].size() == 0) continue;
+    middle = count == 0 ? spectra[i] : ComplexGrid(middle + spectra[i]);
+    ++count;
+  }
+  if (count == 0) return;
+  middle /= count;
+  std::vector<double> change;
+  for (const ComplexGrid& s : spectra) change.push_back(s.size() > 0 ? changeBetween(s, middle) : 0);
+  const double least = std::max(kMoves, kMovesMore * upperMedian(change));
+  std::size_t first = 0, last = frames.size();
+  while (came && first < quarter && change[first] > least && frames[first].stamp_ns < begin_ns + kStarts_ns) ++first;
+  while (goes && frames.size() - last < quarter && change[last - 1] > least &&
+         frames[last - 1].stamp_ns > end_ns - kStarts_ns) {
+    --last;
+  }
+  frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(last), frames.end());
+  frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
+}
+
+/// True where packets were lost and not filled, which leaves a capture that is too short by them.
+bool missesPackets(const RadarConfig& radar, const std::vector<AdcCube>& frames) {
+  const std::vector<int> order = payloadOrder(radar);
+  Payload payload = toPayload(frames, order);
+  markZeroedPackets(payload, order);
+  return findSlip(payload).has_value();
+}
+
+}  // namespace
+
+ComplexGrid frameSpectra(const SignalChain& chain, const AdcCube& frame) {
+  CoherentAverage average(chain.radar(), 1);
+  average.add(frame);
+  return average.complete() ? chain.rangeSpectra(average.grid().x) : ComplexGrid();
+}
+
+double changeBetween(const ComplexGrid& a, const ComplexGrid& b) {
+  const double power = a.squaredNorm() + b.squaredNorm();
+  return power > 0 ? (a - b).squaredNorm() / power : 0;
+}
+
+double upperMedian(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+void transformGrid(const SignalChain& chain, PoseChannels& pose) {
+  const double window = sum(hannWindow(chain.radar().samples_per_chirp));
+  pose.y = chain.rangeSpectra(pose.grid.x) / (window * pose.grid.full_scale);
+}
+
+ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, const ReadingProgress& on_progress,
+                         const std::function<void(AdcCube&)>& repair) {
+  ChannelData data;
+  data.radar = recording.radar;
+  data.problems = recording.problems;
+  const SignalChain chain(recording.radar);
+  const std::vector<double> window = hannWindow(recording.radar.samples_per_chirp);
+  double window2 = 0;
+  for (double w : window) window2 += w * w;
+  const double per_sample = window2 / (sum(window) * sum(window) * 32768.0 * 32768.0);
+  std::size_t done = 0;
+  for (const Pose& pose : recording.poses) {
+    try {
+      std::vector<AdcCube> frames;
+      try {
+        recording.forEachFrame(pose, [&](const AdcCube& cube) {
+          frames.push_back(cube);
+          if (repair) repair(frames.back());
+        });
+      } catch (const TruncatedCapture& error) {
+        if (frames.empty() || !missesPackets(recording.radar, frames)) throw;
+        data.problems.push_back(
+            {pose.name, std::string(error.what()) + "; packets are missing in it, the rest was used"});
+      }
+      if (frames.empty()) throw InputError("its capture holds no frame; record it again");
+      leaveOutMoving(chain, recording.track, pose, frames);
+      const bool silent = std::all_of(frames.begin(), frames.end(), [](const AdcCube& cube) {
+        return std::all_of(cube.data.begin(), cube.data.end(), [](std::int16_t v) { return v == 0; });
+      });
+      if (silent) throw InputError("all its samples are zero; check the capture");
+      examiner.addPose(pose, frames);
+      CoherentAverage plain(recording.radar, 0);
+      for (const AdcCube& cube : frames) plain.add(cube);
+      const PoseFrames& seen = examiner.poses().back();
+      PoseChannels channels;
+      channels.pose = pose;
+      channels.grid = seen.mean;
+      channels.moving = seen.moving;
+      if (plain.complete()) channels.plain = plain.grid();
+      std::vector<double> noise = seen.noise_variance;
+      if (recording.channels) {
+        correctChannels(*recording.channels, channels.grid.x);
+        if (plain.complete()) correctChannels(*recording.channels, channels.plain.x);
+        for (std::size_t k = 0; k < noise.size(); ++k) {
+          noise[k] /= std::norm(recording.channels->error(k));
+          for (MovingCell& cell : channels.moving) {
+            cell.channels[static_cast<Eigen::Index>(k)] /= recording.channels->error(k);
+          }
+        }
+      }
+      channels.noise_power = per_sample * sum(noise) / static_cast<double>(noise.size()) / std::max(1, seen.shots);
+      channels.unsteadiness = seen.unsteadiness;
+      channels.shots = std::max(1, seen.shots);
+      transformGrid(chain, channels);
+      data.poses.push_back(std::move(channels));
+    } catch (const InputError& error) {
+      const std::string message = error.what();
+      const bool named = message.rfind("pose '" + pose.name, 0) == 0 || message.rfind("pose " + pose.name, 0) == 0;
+      data.problems.push_back({pose.name, named ? message : "pose '" + pose.name + "': " + message});
+    }
+    if (on_progress) on_progress(++done, recording.poses.size());
+  }
+  if (data.poses.empty()) {
+    throw InputError(recording.source + ": no pose can be used" +
+                     (data.problems.empty() ? "" : "; the first problem: " + data.problems.front().message));
+  }
+  numberLocations(data);
+  return data;
+}
+
+void numberLocations(ChannelData& data) {
+  data.locations.clear();
+  for (PoseChannels& p : data.poses) {
+    const auto at = std::find(data.locations.begin(), data.locations.end(), p.pose.location);
+    p.location = static_cast<int>(at - data.locations.begin());
+    if (at == data.locations.end()) data.locations.push_back(p.pose.location);
+  }
+}
+
+}  // namespace mmradartwin::diagnosis::channels

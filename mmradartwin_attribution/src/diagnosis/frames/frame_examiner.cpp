@@ -1,0 +1,461 @@
+#include "diagnosis/frames/frame_examiner.h"
+
+#include <algorithm>
+#include <boost/math/distributions/beta.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <set>
+#include <sstream>
+
+#include "diagnosis/frames/frame_stack.h"
+#include "diagnosis/frames/motion_locator.h"
+#include "diagnosis/frames/payload_defects.h"
+#include "diagnosis/frames/shot_examiner.h"
+#include "mmradartwin_attribution/ledger.h"
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin::diagnosis::frames {
+namespace {
+
+using Complex = std::complex<float>;
+
+// Chance of a false finding of one kind in a session; six kinds stay far below the one in a hundred that a diagnosis
+// may afford for all its hypotheses.
+constexpr double kFalseAlarm = 1e-6;
+
+/// Clopper and Pearson's 95 % interval of a share.
+std::array<double, 2> shareInterval(double hits, double of) {
+  const auto quantile = [](double a, double b, double p) {
+    return boost::math::quantile(boost::math::beta_distribution<double>(a, b), p);
+  };
+  return {hits > 0 ? quantile(hits, of - hits + 1, 0.025) : 0.0,
+          hits < of ? quantile(hits + 1, of - hits, 0.975) : 1.0};
+}
+
+FindingParameter number(const char* name, const char* unit, double value, const std::array<double, 2>& ci95) {
+  return {name, unit, value, {ci95}};
+}
+
+constexpr double kUnsteady = 0.5;  ///< of the bins with standing echoes, where it is not something in the room
+
+/// Of one pose, what findings() judges.
+struct PoseJudgement {
+  std::string pose;
+  ZeroedPackets packets;
+  double slip_gain = 0;
+  Rails rails;
+  double clipped = 0, counted = 0;  ///< I and Q values per shot: beyond the converter, and all that were looked at
+  Bursts bursts;
+  double turn_rad_per_frame = 0, turn_variance = 0;
+  int turn_cells = 0, frames = 0;
+  std::vector<double> frame_gain_db;  ///< common to all channels and samples
+  double unsteady_share = 0, unsteady_nats = 0;
+};
+
+}  // namespace
+
+struct FrameExaminer::State {
+  explicit State(const RadarConfig& config) : radar(config), order(payloadOrder(config)), examiner(config) {}
+
+  RadarConfig radar;
+  std::vector<int> order;
+  ShotExaminer examiner;
+  std::vector<PoseJudgement> judged;
+  std::vector<PoseMotion> motion;
+  std::vector<PoseFrames> poses;
+  mutable std::optional<LocatedMotion> located;  ///< of the poses so far, once asked for
+
+  const LocatedMotion& locate() const {
+    if (!located) located = locateMotion(radar, motion);
+    return *located;
+  }
+  FrameFinding saturation() const;
+  FrameFinding packetLoss() const;
+  std::vector<FrameFinding> misalignments() const;  ///< one a pose
+  FrameFinding interference() const;
+  FrameFinding drift() const;
+  FrameFinding frameGain() const;
+  FrameFinding unsteadiness() const;
+  /// A frame's level at all poses but those of one location.
+  std::vector<double> levelsOf_db(std::size_t frame, const std::string& without = "") const;
+};
+
+FrameExaminer::FrameExaminer(const RadarConfig& radar) : state_(std::make_unique<State>(radar)) {}
+FrameExaminer::~FrameExaminer() = default;
+FrameExaminer::FrameExaminer(FrameExaminer&&) noexcept = default;
+FrameExaminer& FrameExaminer::operator=(FrameExaminer&&) noexcept = default;
+
+const std::vector<PoseFrames>& FrameExaminer::poses() const { return state_->poses; }
+
+void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames) {
+  State& s = *state_;
+  const RadarConfig& radar = s.radar;
+  for (const AdcCube& cube : frames) {
+    if (cube.chirps == radar.chirps_per_frame() && cube.samples == radar.samples_per_chirp &&
+        cube.receivers == radar.receivers() && cube.chirp_valid.size() == static_cast<std::size_t>(cube.chirps) &&
+        cube.data.size() == static_cast<std::size_t>(cube.chirps) * cube.samples * cube.receivers * 2) {
+      continue;
+    }
+    throw InputError("pose " + pose.name + ": frame " + std::to_string(cube.sequence) + " has " +
+                     std::to_string(cube.chirps) + " chirps x " + std::to_string(cube.samples) + " samples x " +
+                     std::to_string(cube.receivers) + " receivers; the radar's radar.yaml says " +
+                     std::to_string(radar.chirps_per_frame()) + " x " + std::to_string(radar.samples_per_chirp) +
+                     " x " + std::to_string(radar.receivers()));
+  }
+  PoseJudgement judged;
+  judged.pose = pose.name;
+  judged.frames = static_cast<int>(frames.size());
+
+  // Bytes first: all that follows takes samples for what they are.
+  Payload payload = toPayload(frames, s.order);
+  judged.packets = markZeroedPackets(payload, s.order);
+  for (int slips = 0; slips < 3; ++slips) {
+    const std::optional<Slip> slip = findSlip(payload);
+    if (!slip) break;
+    closeSlip(*slip, payload);
+    judged.slip_gain += slip->log_likelihood_gain;
+  }
+  FrameStack stack(radar, payload, s.order);
+  payload = Payload();
+
+  judged.rails = countRails(stack);
+  ClippedValues clipped = clippedValues(judged.rails, stack);
+  const std::map<std::size_t, Complex> clipped_means = clippedMeans(clipped, stack);
+  const double turn = s.examiner.commonTurn(stack);
+  turnFrames(-turn, stack);
+  std::vector<Complex> average = medianShot(stack);
+  // Where the standing signal itself comes to the converter's limit, clipped values are no bursts.
+  dropStandingClipped(clipped, average, stack);
+  Bursts bursts = dropBursts(average, differenceVariance(stack), stack);
+  countClipped(clipped, bursts, stack, judged.clipped, judged.counted);
+  judged.bursts = bursts;
+
+  average = meanShot(stack);
+  // What is clipped in every shot is nearer to the truth than nothing at all.
+  for (const auto& [place, mean] : clipped_means) {
+    if (average[place] == Complex(0)) average[place] = mean;
+  }
+  ShotStatistics residuals = s.examiner.examine(stack, average);
+  judged.turn_rad_per_frame = turn + residuals.turn_rad_per_frame;
+  judged.turn_variance = residuals.turn_variance;
+  judged.turn_cells = residuals.turn_cells;
+  judged.unsteady_share = residuals.unsteady_share;
+  judged.unsteady_nats = residuals.unsteady_nats;
+  for (double level : residuals.frame_level) judged.frame_gain_db.push_back(20 * std::log10(std::max(level, 1e-6)));
+
+  PoseFrames result;
+  result.pose = pose.name;
+  result.mean.stamp_ns = pose.stamp_ns;
+  result.mean.frames = stack.frames;
+  result.mean.pose_valid = true;
+  result.mean.T_map_radar = pose.T_map_radar;
+  result.mean.x.resize(stack.channels(), stack.samples);
+  for (int k = 0; k < stack.channels(); ++k) {
+    for (int n = 0; n < stack.samples; ++n) result.mean.x(k, n) = average[stack.at(0, k, n)];
+  }
+  result.noise_variance = std::move(residuals.noise_variance);
+  result.shots = residuals.shots;
+  result.unsteadiness = std::move(residuals.unsteadiness);
+  result.moving = std::move(residuals.cells);
+  s.poses.push_back(std::move(result));
+  const std::vector<double>& noise = s.poses.back().noise_variance;
+  s.motion.push_back({pose, stack.frames, std::move(residuals.evidence), std::move(residuals.echoes),
+                      std::accumulate(noise.begin(), noise.end(), 0.0) / static_cast<double>(noise.size())});
+  s.judged.push_back(std::move(judged));
+  s.located.reset();
+}
+
+FrameFinding FrameExaminer::State::packetLoss() const {
+  FrameFinding f;
+  f.cause = "packet_loss";
+  long long lost = 0, packets = 0;
+  for (const PoseJudgement& p : judged) {
+    packets += p.packets.packets;
+    lost += p.packets.lost;
+    f.log_likelihood_gain += p.packets.log_likelihood_gain;
+    f.nats_by_pose[p.pose] = p.packets.log_likelihood_gain;
+    if (p.packets.lost > 0) f.poses.push_back(p.pose);
+  }
+  if (lost == 0) return f;
+  f.false_alarm_rate = kFalseAlarm;
+  const double share = static_cast<double>(lost) / static_cast<double>(packets);
+  f.parameters = {number("lost_fraction", "1", share, shareInterval(lost, packets))};
+  std::ostringstream text;
+  text << lost << " of " << packets << " packets of " << kPacketBytes << " bytes are filled with zeros and not flagged";
+  f.description = text.str();
+  return f;
+}
+
+std::vector<FrameFinding> FrameExaminer::State::misalignments() const {
+  std::vector<FrameFinding> all;
+  for (const PoseJudgement& p : judged) {
+    if (p.slip_gain <= 0) continue;
+    FrameFinding f;
+    f.cause = "packet_misalignment";
+    f.poses = {p.pose};
+    f.log_likelihood_gain = p.slip_gain;
+    f.nats_by_pose = {{p.pose, p.slip_gain}};
+    f.false_alarm_rate = kFalseAlarm;
+    f.parameters = {{"pose", "", p.pose, {}}};
+    f.description = "packets are missing and were not filled: from there on samples belong to other channels and times";
+    all.push_back(std::move(f));
+  }
+  return all;
+}
+
+FrameFinding FrameExaminer::State::saturation() const {
+  FrameFinding f;
+  f.cause = "adc_saturation";
+  // One converter: its limits are the outermost codes of the whole session.
+  int high = 0, low = 0;
+  for (const PoseJudgement& p : judged) {
+    high = std::max(high, p.rails.high.code);
+    low = std::min(low, p.rails.low.code);
+  }
+  double at_code = 0, next_codes = 0, clipped = 0, counted = 0, spread = 0;
+  for (const PoseJudgement& p : judged) {
+    counted += p.counted;
+    const bool top = p.rails.high.code == high, bottom = p.rails.low.code == low;
+    if ((!top && !bottom) || p.clipped <= 0) continue;
+    at_code += p.clipped;
+    next_codes += (top ? p.rails.high.next_codes : 0) + (bottom ? p.rails.low.next_codes : 0);
+    clipped += p.clipped;
+    spread += p.clipped;
+    f.poses.push_back(p.pose);
+  }
+  f.log_likelihood_gain = pileUp({0, at_code, next_codes});
+  // That the outermost code is the last one of 16 bits happens by chance once in a thousand sessions at most.
+  if (f.log_likelihood_gain > 0 && (high == INT16_MAX || low == INT16_MIN)) f.log_likelihood_gain += std::log(1e3);
+  f.false_alarm_rate = std::exp(-f.log_likelihood_gain);
+  if (f.false_alarm_rate > kFalseAlarm || counted == 0) {
+    f.log_likelihood_gain = 0;
+    return f;
+  }
+  const double share = clipped / counted;
+  // Samples of one pose clip together or not at all only where noise decides: their number is as good as its root.
+  f.parameters = {number("clipped_fraction", "1", share,
+                         {std::max(0.0, share - 1.96 * std::sqrt(spread) / counted * 0.2),
+                          share + 1.96 * std::sqrt(spread) / counted * 0.2})};
+  std::ostringstream text;
+  text << "samples pile up at the outermost codes " << low << " and " << high << ": " << 100 * share
+       << " % of all I and Q values";
+  f.description = text.str();
+  return f;
+}
+
+FrameFinding FrameExaminer::State::interference() const {
+  FrameFinding f;
+  f.cause = "interference";
+  double frames = 0, hit = 0;
+  for (const PoseJudgement& p : judged) {
+    frames += p.bursts.frames;
+    hit += p.bursts.hit_frames;
+    f.log_likelihood_gain += p.bursts.log_likelihood_gain;
+    f.nats_by_pose[p.pose] = p.bursts.log_likelihood_gain;
+    if (p.bursts.hit_frames > 0) f.poses.push_back(p.pose);
+  }
+  if (hit == 0) return f;
+  // dropBursts' thresholds: 1e-12 per window, some 1e7 windows in a session at most.
+  f.false_alarm_rate = 1e-5;
+  f.parameters = {number("frame_fraction", "1", hit / frames, shareInterval(hit, frames))};
+  std::ostringstream text;
+  text << "bursts within single chirps, the same wave at all receivers, in " << hit << " of " << frames << " frames";
+  f.description = text.str();
+  return f;
+}
+
+FrameFinding FrameExaminer::State::drift() const {
+  FrameFinding f;
+  f.cause = "phase_drift";
+  std::vector<const PoseJudgement*> used;
+  for (const PoseJudgement& p : judged) {
+    if (std::isfinite(p.turn_variance)) used.push_back(&p);
+  }
+  if (used.empty()) return f;
+  // Random-effects mean (DerSimonian and Laird): poses may differ by more than each one's own error.
+  const auto mean = [&](double between, double& weights) {
+    double sum = 0;
+    weights = 0;
+    for (const PoseJudgement* p : used) {
+      sum += p->turn_rad_per_frame / (p->turn_variance + between);
+      weights += 1 / (p->turn_variance + between);
+    }
+    return sum / weights;
+  };
+  double weights = 0, squares = 0, chi2 = 0;
+  const double fixed = mean(0, weights);
+  for (const PoseJudgement* p : used) {
+    squares += 1 / (p->turn_variance * p->turn_variance);
+    chi2 += std::pow(p->turn_rad_per_frame - fixed, 2) / p->turn_variance;
+  }
+  const double poses = static_cast<double>(used.size());
+  const double room = weights - squares / weights;
+  const double between = room > 0 ? std::max(0.0, (chi2 - (poses - 1)) / room) : 0;
+  const double turn = mean(between, weights);
+  const double error = std::sqrt(1 / weights);
+  // Common to all cells is what makes it drift of the radar: what one echo of one pose does may be that echo's own
+  // motion.
+  int cells = 0;
+  for (const PoseJudgement* p : used) cells += p->turn_cells;
+  const double freedom = std::max(poses, static_cast<double>(cells)) - 1;
+  if (freedom < 2) return f;
+  const double t = std::abs(turn) / error;
+  const boost::math::students_t_distribution<double> student(freedom);
+  f.false_alarm_rate = 2 * boost::math::cdf(boost::math::complement(student, t));
+  if (!(f.false_alarm_rate < kFalseAlarm)) return f;
+  f.log_likelihood_gain = 0.5 * t * t;
+  const double half = boost::math::quantile(student, 0.975) * error;
+  f.parameters = {number("rad_per_frame", "rad", turn, {turn - half, turn + half})};
+  for (const PoseJudgement* p : used) {
+    if (std::abs(p->turn_rad_per_frame) > 3 * std::sqrt(p->turn_variance)) f.poses.push_back(p->pose);
+  }
+  std::ostringstream text;
+  text << "all cells turn alike by " << turn << " rad from each frame to the next; an average over "
+       << used.front()->frames << " frames loses "
+       << -20 * std::log10(std::max(1e-9, std::abs(std::sin(0.5 * turn * used.front()->frames) /
+                                                   (used.front()->frames * std::sin(0.5 * turn)))))
+       << " dB by it";
+  f.description = text.str();
+  return f;
+}
+
+std::vector<double> FrameExaminer::State::levelsOf_db(std::size_t frame, const std::string& without) const {
+  std::vector<double> levels;
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    const std::vector<double>& gain_db = judged[i].frame_gain_db;
+    if (frame >= gain_db.size() || gain_db.size() < 3) continue;
+    if (without.empty() || motion[i].pose.location != without) levels.push_back(gain_db[frame]);
+  }
+  return levels;
+}
+
+FrameFinding FrameExaminer::State::frameGain() const {
+  FrameFinding f;
+  f.cause = "unknown";
+  std::size_t frames = 0;
+  for (const PoseJudgement& p : judged) frames = std::max(frames, p.frame_gain_db.size());
+  // The median over poses of each frame's level against the pose's other frames, which bursts at some poses do not
+  // move; it changes where it differs between frames by far more than its error over poses.
+  double chi2 = 0, lowest = 0, highest = 0;
+  std::size_t lowest_at = 0, highest_at = 0, counted = 0;
+  std::vector<double> middle_db(frames, 0.0), scatter_db(frames, std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < frames; ++i) {
+    const std::vector<double> levels = levelsOf_db(i);
+    if (levels.size() < 3) continue;
+    const double middle = middle_db[i] = quantile(levels, 0.5);
+    std::vector<double> apart;
+    for (double level : levels) apart.push_back(std::abs(level - middle));
+    // Of normal errors: the deviation is 1.48 times the median of sizes, the median's own 1.25 times the mean's.
+    scatter_db[i] = std::max(1.48 * quantile(apart, 0.5), 1e-4);
+    const double error = 1.25 * scatter_db[i] / std::sqrt(static_cast<double>(levels.size()));
+    chi2 += std::pow(middle / error, 2);
+    ++counted;
+    if (middle < lowest) {
+      lowest = middle;
+      lowest_at = i;
+    }
+    if (middle > highest) {
+      highest = middle;
+      highest_at = i;
+    }
+  }
+  // A tenth of a decibel matters to nobody, whatever its error.
+  if (counted < 3 || highest - lowest < 0.1) return f;
+  const double excess = (chi2 - static_cast<double>(counted)) / std::sqrt(2.0 * static_cast<double>(counted));
+  if (excess < 12) return f;
+  f.log_likelihood_gain = 0.5 * (chi2 - static_cast<double>(counted));
+  f.false_alarm_rate = std::exp(-0.5 * excess);
+  for (const PoseJudgement& p : judged) f.poses.push_back(p.pose);
+  f.mechanism = NamedParameters{"empirical_frame_gain", {}};
+  f.mechanism->values.set("gain_db", middle_db);
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    double& nats = f.nats_by_pose[judged[i].pose];
+    for (std::size_t j = 0; j < judged[i].frame_gain_db.size(); ++j) {
+      const std::vector<double> others = levelsOf_db(j, motion[i].pose.location);
+      if (others.empty()) continue;
+      const double level = judged[i].frame_gain_db[j], rest = level - quantile(others, 0.5);
+      nats += 0.5 * (level * level - rest * rest) / (scatter_db[j] * scatter_db[j]);
+    }
+  }
+  std::ostringstream text;
+  text << "the common level of frames changes within a pose, at all poses alike: lowest in frame " << lowest_at << " ("
+       << lowest << " dB), highest in frame " << highest_at << " (" << highest << " dB against the mean)";
+  f.description = text.str();
+  return f;
+}
+
+FrameFinding FrameExaminer::State::unsteadiness() const {
+  FrameFinding f;
+  f.cause = "unknown";
+  for (const PoseJudgement& p : judged) {
+    if (p.unsteady_share < kUnsteady) continue;
+    f.poses.push_back(p.pose);
+    f.log_likelihood_gain += p.unsteady_nats;
+  }
+  if (f.poses.size() < 3 || 3 * f.poses.size() < 2 * judged.size()) return {};
+  f.false_alarm_rate = 1e-6;  // nobody who walks is in half of all bins at two thirds of the poses
+  f.description = "frames of one pose disagree about what stands, in most of its echoes at once, at " +
+                  std::to_string(f.poses.size()) + " of " + std::to_string(judged.size()) +
+                  " poses: the radar itself changes from frame to frame";
+  return f;
+}
+
+namespace {
+
+bool standsWithin(const FrameFinding& f, const std::set<std::string>& poses) {
+  return std::all_of(f.poses.begin(), f.poses.end(), [&](const std::string& p) { return poses.count(p) > 0; });
+}
+
+}  // namespace
+
+std::vector<FrameFinding> FrameExaminer::findings() const {
+  const State& s = *state_;
+  std::vector<FrameFinding> all = s.misalignments();
+  all.push_back(s.saturation());
+  all.push_back(s.packetLoss());
+  // What moves, bursts and turns are told from a radar that is the same in all frames.
+  const bool steady = s.unsteadiness().poses.empty();
+  if (steady) {
+    all.push_back(s.interference());
+    all.push_back(s.drift());
+  }
+  // A strong walker pulls the gain that a frame's samples share, and what that leaves looks like a burst; what is left
+  // of bursts looks like something that moves. Of two that stand at the same poses the one with more poses is the
+  // cause.
+  const std::vector<FrameFinding> walkers = steady ? s.locate().walkers : std::vector<FrameFinding>();
+  std::set<std::string> walked, hit;
+  for (const FrameFinding& walker : walkers) walked.insert(walker.poses.begin(), walker.poses.end());
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [&](const FrameFinding& f) { return f.cause == "interference" && standsWithin(f, walked); }),
+            all.end());
+  for (const FrameFinding& f : all) {
+    if (f.cause == "interference" && f.log_likelihood_gain > 0) hit.insert(f.poses.begin(), f.poses.end());
+  }
+  for (const FrameFinding& walker : walkers) {
+    if (!standsWithin(walker, hit)) all.push_back(walker);
+  }
+  all.erase(std::remove_if(all.begin(), all.end(), [](const auto& f) { return f.log_likelihood_gain <= 0; }),
+            all.end());
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.log_likelihood_gain > b.log_likelihood_gain; });
+  return all;
+}
+
+std::vector<FrameFinding> FrameExaminer::unexplained() const {
+  if (FrameFinding f = state_->unsteadiness(); !f.poses.empty()) return {std::move(f)};
+  std::vector<FrameFinding> all = state_->locate().unexplained;
+  // A tone of the radar's own is at most poses; one beat at a few of those with bursts is what is left of these.
+  const FrameFinding bursts = state_->interference();
+  const std::set<std::string> hit(bursts.poses.begin(), bursts.poses.end());
+  all.erase(
+      std::remove_if(all.begin(), all.end(),
+                     [&](const FrameFinding& f) { return 2 * f.poses.size() < hit.size() && standsWithin(f, hit); }),
+      all.end());
+  FrameFinding gain = state_->frameGain();
+  if (gain.log_likelihood_gain > 0) all.push_back(std::move(gain));
+  return all;
+}
+
+}  // namespace mmradartwin::diagnosis::frames

@@ -1,0 +1,587 @@
+#include "diagnosis/frames/shot_examiner.h"
+
+#include <algorithm>
+#include <boost/math/special_functions/gamma.hpp>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <unsupported/Eigen/FFT>
+
+namespace mmradartwin::diagnosis::frames {
+namespace {
+
+using Complex = std::complex<float>;
+
+// Loops from which on a frame has a Doppler spectrum worth the name: static echoes take three bins of a Hann window.
+constexpr int kLeastLoops = 16;
+// Of a frame's moving echoes the strongest are kept.
+constexpr std::size_t kEchoesPerFrame = 3;
+constexpr double kLimb_m = 0.75;
+constexpr double kUnsteadyRadar = 0.5;      ///< of the standing echoes: more change with the radar itself
+constexpr double kChance = 6;               ///< standard deviations of a bin's scatter
+constexpr double kAlike = 2;                ///< a body's echo is alike for some frames: its average scatters by more
+constexpr double kLeastOfStrongest = 0.03;  ///< power of the moving cells that are told of
+
+template <typename T>
+T medianOf(std::vector<T> values) {
+  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Of values with weights; 0 of none.
+double weightedMedian(std::vector<std::pair<double, double>>& values) {
+  std::sort(values.begin(), values.end());
+  double total = 0, sum = 0;
+  for (const auto& [value, weight] : values) total += weight;
+  for (const auto& [value, weight] : values) {
+    sum += weight;
+    if (2 * sum >= total) return value;
+  }
+  return values.empty() ? 0 : values.back().first;
+}
+
+/// Standard deviation of the median of values that scatter so about it, normally but for outliers.
+template <typename T>
+double errorOfMedian(std::vector<T> values, double median) {
+  for (T& v : values) v = std::abs(v - median);
+  return 1.25 * 1.48 * medianOf(values) / std::sqrt(static_cast<double>(values.size()));
+}
+
+Eigen::FFT<float>& fft() {
+  thread_local Eigen::FFT<float> fft(Eigen::FFT<float>::impl_type(), Eigen::FFT<float>::Unscaled);
+  return fft;
+}
+
+/// From one chirp's start to the next: as radar.yaml says, else as short as its samples allow.
+double chirpPeriod_s(const RadarConfig& radar) {
+  const double sampled_s = radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
+  return (std::isfinite(radar.ramp_end_s) ? radar.ramp_end_s : sampled_s) +
+         (std::isfinite(radar.idle_s) ? radar.idle_s : 0);
+}
+
+/// Offset of a peak from the middle of three levels, by a parabola through their logarithms: +-1/2 at most.
+double peakOffset(double left, double middle, double right) {
+  if (!(left > 0 && middle > 0 && right > 0)) return 0;
+  const double l = std::log(left), m = std::log(middle), r = std::log(right), curve = l - 2 * m + r;
+  return curve < 0 ? std::clamp(0.5 * (l - r) / curve, -0.5, 0.5) : 0;
+}
+
+}  // namespace
+
+/// Range spectra of the residuals, shot by shot, of those shots that are nearly whole.
+struct ShotExaminer::Spectra {
+  int channels = 0, bins = 0;
+  std::vector<int> shot;                   ///< numbers of the shots
+  std::vector<Complex> residual;           ///< [shot][bin][channel]; whitened once the noise is known
+  std::vector<Complex> average;            ///< [bin][channel], alike
+  std::vector<std::complex<double>> gain;  ///< [shot] common to all cells, taken out of the residuals
+  int per_frame = 1;
+  const Complex* at(std::size_t i, int bin) const {
+    return &residual[(i * static_cast<std::size_t>(bins) + static_cast<std::size_t>(bin)) *
+                     static_cast<std::size_t>(channels)];
+  }
+  Complex* at(std::size_t i, int bin) { return const_cast<Complex*>(std::as_const(*this).at(i, bin)); }
+};
+
+ShotExaminer::ShotExaminer(const RadarConfig& radar) : radar_(radar), chain_(radar) {
+  for (double w : hannWindow(radar.samples_per_chirp)) window_.push_back(static_cast<float>(w));
+  beams_.resize(radar.channels(), kAngleBins);
+  for (int a = 0; a < kAngleBins; ++a) {
+    const double azimuth_rad = axes().azimuth_rad[static_cast<std::size_t>(a)];
+    beams_.col(a) = std::isnan(azimuth_rad) ? Eigen::VectorXcf::Zero(radar.channels()) : steering(azimuth_rad);
+  }
+}
+
+Eigen::VectorXcf ShotExaminer::steering(double azimuth_rad) const {
+  Eigen::VectorXcf v(radar_.channels());
+  for (int k = 0; k < radar_.channels(); ++k) {
+    const double y_m = radar_.virtual_element_m(k).y();
+    v[k] = Complex(std::polar(1.0, -2 * M_PI * y_m * std::sin(azimuth_rad) / radar_.wavelength_m()));
+  }
+  return v;
+}
+
+ShotExaminer::Spectra ShotExaminer::spectra(const FrameStack& stack, const std::vector<Complex>& average) const {
+  Spectra s;
+  s.channels = stack.channels();
+  s.bins = stack.samples;
+  s.per_frame = stack.loops;
+  const std::size_t values = stack.values();
+  for (int shot = 0; shot < stack.shots(); ++shot) {
+    const auto first = stack.use.begin() + static_cast<long>(static_cast<std::size_t>(shot) * values);
+    const auto used = std::count(first, first + static_cast<long>(values), std::uint8_t{1});
+    if (10 * static_cast<std::size_t>(used) >= 9 * values) s.shot.push_back(shot);
+  }
+  s.residual.resize(s.shot.size() * values);
+  s.average.resize(values);
+  std::vector<Complex> in(static_cast<std::size_t>(s.bins)), out(in);
+  const auto transform = [&](Complex* to, int k) {
+    fft().fwd(out.data(), in.data(), s.bins);
+    for (int b = 0; b < s.bins; ++b) to[b * s.channels + k] = out[static_cast<std::size_t>(b)];
+  };
+  for (int k = 0; k < s.channels; ++k) {
+    for (int n = 0; n < s.bins; ++n) {
+      const auto i = static_cast<std::size_t>(n);
+      in[i] = average[stack.at(0, k, n)] * window_[i];
+    }
+    transform(s.average.data(), k);
+  }
+  for (std::size_t i = 0; i < s.shot.size(); ++i) {
+    for (int k = 0; k < s.channels; ++k) {
+      const std::size_t at = stack.at(s.shot[i], k, 0), still = stack.at(0, k, 0);
+      for (std::size_t n = 0; n < in.size(); ++n) {
+        in[n] = stack.use[at + n] ? (stack.x[at + n] - average[still + n]) * window_[n] : 0;
+      }
+      transform(s.at(i, 0), k);
+    }
+  }
+  return s;
+}
+
+double ShotExaminer::commonTurn(const FrameStack& stack) const {
+  if (stack.frames < 3) return 0;
+  const auto bins = static_cast<std::size_t>(stack.samples);
+  std::vector<std::vector<std::complex<double>>> steps(bins);  ///< of size 1
+  std::vector<Complex> in(bins), before(bins), now(bins);
+  // One receiver of each slot tells enough about what is strong.
+  for (int k = 0; k < stack.channels(); k += stack.receivers) {
+    int last = -2;
+    for (int f = 0; f < stack.frames; ++f) {
+      const std::size_t at = stack.at(f * stack.loops, k, 0);
+      const auto use = stack.use.begin() + static_cast<long>(at);
+      if (std::count(use, use + stack.samples, std::uint8_t{0}) > stack.samples / 10) continue;
+      for (std::size_t n = 0; n < bins; ++n) in[n] = stack.x[at + n] * window_[n];
+      std::swap(now, before);
+      fft().fwd(now.data(), in.data(), stack.samples);
+      if (last == f - 1) {
+        for (std::size_t b = 0; b < bins; ++b) {
+          const std::complex<double> z(now[b] * std::conj(before[b]));
+          if (std::abs(z) > 0) steps[b].push_back(z / std::abs(z));
+        }
+      }
+      last = f;
+    }
+  }
+  // The median of angles about their middle: what bursts do to two steps each counts for no more than that.
+  struct Turn {
+    double rad, error_rad;
+  };
+  const auto middle = [](const std::vector<std::complex<double>>& turns) {
+    const std::complex<double> sum = std::accumulate(turns.begin(), turns.end(), std::complex<double>(0));
+    std::vector<double> angles;
+    for (const auto& z : turns) angles.push_back(std::arg(z * std::conj(sum)));
+    const double beside = medianOf(angles);
+    return Turn{std::arg(sum) + beside, errorOfMedian(angles, beside)};
+  };
+  std::vector<Turn> of_bins;
+  std::vector<std::complex<double>> each;
+  for (const auto& of_bin : steps) {
+    // Half of the steps may be turned anyhow; noise's add up to a sixth of 40.
+    const std::complex<double> sum = std::accumulate(of_bin.begin(), of_bin.end(), std::complex<double>(0));
+    if (!(std::abs(sum) > 0.5 * static_cast<double>(of_bin.size()))) continue;
+    of_bins.push_back(middle(of_bin));
+    each.push_back(std::polar(1.0, of_bins.back().rad));
+  }
+  if (of_bins.empty()) return 0;
+  const Turn common = middle(each);
+  // Most of these bins are weak. Those that know better tell how much it is, where they do not turn by themselves.
+  std::vector<std::pair<double, double>> weighed;
+  for (const Turn& t : of_bins) {
+    const double apart = std::remainder(t.rad - common.rad, 2 * M_PI);
+    const double variance = std::max(t.error_rad * t.error_rad, 1e-12);
+    if (apart * apart > 16 * (variance + common.error_rad * common.error_rad)) continue;
+    weighed.emplace_back(apart, 1 / variance);
+  }
+  return common.rad + weightedMedian(weighed);
+}
+
+void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotStatistics& result) const {
+  s.gain.assign(s.shot.size(), 1);
+  result.frame_level.assign(static_cast<std::size_t>(stack.frames), 1);
+  const double freedom = static_cast<double>(s.shot.size()) - 1;
+  if (freedom < 1) return;
+  // What all cells share, by the weighted median over range bins: what moves is in few of them.
+  struct Cell {
+    int bin;
+    double power;
+  };
+  const auto still = [&](int b) {
+    return Eigen::Map<const Eigen::VectorXcf>(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
+  };
+  const auto varied = [&](std::size_t i, int b) { return Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels); };
+  const auto beyondOne = [&](const std::vector<Cell>& cells) {
+    std::vector<std::complex<double>> beyond;
+    std::vector<std::pair<double, double>> re(cells.size()), im(cells.size());
+    for (std::size_t i = 0; i < s.shot.size(); ++i) {
+      for (std::size_t c = 0; c < cells.size(); ++c) {
+        const std::complex<double> share =
+            std::complex<double>(still(cells[c].bin).dot(varied(i, cells[c].bin))) / cells[c].power;
+        re[c] = {share.real(), cells[c].power};
+        im[c] = {share.imag(), cells[c].power};
+      }
+      beyond.emplace_back(weightedMedian(re), weightedMedian(im));
+    }
+    return beyond;
+  };
+  // A cell that varies by more than a tenth of itself, beyond what is taken to be common, does not tell what is common.
+  const auto steady = [&](const std::vector<std::complex<double>>& beyond) {
+    std::vector<Cell> cells;
+    for (int b = 0; b < s.bins; ++b) {
+      double scatter = 0;
+      for (std::size_t i = 0; i < s.shot.size(); ++i) {
+        scatter += (varied(i, b) - Complex(beyond[i]) * still(b)).squaredNorm();
+      }
+      const double power = still(b).squaredNorm();
+      if (power > 10 * scatter / freedom) cells.push_back({b, power});
+    }
+    return cells;
+  };
+  std::vector<Cell> cells = steady(std::vector<std::complex<double>>(s.shot.size(), 0.0)), all;
+  // A gain that itself changes by more than that lets no cell be steady but beside it.
+  for (int b = 0; b < s.bins; ++b) {
+    if (still(b).squaredNorm() > 0) all.push_back({b, still(b).squaredNorm()});
+  }
+  std::vector<Cell> beside = steady(beyondOne(all));
+  if (beside.size() > cells.size()) cells = std::move(beside);
+  if (cells.empty()) return;
+  const std::vector<std::complex<double>> common = beyondOne(cells);
+  for (std::size_t i = 0; i < s.shot.size(); ++i) {
+    const std::complex<double> beyond = common[i];
+    s.gain[i] = 1.0 + beyond;
+    result.frame_level[static_cast<std::size_t>(s.shot[i] / s.per_frame)] = std::abs(s.gain[i]);
+    Complex* e = s.at(i, 0);
+    for (std::size_t j = 0; j < s.average.size(); ++j) e[j] -= Complex(beyond) * s.average[j];
+  }
+}
+
+void ShotExaminer::readSteadiness(const Spectra& s, ShotStatistics& result) const {
+  const double freedom = static_cast<double>(s.shot.size()) - 1;
+  if (freedom < 4) return;
+  std::vector<double> varied(static_cast<std::size_t>(s.bins), 0), standing(varied);
+  for (int b = 0; b < s.bins; ++b) {
+    const auto bin = static_cast<std::size_t>(b);
+    for (std::size_t i = 0; i < s.shot.size(); ++i) {
+      varied[bin] += Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm() / freedom;
+    }
+    standing[bin] =
+        Eigen::Map<const Eigen::VectorXcf>(&s.average[bin * static_cast<std::size_t>(s.channels)], s.channels)
+            .squaredNorm();
+  }
+  // Noise fills all bins alike: the steadiest hold no more than it.
+  std::vector<double> sorted = varied;
+  std::sort(sorted.begin(), sorted.end());
+  const double noise = sorted[sorted.size() / 10];
+  double all = 0, unsteady = 0;
+  for (std::size_t b = 0; b < varied.size(); ++b) {
+    if (!(standing[b] > 30 * noise)) continue;
+    ++all;
+    if (!(varied[b] > 4 * noise && varied[b] - noise > 0.1 * standing[b])) continue;
+    ++unsteady;
+    const double q = varied[b] / std::max(noise, 1e-30);
+    result.unsteady_nats += freedom * s.channels * (q - 1 - std::log(q));
+  }
+  if (all > 0) result.unsteady_share = unsteady / all;
+}
+
+void ShotExaminer::readNoise(Spectra& s, ShotStatistics& result) const {
+  double window_power = 0;
+  for (float w : window_) window_power += w * w;
+  const double freedom = static_cast<double>(s.shot.size()) - 1;
+  // Whatever moves fills few range bins, noise fills all of them alike: the median over bins, of sums that are Gamma
+  // distributed with the number of shots (Wilson and Hilferty: median = mean (1 - 1/(9 n))^3).
+  const double median_of_mean = std::pow(1 - 1 / (9 * std::max(freedom, 1.0)), 3);
+  result.noise_variance.assign(static_cast<std::size_t>(s.channels), 1.0 / 6);
+  if (freedom < 1) return;
+  for (int k = 0; k < s.channels; ++k) {
+    std::vector<double> power(static_cast<std::size_t>(s.bins), 0);
+    for (std::size_t i = 0; i < s.shot.size(); ++i) {
+      for (int b = 0; b < s.bins; ++b) power[static_cast<std::size_t>(b)] += std::norm(s.at(i, b)[k]);
+    }
+    const double variance = medianOf(power) / freedom / median_of_mean / window_power;
+    result.noise_variance[static_cast<std::size_t>(k)] = std::max(variance, 1.0 / 6);
+  }
+  std::vector<float> scale;
+  for (double v : result.noise_variance) scale.push_back(static_cast<float>(1 / std::sqrt(v * window_power)));
+  for (std::size_t i = 0; i < s.residual.size(); ++i) s.residual[i] *= scale[i % scale.size()];
+  for (std::size_t i = 0; i < s.average.size(); ++i) s.average[i] *= scale[i % scale.size()];
+}
+
+void ShotExaminer::readUnsteadiness(const Spectra& s, ShotStatistics& result) const {
+  const double values = static_cast<double>(s.shot.size()) * s.channels, freedom = values - s.channels;
+  // A radar that changes itself does so in all its echoes, which are what is to be explained.
+  if (freedom < 1 || result.unsteady_share > kUnsteadyRadar) return;
+  for (int b = 0; b < s.bins; ++b) {
+    double power = 0;
+    for (std::size_t i = 0; i < s.shot.size(); ++i) {
+      power += Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm();
+    }
+    const double beyond = power / freedom - 1;
+    if (beyond < kChance / std::sqrt(freedom)) continue;
+    result.unsteadiness.resize(static_cast<std::size_t>(s.bins), 1.0);
+    result.unsteadiness[static_cast<std::size_t>(b)] += kAlike * beyond;
+  }
+}
+
+void ShotExaminer::readEvidence(const Spectra& s, ShotStatistics& result) const {
+  result.evidence = Eigen::ArrayXXf::Zero(s.bins, kAngleBins);
+  const double freedom = static_cast<double>(s.shot.size()) - 1;
+  if (freedom < 4) return;
+  Eigen::ArrayXXf ratio(s.bins, kAngleBins);
+  for (int b = 0; b < s.bins; ++b) {
+    Eigen::MatrixXcf c = Eigen::MatrixXcf::Zero(s.channels, s.channels);
+    for (std::size_t i = 0; i < s.shot.size(); ++i) {
+      const Eigen::Map<const Eigen::VectorXcf> e(s.at(i, b), s.channels);
+      c.noalias() += e * e.adjoint();
+    }
+    c /= static_cast<float>(freedom);
+    const Eigen::Map<const Eigen::VectorXcf> still(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
+    // Flicker of a standing echo (phase noise, gain) has that echo's channel vector and some permille of its power:
+    // that direction is left out where so little varies. A body that stands and breathes varies by more.
+    const float standing = still.squaredNorm();
+    Eigen::MatrixXcf beams = beams_;
+    if (c.trace().real() < 0.01f * standing) {
+      beams -= still * (still.adjoint() * beams_) / standing;
+    }
+    const Eigen::MatrixXcf varied = c * beams;
+    for (int a = 0; a < kAngleBins; ++a) {
+      const float size = beams.col(a).squaredNorm();
+      ratio(b, a) = size > 0.2f * static_cast<float>(s.channels) ? beams.col(a).dot(varied.col(a)).real() / size : 1.0f;
+    }
+  }
+  // Skirts of strong echoes reach over many bins; what is somewhere stands out of its surroundings in range too.
+  std::vector<float> around;
+  for (int a = 0; a < kAngleBins; ++a) {
+    for (int b = 0; b < s.bins; ++b) {
+      if (ratio(b, a) <= 1) continue;
+      around.clear();
+      for (int d = -8; d <= 8; ++d) {
+        if (std::abs(d) > 2 && b + d >= 0 && b + d < s.bins) around.push_back(ratio(b + d, a));
+      }
+      const double q = ratio(b, a) / std::max(1.0f, medianOf(around));
+      if (q > 1) result.evidence(b, a) = static_cast<float>(freedom * (q - 1 - std::log(q)));
+    }
+  }
+}
+
+void ShotExaminer::readEchoes(const Spectra& s, ShotStatistics& result) const {
+  // Over all channels a bin holds M times the noise; chance exceeds this once in 1e6 bins.
+  const auto least = static_cast<float>(boost::math::gamma_q_inv(static_cast<double>(s.channels), 1e-6));
+  std::vector<float> power(static_cast<std::size_t>(s.bins));
+  Eigen::VectorXf beam(kAngleBins);
+  for (std::size_t i = 0; i < s.shot.size(); ++i) {
+    std::vector<MovingEcho> echoes;
+    for (int b = 0; b < s.bins; ++b) {
+      power[static_cast<std::size_t>(b)] = Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm();
+    }
+    for (int b = 1; b + 1 < s.bins; ++b) {
+      const float here = power[static_cast<std::size_t>(b)];
+      const float left = power[static_cast<std::size_t>(b - 1)], right = power[static_cast<std::size_t>(b + 1)];
+      if (here < least || here < left || here <= right) continue;
+      beam = (beams_.adjoint() * Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels)).cwiseAbs2();
+      int a = 0;
+      const float peak = beam.maxCoeff(&a);
+      const double offset = peakOffset(beam[(a + kAngleBins - 1) % kAngleBins], peak, beam[(a + 1) % kAngleBins]);
+      const double step = radar_.wavelength_m() / (2 * radar_.virtual_pitch_m()) / (kAngleBins / 2);
+      MovingEcho echo;
+      echo.frame = s.shot[i] / s.per_frame;
+      echo.range_m = (b + peakOffset(left, here, right)) * radar_.range_bin_m();
+      echo.azimuth_rad = std::asin(std::clamp((a - kAngleBins / 2 + offset) * step, -1.0, 1.0));
+      echo.snr = peak / s.channels;
+      echo.radial_m_per_s = std::numeric_limits<double>::quiet_NaN();
+      echoes.push_back(echo);
+    }
+    std::sort(echoes.begin(), echoes.end(), [](const auto& p, const auto& q) { return p.snr > q.snr; });
+    if (echoes.size() > kEchoesPerFrame) echoes.resize(kEchoesPerFrame);
+    result.echoes.insert(result.echoes.end(), echoes.begin(), echoes.end());
+  }
+}
+
+void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& s, ShotStatistics& result) const {
+  result.turn_variance = std::numeric_limits<double>::infinity();
+  const double shots = static_cast<double>(s.shot.size());
+  if (stack.frames < 3 || s.shot.size() < 3) return;
+  std::vector<double> frame;
+  double mean_frame = 0;
+  for (int shot : s.shot) frame.push_back(shot / stack.loops);
+  for (double f : frame) mean_frame += f / shots;
+  double spread = 0;
+  for (double f : frame) spread += (f - mean_frame) * (f - mean_frame);
+  if (!(spread > 0)) return;
+  // The slope of each second bin's phase (a Hann window ties neighbours together), weighed by its own scatter: a cell
+  // in which something moves counts for little.
+  double weights = 0, weighted = 0, squares = 0, moments = 0;
+  for (int b = 0; b < s.bins; b += 2) {
+    const Eigen::Map<const Eigen::VectorXcf> still(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
+    const double power = still.squaredNorm();
+    // The average's own noise is channels/shots.
+    if (power < 10 * s.channels / shots || power < 10) continue;
+    std::vector<double> phase;
+    double mean = 0, slope = 0;
+    for (std::size_t i = 0; i < s.shot.size(); ++i) {
+      const Eigen::Map<const Eigen::VectorXcf> e(s.at(i, b), s.channels);
+      phase.push_back(std::arg(s.gain[i] + std::complex<double>(still.dot(e)) / power));
+      mean += phase.back() / shots;
+    }
+    for (std::size_t i = 0; i < phase.size(); ++i) slope += phase[i] * (frame[i] - mean_frame) / spread;
+    double misfit = 0;
+    for (std::size_t i = 0; i < phase.size(); ++i) {
+      const double r = phase[i] - mean - slope * (frame[i] - mean_frame);
+      misfit += r * r;
+    }
+    const double variance = std::max(misfit / (shots - 2), 0.5 / power) / spread;
+    weights += 1 / variance;
+    weighted += slope / variance;
+    moments += slope * slope / variance;
+    squares += 1 / (variance * variance);
+    ++result.turn_cells;
+  }
+  if (result.turn_cells == 0) return;
+  result.turn_rad_per_frame = weighted / weights;
+  // Cells that disagree beyond their scatter widen it (Birge).
+  const double chi2 = moments - weighted * weighted / weights;
+  const double ratio = result.turn_cells > 1 ? std::max(1.0, chi2 / (result.turn_cells - 1)) : 1.0;
+  result.turn_variance = ratio / weights;
+  result.turn_cells = static_cast<int>(std::lround(weights * weights / squares));
+}
+
+ShotStatistics ShotExaminer::examine(const FrameStack& stack, const std::vector<Complex>& average) const {
+  ShotStatistics result;
+  Spectra s = spectra(stack, average);
+  takeCommonGain(stack, s, result);
+  result.shots = static_cast<int>(s.shot.size());
+  readSteadiness(s, result);
+  readNoise(s, result);
+  readTurn(stack, s, result);
+  readUnsteadiness(s, result);
+  readEvidence(s, result);
+  if (stack.loops >= kLeastLoops) {
+    readDopplerEchoes(s, result);
+  } else {
+    readEchoes(s, result);
+  }
+  return result;
+}
+
+void ShotExaminer::readDopplerEchoes(const Spectra& s, ShotStatistics& result) const {
+  const int loops = s.per_frame;
+  const auto least = static_cast<float>(boost::math::gamma_q_inv(static_cast<double>(s.channels), 1e-9));
+  std::vector<float> window;
+  float window_power = 0;
+  for (double w : hannWindow(loops)) {
+    window.push_back(static_cast<float>(w));
+    window_power += window.back() * window.back();
+  }
+  const double per_turn_m_per_s = 0.5 * radar_.wavelength_m() / (loops * radar_.slots() * chirpPeriod_s(radar_));
+  std::vector<Complex> in(static_cast<std::size_t>(loops)), out(in);
+  std::vector<Complex> doppler(static_cast<std::size_t>(loops) * static_cast<std::size_t>(s.bins * s.channels));
+  Eigen::ArrayXXf power(s.bins, loops);
+  const auto cell = [&](int bin, int d) {
+    return Eigen::Map<Eigen::VectorXcf>(&doppler[static_cast<std::size_t>((d * s.bins + bin) * s.channels)],
+                                        s.channels);
+  };
+  for (std::size_t begin = 0; begin < s.shot.size();) {
+    const int frame = s.shot[begin] / loops;
+    std::size_t end = begin;
+    while (end < s.shot.size() && s.shot[end] / loops == frame) ++end;
+    for (int b = 0; b < s.bins; ++b) {
+      for (int k = 0; k < s.channels; ++k) {
+        std::fill(in.begin(), in.end(), Complex(0));
+        for (std::size_t i = begin; i < end; ++i) {
+          const auto loop = static_cast<std::size_t>(s.shot[i] % loops);
+          in[loop] = s.at(i, b)[k] * window[loop] / std::sqrt(window_power);
+        }
+        fft().fwd(out.data(), in.data(), loops);
+        for (int d = 0; d < loops; ++d) cell(b, d)[k] = out[static_cast<std::size_t>(d)];
+      }
+      for (int d = 0; d < loops; ++d) power(b, d) = cell(b, d).squaredNorm();
+    }
+    begin = end;
+
+    struct Peak {
+      MovingEcho echo;
+      double weight, sum_range, sum_azimuth, sum_speed;
+    };
+    std::vector<Peak> peaks;
+    std::vector<MovingCell> cells;
+    for (int b = 1; b + 1 < s.bins; ++b) {
+      for (int d = 0; d < loops; ++d) {
+        const int turns = d < (loops + 1) / 2 ? d : d - loops;
+        // What stands leaks into two turns per frame by the window, and flickers there.
+        if (std::abs(turns) <= 2 || power(b, d) < least) continue;
+        bool highest = true;
+        for (int i = -1; i <= 1; ++i) {
+          for (int j = -1; j <= 1; ++j) highest &= power(b, d) >= power(b + i, (d + j + loops) % loops);
+        }
+        if (!highest) continue;
+        Eigen::VectorXcf v = cell(b, d);
+        MovingCell moving;
+        moving.bin = b;
+        moving.turn_rad = 2 * M_PI * turns / (loops * radar_.slots());
+        moving.power = power(b, d) / static_cast<double>(s.channels);
+        moving.channels = v.cast<std::complex<double>>();
+        for (int k = 0; k < s.channels; ++k) {
+          moving.channels[k] *= std::sqrt(result.noise_variance[static_cast<std::size_t>(k)]);
+        }
+        cells.push_back(std::move(moving));
+        // Later slots see a mover further on its way.
+        for (int k = 0; k < s.channels; ++k) {
+          const int slot = k / radar_.receivers();
+          v[k] *= Complex(std::polar(1.0, -2 * M_PI * turns * slot / (loops * radar_.slots())));
+        }
+        const Eigen::VectorXf beam = (beams_.adjoint() * v).cwiseAbs2();
+        int a = 0;
+        const float peak = beam.maxCoeff(&a);
+        // An echo from one direction has most of its power in one beam; a sum of others' sidelobes has not.
+        if (peak < 0.5f * static_cast<float>(s.channels) * power(b, d)) continue;
+        const double step = radar_.wavelength_m() / (2 * radar_.virtual_pitch_m()) / (kAngleBins / 2);
+        const double offset = peakOffset(beam[(a + kAngleBins - 1) % kAngleBins], peak, beam[(a + 1) % kAngleBins]);
+        const double turn_offset =
+            peakOffset(power(b, (d + loops - 1) % loops), power(b, d), power(b, (d + 1) % loops));
+        Peak p{};
+        p.echo.frame = frame;
+        p.echo.range_m = (b + peakOffset(power(b - 1, d), power(b, d), power(b + 1, d))) * radar_.range_bin_m();
+        p.echo.azimuth_rad = std::asin(std::clamp((a - kAngleBins / 2 + offset) * step, -1.0, 1.0));
+        p.echo.snr = peak / static_cast<float>(s.channels);
+        p.echo.radial_m_per_s = (turns + turn_offset) * per_turn_m_per_s;
+        peaks.push_back(p);
+      }
+    }
+    // Samples that were lost in some channels alone give a strong mover sidelobes in those.
+    double strongest = 0;
+    for (const MovingCell& c : cells) strongest = std::max(strongest, c.power);
+    for (MovingCell& c : cells) {
+      if (c.power > kLeastOfStrongest * strongest) result.cells.push_back(std::move(c));
+    }
+    std::sort(peaks.begin(), peaks.end(), [](const auto& p, const auto& q) { return p.echo.snr > q.echo.snr; });
+    std::vector<Peak> bodies;
+    for (const Peak& p : peaks) {
+      bool part = false, ghost = false;
+      for (Peak& body : bodies) {
+        // Arms and legs move with the body, near it and to the same side.
+        if (std::abs(p.echo.range_m - body.echo.range_m) < kLimb_m &&
+            p.echo.radial_m_per_s * body.echo.radial_m_per_s > 0) {
+          body.weight += p.echo.snr;
+          body.sum_range += p.echo.snr * p.echo.range_m;
+          body.sum_azimuth += p.echo.snr * p.echo.azimuth_rad;
+          body.sum_speed += p.echo.snr * p.echo.radial_m_per_s;
+          part = true;
+          break;
+        }
+        // By way of a wall a body is seen again, further away and weaker; what is 20 dB below a nearer one may be that.
+        ghost |= p.echo.range_m > body.echo.range_m - 1 && p.echo.snr < 0.01 * body.echo.snr;
+      }
+      if (part || ghost) continue;
+      bodies.push_back({p.echo, p.echo.snr, p.echo.snr * p.echo.range_m, p.echo.snr * p.echo.azimuth_rad,
+                        p.echo.snr * p.echo.radial_m_per_s});
+    }
+    for (Peak& body : bodies) {
+      body.echo.range_m = body.sum_range / body.weight;
+      body.echo.azimuth_rad = body.sum_azimuth / body.weight;
+      body.echo.radial_m_per_s = body.sum_speed / body.weight;
+      result.echoes.push_back(body.echo);
+    }
+  }
+}
+
+}  // namespace mmradartwin::diagnosis::frames

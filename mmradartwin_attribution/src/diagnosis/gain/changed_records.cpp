@@ -1,0 +1,93 @@
+#include "diagnosis/gain/changed_records.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin::diagnosis::gain {
+namespace {
+
+constexpr std::size_t kMostPerPose = 20, kMostPoses = 10;
+constexpr double kSameLevel_db = 0.05, kSameRange_m = 5e-4, kSameAzimuth_deg = 0.02;  ///< no change
+
+/// Of one mechanism by the same facets and actors: sums over power.
+struct Bundle {
+  double power = 0, range_m = 0, azimuth_rad = 0;
+  void add(const PathRecord& r) {
+    const double p = r.amplitude * r.amplitude;
+    power += p;
+    range_m += p * 0.5 * meanLength_m(r);
+    azimuth_rad += p * std::atan2(r.arrival.y(), r.arrival.x());
+  }
+  RecordState state() const { return {10 * std::log10(power), range_m / power, azimuth_rad / power * 180 / M_PI}; }
+};
+
+using Key = std::tuple<std::string, std::vector<int>, std::vector<int>>;
+using Bundles = std::map<Key, Bundle>;
+
+Bundles bundles(const Twin& twin, const Pose& pose) {
+  Bundles all;
+  const std::vector<PathRecord> traced = twin.trace(pose.T_map_radar, pose.stamp_ns);
+  for (const PathRecord& r : twin.receivedPaths(pose.T_map_radar, traced, pose.stamp_ns)) {
+    if (!(r.amplitude > 0)) continue;
+    all[{*r.event, {r.facets.begin(), r.facets.end()}, {r.actors.begin(), r.actors.end()}}].add(r);
+  }
+  return all;
+}
+
+bool differ(const ChangedRecord& c) {
+  if (!c.before || !c.after) return true;
+  return std::abs(c.after->amplitude_db - c.before->amplitude_db) > kSameLevel_db ||
+         std::abs(c.after->range_m - c.before->range_m) > kSameRange_m ||
+         std::abs(c.after->azimuth_deg - c.before->azimuth_deg) > kSameAzimuth_deg;
+}
+
+std::vector<ChangedRecord> changedAt(const Twin& before, const Twin& after, const Pose& pose) {
+  const Bundles b = bundles(before, pose), a = bundles(after, pose);
+  std::map<Key, ChangedRecord> all;
+  for (const auto& [key, bundle] : b) all[key].before = bundle.state();
+  for (const auto& [key, bundle] : a) all[key].after = bundle.state();
+  std::vector<ChangedRecord> changed;
+  for (auto& [key, record] : all) {
+    if (!differ(record)) continue;
+    record.pose = pose.name;
+    record.event = std::get<0>(key);
+    for (int actor : std::get<2>(key)) record.actors.push_back(before.scene().actorOf(actor).name);
+    changed.push_back(std::move(record));
+  }
+  std::stable_sort(changed.begin(), changed.end(),
+                   [](const ChangedRecord& x, const ChangedRecord& y) { return x.strongest_db() > y.strongest_db(); });
+  if (changed.size() > kMostPerPose) changed.resize(kMostPerPose);
+  return changed;
+}
+
+}  // namespace
+
+std::vector<ChangedRecord> changedRecords(const Twin& twin, const ChannelData& data,
+                                          const std::vector<std::string>& poses,
+                                          const std::vector<NamedParameters>& before,
+                                          const std::vector<NamedParameters>& after) {
+  std::vector<const Pose*> shown;
+  for (const PoseChannels& p : data.poses) {
+    const bool named = poses.empty() || std::find(poses.begin(), poses.end(), p.pose.name) != poses.end();
+    if (named && shown.size() < kMostPoses) shown.push_back(&p.pose);
+  }
+  const Twin without = twin.changed(before), with = twin.changed(after);
+  std::vector<std::vector<ChangedRecord>> by_pose(shown.size());
+  tbb::parallel_for(std::size_t{0}, shown.size(), [&](std::size_t i) {
+    try {
+      by_pose[i] = changedAt(without, with, *shown[i]);
+    } catch (const InputError&) {  // one of the two has something where the radar stands
+    }
+  });
+  std::vector<ChangedRecord> all;
+  for (const auto& records : by_pose) all.insert(all.end(), records.begin(), records.end());
+  return all;
+}
+
+}  // namespace mmradartwin::diagnosis::gain

@@ -1,0 +1,268 @@
+#include "diagnosis/hypotheses/hypothesis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "diagnosis/likelihood/expected_echoes.h"
+#include "mmradartwin_attribution/finding.h"
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin::diagnosis::hypotheses {
+namespace {
+
+// Pairs of actors are tried as a corner where their bounds come this near.
+constexpr double kNear_m = 0.1;
+// A face has to be this large to mirror a room.
+constexpr double kMirrorArea_m2 = 0.5;
+
+bool hasTried(const std::vector<ParameterSpec>& specs) {
+  return std::any_of(specs.begin(), specs.end(), [](const ParameterSpec& s) { return !std::isnan(s.neutral); });
+}
+
+/// Mechanisms without a number that are there or not, about something in the scene.
+bool isPresence(const std::vector<ParameterSpec>& specs) {
+  return std::any_of(specs.begin(), specs.end(), [](const ParameterSpec& s) {
+    return (s.kind == ParameterKind::kText && s.required && s.name == "actor") ||
+           (s.kind == ParameterKind::kTexts && s.name == "actors");
+  });
+}
+
+/// False of what lies: floors, ceilings, table tops reflect and scatter nothing (DESIGN section 4).
+bool takesPart(const Scene& scene, const Actor& actor) {
+  return std::any_of(actor.facets.begin(), actor.facets.end(), [&](int id) {
+    const Facet& f = scene.facets[static_cast<std::size_t>(id)];
+    return f.present && f.reflects;
+  });
+}
+
+double mirrorArea_m2(const Scene& scene, const Actor& actor) {
+  double largest = 0;
+  for (int id : actor.facets) {
+    const Facet& f = scene.facets[static_cast<std::size_t>(id)];
+    if (f.present && f.reflects) largest = std::max(largest, f.area_m2);
+  }
+  return largest;
+}
+
+void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<ParameterSpec>& specs,
+                 std::vector<Hypothesis>& out) {
+  const Scene& scene = twin.scene();
+  const auto spec = [&](const char* name) {
+    return std::find_if(specs.begin(), specs.end(), [&](const ParameterSpec& s) { return s.name == name; });
+  };
+  const auto with = [&](const char* parameter, Parameters::Value value, const std::string& subject) {
+    Hypothesis h = bare;
+    h.mechanism.values.set(parameter, std::move(value));
+    h.subject = subject;
+    out.push_back(std::move(h));
+  };
+  const bool material = spec("material") != specs.end() && spec("material")->kind == ParameterKind::kText;
+  const bool actor = spec("actor") != specs.end() && spec("actor")->kind == ParameterKind::kText;
+  if (material) {
+    std::set<std::string> tags;
+    for (const Actor& a : scene.actors) {
+      // Where a material scatters already there is nothing to find missing.
+      const bool scatters = a.material.scattering_coefficient > 0 && spec("scattering_coefficient") != specs.end();
+      if (a.present && !scatters) tags.insert(a.material_tag);
+    }
+    for (const std::string& tag : tags) with("material", tag, tag);
+  }
+  if (actor) {
+    for (const Actor& a : scene.actors) {
+      if (a.present && takesPart(scene, a)) with("actor", a.name, a.name);
+    }
+  }
+  if (spec("walls") != specs.end()) {
+    for (const Actor& a : scene.actors) {
+      if (a.present && mirrorArea_m2(scene, a) > kMirrorArea_m2) {
+        with("walls", std::vector<std::string>{a.name}, a.name);
+      }
+    }
+  }
+  if (spec("actors") != specs.end()) {
+    for (std::size_t i = 0; i < scene.actors.size(); ++i) {
+      const Actor& a = scene.actors[i];
+      if (!a.present || mirrorArea_m2(scene, a) == 0) continue;
+      with("actors", std::vector<std::string>{a.name}, a.name);  // an alcove's own
+      for (std::size_t j = i + 1; j < scene.actors.size(); ++j) {
+        const Actor& b = scene.actors[j];
+        if (!b.present || a.bounds.exteriorDistance(b.bounds) > kNear_m || mirrorArea_m2(scene, b) == 0) continue;
+        with("actors", std::vector<std::string>{a.name, b.name}, a.name + ";" + b.name);
+      }
+    }
+  }
+  if (!material && !actor && spec("walls") == specs.end() && spec("actors") == specs.end()) out.push_back(bare);
+}
+
+/// The same about the values that the twin states; nothing where zero of the scale would not be these.
+std::optional<Hypothesis> aboutStated(Hypothesis h, const NamedParameters& stated) {
+  h.stated = true;
+  std::map<std::string, std::size_t> lengths;
+  for (const Coordinate& c : h.coordinates) {
+    if (c.logarithmic() || c.reciprocal()) return std::nullopt;
+    if (c.element >= 0) lengths[c.parameter] = h.mechanism.values.numbers(c.parameter).size();
+  }
+  if (h.coordinates.empty()) return std::nullopt;
+  h.mechanism = stated;
+  for (const auto& [parameter, length] : lengths) {
+    std::vector<double> list = stated.values.numbers(parameter);
+    if (!h.variant.empty() && list.size() != length) return std::nullopt;  // steps at other times
+    list.resize(length, 0.0);
+    h.mechanism.values.set(parameter, std::move(list));
+  }
+  for (Coordinate& c : h.coordinates) {
+    const double value = c.element < 0 ? stated.values.number(c.parameter)
+                                       : h.mechanism.values.numbers(c.parameter)[static_cast<std::size_t>(c.element)];
+    const double step = c.typical - c.neutral;
+    c.neutral = value;
+    c.typical = value + step > c.max || value + step < c.min ? value - step : value + step;
+  }
+  return h;
+}
+
+bool isSame(const NamedParameters& a, const NamedParameters& b) {
+  return a.mechanism == b.mechanism && a.values.all() == b.values.all();
+}
+
+}  // namespace
+
+double Coordinate::value(double scaled_values) const {
+  if (logarithmic()) return std::clamp(typical + 10 * std::log10(std::max(scaled_values, 1e-12)), min, max);
+  if (reciprocal()) return std::clamp(typical / std::max(scaled_values, 1e-12), min, max);
+  return std::clamp(neutral + scaled_values * (typical - neutral), min, max);
+}
+
+double Coordinate::scaled_values(double v) const {
+  if (logarithmic()) return std::pow(10.0, (v - typical) / 10);
+  if (reciprocal()) return typical / v;
+  return (v - neutral) / (typical - neutral);
+}
+
+double Coordinate::slope(double scaled_values) const {
+  if (logarithmic()) return 10 / std::log(10.0) / std::max(scaled_values, 1e-12);
+  if (reciprocal()) return -typical / std::max(scaled_values * scaled_values, 1e-12);
+  return typical - neutral;
+}
+
+NamedParameters Hypothesis::at(const std::vector<double>& scaled_values) const {
+  NamedParameters m = mechanism;
+  for (std::size_t i = 0; i < coordinates.size(); ++i) {
+    const Coordinate& c = coordinates[i];
+    if (!c.shape.empty()) {
+      std::vector<double> list = m.values.numbers(c.parameter);
+      for (std::size_t k = 0; k < list.size(); ++k) list[k] += c.value(scaled_values[i]) * c.shape[k];
+      m.values.set(c.parameter, std::move(list));
+    } else if (c.element < 0) {
+      m.values.set(c.parameter, c.value(scaled_values[i]));
+    } else {
+      std::vector<double> list = m.values.numbers(c.parameter);
+      list[static_cast<std::size_t>(c.element)] = c.value(scaled_values[i]);
+      m.values.set(c.parameter, std::move(list));
+    }
+  }
+  return m;
+}
+
+std::string Hypothesis::label() const {
+  return mechanism.mechanism + (subject.empty() ? "" : " of " + subject) + (variant.empty() ? "" : ", " + variant);
+}
+
+bool Hypothesis::isOneSided() const {
+  return std::all_of(coordinates.begin(), coordinates.end(), [](const Coordinate& c) { return c.oneSided(); });
+}
+
+bool Hypothesis::isGeometry() const {
+  return subject.empty() && !coordinates.empty() && coordinates.size() <= 3 && isCatalogued(mechanism.mechanism) &&
+         causeDescription(mechanism.mechanism).residual_class == ResidualClass::kShiftedResponse;
+}
+
+bool Hypothesis::isMove() const { return mechanism.mechanism == "actor_moved"; }
+
+void replaceOrAppend(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms) {
+  const auto at = std::find_if(mechanisms.begin(), mechanisms.end(),
+                               [&](const NamedParameters& m) { return excludeEachOther(m, mechanism); });
+  if (at == mechanisms.end()) {
+    mechanisms.push_back(mechanism);
+  } else {
+    *at = mechanism;
+  }
+}
+
+std::vector<NamedParameters> mechanismsWith(std::vector<NamedParameters> base, const std::vector<Hypothesis>& parts,
+                                            const std::vector<double>& scaled_values) {
+  auto from = scaled_values.begin();
+  for (const Hypothesis& h : parts) {
+    const auto to = from + static_cast<std::ptrdiff_t>(h.coordinates.size());
+    replaceOrAppend(h.at({from, to}), base);
+    from = to;
+  }
+  return base;
+}
+
+std::optional<Hypothesis> withSteps(Hypothesis h, int steps) {
+  const std::vector<ParameterSpec> specs = MechanismRegistry::instance().create(h.mechanism.mechanism)->parameters();
+  const auto spec =
+      std::find_if(specs.begin(), specs.end(), [](const ParameterSpec& s) { return s.name == "steps_db"; });
+  if (spec == specs.end()) return std::nullopt;
+  h.coordinates.clear();
+  h.mechanism.values.set(spec->name, std::vector<double>(static_cast<std::size_t>(steps), 0.0));
+  for (int k = 0; k < steps; ++k) h.coordinates.push_back({spec->name, spec->unit, k, 0, 1, spec->min, spec->max, {}});
+  h.variant = std::to_string(steps) + (steps > 1 ? " steps" : " step");
+  return h;
+}
+
+std::vector<Hypothesis> allHypotheses(const Twin& twin, const std::vector<NamedParameters>& present) {
+  std::vector<Hypothesis> result;
+  const MechanismRegistry& registry = MechanismRegistry::instance();
+  const std::size_t channels = static_cast<std::size_t>(twin.radar().channels());
+  for (const std::string& name : registry.names()) {
+    const std::vector<ParameterSpec> specs = registry.create(name)->parameters();
+    if (!hasTried(specs) && !isPresence(specs)) continue;
+    Hypothesis bare;
+    bare.mechanism = defaultMechanism(name);
+    for (const ParameterSpec& s : specs) {
+      if (std::isnan(s.neutral)) continue;
+      Coordinate c{s.name, s.unit, -1, s.neutral, s.typical, s.min, s.max, {}};
+      if (s.kind == ParameterKind::kNumber) {
+        bare.mechanism.values.set(s.name, s.neutral);
+        bare.coordinates.push_back(c);
+      } else if (s.kind == ParameterKind::kNumbers) {  // per channel, the first one being the reference
+        bare.mechanism.values.set(s.name, std::vector<double>(channels, s.neutral));
+        for (std::size_t k = 1; k < channels; ++k) {
+          c.element = static_cast<int>(k);
+          bare.coordinates.push_back(c);
+        }
+      }
+    }
+    std::vector<Hypothesis> all;
+    addSubjects(twin, bare, specs, all);
+    for (int steps = 1; steps <= kMostSteps; ++steps) {
+      if (std::optional<Hypothesis> stepped = withSteps(bare, steps)) all.push_back(std::move(*stepped));
+    }
+    for (Hypothesis& h : all) {
+      const auto there = std::find_if(present.begin(), present.end(),
+                                      [&](const NamedParameters& m) { return excludeEachOther(m, h.mechanism); });
+      if (there != present.end()) {
+        const std::vector<NamedParameters>& given = twin.description().mechanisms;
+        const bool is_stated =
+            std::any_of(given.begin(), given.end(), [&](const NamedParameters& m) { return isSame(m, *there); });
+        std::optional<Hypothesis> other = is_stated ? aboutStated(std::move(h), *there) : std::nullopt;
+        if (!other) continue;
+        h = std::move(*other);
+      }
+      try {  // what the scene or the radar does not allow is no hypothesis
+        const Twin with = twin.changed({h.at(std::vector<double>(h.coordinates.size(), 1.0))});
+        // Of what is there or not a note says that it is not.
+        if (h.coordinates.empty() && !with.notes().empty()) continue;
+        result.push_back(std::move(h));
+      } catch (const InputError&) {
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace mmradartwin::diagnosis::hypotheses

@@ -1,0 +1,84 @@
+#include "diagnosis/hypotheses/law_words.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <set>
+#include <sstream>
+
+#include "mmradartwin_sim/law_variable.h"
+
+namespace mmradartwin::diagnosis::hypotheses {
+namespace {
+
+constexpr const char* kObservables[] = {"gain_db", "delay_m", "angle_deg", "phase_deg"};
+constexpr std::size_t kMostInWords = 12;  ///< points of a law; of more, the extremes
+
+}  // namespace
+
+std::string channelsInWords(const NamedParameters& law) {
+  std::ostringstream out;
+  for (double k : law.values.numbers("channels")) out << (out.tellp() > 0 ? " " : " of channels ") << k;
+  return out.str();
+}
+
+std::string describeLaw(const Hypothesis& hypothesis, const NamedParameters& fitted) {
+  std::ostringstream out;
+  out << std::setprecision(3);
+  if (fitted.mechanism != "empirical_law") {
+    out << "the mechanism " << fitted.mechanism;
+    for (const Coordinate& c : hypothesis.coordinates) {
+      if (c.element < 0) out << ", " << c.parameter << " = " << fitted.values.number(c.parameter);
+    }
+    return out.str();
+  }
+  const std::string variable = fitted.values.text("variable");
+  const std::vector<double>& at = fitted.values.numbers("at");
+  for (const char* observable : kObservables) {
+    const std::vector<double>& values = fitted.values.numbers(observable);
+    if (values.empty()) continue;
+    out << observable << " of the echoes over " << variable;
+    if (LawVariable::isAboutPlace(variable)) {
+      out << " from x_m " << fitted.values.number("x_m") << ", y_m " << fitted.values.number("y_m");
+    }
+    if (variable == "standing_m") out << " along bearing_deg " << fitted.values.number("bearing_deg");
+    if (!fitted.values.text("actor").empty()) out << " of " << fitted.values.text("actor");
+    out << channelsInWords(fitted);
+    if (!hypothesis.variant.empty()) out << " (" << hypothesis.variant << ")";
+    if (values.size() > kMostInWords) {
+      const auto [low, high] = std::minmax_element(values.begin(), values.end());
+      out << ": from " << *low << " at " << at[static_cast<std::size_t>(low - values.begin())] << " to " << *high
+          << " at " << at[static_cast<std::size_t>(high - values.begin())];
+      continue;
+    }
+    out << ":";
+    for (std::size_t i = 0; i < values.size(); ++i) out << (i ? ", " : " ") << values[i] << " at " << at[i];
+  }
+  return out.str();
+}
+
+std::string experimentFor(const std::vector<CauseProbability>& candidates) {
+  std::set<std::string> names;
+  for (const CauseProbability& c : candidates) names.insert(c.cause);
+  const auto any = [&](std::initializer_list<const char*> of) {
+    return std::any_of(of.begin(), of.end(), [&](const char* n) { return names.count(n) > 0; });
+  };
+  if (any({"radar_yaw_offset", "tx_imbalance", "channel_phase_error", "carrier_scale"})) {
+    return "put a corner reflector at a surveyed place, at several azimuths and ranges; use each transmitter alone";
+  }
+  if (any({"if_highpass", "if_lowpass", "excess_attenuation"})) {
+    return "record the same places with another high-pass code, and a corner reflector from 0.5 m to the far wall";
+  }
+  if (any({"radar_position_offset", "scene_registration", "range_bias", "range_scale"})) {
+    return "turn the radar by 90 and 180 degrees at one place, and measure a distance with a laser";
+  }
+  if (any({"radar_pitch_offset", "elevation_pattern", "floor_ceiling_multipath", "gain_drift"})) {
+    return "raise the radar by 0.3 m at five places and record them again";
+  }
+  if (any({"material_reflectivity", "surface_roughness", "diffuse_scattering"})) {
+    return "record the surface from oblique places, and with an absorber in front of it";
+  }
+  return "cover the object in question with an absorber, and record from places around it";
+}
+
+}  // namespace mmradartwin::diagnosis::hypotheses

@@ -1,0 +1,629 @@
+#include "diagnosis/likelihood/channel_likelihood.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace mmradartwin::diagnosis::likelihood {
+namespace {
+
+constexpr double kTail = 4;  ///< degrees of freedom of the complex t
+
+// Hann's neighbours are so alike that a beam's least eigenvalue drowns in single precision's errors without this share
+// of its power.
+constexpr double kBeamShare = 3e-6;
+
+// A group that changes a cell's covariance by less than this share even where it moves so far has no slope there.
+constexpr double kNegligible = 3e-4, kMoved_m = 0.03;
+
+constexpr double kEnough = 0.1;  ///< nats: what a further step would bring is not worth it
+
+enum Global {
+  kGain,
+  kFloor,
+  kRelative,
+  kGraze,
+  kRange,
+  kShape,
+  kActors = kShape + std::tuple_size_v<decltype(SessionLatents::floor_shape)>
+};
+
+/// Where a number of the nuisance may stand, and how far it may go in one step.
+struct Limits {
+  double low, high, step;
+};
+Limits limitsOf(int global, int errors) {
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  if (global >= kActors + errors) return {-kMostRangeError_m, kMostRangeError_m, 0.02};
+  if (global >= kActors) return {-2, 2, 0.5};
+  if (global >= kShape) return {-8, 8, 1};
+  switch (global) {
+    case kRelative:  // lower, and single precision would no longer keep every matrix definite
+      return {-11.5, -2, 2};
+    case kGraze:
+      return {-6, 6, 2};
+    case kRange:
+      return {-6, 4, 2};
+    default:
+      return {-kAny, kAny, 2};
+  }
+}
+
+/// A heading's error turns the mean direction of a group's echoes in a bin by so many radians of sine.
+double turnOf(double yaw_rad, const EchoGroup::Cell& cell) {
+  if (yaw_rad == 0 || cell.cosine == 0 || !(cell.power[0].real() > 0)) return 0;
+  return yaw_rad * cell.cosine / cell.power[0].real();
+}
+
+/// 2 pi y_k / lambda of the virtual elements.
+std::vector<double> elementPhases(const RadarConfig& radar) {
+  std::vector<double> phases;
+  for (int k = 0; k < radar.channels(); ++k) {
+    phases.push_back(2 * M_PI / radar.wavelength_m() * radar.virtual_element_m(k).y());
+  }
+  return phases;
+}
+
+double groupGain(const EchoGroup& group, const SessionLatents& nuisance) {
+  double sum = 0;
+  for (int a : group.actors) sum += nuisance.actor_gain[errorOf(a, nuisance.actor_gain.size())];
+  return std::exp(sum);
+}
+
+/// One-way range that the group's actors add beyond what its fields hold already.
+double groupShift_m(const EchoGroup& group, const SessionLatents& nuisance) {
+  double sum = -group.added_range_m;
+  for (int a : group.actors) sum += nuisance.actor_range_m[errorOf(a, nuisance.actor_range_m.size())];
+  return sum;
+}
+
+}  // namespace
+
+double& SessionLatents::global(int j) {
+  const auto at = [j](int first) { return static_cast<std::size_t>(j - first); };
+  const int ranges = kActors + static_cast<int>(actor_gain.size());
+  if (j >= ranges) return actor_range_m[at(ranges)];
+  if (j >= kActors) return actor_gain[at(kActors)];
+  if (j >= kShape) return floor_shape[at(kShape)];
+  double* const first[] = {&log_gain, &log_floor, &log_relative, &log_graze, &log_range};
+  return *first[j];
+}
+
+ChannelLikelihood::ChannelLikelihood(const ChannelData& data, int actors, const PoseAccuracy& accuracy,
+                                     const LatentSpread& spread)
+    : data_(data),
+      errors_(actors + 1),
+      accuracy_(accuracy),
+      spread_(spread),
+      channels_(data.radar.channels()),
+      samples_(data.radar.samples_per_chirp),
+      size_(static_cast<std::size_t>(channels_) * (channels_ + 1) / 2),
+      apart_(elementPhases(data.radar)) {}
+
+void ChannelLikelihood::addClutter(const SessionLatents& n, int pose, int cell, double factor,
+                                   PackedHermitian& to) const {
+  const PoseChannels& p = data_.poses[pose];
+  const int bin = binOf(pose, cell);
+  const auto [at, share] = shapeAt(bin);
+  const auto* shape = &n.floor_shape[static_cast<std::size_t>(at)];
+  const double level = factor * std::exp(n.log_floor + (1 - share) * shape[0] + share * shape[1]);
+  if (isBeam(cell)) {
+    addApart(cell, level * p.beams[static_cast<std::size_t>(cell - samples_)].clutter, to);
+  } else {
+    to.add(p.clutter.at(bin, size_), level);
+  }
+}
+
+std::pair<int, double> ChannelLikelihood::shapeAt(int bin) const {
+  const int most = static_cast<int>(SessionLatents().floor_shape.size()) - 1;
+  const double first = firstBin(),
+               along = std::log(std::max<double>(bin, first) / first) / std::log((samples_ - 1) / first);
+  const int at = std::clamp(static_cast<int>(most * along), 0, most - 1);
+  return {at, most * along - at};
+}
+
+int ChannelLikelihood::binOf(int pose, int cell) const {
+  return isBeam(cell) ? middleBin(data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)], channels_) : cell;
+}
+
+double ChannelLikelihood::noiseOf(int pose, int cell) const {
+  const PoseChannels& p = data_.poses[pose];
+  if (p.unsteadiness.empty()) return p.noise_power;
+  if (!isBeam(cell)) return p.noise_power * p.unsteadiness[static_cast<std::size_t>(cell)];
+  const auto first = p.unsteadiness.begin() + p.beams[static_cast<std::size_t>(cell - samples_)].first_bin;
+  return p.noise_power * *std::max_element(first, first + channels_);
+}
+
+const std::complex<double>* ChannelLikelihood::dataOf(int pose, int cell) const {
+  if (isBeam(cell)) return data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)].y.data();
+  return data_.poses[pose].y.col(cell).data();
+}
+
+void ChannelLikelihood::addApart(int cell, double power, PackedHermitian& to) const {
+  for (int k = 0; k < channels_; ++k) {
+    const std::size_t at = static_cast<std::size_t>(PackedHermitian::diagonal(k));
+    to.re[at] += power;
+    if (!isBeam(cell)) continue;
+    // Hann's neighbours share what falls between them: sum of w^2 exp(j 2 pi n/N) over that of w^2.
+    if (k > 0) to.re[at - 1] += 2.0 / 3 * power;
+    if (k > 1) to.re[at - 2] += 1.0 / 6 * power;
+  }
+}
+
+void ChannelLikelihood::addRelative(const SessionLatents& n, int cell, PackedHermitian& to) const {
+  const double mean = to.trace() / channels_;
+  addApart(cell, std::exp(n.log_relative) * mean, to);
+  if (!isBeam(cell)) return;
+  for (int k = 0; k < channels_; ++k) {
+    to.re[static_cast<std::size_t>(PackedHermitian::diagonal(k))] += kBeamShare * mean;
+  }
+}
+
+std::vector<ChannelLikelihood::GroupLevel> ChannelLikelihood::levels(const PoseEchoes& echoes,
+                                                                     const SessionLatents& n) const {
+  std::vector<GroupLevel> levels;
+  const double gain = std::exp(n.log_gain);
+  const double grazing = std::exp(n.log_graze);
+  for (std::size_t i = 0; i < echoes.all(); ++i) {
+    const EchoGroup& group = echoes.at(i);
+    levels.push_back({gain * groupGain(group, n) * (echoes.grazes(i) ? grazing : 1), groupShift_m(group, n)});
+  }
+  return levels;
+}
+
+double ChannelLikelihood::rangeVariance_m2(const SessionLatents& n) const {
+  return accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
+}
+
+PackedHermitian ChannelLikelihood::sigma(const PoseEchoes& echoes, const std::vector<GroupLevel>& levels,
+                                         const SessionLatents& n, int pose, int cell) const {
+  const int at = isBeam(cell) ? cell - samples_ : cell;
+  PackedHermitian s(channels_);
+  PackedTurn turn;
+  const double range_variance = rangeVariance_m2(n);
+  for (std::size_t i = 0; i < echoes.all(); ++i) {
+    const EchoGroup& g = echoes.at(i);
+    const auto f = (isBeam(cell) ? g.beams : g.bins).at(at, size_);
+    if (!f) continue;
+    const auto [u, shift] = levels[i];
+    turn.set(apart_, turnOf(n.yaw_rad[pose], *f));
+    s.addTurned({f->power, f->shift, f->curvature}, {u, u * shift, u * (shift * shift + range_variance)}, turn);
+  }
+  // At least a share of the mean power everywhere keeps the matrix definite where the first-order terms would not.
+  if (s.trace() > 0) addRelative(n, cell, s);
+  addApart(cell, noiseOf(pose, cell), s);
+  addClutter(n, pose, cell, 1, s);
+  return s;
+}
+
+double ChannelLikelihood::prior(const SessionLatents& n) const {
+  double sum = 0;
+  for (double v : n.actor_gain) sum -= 0.5 * v * v / (spread_.actor_gain * spread_.actor_gain);
+  for (double v : n.actor_range_m) sum -= 0.5 * v * v / (spread_.actor_range_m * spread_.actor_range_m);
+  for (double v : n.yaw_rad) sum -= 0.5 * v * v / (accuracy_.heading_rad * accuracy_.heading_rad);
+  return sum;
+}
+
+double ChannelLikelihood::poseLikelihood(const PoseEchoes& echoes, const SessionLatents& n, int pose) const {
+  double sum = 0;
+  InverseFactor factor;
+  std::array<std::complex<double>, kMaxChannels> y;
+  const std::vector<GroupLevel> level = levels(echoes, n);
+  for (int cell = firstBin(); cell < cells(pose); ++cell) {
+    if (!factor.compute(sigma(echoes, level, n, pose, cell))) return -1e9;
+    factor.apply(dataOf(pose, cell), y.data());
+    double q = 0;
+    for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
+    sum += -factor.logDeterminant() - (channels_ + kTail) * std::log1p(q / kTail);
+  }
+  return weight() * sum;
+}
+
+std::vector<double> ChannelLikelihood::byPose(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance,
+                                              const std::vector<int>& poses) const {
+  std::vector<double> each(poses.size());
+  tbb::parallel_for(std::size_t{0}, each.size(),
+                    [&](std::size_t i) { each[i] = poseLikelihood(echoes[i], nuisance, poses[i]); });
+  return each;
+}
+
+double ChannelLikelihood::logLikelihood(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance,
+                                        std::vector<double>* by_pose) const {
+  std::vector<int> all(data_.poses.size());
+  std::iota(all.begin(), all.end(), 0);
+  std::vector<double> each = byPose(echoes, nuisance, all);
+  const double sum = std::accumulate(each.begin(), each.end(), 0.0);
+  if (by_pose != nullptr) *by_pose = std::move(each);
+  return sum + prior(nuisance);
+}
+
+SessionCovariance ChannelLikelihood::covariance(const std::vector<PoseEchoes>& echoes, const SessionLatents& n,
+                                                const std::vector<int>& poses) const {
+  SessionCovariance result(poses.size());
+  const double gain = std::exp(n.log_gain);
+  const double range_variance = rangeVariance_m2(n);
+  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
+    result[i].assign(static_cast<std::size_t>(cells(poses[i])) * size_, {});
+    PackedHermitian own(channels_);
+    PackedTurn turn;
+    for (const auto& group : echoes[i].groups) {
+      const EchoGroup& g = *group;
+      const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
+      for (const EchoGroup::Fields* fields : {&g.bins, &g.beams}) {
+        for (int at = fields->first; at < fields->first + fields->cells; ++at) {
+          const EchoGroup::Cell f = *fields->at(at, size_);
+          turn.set(apart_, turnOf(n.yaw_rad[poses[i]], f));
+          own.setZero();
+          own.addTurned({f.power, f.shift, f.curvature}, {u, u * shift, u * (shift * shift + range_variance)}, turn);
+          const int cell = fields == &g.beams ? samples_ + at : at;
+          std::complex<float>* to = result[i].data() + static_cast<std::size_t>(cell) * size_;
+          for (std::size_t j = 0; j < size_; ++j) {
+            to[j] += std::complex<float>(static_cast<float>(own.re[j]), static_cast<float>(own.im[j]));
+          }
+        }
+      }
+    }
+  });
+  return result;
+}
+
+void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents& n, int pose, bool keep,
+                                 PoseBasis& out) const {
+  const int globals = n.globals(), heading = globals;
+  const int numbers = channels_ * channels_;
+  out.score = Eigen::VectorXd::Zero(globals + 1);
+  out.information = Eigen::MatrixXd::Zero(globals + 1, globals + 1);
+  out.log_likelihood = 0;
+  out.bins.clear();
+  const double relative = std::exp(n.log_relative);
+  const double range_variance = rangeVariance_m2(n);
+  // Only directions that do something in a bin enter its products.
+  std::vector<int> active;
+  PackedTurn turn;
+  PackedHermitian own(channels_);  // of a group
+  std::vector<char> is_active(static_cast<std::size_t>(globals + 1));
+  std::vector<PackedHermitian> raw(static_cast<std::size_t>(globals + 1), PackedHermitian(channels_));
+  const auto touch = [&](int j) -> PackedHermitian& {
+    if (!is_active[j]) {
+      is_active[j] = 1;
+      active.push_back(j);
+      raw[j].setZero();
+    }
+    return raw[j];
+  };
+  std::array<std::complex<double>, kMaxChannels> y;
+  const std::vector<GroupLevel> of_groups = levels(echoes, n);
+  std::vector<double> products(static_cast<std::size_t>((globals + 1) * (globals + 1)));
+  BinBasis basis;
+  Eigen::MatrixXd whitened(numbers, globals + 1);  // of the active ones, in its first columns
+  for (int cell = firstBin(); cell < cells(pose); ++cell) {
+    for (int j : active) is_active[j] = 0;
+    active.clear();
+    const int at = isBeam(cell) ? cell - samples_ : cell;
+    const PackedHermitian s = sigma(echoes, of_groups, n, pose, cell);
+    basis.cell = cell;
+    if (!basis.factor.compute(s)) continue;
+    basis.factor.apply(dataOf(pose, cell), y.data());
+    double q = 0;
+    for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
+    const double w = (channels_ + kTail) / (kTail + q);
+    const PackedHermitian inverse = basis.factor.inverse();
+    out.log_likelihood += -basis.factor.logDeterminant() - (channels_ + kTail) * std::log1p(q / kTail);
+
+    for (std::size_t i = 0; i < echoes.all(); ++i) {
+      const EchoGroup& g = echoes.at(i);
+      const auto fields = (isBeam(cell) ? g.beams : g.bins).at(at, size_);
+      if (!fields) continue;
+      const std::complex<float>*power = fields->power, *shift = fields->shift, *curvature = fields->curvature;
+      const auto [f, moved] = of_groups[i];
+      const double share = inverse.traceOfProduct(power) + kMoved_m * kMoved_m * inverse.traceOfProduct(curvature);
+      if (f * share < kNegligible) continue;
+      turn.set(apart_, turnOf(n.yaw_rad[pose], *fields));
+      own.setZero();
+      own.addTurned({power, shift, curvature}, {f, f * moved, f * (moved * moved + range_variance)}, turn);
+      for (int actor : g.actors) {
+        const int a = static_cast<int>(errorOf(actor, static_cast<std::size_t>(errors_)));
+        touch(kActors + a).add(own, 1);
+        touch(kActors + errors_ + a).addTurned({nullptr, shift, curvature}, {0, f, 2 * f * moved}, turn);
+      }
+      if (echoes.grazes(i)) touch(kGraze).add(own, 1);
+      touch(kRange).addTurned({curvature, nullptr, nullptr}, {f * range_variance, 0, 0}, turn);
+      const double by_yaw = turnOf(1, *fields);
+      if (by_yaw != 0) touch(heading).addTurnDerivative(own, by_yaw, apart_);
+    }
+    for (int j : active) {  // a heading's trace is 0
+      if (j != heading) addRelative(n, cell, raw[j]);
+    }
+    PackedHermitian& floor = touch(kFloor);
+    addClutter(n, pose, cell, 1, floor);
+    const auto [shape_at, shape_share] = shapeAt(binOf(pose, cell));
+    touch(kShape + shape_at).add(floor, 1 - shape_share);
+    touch(kShape + shape_at + 1).add(floor, shape_share);
+    PackedHermitian& level = touch(kGain);
+    level.add(s, 1);
+    level.add(floor, -1);
+    addApart(cell, -noiseOf(pose, cell), level);
+    const double mean = level.trace() / channels_ / (1 + relative + (isBeam(cell) ? kBeamShare : 0));
+    addApart(cell, relative * mean, touch(kRelative));
+    basis.active = active;
+    const int count = static_cast<int>(active.size());
+    for (int a = 0; a < count; ++a) basis.factor.whiten(raw[active[a]], whitened.col(a).data());
+    // Data in the same numbers: w y y^H - I.
+    basis.data.resize(numbers);
+    int i = 0;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(channels_); ++k) {
+      basis.data[i++] = w * std::norm(y[k]) - 1;
+      for (std::size_t l = 0; l < k; ++l) {
+        const std::complex<double> v = w * y[k] * std::conj(y[l]);
+        basis.data[i++] = M_SQRT2 * v.real();
+        basis.data[i++] = M_SQRT2 * v.imag();
+      }
+    }
+    const Eigen::VectorXd score = whitened.leftCols(count).transpose() * basis.data;
+    pairProducts(whitened.data(), numbers, count, products.data());
+    basis.traces.resize(count);
+    for (std::size_t a = 0; a < active.size(); ++a) {
+      const Eigen::Index ia = static_cast<Eigen::Index>(a);
+      basis.traces[ia] = traceOfWhitened(whitened.col(ia).data(), channels_);
+      out.score[active[a]] += weight() * score[ia];
+      for (std::size_t b = 0; b <= a; ++b) {
+        const Eigen::Index ib = static_cast<Eigen::Index>(b);
+        const double v = weight() * informationOf(products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
+        out.information(active[a], active[b]) += v;
+        if (a != b) out.information(active[b], active[a]) += v;
+      }
+    }
+    if (!keep) continue;
+    basis.whitened = whitened.leftCols(count).cast<float>();
+    out.bins.push_back(std::move(basis));
+  }
+  out.log_likelihood *= weight();
+}
+
+/// Information of the complex t about its covariance (Lange, Little and Taylor 1989, in complex form).
+double ChannelLikelihood::informationOf(double product, double trace_a, double trace_b) const {
+  return ((channels_ + kTail) * product - trace_a * trace_b) / (channels_ + kTail + 1);
+}
+
+Basis ChannelLikelihood::basis(const std::vector<PoseEchoes>& echoes, const SessionLatents& n, bool further) const {
+  Basis b;
+  b.nuisance = n;
+  b.poses.resize(echoes.size());
+  tbb::parallel_for(std::size_t{0}, echoes.size(),
+                    [&](std::size_t i) { addBasis(echoes[i], n, static_cast<int>(i), further, b.poses[i]); });
+  return b;
+}
+
+Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
+                                 const std::vector<int>& poses) const {
+  const SessionLatents& n = basis.nuisance;
+  const int globals = n.globals(), more = static_cast<int>(directions.size()), all = globals + more;
+  const int numbers = channels_ * channels_;
+  struct Own {
+    Eigen::VectorXd score;
+    Eigen::MatrixXd information;  // last row and column: heading
+  };
+  std::vector<Own> each(poses.size());
+  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
+    const PoseBasis& p = basis.poses[static_cast<std::size_t>(poses[j])];
+    Own& own = each[j];
+    own.score.resize(all + 1);
+    own.score << p.score.head(globals), Eigen::VectorXd::Zero(more), p.score[globals];
+    own.information = Eigen::MatrixXd::Zero(all + 1, all + 1);
+    own.information.topLeftCorner(globals, globals) = p.information.topLeftCorner(globals, globals);
+    own.information.col(all).head(globals) = p.information.col(globals).head(globals);
+    own.information.row(all).head(globals) = p.information.row(globals).head(globals);
+    own.information(all, all) = p.information(globals, globals);
+    Eigen::MatrixXd v(numbers, more);
+    PackedHermitian m(channels_);
+    for (const BinBasis& bin : p.bins) {
+      std::vector<int> active;
+      Eigen::VectorXd traces(more);
+      for (int h = 0; h < more; ++h) {
+        const PoseCovariance& field = directions[static_cast<std::size_t>(h)][j];
+        if (field.empty()) continue;
+        const auto* from = field.data() + static_cast<std::size_t>(bin.cell) * size_;
+        if (std::all_of(from, from + size_, [](auto x) { return x == 0.0f; })) continue;
+        m.setZero();
+        m.add(from, 1);
+        addRelative(n, bin.cell, m);
+        bin.factor.whiten(m, v.col(h).data());
+        traces[h] = traceOfWhitened(v.col(h).data(), channels_);
+        active.push_back(h);
+      }
+      for (int h : active) {
+        own.score[globals + h] += weight() * v.col(h).dot(bin.data);
+        const Eigen::VectorXf single = v.col(h).cast<float>();
+        const Eigen::VectorXf products = bin.whitened.transpose() * single;
+        for (std::size_t a = 0; a < bin.active.size(); ++a) {
+          const int g = bin.active[a] == globals ? all : bin.active[a];
+          const Eigen::Index ia = static_cast<Eigen::Index>(a);
+          const double x = weight() * informationOf(products[ia], bin.traces[ia], traces[h]);
+          own.information(globals + h, g) += x;
+          own.information(g, globals + h) += x;
+        }
+        for (int k : active) {
+          if (k > h) continue;
+          const double x = weight() * informationOf(v.col(h).dot(v.col(k)), traces[h], traces[k]);
+          own.information(globals + h, globals + k) += x;
+          if (k != h) own.information(globals + k, globals + h) += x;
+        }
+      }
+    }
+  });
+  Scores s;
+  s.by_location = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.locations.size()), all);
+  s.information = Eigen::MatrixXd::Zero(all, all);
+  s.yaw_step.assign(data_.poses.size(), 0.0);
+  s.yaw_coupling = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.poses.size()), all);
+  const double heading_prior = 1 / (accuracy_.heading_rad * accuracy_.heading_rad);
+  for (std::size_t j = 0; j < each.size(); ++j) {
+    const Own& p = each[j];
+    const std::size_t i = static_cast<std::size_t>(poses[j]);
+    s.log_likelihood += basis.poses[i].log_likelihood;
+    const double own = p.information(all, all) + heading_prior;
+    const double yaw = p.score[all] - heading_prior * n.yaw_rad[i];
+    const Eigen::VectorXd coupling = p.information.col(all).head(all) / own;
+    s.by_location.row(data_.poses[i].location) += (p.score.head(all) - coupling * yaw).transpose();
+    s.information += p.information.topLeftCorner(all, all) - own * coupling * coupling.transpose();
+    s.yaw_step[i] = yaw / own;
+    s.yaw_coupling.row(static_cast<Eigen::Index>(i)) = coupling.transpose();
+  }
+  s.total = s.by_location.colwise().sum().transpose();
+  s.prior = Eigen::VectorXd::Zero(globals);
+  for (int a = 0; a < errors_; ++a) {
+    const double gain = 1 / (spread_.actor_gain * spread_.actor_gain);
+    const double range = 1 / (spread_.actor_range_m * spread_.actor_range_m);
+    s.prior[kActors + a] = gain;
+    s.prior[kActors + errors_ + a] = range;
+    s.information(kActors + a, kActors + a) += gain;
+    s.total[kActors + a] -= gain * n.actor_gain[a];
+    s.information(kActors + errors_ + a, kActors + errors_ + a) += range;
+    s.total[kActors + errors_ + a] -= range * n.actor_range_m[a];
+  }
+  // Levels of errors are known roughly (a factor of 10 in power), so that none runs away where nothing shows it.
+  const double rough = 1 / (2.3 * 2.3);
+  const SessionLatents usual;
+  for (int j = kRelative; j < kActors; ++j) {
+    s.information(j, j) += rough;
+    s.total[j] -= rough * (n.global(j) - usual.global(j));
+  }
+  // What stands at a limit and would go beyond it moves no more, and nothing else moves as if it did.
+  for (int j = 0; j < globals; ++j) {
+    const Limits limits = limitsOf(j, errors_);
+    const double v = n.global(j);
+    if (s.total[j] > 0 ? v < limits.high : v > limits.low) continue;
+    s.total[j] = 0;
+    s.by_location.col(j).setZero();
+    s.yaw_coupling.col(j).setZero();
+    s.information.row(j).setZero();
+    s.information.col(j).setZero();
+    s.information(j, j) = 1;
+  }
+  s.log_likelihood += prior(n);
+  return s;
+}
+
+SessionLatents ChannelLikelihood::stepped(const SessionLatents& from, const Eigen::VectorXd& g, const Scores& scores,
+                                          const Eigen::VectorXd& whole_step, double share) const {
+  SessionLatents n = from;
+  const auto held = [share](double step, double limit) { return std::clamp(share * step, -limit, limit); };
+  for (int j = 0; j < n.globals(); ++j) {
+    const Limits limits = limitsOf(j, errors_);
+    double& v = n.global(j);
+    v = std::clamp(v + held(g[j], limits.step), limits.low, limits.high);
+  }
+  for (std::size_t i = 0; i < n.yaw_rad.size(); ++i) {
+    const double step =
+        scores.yaw_step[i] - scores.yaw_coupling.row(static_cast<Eigen::Index>(i)).dot(whole_step.transpose());
+    n.yaw_rad[i] = std::clamp(n.yaw_rad[i] + held(step, 0.02), -0.06, 0.06);
+  }
+  return n;
+}
+
+double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLatents& nuisance, int iterations) const {
+  double best = -1e300;
+  std::vector<int> all(echoes.size());
+  std::iota(all.begin(), all.end(), 0);
+  for (int i = 0; i < iterations; ++i) {
+    const Scores s = scores(basis(echoes, nuisance, false), {}, all);
+    best = s.log_likelihood;
+    const Eigen::VectorXd step = s.information.ldlt().solve(s.total);
+    const double screened_nats = 0.5 * s.total.dot(step);
+    bool better = false;
+    const Eigen::VectorXd none = Eigen::VectorXd::Zero(step.size());
+    // Together; else, where the headings are far off, one after the other.
+    for (int attempt = 0; attempt < 6 && !better; ++attempt) {
+      constexpr double kShares[] = {1.0, 0.5, 0.2, 0.05};
+      SessionLatents next = attempt < 4    ? stepped(nuisance, step, s, step, kShares[attempt])
+                            : attempt == 4 ? stepped(nuisance, none, s, none, 1)
+                                           : stepped(nuisance, step, s, step, 0.5);
+      if (attempt == 5) next.yaw_rad = nuisance.yaw_rad;
+      const double value = logLikelihood(echoes, next);
+      if (value <= best) continue;
+      nuisance = std::move(next);
+      best = value;
+      better = true;
+    }
+    if (!better || screened_nats < kEnough) break;
+  }
+  return best;
+}
+
+SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) const {
+  SessionLatents n;
+  n.actor_gain.assign(static_cast<std::size_t>(errors_), 0.0);
+  n.actor_range_m.assign(static_cast<std::size_t>(errors_), 0.0);
+  n.yaw_rad.assign(data_.poses.size(), 0.0);
+  // Gain: median over poses of power over expected power. Floor: the lower quartile of cells, taken to 3 m.
+  std::vector<double> ratio, low;
+  for (std::size_t i = 0; i < echoes.size(); ++i) {
+    double expected = 0;
+    for (const auto& group : echoes[i].groups) {
+      const EchoGroup& g = *group;
+      for (int bin = std::max(firstBin(), g.bins.first); bin < g.bins.first + g.bins.cells; ++bin) {
+        const auto* p = g.bins.at(bin, size_)->power;
+        for (int k = 0; k < channels_; ++k) expected += p[static_cast<std::size_t>(k) * (k + 3) / 2].real();
+      }
+    }
+    double measured = 0;
+    for (int bin = firstBin(); bin < samples_; ++bin) {
+      const double power = data_.poses[i].y.col(bin).squaredNorm();
+      measured += power;
+      low.push_back(std::log(power / channels_ + 1e-300) -
+                    std::log(data_.poses[i].clutter.at(bin, size_)[0].real() + 1e-300));
+    }
+    if (expected > 0) ratio.push_back(std::log(measured / expected));
+  }
+  const auto quantile = [](std::vector<double>& v, double share) {
+    if (v.empty()) return 0.0;
+    const auto at = v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
+    std::nth_element(v.begin(), at, v.end());
+    return *at;
+  };
+  n.log_gain = quantile(ratio, 0.5);
+  n.log_floor = quantile(low, 0.25);
+  // Wide errors first: far outliers of a narrow t pull on nothing, and headings would not find their place.
+  n.log_relative = -3;
+  return n;
+}
+
+ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes, const SessionLatents& n, int pose,
+                                                        int bin) const {
+  Whitened w;
+  const PackedHermitian packed = sigma(echoes, levels(echoes, n), n, pose, bin);
+  Eigen::MatrixXcd full(channels_, channels_);
+  std::size_t i = 0;
+  for (int k = 0; k < channels_; ++k) {
+    for (int l = 0; l <= k; ++l, ++i) {
+      full(k, l) = {packed.re[i], packed.im[i]};
+      full(l, k) = std::conj(full(k, l));
+    }
+  }
+  const Eigen::LLT<Eigen::MatrixXcd> llt(full);
+  w.inverse = llt.solve(Eigen::MatrixXcd::Identity(channels_, channels_));
+  const Eigen::VectorXcd y = data_.poses[pose].y.col(bin);
+  w.solved = w.inverse * y;
+  w.weight = (channels_ + kTail) / (kTail + y.dot(w.solved).real());
+  return w;
+}
+
+std::vector<ChannelLikelihood::Whitened> ChannelLikelihood::whitened(const PoseEchoes& echoes, const SessionLatents& n,
+                                                                     int pose) const {
+  std::vector<Whitened> cells;
+  for (int bin = 0; bin < samples_; ++bin) cells.push_back(whitened(echoes, n, pose, std::max(bin, firstBin())));
+  return cells;
+}
+
+double ChannelLikelihood::gainOfPoint(const Whitened& cell, double power, double noise, double found) const {
+  // Sigma + power v v^H, by the determinant lemma and Sherman and Morrison.
+  const double more = 1 + power * noise, q = (channels_ + kTail) / cell.weight - kTail;
+  const double after = std::max(0.0, q - power * found / more);
+  return weight() * (-std::log(more) + (channels_ + kTail) * (std::log1p(q / kTail) - std::log1p(after / kTail)));
+}
+
+}  // namespace mmradartwin::diagnosis::likelihood

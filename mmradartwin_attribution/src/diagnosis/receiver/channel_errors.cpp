@@ -1,0 +1,313 @@
+#include "diagnosis/receiver/channel_errors.h"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <set>
+
+namespace mmradartwin::diagnosis::receiver {
+namespace {
+
+constexpr int kDirections = 512;  ///< of sin(azimuth) from -1 to 1: half a step turns the array's ends by 1.2 degrees
+constexpr double kFirst_m = 0.3;  ///< nearer lies what the radar hears of itself
+constexpr double kLeastPower = 100;  ///< over the noise: 1/10 rad in each channel
+constexpr double kFloor = 0.002;     ///< of an echo's power: what an array response leaves of a real one
+constexpr std::size_t kMostEchoes = 200;
+constexpr std::size_t kFewestEchoes = 6;
+constexpr int kRounds = 40;
+constexpr double kGroup_m = 0.6;  ///< echoes of one body stand together, and are held out together
+constexpr std::size_t kMostOrders = 200;
+constexpr double kLeastGain = 25, kLeastHeldOut = 8, kLeastOrderGain = 20;  ///< nats
+
+struct Echo {
+  Eigen::VectorXcd y;   ///< [M] as delivered
+  double turn_rad = 0;  ///< from one slot to the next
+  double power = 0;     ///< over noise
+  int group = 0;
+};
+
+using Factors = Eigen::VectorXcd;
+
+/// All the array responses in question, [M][directions].
+Eigen::MatrixXcd responses(const RadarConfig& radar) {
+  Eigen::MatrixXcd v(radar.channels(), kDirections + 1);
+  for (int i = 0; i <= kDirections; ++i) {
+    const double u = 2.0 * i / kDirections - 1;
+    for (int k = 0; k < radar.channels(); ++k) {
+      v(k, i) = std::polar(1.0, -2 * M_PI * radar.virtual_element_m(k).y() * u / radar.wavelength_m());
+    }
+  }
+  return v;
+}
+
+class EchoFit {
+ public:
+  explicit EchoFit(const ChannelData& data) : radar_(data.radar), directions_(responses(data.radar)) {
+    const int first = static_cast<int>(std::ceil(kFirst_m / radar_.range_bin_m()));
+    const bool by_place = data.locations.size() > 2;
+    for (const PoseChannels& p : data.poses) {
+      const Eigen::VectorXd power = p.y.colwise().squaredNorm().transpose() / static_cast<double>(p.y.rows());
+      const auto group = [&](int bin) {
+        return by_place ? p.location : static_cast<int>(bin * radar_.range_bin_m() / kGroup_m);
+      };
+      for (int r = std::max(1, first); r + 1 < static_cast<int>(power.size()); ++r) {
+        if (power[r] < power[r - 1] || power[r] < power[r + 1] || power[r] < kLeastPower * p.noise_power) continue;
+        echoes_.push_back({p.y.col(r), 0, power[r] / std::max(p.noise_power, 1e-30), group(r)});
+      }
+      for (const MovingCell& cell : p.moving) {
+        if (cell.bin < first || cell.power < kLeastPower) continue;
+        echoes_.push_back({cell.channels, cell.turn_rad, cell.power, group(cell.bin)});
+      }
+    }
+    std::stable_sort(echoes_.begin(), echoes_.end(), [](const Echo& a, const Echo& b) { return a.power > b.power; });
+    if (echoes_.size() > kMostEchoes) echoes_.resize(kMostEchoes);
+    for (const Echo& e : echoes_) groups_.insert(e.group);
+  }
+
+  bool enough() const { return echoes_.size() >= kFewestEchoes && groups_.size() >= 3; }
+  int echoes() const { return static_cast<int>(echoes_.size()); }
+  const std::set<int>& groups() const { return groups_; }
+
+  /// Puts channels where `order` says they belong and takes out what moved on from slot to slot.
+  void arrange(const std::vector<int>& order) {
+    const Eigen::Index channels = radar_.channels();
+    y_.resize(channels, static_cast<Eigen::Index>(echoes_.size()));
+    for (std::size_t e = 0; e < echoes_.size(); ++e) {
+      for (Eigen::Index i = 0; i < channels; ++i) {
+        const int k = order[static_cast<std::size_t>(i)];
+        y_(k, static_cast<Eigen::Index>(e)) =
+            echoes_[e].y[i] * std::polar(1.0, -echoes_[e].turn_rad * (k / radar_.receivers()));
+      }
+      y_.col(static_cast<Eigen::Index>(e)).normalize();
+    }
+  }
+
+  /// Nats of every echo with these factors on the channels, its direction and amplitude free: its errors in all
+  /// channels alike, of a variance of its own that is at least kFloor's.
+  Eigen::VectorXd logLikelihood(const Factors& factors) const {
+    const Directed d = direct(factors);
+    return -static_cast<double>(radar_.channels()) * (1 - d.share.array() + kFloor).log().matrix();
+  }
+
+  /// Factors of most likelihood, without the echoes of one group: directions, amplitudes and weights by turns with the
+  /// least squares of the factors.
+  Factors fit(ChannelTie tie, std::optional<int> without = std::nullopt) const {
+    const int channels = radar_.channels(), receivers = radar_.receivers();
+    Factors factors = Factors::Ones(channels);
+    for (int round = 0; round < kRounds; ++round) {
+      const Directed d = direct(factors);
+      Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(channels);
+      double total = 0;
+      for (std::size_t e = 0; e < echoes_.size(); ++e) {
+        if (without && echoes_[e].group == *without) continue;
+        const auto i = static_cast<Eigen::Index>(e);
+        const double weight = 1 / (1 - d.share[i] + kFloor);
+        sum += weight * std::conj(d.amplitude[i]) * y_.col(i).cwiseProduct(directions_.col(d.at[i]).conjugate());
+        total += weight * std::norm(d.amplitude[i]);
+      }
+      sum /= total;
+      if (tie == ChannelTie::kTransmitters) {
+        for (int t = 0; t < channels / receivers; ++t) {
+          sum.segment(t * receivers, receivers).setConstant(sum.segment(t * receivers, receivers).mean());
+        }
+      } else if (tie == ChannelTie::kReceivers) {
+        // The rank-one table of receivers and transmitters that is nearest.
+        const Eigen::Map<const Eigen::MatrixXcd> table(sum.data(), receivers, channels / receivers);
+        const Eigen::JacobiSVD<Eigen::MatrixXcd> svd(table, Eigen::ComputeThinU | Eigen::ComputeThinV);
+        const Eigen::MatrixXcd nearest =
+            svd.singularValues()[0] * svd.matrixU().col(0) * svd.matrixV().col(0).adjoint();
+        sum = Eigen::Map<const Eigen::VectorXcd>(nearest.data(), channels);
+      }
+      factors = sum / sum[0];
+    }
+    return factors;
+  }
+
+  /// [M] phases without jumps, relative to channel 0, less the slope that a turn of the radar would be.
+  Eigen::VectorXd phases(const Factors& factors, ChannelTie tie) const {
+    if (tie == ChannelTie::kTransmitters) return factors.array().arg();
+    Eigen::VectorXd phase(factors.size()), place = places();
+    phase[0] = 0;
+    for (Eigen::Index k = 1; k < phase.size(); ++k) {
+      phase[k] = phase[k - 1] + std::arg(factors[k] * std::conj(factors[k - 1]));
+    }
+    const Eigen::VectorXd centred = place.array() - place.mean();
+    phase -= place * (centred.dot(phase) / centred.squaredNorm());
+    return phase.array() - phase[0];
+  }
+
+  /// [M] places along the array, m.
+  Eigen::VectorXd places() const {
+    Eigen::VectorXd place(radar_.channels());
+    for (int k = 0; k < radar_.channels(); ++k) place[k] = radar_.virtual_element_m(k).y();
+    return place;
+  }
+
+  double heldOut(const Eigen::VectorXd& with, const Eigen::VectorXd& base, int group) const {
+    double sum = 0;
+    for (std::size_t e = 0; e < echoes_.size(); ++e) {
+      const auto i = static_cast<Eigen::Index>(e);
+      if (echoes_[e].group == group) sum += with[i] - base[i];
+    }
+    return sum;
+  }
+
+ private:
+  struct Directed {
+    Eigen::VectorXd share;
+    Eigen::VectorXcd amplitude;
+    Eigen::VectorXi at;
+  };
+
+  Directed direct(const Factors& factors) const {
+    const Eigen::MatrixXcd match = directions_.adjoint() * (factors.conjugate().asDiagonal() * y_);
+    const double norm = factors.squaredNorm();
+    Directed d{Eigen::VectorXd(y_.cols()), Eigen::VectorXcd(y_.cols()), Eigen::VectorXi(y_.cols())};
+    for (Eigen::Index i = 0; i < y_.cols(); ++i) {
+      Eigen::Index at = 0;
+      d.share[i] = std::min(1.0, match.col(i).cwiseAbs2().maxCoeff(&at) / norm);
+      d.amplitude[i] = match(at, i) / norm;
+      d.at[i] = static_cast<int>(at);
+    }
+    return d;
+  }
+
+  const RadarConfig& radar_;
+  Eigen::MatrixXcd directions_;
+  std::vector<Echo> echoes_;
+  std::set<int> groups_;
+  Eigen::MatrixXcd y_;  ///< [M][echoes] of power 1
+};
+
+std::vector<int> asItIs(const RadarConfig& radar) {
+  std::vector<int> order(static_cast<std::size_t>(radar.channels()));
+  std::iota(order.begin(), order.end(), 0);
+  return order;
+}
+
+/// Receivers in any order, the same under all transmitters, and those in any order.
+std::vector<std::vector<int>> orders(const RadarConfig& radar) {
+  const int receivers = radar.receivers(), slots = radar.slots();
+  std::vector<std::vector<int>> all;
+  std::vector<int> slot(static_cast<std::size_t>(slots));
+  std::iota(slot.begin(), slot.end(), 0);
+  do {
+    std::vector<int> receiver(static_cast<std::size_t>(receivers));
+    std::iota(receiver.begin(), receiver.end(), 0);
+    do {
+      std::vector<int> order;
+      for (int t : slot) {
+        for (int r : receiver) order.push_back(t * receivers + r);
+      }
+      all.push_back(std::move(order));
+      if (all.size() > kMostOrders) return {};
+    } while (std::next_permutation(receiver.begin(), receiver.end()));
+  } while (std::next_permutation(slot.begin(), slot.end()));
+  return all;
+}
+
+}  // namespace
+
+double student95(double freedom) {
+  return boost::math::quantile(boost::math::students_t_distribution<double>(freedom), 0.975);
+}
+
+std::optional<ChannelOrder> findChannelOrder(const ChannelData& data) {
+  EchoFit fit(data);
+  if (!fit.enough() || data.radar.channels() < 4) return std::nullopt;
+  const std::vector<int> same = asItIs(data.radar);
+  double as_it_is = 0;
+  std::vector<std::pair<double, std::vector<int>>> tried;
+  for (const std::vector<int>& order : orders(data.radar)) {
+    fit.arrange(order);
+    const double nats = fit.logLikelihood(fit.fit(ChannelTie::kFree)).sum();
+    if (order == same) as_it_is = nats;
+    tried.emplace_back(nats, order);
+  }
+  if (tried.size() < 2) return std::nullopt;
+  std::stable_sort(tried.begin(), tried.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  const double gain = tried[0].first - as_it_is;
+  if (gain < kLeastOrderGain) return std::nullopt;
+  // Of mirrored orders that nothing tells apart, the one that leaves transmitters where they are.
+  const std::size_t chosen = tried[0].first - tried[1].first < 1 && tried[1].second < tried[0].second ? 1 : 0;
+  return ChannelOrder{tried[chosen].second, gain, tried[0].first - tried[1].first};
+}
+
+std::optional<ChannelErrors> findChannelErrors(const ChannelData& data) {
+  EchoFit fit(data);
+  if (!fit.enough()) return std::nullopt;
+  fit.arrange(asItIs(data.radar));
+  const Eigen::VectorXd base = fit.logLikelihood(Factors::Ones(data.radar.channels()));
+  struct Tried {
+    ChannelTie tie;
+    Factors factors;
+    std::vector<Factors> without;  ///< one group each
+    double gain = 0, held_out = 0;
+  };
+  const auto attempt = [&](ChannelTie tie) {
+    Tried t{tie, fit.fit(tie), {}, 0, 0};
+    t.gain = fit.logLikelihood(t.factors).sum() - base.sum();
+    for (int group : fit.groups()) {
+      t.without.push_back(fit.fit(tie, group));
+      t.held_out += fit.heldOut(fit.logLikelihood(t.without.back()), base, group);
+    }
+    return t;
+  };
+  // The fewest numbers that predict as well as more do.
+  const Tried tied = attempt(ChannelTie::kReceivers), free = attempt(ChannelTie::kFree);
+  Tried best = attempt(ChannelTie::kTransmitters);
+  const double receivers = data.radar.receivers(), slots = data.radar.slots();
+  if (tied.held_out > best.held_out + receivers - 1) best = tied;
+  if (free.held_out > best.held_out + (receivers - 1) * (slots - 1)) best = free;
+  if (best.gain < kLeastGain || best.held_out < kLeastHeldOut) return std::nullopt;
+
+  ChannelErrors errors;
+  errors.tie = best.tie;
+  errors.gain = best.gain;
+  errors.held_out_gain = best.held_out;
+  errors.echoes = fit.echoes();
+  errors.groups = static_cast<int>(fit.groups().size());
+  errors.phase_rad = fit.phases(best.factors, best.tie);
+  errors.gain_db = 20 * best.factors.cwiseAbs().array().log10();
+  // Jackknife over groups.
+  const auto groups = static_cast<double>(best.without.size());
+  Eigen::ArrayXd phase2 = Eigen::ArrayXd::Zero(errors.phase_rad.size()), gain2 = phase2;
+  for (const Factors& f : best.without) {
+    phase2 += (fit.phases(f, best.tie) - errors.phase_rad).array().square();
+    gain2 += (20 * f.cwiseAbs().array().log10() - errors.gain_db.array()).square();
+  }
+  if (best.tie != ChannelTie::kTransmitters) {
+    const Eigen::VectorXd place = fit.places();
+    const Eigen::ArrayXd centred = place.array() - place.mean();
+    const double freedom = std::max(1.0, static_cast<double>(place.size()) - 2);
+    const double rms = std::sqrt((errors.phase_rad.array() - errors.phase_rad.mean()).square().sum() / freedom);
+    // Of a size known from so few, a slope's error is Student's: as wide as that of the groups' at 95 %.
+    const double wide = rms * student95(freedom) / student95(groups - 1);
+    phase2 += ((place.array() - place[0]) * wide).square() / centred.square().sum() * groups / (groups - 1);
+  }
+  errors.phase_error_rad = (phase2 * (groups - 1) / groups).sqrt();
+  errors.gain_error_db = (gain2 * (groups - 1) / groups).sqrt();
+  const Eigen::VectorXd each = fit.phases(free.factors, free.tie), common = fit.phases(tied.factors, tied.tie);
+  errors.apart_rad = 2 * (each - common).cwiseAbs().maxCoeff();
+  return errors;
+}
+
+void widenGains(const ChannelData& data, const Hypothesis& hypothesis, std::vector<double>& standard_error) {
+  const std::optional<ChannelErrors> errors = findChannelErrors(data);
+  if (!errors) return;
+  for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
+    const Coordinate& c = hypothesis.coordinates[j];
+    if (c.parameter == "gain_db" && c.element >= 0) {
+      standard_error[j] = std::max(standard_error[j], errors->gain_error_db[c.element]);
+    }
+  }
+}
+
+double arrayShare(const RadarConfig& radar, const Eigen::VectorXcd& channels) {
+  return (responses(radar).adjoint() * channels).cwiseAbs2().maxCoeff() /
+         (static_cast<double>(channels.size()) * channels.squaredNorm());
+}
+
+}  // namespace mmradartwin::diagnosis::receiver

@@ -1,0 +1,77 @@
+#include "diagnosis/receiver/receiver_image.h"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <complex>
+#include <numeric>
+#include <vector>
+
+#include "mmradartwin_dsp/range_angle.h"
+
+namespace mmradartwin::diagnosis::receiver {
+namespace {
+
+constexpr double kDbPerNeper = 8.685889638065035;
+
+}  // namespace
+
+bool measureImage(const ChannelData& data, Finding& f) {
+  constexpr double kHost = 10;        // times the power beside its image
+  constexpr Eigen::Index kFirst = 2;  // leakage and offset stand below, their images at the end
+  constexpr int kIterations = 6;
+  constexpr double kLeastError_db = 0.03;
+  const std::size_t locations = data.locations.size();
+  if (locations < 3) return false;
+  std::vector<std::complex<double>> shared;
+  std::vector<double> host;
+  std::complex<double> beta = 0;
+  double hosts = 0;
+  // Cells count by what stands there beside the image: by all power there, those that echoes of the room make weaker
+  // would count most.
+  for (int i = 0; i < kIterations; ++i) {
+    shared.assign(locations, 0.0);
+    host.assign(locations, 0.0);
+    for (const PoseChannels& p : data.poses) {
+      const std::size_t l = static_cast<std::size_t>(p.location);
+      for (Eigen::Index k = kFirst; k <= p.y.cols() - kFirst; ++k) {
+        const Eigen::VectorXcd there = p.y.col(p.y.cols() - k).conjugate();
+        const double beside = (p.y.col(k) - beta * there).squaredNorm();
+        if (!(beside > 0) || there.squaredNorm() < kHost * beside) continue;
+        shared[l] += there.dot(p.y.col(k)) / beside;
+        host[l] += there.squaredNorm() / beside;
+      }
+    }
+    hosts = std::accumulate(host.begin(), host.end(), 0.0);
+    if (!(hosts > 0)) return false;
+    beta = std::accumulate(shared.begin(), shared.end(), std::complex<double>()) / hosts;
+  }
+  double scatter = 0;
+  for (std::size_t l = 0; l < locations; ++l) {
+    scatter += std::pow(std::real((shared[l] - beta * host[l]) * std::conj(beta)) / std::norm(beta) / hosts, 2);
+  }
+  const double n = static_cast<double>(locations);
+  const double width = boost::math::quantile(boost::math::students_t(n - 1), 0.975);
+  const double half_db = width * std::max(kLeastError_db, kDbPerNeper * std::sqrt(scatter * n / (n - 1)));
+  const double image_db = kDbPerNeper * std::log(std::abs(beta));
+  f.mechanism->values.set("image_db", image_db);
+  f.mechanism->values.set("phase_deg", std::arg(beta) * 180 / M_PI);
+  for (FindingParameter& p : f.parameters) {
+    if (p.name != "image_db") continue;
+    p.value = image_db;
+    p.ci95 = {{image_db - half_db, image_db + half_db}};
+  }
+  return true;
+}
+
+void subtractImage(const NamedParameters& m, ChannelData& data) {
+  const std::complex<double> beta =
+      std::polar(std::pow(10.0, m.values.number("image_db") / 20), m.values.number("phase_deg") * M_PI / 180);
+  const SignalChain chain(data.radar);
+  for (PoseChannels& p : data.poses) {
+    p.grid.x -= beta * p.grid.x.conjugate().eval();
+    transformGrid(chain, p);
+  }
+}
+
+}  // namespace mmradartwin::diagnosis::receiver

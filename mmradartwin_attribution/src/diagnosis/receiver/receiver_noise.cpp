@@ -1,0 +1,34 @@
+#include "diagnosis/receiver/receiver_noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "mmradartwin_attribution/ledger.h"
+
+namespace mmradartwin::diagnosis::receiver {
+std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated) {
+  // A sample's noise from that of a cell of the average: Hann's sums over N samples, N/2 and 3N/8.
+  std::vector<double> levels_db;
+  for (const PoseChannels& p : data.poses) {
+    if (!(p.noise_power > 0)) continue;
+    levels_db.push_back(10 * std::log10(p.noise_power * p.shots * 2.0 / 3 * data.radar.samples_per_chirp));
+  }
+  if (levels_db.size() < 2) return std::nullopt;
+  const double stated_db = stated.values.number("level_dbfs") + stated.values.number("delta_db");
+  const double delta_db = quantile(levels_db, 0.5) - stated_db;
+  const double scatter = (quantile(levels_db, 0.84) - quantile(levels_db, 0.16)) / 2;
+  const double error = std::max(0.02, scatter / std::sqrt(static_cast<double>(levels_db.size())));
+  if (std::abs(delta_db) < std::max(0.3, 6 * error)) return std::nullopt;
+  Finding f;
+  f.cause = "noise_floor";
+  f.mechanism = stated;
+  f.mechanism->values.set("delta_db", stated.values.number("delta_db") + delta_db);
+  f.parameters = {{"delta_db", "dB", delta_db, {{delta_db - 1.96 * error, delta_db + 1.96 * error}}}};
+  f.candidates = {{f.cause, 1.0}};
+  f.evidence.log_likelihood_gain = 0.5 * delta_db * delta_db / (error * error);
+  f.evidence.false_alarm_rate = std::min(1.0, std::exp(-f.evidence.log_likelihood_gain));
+  return f;
+}
+
+}  // namespace mmradartwin::diagnosis::receiver

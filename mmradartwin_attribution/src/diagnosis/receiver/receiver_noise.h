@@ -1,0 +1,14 @@
+#pragma once
+
+#include <optional>
+
+#include "diagnosis/channels/channel_data.h"
+#include "diagnosis/rooms.h"
+#include "mmradartwin_attribution/finding.h"
+
+namespace mmradartwin::diagnosis::receiver {
+
+/// Where the noise departs from the level that the twin's noise_floor states.
+std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated);
+
+}  // namespace mmradartwin::diagnosis::receiver

@@ -1,0 +1,97 @@
+#include "diagnosis/receiver/strongest_echo.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <utility>
+#include <vector>
+
+namespace mmradartwin::diagnosis::receiver {
+namespace {
+
+constexpr double kDbPerNeper = 8.685889638065035;
+constexpr double kLevelError_db = 0.3, kSharedError_db = 3;  ///< of an echo alone in its cell, and by the others there
+
+/// By bin, mean over the channels.
+Eigen::VectorXd measuredPower(const PoseChannels& pose) {
+  return pose.y.colwise().squaredNorm().transpose() / static_cast<double>(pose.y.rows());
+}
+
+/// Of a tone about that bin: its power summed over Hann's lobe is 1.5 times its own, wherever it lies between the bins.
+double tonePower(const Eigen::VectorXd& power, Eigen::Index bin) { return power.segment(bin - 2, 5).sum() / 1.5; }
+
+void changeLevel(Finding& f, double by_db, double error_db) {
+  const auto level = std::find_if(f.parameters.begin(), f.parameters.end(),
+                                  [](const FindingParameter& p) { return p.name == "level_db"; });
+  if (level == f.parameters.end()) return;
+  const double was_db = std::get<double>(level->value), half_db = level->ci95[0][1] - was_db;
+  const double level_db = was_db + by_db, both_db = std::hypot(half_db, 1.96 * error_db);
+  level->value = level_db;
+  level->ci95 = {{level_db - both_db, level_db + both_db}};
+  f.mechanism->values.set("level_db", level_db);
+}
+
+/// The session's strongest echo: what was measured where the twin has one, and of that the share that the twin gives it
+/// beside the others there. What the twin has and the room has not is weak in the data.
+struct MeasuredEcho {
+  double amplitude = 0, share = 1;
+};
+
+MeasuredEcho strongestMeasured(const Twin& twin, const ChannelData& data) {
+  constexpr double kReach = 2.5;  // bins
+  double strongest = 0;
+  MeasuredEcho echo;
+  for (const PoseChannels& p : data.poses) {
+    const Eigen::Isometry3d& T = p.pose.T_map_radar;
+    const Eigen::VectorXd measured = measuredPower(p);
+    std::vector<std::pair<double, double>> expected;  // bin and power
+    for (const PathRecord& r : twin.receivedPaths(T, twin.trace(T), p.pose.stamp_ns)) {
+      double power = 0;
+      for (const std::complex<double>& c : r.c) power += std::norm(c);
+      expected.emplace_back(0.5 * r.length_m[0] / data.radar.range_bin_m(), power);
+    }
+    for (const auto& [place, power] : expected) {
+      const Eigen::Index bin = std::lround(place);
+      if (bin < 2 || bin + 2 >= measured.size()) continue;
+      const double lobe = tonePower(measured, bin);
+      if (lobe <= strongest) continue;
+      double all = 0;
+      for (const auto& [other, other_power] : expected) all += std::abs(other - place) < kReach ? other_power : 0;
+      const double own = lobe * power / all;
+      if (own <= strongest) continue;
+      strongest = own;
+      echo = {std::sqrt(own), power / all};
+    }
+  }
+  return echo;
+}
+
+/// Of the strongest echo's level: how it adds to others in its cell is chance.
+double errorOf_db(const MeasuredEcho& echo) { return kLevelError_db + kSharedError_db * (1 - echo.share); }
+
+}  // namespace
+
+double strongestMeasured(const ChannelData& data) {
+  double strongest = 0;
+  for (const PoseChannels& p : data.poses) {
+    const Eigen::VectorXd power = measuredPower(p);
+    for (Eigen::Index r = 2; r + 2 < power.size(); ++r) {
+      if (power[r] >= power[r - 1] && power[r] >= power[r + 1]) strongest = std::max(strongest, tonePower(power, r));
+    }
+  }
+  return std::sqrt(strongest);
+}
+
+void referToStrongestEcho(const Twin& twin, const ChannelData& data, Finding& f) {
+  const MeasuredEcho echo = strongestMeasured(twin, data);
+  if (!(echo.amplitude > 0)) return;
+  changeLevel(f, kDbPerNeper * std::log(strongestMeasured(data) / echo.amplitude), errorOf_db(echo));
+}
+
+void referToStrongestHost(const Twin& twin, const ChannelData& data, double log_gain, double amplitude, Finding& f) {
+  const MeasuredEcho echo = strongestMeasured(twin, data);
+  if (!(echo.amplitude > 0)) return;
+  changeLevel(f, kDbPerNeper * (std::log(echo.amplitude / amplitude) - 0.5 * log_gain), errorOf_db(echo));
+}
+
+}  // namespace mmradartwin::diagnosis::receiver

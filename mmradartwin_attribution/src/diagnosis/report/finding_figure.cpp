@@ -1,0 +1,147 @@
+#include "diagnosis/report/finding_figure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <set>
+#include <string>
+
+#include "mmradartwin_dsp/map_picture.h"
+#include "mmradartwin_sim/scene.h"
+
+namespace mmradartwin::diagnosis::report {
+namespace {
+
+constexpr int kHeight_px = 470, kMargin_px = 34;
+constexpr double kLimit_db = 12;  ///< of the maps' colours
+const cv::Scalar kPaper(255, 255, 255), kInk(40, 40, 40), kSoft(205, 205, 205), kWall(150, 150, 150),
+    kBlue(200, 100, 20), kRed(30, 30, 220), kFaint(170, 170, 240);
+
+/// A part of map drawn upright, x to the right.
+class PlanView {
+ public:
+  explicit PlanView(const Eigen::AlignedBox2d& shown)
+      : shown_(shown),
+        px_per_m_((kHeight_px - 2 * kMargin_px) / std::max(shown.sizes().x() / kWidest, shown.sizes().y())),
+        picture_(kHeight_px, 2 * kMargin_px + static_cast<int>(px_per_m_ * shown.sizes().x()), CV_8UC3, kPaper) {}
+  cv::Point at(const Eigen::Vector2d& p_m) const {
+    return {kMargin_px + static_cast<int>(std::lround(px_per_m_ * (p_m.x() - shown_.min().x()))),
+            kHeight_px - kMargin_px - static_cast<int>(std::lround(px_per_m_ * (p_m.y() - shown_.min().y())))};
+  }
+  void line(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m, const cv::Scalar& color, int width_px) {
+    cv::line(picture_, at(from_m), at(to_m), color, width_px, cv::LINE_AA);
+  }
+  void text(const std::string& words, const cv::Point& at_px, const cv::Scalar& color) {
+    cv::putText(picture_, words, at_px, cv::FONT_HERSHEY_SIMPLEX, 0.4, color, 1, cv::LINE_AA);
+  }
+  double px_per_m() const { return px_per_m_; }
+  cv::Mat& picture() { return picture_; }
+
+ private:
+  static constexpr double kWidest = 1.6;  ///< width over height
+  Eigen::AlignedBox2d shown_;
+  double px_per_m_;
+  cv::Mat picture_;
+};
+
+/// Whole metres about all that is to be seen.
+Eigen::AlignedBox2d extent(const SurveyPlan& plan, const std::vector<Eigen::Vector2d>& places) {
+  Eigen::AlignedBox2d box;
+  for (const SurveyPlan::Wall& w : plan.walls) box.extend(w.from_m).extend(w.to_m);
+  for (const SurveyPlan::Station& s : plan.stations) box.extend(s.at_m);
+  for (const Eigen::Vector2d& p : places) box.extend(p);
+  return {(box.min().array() - 0.5).floor().matrix(), (box.max().array() + 0.5).ceil().matrix()};
+}
+
+void drawGrid(PlanView& view, const Eigen::AlignedBox2d& shown) {
+  const double step = std::max(1.0, std::ceil(shown.sizes().maxCoeff() / 12));
+  for (double x = shown.min().x(); x <= shown.max().x(); x += step) {
+    view.line({x, shown.min().y()}, {x, shown.max().y()}, kSoft, 1);
+    view.text(cv::format("%g", x), view.at({x, shown.min().y()}) + cv::Point(-4, 15), kInk);
+  }
+  for (double y = shown.min().y(); y <= shown.max().y(); y += step) {
+    view.line({shown.min().x(), y}, {shown.max().x(), y}, kSoft, 1);
+    view.text(cv::format("%g", y), view.at({shown.min().x(), y}) + cv::Point(-20, 4), kInk);
+  }
+}
+
+/// How a finding says that its actor moved, in the floor plane about `to_m`, where its middle then is.
+Eigen::Isometry2d moveOf(const NamedParameters& moved, const Eigen::Vector2d& to_m) {
+  const Eigen::Vector2d by_m(moved.values.number("dx_m"), moved.values.number("dy_m"));
+  return Eigen::Translation2d(to_m) * Eigen::Rotation2Dd(moved.values.number("dyaw_deg") * M_PI / 180) *
+         Eigen::Translation2d(by_m - to_m);
+}
+
+std::set<std::string> actorsOf(const Finding& f) {
+  std::set<std::string> names;
+  for (const FindingPlace& place : f.where) names.insert(place.actors.begin(), place.actors.end());
+  for (const FindingParameter& p : f.parameters) {
+    if (const auto* text = std::get_if<std::string>(&p.value)) names.insert(*text);
+    if (const auto* texts = std::get_if<std::vector<std::string>>(&p.value)) names.insert(texts->begin(), texts->end());
+  }
+  return names;
+}
+
+cv::Mat drawPlan(const Finding& f, const SurveyPlan& plan) {
+  std::vector<Eigen::Vector2d> places;
+  std::set<std::string> poses;
+  for (const FindingPlace& place : f.where) {
+    if (place.x_m && place.y_m) places.emplace_back(*place.x_m, *place.y_m);
+    poses.insert(place.poses.begin(), place.poses.end());
+  }
+  const std::set<std::string> actors = actorsOf(f);
+  const Eigen::AlignedBox2d shown = extent(plan, places);
+  PlanView view(shown);
+  drawGrid(view, shown);
+  for (const SurveyPlan::Wall& w : plan.walls) view.line(w.from_m, w.to_m, kWall, 1);
+  const bool moved = f.cause == "actor_moved" && f.mechanism && places.size() == 1;
+  for (const SurveyPlan::Wall& w : plan.walls) {
+    if (actors.count(w.actor) == 0) continue;
+    view.line(w.from_m, w.to_m, moved ? kFaint : kRed, 2);
+    if (!moved) continue;
+    const Eigen::Isometry2d move = moveOf(*f.mechanism, places.front());
+    view.line(move * w.from_m, move * w.to_m, kRed, 2);
+  }
+  for (const SurveyPlan::Station& s : plan.stations) {
+    const bool carries = poses.count(s.pose) > 0;
+    const cv::Scalar& color = carries ? kBlue : kWall;
+    cv::circle(view.picture(), view.at(s.at_m), carries ? 4 : 2, color, cv::FILLED, cv::LINE_AA);
+    view.line(s.at_m, s.at_m + s.boresight * 14 / view.px_per_m(), color, carries ? 2 : 1);
+  }
+  for (const Eigen::Vector2d& p : places) {
+    cv::drawMarker(view.picture(), view.at(p), kRed, cv::MARKER_TILTED_CROSS, 14, 2, cv::LINE_AA);
+    const auto [x_m, y_m] = f.placeError_m();
+    const double x = view.px_per_m() * x_m, y = view.px_per_m() * y_m;
+    if (places.size() > 1 || !(x > 0) || !(y > 0) || std::max(x, y) > kHeight_px) continue;
+    cv::ellipse(view.picture(), view.at(p), cv::Size(static_cast<int>(x) + 1, static_cast<int>(y) + 1), 0, 0, 360, kRed,
+                1, cv::LINE_AA);
+  }
+  view.text(std::string("map [m]") + (poses.empty() ? "" : "; blue: poses that carry it most") +
+                (moved                              ? "; red: where it stands"
+                 : actors.empty() && places.empty() ? ""
+                                                    : "; red: what it is about"),
+            {kMargin_px, 18}, kInk);
+  return view.picture();
+}
+
+}  // namespace
+
+cv::Mat drawFinding(const Finding& finding, const SurveyPlan& plan) {
+  const cv::Mat survey = drawPlan(finding, plan);
+  if (!finding.maps) return survey;
+  FanStyle style;
+  style.diverging = true;
+  style.max_db = kLimit_db;
+  style.min_db = -kLimit_db;
+  style.height_px = kHeight_px;
+  style.max_range_m = std::min(10.0, std::ceil(finding.maps->axes.range_m.back()));
+  style.title = "simulated - measured, without it";
+  const cv::Mat before = drawFan(finding.maps->axes, finding.maps->before_db, style);
+  style.title = "with " + finding.cause;
+  const cv::Mat after = drawFan(finding.maps->axes, finding.maps->after_db, style);
+  cv::Mat all;
+  cv::hconcat(std::vector<cv::Mat>{before, after, survey}, all);
+  return all;
+}
+
+}  // namespace mmradartwin::diagnosis::report

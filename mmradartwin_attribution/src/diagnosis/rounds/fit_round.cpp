@@ -1,0 +1,142 @@
+#include "diagnosis/rounds/fit_round.h"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+
+#include "diagnosis/numbers/number_text.h"
+#include "diagnosis/rounds/hypothesis_finding.h"
+#include "diagnosis/search/hypothesis_ranking.h"
+#include "diagnosis/search/law_screen.h"
+#include "diagnosis/search/object_search.h"
+#include "mmradartwin_attribution/finding.h"
+
+namespace mmradartwin::diagnosis::rounds {
+namespace {
+
+constexpr std::size_t kMostNames = 5;  ///< fits of one round
+constexpr std::size_t kMostLaws = 4;
+constexpr double kMostFits = 20;  ///< of a round, some six geometries and a box among them
+constexpr double kWorthAFit = 4;  ///< nats promised
+constexpr double kWorthAFitOfGeometry = 0.5;
+constexpr double kLonger[] = {1.5, 2};   ///< starts of a geometry
+constexpr double kWorthABox = 15;        ///< nats of a round one there,
+constexpr double kShareWorthABox = 0.3;  ///< and so much of what the best other fit brings
+constexpr double kNoRival = 1 / 40.0;    ///< of what a plain name brings: who promises less waits for the next round
+constexpr double kShareOfPlain = 0.25;   ///< of the same: who will not bring as much is not fitted to the end
+constexpr double kObjectPlaces = 500;    ///< places of an 8 by 6 m room that a session resolves, as a family
+
+bool isObject(const Hypothesis& h) { return h.mechanism.mechanism == "actor_unmodelled"; }
+bool isPlaced(const Hypothesis& h) { return isObject(h) || h.mechanism.mechanism == "empirical_echo"; }
+
+}  // namespace
+
+void FitRound::fitOne(Screened s) {
+  const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism), box = isUnmodelledBox(s.hypothesis);
+  if (s.hypothesis.isGeometry()) {
+    // Latents stand in for a part of it only, as much as their own spread lets them.
+    const std::vector<std::vector<double>> starts = s.starts;
+    for (double longer : kLonger) {
+      for (std::vector<double> start : starts) {
+        for (double& scaled_values : start) scaled_values *= longer;
+        s.starts.push_back(std::move(start));
+      }
+    }
+  }
+  report_("fitting " + s.hypothesis.label(), std::min(1.0, static_cast<double>(fits_.size()) / kMostFits));
+  const bool around = s.hypothesis.isMove() || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
+  // A geometry climbs slowly at first.
+  const double least_nats = s.hypothesis.isGeometry() ? 0 : kShareOfPlain * plain_name_;
+  fits_.push_back(around ? fitObject(fitter_, state_, s) : fitter_.fit(state_, s.hypothesis, s.starts, least_nats));
+  source_.setBaseline(state_.mechanisms);
+  if (!law && fitter_.isPlain(fits_.back().gain_without_best_place))
+    plain_name_ = std::max(plain_name_, fits_.back().gain);
+  if (isObject(s.hypothesis) && !box && fits_.back().gain_without_best_place > std::max(kWorthABox, best_object_)) {
+    best_object_ = fits_.back().gain_without_best_place;
+    if (isUnmodelledBox(screened_.back().hypothesis)) screened_.pop_back();
+    screened_.push_back(asBox(data_, state_, fits_.back()));  // last: the slowest of all fits
+  }
+  // What latents bring that the fit has found, and the twin as it is had not, is nobody's gain.
+  if (std::optional<ModelState> better = fitter_.improved(state_, fits_.back().state.nuisance)) {
+    const double nats = better->log_likelihood - state_.log_likelihood;
+    state_ = std::move(*better);
+    // Where that is much, it is one place's, and what the others gain beside it is seen by fits from there alone.
+    for (HypothesisFit& earlier : fits_) {
+      if (nats > kWorthAFit && &earlier != &fits_.back()) {
+        earlier = fitter_.fit(state_, earlier.hypothesis, {earlier.scaled_values});
+        source_.setBaseline(state_.mechanisms);
+      } else {
+        fitter_.gainOver(state_, earlier);
+      }
+    }
+  }
+  std::stable_sort(fits_.begin(), fits_.end(),
+                   [](const HypothesisFit& a, const HypothesisFit& b) { return a.ranking() > b.ranking(); });
+}
+
+std::vector<HypothesisFit> FitRound::fit(std::vector<Screened> screened, std::size_t family, int round,
+                                         std::vector<TriedHypothesis>& tried) {
+  screened_ = std::move(screened);
+  std::size_t names_fitted = 0, geometries_fitted = 0, laws_fitted = 0, objects_fitted = 0;
+  for (std::size_t i = 0; i < screened_.size(); ++i) {
+    Screened s = screened_[i];  // a copy: more may be put behind it
+    TriedHypothesis looked_at;
+    looked_at.label = s.hypothesis.label();
+    looked_at.screened_nats = s.screened_nats;
+    looked_at.gain = std::numeric_limits<double>::quiet_NaN();
+    looked_at.round = round;
+    // A promise is a quadratic's and often far too small, most so of geometry, of places and of laws, which paths
+    // promise: names get several chances, laws without a name four. A geometry that latents have covered promises less
+    // than what they leave over (7 cm of position 10 nats, of 1400).
+    const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
+    const bool object = isObject(s.hypothesis), geometry = s.hypothesis.isGeometry();
+    std::size_t& fitted = law ? laws_fitted : object ? objects_fitted : geometry ? geometries_fitted : names_fitted;
+    const bool moved = s.hypothesis.isMove();
+    const bool box = isUnmodelledBox(s.hypothesis);
+    const double rival = kNoRival * plain_name_;
+    const double worth = box                 ? (fits_.empty() ? kWorthABox : kShareWorthABox * fits_.front().gain)
+                         : object            ? kWorthAnObject
+                         : law               ? kWorthALaw
+                         : geometry || moved ? kWorthAFitOfGeometry
+                                             : std::max(kWorthAFit, rival);
+    // Where an actor went is known by the fit alone: what little the quadratic promises does not rank it.
+    const std::size_t most = law      ? kMostLaws
+                             : object ? kMostObjects
+                             : moved  ? kMostNames + kMostOutOfPlace
+                                      : kMostNames;
+    if (s.screened_nats > worth && (box || fitted < most)) {
+      ++fitted;
+      fitOne(std::move(s));
+    } else if (worth == rival && s.screened_nats > kWorthAFit && s.screened_nats <= rival) {
+      looked_at.verdict = "promises little beside what is plain";
+    }
+    tried.push_back(looked_at);
+  }
+  // Where a geometry explains most, latents may hide that another one explains more: each is fitted then.
+  const bool leads = !fits_.empty() && fits_.front().hypothesis.isGeometry() && fits_.front().ranking() > 0;
+  for (const Screened& s : screened_) {
+    const auto fitted = [&](const HypothesisFit& f) { return f.hypothesis.label() == s.hypothesis.label(); };
+    if (leads && s.hypothesis.isGeometry() && std::none_of(fits_.begin(), fits_.end(), fitted)) fitOne(s);
+  }
+  for (HypothesisFit& f : fits_) {
+    fitter_.judge(f, family + static_cast<std::size_t>(isPlaced(f.hypothesis) ? kObjectPlaces : 0));
+    TriedHypothesis& t = triedAs(f, round, tried);
+    t.gain = f.gain;
+    t.gain_without_best_place = f.gain_without_best_place;
+    t.overdispersion = f.overdispersion;
+    t.held_out_gain = f.held_out_gain;
+    t.false_alarm_rate = f.false_alarm_rate;
+    for (std::size_t i = 0; i < f.scaled_values.size(); ++i) {
+      const Coordinate& c = f.hypothesis.coordinates[i];
+      t.fitted += (i ? "; " : "") + c.parameter + " " + number(c.value(f.scaled_values[i]));
+    }
+  }
+  return std::move(fits_);
+}
+
+TriedHypothesis& triedAs(const HypothesisFit& fit, int round, std::vector<TriedHypothesis>& tried) {
+  return *std::find_if(tried.begin(), tried.end(),
+                       [&](const TriedHypothesis& t) { return t.round == round && t.label == fit.hypothesis.label(); });
+}
+
+}  // namespace mmradartwin::diagnosis::rounds

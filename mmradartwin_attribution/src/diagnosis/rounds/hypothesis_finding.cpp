@@ -1,0 +1,226 @@
+#include "diagnosis/rounds/hypothesis_finding.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <sstream>
+
+#include "diagnosis/hypotheses/fitted_parameters.h"
+#include "diagnosis/hypotheses/law_words.h"
+#include "diagnosis/numbers/number_text.h"
+#include "mmradartwin_sim/law_variable.h"
+
+namespace mmradartwin::diagnosis::rounds {
+namespace {
+
+constexpr double kAlike = 5;                ///< nats within which two names are not told apart
+constexpr double kLeastSize_m = 0.05;       ///< of an object: any room is full of smaller ones
+constexpr double kLeastScattering = 0.15;   ///< S: less lies under the clutter of any room, whose law is not its own
+constexpr double kMostScattering = 0.98;    ///< no surface mirrors nothing: what wants all is clutter beside its actors
+constexpr double kStrongScattering = 0.35;  ///< an eighth of what is reflected is no clutter
+constexpr double kLeastGhost_db = -25;      ///< over what its scatterers send by their law
+/// Against its echo: a second face returns a tenth of the power; a wall's replica of -26 dB was worth 264 nats of
+/// clutter.
+constexpr double kPlainReplica_db = -10;
+constexpr double kFurniture_m = 0.1;   ///< smaller than this is what lies about
+constexpr double kLeastLoss_db = 0.5;  ///< of a crossing: what lets all through is not there, or not the cause
+constexpr double kSameLaw = 0.7;       ///< correlation over poses of what two names gain that explain the same
+constexpr double kMovesAlike = 0.8;    ///< of what an object gains, by a move of what then stands there
+constexpr double kStandsThere_m = 0.1;
+constexpr double kPerson_m = 0.3, kWalk_m = 0.6;  ///< size, and how far from the middle of a walk
+
+}  // namespace
+
+Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
+                  const Scene& scene, const ChannelData& data) {
+  Finding f;
+  const NamedParameters m = best.hypothesis.at(best.scaled_values);
+  const bool named = isCatalogued(m.mechanism);
+  f.cause = named ? m.mechanism : "unknown";
+  f.mechanism = m;
+  f.parameters =
+      fittedParameters(best.hypothesis, best.scaled_values, best.standard_error, f.cause, data.locations.size());
+  // Names that explain nearly as much, by their share of probability.
+  double sum = 0;
+  std::vector<std::pair<std::string, double>> alike;
+  for (const HypothesisFit& other : fits) {
+    const double behind = (best.ranking() - other.ranking()) / best.overdispersion;
+    // Those ahead were refused, or are the same thing.
+    if (behind > kAlike || behind < 0 || !(other.gain > 0)) continue;
+    const std::string& name = other.hypothesis.mechanism.mechanism;
+    const double weight = std::exp(-behind);
+    const std::string cause = isCatalogued(name) ? name : "unknown";
+    const auto at = std::find_if(alike.begin(), alike.end(), [&](const auto& a) { return a.first == cause; });
+    if (at == alike.end()) {
+      alike.emplace_back(cause, weight);
+      sum += weight;
+    }
+  }
+  for (const auto& [cause, weight] : alike) f.candidates.push_back({cause, weight / sum});
+  if (f.candidates.size() > 1) f.experiment = experimentFor(f.candidates);
+  for (const HypothesisFit& other : fits) {
+    // Those ahead were refused.
+    if (other.hypothesis.mechanism.mechanism == m.mechanism || other.ranking() > best.ranking()) continue;
+    const std::string& name = other.hypothesis.mechanism.mechanism;
+    f.evidence.runner_up = isCatalogued(name) ? name : "unknown";
+    f.evidence.margin = best.gain - std::max(0.0, other.gain);
+    break;
+  }
+  FindingPlace place;
+  if (scene.actorIndex(best.hypothesis.subject) >= 0) place.actors = {best.hypothesis.subject};
+  if (const std::optional<Eigen::Vector2d> at = placeOf(m, scene)) {
+    place.x_m = at->x();
+    place.y_m = at->y();
+  }
+  f.where.push_back(std::move(place));
+  if (best.hypothesis.stated) {
+    std::string states;
+    for (const Coordinate& c : best.hypothesis.coordinates) {
+      states += (states.empty() ? "" : ", ") + c.parameter + " " + number(c.neutral);
+    }
+    f.description = "instead of what the twin states: " + states;
+  }
+  describeGain(best, before, data, f);
+  return f;
+}
+
+void describeGain(const HypothesisFit& fit, const ModelState& before, const ChannelData& data, Finding& f) {
+  f.evidence.log_likelihood_gain = fit.gain;
+  f.evidence.false_alarm_rate = fit.false_alarm_rate;
+  std::vector<std::pair<double, std::string>> poses;
+  for (std::size_t i = 0; i < before.by_pose.size(); ++i) {
+    poses.emplace_back(fit.state.by_pose[i] - before.by_pose[i], data.poses[i].pose.name);
+  }
+  std::stable_sort(poses.begin(), poses.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  f.where.front().poses.clear();
+  for (std::size_t i = 0; i < std::min<std::size_t>(10, poses.size()) && poses[i].first > 1; ++i) {
+    f.where.front().poses.push_back(poses[i].second);
+  }
+  if (f.cause == "unknown") {
+    f.description =
+        "no cause of the catalogue explains this; what it looks like: " + describeLaw(fit.hypothesis, *f.mechanism) +
+        "; " + number(fit.gain, 4) + " nats over " + std::to_string(data.poses.size()) + " poses";
+  }
+}
+
+std::optional<Eigen::Vector2d> placeOf(const NamedParameters& m, const Scene& scene) {
+  const bool of_place = m.mechanism == "actor_unmodelled" || m.mechanism == "empirical_echo" ||
+                        (m.mechanism == "empirical_law" && LawVariable::isAboutPlace(m.values.text("variable")));
+  if (of_place) return Eigen::Vector2d(m.values.number("x_m"), m.values.number("y_m"));
+  const bool moved = m.mechanism == "actor_moved";
+  const bool of_actor =
+      moved || m.mechanism == "actor_absent" || m.mechanism == "echo_replica" || m.mechanism == "empirical_law";
+  if (!of_actor) return std::nullopt;
+  const int actor = scene.actorIndex(m.values.text("actor"));
+  if (actor < 0) return std::nullopt;
+  const Eigen::Vector2d middle = scene.actors[static_cast<std::size_t>(actor)].bounds.center().head<2>();
+  return moved ? middle + Eigen::Vector2d(m.values.number("dx_m"), m.values.number("dy_m")) : middle;
+}
+
+std::string rejectionReason(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers) {
+  const Parameters values = fit.hypothesis.at(fit.scaled_values).values;
+  const std::string& name = fit.hypothesis.mechanism.mechanism;
+  if (name == "diffuse_scattering" && values.number("scattering_coefficient") < kLeastScattering) {
+    return "no more than clutter is: S = " + number(values.number("scattering_coefficient"));
+  }
+  if (name == "diffuse_scattering" && values.number("scattering_coefficient") > kMostScattering) {
+    return "no surface scatters all that it reflects: S = " + number(values.number("scattering_coefficient"));
+  }
+  if (name == "transmission" && values.number("one_way_db") > -kLeastLoss_db) {
+    return "no panel lets all through: " + number(values.number("one_way_db")) + " dB";
+  }
+  if (name == "wall_ghost" && values.number("gain_db") < kLeastGhost_db) {
+    return "no ghost has edges and nothing else: " + number(values.number("gain_db")) + " dB";
+  }
+  if (name != "actor_unmodelled") return "";
+  const double size_m = values.number("size_m"), x_m = values.number("x_m"), y_m = values.number("y_m");
+  const std::string which = ": " + number(size_m) + " m at (" + number(x_m) + ", " + number(y_m) + ")";
+  if (size_m <= kLeastSize_m) return "no larger than clutter is" + which;
+  for (const FrameFinding& f : walkers) {
+    if (f.cause != "moving_target" || size_m > kPerson_m) continue;
+    for (const FindingPlace& place : f.where) {
+      if (place.x_m && place.y_m && std::hypot(*place.x_m - x_m, *place.y_m - y_m) < kWalk_m) {
+        return "what is left of someone who walks there" + which;
+      }
+    }
+  }
+  return "";
+}
+
+bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure) {
+  const std::string& name = fit.hypothesis.mechanism.mechanism;
+  if (name == "actor_unmodelled") return !explains_more || (!sure && fit.size_m() < kFurniture_m);
+  if (name == "diffuse_scattering") {
+    return !sure && !fit.plain &&
+           fit.hypothesis.at(fit.scaled_values).values.number("scattering_coefficient") < kStrongScattering;
+  }
+  if (name == "empirical_echo") return !explains_more;
+  if (name == "echo_replica") {
+    return !explains_more && !fit.hypothesis.subject.empty() &&
+           fit.hypothesis.at(fit.scaled_values).values.number("level_db") < kPlainReplica_db;
+  }
+  return name == "transmission" && !sure && !fit.plain;
+}
+
+void preferAbsences(std::vector<HypothesisFit>& fits) {
+  for (HypothesisFit& gone : fits) {
+    if (gone.hypothesis.mechanism.mechanism != "actor_absent") continue;
+    for (const HypothesisFit& moved : fits) {
+      if (moved.hypothesis.isMove() && moved.hypothesis.subject == gone.hypothesis.subject &&
+          gone.ranking() >= moved.ranking()) {
+        gone.false_alarm_rate = std::min(gone.false_alarm_rate, moved.false_alarm_rate);
+      }
+    }
+  }
+}
+
+void preferMoves(std::vector<HypothesisFit>& fits, const Scene& scene) {
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    const NamedParameters object = fits[i].hypothesis.at(fits[i].scaled_values);
+    if (object.mechanism != "actor_unmodelled") continue;
+    const Eigen::Vector2d at(object.values.number("x_m"), object.values.number("y_m"));
+    for (std::size_t j = i + 1; j < fits.size(); ++j) {
+      if (!fits[j].hypothesis.isMove() || fits[j].gain < kMovesAlike * fits[i].gain) continue;
+      const NamedParameters move = fits[j].hypothesis.at(fits[j].scaled_values);
+      const Actor& actor = scene.actors[static_cast<std::size_t>(scene.actorIndex(fits[j].hypothesis.subject))];
+      const Eigen::Vector2d by(move.values.number("dx_m"), move.values.number("dy_m"));
+      const Eigen::AlignedBox2d plan(actor.bounds.min().head<2>(), actor.bounds.max().head<2>());
+      if (plan.exteriorDistance(at - by) > kStandsThere_m) continue;
+      std::rotate(fits.begin() + static_cast<std::ptrdiff_t>(i), fits.begin() + static_cast<std::ptrdiff_t>(j),
+                  fits.begin() + static_cast<std::ptrdiff_t>(j) + 1);
+      break;
+    }
+  }
+}
+
+Eigen::VectorXd gainByPose(const HypothesisFit& fit, const ModelState& before) {
+  Eigen::VectorXd gain(static_cast<Eigen::Index>(before.by_pose.size()));
+  for (std::size_t i = 0; i < before.by_pose.size(); ++i) {
+    gain[static_cast<Eigen::Index>(i)] = fit.state.by_pose[i] - before.by_pose[i];
+  }
+  return gain;
+}
+
+double correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  const Eigen::VectorXd x = a.array() - a.mean(), y = b.array() - b.mean();
+  return x.dot(y) / std::max(1e-300, x.norm() * y.norm());
+}
+
+void preferBetterNames(std::vector<HypothesisFit>& fits, const ModelState& before) {
+  const auto ofAllEchoes = [](const HypothesisFit& f) {
+    return f.hypothesis.subject.empty() && isCatalogued(f.hypothesis.mechanism.mechanism);
+  };
+  std::vector<Eigen::VectorXd> gained;
+  for (const HypothesisFit& f : fits) gained.push_back(gainByPose(f, before));
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    for (std::size_t j = 0; j < fits.size(); ++j) {
+      HypothesisFit& better = fits[i];
+      const HypothesisFit& sure = fits[j];
+      if (!ofAllEchoes(better) || !ofAllEchoes(sure) || better.ranking() <= sure.ranking()) continue;
+      if (correlation(gained[i], gained[j]) < kSameLaw) continue;
+      better.false_alarm_rate = std::min(better.false_alarm_rate, sure.false_alarm_rate);
+    }
+  }
+}
+
+}  // namespace mmradartwin::diagnosis::rounds

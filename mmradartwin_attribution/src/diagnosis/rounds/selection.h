@@ -1,0 +1,96 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "diagnosis/channels/channel_data.h"
+#include "diagnosis/fit/hypothesis_fit.h"
+#include "diagnosis/gain/gain_measurement.h"
+#include "diagnosis/likelihood/channel_likelihood.h"
+#include "diagnosis/likelihood/expected_echoes.h"
+#include "diagnosis/rooms.h"
+#include "mmradartwin_attribution/diagnosis_result.h"
+#include "mmradartwin_attribution/finding.h"
+
+namespace mmradartwin::diagnosis::rounds {
+
+constexpr double kFalseAlarm = 0.01;  ///< family-wise, per round
+
+/// Forward selection with joint refit and backward deletion: what rounds have found so far, fitted together, and the
+/// state of everything else beside it.
+class Selection {
+ public:
+  using Report = std::function<void(const std::string& stage, double share)>;
+  /// Keeps references. `findings`: all of the session; those of rounds are put behind the others. `tried`: of whose
+  /// entries one may be called otherwise later. Mechanisms as the engine simulates them, and `extended` as the
+  /// recording has them, with what was taken out of the data.
+  Selection(const Twin& twin, ChannelData& data, ExpectedEchoes& source, const ChannelLikelihood& model,
+            HypothesisFitter& fitter, GainMeasurement& gains, const PoseAccuracy& accuracy,
+            std::vector<Finding>& findings, std::vector<TriedHypothesis>& tried, Report report);
+  void begin(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& extended,
+             ModelState state);
+
+  const std::vector<NamedParameters>& mechanisms() const { return mechanisms_; }
+  const std::vector<NamedParameters>& extended() const { return extended_; }
+  ModelState& state() { return state_; }
+  /// Nats of the unknown that was found; 0 where there is none.
+  double unknownNats() const;
+
+  /// Takes a fit of a round over state() as one finding more, with the round's other `fits` as its rivals, and refits
+  /// all. `family`: how many hypotheses the round had. Why it does not stand after all, "" where it does; then nothing
+  /// has changed.
+  std::string take(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding,
+                   std::size_t family);
+  /// Findings of rounds by falling gain, an unknown last; gains that were measured beside others than those that now
+  /// stand before them are measured again.
+  void orderByGain();
+
+ private:
+  /// What rounds have found, as it was fitted last; `finding` is its place among the findings.
+  struct Accepted {
+    Hypothesis hypothesis;
+    std::vector<double> scaled_values, standard_error;
+    bool plain;
+    std::size_t finding;
+    /// Labels of those beside which its gain was measured; none where it was not.
+    std::optional<std::vector<std::string>> beside;
+    /// Simpler names that explained nearly as much in its round, with their numbers.
+    std::vector<std::pair<Hypothesis, std::vector<double>>> rivals;
+  };
+  std::vector<Accepted>::const_iterator acceptedAs(const Hypothesis& h) const;
+  void accept(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding);
+  void writeBackFindings();
+  void refitTogether();
+  void withdraw(std::size_t accepted);
+  void withdrawExplainedByUnknown();
+  void refitAndProfile();
+  void renameVerdict(const std::string& label, const std::string& verdict);
+  void profileFound();
+  bool isWithinErrors(const HypothesisFit& fit) const;
+  std::optional<HypothesisFit> betterName(const Accepted& a);
+  void exchangeNames();
+  void takeOutImage();
+  void measureAgain(const Accepted& a);
+
+  const Twin& twin_;
+  ChannelData& data_;
+  ExpectedEchoes& source_;
+  const ChannelLikelihood& model_;
+  HypothesisFitter& fitter_;
+  GainMeasurement& gains_;
+  const PoseAccuracy& accuracy_;
+  std::vector<Finding>& findings_;
+  std::vector<TriedHypothesis>& tried_;
+  Report report_;
+  std::vector<NamedParameters> mechanisms_, extended_;
+  /// The same without what rounds have found.
+  std::vector<NamedParameters> before_rounds_, extended_before_rounds_;
+  ModelState state_;
+  std::vector<Accepted> accepted_;
+  std::size_t family_ = 1;  ///< hypotheses of the last round
+};
+
+}  // namespace mmradartwin::diagnosis::rounds

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "diagnosis/rooms.h"
+#include "diagnosis/search/hypothesis_screen.h"
+
+namespace mmradartwin::diagnosis::search {
+
+constexpr std::size_t kMostOutOfPlace = 4;  ///< actors that are looked for elsewhere
+constexpr double kWorthALaw = 8;            ///< nats promised
+constexpr double kWorthAnObject = 3;        ///< at the best of all places
+constexpr std::size_t kMostObjects = 4;     ///< what is wide or turned promises less than a point elsewhere
+
+/// What a round of a diagnosis fits, and in which order: everything that could be wrong, looked at without a fit.
+class HypothesisRanking {
+ public:
+  /// Keeps references. report: called with a stage and its share done.
+  HypothesisRanking(Twin& twin, ExpectedEchoes& source, const ChannelLikelihood& model, const PoseAccuracy& accuracy,
+                    std::function<void(const std::string& stage, double share)> report)
+      : twin_(twin),
+        source_(source),
+        model_(model),
+        data_(model.data()),
+        accuracy_(accuracy),
+        screen_(source, model),
+        report_(std::move(report)) {}
+
+  /// Names, and what they leave out: objects, late points, laws and replicas. Most nats promised first.
+  /// shifted: actors that are looked for elsewhere, most suspicious first.
+  std::vector<Screened> rank(const std::vector<Hypothesis>& all, const ModelState& state,
+                             const std::vector<RangeShift>& shifted);
+  /// Actors whose echoes are plainly likelier nearer or farther away than their errors have them, most plainly first.
+  std::vector<RangeShift> shifted(const ModelState& state);
+  /// The geometry has changed: what gained nothing before may gain now.
+  void tryAllAgain() { no_use_.clear(); }
+
+ private:
+  std::vector<int> spread(std::size_t wanted) const;  // of all poses, evenly
+
+  Twin& twin_;
+  ExpectedEchoes& source_;
+  const ChannelLikelihood& model_;
+  const ChannelData& data_;
+  const PoseAccuracy& accuracy_;
+  HypothesisScreen screen_;
+  std::function<void(const std::string&, double)> report_;
+  std::set<std::string> no_use_;  ///< costly ones that gain nothing whatever is found beside them
+};
+
+}  // namespace mmradartwin::diagnosis::search

@@ -1,0 +1,324 @@
+#include "diagnosis/search/hypothesis_screen.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/hypotheses/evidence_bounds.h"
+#include "diagnosis/likelihood/profiled_scores.h"
+
+namespace mmradartwin::diagnosis::search {
+namespace {
+
+constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what rises from nothing is looked at first
+constexpr double kMore[] = {4, 16};            ///< of the scale, as long as that gains
+constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents have stood in for it
+constexpr double kStoodIn = 1;                 ///< nats of theirs
+constexpr double kShifts_m[] = {-0.3, -0.14, -0.06, 0.06, 0.14, 0.3};  ///< of all of an actor's echoes
+constexpr double kRadii[] = {1, 2, 4, 7};  ///< of the scale, about a place where an object may have stood before
+constexpr double kFiner[] = {0.35, 0.18};  ///< of the distance of the best of them
+constexpr int kDirections = 8;
+constexpr double kTurns_deg[] = {-8, -5, -3, 3, 5, 8};  ///< of that object about itself
+constexpr std::size_t kLookedAtFirst = 3;               ///< every third pose,
+constexpr double kHopeless = 60;  ///< and nats, of all poses, that a value loses there to be looked at no more
+constexpr std::size_t kStartsKept = 6;
+constexpr double kNearlyAsLikely = 10;  ///< nats that a place may be less likely, before latents settle there
+
+/// Without gains of their own of the actors of a material; and nats of what is known of those beforehand.
+std::pair<SessionLatents, double> withoutGains(SessionLatents nuisance, const Scene& scene, const std::string& material,
+                                               double spread) {
+  double nats = 0;
+  for (std::size_t a = 0; a < scene.actors.size(); ++a) {
+    if (scene.actors[a].material_tag != material) continue;
+    nats += 0.5 * std::pow(nuisance.actor_gain[a] / spread, 2);
+    nuisance.actor_gain[a] = 0;
+  }
+  return {std::move(nuisance), nats};
+}
+
+}  // namespace
+
+std::vector<std::pair<int, double>> HypothesisScreen::suspects(const ModelState& null) const {
+  std::vector<std::pair<int, double>> result;
+  const LatentSpread spread = model_.spread();
+  for (std::size_t a = 0; a + 1 < null.nuisance.actor_gain.size(); ++a) {  // the last is of no actor
+    const double gain = null.nuisance.actor_gain[a] / spread.actor_gain;
+    const double range = null.nuisance.actor_range_m[a] / spread.actor_range_m;
+    result.emplace_back(static_cast<int>(a), 0.5 * (gain * gain + range * range));
+  }
+  std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  return result;
+}
+
+std::vector<RangeShift> HypothesisScreen::nearerOrFarther(const ModelState& null, const std::vector<int>& poses) {
+  std::vector<RangeShift> result;
+  for (std::size_t a = 0; a + 1 < null.nuisance.actor_range_m.size(); ++a) {  // the last is of no actor
+    RangeShift best{static_cast<int>(a), 0, 0};
+    SessionLatents nuisance = withoutErrors(null.nuisance, static_cast<int>(a));
+    std::vector<double> about_m = null.actor_range_m;
+    for (double shift_m : kShifts_m) {
+      about_m[a] = nuisance.actor_range_m[a] = shift_m;
+      const std::vector<double> there =
+          byPose(null, source_.echoes(null.mechanisms, poses, about_m), nuisance, poses, true);
+      double gain = 0;
+      for (std::size_t i = 0; i < poses.size(); ++i)
+        gain += there[i] - null.by_pose[static_cast<std::size_t>(poses[i])];
+      if (gain > best.nats) best = {best.actor, gain, shift_m};
+    }
+    result.push_back(best);
+  }
+  std::stable_sort(result.begin(), result.end(),
+                   [](const RangeShift& a, const RangeShift& b) { return a.nats > b.nats; });
+  return result;
+}
+
+std::pair<double, double> HypothesisScreen::valueAt(const ModelState& null, const Hypothesis& hypothesis,
+                                                    const std::vector<double>& scaled_values,
+                                                    const std::vector<int>& poses, const SessionLatents& nuisance,
+                                                    double beside) {
+  std::vector<int> looked_at, rest;
+  for (std::size_t i = 0; i < poses.size(); ++i) (i % kLookedAtFirst == 0 ? looked_at : rest).push_back(poses[i]);
+  std::vector<double> there = likelihoodsAt(null, hypothesis, scaled_values, looked_at, nuisance);
+  auto [gain, screened_nats] = promiseOf(null, hypothesis, there, looked_at);
+  gain *= static_cast<double>(poses.size()) / static_cast<double>(looked_at.size());
+  if (gain < beside - kHopeless) return {gain, screened_nats};
+  const std::vector<double> more = likelihoodsAt(null, hypothesis, scaled_values, rest, nuisance);
+  there.insert(there.end(), more.begin(), more.end());
+  looked_at.insert(looked_at.end(), rest.begin(), rest.end());
+  return promiseOf(null, hypothesis, there, looked_at);
+}
+
+std::vector<double> HypothesisScreen::likelihoodsAt(const ModelState& null, const Hypothesis& hypothesis,
+                                                    const std::vector<double>& scaled_values,
+                                                    const std::vector<int>& poses, const SessionLatents& nuisance) {
+  // About the same ranges as the null's, so that a hypothesis that does nothing gains nothing; but for an actor whose
+  // own error was changed.
+  std::vector<double> about_m = null.actor_range_m;
+  for (std::size_t a = 0; a < about_m.size(); ++a) {
+    if (nuisance.actor_range_m[a] != null.nuisance.actor_range_m[a]) about_m[a] = nuisance.actor_range_m[a];
+  }
+  std::vector<PoseEchoes> echoes =
+      source_.echoes(mechanismsWith(null.mechanisms, {hypothesis}, scaled_values), poses, about_m);
+  return byPose(null, std::move(echoes), nuisance, poses, &nuisance == &null.nuisance);
+}
+
+std::vector<double> HypothesisScreen::byPose(const ModelState& null, std::vector<PoseEchoes> echoes,
+                                             const SessionLatents& nuisance, const std::vector<int>& poses,
+                                             bool known_where_same) const {
+  std::vector<double> there;
+  std::vector<int> changed;
+  std::vector<PoseEchoes> changed_echoes;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::size_t pose = static_cast<std::size_t>(poses[i]);
+    there.push_back(null.by_pose[pose]);
+    if (known_where_same && echoes[i].groups == null.echoes[pose].groups) continue;
+    changed.push_back(static_cast<int>(i));
+    changed_echoes.push_back(std::move(echoes[i]));
+  }
+  std::vector<int> changed_poses;
+  for (int i : changed) changed_poses.push_back(poses[static_cast<std::size_t>(i)]);
+  const std::vector<double> values = model_.byPose(changed_echoes, nuisance, changed_poses);
+  for (std::size_t i = 0; i < changed.size(); ++i) there[static_cast<std::size_t>(changed[i])] = values[i];
+  return there;
+}
+
+std::pair<double, double> HypothesisScreen::promiseOf(const ModelState& null, const Hypothesis& hypothesis,
+                                                      const std::vector<double>& there,
+                                                      const std::vector<int>& poses) const {
+  std::vector<double> by_location(model_.data().locations.size(), 0.0);
+  double gain = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::size_t pose = static_cast<std::size_t>(poses[i]);
+    const double v = there[i] - null.by_pose[pose];
+    gain += v;
+    by_location[static_cast<std::size_t>(model_.data().poses[pose].location)] += v;
+  }
+  const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
+  // All places see what a geometry does; what is there or not, or elsewhere, gains at the few that see it.
+  const double overdispersion =
+      hypothesis.isGeometry() ? overdispersionOf(gain, by_location) : overdispersionOfPresence(gain, by_location);
+  return {gain, whole * gain / overdispersion};
+}
+
+Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypothesis, int actor,
+                                  const std::vector<int>& poses) {
+  Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 0.0)}};
+  const SessionLatents nuisance = withoutErrors(null.nuisance, actor);  // they have stood in for the move
+  double gained = -INFINITY, screened_nats = 0;
+  std::vector<double> likeliest(hypothesis.coordinates.size(), 0.0), most_promising;
+  const auto tryAt = [&](const std::vector<double>& at) {
+    const auto [gain, promise] = valueAt(null, hypothesis, at, poses, nuisance, std::min(gained, 0.0));
+    source_.setBaseline(null.mechanisms);
+    if (gain > gained) {
+      gained = gain;
+      likeliest = at;
+    }
+    if (promise > screened_nats) {
+      screened_nats = promise;
+      most_promising = at;
+    }
+  };
+  const auto tryAbout = [&](std::vector<double> middle, double radius) {
+    for (int k = 0; k < kDirections; ++k) {
+      std::vector<double> at = middle;
+      at[0] += radius * std::cos(2 * M_PI * k / kDirections);
+      at[1] += radius * std::sin(2 * M_PI * k / kDirections);
+      tryAt(at);
+    }
+  };
+  // A wide side shows elsewhere once it is turned by some degrees, wherever it stands.
+  const auto tryTurned = [&](const std::vector<double>& middle, double share) {
+    for (std::size_t j = 2; j < hypothesis.coordinates.size(); ++j) {
+      for (double turn_deg : kTurns_deg) {
+        std::vector<double> at = middle;
+        at[j] += hypothesis.coordinates[j].scaled_values(share * turn_deg);
+        tryAt(at);
+      }
+    }
+  };
+  const std::vector<double> here(hypothesis.coordinates.size(), 0.0);
+  for (double radius : kRadii) tryAbout(here, radius);
+  tryTurned(here, 1);
+  if (likeliest[0] == 0 && likeliest[1] == 0) {
+    const std::vector<double> turned = likeliest;
+    for (double radius : kRadii) tryAbout(turned, radius);
+  }
+  // Echoes stand within centimetres of the right place, and these places are farther from each other.
+  for (double share : kFiner) {
+    tryAbout(likeliest, share * std::max(kRadii[0], std::hypot(likeliest[0], likeliest[1])));
+    tryTurned(likeliest, share);
+  }
+  if (gained <= -kNearlyAsLikely) likeliest.clear();
+  if (most_promising == likeliest) most_promising.clear();
+  for (const std::vector<double>& at : {likeliest, most_promising}) {
+    if (at.empty()) continue;
+    // Latents have covered with wide errors what is wrong where the actor is not: they settle before it is judged.
+    const double settled = settledAt(null, hypothesis, at, nuisance);
+    source_.setBaseline(null.mechanisms);
+    if (settled <= result.screened_nats) continue;
+    result.screened_nats = settled;
+    result.starts.front() = at;
+  }
+  return result;
+}
+
+Screened HypothesisScreen::amongStarts(const ModelState& null, Screened of, const std::vector<int>& poses) {
+  std::vector<std::pair<double, std::vector<double>>> starts;  // by what they promise
+  for (std::vector<double>& at : of.starts) {
+    const double screened_nats = valueAt(null, of.hypothesis, at, poses, null.nuisance).second;
+    starts.emplace_back(screened_nats, std::move(at));
+    source_.setBaseline(null.mechanisms);
+  }
+  std::sort(starts.rbegin(), starts.rend());
+  starts.resize(std::min(kStartsKept, starts.size()));
+  of.screened_nats = starts.front().first;
+  of.starts.clear();
+  for (auto& [screened_nats, at] : starts) of.starts.push_back(std::move(at));
+  return of;
+}
+
+double HypothesisScreen::settledAt(const ModelState& null, const Hypothesis& hypothesis,
+                                   const std::vector<double>& scaled_values, SessionLatents nuisance) {
+  const std::vector<int> all = everyPose(null);
+  const auto echoes =
+      source_.echoes(mechanismsWith(null.mechanisms, {hypothesis}, scaled_values), all, nuisance.actor_range_m);
+  model_.fit(echoes, nuisance, kSettling);
+  return promiseOf(null, hypothesis, model_.byPose(echoes, nuisance, all), all).second;
+}
+
+Screened HypothesisScreen::directly(const ModelState& null, const Hypothesis& hypothesis,
+                                    const std::vector<int>& poses) {
+  std::vector<double> start(hypothesis.coordinates.size(), kLittle);
+  double best = 0;
+  const auto tryAt = [&](double scaled_values) {
+    const std::vector<double> at(hypothesis.coordinates.size(), scaled_values);
+    const auto [gain, screened_nats] = valueAt(null, hypothesis, at, poses, null.nuisance);
+    if (screened_nats > best) {
+      best = screened_nats;
+      start = at;
+    }
+    return gain;
+  };
+  const auto reciprocal = [](const Coordinate& c) { return c.reciprocal(); };
+  if (hypothesis.coordinates.empty()) {
+    tryAt(1);
+  } else if (std::all_of(hypothesis.coordinates.begin(), hypothesis.coordinates.end(), reciprocal)) {
+    // A steep edge far above all tones does nothing: it is looked for among them.
+    for (double scaled_values : {0.8, 1.0, 1.3}) tryAt(scaled_values);
+  } else {
+    const double gain = tryAt(kSome);
+    const bool costly = source_.altersGeometry(hypothesis.at(start));
+    if (gain > 0 || !costly) {
+      double last = tryAt(gain > 0 ? 1 : kLittle);
+      // A level may be far above its typical one, where that one hardly shows.
+      const bool level = hypothesis.coordinates.size() == 1 && hypothesis.coordinates[0].logarithmic();
+      for (double scaled_values : kMore) {
+        if (!level || gain <= 0 || last <= gain) break;
+        const double next = tryAt(scaled_values);
+        if (next <= last) break;
+        last = next;
+      }
+    }
+  }
+  // What a material does may have been fitted as gains of its actors, beside which it has nothing to do.
+  const auto [freed, nats] =
+      withoutGains(null.nuisance, source_.base().scene(), hypothesis.subject, model_.spread().actor_gain);
+  for (double scaled_values : kInstead) {
+    if (nats < kStoodIn) break;
+    const std::vector<double> at(hypothesis.coordinates.size(), scaled_values);
+    const double screened_nats = nats + valueAt(null, hypothesis, at, poses, freed).second;
+    if (screened_nats <= best) continue;
+    best = screened_nats;
+    start = at;
+  }
+  return {hypothesis, best, {start}};
+}
+
+Screened HypothesisScreen::screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses) {
+  if (hypothesis.isOneSided()) return directly(null, hypothesis, poses);
+  Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 1.0)}};
+  std::vector<SessionCovariance> directions;
+  for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
+    const std::vector<double> nothing(hypothesis.coordinates.size(), 0.0);
+    // What rises from nothing does so with its power: its typical value shows more than the slope at nothing. What
+    // shifts or turns does so to first order for small amounts alone.
+    const double step = hypothesis.coordinates[j].oneSided() ? 1 : kSmallStep;
+    const auto covarianceAt = [&](double scaled_values) {
+      std::vector<double> at = nothing;
+      at[j] = scaled_values;
+      const auto echoes =
+          step < 1
+              ? source_.echoesNear(mechanismsWith(null.mechanisms, {hypothesis}, at),
+                                   mechanismsWith(null.mechanisms, {hypothesis}, nothing), poses, null.actor_range_m)
+              : source_.echoes(mechanismsWith(null.mechanisms, {hypothesis}, at), poses, null.actor_range_m);
+      return model_.covariance(echoes, null.nuisance, poses);
+    };
+    directions.push_back(hypothesis.coordinates[j].oneSided()
+                             ? difference(covarianceAt(step), null.covariance, poses, step)
+                             : difference(covarianceAt(step), covarianceAt(-step), 2 * step));
+  }
+  const ProfiledScores e = profiledScores(model_.scores(null.basis, directions, poses), null.nuisance.globals());
+  const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
+  Eigen::VectorXd step = e.information.ldlt().solve(e.total);
+  bool possible = true;
+  for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
+    const bool one_sided = hypothesis.coordinates[j].oneSided();
+    if (one_sided && step[static_cast<Eigen::Index>(j)] <= 0) possible = false;
+    result.starts.front()[j] = std::clamp(step[static_cast<Eigen::Index>(j)], one_sided ? 0.02 : -8.0, 8.0);
+  }
+  if (possible)
+    result.screened_nats = whole * 0.5 * e.total.dot(step) /
+                           shrunkOverdispersion(e.overdispersion, hypothesis, model_.data().locations.size());
+  // Slopes are of paths that stay. What a turn of the view lets in and out shows in the likelihood itself.
+  if (hypothesis.isGeometry() && hypothesis.coordinates.size() == 1 && source_.altersGeometry(hypothesis.at({1.0}))) {
+    for (double scaled_values : {-1.0, 1.0}) {
+      const double screened_nats = valueAt(null, hypothesis, {scaled_values}, poses, null.nuisance).second;
+      if (screened_nats <= result.screened_nats) continue;
+      result.screened_nats = screened_nats;
+      result.starts.push_back({scaled_values});
+    }
+  }
+  return result;
+}
+
+}  // namespace mmradartwin::diagnosis::search

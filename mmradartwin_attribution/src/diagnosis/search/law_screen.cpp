@@ -1,0 +1,584 @@
+#include "diagnosis/search/law_screen.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "diagnosis/hypotheses/law_words.h"
+#include "diagnosis/search/law_form.h"
+#include "diagnosis/search/path_measurement.h"
+#include "mmradartwin_sim/law_variable.h"
+
+namespace mmradartwin::diagnosis::search {
+namespace {
+
+constexpr double kHuber = 2;  ///< standard deviations from which on a path counts less
+constexpr int kReweighings = 3;
+constexpr double kPricePerNumber = 4;  ///< nats, by which fewer numbers are preferred,
+constexpr double kLeastWorth = -2;     ///< and that may be missing: a fit finds some times what paths alone show
+constexpr double kFewestPlaces = 3;    ///< that tell of a law with nothing outside a part of its variable
+constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;
+constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};
+constexpr int kBearings = 24;  ///< that half a turn is divided into
+constexpr int kOften = 12;     ///< paths of an actor
+constexpr double kMaxInflation = 50;
+constexpr double kBeyondTime = 1.5;    ///< of what time explains: what each pose by itself may, chance left off
+constexpr double kScattersLess = 0.7;  ///< of the scatter before a law, from where on its size is judged by it anew
+constexpr double kWeakest_db = -45;    ///< echoes below this are one for a law over amplitudes
+
+/// One observable of all paths, robustly weighted.
+struct Sample {
+  Observable observable;
+  Eigen::VectorXd off, weight;  // [P], 0 where a path does not show it
+  double scatter = 1;           // of what latents leave
+  Eigen::MatrixXd latent;       // [P][G] a constant and the actors' errors
+  Eigen::LDLT<Eigen::MatrixXd> latent_solver;
+  Eigen::VectorXd latent_prior;  // [G] precision
+  Eigen::VectorXd latents;       // [G] without a law
+  Eigen::VectorXd rest;          // [P] what they leave
+
+  /// Weighted squares of what is left, with what the latents cost.
+  double squares(const Eigen::VectorXd& left, const Eigen::VectorXd& of_latents) const {
+    return left.dot(weight.cwiseProduct(left)) + of_latents.cwiseProduct(latent_prior).dot(of_latents);
+  }
+};
+
+struct Promise {
+  double raw = 0;             ///< nats by which the law explains the paths
+  double overdispersion = 1;  ///< of the scores' scatter over places
+  Eigen::VectorXd value;      ///< of the directions, in the observable's unit
+  double constant = 0;        ///< beside them
+};
+
+class LawScreen {
+ public:
+  LawScreen(const Twin& base, const ChannelLikelihood& model, const ModelState& null, const std::vector<int>& poses);
+  /// What a law is over, and whose paths.
+  struct Over {
+    std::string variable, actor = "";  ///< all paths where no actor is given
+    double bearing_deg = 0;            ///< of standing_m
+  };
+  std::optional<Screened> best(const Sample& s, const Over& over) const;
+  /// By observable.
+  const std::vector<Sample>& samples() const { return samples_; }
+  const Sample& gain() const { return samples_.front(); }
+  /// Over where the radar stands, along the direction that promises most.
+  std::optional<Screened> bestBearing() const;
+  /// Over how near to a place paths pass, or the radar stands: the place that promises most.
+  std::optional<Screened> bestPlace(const std::string& variable) const;
+  /// Steps of all levels, at the times between poses that promise most.
+  std::optional<Screened> bestSteps() const;
+  /// False where poses differ in gain by far more than these steps, or a slope over time, explain.
+  bool gainsFollowTime(const std::optional<Screened>& steps) const;
+  /// Actors of whom enough paths are measured for a law of their own.
+  std::vector<std::string> oftenSeen() const;
+
+ private:
+  Sample sampleOf(const Observable& observable, std::size_t kind) const;
+  /// Of directions [P][K], beyond what a constant and the actors' own errors explain.
+  Promise promise(const Sample& s, const Eigen::MatrixXd& directions) const;
+  /// Of numbers of each pose, one a column, as directions [P][K] of its paths' gains.
+  Eigen::MatrixXd alikeAtPose(const Eigen::MatrixXd& of_poses) const;
+  /// Of each pose and step, 1 after it.
+  Eigen::MatrixXd afterSteps(const std::vector<double>& steps_s) const;
+  /// How many places tell of a direction, each by its paths' share in it.
+  double places(const Sample& s, const Eigen::VectorXd& direction) const;
+  Hypothesis law(const Observable& o, const Over& over, const std::vector<double>& at) const;
+
+  const Twin& base_;
+  const Twin twin_;  ///< with the state's mechanisms: paths are of its scene
+  const ChannelLikelihood& model_;
+  std::vector<MeasuredPose> poses_;
+  std::vector<int> location_;  // [P]
+  std::vector<Sample> samples_;
+  double whole_ = 1;  // poses of the session over those measured
+};
+
+LawScreen::LawScreen(const Twin& base, const ChannelLikelihood& model, const ModelState& null,
+                     const std::vector<int>& poses)
+    : base_(base), twin_(base.changed(null.mechanisms)), model_(model) {
+  const std::vector<Observable> of = observables(base.radar());
+  std::int64_t first_ns = model.data().poses.front().pose.stamp_ns;
+  for (const PoseChannels& p : model.data().poses) first_ns = std::min(first_ns, p.pose.stamp_ns);
+  std::vector<std::optional<MeasuredPose>> each(poses.size());
+  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
+    const std::int64_t stamp_ns = model.data().poses[static_cast<std::size_t>(poses[j])].pose.stamp_ns;
+    const double session_s = 1e-9 * static_cast<double>(stamp_ns - first_ns);
+    each[j].emplace(measurePaths(twin_, model, null, poses[j], session_s, of));
+  });
+  double strongest_amplitude = 0;
+  for (std::optional<MeasuredPose>& p : each) {
+    strongest_amplitude = std::max(strongest_amplitude, p->where.strongest_amplitude);
+    location_.insert(location_.end(), p->paths.size(), p->location);
+    poses_.push_back(std::move(*p));
+  }
+  for (MeasuredPose& p : poses_) p.where.strongest_amplitude = strongest_amplitude;
+  whole_ = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
+  for (std::size_t kind = 0; kind < of.size(); ++kind) samples_.push_back(sampleOf(of[kind], kind));
+}
+
+/// Phases in degrees, each within half a turn of their mean direction: a law may lead beyond 180 degrees.
+void wrapAround(const Eigen::VectorXd& weight, Eigen::VectorXd& phase_deg) {
+  std::complex<double> sum = 0;
+  for (Eigen::Index i = 0; i < phase_deg.size(); ++i) sum += std::polar(weight[i], phase_deg[i] * M_PI / 180);
+  const double mean_deg = std::arg(sum) * 180 / M_PI;
+  for (double& v : phase_deg) v = mean_deg + std::remainder(v - mean_deg, 360);
+}
+
+Sample LawScreen::sampleOf(const Observable& o, std::size_t kind) const {
+  using Kind = Observable::Kind;
+  const Eigen::Index count = static_cast<Eigen::Index>(location_.size());
+  const Eigen::Index actors = static_cast<Eigen::Index>(base_.scene().actors.size());
+  const bool of_gain = o.kind == Kind::kGain, of_actors = of_gain || o.kind == Kind::kDelay;
+  Sample s;
+  s.observable = o;
+  s.off.resize(count);
+  Eigen::VectorXd shows(count);
+  s.latent = Eigen::MatrixXd::Zero(count, 1 + actors);
+  Eigen::Index at = 0;
+  for (const MeasuredPose& pose : poses_) {
+    for (const MeasuredPath& p : pose.paths) {
+      const double share = of_gain ? p.share : 1;
+      s.off[at] = p.off[kind];
+      // What a pose's likelihood has found of its heading is one number, however many paths it has.
+      shows[at] = o.kind == Kind::kAngleOfPose ? 1 / static_cast<double>(pose.paths.size())
+                  : of_actors || p.alone       ? 1
+                                               : 0;
+      s.latent(at, 0) = share;
+      for (int a : p.record.actors) {
+        if (a >= 0 && of_actors) s.latent(at, 1 + a) += share;
+      }
+      ++at;
+    }
+  }
+  if (o.kind == Kind::kChannelPhase) wrapAround(shows, s.off);
+  const double own = of_gain ? 10 / std::log(10.0) * model_.spread().actor_gain : model_.spread().actor_range_m;
+  s.weight = shows;
+  if (shows.sum() == 0) return s;
+  const auto median = [&](const Eigen::VectorXd& of) {
+    std::vector<double> v;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      if (shows[i] > 0) v.push_back(of[i]);
+    }
+    const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
+    std::nth_element(v.begin(), middle, v.end());
+    return *middle;
+  };
+  s.scatter = std::max(o.floor, 1.4826 * median((s.off.array() - median(s.off)).abs().matrix()));
+  const auto setBaseline = [&] {
+    Eigen::MatrixXd information = s.latent.transpose() * s.weight.asDiagonal() * s.latent;
+    information.diagonal() += s.latent_prior;
+    s.latent_solver.compute(information);
+    s.latents = s.latent_solver.solve(s.latent.transpose() * s.weight.cwiseProduct(s.off));
+    s.rest = s.off - s.latent * s.latents;
+  };
+  for (int i = 0; i < kReweighings; ++i) {
+    s.latent_prior = Eigen::VectorXd::Constant(1 + actors, s.scatter * s.scatter / (own * own));
+    s.latent_prior[0] = 1e-9;
+    setBaseline();
+    s.scatter = std::max(o.floor, 1.4826 * median(s.rest.cwiseAbs()));
+    s.weight = shows.cwiseProduct((kHuber * s.scatter / s.rest.array().abs().max(1e-12)).min(1.0).matrix());
+  }
+  setBaseline();
+  return s;
+}
+
+Promise LawScreen::promise(const Sample& s, const Eigen::MatrixXd& directions) const {
+  const Eigen::Index n = directions.cols();
+  // Latents eliminated: what of a direction they cannot follow.
+  const Eigen::MatrixXd weighted = s.weight.asDiagonal() * directions;
+  const Eigen::MatrixXd follow = s.latent_solver.solve(s.latent.transpose() * weighted);  // [G][K]
+  const Eigen::MatrixXd seen_by_paths = directions.transpose() * weighted - (weighted.transpose() * s.latent) * follow;
+  const Eigen::VectorXd total = weighted.transpose() * s.rest;
+  Promise p;
+  Eigen::LDLT<Eigen::MatrixXd> solver;
+  Eigen::VectorXd latents_after, after;
+  double left = 0, scatter = s.scatter;
+  while (true) {
+    const double prior = std::pow(scatter / s.observable.usual, 2);
+    Eigen::MatrixXd information = seen_by_paths;
+    information.diagonal().array() += prior;
+    solver.compute(information);
+    p.value = solver.solve(total);
+    latents_after = s.latents - follow * p.value;
+    after = s.off - s.latent * latents_after - directions * p.value;
+    const double squares = s.squares(after, latents_after);
+    left = squares + prior * p.value.squaredNorm();
+    // What a law of many times the usual size leaves scatters far less than all that it explains did.
+    const double own = std::max(s.observable.floor, std::sqrt(squares / std::max(1.0, s.weight.sum())));
+    if (own > kScattersLess * scatter) break;
+    scatter = own;
+  }
+  p.constant = latents_after[0];
+  // The scatter is as free as the law: its likelihood's maximum.
+  p.raw = whole_ * 0.5 * s.weight.sum() * std::log(std::max(1.0, s.squares(s.rest, s.latents) / left));
+  const double locations = static_cast<double>(model_.data().locations.size());
+  if (locations > 1) {
+    const Eigen::MatrixXd seen = directions - s.latent * follow;
+    Eigen::MatrixXd by_location = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model_.data().locations.size()), n);
+    for (Eigen::Index i = 0; i < after.size(); ++i) {
+      by_location.row(location_[static_cast<std::size_t>(i)]) += s.weight[i] * after[i] * seen.row(i);
+    }
+    const double own = left / std::max(1.0, s.weight.sum());
+    const Eigen::MatrixXd spread = by_location.transpose() * by_location * (locations / (locations - 1) / own);
+    p.overdispersion = std::clamp(solver.solve(spread).trace() / static_cast<double>(n), 1.0, kMaxInflation);
+  }
+  return p;
+}
+
+double LawScreen::places(const Sample& s, const Eigen::VectorXd& direction) const {
+  Eigen::VectorXd by_location = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model_.data().locations.size()));
+  for (Eigen::Index i = 0; i < direction.size(); ++i) {
+    by_location[location_[static_cast<std::size_t>(i)]] += s.weight[i] * direction[i] * direction[i];
+  }
+  return std::pow(by_location.sum(), 2) / std::max(1e-300, by_location.squaredNorm());
+}
+
+Hypothesis LawScreen::law(const Observable& o, const Over& over, const std::vector<double>& at) const {
+  Hypothesis h;
+  h.mechanism = defaultMechanism("empirical_law");
+  h.mechanism.values.set("variable", over.variable);
+  h.mechanism.values.set("at", at);
+  h.mechanism.values.set(o.parameter, std::vector<double>(at.size(), 0.0));
+  h.mechanism.values.set("actor", over.actor);
+  h.mechanism.values.set("bearing_deg", over.bearing_deg);
+  h.mechanism.values.set("channels", o.channels);
+  h.subject = std::string(o.parameter) + " over " + over.variable + (over.actor.empty() ? "" : " of " + over.actor) +
+              channelsInWords(h.mechanism);
+  return h;
+}
+
+/// The numbers of a form, each typically o.typical.
+std::vector<Coordinate> coordinatesOf(const LawForm& form, const Observable& o) {
+  std::vector<Coordinate> coordinates;
+  for (Eigen::Index k = 0; k < form.shapes.cols(); ++k) {
+    Coordinate c{o.parameter, o.unit, -1, 0, o.typical, -o.limit, o.limit};
+    const Eigen::VectorXd shape = form.shapes.col(k);
+    if (form.of_points) {
+      shape.maxCoeff(&c.element);
+    } else {
+      c.shape.assign(shape.data(), shape.data() + shape.size());
+    }
+    coordinates.push_back(std::move(c));
+  }
+  return coordinates;
+}
+
+std::optional<Screened> LawScreen::best(const Sample& s, const Over& over) const {
+  const int actor = base_.scene().actorIndex(over.actor);
+  const LawVariable of(over.variable, {0, 0, over.bearing_deg, actor});
+  const Observable& o = s.observable;
+  std::vector<LawVariable::Values> values;
+  std::vector<double> all;
+  for (const MeasuredPose& pose : poses_) {
+    for (const MeasuredPath& p : pose.paths) {
+      LawVariable::Values v = of.of(pose.where, p.record);
+      if (actor >= 0 && std::count(p.record.actors.begin(), p.record.actors.end(), actor) == 0) v.count = 0;
+      for (int i = 0; i < v.count; ++i) {
+        double& x = v.of[static_cast<std::size_t>(i)];
+        if (over.variable == "amplitude_db") x = std::max(x, kWeakest_db);
+        all.push_back(x);
+      }
+      values.push_back(v);
+    }
+  }
+  if (all.empty() || s.weight.sum() == 0) return std::nullopt;
+  const LawForms forms(over.variable, std::move(all), o.constant);
+  if (!forms.varies()) return std::nullopt;
+  const Eigen::Index nodes = static_cast<Eigen::Index>(forms.fine().size());
+  Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(values.size()), nodes);
+  for (std::size_t p = 0; p < values.size(); ++p) {
+    Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(nodes);
+    for (int i = 0; i < values[p].count; ++i) {
+      forms.addAt(values[p].of[static_cast<std::size_t>(i)], 1.0 / values[p].count, row);
+    }
+    basis.row(static_cast<Eigen::Index>(p)) = s.latent(static_cast<Eigen::Index>(p), 0) * row;
+  }
+
+  std::vector<LawForm> tried = forms.curves();
+  if (!o.isOfChannels()) {
+    std::vector<LawForm> others = forms.others();
+    std::move(others.begin(), others.end(), std::back_inserter(tried));
+  }
+  double most = kLeastWorth;
+  const LawForm* best = nullptr;
+  Promise of_best;
+  for (const LawForm& form : tried) {
+    const Eigen::MatrixXd directions = basis * forms.onFine(form);
+    if (form.local && places(s, directions.rightCols(1)) < kFewestPlaces) continue;
+    const Promise p = promise(s, directions);
+    const double worth = p.raw / p.overdispersion - kPricePerNumber * form.priced(o.constant);
+    if (worth <= most) continue;
+    most = worth;
+    best = &form;
+    of_best = p;
+  }
+  if (best == nullptr) return std::nullopt;
+  Screened result;
+  result.hypothesis = law(o, over, best->at);
+  result.hypothesis.variant = best->words;
+  result.hypothesis.coordinates = coordinatesOf(*best, o);
+  result.hypothesis.searched = best->searched + 1;  // and the variable
+  result.screened_nats = of_best.raw / of_best.overdispersion - 0.5 * best->priced(o.constant);
+  result.starts = {{}};
+  for (Eigen::Index k = 0; k < of_best.value.size(); ++k) {
+    // Of a curve all values have the constant, of another form the first one is it.
+    const bool has_constant = o.constant && (k == 0 || best->words.empty());
+    const double value = of_best.value[k] + (has_constant ? of_best.constant : 0);
+    result.starts.front().push_back(std::clamp(value / o.typical, -8.0, 8.0));
+  }
+  return result;
+}
+
+std::vector<std::string> LawScreen::oftenSeen() const {
+  std::vector<int> paths(base_.scene().actors.size(), 0);
+  for (const MeasuredPose& pose : poses_) {
+    for (const MeasuredPath& p : pose.paths) {
+      for (int a : std::set<int>(p.record.actors.begin(), p.record.actors.end())) {
+        if (a >= 0) ++paths[static_cast<std::size_t>(a)];
+      }
+    }
+  }
+  std::vector<std::string> names;
+  for (std::size_t a = 0; a < paths.size(); ++a) {
+    if (paths[a] >= kOften) names.push_back(base_.scene().actors[a].name);
+  }
+  return names;
+}
+
+void keepBetter(std::optional<Screened> s, std::optional<Screened>& best) {
+  if (s && (!best || s->screened_nats > best->screened_nats)) best = std::move(s);
+}
+
+std::optional<Screened> LawScreen::bestBearing() const {
+  std::optional<Screened> best_of_all;
+  for (int i = 0; i < kBearings; ++i) {
+    keepBetter(best(gain(), {"standing_m", "", 180.0 * i / kBearings}), best_of_all);
+  }
+  if (best_of_all) {
+    ++best_of_all->hypothesis.searched;
+    best_of_all->screened_nats -= 0.5;
+  }
+  return best_of_all;
+}
+
+std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const {
+  if (location_.empty()) return std::nullopt;
+  Eigen::AlignedBox3d bounds;
+  for (const Actor& a : base_.scene().actors) bounds.extend(a.bounds);
+  const Observable& o = gain().observable;
+  struct Spot {
+    double x_m = 0, y_m = 0, radius_m = 0;
+    Promise promise;
+  };
+  const auto spotAt = [&](double x_m, double y_m, double radius_m) {
+    const LawVariable passing(variable, {x_m, y_m});
+    Eigen::MatrixXd direction(static_cast<Eigen::Index>(location_.size()), 1);
+    Eigen::Index at = 0;
+    for (const MeasuredPose& pose : poses_) {
+      for (const MeasuredPath& p : pose.paths) {
+        const LawVariable::Values v = passing.of(pose.where, p.record);
+        direction(at++, 0) = v.count > 0 ? p.share * std::max(0.0, 1 - v.of[0] / radius_m) : 0;
+      }
+    }
+    return Spot{x_m, y_m, radius_m, promise(gain(), direction)};
+  };
+  std::vector<Spot> spots;
+  for (double x = bounds.min().x() + 0.5 * kPlanGrid_m; x < bounds.max().x(); x += kPlanGrid_m) {
+    for (double y = bounds.min().y() + 0.5 * kPlanGrid_m; y < bounds.max().y(); y += kPlanGrid_m) {
+      for (double radius : kPlanRadii_m) spots.push_back({x, y, radius, {}});
+      if (spots.size() > 10000) return std::nullopt;  // no room: a hall's cells are too many to tell apart
+    }
+  }
+  const auto better = [](const Spot& a, const Spot& b) {
+    return a.promise.raw / a.promise.overdispersion < b.promise.raw / b.promise.overdispersion;
+  };
+  const auto bestOf = [&](std::vector<Spot>& all) {
+    tbb::parallel_for(std::size_t{0}, all.size(),
+                      [&](std::size_t i) { all[i] = spotAt(all[i].x_m, all[i].y_m, all[i].radius_m); });
+    return *std::max_element(all.begin(), all.end(), better);
+  };
+  if (spots.empty()) return std::nullopt;
+  const Spot coarse = bestOf(spots);
+  std::vector<Spot> near;
+  for (int i = -2; i <= 2; ++i) {
+    for (int j = -2; j <= 2; ++j) {
+      for (double factor : {0.75, 1.0, 1.35}) {
+        near.push_back(
+            {coarse.x_m + i * kPlanFineGrid_m, coarse.y_m + j * kPlanFineGrid_m, coarse.radius_m * factor, {}});
+      }
+    }
+  }
+  const Spot best = bestOf(near);
+  const double nats = best.promise.raw / best.promise.overdispersion;
+  if (!(nats > kPricePerNumber * 4)) return std::nullopt;
+  Screened result;
+  result.hypothesis = law(o, {variable}, {0, best.radius_m});
+  result.hypothesis.mechanism.values.set("x_m", best.x_m);
+  result.hypothesis.mechanism.values.set("y_m", best.y_m);
+  result.hypothesis.coordinates = {{o.parameter, o.unit, 0, 0, o.typical, -o.limit, o.limit}};
+  result.hypothesis.searched = 4;  // place, radius and the variable
+  result.screened_nats = nats - 0.5 * 4;
+  result.starts = {{std::clamp(best.promise.value[0] / o.typical, -8.0, 8.0)}};
+  return result;
+}
+
+Eigen::MatrixXd LawScreen::alikeAtPose(const Eigen::MatrixXd& of_poses) const {
+  Eigen::MatrixXd of_paths(gain().off.size(), of_poses.cols());
+  Eigen::Index at = 0;
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    for (std::size_t k = 0; k < poses_[i].paths.size(); ++k, ++at) {
+      of_paths.row(at) = gain().latent(at, 0) * of_poses.row(static_cast<Eigen::Index>(i));
+    }
+  }
+  return of_paths;
+}
+
+Eigen::MatrixXd LawScreen::afterSteps(const std::vector<double>& steps_s) const {
+  Eigen::MatrixXd after(static_cast<Eigen::Index>(poses_.size()), static_cast<Eigen::Index>(steps_s.size()));
+  for (Eigen::Index i = 0; i < after.rows(); ++i) {
+    for (Eigen::Index k = 0; k < after.cols(); ++k) {
+      after(i, k) = poses_[static_cast<std::size_t>(i)].where.session_s > steps_s[static_cast<std::size_t>(k)] ? 1 : 0;
+    }
+  }
+  return after;
+}
+
+bool LawScreen::gainsFollowTime(const std::optional<Screened>& steps) const {
+  const Eigen::Index poses = static_cast<Eigen::Index>(poses_.size());
+  if (poses == 0 || gain().weight.sum() == 0) return true;
+  Eigen::MatrixXd time(poses, 1);
+  for (Eigen::Index i = 0; i < poses; ++i) time(i, 0) = poses_[static_cast<std::size_t>(i)].where.session_s;
+  time.array() /= std::max(1.0, time.maxCoeff());
+  double by_time = promise(gain(), alikeAtPose(time)).raw;
+  if (steps) {
+    const std::vector<double>& steps_s = steps->hypothesis.mechanism.values.numbers("steps_s");
+    by_time = std::max(by_time, promise(gain(), alikeAtPose(afterSteps(steps_s))).raw);
+  }
+  const double by_pose = promise(gain(), alikeAtPose(Eigen::MatrixXd::Identity(poses, poses))).raw;
+  const double by_chance = 0.5 * whole_ * static_cast<double>(poses);
+  return by_pose - by_chance < kBeyondTime * by_time + kPricePerNumber;
+}
+
+std::optional<Screened> LawScreen::bestSteps() const {
+  const Sample& s = gain();
+  std::set<double> stamps_s;
+  std::set<int> places;
+  for (const MeasuredPose& pose : poses_) {
+    stamps_s.insert(pose.where.session_s);
+    places.insert(pose.location);
+  }
+  if (stamps_s.size() < 2 || s.weight.sum() == 0) return std::nullopt;
+  std::vector<double> between_s;
+  for (auto stamp = std::next(stamps_s.begin()); stamp != stamps_s.end(); ++stamp) {
+    between_s.push_back(0.5 * (*std::prev(stamp) + *stamp));
+  }
+  const auto of = [&](const std::vector<double>& steps_s) { return promise(s, alikeAtPose(afterSteps(steps_s))); };
+  // Between two steps lie several places: what one alone sees may be that place's.
+  const auto isTold = [&](std::vector<double> steps_s) {
+    std::sort(steps_s.begin(), steps_s.end());
+    std::vector<std::set<int>> between(steps_s.size() + 1);
+    for (const MeasuredPose& pose : poses_) {
+      const auto after = std::lower_bound(steps_s.begin(), steps_s.end(), pose.where.session_s) - steps_s.begin();
+      between[static_cast<std::size_t>(after)].insert(pose.location);
+    }
+    return std::all_of(between.begin(), between.end(),
+                       [&](const std::set<int>& of) { return of.size() >= std::min<std::size_t>(2, places.size()); });
+  };
+  // One step at the time that promises most beside the others.
+  const auto moved = [&](std::vector<double> steps_s, std::size_t which) {
+    std::vector<double> best = steps_s;
+    double most = -INFINITY;
+    for (double t : between_s) {
+      if (std::count(steps_s.begin(), steps_s.end(), t) > (steps_s[which] == t ? 1 : 0)) continue;
+      steps_s[which] = t;
+      if (!isTold(steps_s)) continue;
+      const Promise p = of(steps_s);
+      if (p.raw / p.overdispersion <= most) continue;
+      most = p.raw / p.overdispersion;
+      best = steps_s;
+    }
+    return best;
+  };
+  std::vector<double> steps_s;
+  std::optional<Screened> result;
+  double most = kLeastWorth;
+  while (steps_s.size() < std::min<std::size_t>(kMostSteps, between_s.size())) {
+    steps_s.push_back(-1);
+    steps_s = moved(steps_s, steps_s.size() - 1);
+    if (steps_s.back() < 0) break;  // there is no time for one more
+    for (std::size_t which = steps_s.size() - 1; which-- > 0;) steps_s = moved(steps_s, which);
+    std::vector<double> sorted_s = steps_s;
+    std::sort(sorted_s.begin(), sorted_s.end());
+    const Promise p = of(sorted_s);
+    const double count = static_cast<double>(steps_s.size()), nats = p.raw / p.overdispersion;
+    if (nats - kPricePerNumber * 2 * count <= most) continue;
+    most = nats - kPricePerNumber * 2 * count;
+    result.emplace();
+    const int steps = static_cast<int>(sorted_s.size());
+    Hypothesis& h = result->hypothesis;
+    h.mechanism = defaultMechanism("gain_drift");
+    h = withSteps(std::move(h), steps).value();
+    h.mechanism.values.set("steps_s", sorted_s);
+    h.variant += steps > 1 ? " where they show" : " where it shows";
+    h.searched = steps;  // when
+    result->screened_nats = nats - 0.5 * 2 * count;
+    result->starts = {{}};
+    for (double step_db : p.value) result->starts.front().push_back(std::clamp(step_db, -8.0, 8.0));
+  }
+  return result;
+}
+
+}  // namespace
+
+ScreenedLaws screenLaws(const Twin& base, const ChannelLikelihood& model, const ModelState& null,
+                        const std::vector<int>& poses) {
+  ScreenedLaws result;
+  for (const NamedParameters& m : null.mechanisms) {
+    if (m.mechanism == "empirical_law") return result;  // what it leaves is of its own shape
+  }
+  if (poses.empty()) return result;
+  const LawScreen screen(base, model, null, poses);
+  const auto add = [&](std::optional<Screened> s) {
+    if (s) result.laws.push_back(std::move(*s));
+  };
+  // An error of directions looks like one of each channel: the best stands for all.
+  std::map<std::string, std::optional<Screened>> of_channels;  // by variable
+  for (const Sample& s : screen.samples()) {
+    for (const std::string& variable : s.observable.over) {
+      std::optional<Screened> law = screen.best(s, {variable});
+      if (s.observable.isOfChannels()) {
+        keepBetter(std::move(law), of_channels[variable]);
+      } else {
+        add(std::move(law));
+      }
+    }
+  }
+  for (auto& [variable, law] : of_channels) add(std::move(law));
+  for (const std::string& actor : screen.oftenSeen()) {
+    for (const char* variable : {"foot_m", "time_s"}) add(screen.best(screen.gain(), {variable, actor}));
+  }
+  const auto drifts = [](const NamedParameters& m) { return m.mechanism == "gain_drift"; };
+  if (std::none_of(null.mechanisms.begin(), null.mechanisms.end(), drifts)) {
+    std::optional<Screened> steps = screen.bestSteps();
+    result.gains_follow_time = screen.gainsFollowTime(steps);
+    if (result.gains_follow_time) add(std::move(steps));
+  }
+  add(screen.bestBearing());
+  for (const std::string& variable : LawVariable::names()) {
+    if (LawVariable::isAboutPlace(variable)) add(screen.bestPlace(variable));
+  }
+  std::stable_sort(result.laws.begin(), result.laws.end(),
+                   [](const Screened& a, const Screened& b) { return a.screened_nats > b.screened_nats; });
+  return result;
+}
+
+}  // namespace mmradartwin::diagnosis::search

@@ -1,0 +1,152 @@
+#include "diagnosis/search/object_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/numbers/number_text.h"
+#include "diagnosis/search/back_projection.h"
+
+namespace mmradartwin::diagnosis::search {
+namespace {
+
+constexpr double kSides_m[] = {0.25, 0.45};
+constexpr double kTurned_deg = 15, kSquare_deg = 90;  // ways in which it may stand, and when they are the same again
+constexpr std::size_t kFacing = 5;                    // poses that a side of it may face
+constexpr double kGrown[] = {0.6, 0.8, 1.25, 1.6};    // of a side
+constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1}, kTurns_deg[] = {-8, -3, 3, 8};
+constexpr double kHides_db = -6;               // of a law over paths that pass a place, at least
+constexpr double kAbout_m[] = {-0.1, 0, 0.1};  // of the place that paths pass which something hides
+constexpr int kSweeps = 4;
+constexpr double kHigher = 5;        // nats of a sweep that are worth another
+constexpr double kWorthSweeps = 15;  // nats of the fit
+
+enum Coordinates { kX, kY, kSide, kYaw };
+
+/// A box with that place for its middle, to start with.
+Hypothesis boxAt(const Eigen::Vector2d& middle) {
+  Hypothesis h;
+  h.mechanism = defaultMechanism("actor_unmodelled");
+  h.mechanism.values.set("shape", std::string("box"));
+  h.coordinates = {{"x_m", "m", -1, middle.x(), middle.x() + 0.1, -1000, 1000, {}},
+                   {"y_m", "m", -1, middle.y(), middle.y() + 0.1, -1000, 1000, {}},
+                   {"size_m", "m", -1, 0, kSides_m[0], 0.02, 5, {}},
+                   {"yaw_deg", "deg", -1, 0, kTurned_deg, -360, 360, {}}};
+  return h;
+}
+
+/// Boxes that share something with the one that was fitted, as scaled coordinates.
+std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
+  const std::vector<Coordinate>& c = fit.hypothesis.coordinates;
+  const Eigen::Vector2d center(c[kX].value(fit.scaled_values[kX]), c[kY].value(fit.scaled_values[kY]));
+  const double side_m = c[kSide].value(fit.scaled_values[kSide]), yaw_deg = c[kYaw].value(fit.scaled_values[kYaw]);
+  const double yaw_rad = yaw_deg * M_PI / 180;
+  const Eigen::Vector2d u(std::cos(yaw_rad), std::sin(yaw_rad)), v(-u.y(), u.x());
+  std::vector<std::vector<double>> boxes;
+  const auto add = [&](const Eigen::Vector2d& at, double size_m, double turned_deg) {
+    boxes.push_back({c[kX].scaled_values(at.x()), c[kY].scaled_values(at.y()), c[kSide].scaled_values(size_m),
+                     c[kYaw].scaled_values(turned_deg)});
+  };
+  for (double grown : kGrown) {
+    const double half_m = 0.5 * (grown - 1) * side_m;
+    for (int i : {-1, 0, 1}) {
+      for (int j : {-1, 0, 1}) add(center + half_m * (i * u + j * v), grown * side_m, yaw_deg);
+    }
+  }
+  for (double shift_m : kShifts_m) {
+    add(center + shift_m * u, side_m, yaw_deg);
+    add(center + shift_m * v, side_m, yaw_deg);
+  }
+  for (double turn_deg : kTurns_deg) add(center, side_m, yaw_deg + turn_deg);
+  return boxes;
+}
+
+/// Other places and ways to stand of an actor, places and distances of a late echo, as scaled coordinates.
+std::vector<std::vector<double>> placesAround(const HypothesisFit& fit) {
+  std::vector<std::vector<double>> places;
+  const auto add = [&](std::size_t coordinate, double by) {
+    const Coordinate& c = fit.hypothesis.coordinates[coordinate];
+    places.push_back(fit.scaled_values);
+    places.back()[coordinate] = c.scaled_values(c.value(fit.scaled_values[coordinate]) + by);
+  };
+  for (std::size_t i = 0; i < fit.scaled_values.size(); ++i) {
+    if (fit.hypothesis.coordinates[i].unit == "deg") {
+      for (double turn_deg : kTurns_deg) add(i, turn_deg);
+    } else if (fit.hypothesis.coordinates[i].unit == "m") {
+      for (double shift_m : kShifts_m) add(i, shift_m);
+    }
+  }
+  return places;
+}
+
+}  // namespace
+
+bool isUnmodelledBox(const Hypothesis& hypothesis) {
+  return hypothesis.mechanism.mechanism == "actor_unmodelled" && hypothesis.mechanism.values.text("shape") == "box";
+}
+
+Screened asBox(const ChannelData& data, const ModelState& null, const HypothesisFit& cylinder) {
+  const NamedParameters fitted = cylinder.hypothesis.at(cylinder.scaled_values);
+  const Eigen::Vector2d axis(fitted.values.number("x_m"), fitted.values.number("y_m"));
+  Screened box{boxAt(axis), cylinder.gain, {}};
+  Hypothesis& h = box.hypothesis;
+  h.variant = "a box " + cylinder.hypothesis.variant;
+  const double radius_m = 0.5 * fitted.values.number("size_m");
+  // The cylinder's front stands where sides shine, half a side before the middle of the box.
+  const auto startBehind = [&](const Eigen::Vector2d& toward_radar, double yaw_deg) {
+    for (double side_m : kSides_m) {
+      const Eigen::Vector2d center = axis + (radius_m - 0.5 * side_m) * toward_radar;
+      box.starts.push_back({h.coordinates[0].scaled_values(center.x()), h.coordinates[1].scaled_values(center.y()),
+                            h.coordinates[2].scaled_values(side_m), h.coordinates[3].scaled_values(yaw_deg)});
+    }
+  };
+  const Eigen::Vector2d toward_most = -awayFromRadar(data, axis);
+  for (double yaw_deg = 0; yaw_deg < kSquare_deg; yaw_deg += kTurned_deg) startBehind(toward_most, yaw_deg);
+  // Poses that see most of it may be those that a side faces.
+  std::vector<std::pair<double, std::size_t>> seen;
+  for (std::size_t i = 0; i < data.poses.size(); ++i) seen.emplace_back(null.by_pose[i] - cylinder.state.by_pose[i], i);
+  std::sort(seen.begin(), seen.end());
+  seen.resize(std::min(kFacing, seen.size()));
+  for (const auto& [gain, i] : seen) {
+    const Eigen::Vector2d way = (data.poses[i].pose.T_map_radar.translation().head<2>() - axis).normalized();
+    startBehind(way, std::fmod(std::atan2(way.y(), way.x()) * 180 / M_PI + 360, kSquare_deg));
+  }
+  return box;
+}
+
+std::optional<Screened> boxThatHides(const Screened& law) {
+  const NamedParameters& m = law.hypothesis.mechanism;
+  if (m.mechanism != "empirical_law" || m.values.text("variable") != "passing_m" ||
+      law.hypothesis.coordinates.front().value(law.starts.front().front()) > kHides_db) {
+    return std::nullopt;
+  }
+  const Eigen::Vector2d place(m.values.number("x_m"), m.values.number("y_m"));
+  Screened box{boxAt(place), 0, {}};
+  Hypothesis& h = box.hypothesis;
+  h.variant = "a box that hides what is behind it, about " + number(place.x(), 2) + ", " + number(place.y(), 2) + " m";
+  for (double side_m : kSides_m) {
+    for (double yaw_deg = 0; yaw_deg < kSquare_deg; yaw_deg += 2 * kTurned_deg) {
+      for (double dx_m : kAbout_m) {
+        for (double dy_m : kAbout_m) {
+          box.starts.push_back(
+              {h.coordinates[kX].scaled_values(place.x() + dx_m), h.coordinates[kY].scaled_values(place.y() + dy_m),
+               h.coordinates[kSide].scaled_values(side_m), h.coordinates[kYaw].scaled_values(yaw_deg)});
+        }
+      }
+    }
+  }
+  return box;
+}
+
+HypothesisFit fitObject(HypothesisFitter& fitter, const ModelState& null, const Screened& object) {
+  const Hypothesis& h = object.hypothesis;
+  HypothesisFit best = fitter.fit(null, h, object.starts);
+  for (int i = 0; i < kSweeps && best.gain_without_best_place > kWorthSweeps; ++i) {
+    HypothesisFit other = fitter.fit(null, h, isUnmodelledBox(h) ? boxesAround(best) : placesAround(best), 0, &best);
+    const double higher = other.gain - best.gain;
+    if (higher > 0) best = std::move(other);
+    if (higher < kHigher) break;
+  }
+  return best;
+}
+
+}  // namespace mmradartwin::diagnosis::search

@@ -1,0 +1,174 @@
+#include "diagnosis/likelihood/channel_likelihood.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "diagnosis/channels/echo_beam.h"
+#include "diagnosis/likelihood/profiled_scores.h"
+#include "mmradartwin_dsp/paper_radar.h"
+
+namespace mmradartwin::diagnosis {
+namespace {
+
+const std::string kEvent = "specular";
+
+/// An echo from a point at range and azimuth of the radar, off one actor.
+PathRecord echoAt(const RadarConfig& radar, int actor, double range_m, double azimuth_rad, double amplitude) {
+  PathRecord r;
+  r.event = &kEvent;
+  r.actors = {actor};
+  r.facets = {actor};
+  r.bounces = 1;
+  r.departure = r.arrival = {std::cos(azimuth_rad), std::sin(azimuth_rad), 0};
+  for (int k = 0; k < radar.channels(); ++k) {
+    r.length_m.push_back(2 * range_m - radar.virtual_element_m(k).y() * std::sin(azimuth_rad));
+  }
+  setContribution(radar, amplitude, r);
+  return r;
+}
+
+/// Two poses before three actors, two of which share a bin of the second pose, and channels that are not as expected.
+class ThreeActors : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    data_.radar = paperRadar();
+    data_.locations = {"a", "b"};
+    const double ranges_m[][3] = {{2.0, 2.3, 4.1}, {3.0, 3.02, 5.3}};
+    for (int i = 0; i < 2; ++i) {
+      std::vector<PathRecord>& paths = paths_.emplace_back();
+      for (int a = 0; a < 3; ++a) {
+        paths.push_back(echoAt(data_.radar, a, ranges_m[i][a], 0.3 * a - 0.2, 0.03 / (1 + a)));
+        paths.push_back(echoAt(data_.radar, a, ranges_m[i][a] + 0.05, 0.3 * a - 0.15, 0.01 / (1 + a)));
+      }
+      PoseChannels p;
+      p.location = i;
+      p.noise_power = 1e-9;
+      const int channels = data_.radar.channels(), bins = data_.radar.samples_per_chirp;
+      const std::size_t size = static_cast<std::size_t>(channels * (channels + 1) / 2);
+      p.clutter.bins = bins;
+      p.clutter.packed.assign(static_cast<std::size_t>(bins) * size, {});
+      for (int b = 0; b < bins; ++b) {
+        for (int k = 0; k < channels; ++k) p.clutter.at(b, size)[k * (k + 3) / 2] = 1;
+      }
+      data_.poses.push_back(p);
+    }
+    measure(0.1);
+    nuisance_.log_gain = 0.2;
+    nuisance_.log_floor = std::log(1e-9);
+    nuisance_.log_relative = -3.5;
+    nuisance_.log_range = 0.3;
+    nuisance_.floor_shape = {0.1, -0.2, 0.3, 0, 0.2, -0.1};
+    nuisance_.actor_gain = {0.1, -0.2, 0.15, 0};
+    nuisance_.actor_range_m = {0.006, -0.004, 0.003, 0};
+    nuisance_.yaw_rad = {0.002, -0.003};
+  }
+  /// Fills the channels, each of which an echo has with an error of its own.
+  void measure(double channel_error) {
+    std::mt19937 random(1);
+    std::normal_distribution<double> normal(0, 1);
+    for (std::size_t i = 0; i < paths_.size(); ++i) {
+      PoseChannels& p = data_.poses[i];
+      p.y.resize(data_.radar.channels(), data_.radar.samples_per_chirp);
+      for (std::complex<double>& y : p.y.reshaped()) y = 2e-5 * std::complex<double>(normal(random), normal(random));
+      for (const PathRecord& r : paths_[i]) {
+        const int bin = static_cast<int>(std::lround(0.5 * meanLength_m(r) / data_.radar.range_bin_m()));
+        for (int k = 0; k < data_.radar.channels(); ++k) {
+          p.y(k, bin) += (1 + channel_error * normal(random)) * r.c[static_cast<std::size_t>(k)];
+        }
+      }
+      p.beams = chooseBeams(data_.radar, paths_[i], 2);
+      ASSERT_FALSE(p.beams.empty());
+      for (EchoBeam& beam : p.beams) {
+        beam.y = formBeam(beam, p.y);
+        beam.clutter = 1;
+      }
+    }
+  }
+  /// share: of the third actor's power.
+  std::vector<PoseEchoes> echoes(double share = 1) const {
+    std::vector<PoseEchoes> all;
+    static const std::vector<double> kNone;
+    for (std::size_t i = 0; i < paths_.size(); ++i) {
+      EchoCollector collector(data_.radar, 0.003, data_.poses[i].beams, kNone);
+      for (int a = 0; a < 3; ++a) {
+        std::vector<PathRecord> own;
+        for (PathRecord r : paths_[i]) {
+          if (r.actors.front() != a) continue;
+          if (a == 2) scaleRecord(std::sqrt(share), r);
+          own.push_back(r);
+        }
+        std::vector<const PathRecord*> records;
+        for (const PathRecord& r : own) records.push_back(&r);
+        collector.addTones(records, 0.03 * 0.03);
+      }
+      PoseEchoes& of_pose = all.emplace_back();
+      of_pose.groups = collector.take();
+      collector.addTones({&paths_[i][1]}, 0.03 * 0.03);
+      of_pose.grazing = collector.take();
+    }
+    return all;
+  }
+
+  ChannelData data_;
+  std::vector<std::vector<PathRecord>> paths_;
+  SessionLatents nuisance_;
+};
+
+// What a step promises is only as good as its slope.
+TEST_F(ThreeActors, ScoresAreTheLikelihoodsSlopes) {
+  const ChannelLikelihood model(data_, 3, PoseAccuracy());
+  const auto expected = echoes();
+  const Basis basis = model.basis(expected, nuisance_);
+  const auto slope = [&](const std::function<double&(SessionLatents&)>& of, double step, std::size_t pose) {
+    SessionLatents up = nuisance_, down = nuisance_;
+    of(up) += step;
+    of(down) -= step;
+    return (model.byPose(expected, up, {0, 1})[pose] - model.byPose(expected, down, {0, 1})[pose]) / (2 * step);
+  };
+  for (std::size_t pose = 0; pose < 2; ++pose) {
+    for (int j = 0; j < nuisance_.globals(); ++j) {
+      const double want = slope([j](SessionLatents& n) -> double& { return n.global(j); }, 1e-4, pose);
+      EXPECT_NEAR(basis.poses[pose].score[j], want, 0.01 * std::abs(want) + 0.05)
+          << "of number " << j << ", pose " << pose;
+    }
+    const double want = slope([pose](SessionLatents& n) -> double& { return n.yaw_rad[pose]; }, 1e-5, pose);
+    EXPECT_NEAR(basis.poses[pose].score[nuisance_.globals()], want, 0.01 * std::abs(want) + 0.5)
+        << "of the heading, pose " << pose;
+  }
+}
+
+// A step in which a number goes beyond its limit promises what it cannot bring.
+TEST_F(ThreeActors, PromisesNothingBeyondALimit) {
+  const int relative = 2;
+  nuisance_.global(relative) = -11.5;
+  for (double channel_error : {0.1, 0.0}) {
+    measure(channel_error);
+    const ChannelLikelihood model(data_, 3, PoseAccuracy());
+    const Basis basis = model.basis(echoes(), nuisance_);
+    const double beyond = basis.poses[0].score[relative] + basis.poses[1].score[relative];
+    ASSERT_EQ(beyond < 0, channel_error == 0) << beyond;
+    const Scores scores = model.scores(basis, {}, {0, 1});
+    EXPECT_EQ(scores.total[relative] == 0, channel_error == 0);
+    EXPECT_EQ(scores.information.ldlt().solve(scores.total)[relative] == 0, channel_error == 0);
+  }
+}
+
+TEST_F(ThreeActors, ScoresOfAMechanismAreTheLikelihoodsSlopes) {
+  PoseAccuracy known;
+  known.heading_rad = 1e-7;  // nothing is eliminated
+  nuisance_.yaw_rad = {0, 0};
+  const ChannelLikelihood model(data_, 3, known);
+  const double step = 0.01;
+  const auto at = [&](double share) { return model.covariance(echoes(share), nuisance_, {0, 1}); };
+  const Scores scores = model.scores(model.basis(echoes(), nuisance_), {difference(at(1.5), at(0.5), 1)}, {0, 1});
+  const double want =
+      (model.logLikelihood(echoes(1 + step), nuisance_) - model.logLikelihood(echoes(1 - step), nuisance_)) /
+      (2 * step);
+  EXPECT_NEAR(scores.total[scores.total.size() - 1], want, 0.01 * std::abs(want));
+}
+
+}  // namespace
+}  // namespace mmradartwin::diagnosis
