@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# mmradartwin's commands: ./run.sh demo | test | setup | build | bench | fuzz | tsan | lint | exec CMD...
+# mmradartwin's commands: ./run.sh demo | test | setup | build | bench | fuzz | tsan | core | lint | exec CMD...
 set -euo pipefail
 
 root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
@@ -29,6 +29,7 @@ usage: ./run.sh VERB
   fuzz [S]     every reader of foreign bytes under libFuzzer with address and undefined-behaviour sanitizer, S seconds
                each (60); needs clang; corpus and findings stay in .ws/fuzz
   tsan         the streaming path's tests under the thread sanitizer
+  core [...]   build what needs no ROS by cmake alone, without catkin, and run its tests; arguments go to ctest
   lint         catkin_lint over all packages
   exec CMD...  run CMD in the sourced workspace, e.g. ./run.sh exec rosrun mmradartwin_attribution evaluate --help
 U
@@ -168,8 +169,20 @@ run_tsan() {
   return $status
 }
 
+# core [ctest arguments]: no part of catkin's workspace is seen, but the same paths, so that ccache knows the files.
+core() {
+  workspace
+  [ -d /usr/lib/ccache ] && export PATH=/usr/lib/ccache:$PATH
+  unset CMAKE_PREFIX_PATH ROS_PACKAGE_PATH LD_LIBRARY_PATH PYTHONPATH
+  cmake -S "$ws/src/mmradartwin" -B "$ws/core" -DCMAKE_BUILD_TYPE=Release >&2
+  cmake --build "$ws/core" -j"$(jobs)" >&2
+  data_folder
+  ctest --test-dir "$ws/core" -j"$(jobs)" --output-on-failure "$@" >&2
+}
+
 lint() {
-  catkin_lint --offline -W2 --ignore package_path_name "$root"/mmradartwin_* "$root/launch" "$root/config" "$root/test"
+  # Include folders stand at each target, not at the directory.
+  catkin_lint --offline -W2 --ignore package_path_name --ignore unused_catkin_include_dirs "$root"/mmradartwin_* "$root/launch" "$root/config" "$root/test"
 }
 
 verb=${1:-}
@@ -182,6 +195,7 @@ case $verb in
   bench) setup; run_bench "$@" ;;
   fuzz) setup; run_fuzz "$@" ;;
   tsan) setup; run_tsan ;;
+  core) setup; core "$@" ;;
   lint) setup; lint ;;
   exec) [ $# -gt 0 ] || usage; source_workspace; data_folder; exec "$@" ;;
   *) usage ;;
