@@ -20,7 +20,6 @@
 
 namespace mmradartwin {
 
-class CondensedTrace;
 class MovingTwin;
 
 struct NamedParameters {
@@ -150,9 +149,6 @@ class Twin {
   /// Where all that the receiver does beyond filters is one complex matrix over the channels, the same at all samples:
   /// that matrix [M][M]; else nothing.
   std::optional<Eigen::MatrixXcd> channelMatrix(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
-  /// The same of what a trace was condensed to (traced_session.h): some sixty times as fast as tracing. Mechanisms
-  /// that look at the paths for what they do to the grid (second_harmonic) see those that stayed records.
-  Simulation weigh(const Eigen::Isometry3d& T_map_radar, const CondensedTrace& traced, std::int64_t stamp_ns = 0) const;
   /// Throws InputError for a pose that is NaN or inside an actor (names it).
   Simulation simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
 
@@ -177,8 +173,6 @@ class Twin {
                    const std::function<void(const ChirpContext&, const ComplexGrid&)>& visit) const;
 
  private:
-  Simulation weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced, std::int64_t stamp_ns,
-                   const CondensedTrace* condensed) const;
   void forEachChirp(const Simulation& pose, int frames,
                     const std::function<void(const ChirpContext&, ComplexGrid&)>& visit) const;
   friend class MovingTwin;

@@ -22,25 +22,6 @@ std::vector<std::vector<std::size_t>> groupByFacet(const std::vector<PathRecord>
   return groups;
 }
 
-std::vector<std::vector<std::size_t>> groupByFacetOrActor(const std::vector<PathRecord>& records, int fewest) {
-  std::vector<std::vector<std::size_t>> groups = groupByFacet(records, fewest);
-  std::vector<char> grouped(records.size(), 0);
-  for (const auto& group : groups) {
-    for (std::size_t i : group) grouped[i] = 1;
-  }
-  std::map<std::pair<const std::string*, PerInteraction<int>>, std::vector<std::size_t>> rest;
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    const PathRecord& r = records[i];
-    if (grouped[i] || r.facets.size() != 1 || !r.reflection_cosine.empty() || r.departure != r.arrival) continue;
-    rest[{r.event, r.actors}].push_back(i);
-  }
-  for (auto& [key, members] : rest) {
-    if (static_cast<int>(members.size()) >= fewest) groups.push_back(std::move(members));
-  }
-  std::sort(groups.begin(), groups.end(), [](const auto& a, const auto& b) { return a.front() < b.front(); });
-  return groups;
-}
-
 PathRecord standIn(const PathRecord& first) {
   PathRecord r;
   r.event = first.event;

@@ -11,9 +11,6 @@ namespace mmradartwin {
 /// least `fewest`, in the order of their first records, each as indices.
 std::vector<std::vector<std::size_t>> groupByFacet(const std::vector<PathRecord>& records, int fewest);
 
-/// The same, and of what small facets leave over groups of one event and actor, unless they are reflections.
-std::vector<std::vector<std::size_t>> groupByFacetOrActor(const std::vector<PathRecord>& records, int fewest);
-
 /// What all records of a group have in common: event, actors, facets, bounces, cosines.
 PathRecord standIn(const PathRecord& first);
 

@@ -8,7 +8,6 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
-#include "mmradartwin_sim/traced_session.h"
 #include "rays/view_cone.h"
 #include "twin/twin_impl.h"
 
@@ -424,16 +423,6 @@ std::optional<Eigen::MatrixXcd> Twin::channelMatrix(const Eigen::Isometry3d& T_m
 
 Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                        std::int64_t stamp_ns) const {
-  return weigh(T_map_radar, std::move(traced), stamp_ns, nullptr);
-}
-
-Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, const CondensedTrace& traced,
-                       std::int64_t stamp_ns) const {
-  return weigh(T_map_radar, traced.records(), stamp_ns, &traced);
-}
-
-Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced, std::int64_t stamp_ns,
-                       const CondensedTrace* condensed) const {
   PoseContext c = impl_->context(T_map_radar, stamp_ns);
   c.receiver_gain = [this, &c](double length_m) { return impl_->toneGain(c, length_m); };
   Simulation s;
@@ -455,29 +444,6 @@ Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRec
   if (impl_->has_tone_gain || impl_->has_distort) {
     s.grid.x.setZero();
     impl_->propagate(c, impl_->filtered(c, s.records), s.grid.x);
-  }
-  if (condensed) {
-    const auto weighNode = [&](PathRecord& node) {
-      for (const auto& m : impl_->mechanisms) m->reweight(c, node);
-    };
-    condensed->addNodes(
-        radar,
-        [&](PathRecord& node) {
-          weighNode(node);
-          impl_->filter(c, node);
-        },
-        s.grid.x);
-    for (const auto& m : impl_->mechanisms) {
-      if (!m->hasReplicas()) continue;
-      condensed->addNodes(
-          radar,
-          [&](PathRecord& node) {
-            weighNode(node);
-            if (!m->replicate(c, node)) scaleRecord(0, node);
-            impl_->filter(c, node);
-          },
-          s.grid.x);
-    }
   }
   impl_->receive(c, s.grid.x);
   return s;

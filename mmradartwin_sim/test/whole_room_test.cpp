@@ -1,8 +1,5 @@
-#include <tbb/global_control.h>
-
 #include "closed_form.h"
 #include "mmradartwin_sim/cell_records.h"
-#include "mmradartwin_sim/traced_session.h"
 #include "scene_files.h"
 
 namespace mmradartwin {
@@ -10,7 +7,8 @@ namespace {
 
 using V = Eigen::Vector3d;
 
-class TracedSessionTest : public SceneFiles {
+/// A room with rough walls and a cabinet, seen from three poses, with all base mechanisms.
+class WholeRoom : public SceneFiles {
  protected:
   void SetUp() override {
     SceneFiles::SetUp();
@@ -32,82 +30,11 @@ class TracedSessionTest : public SceneFiles {
     return makeTwin(scene_,
                     "  specular: {}\n  corner: {}\n  diffuse: {}\n  edge_diffraction: {level: 1}\n" + mechanisms);
   }
-  /// Largest relative difference of a pose's grid, weighed again against simulated from the start.
-  double worst(const TracedSession& session, const std::string& mechanisms) const {
-    Twin other = twin(mechanisms);
-    other.setSession(poses_);
-    double worst = 0;
-    for (std::size_t i = 0; i < poses_.size(); ++i) {
-      const ComplexGrid again = session.weigh(other, i).grid.x;
-      const ComplexGrid fresh = other.simulate(poses_[i].T_map_radar, poses_[i].stamp_ns).grid.x;
-      worst = std::max(worst, (again - fresh).norm() / fresh.norm());
-    }
-    return worst;
-  }
   std::string scene_;
   std::vector<Pose> poses_;
 };
 
-TEST_F(TracedSessionTest, WeighsMaterialsChannelsAndGainAsIfTracedAgain) {
-  const TracedSession session(twin(), poses_);
-  EXPECT_TRUE(session.problems().empty());
-  for (std::size_t i = 0; i < poses_.size(); ++i) {
-    EXPECT_GT(session.trace(i).nodes().size(), 20u);
-    EXPECT_LT(session.trace(i).nodes().size() + session.trace(i).records().size(),
-              twin().trace(poses_[i].T_map_radar).size());
-  }
-  for (const char* mechanisms :
-       {"", "  material_reflectivity: {material: RoughConcrete, delta_db: -7}\n",
-        "  material_reflectivity: {actor: west, delta_db: 4}\n",
-        "  surface_roughness: {material: RoughMetal, roughness_rms_m: 0.0002}\n",
-        "  channel_phase_error: {phase_deg: [0, 10, 20, 30, 40, 50, 60, 70]}\n  gain_drift: {db_per_hour: 30}\n",
-        "  tx_rx_leakage: {range_m: 0.6, level_db: -3}\n", "  range_bias: {range_m: 0.05}\n",
-        "  echo_replica: {behind_m: 0.1, level_db: -6}\n",
-        "  echo_replica: {behind_m: 0.1, level_db: -6, actor: west}\n"}) {
-    // What lengthens a path turns its phase with a term in delay times length, which differs within a node by some
-    // 1e-5 rad.
-    EXPECT_LT(worst(session, mechanisms), std::string(mechanisms).find("_m: 0.") == std::string::npos ? 1e-6 : 1e-4)
-        << mechanisms;
-  }
-}
-
-TEST_F(TracedSessionTest, InterpolatesPatternsBetweenItsNodes) {
-  const std::string pattern = "  element_pattern: {cos_exponent: 2.1}\n",
-                    filter = "  if_highpass: {corner_hz: 500.0e+3}\n";
-  CondensedTrace::Options fine;
-  fine.azimuth_step_deg = 1;
-  fine.elevation_step_deg = 2;
-  fine.length_step_m = 0.2;
-  const TracedSession coarse(twin(), poses_), close(twin(), poses_, fine);
-  EXPECT_LT(worst(coarse, pattern), 3e-3);
-  EXPECT_LT(worst(coarse, filter), 2e-2);
-  EXPECT_LT(worst(close, pattern), 0.2 * worst(coarse, pattern)) << "falls with the steps";
-  EXPECT_LT(worst(close, filter), 0.5 * worst(coarse, filter));
-}
-
-TEST_F(TracedSessionTest, DoesNotDependOnThreads) {
-  const Twin base = twin();
-  const TracedSession many(base, poses_);
-  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  const TracedSession alone(base, poses_);
-  for (std::size_t i = 0; i < poses_.size(); ++i) EXPECT_EQ(many.weigh(base, i).grid.x, alone.weigh(base, i).grid.x);
-  EXPECT_EQ(many.bytes(), alone.bytes());
-}
-
-TEST_F(TracedSessionTest, SaysWhatItCannotWeigh) {
-  poses_[1].T_map_radar = radarPose(5, 4.6, 1);
-  const TracedSession session(twin(), poses_);
-  ASSERT_EQ(session.problems().size(), 1u);
-  EXPECT_NE(session.problems()[0].message.find("cabinet"), std::string::npos);
-  EXPECT_FALSE(session.usable(1));
-  EXPECT_NE(errorOf([&] { session.weigh(twin(), 1); }).find("not traced"), std::string::npos);
-  addWall("wall", "Metal", {3, -3}, {3, 3});
-  const Twin elsewhere = makeTwin(writeScene("other"));
-  EXPECT_NE(errorOf([&] { session.weigh(elsewhere, 0); }).find("another scene"), std::string::npos);
-}
-
-// Meta-tests of the simulator as a whole, on the same room.
-TEST_F(TracedSessionTest, ReciprocityTransmittersAndReceiversMaySwap) {
+TEST_F(WholeRoom, ReciprocityTransmittersAndReceiversMaySwap) {
   RadarConfig there = paperRadar(), back = there;
   there.tx_position_m = {{0, 0.02, 0}, {0, -0.05, 0}};
   back.tx_position_m = there.rx_position_m;
@@ -126,7 +53,7 @@ TEST_F(TracedSessionTest, ReciprocityTransmittersAndReceiversMaySwap) {
 }
 
 // What is exported: fewer records of the same grid, whatever is weighed on them.
-TEST_F(TracedSessionTest, CellsAreTheirPoints) {
+TEST_F(WholeRoom, CellsAreTheirPoints) {
   const std::string dense =
       "  specular: {}\n  corner: {}\n  edge_diffraction: {level: 1}\n  diffuse: {spacing_m: 0.04}\n";
   const Twin base = makeTwin(scene_, dense);
