@@ -3,6 +3,7 @@
 #include "closed_form.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/law_variable.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 #include "scene_files.h"
 
 namespace mmradartwin {

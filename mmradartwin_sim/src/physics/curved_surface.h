@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "mechanisms/base/builtin.h"
+#include "physics/elements_in_map.h"
 
 namespace mmradartwin {
 

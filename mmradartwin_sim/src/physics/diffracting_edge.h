@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "mechanisms/base/builtin.h"
+#include "physics/elements_in_map.h"
 #include "physics/polarisation.h"
 
 namespace mmradartwin {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "mechanisms/base/builtin.h"
+#include "physics/elements_in_map.h"
 #include "rays/image_paths.h"
 
 namespace mmradartwin {

@@ -35,7 +35,7 @@ MovingTwin::MovingTwin(const Twin& twin, const std::vector<std::string>& actors)
   rest_ = *m.edited;
   m.edited_rays = std::make_unique<RayCaster>(*m.edited, movable);
   for (const auto& mechanism : m.mechanisms) mechanism->build(*m.edited, m.description.radar);
-  parts_.resize(m.mechanisms.size());
+  parts_.resize(m.stages.paths.size());
 }
 
 MovingTwin::~MovingTwin() = default;
@@ -114,9 +114,9 @@ void MovingTwin::trace(const PoseContext& context, const SceneChange* change) {
     return change->touches(radar, r);
   };
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    const Mechanism& mechanism = *m.mechanisms[i];
+    const auto& [stage, mechanism] = m.stages.paths[i];
     Part& part = parts_[i];
-    const bool partly = change && mechanism.tracesChanges();
+    const bool partly = change && stage->tracesChanges();
     PoseContext c = context;
     c.change = partly ? change : nullptr;
     const std::size_t begin = records.size();
@@ -129,7 +129,7 @@ void MovingTwin::trace(const PoseContext& context, const SceneChange* change) {
       part.sum.setZero(context.radar.channels(), context.radar.samples_per_chirp);
     }
     const std::size_t kept = records.size();
-    if (!mechanism.needsStrongestAmplitude()) m.addPaths(mechanism, c, records);
+    if (!mechanism->needsStrongestAmplitude()) m.addPaths(*stage, c, records);
     m.reweight(c, records, kept);
     found_ += records.size() - kept;
     part.begin = begin;
@@ -171,7 +171,7 @@ const Simulation& MovingTwin::simulate(const Eigen::Isometry3d& T_map_radar, std
   c.receiver_gain = [&m, &c](double length_m) { return m.toneGain(c, length_m); };
   simulation_.stamp_ns = stamp_ns;
   simulation_.T_map_radar = T_map_radar;
-  simulation_.propagation_only = !m.has_tone_gain && !m.has_receive && !m.has_distort;
+  simulation_.propagation_only = m.propagatesOnly();
   simulation_.records.resize(std::min(simulation_.records.size(), echoes_));
 
   const bool moved = !change.actors.empty();
@@ -204,13 +204,13 @@ const Simulation& MovingTwin::simulate(const Eigen::Isometry3d& T_map_radar, std
   addSum(c, m.filtered(c, relative), grid.x);
   if (checked) {
     ComplexGrid sum = grid.x;
-    if (m.has_tone_gain) {
+    if (!m.stages.tones.empty()) {
       sum.setZero();
       accumulate(c.radar, records, sum);
     }
     simulation_.check = checkRecords(c.radar, records, sum);
   }
-  if (m.has_distort) {
+  if (!m.stages.distortions.empty()) {
     grid.x.setZero();
     m.propagate(c, m.filtered(c, records), grid.x);
   }

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 #include "rays/view_cone.h"
 #include "twin/twin_impl.h"
 
@@ -194,8 +195,9 @@ void Twin::Impl::assemble() {
     std::stable_sort(m.mechanisms.begin(), m.mechanisms.end(), [](const auto& a, const auto& b) {
       return std::make_pair(a->rank(), a->name()) < std::make_pair(b->rank(), b->name());
     });
+    m.stages = StageLists(m.mechanisms);
     m.edited = std::make_unique<Scene>(m.scene);
-    for (const auto& mechanism : m.mechanisms) mechanism->editScene(*m.edited);
+    for (const SceneStage* stage : m.stages.scene) stage->editScene(*m.edited);
     const bool same = std::equal(m.edited->actors.begin(), m.edited->actors.end(), m.scene.actors.begin(),
                                  m.scene.actors.end(), isSame);
     if (same && m.edited->screens.empty()) {
@@ -209,19 +211,7 @@ void Twin::Impl::assemble() {
       m.screens = std::make_unique<RayCaster>(alone);
       m.screens_alone = same;
     }
-    for (const auto& mechanism : m.mechanisms) {
-      mechanism->build(m.model(), radar);
-      m.has_tone_gain = m.has_tone_gain || mechanism->hasToneGain();
-      m.has_receive = m.has_receive || mechanism->hasReceiveStage();
-      m.has_replicas = m.has_replicas || mechanism->hasReplicas();
-      m.has_distort = m.has_distort || mechanism->hasDistortStage();
-      m.has_chirp_paths = m.has_chirp_paths || mechanism->hasChirpPaths();
-      m.has_modulation = m.has_modulation || mechanism->hasModulation();
-      m.has_chirp_stage = m.has_chirp_stage || mechanism->hasChirpStage();
-      m.has_digitise = m.has_digitise || mechanism->hasDigitiseStage();
-      m.has_transport = m.has_transport || mechanism->hasTransportStage();
-      m.needs_strongest = m.needs_strongest || mechanism->needsStrongestAmplitude();
-    }
+    for (const auto& mechanism : m.mechanisms) mechanism->build(m.model(), radar);
   } catch (const InputError& e) {
     throw InputError((m.description.file.empty() ? m.description.scene_file : m.description.file) + ": " + e.what());
   }
@@ -243,7 +233,8 @@ void Twin::setSession(const std::vector<Pose>& poses) {
   std::sort(impl_->session_ns.begin(), impl_->session_ns.end());
   impl_->reported = trajectoryOf(poses);
   for (const auto& m : impl_->mechanisms) {
-    const std::string only = m->onlyPose();
+    const auto* stage = dynamic_cast<const TransportStage*>(m.get());
+    const std::string only = stage ? stage->onlyPose() : std::string();
     if (only.empty() || std::any_of(poses.begin(), poses.end(), [&only](const Pose& p) { return p.name == only; })) {
       continue;
     }
@@ -262,7 +253,7 @@ std::vector<std::string> Twin::notes() const {
 }
 
 void Twin::prepare(const std::vector<Eigen::Isometry3d>& poses) {
-  if (!impl_->needs_strongest || impl_->strongest >= 0) return;
+  if (!impl_->stages.needs_strongest || impl_->strongest >= 0) return;
   std::vector<double> best(poses.size(), 0);
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
     try {
@@ -293,8 +284,8 @@ std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar, std::i
   c.cloud = cloud;
   impl_->refuseUnusablePose(c);
   std::vector<PathRecord> records;
-  for (const auto& m : impl_->mechanisms) {
-    if (!m->needsStrongestAmplitude()) impl_->addPaths(*m, c, records);
+  for (const auto& [stage, m] : impl_->stages.paths) {
+    if (!m->needsStrongestAmplitude()) impl_->addPaths(*stage, c, records);
   }
   return records;
 }
@@ -304,16 +295,16 @@ std::vector<PathRecord> Twin::trace(std::size_t mechanism, const Eigen::Isometry
   PoseContext c = impl_->context(T_map_radar);
   c.cloud = cloud;
   impl_->refuseUnusablePose(c);
-  const Mechanism& wanted = *impl_->as_described[mechanism];
-  const std::vector<std::string> beside = wanted.looksAtPathsOf();
+  const PathStage* wanted = impl_->pathStage(mechanism);
   std::vector<PathRecord> records;
-  if (wanted.needsStrongestAmplitude()) return records;
-  for (const auto& m : impl_->mechanisms) {
-    if (m.get() == &wanted) break;  // of those that it looks at, all act before it
-    if (std::find(beside.begin(), beside.end(), m->name()) != beside.end()) impl_->addPaths(*m, c, records);
+  if (!wanted || impl_->as_described[mechanism]->needsStrongestAmplitude()) return records;
+  const std::vector<std::string> beside = wanted->looksAtPathsOf();
+  for (const auto& [stage, m] : impl_->stages.paths) {
+    if (stage == wanted) break;  // of those that it looks at, all act before it
+    if (std::find(beside.begin(), beside.end(), m->name()) != beside.end()) impl_->addPaths(*stage, c, records);
   }
   const auto known = static_cast<std::ptrdiff_t>(records.size());
-  impl_->addPaths(wanted, c, records);
+  impl_->addPaths(*wanted, c, records);
   records.erase(records.begin(), records.begin() + known);
   return records;
 }
@@ -321,8 +312,8 @@ std::vector<PathRecord> Twin::trace(std::size_t mechanism, const Eigen::Isometry
 std::vector<PathRecord> Twin::retrace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
                                       const CloudCells& cloud, const SceneChange& change,
                                       const std::vector<PathRecord>& known) const {
-  const Mechanism& wanted = *impl_->as_described[mechanism];
-  if (!wanted.tracesChanges()) return trace(mechanism, T_map_radar, &cloud);
+  const PathStage* wanted = impl_->pathStage(mechanism);
+  if (!wanted || !wanted->tracesChanges()) return trace(mechanism, T_map_radar, &cloud);
   PoseContext c = impl_->context(T_map_radar);
   impl_->refuseUnusablePose(c);
   CloudCells::CellSet touched;
@@ -331,7 +322,7 @@ std::vector<PathRecord> Twin::retrace(std::size_t mechanism, const Eigen::Isomet
   c.cloud = &cells;
   c.change = &change;
   std::vector<PathRecord> records;
-  impl_->addPaths(wanted, c, records);
+  impl_->addPaths(*wanted, c, records);
   for (const PathRecord& r : known) {
     if (r.actors.size() == 1 && r.actors[0] >= 0 && !change.moved(r.actors[0]) &&
         touched.count(cells.cellOf(r.facets[0], r.vertices[0])) == 0) {
@@ -344,15 +335,15 @@ std::vector<PathRecord> Twin::retrace(std::size_t mechanism, const Eigen::Isomet
 std::vector<PathRecord> Twin::traceAround(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
                                           const CloudCells& cloud, const PlacedActor& placed,
                                           const std::vector<PathRecord>& without) const {
-  const Mechanism& wanted = *impl_->as_described[mechanism];
-  if (!wanted.looksAtPathsOf().empty()) return trace(mechanism, T_map_radar, &cloud);
+  const PathStage* wanted = impl_->pathStage(mechanism);
+  if (!wanted || !wanted->looksAtPathsOf().empty()) return trace(mechanism, T_map_radar, &cloud);
   PoseContext c = impl_->context(T_map_radar);
   impl_->refuseUnusablePose(c);
   const Scene& scene = impl_->model();
   c.only_actor = placed.actor >= 0 ? placed.actor : static_cast<int>(scene.actors.size()) - 1;
   c.cloud = &cloud;
   std::vector<PathRecord> records;
-  wanted.addPaths(c, records);
+  wanted->addPaths(c, records);
   const auto others = [&](const PathRecord& r) {
     return std::find(r.actors.begin(), r.actors.end(), c.only_actor) == r.actors.end();
   };
@@ -375,11 +366,11 @@ std::vector<PathRecord> Twin::Impl::weighted(const PoseContext& c, std::vector<P
 }
 
 void Twin::Impl::addRelativePaths(const PoseContext& c, std::vector<PathRecord>& records) const {
-  if (needs_strongest) {
+  if (stages.needs_strongest) {
     raise(strongest_so_far, strongestOf(c, records));
     const std::size_t echoes = records.size();
-    for (const auto& m : mechanisms) {
-      if (m->needsStrongestAmplitude()) addPaths(*m, c, records);
+    for (const auto& [stage, m] : stages.paths) {
+      if (m->needsStrongestAmplitude()) addPaths(*stage, c, records);
     }
     reweight(c, records, echoes);
   }
@@ -393,10 +384,10 @@ std::vector<PathRecord> Twin::receivedPaths(const Eigen::Isometry3d& T_map_radar
   return impl_->filtered(c, impl_->weighted(c, std::move(traced)));
 }
 
-bool Twin::hasReceiveStage() const { return impl_->has_receive || impl_->has_distort; }
+bool Twin::hasReceiveStage() const { return !impl_->stages.receive.empty() || !impl_->stages.distortions.empty(); }
 
 std::optional<Eigen::MatrixXcd> Twin::channelMatrix(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) const {
-  if (impl_->has_distort) return std::nullopt;
+  if (!impl_->stages.distortions.empty()) return std::nullopt;
   const PoseContext c = impl_->context(T_map_radar, stamp_ns);
   const int channels = c.radar.channels(), samples = c.radar.samples_per_chirp;
   const auto answer = [&](int channel, double cycles) {
@@ -440,8 +431,8 @@ Simulation Twin::weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRec
   accumulate(radar, s.records, s.grid.x);
   if (s.records.empty()) s.grid.x = ComplexGrid::Zero(radar.channels(), radar.samples_per_chirp);
   s.check = checkRecords(radar, s.records, s.grid.x);
-  s.propagation_only = !impl_->has_tone_gain && !impl_->has_receive && !impl_->has_distort;
-  if (impl_->has_tone_gain || impl_->has_distort) {
+  s.propagation_only = impl_->propagatesOnly();
+  if (!impl_->stages.tones.empty() || !impl_->stages.distortions.empty()) {
     s.grid.x.setZero();
     impl_->propagate(c, impl_->filtered(c, s.records), s.grid.x);
   }

@@ -1,3 +1,5 @@
+#include "mmradartwin_sim/twin_description.h"
+
 #include <Eigen/Core>
 #include <cmath>
 #include <iomanip>
@@ -7,8 +9,8 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/strict_yaml.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 #include "mmradartwin_sim/plugin.h"
-#include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
 namespace {

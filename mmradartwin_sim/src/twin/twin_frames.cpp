@@ -22,16 +22,66 @@ std::int16_t count(double full_scales) {
 }  // namespace
 
 bool Twin::hasFrameStage() const {
-  const Impl& m = *impl_;
-  return m.has_chirp_paths || m.has_modulation || m.has_chirp_stage || m.has_digitise || m.has_transport;
+  const StageLists& stages = impl_->stages;
+  return framesNeedRecords() || !stages.chirps.empty() || !stages.digitise.empty() || !stages.transport.empty();
 }
 
-bool Twin::framesNeedRecords() const { return impl_->has_chirp_paths || impl_->has_modulation; }
+bool Twin::framesNeedRecords() const {
+  return !impl_->stages.chirp_paths.empty() || !impl_->stages.modulations.empty();
+}
 
 double Twin::clippedFraction() const {
   double fraction = 0;
-  for (const auto& m : impl_->mechanisms) fraction = std::max(fraction, m->clippedFraction());
+  for (const DigitiseStage* m : impl_->stages.digitise) fraction = std::max(fraction, m->clippedFraction());
   return fraction;
+}
+
+ChirpContext Twin::Impl::chirpContext(const PoseContext& c, std::int64_t stamp_ns, int frame, int chirp) const {
+  const RadarConfig& radar = c.radar;
+  ChirpContext now{c};
+  now.stamp_ns = stamp_ns;
+  now.frame = frame;
+  now.chirp = chirp;
+  now.slot = chirp % radar.slots();
+  now.time_s =
+      1e-9 * static_cast<double>(radar.frame_offset_ns(frame)) + chirp * chirpPeriod_s(radar) + radar.window_center_s();
+  now.frame_draw = drawKey(drawKey(seed, static_cast<std::uint64_t>(stamp_ns)), static_cast<std::uint64_t>(frame));
+  now.draw = drawKey(now.frame_draw, static_cast<std::uint64_t>(chirp) + 1);
+  return now;
+}
+
+void Twin::Impl::propagateWithDelays(const PoseContext& c, std::vector<PathRecord>& paths, DelayedGrid& grid) const {
+  grid.x.setZero(c.radar.channels(), c.radar.samples_per_chirp);
+  propagate(c, paths, grid.x);
+  if (stages.modulations.empty()) return;
+  for (PathRecord& r : paths) {
+    for (std::size_t k = 0; k < r.c.size(); ++k) r.c[k] *= r.length_m[k] / kSpeedOfLight_m_per_s;
+  }
+  grid.delayed.setZero(c.radar.channels(), c.radar.samples_per_chirp);
+  accumulate(c.radar, paths, grid.delayed);
+}
+
+void Twin::Impl::varyChirp(const ChirpContext& now, const DelayedGrid& still, ChirpScratch& scratch,
+                           ComplexGrid& x) const {
+  const PoseContext& c = now.pose;
+  const int receivers = c.radar.receivers(), first = now.slot * receivers;
+  const bool modulates = !stages.modulations.empty();
+  if (modulates) scratch.weighted = still.delayed.middleRows(first, receivers);
+  std::vector<PathRecord>& moving = scratch.moving;
+  moving.clear();
+  for (const ChirpPathStage* m : stages.chirp_paths) m->addChirpPaths(now, moving);
+  if (!moving.empty()) {
+    reweight(c, moving, 0);
+    addReplicas(c, moving);
+    moving = filtered(c, std::move(moving));
+    propagateWithDelays(c, moving, scratch.added);
+    x.middleRows(first, receivers) += scratch.added.x.middleRows(first, receivers);
+    if (modulates) scratch.weighted += scratch.added.delayed.middleRows(first, receivers);
+  }
+  if (!modulates) return;
+  scratch.chirp = x.middleRows(first, receivers);
+  for (const ModulationStage* m : stages.modulations) m->modulateChirp(now, scratch.weighted, scratch.chirp);
+  x.middleRows(first, receivers) = scratch.chirp;
 }
 
 void Twin::forEachChirp(const Simulation& pose, int frames,
@@ -40,76 +90,23 @@ void Twin::forEachChirp(const Simulation& pose, int frames,
   const RadarConfig& radar = m.description.radar;
   PoseContext c = m.context(pose.T_map_radar, pose.stamp_ns);
   c.receiver_gain = [&m, &c](double length_m) { return m.toneGain(c, length_m); };
-  const int slots = radar.slots(), receivers = radar.receivers(), samples = radar.samples_per_chirp;
-  const double period_s = chirpPeriod_s(radar);
-  const std::uint64_t pose_draw = drawKey(m.seed, static_cast<std::uint64_t>(pose.stamp_ns));
+  const int slots = radar.slots(), receivers = radar.receivers();
   const bool varies = framesNeedRecords();
 
   // What stays the same from chirp to chirp is propagated once.
-  ComplexGrid still = ComplexGrid::Zero(radar.channels(), samples), delayed;
+  Impl::DelayedGrid still;
   if (varies) {
     std::vector<PathRecord> paths = m.filtered(c, pose.records);
-    m.propagate(c, paths, still);
-    if (m.has_modulation) {
-      for (PathRecord& r : paths) {
-        for (std::size_t k = 0; k < r.c.size(); ++k) r.c[k] *= r.length_m[k] / kSpeedOfLight_m_per_s;
-      }
-      delayed = ComplexGrid::Zero(radar.channels(), samples);
-      accumulate(radar, paths, delayed);
-    }
+    m.propagateWithDelays(c, paths, still);
   }
-  ComplexGrid x, moving_delayed, chirp, weighted;
-  std::vector<PathRecord> moving;
+  Impl::ChirpScratch scratch;
+  ComplexGrid x, chirp;
   for (int f = 0; f < frames; ++f) {
     for (int loop = 0; loop < radar.loops_per_frame; ++loop) {
-      const auto at = [&](int slot) {
-        const int number = loop * slots + slot;
-        ChirpContext chirp_context{c};
-        chirp_context.stamp_ns = pose.stamp_ns;
-        chirp_context.frame = f;
-        chirp_context.chirp = number;
-        chirp_context.slot = slot;
-        chirp_context.time_s =
-            1e-9 * static_cast<double>(radar.frame_offset_ns(f)) + number * period_s + radar.window_center_s();
-        chirp_context.frame_draw = drawKey(pose_draw, static_cast<std::uint64_t>(f));
-        chirp_context.draw = drawKey(chirp_context.frame_draw, static_cast<std::uint64_t>(number) + 1);
-        return chirp_context;
-      };
+      const auto at = [&](int slot) { return m.chirpContext(c, pose.stamp_ns, f, loop * slots + slot); };
       if (varies) {
-        x = still;
-        for (int slot = 0; slot < slots; ++slot) {
-          const ChirpContext now = at(slot);
-          const auto rows = [&](ComplexGrid& grid) { return grid.middleRows(slot * receivers, receivers); };
-          if (m.has_modulation) weighted = rows(delayed);
-          moving.clear();
-          if (m.has_chirp_paths) {
-            for (const auto& mechanism : m.mechanisms) {
-              if (mechanism->hasChirpPaths()) mechanism->addChirpPaths(now, moving);
-            }
-          }
-          if (!moving.empty()) {
-            m.reweight(c, moving, 0);
-            m.addReplicas(c, moving);
-            moving = m.filtered(c, std::move(moving));
-            moving_delayed.setZero(radar.channels(), samples);
-            m.propagate(c, moving, moving_delayed);
-            rows(x) += rows(moving_delayed);
-            if (m.has_modulation) {
-              for (PathRecord& r : moving) {
-                for (std::size_t k = 0; k < r.c.size(); ++k) r.c[k] *= r.length_m[k] / kSpeedOfLight_m_per_s;
-              }
-              moving_delayed.setZero();
-              accumulate(radar, moving, moving_delayed);
-              weighted += rows(moving_delayed);
-            }
-          }
-          if (!m.has_modulation) continue;
-          chirp = rows(x);
-          for (const auto& mechanism : m.mechanisms) {
-            if (mechanism->hasModulation()) mechanism->modulateChirp(now, weighted, chirp);
-          }
-          rows(x) = chirp;
-        }
+        x = still.x;
+        for (int slot = 0; slot < slots; ++slot) m.varyChirp(at(slot), still, scratch, x);
         m.receive(c, x);
       } else {
         x = pose.grid.x;
@@ -117,11 +114,7 @@ void Twin::forEachChirp(const Simulation& pose, int frames,
       for (int slot = 0; slot < slots; ++slot) {
         const ChirpContext now = at(slot);
         chirp = x.middleRows(slot * receivers, receivers);
-        if (m.has_chirp_stage) {
-          for (const auto& mechanism : m.mechanisms) {
-            if (mechanism->hasChirpStage()) mechanism->changeChirp(now, chirp);
-          }
-        }
+        for (const ChirpStage* stage : m.stages.chirps) stage->changeChirp(now, chirp);
         visit(now, chirp);
       }
     }
@@ -137,7 +130,7 @@ std::vector<AdcCube> Twin::simulateFrames(const Simulation& pose, const FrameOpt
   const Impl& m = *impl_;
   const RadarConfig& radar = m.description.radar;
   std::size_t surplus_bytes = 0;
-  for (const auto& mechanism : m.mechanisms) surplus_bytes += mechanism->surplusBytes();
+  for (const TransportStage* stage : m.stages.transport) surplus_bytes += stage->surplusBytes();
   const int surplus = static_cast<int>((surplus_bytes + radar.bytes_per_frame() - 1) / radar.bytes_per_frame());
 
   std::vector<AdcCube> cubes(static_cast<std::size_t>(options.frames + surplus));
@@ -154,11 +147,7 @@ std::vector<AdcCube> Twin::simulateFrames(const Simulation& pose, const FrameOpt
   const double gain = std::pow(10.0, options.gain_db / 20);
   forEachChirp(pose, static_cast<int>(cubes.size()), [&](const ChirpContext& now, ComplexGrid& x) {
     x *= gain;
-    if (m.has_digitise) {
-      for (const auto& mechanism : m.mechanisms) {
-        if (mechanism->hasDigitiseStage()) mechanism->digitise(now, x);
-      }
-    }
+    for (const DigitiseStage* stage : m.stages.digitise) stage->digitise(now, x);
     std::vector<std::int16_t>& data = cubes[static_cast<std::size_t>(now.frame)].data;
     for (Eigen::Index n = 0; n < x.cols(); ++n) {
       for (Eigen::Index r = 0; r < x.rows(); ++r) {
@@ -167,7 +156,7 @@ std::vector<AdcCube> Twin::simulateFrames(const Simulation& pose, const FrameOpt
       }
     }
   });
-  if (m.has_transport) {
+  if (!m.stages.transport.empty()) {
     std::vector<std::uint8_t> payload;
     for (const AdcCube& cube : cubes) {
       const std::vector<std::uint8_t> bytes = encodeFrame(radar, cube.data);
@@ -175,9 +164,7 @@ std::vector<AdcCube> Twin::simulateFrames(const Simulation& pose, const FrameOpt
     }
     const PayloadContext context{radar, options.pose_name,
                                  drawKey(drawKey(m.seed, static_cast<std::uint64_t>(pose.stamp_ns)), 0x7061796C6F6164)};
-    for (const auto& mechanism : m.mechanisms) {
-      if (mechanism->hasTransportStage()) mechanism->transport(context, payload);
-    }
+    for (const TransportStage* stage : m.stages.transport) stage->transport(context, payload);
     payload.resize(static_cast<std::size_t>(options.frames) * radar.bytes_per_frame(), 0);
     for (int f = 0; f < options.frames; ++f) {
       decodeFrame(radar, payload.data() + static_cast<std::size_t>(f) * radar.bytes_per_frame(),

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mmradartwin_sim/twin.h"
+#include "twin/stage_lists.h"
 
 namespace mmradartwin {
 
@@ -25,13 +26,11 @@ struct Twin::Impl {
   bool screens_alone = false;                          // are all that was added
   std::vector<std::unique_ptr<Mechanism>> mechanisms;  // by rank
   std::vector<const Mechanism*> as_described;          // the same by Twin::description()
+  StageLists stages;                                   // the same by what they act in
   double strongest = -1;                               // of the session, where it is known
   mutable std::atomic<double> strongest_so_far{0};
   mutable std::once_flag alone_made;
   mutable std::unique_ptr<RayCaster> alone_rays;
-  bool has_tone_gain = false, has_receive = false, has_distort = false, has_replicas = false, needs_strongest = false;
-  bool has_chirp_paths = false, has_modulation = false, has_chirp_stage = false, has_digitise = false,
-       has_transport = false;
   std::vector<std::int64_t> session_ns;  // stamps of the session's poses in order of time
   Trajectory reported;                   // null where nothing is known
 
@@ -39,9 +38,9 @@ struct Twin::Impl {
   void assemble();
 
   /// The mechanism's paths. What it meets that a mechanism put into the room has no index that others know: it is -1.
-  void addPaths(const Mechanism& mechanism, const PoseContext& c, std::vector<PathRecord>& records) const {
+  void addPaths(const PathStage& stage, const PoseContext& c, std::vector<PathRecord>& records) const {
     const std::size_t known = records.size();
-    mechanism.addPaths(c, records);
+    stage.addPaths(c, records);
     nameAddedActors(records, known);
   }
   void nameAddedActors(std::vector<PathRecord>& records, std::size_t from) const {
@@ -60,6 +59,11 @@ struct Twin::Impl {
     return *alone_rays;
   }
 
+  /// Of a mechanism of Twin::description(); null where it adds no paths.
+  const PathStage* pathStage(std::size_t described) const {
+    return dynamic_cast<const PathStage*>(as_described[described]);
+  }
+
   const Scene& model() const { return edited ? *edited : scene; }
   const RayCaster& modelRays() const { return edited_rays ? *edited_rays : *rays; }
 
@@ -70,7 +74,7 @@ struct Twin::Impl {
   }
   double poseLag_s() const {
     double lag_s = 0;
-    for (const auto& m : mechanisms) lag_s += m->poseLag_s();
+    for (const MountingStage* m : stages.mounting) lag_s += m->poseLag_s();
     return lag_s;
   }
 
@@ -81,7 +85,7 @@ struct Twin::Impl {
       const auto now = reported(stamp_ns), later = reported(stamp_ns + std::llround(lag_s * 1e9));
       if (now && later) T = T * (now->inverse() * *later);
     }
-    for (const auto& m : mechanisms) T = m->pose(T);
+    for (const MountingStage* m : stages.mounting) T = m->pose(T);
     return T;
   }
 
@@ -107,24 +111,21 @@ struct Twin::Impl {
 
   double toneGain(const PoseContext& c, double length_m) const {
     double gain = 1;
-    for (const auto& m : mechanisms) {
-      if (m->hasToneGain()) gain *= std::abs(m->toneGain(c, length_m));
-    }
+    for (const ToneStage* m : stages.tones) gain *= std::abs(m->toneGain(c, length_m));
     return gain;
   }
 
   void reweight(const PoseContext& c, std::vector<PathRecord>& records, std::size_t from) const {
     for (std::size_t i = from; i < records.size(); ++i) {
-      for (const auto& m : mechanisms) m->reweight(c, records[i]);
+      for (const WeightStage* m : stages.weights) m->reweight(c, records[i]);
     }
   }
 
-  /// Adds to weighted paths what they bring along (Mechanism::replicate).
+  /// Adds to weighted paths what they bring along (ReplicaStage).
   void addReplicas(const PoseContext& c, std::vector<PathRecord>& records) const {
-    if (!has_replicas) return;
     const std::size_t echoes = records.size();
-    for (const auto& m : mechanisms) {
-      for (std::size_t i = 0; m->hasReplicas() && i < echoes; ++i) {
+    for (const ReplicaStage* m : stages.replicas) {
+      for (std::size_t i = 0; i < echoes; ++i) {
         PathRecord replica = records[i];
         if (m->replicate(c, replica)) records.push_back(std::move(replica));
       }
@@ -141,39 +142,48 @@ struct Twin::Impl {
 
   /// Paths as the receiver's filters leave them; the same records where there are no filters.
   std::vector<PathRecord> filtered(const PoseContext& c, std::vector<PathRecord> records) const {
-    if (!has_tone_gain) return records;
-    for (PathRecord& r : records) filter(c, r);
-    return records;
-  }
-  void filter(const PoseContext& c, PathRecord& r) const {
-    if (!has_tone_gain) return;
-    for (std::size_t k = 0; k < r.c.size(); ++k) {
-      for (const auto& m : mechanisms) {
-        if (m->hasToneGain()) r.c[k] *= m->toneGain(c, r.length_m[k]);
+    if (stages.tones.empty()) return records;
+    for (PathRecord& r : records) {
+      for (std::size_t k = 0; k < r.c.size(); ++k) {
+        for (const ToneStage* m : stages.tones) r.c[k] *= m->toneGain(c, r.length_m[k]);
       }
     }
+    return records;
   }
 
   /// Grid of filtered paths before receive().
   void propagate(const PoseContext& c, const std::vector<PathRecord>& filtered_paths, ComplexGrid& x) const {
     accumulate(c.radar, filtered_paths, x);
-    if (!has_distort) return;
-    for (const auto& m : mechanisms) {
-      if (m->hasDistortStage()) m->distort(c, filtered_paths, x);
-    }
+    for (const DistortionStage* m : stages.distortions) m->distort(c, filtered_paths, x);
   }
 
   void receive(const PoseContext& c, ComplexGrid& x) const {
-    if (!has_receive) return;
-    for (const auto& m : mechanisms) {
-      if (m->hasReceiveStage()) m->receive(c, x);
-    }
+    for (const ReceiveStage* m : stages.receive) m->receive(c, x);
   }
+
+  /// True where the receiver does nothing: the grid is the sum of its records.
+  bool propagatesOnly() const { return stages.tones.empty() && stages.receive.empty() && stages.distortions.empty(); }
+
+  /// A grid [M][N] and, where a stage modulates chirps, the same with every path weighted by its delay in s.
+  struct DelayedGrid {
+    ComplexGrid x, delayed;
+  };
+  /// Memory that is used again from chirp to chirp.
+  struct ChirpScratch {
+    std::vector<PathRecord> moving;
+    DelayedGrid added;
+    ComplexGrid weighted, chirp;
+  };
+  ChirpContext chirpContext(const PoseContext& c, std::int64_t stamp_ns, int frame, int chirp) const;
+  /// Makes both grids of filtered paths, before receive(); the paths are weighted by their delays then.
+  void propagateWithDelays(const PoseContext& c, std::vector<PathRecord>& paths, DelayedGrid& grid) const;
+  /// Adds one chirp's own paths to its rows of x, and modulates them; before receive().
+  void varyChirp(const ChirpContext& now, const DelayedGrid& still, ChirpScratch& scratch, ComplexGrid& x) const;
 
   double strongestOf(const PoseContext& c, const std::vector<PathRecord>& records) const {
     double best = 0;
     for (const PathRecord& r : records) {
-      best = std::max(best, has_tone_gain ? r.amplitude * toneGain(c, r.length_m[0]) : r.amplitude);
+      best = std::max(best, stages.tones.empty() ? r.amplitude : r.amplitude * toneGain(c, r.length_m[0]));
     }
     return best;
   }

@@ -1,4 +1,4 @@
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -7,7 +7,7 @@ const std::string kName = "channel_conjugation";
 
 /// The channel vector of every range bin conjugated: echoes at -azimuth, at their range. Conjugate and reversal of time
 /// (n to N - n, which leaves the periodic Hann window as it is) conjugate the range spectrum and nothing else.
-class ChannelConjugation : public Mechanism {
+class ChannelConjugation : public Mechanism, public ReceiveStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override { return {}; }
@@ -18,11 +18,10 @@ class ChannelConjugation : public Mechanism {
     for (Eigen::Index n = 0; n < x.cols(); ++n) y.col(n) = x.col((x.cols() - n) % x.cols()).conjugate();
     x = y;
   }
-  bool hasReceiveStage() const override { return true; }
 };
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeChannelConjugation() { return std::make_unique<ChannelConjugation>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(ChannelConjugation)
 
 }  // namespace mmradartwin

@@ -1,4 +1,4 @@
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -7,11 +7,12 @@ namespace {
 const std::string kName = "channel_permutation";
 
 /// Virtual channels delivered in another order.
-class ChannelPermutation : public Mechanism {
+class ChannelPermutation : public Mechanism, public ReceiveStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    ParameterSpec order = optionalListSpec("order", "1", 0, 1023, "order[i] is the true channel delivered in place i");
+    ParameterSpec order =
+        optionalNumbersSpec("order", "1", 0, 1023, "order[i] is the true channel delivered in place i");
     order.required = true;
     return {order};
   }
@@ -36,7 +37,6 @@ class ChannelPermutation : public Mechanism {
     const ComplexGrid ordered = x;
     for (Eigen::Index i = 0; i < x.rows(); ++i) x.row(i) = ordered.row(order_[static_cast<std::size_t>(i)]);
   }
-  bool hasReceiveStage() const override { return true; }
 
  private:
   std::vector<Eigen::Index> order_;
@@ -44,6 +44,6 @@ class ChannelPermutation : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeChannelPermutation() { return std::make_unique<ChannelPermutation>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(ChannelPermutation)
 
 }  // namespace mmradartwin

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -9,7 +9,7 @@ namespace {
 const std::string kName = "channel_phase_error";
 
 /// A phase and gain per virtual channel, the same for all paths.
-class ChannelPhaseError : public Mechanism {
+class ChannelPhaseError : public Mechanism, public ReceiveStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -47,7 +47,6 @@ class ChannelPhaseError : public Mechanism {
   void receive(const PoseContext&, ComplexGrid& x) const override {
     for (Eigen::Index k = 0; k < x.rows(); ++k) x.row(k) *= factor_[static_cast<std::size_t>(k)];
   }
-  bool hasReceiveStage() const override { return true; }
 
  private:
   std::vector<std::complex<double>> factor_;
@@ -55,6 +54,6 @@ class ChannelPhaseError : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeChannelPhaseError() { return std::make_unique<ChannelPhaseError>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(ChannelPhaseError)
 
 }  // namespace mmradartwin

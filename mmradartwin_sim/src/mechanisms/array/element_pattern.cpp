@@ -1,7 +1,7 @@
 #include <cmath>
 
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/pattern_curve.h"
-#include "mechanisms/base/receiver_builtin.h"
 
 namespace mmradartwin {
 namespace {
@@ -9,16 +9,16 @@ namespace {
 const std::string kName = "element_pattern";
 
 /// Directivity of the elements: roll-off with azimuth as a cosine or a measured curve, and with elevation as a curve.
-class ElementPattern : public Mechanism {
+class ElementPattern : public Mechanism, public WeightStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {
-        tried(numberSpec("cos_exponent", "1", 0, 100, 0, "n of the one-way power cos^n of the azimuth"), 0, 1.5),
-        optionalListSpec("angles_deg", "deg", -180, 180, "azimuths of a measured curve, rising, positive to the left"),
-        optionalListSpec("gain_db", "dB", -200, 60, "one-way power at angles_deg"),
-        optionalListSpec("elevation_angles_deg", "deg", -90, 90, "elevations of a measured curve, rising"),
-        optionalListSpec("elevation_gain_db", "dB", -200, 60, "one-way power at elevation_angles_deg")};
+    return {tried(numberSpec("cos_exponent", "1", 0, 100, 0, "n of the one-way power cos^n of the azimuth"), 0, 1.5),
+            optionalNumbersSpec("angles_deg", "deg", -180, 180,
+                                "azimuths of a measured curve, rising, positive to the left"),
+            optionalNumbersSpec("gain_db", "dB", -200, 60, "one-way power at angles_deg"),
+            optionalNumbersSpec("elevation_angles_deg", "deg", -90, 90, "elevations of a measured curve, rising"),
+            optionalNumbersSpec("elevation_gain_db", "dB", -200, 60, "one-way power at elevation_angles_deg")};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     exponent_ = values.number("cos_exponent");
@@ -49,6 +49,6 @@ class ElementPattern : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeElementPattern() { return std::make_unique<ElementPattern>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(ElementPattern)
 
 }  // namespace mmradartwin

@@ -1,7 +1,7 @@
 #include <cmath>
 
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/pattern_curve.h"
-#include "mechanisms/base/receiver_builtin.h"
 
 namespace mmradartwin {
 namespace {
@@ -9,13 +9,14 @@ namespace {
 const std::string kName = "elevation_pattern";
 
 /// Roll-off of the elements with elevation, as a cosine or a measured curve.
-class ElevationPattern : public Mechanism {
+class ElevationPattern : public Mechanism, public WeightStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
-    return {tried(numberSpec("cos_exponent", "1", 0, 100, 0, "n of the one-way power cos^n"), 0, 8),
-            optionalListSpec("angles_deg", "deg", -90, 90, "elevations of a measured curve, rising, positive upwards"),
-            optionalListSpec("gain_db", "dB", -200, 60, "one-way power at angles_deg")};
+    return {
+        tried(numberSpec("cos_exponent", "1", 0, 100, 0, "n of the one-way power cos^n"), 0, 8),
+        optionalNumbersSpec("angles_deg", "deg", -90, 90, "elevations of a measured curve, rising, positive upwards"),
+        optionalNumbersSpec("gain_db", "dB", -200, 60, "one-way power at angles_deg")};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     exponent_ = values.number("cos_exponent");
@@ -37,6 +38,6 @@ class ElevationPattern : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeElevationPattern() { return std::make_unique<ElevationPattern>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(ElevationPattern)
 
 }  // namespace mmradartwin

@@ -1,7 +1,7 @@
 #include <cmath>
 #include <complex>
 
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -13,7 +13,7 @@ const std::string kName = "mutual_coupling";
 /// Toeplitz with ones on its diagonal. Beside it stands level_db at phase_deg, decay_db less and phase_deg more for
 /// every element further; or the complex shares of the next and the second element as numbers, which a diagnosis can
 /// follow from nothing: no level and phase are known where there is no coupling.
-class MutualCoupling : public Mechanism {
+class MutualCoupling : public Mechanism, public ReceiveStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -58,7 +58,6 @@ class MutualCoupling : public Mechanism {
       x.middleRows(first, receivers) = (coupling_ * x.middleRows(first, receivers)).eval();
     }
   }
-  bool hasReceiveStage() const override { return true; }
 
  private:
   Eigen::MatrixXcd coupling_;
@@ -66,6 +65,6 @@ class MutualCoupling : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeMutualCoupling() { return std::make_unique<MutualCoupling>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(MutualCoupling)
 
 }  // namespace mmradartwin

@@ -1,6 +1,6 @@
 #include <complex>
 
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -10,7 +10,7 @@ const std::string kName = "transmitter_coupling";
 
 /// A transmitter that is switched off still radiates a little: every transmitter's slot carries the others' signals,
 /// too, all at the same complex share.
-class TransmitterCoupling : public Mechanism {
+class TransmitterCoupling : public Mechanism, public ReceiveStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -35,7 +35,6 @@ class TransmitterCoupling : public Mechanism {
       x.middleRows(first, receivers) = ((1.0 - share_) * x.middleRows(first, receivers) + share_ * all).eval();
     }
   }
-  bool hasReceiveStage() const override { return true; }
 
  private:
   std::complex<double> share_;
@@ -43,6 +42,6 @@ class TransmitterCoupling : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeTransmitterCoupling() { return std::make_unique<TransmitterCoupling>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(TransmitterCoupling)
 
 }  // namespace mmradartwin

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -9,7 +9,7 @@ namespace {
 const std::string kName = "tx_imbalance";
 
 /// The second transmitter's block of channels turned or scaled.
-class TxImbalance : public Mechanism {
+class TxImbalance : public Mechanism, public ReceiveStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -23,7 +23,6 @@ class TxImbalance : public Mechanism {
     factor_ = std::polar(std::pow(10.0, values.number("gain_db") / 20), values.number("phase_deg") * M_PI / 180);
   }
   void receive(const PoseContext&, ComplexGrid& x) const override { x.middleRows(receivers_, receivers_) *= factor_; }
-  bool hasReceiveStage() const override { return true; }
 
  private:
   int receivers_ = 0;
@@ -32,6 +31,6 @@ class TxImbalance : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeTxImbalance() { return std::make_unique<TxImbalance>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(TxImbalance)
 
 }  // namespace mmradartwin

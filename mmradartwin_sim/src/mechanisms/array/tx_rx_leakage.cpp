@@ -1,7 +1,7 @@
 #include <cmath>
 #include <random>
 
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -11,7 +11,7 @@ const std::string kName = "tx_rx_leakage";
 
 /// Coupling from transmitters into receivers: one echo fixed to the radar's body, the same at every pose, with an
 /// arbitrary but fixed complex vector over the channels.
-class TxRxLeakage : public Mechanism {
+class TxRxLeakage : public Mechanism, public PathStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -82,6 +82,6 @@ class TxRxLeakage : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeTxRxLeakage() { return std::make_unique<TxRxLeakage>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(TxRxLeakage)
 
 }  // namespace mmradartwin

@@ -1,6 +1,7 @@
 #include <algorithm>
 
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
+#include "physics/elements_in_map.h"
 #include "physics/trihedral.h"
 
 namespace mmradartwin {
@@ -9,7 +10,7 @@ namespace {
 const std::string kName = "corner";
 
 /// The retro paths of two and of three facets that meet at concave right angles.
-class Corner : public Mechanism {
+class Corner : public Mechanism, public PathStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override { return {}; }
@@ -54,6 +55,6 @@ class Corner : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeCorner() { return std::make_unique<Corner>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(Corner)
 
 }  // namespace mmradartwin

@@ -4,8 +4,9 @@
 #include <optional>
 #include <unordered_map>
 
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "physics/elements_in_map.h"
 #include "physics/polarisation.h"
 #include "physics/scatter_points.h"
 #include "rays/view_cone.h"
@@ -37,7 +38,7 @@ double directiveNorm(int alpha, double cos_theta) {
   return sum / std::pow(2.0, alpha);
 }
 
-class Diffuse : public Mechanism {
+class Diffuse : public Mechanism, public PathStage {
  public:
   const std::string& name() const override { return kName; }
 
@@ -203,6 +204,6 @@ class Diffuse : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeDiffuse() { return std::make_unique<Diffuse>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(Diffuse)
 
 }  // namespace mmradartwin

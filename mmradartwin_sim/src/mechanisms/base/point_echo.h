@@ -3,7 +3,7 @@
 #include <cmath>
 #include <optional>
 
-#include "mechanisms/base/builtin.h"
+#include "physics/elements_in_map.h"
 
 namespace mmradartwin {
 

@@ -1,9 +1,10 @@
 #include <atomic>
 #include <cmath>
 
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "physics/aperture.h"
 #include "physics/curved_surface.h"
+#include "physics/elements_in_map.h"
 #include "physics/image_record.h"
 #include "physics/polarisation.h"
 #include "rays/image_paths.h"
@@ -15,7 +16,7 @@ const std::string kName = "specular";
 constexpr double kInset_m = 0.01;  // where a return beside a facet is taken to come from
 constexpr double kSmallestFactor = 0.01;
 
-class Specular : public Mechanism {
+class Specular : public Mechanism, public PathStage {
  public:
   const std::string& name() const override { return kName; }
 
@@ -204,6 +205,6 @@ class Specular : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeSpecular() { return std::make_unique<Specular>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(Specular)
 
 }  // namespace mmradartwin

@@ -1,7 +1,7 @@
 #include <cmath>
 
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/point_echo.h"
-#include "mechanisms/base/propagation_builtin.h"
 
 namespace mmradartwin {
 namespace {
@@ -10,7 +10,7 @@ const std::string kName = "empirical_echo";
 
 /// A point that answers alike in all directions, later than its distance says: a tag with a delay line, something that
 /// rings, a way behind a panel. It hides nothing.
-class EmpiricalEcho : public Mechanism {
+class EmpiricalEcho : public Mechanism, public PathStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -41,6 +41,6 @@ class EmpiricalEcho : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeEmpiricalEcho() { return std::make_unique<EmpiricalEcho>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(EmpiricalEcho)
 
 }  // namespace mmradartwin

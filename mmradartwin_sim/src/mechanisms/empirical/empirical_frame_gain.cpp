@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -9,19 +9,18 @@ namespace {
 const std::string kName = "empirical_frame_gain";
 
 /// A level that changes from frame to frame, at every pose alike: what a diagnosis found without a cause.
-class EmpiricalFrameGain : public Mechanism {
+class EmpiricalFrameGain : public Mechanism, public ChirpStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
     ParameterSpec gain =
-        optionalListSpec("gain_db", "dB", -120, 120, "of each frame of a pose; the last one holds for all beyond");
+        optionalNumbersSpec("gain_db", "dB", -120, 120, "of each frame of a pose; the last one holds for all beyond");
     gain.required = true;
     return {gain};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     for (double db : values.numbers("gain_db")) gain_.push_back(std::pow(10.0, db / 20));
   }
-  bool hasChirpStage() const override { return true; }
   void changeChirp(const ChirpContext& now, ComplexGrid& x) const override {
     if (!gain_.empty()) x *= gain_[std::min(static_cast<std::size_t>(now.frame), gain_.size() - 1)];
   }
@@ -32,6 +31,6 @@ class EmpiricalFrameGain : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeEmpiricalFrameGain() { return std::make_unique<EmpiricalFrameGain>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(EmpiricalFrameGain)
 
 }  // namespace mmradartwin

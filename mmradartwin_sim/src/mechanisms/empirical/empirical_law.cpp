@@ -3,9 +3,10 @@
 #include <complex>
 #include <optional>
 
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/law_variable.h"
+#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -14,7 +15,7 @@ const std::string kName = "empirical_law";
 
 /// A law that was read off the data and has no name: gain, delay or angle of paths, or gain and phase of some virtual
 /// channels, tabulated over one variable. Between the table's points it is linear, beyond its ends constant.
-class EmpiricalLaw : public Mechanism {
+class EmpiricalLaw : public Mechanism, public WeightStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -163,6 +164,6 @@ class EmpiricalLaw : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeEmpiricalLaw() { return std::make_unique<EmpiricalLaw>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(EmpiricalLaw)
 
 }  // namespace mmradartwin

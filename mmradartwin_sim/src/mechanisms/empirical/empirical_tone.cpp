@@ -1,7 +1,8 @@
 #include <cmath>
 
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/random_draw.h"
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/receiver_wave.h"
 
 namespace mmradartwin {
 namespace {
@@ -10,7 +11,7 @@ const std::string kName = "empirical_tone";
 
 /// A tone of one beat frequency with a phase of its own in every frame, wherever the radar stands (a clock, say): what
 /// a diagnosis found without a cause. It is one wave over the receivers, the same for all transmitters.
-class EmpiricalTone : public Mechanism {
+class EmpiricalTone : public Mechanism, public ChirpStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -25,7 +26,6 @@ class EmpiricalTone : public Mechanism {
     wave_ = receiverWave(radar, values.number("azimuth_deg"));
   }
   bool needsStrongestAmplitude() const override { return true; }
-  bool hasChirpStage() const override { return true; }
   void changeChirp(const ChirpContext& now, ComplexGrid& x) const override {
     const double phase_rad = 2 * M_PI * drawUniform(drawKey(now.frame_draw, 0x746f6e65));
     const double level = level_ * now.pose.strongest_amplitude();
@@ -41,6 +41,6 @@ class EmpiricalTone : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeEmpiricalTone() { return std::make_unique<EmpiricalTone>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(EmpiricalTone)
 
 }  // namespace mmradartwin

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -9,7 +9,7 @@ const std::string kName = "adc_saturation";
 
 /// So much gain that this share of all I and Q values of the session lies beyond full scale, where it is held. The
 /// session's gain_db is that gain.
-class AdcSaturation : public Mechanism {
+class AdcSaturation : public Mechanism, public DigitiseStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -20,7 +20,6 @@ class AdcSaturation : public Mechanism {
   }
   int rank() const override { return 20; }  // after the noise
   double clippedFraction() const override { return fraction_; }
-  bool hasDigitiseStage() const override { return true; }
   void digitise(const ChirpContext&, ComplexGrid& x) const override {
     const auto held = [](double v) { return std::min(32767.0 / 32768, std::max(-1.0, v)); };
     for (Eigen::Index i = 0; i < x.size(); ++i) x.data()[i] = {held(x.data()[i].real()), held(x.data()[i].imag())};
@@ -32,6 +31,6 @@ class AdcSaturation : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeAdcSaturation() { return std::make_unique<AdcSaturation>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(AdcSaturation)
 
 }  // namespace mmradartwin

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -10,13 +10,13 @@ namespace {
 const std::string kName = "gain_drift";
 
 /// A gain that changes with time, not place: at a rate, or by steps at times or at equal parts of the session's poses.
-class GainDrift : public Mechanism {
+class GainDrift : public Mechanism, public ReceiveStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("db_per_hour", "dB/h", -1000, 1000, 0, "give this or steps_db"), 0, 5),
-            optionalListSpec("steps_db", "dB", -100, 100, "steps of the gain in time order"),
-            optionalListSpec("steps_s", "s", 0, 1e6, "when after the first pose, rising; else between equal parts")};
+            optionalNumbersSpec("steps_db", "dB", -100, 100, "steps of the gain in time order"),
+            optionalNumbersSpec("steps_s", "s", 0, 1e6, "when after the first pose, rising; else between equal parts")};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     db_per_hour_ = values.number("db_per_hour");
@@ -43,7 +43,6 @@ class GainDrift : public Mechanism {
     }
     x *= std::pow(10.0, gain_db / 20);
   }
-  bool hasReceiveStage() const override { return true; }
 
  private:
   double db_per_hour_ = 0;
@@ -52,6 +51,6 @@ class GainDrift : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeGainDrift() { return std::make_unique<GainDrift>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(GainDrift)
 
 }  // namespace mmradartwin

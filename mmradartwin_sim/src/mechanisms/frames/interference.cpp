@@ -1,7 +1,8 @@
 #include <cmath>
 
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/random_draw.h"
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/receiver_wave.h"
 
 namespace mmradartwin {
 namespace {
@@ -11,7 +12,7 @@ const std::string kName = "interference";
 /// Chirps of another radar that cross ours in some frames: its beat sweeps through the receiver's band as
 /// exp(j pi d_slope (t - t0)^2) and is seen while it lies within +-f_s/2, that is for f_s^2/d_slope samples. One wave
 /// over the receivers of a chirp, another for every chirp.
-class Interference : public Mechanism {
+class Interference : public Mechanism, public ChirpStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -27,7 +28,6 @@ class Interference : public Mechanism {
     wave_ = receiverWave(radar, values.number("azimuth_deg"));
   }
   bool needsStrongestAmplitude() const override { return true; }
-  bool hasChirpStage() const override { return true; }
   void changeChirp(const ChirpContext& now, ComplexGrid& x) const override {
     if (drawUniform(drawKey(now.frame_draw, 0x627572737473)) >= fraction_) return;
     const RadarConfig& radar = now.pose.radar;
@@ -49,6 +49,6 @@ class Interference : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeInterference() { return std::make_unique<Interference>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(Interference)
 
 }  // namespace mmradartwin

@@ -1,8 +1,8 @@
 #include <cmath>
 
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/point_echo.h"
 #include "mechanisms/base/random_draw.h"
-#include "mechanisms/base/receiver_builtin.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -13,7 +13,7 @@ const std::string kName = "moving_target";
 /// Someone who walks to and fro along a line about (x_m, y_m) for all of the session. Every chirp meets him where he
 /// is at the centre of its window, so that Doppler and the phase between TDM slots, 4 pi v T / lambda, follow from
 /// delays alone; what he moves within a chirp (a hundredth of a range bin at 10 m/s) is left out.
-class MovingTarget : public Mechanism {
+class MovingTarget : public Mechanism, public ChirpPathStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -37,7 +37,6 @@ class MovingTarget : public Mechanism {
     fading_m_ = values.number("fading_m");
     cross_section_m2_ = std::pow(10.0, values.number("rcs_dbsm") / 10);
   }
-  bool hasChirpPaths() const override { return true; }
   void addChirpPaths(const ChirpContext& now, std::vector<PathRecord>& records) const override {
     const PoseContext& context = now.pose;
     // The walk's period in whole nanoseconds takes the stamp's many digits away before they meet a double.
@@ -81,6 +80,6 @@ class MovingTarget : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeMovingTarget() { return std::make_unique<MovingTarget>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(MovingTarget)
 
 }  // namespace mmradartwin

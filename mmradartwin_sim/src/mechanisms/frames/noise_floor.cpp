@@ -1,7 +1,7 @@
 #include <cmath>
 
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/random_draw.h"
-#include "mechanisms/base/receiver_builtin.h"
 
 namespace mmradartwin {
 namespace {
@@ -10,7 +10,7 @@ const std::string kName = "noise_floor";
 
 /// Thermal noise: circular, white, independent over receivers, samples and chirps. The level is the rms of one complex
 /// sample of one chirp; averaging n chirps takes 10 log10 n off it, the range transform another 10 log10(N 2/3).
-class NoiseFloor : public Mechanism {
+class NoiseFloor : public Mechanism, public DigitiseStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -20,7 +20,6 @@ class NoiseFloor : public Mechanism {
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     rms_ = std::pow(10.0, (values.number("level_dbfs") + values.number("delta_db")) / 20);
   }
-  bool hasDigitiseStage() const override { return true; }
   void digitise(const ChirpContext& now, ComplexGrid& x) const override {
     const std::uint64_t key = drawKey(now.draw, 0x6E6F697365);
     for (Eigen::Index i = 0; i < x.size(); ++i) x.data()[i] += rms_ * drawNormal(drawKey(key, i));
@@ -32,6 +31,6 @@ class NoiseFloor : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeNoiseFloor() { return std::make_unique<NoiseFloor>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(NoiseFloor)
 
 }  // namespace mmradartwin

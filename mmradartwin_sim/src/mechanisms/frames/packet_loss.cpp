@@ -1,7 +1,7 @@
 #include <algorithm>
 
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/random_draw.h"
-#include "mechanisms/base/receiver_builtin.h"
 
 namespace mmradartwin {
 namespace {
@@ -10,7 +10,7 @@ const std::string kName = "packet_loss";
 constexpr std::size_t kPacketBytes = 1456;  // of the DCA1000, counted from the start of the recording
 
 /// Packets lost on the way, filled with zeros and not flagged.
-class PacketLoss : public Mechanism {
+class PacketLoss : public Mechanism, public TransportStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -19,7 +19,6 @@ class PacketLoss : public Mechanism {
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     fraction_ = values.number("lost_fraction");
   }
-  bool hasTransportStage() const override { return true; }
   void transport(const PayloadContext& context, std::vector<std::uint8_t>& payload) const override {
     const std::uint64_t key = drawKey(context.draw, 0x6C6F7374);
     for (std::size_t packet = 0; packet * kPacketBytes < payload.size(); ++packet) {
@@ -36,6 +35,6 @@ class PacketLoss : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makePacketLoss() { return std::make_unique<PacketLoss>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(PacketLoss)
 
 }  // namespace mmradartwin

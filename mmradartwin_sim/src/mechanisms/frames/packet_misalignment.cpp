@@ -1,5 +1,5 @@
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/random_draw.h"
-#include "mechanisms/base/receiver_builtin.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -9,7 +9,7 @@ const std::string kName = "packet_misalignment";
 constexpr std::size_t kPacketBytes = 1456;
 
 /// In one pose a packet was lost and not filled: all that follows slips, and the recording runs on for as long.
-class PacketMisalignment : public Mechanism {
+class PacketMisalignment : public Mechanism, public TransportStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -23,7 +23,6 @@ class PacketMisalignment : public Mechanism {
     if (pose_.empty()) throw InputError("mechanism packet_misalignment: key pose: is empty; give a pose's name");
   }
   int rank() const override { return 1; }  // what arrived, lost packets filled or not, is then cut
-  bool hasTransportStage() const override { return true; }
   std::string onlyPose() const override { return pose_; }
   std::size_t surplusBytes() const override { return kPacketBytes; }
   void transport(const PayloadContext& context, std::vector<std::uint8_t>& payload) const override {
@@ -49,6 +48,6 @@ class PacketMisalignment : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makePacketMisalignment() { return std::make_unique<PacketMisalignment>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(PacketMisalignment)
 
 }  // namespace mmradartwin

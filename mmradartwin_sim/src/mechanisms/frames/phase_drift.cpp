@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -8,7 +8,7 @@ namespace {
 const std::string kName = "phase_drift";
 
 /// Every frame is turned against the one before by the same angle, so that their average loses.
-class PhaseDrift : public Mechanism {
+class PhaseDrift : public Mechanism, public ChirpStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -17,7 +17,6 @@ class PhaseDrift : public Mechanism {
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     rad_per_frame_ = values.number("rad_per_frame");
   }
-  bool hasChirpStage() const override { return true; }
   void changeChirp(const ChirpContext& now, ComplexGrid& x) const override {
     x *= std::polar(1.0, rad_per_frame_ * now.frame);
   }
@@ -28,6 +27,6 @@ class PhaseDrift : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makePhaseDrift() { return std::make_unique<PhaseDrift>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(PhaseDrift)
 
 }  // namespace mmradartwin

@@ -1,7 +1,7 @@
 #include <cmath>
 
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/random_draw.h"
-#include "mechanisms/base/receiver_builtin.h"
 
 namespace mmradartwin {
 namespace {
@@ -12,7 +12,7 @@ const std::string kName = "phase_noise";
 /// spectrum is S_phi(f) 4 sin^2(pi f tau), 2 L(f) = S_phi(f). With S_phi falling as 1/f^2 above the loop's bandwidth
 /// the frequency noise is white, S_phi f^2, and phi(t) - phi(t - tau) = tau times it while f tau is small: the skirt of
 /// a host is flat and grows with the square of its range. Below the loop's bandwidth ranges of metres cancel it anyway.
-class PhaseNoise : public Mechanism {
+class PhaseNoise : public Mechanism, public ModulationStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -25,7 +25,6 @@ class PhaseNoise : public Mechanism {
     rate_rad_per_s_ = 2 * M_PI * values.number("offset_hz") *
                       std::sqrt(std::pow(10.0, values.number("level_dbc_per_hz") / 10) * radar.sample_rate_hz);
   }
-  bool hasModulation() const override { return true; }
   void modulateChirp(const ChirpContext& now, const ComplexGrid& delayed, ComplexGrid& x) const override {
     const std::uint64_t key = drawKey(now.draw, 0x7068617365);
     for (Eigen::Index n = 0; n < x.cols(); ++n) {
@@ -41,6 +40,6 @@ class PhaseNoise : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makePhaseNoise() { return std::make_unique<PhaseNoise>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(PhaseNoise)
 
 }  // namespace mmradartwin

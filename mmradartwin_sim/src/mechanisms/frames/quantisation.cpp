@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -9,7 +9,7 @@ namespace {
 const std::string kName = "quantisation";
 
 /// A converter of fewer bits than the 16 of a sample: I and Q rounded to 2^bits levels over full scale.
-class Quantisation : public Mechanism {
+class Quantisation : public Mechanism, public DigitiseStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -21,7 +21,6 @@ class Quantisation : public Mechanism {
     step_ = std::pow(2.0, 1 - values.number("bits"));
   }
   int rank() const override { return 30; }  // after noise and saturation
-  bool hasDigitiseStage() const override { return true; }
   void digitise(const ChirpContext&, ComplexGrid& x) const override {
     const auto rounded = [this](double v) {
       return std::min(1 - step_, std::max(-1.0, step_ * std::round(v / step_)));
@@ -37,6 +36,6 @@ class Quantisation : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeQuantisation() { return std::make_unique<Quantisation>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(Quantisation)
 
 }  // namespace mmradartwin

@@ -1,4 +1,4 @@
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -8,7 +8,7 @@ const std::string kName = "pose_time_lag";
 /// Poses are stamped later than they were true: while the radar moves it is ahead of its reported pose by what it goes
 /// within the lag. A standing radar shows nothing of it, and averaged poses are of standing radars: no hypothesis about
 /// paths; frames on the way tell it.
-class PoseTimeLag : public Mechanism {
+class PoseTimeLag : public Mechanism, public MountingStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -25,6 +25,6 @@ class PoseTimeLag : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makePoseTimeLag() { return std::make_unique<PoseTimeLag>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(PoseTimeLag)
 
 }  // namespace mmradartwin

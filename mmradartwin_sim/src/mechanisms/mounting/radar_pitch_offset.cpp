@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -8,7 +8,7 @@ namespace {
 const std::string kName = "radar_pitch_offset";
 
 /// The radar looks pitch_deg further down than its pose says.
-class RadarPitchOffset : public Mechanism {
+class RadarPitchOffset : public Mechanism, public MountingStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -28,6 +28,6 @@ class RadarPitchOffset : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeRadarPitchOffset() { return std::make_unique<RadarPitchOffset>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(RadarPitchOffset)
 
 }  // namespace mmradartwin

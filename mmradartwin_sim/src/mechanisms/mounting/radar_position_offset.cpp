@@ -1,4 +1,4 @@
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -6,7 +6,7 @@ namespace {
 const std::string kName = "radar_position_offset";
 
 /// The radar stands elsewhere than its pose says, by a constant vector in the radar frame.
-class RadarPositionOffset : public Mechanism {
+class RadarPositionOffset : public Mechanism, public MountingStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -26,6 +26,6 @@ class RadarPositionOffset : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeRadarPositionOffset() { return std::make_unique<RadarPositionOffset>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(RadarPositionOffset)
 
 }  // namespace mmradartwin

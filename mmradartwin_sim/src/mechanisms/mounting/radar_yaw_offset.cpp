@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -8,7 +8,7 @@ namespace {
 const std::string kName = "radar_yaw_offset";
 
 /// The radar looks yaw_deg further to the left than its pose says.
-class RadarYawOffset : public Mechanism {
+class RadarYawOffset : public Mechanism, public MountingStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -29,6 +29,6 @@ class RadarYawOffset : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeRadarYawOffset() { return std::make_unique<RadarYawOffset>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(RadarYawOffset)
 
 }  // namespace mmradartwin

@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <set>
 
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "physics/elements_in_map.h"
 #include "physics/trihedral.h"
+#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -13,7 +15,7 @@ const std::string kName = "corner_reflection";
 /// The retro path of corners that the named actors form with each other (or in themselves): the law of `corner`, for
 /// faces that come within gap_m of each other, where `corner` itself does not return that pair already. The three faces
 /// of a trihedral may lie any way: one whose boresight is level always has a face within 45 deg of the floor.
-class CornerReflection : public Mechanism {
+class CornerReflection : public Mechanism, public PathStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -70,6 +72,6 @@ class CornerReflection : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeCornerReflection() { return std::make_unique<CornerReflection>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(CornerReflection)
 
 }  // namespace mmradartwin

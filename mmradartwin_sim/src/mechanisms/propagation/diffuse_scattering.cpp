@@ -1,5 +1,6 @@
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -8,7 +9,7 @@ const std::string kName = "diffuse_scattering";
 
 /// A material scatters though the twin has it smooth (or scatters otherwise than the twin says): sets the scattering
 /// coefficient S in the scene, so that `diffuse` returns S and every specular reflection sqrt(1 - S^2).
-class DiffuseScattering : public Mechanism {
+class DiffuseScattering : public Mechanism, public SceneStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -41,6 +42,6 @@ class DiffuseScattering : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeDiffuseScattering() { return std::make_unique<DiffuseScattering>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(DiffuseScattering)
 
 }  // namespace mmradartwin

@@ -1,7 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
+#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -10,7 +11,7 @@ const std::string kName = "echo_replica";
 
 /// Every echo once more at a fixed distance behind (or before) itself: a reflection inside a radome or a cable, paired
 /// echoes of a modulated chirp, the far face of a panel. Direction, actors and channels are the echo's.
-class EchoReplica : public Mechanism {
+class EchoReplica : public Mechanism, public ReplicaStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -25,7 +26,6 @@ class EchoReplica : public Mechanism {
     const std::string& actor = values.text("actor");
     actor_ = actor.empty() ? -1 : requireActor(scene, kName, actor);
   }
-  bool hasReplicas() const override { return true; }
   bool replicate(const PoseContext& context, PathRecord& record) const override {
     if (actor_ >= 0 && std::count(record.actors.begin(), record.actors.end(), actor_) == 0) return false;
     const double length_m = record.length_m[0] + extra_m_;
@@ -43,6 +43,6 @@ class EchoReplica : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeEchoReplica() { return std::make_unique<EchoReplica>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(EchoReplica)
 
 }  // namespace mmradartwin

@@ -1,8 +1,9 @@
 #include <cmath>
 #include <set>
 
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "physics/diffracting_edge.h"
+#include "physics/elements_in_map.h"
 
 namespace mmradartwin {
 namespace {
@@ -12,7 +13,7 @@ const std::string kName = "edge_diffraction";
 /// Retro returns of exposed edges by UTD. A first-order `specular` return holds the edges of its facet in its aperture
 /// factor, also beside the facet; so an edge takes part only at poses where no such return of either face exists, and
 /// takes over where the aperture factor falls below that mechanism's limit.
-class EdgeDiffraction : public Mechanism {
+class EdgeDiffraction : public Mechanism, public PathStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -77,6 +78,6 @@ class EdgeDiffraction : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeEdgeDiffraction() { return std::make_unique<EdgeDiffraction>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(EdgeDiffraction)
 
 }  // namespace mmradartwin

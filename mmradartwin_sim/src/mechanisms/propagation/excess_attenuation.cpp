@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -8,7 +8,7 @@ namespace {
 const std::string kName = "excess_attenuation";
 
 /// Loss that grows with the way: dB of power per metre of one-way range, on every path.
-class ExcessAttenuation : public Mechanism {
+class ExcessAttenuation : public Mechanism, public WeightStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -31,6 +31,6 @@ class ExcessAttenuation : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeExcessAttenuation() { return std::make_unique<ExcessAttenuation>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(ExcessAttenuation)
 
 }  // namespace mmradartwin

@@ -1,7 +1,8 @@
 #include <algorithm>
 
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "physics/corner_edge.h"
+#include "physics/elements_in_map.h"
 #include "physics/image_record.h"
 #include "rays/image_paths.h"
 
@@ -13,7 +14,7 @@ const std::string kName = "floor_ceiling_multipath";
 /// Paths over facets within 45 deg of the horizontal, which the base leaves out: the retro paths of corners that they
 /// form with upright faces, and images of second and third order with at least one such facet, within the same +-20 deg
 /// of elevation as all paths. A first-order return of such a facet leaves that field of view.
-class FloorCeilingMultipath : public Mechanism {
+class FloorCeilingMultipath : public Mechanism, public PathStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -66,6 +67,6 @@ class FloorCeilingMultipath : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeFloorCeilingMultipath() { return std::make_unique<FloorCeilingMultipath>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(FloorCeilingMultipath)
 
 }  // namespace mmradartwin

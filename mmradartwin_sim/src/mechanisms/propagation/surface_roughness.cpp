@@ -1,6 +1,7 @@
 #include <cmath>
 
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
+#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -10,7 +11,7 @@ const std::string kName = "surface_roughness";
 /// Loss of the coherent reflection by roughness (Rayleigh, Ament): exp(-2 (k sigma cos theta)^2) of amplitude at every
 /// specular reflection from the material. Scattered returns stay; roughness_rms_m of materials.yaml takes no part in
 /// the base model.
-class SurfaceRoughness : public Mechanism {
+class SurfaceRoughness : public Mechanism, public WeightStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -39,6 +40,6 @@ class SurfaceRoughness : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeSurfaceRoughness() { return std::make_unique<SurfaceRoughness>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(SurfaceRoughness)
 
 }  // namespace mmradartwin

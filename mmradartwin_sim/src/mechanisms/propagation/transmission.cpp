@@ -1,6 +1,7 @@
 #include <cmath>
 
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
+#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -10,7 +11,7 @@ const std::string kName = "transmission";
 /// A panel that lets rays through, one_way_db at each crossing; its own front still reflects as before, its own back
 /// stays hidden. One leg of a path crosses it once, however thick its mesh. The delay inside is left out: (n - 1) d is
 /// millimetres.
-class Transmission : public Mechanism {
+class Transmission : public Mechanism, public SceneStage, public WeightStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -57,6 +58,6 @@ class Transmission : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeTransmission() { return std::make_unique<Transmission>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(Transmission)
 
 }  // namespace mmradartwin

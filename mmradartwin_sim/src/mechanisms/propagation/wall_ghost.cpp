@@ -2,12 +2,14 @@
 #include <cmath>
 #include <set>
 
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "physics/aperture.h"
 #include "physics/diffracting_edge.h"
+#include "physics/elements_in_map.h"
 #include "physics/scatter_points.h"
 #include "rays/image_paths.h"
+#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -28,7 +30,7 @@ bool enclosesRoom(const Scene& scene, const Actor& actor) {
 /// data to say.
 /// A patch scatters sideways by its Lambertian law with |Gamma| the geometric mean of both legs' (which is reciprocal
 /// and goes over into the monostatic form), and with the phase that its direct echo has.
-class WallGhost : public Mechanism {
+class WallGhost : public Mechanism, public PathStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -208,6 +210,6 @@ class WallGhost : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeWallGhost() { return std::make_unique<WallGhost>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(WallGhost)
 
 }  // namespace mmradartwin

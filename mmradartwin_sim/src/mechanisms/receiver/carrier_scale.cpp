@@ -1,4 +1,4 @@
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -7,7 +7,7 @@ const std::string kName = "carrier_scale";
 
 /// The array is wider against the wavelength than radar.yaml says: every sine of an angle appears 1 + scale larger.
 /// The ways from the elements differ from that of element 0 by 1 + scale times what geometry gives.
-class CarrierScale : public Mechanism {
+class CarrierScale : public Mechanism, public WeightStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -31,6 +31,6 @@ class CarrierScale : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeCarrierScale() { return std::make_unique<CarrierScale>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(CarrierScale)
 
 }  // namespace mmradartwin

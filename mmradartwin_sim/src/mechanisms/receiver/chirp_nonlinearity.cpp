@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -10,7 +10,7 @@ const std::string kName = "chirp_nonlinearity";
 /// A ripple on the chirp's frequency, deviation_hz sin(2 pi ripple_hz t + phase). Transmitted and received chirp differ
 /// by exp(j[phi_e(t) - phi_e(t - tau)]): paired echoes about every echo, ripple_hz away, their level in proportion to
 /// the range while 2 pi deviation tau is small.
-class ChirpNonlinearity : public Mechanism {
+class ChirpNonlinearity : public Mechanism, public DistortionStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -46,7 +46,6 @@ class ChirpNonlinearity : public Mechanism {
       }
     }
   }
-  bool hasDistortStage() const override { return true; }
 
  private:
   /// 2 pi times the integral of the ripple.
@@ -56,6 +55,6 @@ class ChirpNonlinearity : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeChirpNonlinearity() { return std::make_unique<ChirpNonlinearity>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(ChirpNonlinearity)
 
 }  // namespace mmradartwin

@@ -1,7 +1,7 @@
 #include <cmath>
 
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/random_draw.h"
-#include "mechanisms/base/receiver_builtin.h"
 
 namespace mmradartwin {
 namespace {
@@ -9,7 +9,7 @@ namespace {
 const std::string kName = "dc_offset";
 
 /// A constant per channel: range bin 0, no law over the channels.
-class DcOffset : public Mechanism {
+class DcOffset : public Mechanism, public ReceiveStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -27,7 +27,6 @@ class DcOffset : public Mechanism {
   void receive(const PoseContext& context, ComplexGrid& x) const override {
     x.colwise() += level_ * context.strongest_amplitude() * vector_;
   }
-  bool hasReceiveStage() const override { return true; }
 
  private:
   double level_ = 0;
@@ -36,6 +35,6 @@ class DcOffset : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeDcOffset() { return std::make_unique<DcOffset>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(DcOffset)
 
 }  // namespace mmradartwin

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -10,7 +10,7 @@ const std::string kName = "if_highpass";
 /// The receiver's IF high-pass: two first-order sections whose corners stand in a fixed ratio. corner_hz is where both
 /// together have lost 3 dB. The device's corner steps go by factors of two; radar.yaml's if_highpass_hz tells the ratio
 /// where it is known.
-class IfHighpass : public Mechanism {
+class IfHighpass : public Mechanism, public ToneStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -36,7 +36,6 @@ class IfHighpass : public Mechanism {
     using Complex = std::complex<double>;
     return 1.0 / (Complex(1, -first_hz_ / beat_hz) * Complex(1, -second_hz_ / beat_hz));
   }
-  bool hasToneGain() const override { return true; }
 
  private:
   double first_hz_ = 0, second_hz_ = 0;
@@ -44,6 +43,6 @@ class IfHighpass : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeIfHighpass() { return std::make_unique<IfHighpass>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(IfHighpass)
 
 }  // namespace mmradartwin

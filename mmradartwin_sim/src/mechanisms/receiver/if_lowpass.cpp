@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -9,7 +9,7 @@ const std::string kName = "if_lowpass";
 
 /// Edge of the receiver's decimation filter: a Butterworth low-pass on the tone of each path, as it stands ahead of
 /// the sampler.
-class IfLowpass : public Mechanism {
+class IfLowpass : public Mechanism, public ToneStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -28,7 +28,6 @@ class IfLowpass : public Mechanism {
     // The product of all -poles is 1, so that the gain at 0 Hz is 1.
     return gain;
   }
-  bool hasToneGain() const override { return true; }
 
  private:
   double corner_hz_ = 1;
@@ -37,6 +36,6 @@ class IfLowpass : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeIfLowpass() { return std::make_unique<IfLowpass>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(IfLowpass)
 
 }  // namespace mmradartwin

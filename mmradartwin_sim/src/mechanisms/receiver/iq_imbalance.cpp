@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -8,7 +8,7 @@ namespace {
 const std::string kName = "iq_imbalance";
 
 /// I and Q of unequal gain or not quite in quadrature: x + beta conj(x), an image at (R_max - R, -azimuth).
-class IqImbalance : public Mechanism {
+class IqImbalance : public Mechanism, public ReceiveStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -20,7 +20,6 @@ class IqImbalance : public Mechanism {
   }
   int rank() const override { return 10; }  // in the mixer, after what belongs to the channels
   void receive(const PoseContext&, ComplexGrid& x) const override { x += beta_ * x.conjugate().eval(); }
-  bool hasReceiveStage() const override { return true; }
 
  private:
   std::complex<double> beta_;
@@ -28,6 +27,6 @@ class IqImbalance : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeIqImbalance() { return std::make_unique<IqImbalance>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(IqImbalance)
 
 }  // namespace mmradartwin

@@ -1,4 +1,4 @@
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -6,7 +6,7 @@ namespace {
 const std::string kName = "range_bias";
 
 /// A delay inside the radar: every path is longer by twice the bias, the same at all channels.
-class RangeBias : public Mechanism {
+class RangeBias : public Mechanism, public WeightStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -25,6 +25,6 @@ class RangeBias : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeRangeBias() { return std::make_unique<RangeBias>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(RangeBias)
 
 }  // namespace mmradartwin

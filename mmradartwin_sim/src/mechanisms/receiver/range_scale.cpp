@@ -1,4 +1,4 @@
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -6,7 +6,7 @@ namespace {
 const std::string kName = "range_scale";
 
 /// Slope or sampling rate off: beat frequencies scale, phases across the channels stay.
-class RangeScale : public Mechanism {
+class RangeScale : public Mechanism, public WeightStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -27,6 +27,6 @@ class RangeScale : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeRangeScale() { return std::make_unique<RangeScale>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(RangeScale)
 
 }  // namespace mmradartwin

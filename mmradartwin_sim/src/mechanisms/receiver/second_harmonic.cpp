@@ -2,7 +2,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "mechanisms/base/receiver_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -11,7 +11,7 @@ const std::string kName = "second_harmonic";
 
 /// Square law ahead of the sampler's filter: echoes at the sums of beat frequencies, at twice the range for each echo
 /// by itself. What lies beyond the sampling rate is filtered off. Of the paths, the strongest 60 take part.
-class SecondHarmonic : public Mechanism {
+class SecondHarmonic : public Mechanism, public DistortionStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -55,7 +55,6 @@ class SecondHarmonic : public Mechanism {
     }
     accumulate(context.radar, products, x);
   }
-  bool hasDistortStage() const override { return true; }
 
  private:
   double level_ = 0;
@@ -63,6 +62,6 @@ class SecondHarmonic : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeSecondHarmonic() { return std::make_unique<SecondHarmonic>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(SecondHarmonic)
 
 }  // namespace mmradartwin

@@ -1,4 +1,5 @@
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
+#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -6,7 +7,7 @@ namespace {
 const std::string kName = "actor_absent";
 
 /// An actor of the scene that is not in the room: it neither reflects nor hides anything.
-class ActorAbsent : public Mechanism {
+class ActorAbsent : public Mechanism, public SceneStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -22,6 +23,6 @@ class ActorAbsent : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeActorAbsent() { return std::make_unique<ActorAbsent>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(ActorAbsent)
 
 }  // namespace mmradartwin

@@ -1,6 +1,7 @@
 #include <cmath>
 
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
+#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -8,7 +9,7 @@ namespace {
 const std::string kName = "actor_moved";
 
 /// An actor that stands elsewhere: moved in the floor plane and turned about its centroid (of surface area).
-class ActorMoved : public Mechanism {
+class ActorMoved : public Mechanism, public SceneStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -47,6 +48,6 @@ class ActorMoved : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeActorMoved() { return std::make_unique<ActorMoved>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(ActorMoved)
 
 }  // namespace mmradartwin

@@ -1,8 +1,9 @@
 #include <cmath>
 
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "physics/curved_surface.h"
+#include "physics/elements_in_map.h"
 
 namespace mmradartwin {
 namespace {
@@ -17,7 +18,7 @@ constexpr int kSides = 24;  // of the screen that stands for the cylinder in occ
 /// its plan, turned by yaw_deg. It is an actor of the scene like any other: its faces reflect, make corners with
 /// others, diffract at their edges and hide, each where the twin's mechanisms do so. Records know neither by an index:
 /// it is -1, or there is none.
-class ActorUnmodelled : public Mechanism {
+class ActorUnmodelled : public Mechanism, public SceneStage, public PathStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -100,6 +101,6 @@ class ActorUnmodelled : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeActorUnmodelled() { return std::make_unique<ActorUnmodelled>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(ActorUnmodelled)
 
 }  // namespace mmradartwin

@@ -1,7 +1,8 @@
 #include <cmath>
 
-#include "mechanisms/base/builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -9,7 +10,7 @@ namespace {
 const std::string kName = "material_reflectivity";
 
 /// A material's or an actor's echo stronger or weaker, at every interaction with it.
-class MaterialReflectivity : public Mechanism {
+class MaterialReflectivity : public Mechanism, public WeightStage {
  public:
   const std::string& name() const override { return kName; }
   bool standsSeveralTimes() const override { return true; }
@@ -54,6 +55,6 @@ class MaterialReflectivity : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeMaterialReflectivity() { return std::make_unique<MaterialReflectivity>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(MaterialReflectivity)
 
 }  // namespace mmradartwin

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "mechanisms/base/propagation_builtin.h"
+#include "mechanisms/base/built_in_mechanism.h"
 
 namespace mmradartwin {
 namespace {
@@ -8,7 +8,7 @@ namespace {
 const std::string kName = "scene_registration";
 
 /// The whole room stands elsewhere in map: turned about map's origin, then shifted.
-class SceneRegistration : public Mechanism {
+class SceneRegistration : public Mechanism, public SceneStage {
  public:
   const std::string& name() const override { return kName; }
   std::vector<ParameterSpec> parameters() const override {
@@ -34,6 +34,6 @@ class SceneRegistration : public Mechanism {
 
 }  // namespace
 
-std::unique_ptr<Mechanism> makeSceneRegistration() { return std::make_unique<SceneRegistration>(); }
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(SceneRegistration)
 
 }  // namespace mmradartwin
