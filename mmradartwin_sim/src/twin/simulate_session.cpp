@@ -94,126 +94,179 @@ class SampleLevels {
   std::atomic<double> strongest_{0};
 };
 
-}  // namespace
+/// What all steps of a simulation look at.
+struct Job {
+  const SimulateOptions& options;
+  const Recording& recording;
+  const Twin& twin;
+  const Pose& pose(int i) const { return recording.poses[static_cast<std::size_t>(i)]; }
+  int poses() const { return static_cast<int>(recording.poses.size()); }
+};
 
-SimulateResult simulateSession(const SimulateOptions& options, const std::function<void(int, int)>& progress) {
+Recording openInput(const SimulateOptions& options) {
   SessionOptions session_options;
   session_options.need_captures = false;
   session_options.exclude_duplicates = false;  // the simulated session has the poses of the given one
-  const Recording recording = openSession(options.session, session_options);
+  Recording recording = openSession(options.session, session_options);
   if (fs::exists(options.output) &&
       fs::equivalent(options.output, fs::is_directory(options.session) ? fs::path(options.session)
                                                                        : fs::absolute(options.session).parent_path())) {
     throw InputError(options.output + ": --output is the session itself; choose another folder");
   }
-  const std::string twin_file = options.twin_file.empty() ? recording.twin_file.value_or("") : options.twin_file;
-  std::optional<tbb::global_control> limit;
-  if (options.jobs > 0)
-    limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.jobs));
+  return recording;
+}
 
+Twin makeTwin(const SimulateOptions& options, const Recording& recording) {
+  const std::string twin_file = options.twin_file.empty() ? recording.twin_file.value_or("") : options.twin_file;
   Twin twin(loadTwin(twin_file, recording.scene_file, recording.radar), options.seed);
-  SimulateResult result;
-  result.problems = recording.problems;
   std::vector<Eigen::Isometry3d> poses;
   for (const Pose& p : recording.poses) poses.push_back(p.T_map_radar);
   twin.setSession(recording.poses);
   twin.prepare(poses);
+  return twin;
+}
 
-  const fs::path paths = fs::path(options.output) / "paths";
+void addLevels(const Job& job, const Simulation& s, SampleLevels& levels) {
+  if (!job.twin.hasFrameStage()) {
+    levels.add(s.grid.x);
+    return;
+  }
+  job.twin.visitChirps(s, job.options.frames,
+                       [&levels](const ChirpContext&, const ComplexGrid& x) { levels.add(x); });
+}
+
+/// Grids of all poses, without records; a pose that cannot be simulated has an empty grid and is among the result's
+/// problems. Writes the paths' files.
+std::vector<Simulation> simulatePoses(const Job& job, const std::function<void(int, int)>& progress,
+                                      SampleLevels& levels, SimulateResult& result) {
+  const fs::path paths = fs::path(job.options.output) / "paths";
   fs::create_directories(paths);
-  const int count = static_cast<int>(recording.poses.size());
-  std::vector<Simulation> simulated(recording.poses.size());
-  SampleLevels levels(twin.clippedFraction() > 0);
-  std::vector<std::string> failures(recording.poses.size());
+  const int count = job.poses();
+  std::vector<Simulation> simulated(job.recording.poses.size());
+  std::vector<std::string> failures(job.recording.poses.size());
   std::atomic<int> done{0};
   std::mutex mutex;
   tbb::parallel_for(0, count, [&](int i) {
-    const Pose& pose = recording.poses[i];
+    const Pose& pose = job.pose(i);
     try {
-      Simulation s = twin.simulate(pose.T_map_radar, pose.stamp_ns);
-      writePathsCsv(exportedRecords(twin.radar(), s.records, options.diffuse_records), twin.scene(),
+      Simulation s = job.twin.simulate(pose.T_map_radar, pose.stamp_ns);
+      writePathsCsv(exportedRecords(job.twin.radar(), s.records, job.options.diffuse_records), job.twin.scene(),
                     (paths / (pose.name + ".csv")).string());
-      if (twin.hasFrameStage()) {
-        twin.visitChirps(s, options.frames, [&levels](const ChirpContext&, const ComplexGrid& x) { levels.add(x); });
-      } else {
-        levels.add(s.grid.x);
+      addLevels(job, s, levels);
+      {
+        const std::lock_guard<std::mutex> lock(mutex);
+        result.worst_amplitude_error = std::max(result.worst_amplitude_error, s.check.worst_amplitude_error);
+        result.worst_grid_error = std::max(result.worst_grid_error, s.check.grid_error);
       }
       s.records = {};  // of all poses together they are too many; frames that need them trace again
       simulated[i] = std::move(s);
-      const std::lock_guard<std::mutex> lock(mutex);
-      result.worst_amplitude_error = std::max(result.worst_amplitude_error, s.check.worst_amplitude_error);
-      result.worst_grid_error = std::max(result.worst_grid_error, s.check.grid_error);
     } catch (const InputError& e) {
       failures[i] = e.what();
     }
     const int now = ++done;
     if (progress) progress(now, count);
   });
-
   for (int i = 0; i < count; ++i) {
-    if (!failures[i].empty())
-      result.problems.push_back({recording.poses[i].name, "pose " + recording.poses[i].name + ": " + failures[i]});
+    if (failures[i].empty()) continue;
+    result.problems.push_back({job.pose(i).name, "pose " + job.pose(i).name + ": " + failures[i]});
   }
+  return simulated;
+}
+
+void refuseNothing(const Job& job, const std::vector<Simulation>& simulated, const SimulateResult& result) {
   const bool any =
       std::any_of(simulated.begin(), simulated.end(), [](const Simulation& s) { return s.grid.x.size() > 0; });
-  if (!any) {
-    throw InputError(options.session + ": no pose can be simulated" +
-                     (result.problems.empty() ? std::string("; poses.csv has none")
-                                              : "; the first: " + result.problems.front().message));
-  }
-  const double strongest = levels.strongest(), clipped = twin.clippedFraction();
-  if (clipped > 0 && strongest > 0) {
-    result.gain_db = -20 * std::log10(levels.exceededBy(clipped));
-  } else {
-    result.gain_db = strongest > 0 ? kStrongest_dbfs - 20 * std::log10(strongest) : 0;
-  }
+  if (any) return;
+  throw InputError(job.options.session + ": no pose can be simulated" +
+                   (result.problems.empty() ? std::string("; poses.csv has none")
+                                            : "; the first: " + result.problems.front().message));
+}
 
+/// The gain that brings a session's strongest sample, or the share of samples that is to be clipped, to its level.
+double gainOf_db(const Twin& twin, const SampleLevels& levels) {
+  const double strongest = levels.strongest(), clipped = twin.clippedFraction();
+  if (clipped > 0 && strongest > 0) return -20 * std::log10(levels.exceededBy(clipped));
+  return strongest > 0 ? kStrongest_dbfs - 20 * std::log10(strongest) : 0;
+}
+
+std::vector<AdcCube> framesOf(const Job& job, const Pose& pose, const Simulation& simulated, double gain_db) {
+  const Twin& twin = job.twin;
+  if (twin.hasFrameStage()) {
+    try {
+      const FrameOptions options{job.options.frames, gain_db, pose.name};
+      if (!twin.framesNeedRecords()) return twin.simulateFrames(simulated, options);
+      return twin.simulateFrames(twin.simulate(pose.T_map_radar, pose.stamp_ns), options);
+    } catch (const InputError& e) {
+      throw InputError("pose " + pose.name + ": " + e.what());
+    }
+  }
+  const double scale = 32768 * std::pow(10.0, gain_db / 20);
+  std::vector<AdcCube> frames(static_cast<std::size_t>(job.options.frames),
+                              makeCube(twin.radar(), simulated.grid.x, scale));
+  for (int f = 0; f < job.options.frames; ++f) {
+    frames[f].sequence = static_cast<std::uint32_t>(f);
+    frames[f].stamp_ns = pose.stamp_ns + twin.radar().frame_offset_ns(f);
+  }
+  return frames;
+}
+
+/// Writes the session and its captures.
+void writeSession(const Job& job, std::vector<Simulation>& simulated, SimulateResult& result) {
+  const RadarConfig& radar = job.twin.radar();
+  const std::string& output = job.options.output;
   SessionWriter::Files files;
-  files.radar_yaml = toYaml(twin.radar());
-  files.scene = relativeTo(options.output, twin.description().scene_file);
-  if (recording.twin_file) files.twin = relativeTo(options.output, *recording.twin_file);
+  files.radar_yaml = toYaml(radar);
+  files.scene = relativeTo(output, job.twin.description().scene_file);
+  if (job.recording.twin_file) files.twin = relativeTo(output, *job.recording.twin_file);
   files.gain_db = result.gain_db;
-  SessionWriter writer(options.output, twin.radar(), files);
-  const double scale = 32768 * std::pow(10.0, result.gain_db / 20);
+  SessionWriter writer(output, radar, files);
   // Frames of some poses at once, written in order; bounded by what they take.
-  const double bytes_per_pose = static_cast<double>(twin.radar().bytes_per_frame()) * options.frames;
+  const double bytes_per_pose = static_cast<double>(radar.bytes_per_frame()) * job.options.frames;
   const int at_once = static_cast<int>(std::min(16.0, std::max(1.0, 64e6 / bytes_per_pose)));
-  for (int first = 0; first < count; first += at_once) {
-    const int last = std::min(count, first + at_once);
+  for (int first = 0; first < job.poses(); first += at_once) {
+    const int last = std::min(job.poses(), first + at_once);
     std::vector<std::vector<AdcCube>> cubes(static_cast<std::size_t>(last - first));
     tbb::parallel_for(first, last, [&](int i) {
       Simulation& s = simulated[i];
       if (s.grid.x.size() == 0) return;
-      const Pose& pose = recording.poses[i];
-      std::vector<AdcCube>& frames = cubes[static_cast<std::size_t>(i - first)];
-      if (twin.hasFrameStage()) {
-        if (twin.framesNeedRecords()) s = twin.simulate(pose.T_map_radar, pose.stamp_ns);
-        try {
-          frames = twin.simulateFrames(s, {options.frames, result.gain_db, pose.name});
-        } catch (const InputError& e) {
-          throw InputError("pose " + pose.name + ": " + e.what());
-        }
-      } else {
-        frames.assign(static_cast<std::size_t>(options.frames), makeCube(twin.radar(), s.grid.x, scale));
-        for (int f = 0; f < options.frames; ++f) {
-          frames[f].sequence = static_cast<std::uint32_t>(f);
-          frames[f].stamp_ns = pose.stamp_ns + twin.radar().frame_offset_ns(f);
-        }
-      }
+      cubes[static_cast<std::size_t>(i - first)] = framesOf(job, job.pose(i), s, result.gain_db);
       s = {};
     });
     for (int i = first; i < last; ++i) {
       if (cubes[static_cast<std::size_t>(i - first)].empty()) continue;
-      writer.add(recording.poses[i], cubes[static_cast<std::size_t>(i - first)]);
+      writer.add(job.pose(i), cubes[static_cast<std::size_t>(i - first)]);
       ++result.poses;
     }
   }
   writer.finish();
+}
+
+void writeResolvedTwin(const Job& job) {
+  std::ofstream resolved(fs::path(job.options.output) / "twin.resolved.yaml");
+  resolved << "# The twin that made this session, with all its parameters.\n" << job.twin.description().toYaml();
+  if (!resolved) throw std::runtime_error(job.options.output + "/twin.resolved.yaml: cannot be written");
+}
+
+}  // namespace
+
+SimulateResult simulateSession(const SimulateOptions& options, const std::function<void(int, int)>& progress) {
+  const Recording recording = openInput(options);
+  std::optional<tbb::global_control> limit;
+  if (options.jobs > 0)
+    limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.jobs));
+  const Twin twin = makeTwin(options, recording);
+  const Job job{options, recording, twin};
+
+  SimulateResult result;
+  result.problems = recording.problems;
+  SampleLevels levels(twin.clippedFraction() > 0);
+  std::vector<Simulation> simulated = simulatePoses(job, progress, levels, result);
+  refuseNothing(job, simulated, result);
+  result.gain_db = gainOf_db(twin, levels);
+  writeSession(job, simulated, result);
   result.notes = twin.notes();
   for (std::string& note : meshNotes(twin.scene())) result.notes.push_back(std::move(note));
-  std::ofstream resolved(fs::path(options.output) / "twin.resolved.yaml");
-  resolved << "# The twin that made this session, with all its parameters.\n" << twin.description().toYaml();
-  if (!resolved) throw std::runtime_error(options.output + "/twin.resolved.yaml: cannot be written");
+  writeResolvedTwin(job);
   return result;
 }
 
