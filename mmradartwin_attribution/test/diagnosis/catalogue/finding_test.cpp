@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 
 namespace mmradartwin {
 namespace {
