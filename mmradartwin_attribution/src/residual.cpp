@@ -10,7 +10,7 @@ namespace {
 
 double power(double level_db) { return std::pow(10.0, level_db / 10); }
 
-// Classes of one pose by the rules of the design, section 6.
+// Assigns each response that the branches do not share to one residual class (DESIGN section 6).
 class Router {
  public:
   Router(const EvaluationField& field, const std::vector<PathRecord>& records, PoseAttribution& pose)
@@ -36,7 +36,8 @@ class Router {
         (response.azimuth_rad - region.azimuth_rad) / field_.halfAzimuth_rad(config_.wide, region.azimuth_rad));
   }
 
-  // A response inside another region's tight window does not count for this one (unless it is in its own as well).
+  // True where a simulated response supports a region: it lies in the region's wide window, and in another region's
+  // tight window only if it lies in this region's tight window, too.
   bool countsFor(int region, const Response& simulated) const {
     if (!at(config_.wide, pose_.regions[region], simulated)) return false;
     if (at(config_.tight, pose_.regions[region], simulated)) return true;
