@@ -58,8 +58,8 @@ class PoseMarkers : public ::testing::Test {
   }
   PoseAttribution pose(bool simulated) const {
     const std::vector<synthetic::Target> both = {{3, 0, 0}, {5, 30, -5}}, alone = {{3, 0, 0}};
-    return compareMaps(field_, synthetic::map(radar_, both), synthetic::map(radar_, simulated ? both : alone),
-                       {region("wall", 3, 0), region("tv;shelf", 5, 30)}, {});
+    return attributePose(field_, synthetic::map(radar_, both), synthetic::map(radar_, simulated ? both : alone),
+                         {region("wall", 3, 0), region("tv;shelf", 5, 30)}, {});
   }
   static std::vector<Marker> named(const visualization_msgs::MarkerArray& array, const std::string& ns) {
     std::vector<Marker> found;

@@ -41,8 +41,8 @@ class PosePicture : public ::testing::Test {
     tv.actor = "tv";
     PoseResult result;
     result.pose.name = "012";
-    result.attribution = compareMaps(field_, synthetic::map(radar_, measured ? both : alone),
-                                     synthetic::map(radar_, simulated ? both : alone), {anchor, tv}, {});
+    result.attribution = attributePose(field_, synthetic::map(radar_, measured ? both : alone),
+                                       synthetic::map(radar_, simulated ? both : alone), {anchor, tv}, {});
     return result;
   }
   /// Columns of one of the three fans.

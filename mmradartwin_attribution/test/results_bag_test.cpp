@@ -25,7 +25,7 @@ PoseResult poseAt(std::size_t index, double x_m, const EvaluationField& field) {
   result.pose.name = "pose" + std::to_string(index);
   result.pose.T_map_radar = Eigen::Isometry3d(Eigen::Translation3d(x_m, 2, 1));
   result.attribution =
-      compareMaps(field, synthetic::map(radar, {{3, 0, 0}, {5, 30, -5}}), synthetic::map(radar, {{3, 0, 0}}), {}, {});
+      attributePose(field, synthetic::map(radar, {{3, 0, 0}, {5, 30, -5}}), synthetic::map(radar, {{3, 0, 0}}), {}, {});
   return result;
 }
 

@@ -67,8 +67,9 @@ struct PoseAttribution {
 
 /// Compares a measured with a simulated map of one pose. `regions` come from RegionModel; `records` are the paths
 /// behind the simulated map (may be empty). Both maps need the field's axes; throws InputError otherwise.
-PoseAttribution compareMaps(const EvaluationField& field, const RangeAngleMap& measured, const RangeAngleMap& simulated,
-                            std::vector<ResponseRegion> regions, const std::vector<PathRecord>& records);
+PoseAttribution attributePose(const EvaluationField& field, const RangeAngleMap& measured,
+                              const RangeAngleMap& simulated, std::vector<ResponseRegion> regions,
+                              const std::vector<PathRecord>& records);
 
 /// Indices of the records whose own contribution lies in the cell at a place (recordShare >= 1/2, -6 dB), strongest
 /// first, down to config.record_span_db below the strongest.

@@ -25,8 +25,8 @@ std::vector<PoseEchoes> GainMeasurement::heldOutEchoes(const std::vector<NamedPa
 
 void GainMeasurement::ofFit(const ModelState& before, HypothesisFit& fit, Finding& finding) {
   fitter_.settleFolds(before, fit);
-  compareMaps(data_, cellPowers(data_, source_.echoes(before.mechanisms)),
-              cellPowers(data_, heldOutEchoes(before.mechanisms, fit, {})), finding);
+  measureHeldOutGain(data_, cellPowers(data_, source_.echoes(before.mechanisms)),
+                     cellPowers(data_, heldOutEchoes(before.mechanisms, fit, {})), finding);
   std::vector<double> likelihood;
   model_.logLikelihood(heldOutEchoes(before.mechanisms, fit, fit.state.actor_range_m), fit.state.nuisance, &likelihood);
   source_.setBaseline(before.mechanisms);
@@ -39,7 +39,7 @@ void GainMeasurement::ofChange(const ChannelData& before_data, const std::vector
   if (data_.locations.size() < 2) return;
   const std::vector<PoseEchoes> echoes_before = source_.echoes(before), echoes_after = source_.echoes(after);
   source_.setBaseline(before);
-  compareMaps(data_, cellPowers(before_data, echoes_before), cellPowers(after_data, echoes_after), finding);
+  measureHeldOutGain(data_, cellPowers(before_data, echoes_before), cellPowers(after_data, echoes_after), finding);
 }
 
 EvaluationOptions GainMeasurement::evaluationOptions() const {

@@ -221,8 +221,8 @@ void placeInMaps(const RangeAngleAxes& axes, const std::vector<CellPowers>& befo
 
 }  // namespace
 
-void compareMaps(const ChannelData& data, const std::vector<CellPowers>& before, const std::vector<CellPowers>& after,
-                 Finding& finding) {
+void measureHeldOutGain(const ChannelData& data, const std::vector<CellPowers>& before,
+                        const std::vector<CellPowers>& after, Finding& finding) {
   if (!finding.gain) finding.gain.emplace();
   finding.gain->explained_power = explainedPowerGain(data, before, after);
   const RangeAngleAxes axes = SignalChain(data.radar).axes();

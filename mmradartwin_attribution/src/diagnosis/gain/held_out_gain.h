@@ -30,8 +30,8 @@ GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPow
 
 /// Fills a finding's explained power before and after, the maps of its figure, and the cells that carry it where its
 /// one place has none yet. The gain is held out if `after` was expected by fits that did not see the pose.
-void compareMaps(const ChannelData& data, const std::vector<CellPowers>& before, const std::vector<CellPowers>& after,
-                 Finding& finding);
+void measureHeldOutGain(const ChannelData& data, const std::vector<CellPowers>& before,
+                        const std::vector<CellPowers>& after, Finding& finding);
 
 /// Mean log-likelihood per pose [nats] before and after, and the 95 % interval of the mean difference by bootstrap over
 /// locations. before, after: by pose.

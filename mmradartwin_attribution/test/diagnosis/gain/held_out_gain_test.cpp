@@ -171,7 +171,7 @@ class OneCellChanged : public ::testing::Test {
 };
 
 TEST_F(OneCellChanged, IsWhereTheFindingLiesInTheMaps) {
-  compareMaps(places(1), before_, after_, finding_);
+  measureHeldOutGain(places(1), before_, after_, finding_);
   const auto [range_m, azimuth_rad] = cells_[changed_];
   ASSERT_TRUE(finding_.where[0].range_m && finding_.where[0].azimuth_deg);
   EXPECT_NEAR((*finding_.where[0].range_m)[0], range_m, 1e-9);
@@ -182,12 +182,12 @@ TEST_F(OneCellChanged, IsWhereTheFindingLiesInTheMaps) {
 
 TEST_F(OneCellChanged, LeavesAPlaceThatIsKnownAsItIs) {
   finding_.where[0].range_m = {1, 2};
-  compareMaps(places(1), before_, after_, finding_);
+  measureHeldOutGain(places(1), before_, after_, finding_);
   EXPECT_EQ((*finding_.where[0].range_m)[1], 2);
 }
 
 TEST_F(OneCellChanged, IsSeenInTheMapsOfTheFigure) {
-  compareMaps(places(1), before_, after_, finding_);
+  measureHeldOutGain(places(1), before_, after_, finding_);
   ASSERT_TRUE(finding_.maps);
   const FindingMaps& maps = *finding_.maps;
   int different = 0;
@@ -208,7 +208,7 @@ TEST_F(OneCellChanged, IsSeenInTheMapsOfTheFigure) {
 }
 
 TEST_F(OneCellChanged, NothingThatChangesHasNoPlace) {
-  compareMaps(places(1), after_, after_, finding_);
+  measureHeldOutGain(places(1), after_, after_, finding_);
   EXPECT_FALSE(finding_.where[0].range_m);
   EXPECT_NEAR(finding_.gain->explained_power.after, 1, 1e-12);
 }
