@@ -1,6 +1,6 @@
 #include "diagnosis/catalogue/default_mechanism.h"
 
-#include "mmradartwin_sim/mechanism.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 
 namespace mmradartwin::diagnosis::catalogue {
 

@@ -12,6 +12,7 @@
 
 #include "diagnosis/numbers/packed_hermitian.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 
 namespace mmradartwin::diagnosis::likelihood {
 namespace {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 
 namespace mmradartwin {
 namespace {
