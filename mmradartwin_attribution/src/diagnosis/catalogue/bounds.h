@@ -89,4 +89,8 @@ inline constexpr double kBeyondTime = 1.5;
 
 // ---- conductor
 
+/// Share of the measured power that a twin has to explain beyond what chance explains before scene and recording belong
+/// together; see docs/calibration_of_bounds.md#kleastexplainedbeyondchance
+inline constexpr double kLeastExplainedBeyondChance = 0.05;
+
 }  // namespace mmradartwin::diagnosis::bounds

@@ -8,6 +8,8 @@
 #include <optional>
 
 #include "diagnosis/numbers/packed_hermitian.h"
+#include "mmradartwin_sim/mechanism.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 
 namespace mmradartwin::diagnosis::likelihood {
 namespace {

@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/mechanism.h"
+#include "mmradartwin_sim/mechanism_registry.h"
+#include "mmradartwin_sim/mechanism_stages.h"
 
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
@@ -48,7 +52,10 @@ std::string traceKeyOf(const NamedParameters& mechanism) {
 std::vector<NamedParameters> mechanismsReadBy(const NamedParameters& mechanism,
                                               const std::vector<NamedParameters>& list) {
   std::vector<NamedParameters> read;
-  for (const std::string& name : MechanismRegistry::instance().create(mechanism.mechanism)->looksAtPathsOf()) {
+  const std::unique_ptr<Mechanism> reader = MechanismRegistry::instance().create(mechanism.mechanism);
+  const auto* tracer = dynamic_cast<const PathStage*>(reader.get());
+  if (tracer == nullptr) return read;
+  for (const std::string& name : tracer->looksAtPathsOf()) {
     for (const NamedParameters& m : list) {
       if (m.mechanism == name) read.push_back(m);
     }
