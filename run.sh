@@ -22,6 +22,7 @@ usage() {
 usage: ./run.sh VERB
   demo [OUT]   install, build, then play a generated session through the whole loop; results in OUT (default demo_out)
   test         install, build, run the tests; the last line is "N passed, N failed, N skipped"
+  test long    the same with more sessions of the diagnosis, another third each day; test all takes every one
   setup        install the Debian packages that are missing
   build        build the workspace (.ws/)
   bench [OUT]  build, then run all benchmarks; JSON and a table in OUT (default bench_out). Its last part, the blind
@@ -83,18 +84,31 @@ data_folder() {
   export MMRADARTWIN_DATA=${MMRADARTWIN_DATA:-$(readlink -m "$root/../shared/data")}
 }
 
+# run_tests [long|all]: which diagnosis sessions run beside the fixed ones
 run_tests() {
+  local limit_s=1800
+  case ${1:-} in
+    '') ;;
+    long | all) export MMRADARTWIN_LONG=$1 ;;
+    *) usage ;;
+  esac
+  [ -z "${MMRADARTWIN_LONG:-}" ] || limit_s=14400
   build
   # Configured again: ctest's environment has only the folders that were there, and the first build made the messages' one.
   build tests --force-cmake
   source_workspace
   data_folder
   rm -rf "$ws/build/test_results"
-  # Side by side but for those that keep time; seeds are shown as they are drawn. What failed is read from the XML files.
+  rm -f "$ws/build/ctest.xml"
+  (cd "$ws/build" && ctest --show-only=json-v1) >"$ws/build/ctest_list.json"
+  # Side by side but for those that keep time; seeds and the day are shown. Cases are read from the XML files, and ctest
+  # says which modules ended badly or left none.
   say "running the tests (log: $ws/build/Testing/Temporary/LastTest.log)"
-  (cd "$ws/build" && ctest -V -j"$(jobs)" --timeout 5400) |
-    awk '/^ *[0-9]+\/[0-9]+ Test|^ +Start|^[0-9]+: MMRADARTWIN_[A-Z_]*SEED=/ {print; fflush()}' >&2 || true
-  python3 "$root/test/summarise_results.py" "$ws/build/test_results"
+  local status=0
+  (cd "$ws/build" && ctest -V -j"$(jobs)" --timeout "$limit_s" --output-junit ctest.xml) |
+    awk '/^ *[0-9]+\/[0-9]+ Test|^ +Start|^[0-9]+: MMRADARTWIN_[A-Z_]*(SEED|DAY)=/ {print; fflush()}' >&2 || status=$?
+  python3 "$root/test/summarise_results.py" "$ws/build/test_results" --list "$ws/build/ctest_list.json" \
+    --ran "$ws/build/ctest.xml" --status "$status"
 }
 
 run_bench() {
@@ -189,7 +203,7 @@ verb=${1:-}
 [ -n "$verb" ] && shift
 case $verb in
   demo) setup; build >&2; source_workspace; exec "$root/launch/scripts/demo.sh" "$(readlink -m "${1:-$root/demo_out}")" ;;
-  test) setup; run_tests ;;
+  test) setup; run_tests "$@" ;;
   setup) setup ;;
   build) setup; build ;;
   bench) setup; run_bench "$@" ;;
