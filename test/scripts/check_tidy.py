@@ -101,7 +101,9 @@ def check(root, build, cache, seconds=None, jobs=None):
     with concurrent.futures.ThreadPoolExecutor(jobs or os.cpu_count()) as pool:
         looked = sum(pool.map(run, sorted(left)))
     known, late = len(commands) - len(left), len(left) - looked
-    line = f"{looked} sources looked at, {known} known from before" + (f", {late} left for want of time" if late else "")
+    line = f"{looked} sources looked at, {known} known from before"
+    if late:
+        line += f", {late} left for want of time"
     return sorted(problems), line
 
 

@@ -40,12 +40,12 @@ def output_of(*command, **options):
 
 
 def check_format(_):
-    def formatted(file):
-        status, lines = output_of("clang-format", "--dry-run", "-Werror", file)
-        return [line for line in lines if "error:" in line][:1] or [f"{file}: clang-format failed"] if status else []
+    def check_some(some):
+        status, lines = output_of("clang-format", "--dry-run", "-Werror", "--ferror-limit=1", *some)
+        return [line for line in lines if "error:" in line] or ["clang-format failed"] if status else []
     files = tracked("*.cpp", "*.h")
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        problems = sum(pool.map(formatted, files), [])
+        problems = sum(pool.map(check_some, [files[i:i + 30] for i in range(0, len(files), 30)]), [])
     return problems, f"{len(files)} files; clang-format -i mends them"
 
 
@@ -96,7 +96,8 @@ def check_packages(_):
     folders = [name.rsplit("/", 1)[0] for name in tracked("*/package.xml")]
     status, lines = output_of("catkin_lint", "--offline", "-W2", "--ignore", "package_path_name",
                               "--ignore", "unused_catkin_include_dirs", *folders)
-    return [line for line in lines if not line.startswith("catkin_lint: ")] if status else [], f"{len(folders)} packages"
+    problems = [line for line in lines if not line.startswith("catkin_lint: ")]
+    return problems if status else [], f"{len(folders)} packages"
 
 
 def check_sources(arguments):
@@ -120,11 +121,14 @@ PARTS = {
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("parts", nargs="*", choices=[[], *PARTS], help="all if none is named")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all if none is named")
     parser.add_argument("--all", action="store_true", help="clang-tidy looks at every source, however long that takes")
     parser.add_argument("--seconds", type=float, default=180, help="time of clang-tidy otherwise, newest sources first")
     parser.add_argument("--xml", type=Path, help="JUnit file of the outcomes")
     arguments = parser.parse_args()
+    unknown = set(arguments.parts) - set(PARTS)
+    if unknown:
+        parser.error(f"no such part: {', '.join(sorted(unknown))}")
     suite = ElementTree.Element("testsuite", name="lint")
     failed = False
     for name in arguments.parts or PARTS:
