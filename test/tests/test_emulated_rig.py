@@ -16,7 +16,6 @@ import numpy
 import rosbag
 import rosgraph
 
-from mmradartwin_tests.installed_programs import find_program
 from made_session import make_session
 from test_launch_files import Launched, end, free_port
 
