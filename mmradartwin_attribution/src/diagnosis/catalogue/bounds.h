@@ -50,6 +50,38 @@ inline constexpr double kRankedShareOfNestingLaw = 0.9;
 // ---- receiver
 
 // ---- search
+/// Promise from which on a law without a name, or a replica of echoes, is worth a fit; see
+/// docs/calibration_of_bounds.md#kleastnatsoflaw
+inline constexpr double kLeastNatsOfLaw = 8;
+/// Promise of the best of all places from which on an object there is taken for real; see
+/// docs/calibration_of_bounds.md#kleastnatsofobject
+inline constexpr double kLeastNatsOfObject = 3;
+/// Promise from which on a second face of an actor is worth a fit; see
+/// docs/calibration_of_bounds.md#kleastnatsofsecondface
+inline constexpr double kLeastNatsOfSecondFace = 50;
+/// Nats of an actor's own errors from which on the actor is looked for elsewhere; see
+/// docs/calibration_of_bounds.md#kleastnatsoutofplace
+inline constexpr double kLeastNatsOutOfPlace = 1.2;
+/// Gain by all of an actor's echoes nearer or farther away from which on the actor is looked for elsewhere; see
+/// docs/calibration_of_bounds.md#kleastnatselsewhere
+inline constexpr double kLeastNatsElsewhere = 5;
+/// Standard deviations from none at which an error that latents share is tried as a cause; see
+/// docs/calibration_of_bounds.md#ksharedlatent_sigmas
+inline constexpr double kSharedLatent_sigmas = 3;
+/// Level of a law over passing paths, at most, for which something may hide what is behind it; see
+/// docs/calibration_of_bounds.md#khides_db
+inline constexpr double kHides_db = -6;
+/// Price of each number of a law when laws are compared; see docs/calibration_of_bounds.md#kpriceoflawnumber_nats
+inline constexpr double kPriceOfLawNumber_nats = 4;
+/// Nats over the price that a law has at least; a fit sometimes finds what paths alone show less of; see
+/// docs/calibration_of_bounds.md#kleastworthoflaw_nats
+inline constexpr double kLeastWorthOfLaw_nats = -2;
+/// Effective number of places that tell of a law with nothing outside a part of its variable, at least; see
+/// docs/calibration_of_bounds.md#kfewestplacesoflaw
+inline constexpr double kFewestPlacesOfLaw = 3;
+/// Factor of the nats that time explains beyond which gains that differ from pose to pose follow no time; see
+/// docs/calibration_of_bounds.md#kbeyondtime
+inline constexpr double kBeyondTime = 1.5;
 
 // ---- gain
 
