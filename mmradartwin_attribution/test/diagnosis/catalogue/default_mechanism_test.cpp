@@ -4,6 +4,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/mechanism.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 
 namespace mmradartwin::diagnosis {
 namespace {
