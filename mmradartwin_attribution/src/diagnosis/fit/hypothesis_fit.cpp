@@ -21,11 +21,6 @@ constexpr int kMostExpansions = 8;                  ///< of a state's echoes abo
 constexpr double kSettled_nats = 1;                 ///< gain of an expansion below which they end
 constexpr double kFoldShares[] = {1, 0.4, 0.1, 0};  ///< of a fold's step, until its places are no worse
 constexpr double kLeastShareKept = 0.2;             ///< bound of the share of places that a fold is fitted to
-// Three times what an actor's place is wrong by. A shorter move is no likely cause and explains part of other causes.
-constexpr double kLeastMove_m = 0.06;
-
-// Six times what a scene's actors err by.
-constexpr double kFarAway_m = 0.12;
 
 }  // namespace
 
@@ -49,7 +44,7 @@ double HypothesisFit::ranking() const {
                                                     : 1;
   double nats = share * gain - bounds::kPriceOfNumber_nats * static_cast<double>(numbers());
   if (hypothesis.mechanism.mechanism == "actor_unmodelled") nats -= bounds::kPriceOfPlace_nats;
-  if (hypothesis.isMove() && moved_m() < kLeastMove_m) nats -= bounds::kPriceOfNumber_nats;
+  if (hypothesis.isMove() && moved_m() < stated.leastMove_m()) nats -= bounds::kPriceOfNumber_nats;
   return nats;
 }
 
@@ -67,7 +62,8 @@ double HypothesisFit::moved_m() const {
 }
 
 bool HypothesisFit::isFarAway() const {
-  return moved_m() > kFarAway_m && (plain || gain_without_best_place / overdispersion > bounds::kLeastNatsOfFarAway);
+  return moved_m() > stated.farAway_m() &&
+         (plain || gain_without_best_place / overdispersion > bounds::kLeastNatsOfFarAway);
 }
 
 double HypothesisFit::size_m() const {
@@ -75,8 +71,9 @@ double HypothesisFit::size_m() const {
   return hypothesis.at(scaled_values).values.number("size_m");
 }
 
-HypothesisFitter::HypothesisFitter(ExpectedEchoes& source, const ChannelLikelihood& model, int folds)
-    : source_(source), model_(model), folds_(folds) {}
+HypothesisFitter::HypothesisFitter(ExpectedEchoes& source, const ChannelLikelihood& model, int folds,
+                                   StatedBounds stated)
+    : source_(source), model_(model), folds_(folds), stated_(stated) {}
 
 ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanisms, const SessionLatents* start) {
   ModelState s;
@@ -187,6 +184,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
                                     const std::vector<std::vector<double>>& starts, double least_nats,
                                     const HypothesisFit* known) {
   HypothesisFit f;
+  f.stated = stated_;
   f.hypothesis = hypothesis;
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());

@@ -32,8 +32,8 @@ void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector
                                                                                       nlopt_destroy);
   std::vector<double> low, high;
   for (const Coordinate& c : coordinates) {
-    low.push_back(std::min(c.scaled_values(c.min), c.scaled_values(c.max)));
-    high.push_back(std::max(c.scaled_values(c.min), c.scaled_values(c.max)));
+    low.push_back(std::min(c.scaled(c.min), c.scaled(c.max)));
+    high.push_back(std::max(c.scaled(c.min), c.scaled(c.max)));
   }
   const auto call = [](unsigned size, const double* x, double*, void* function) {
     return (*static_cast<const std::function<double(const std::vector<double>&)>*>(function))({x, x + size});
@@ -188,8 +188,7 @@ double LikelihoodClimb::stepBy(const Eigen::VectorXd& step) {
       double& v = next[j];
       v += share * std::clamp(step[globals_ + static_cast<Eigen::Index>(j)], -kLongestStep, kLongestStep);
       if (c.logarithmic()) v = std::max(v, 0.3 * optimum_.scaled_values[j]);
-      const double low = std::min(c.scaled_values(c.min), c.scaled_values(c.max)),
-                   high = std::max(c.scaled_values(c.min), c.scaled_values(c.max));
+      const double low = std::min(c.scaled(c.min), c.scaled(c.max)), high = std::max(c.scaled(c.min), c.scaled(c.max));
       v = std::clamp(v, low, high);
     }
     ModelState s =
