@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <array>
 #include <complex>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/catalogue/stated_bounds.h"
@@ -159,14 +161,45 @@ class ChannelLikelihood {
   struct GroupLevel {
     double gain, shift_m;
   };
-  std::vector<GroupLevel> levels(const PoseEchoes& echoes, const SessionLatents& nuisance) const;
-  PackedHermitian sigma(const PoseEchoes& echoes, const std::vector<GroupLevel>& levels, const SessionLatents& nuisance,
-                        int pose, int cell) const;
+  /// One pose's echoes under latents.
+  struct PoseModel {
+    const PoseEchoes& echoes;
+    const SessionLatents& nuisance;
+    int pose;
+    std::vector<GroupLevel> levels;  ///< [groups, grazing ones last]
+  };
+  PoseModel modelOf(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose) const;
+  /// Covariance of a cell.
+  PackedHermitian sigma(const PoseModel& model, int cell) const;
+  /// A group's fields in a cell; nothing where it has none.
+  std::optional<EchoGroup::Cell> fieldsOf(const EchoGroup& group, int cell) const;
   /// Adds clutter's covariance in a cell, times factor.
   void addClutter(const SessionLatents& nuisance, int pose, int cell, double factor, PackedHermitian& to) const;
   double prior(const SessionLatents& nuisance) const;
   double poseLikelihood(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose) const;
   void addBasis(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose, bool keep, PoseBasis& out) const;
+  struct CellDirections;
+  /// Adds a cell's changes by the actors' errors, the heading, grazing echoes and range errors. inverse: of the cell's
+  /// covariance.
+  void addEchoDirections(const PoseModel& model, int cell, const PackedHermitian& inverse, CellDirections& to) const;
+  /// Adds a cell's changes by the floor, its shape, the gain and the channels' independent share.
+  void addLevelDirections(const PoseModel& model, int cell, const PackedHermitian& covariance,
+                          CellDirections& to) const;
+  /// Fills BinBasis::data: y whitened channels, w their weight under the t distribution.
+  void setData(const std::complex<double>* y, double w, BinBasis& basis) const;
+  /// Whitens a cell's directions and adds their scores and information to the pose's.
+  void addProducts(CellDirections& directions, BinBasis& basis, PoseBasis& out) const;
+  struct PoseScores;
+  /// further: the pose's changes of covariance by each further direction.
+  PoseScores poseScores(const Basis& basis, std::size_t pose, const std::vector<const PoseCovariance*>& further) const;
+  /// Adds the scores of one cell by further directions.
+  void addFurther(const BinBasis& bin, const SessionLatents& nuisance,
+                  const std::vector<const PoseCovariance*>& further, PoseScores& own) const;
+  /// Adds a pose's scores with its heading eliminated.
+  void addWithoutHeading(const PoseScores& pose_scores, const SessionLatents& nuisance, std::size_t pose,
+                         Scores& scores) const;
+  void addPriors(const SessionLatents& nuisance, Scores& scores) const;
+  void holdAtLimits(const SessionLatents& nuisance, Scores& scores) const;
   double informationOf(double product, double trace_a, double trace_b) const;
 
   const ChannelData& data_;
