@@ -167,8 +167,8 @@ void DiagnosisRun::measureFrameGain() {
   ChannelData recorded = data_;
   const SignalChain chain(data_.radar);
   for (PoseChannels& p : recorded.poses) {
-    if (p.plain.x.size() == 0) continue;
-    p.grid = p.plain;
+    if (p.uncorrected_average.x.size() == 0) continue;
+    p.grid = p.uncorrected_average;
     transformGrid(chain, p);
   }
   gains_->ofChange(recorded, mechanisms_, data_, mechanisms_, found.front());
@@ -200,7 +200,7 @@ void DiagnosisRun::judgeTone() {
     if (m.mechanism == "tx_rx_leakage" || m.mechanism == "dc_offset") return;  // the twin has it already
   }
   const BodyFixedTone tone = findBodyFixedTone(data_);
-  if (!isPlain(tone)) return;
+  if (!isUnambiguous(tone)) return;
   const ChannelData recorded = data_;
   subtractTone(tone, data_);
   Finding f = findingOf(tone, data_);
