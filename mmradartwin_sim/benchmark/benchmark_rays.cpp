@@ -18,9 +18,7 @@
 #include "mmradartwin_dsp/paper_radar.h"
 #include "mmradartwin_sim/cell_records.h"
 #include "mmradartwin_sim/moving_twin.h"
-#include "mmradartwin_sim/traced_session.h"
 #include "mmradartwin_sim/twin.h"
-#include "mmradartwin_sim/weight_basis.h"
 
 using namespace mmradartwin;
 
@@ -297,32 +295,6 @@ void fullPoseWeighAgain(benchmark::State& state) {
 }
 BENCHMARK(fullPoseWeighAgain)->Unit(benchmark::kMillisecond);
 
-/// By a twin of other materials (0: a factor per actor), or of another pattern (1: a factor per direction).
-void fullPoseWeighCondensed(benchmark::State& state) {
-  const Twin& base = fullTwin();
-  std::vector<NamedParameters> mechanisms = base.description().mechanisms;
-  NamedParameters more;
-  if (state.range(0) == 0) {
-    more.mechanism = "material_reflectivity";
-    more.values.set("material", base.scene().actors.front().material_tag);
-    more.values.set("actor", std::string());
-    more.values.set("delta_db", -3.0);
-  } else {
-    more.mechanism = "elevation_pattern";
-    more.values.set("cos_exponent", 2.1);
-    more.values.set("angles_deg", std::vector<double>());
-    more.values.set("gain_db", std::vector<double>());
-  }
-  mechanisms.push_back(more);
-  const Twin twin = base.changed(mechanisms);
-  const CondensedTrace traced(base.radar(), base.trace(pose(0)));
-  for (auto _ : state) benchmark::DoNotOptimize(twin.weigh(pose(0), traced).grid.x.data());
-  state.counters["nodes"] = static_cast<double>(traced.nodes().size());
-  state.counters["records"] = static_cast<double>(traced.records().size());
-  state.counters["kB"] = static_cast<double>(traced.bytes()) / 1e3;
-}
-BENCHMARK(fullPoseWeighCondensed)->ArgName("pattern")->Arg(0)->Arg(1)->Unit(benchmark::kMicrosecond);
-
 /// Records as they are exported, summed per cell of a facet.
 void fullPoseCells(benchmark::State& state) {
   const Twin& twin = fullTwin();
@@ -333,19 +305,6 @@ void fullPoseCells(benchmark::State& state) {
   state.counters["cells"] = static_cast<double>(cells);
 }
 BENCHMARK(fullPoseCells)->Unit(benchmark::kMillisecond);
-
-void fullPoseWeighByGroups(benchmark::State& state) {
-  const Twin& twin = fullTwin();
-  const WeightBasis basis(twin.radar(), twin.trace(pose(0)));
-  const std::vector<std::complex<double>> weights(basis.groups().size(), 0.7);
-  ComplexGrid x;
-  for (auto _ : state) {
-    basis.sum(weights, x);
-    benchmark::DoNotOptimize(x.data());
-  }
-  state.counters["groups"] = static_cast<double>(basis.groups().size());
-}
-BENCHMARK(fullPoseWeighByGroups)->Unit(benchmark::kMillisecond);
 
 /// One actor of the full pose goes to and fro by 5 cm while the radar stands.
 void fullPoseOneActorMoved(benchmark::State& state) {

@@ -1,10 +1,12 @@
 // A mechanism as a user's package would add it: an echo weaker by a factor, nothing of the product's own sources.
 
+#include <cmath>
+
 #include "mmradartwin_sim/register_mechanism.h"
 
 namespace user {
 
-class PaperCurtain : public mmradartwin::Mechanism {
+class PaperCurtain : public mmradartwin::Mechanism, public mmradartwin::WeightStage {
  public:
   const std::string& name() const override {
     static const std::string kName = "paper_curtain";

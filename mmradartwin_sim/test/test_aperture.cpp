@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
-#include "../src/aperture.h"
-#include "../src/fresnel_integral.h"
 #include "closed_form.h"
+#include "physics/aperture.h"
+#include "physics/fresnel_integral.h"
 
 namespace mmradartwin {
 namespace {

@@ -1,8 +1,8 @@
 #include <complex>
 
-#include "../src/diffracting_edge.h"
-#include "../src/wedge_diffraction.h"
 #include "closed_form.h"
+#include "physics/diffracting_edge.h"
+#include "physics/wedge_diffraction.h"
 #include "scene_files.h"
 
 namespace mmradartwin {

@@ -5,6 +5,7 @@
 #include "closed_form.h"
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/coherent_average.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 #include "mmradartwin_sim/simulate_session.h"
 #include "scene_files.h"
 

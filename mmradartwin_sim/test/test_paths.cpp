@@ -4,8 +4,8 @@
 #include <set>
 #include <tuple>
 
-#include "../src/image_paths.h"
 #include "closed_form.h"
+#include "rays/image_paths.h"
 #include "scene_files.h"
 
 namespace mmradartwin {

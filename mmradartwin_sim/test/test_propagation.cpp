@@ -3,7 +3,7 @@
 #include "closed_form.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/law_variable.h"
-#include "mmradartwin_sim/weight_basis.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 #include "scene_files.h"
 
 namespace mmradartwin {
@@ -446,34 +446,6 @@ TEST_F(Propagation, CarrierScaleStretchesTheSine) {
     return -(r.length_m[1] - r.length_m[0]) / paperRadar().rx_position_m[1].y();
   };
   EXPECT_NEAR(sine("  carrier_scale: {scale: 0.012}\n") / sine(""), 1.012, 1e-9);
-}
-
-// The grid is linear in the levels of its groups: weighed by them it is what the mechanism makes of all paths.
-TEST_F(Propagation, AWeightBasisIsTheWeighedGrid) {
-  addWall("wall", "RoughConcrete", {3, -4}, {3, 4});
-  addWall("left", "RoughMetal", {3, 2}, {-3, 2});
-  addBox("cabinet", "Metal", {2, -2, -1}, {2.6, -1, 0.5});
-  writeScene();
-  const std::string base = "  specular: {}\n  corner: {}\n  diffuse: {}\n  edge_diffraction: {level: 1}\n";
-  const RadarConfig radar = paperRadar();
-  const Simulation plain = run(base, radarPose(0, 0, 0, 10), radar);
-  const Simulation weighed =
-      run(base + "  material_reflectivity: {material: RoughMetal, delta_db: -7}\n", radarPose(0, 0, 0, 10), radar);
-  const WeightBasis basis(radar, plain.records);
-  int paths = 0;
-  std::vector<Complex> weights;
-  for (const WeightBasis::Group& g : basis.groups()) {
-    double weight = 1;
-    for (int actor : g.actors) weight *= actor == 1 ? std::pow(10, -7.0 / 20) : 1;
-    weights.emplace_back(weight);
-    paths += g.paths;
-  }
-  EXPECT_EQ(paths, static_cast<int>(plain.records.size()));
-  ComplexGrid x;
-  basis.sum(weights, x);
-  EXPECT_LT((x - weighed.grid.x).norm(), 1e-12 * weighed.grid.x.norm());
-  EXPECT_GT((x - plain.grid.x).norm(), 0.01 * plain.grid.x.norm());
-  EXPECT_THROW(basis.sum({1.0}, x), std::invalid_argument);
 }
 
 TEST_F(Propagation, AnEmpiricalLawIsItsTable) {

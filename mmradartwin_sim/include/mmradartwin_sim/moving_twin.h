@@ -62,7 +62,7 @@ class MovingTwin {
   std::unique_ptr<Twin> twin_;
   Scene rest_;  ///< where the twin has its actors
   std::vector<Mover> movers_;
-  std::vector<Part> parts_;  ///< one per mechanism, in their order
+  std::vector<Part> parts_;  ///< one per mechanism that adds paths, in their order
   Simulation simulation_;
   Eigen::Isometry3d traced_at_ = Eigen::Isometry3d::Identity();  ///< where mechanisms put the radar then
   std::size_t echoes_ = 0;  ///< records that were traced; those behind them are relative to the strongest

@@ -9,55 +9,18 @@
 #include <vector>
 
 #include "mmradartwin_dsp/adc_cube.h"
-#include "mmradartwin_dsp/channel_correction.h"
-#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_sim/mechanism.h"
 #include "mmradartwin_sim/path_record.h"
+#include "mmradartwin_sim/ray_caster.h"
 #include "mmradartwin_sim/scene.h"
+#include "mmradartwin_sim/twin_description.h"
 
 namespace mmradartwin {
 
-class CondensedTrace;
 class MovingTwin;
-
-struct NamedParameters {
-  std::string mechanism;
-  Parameters values;
-};
-
-/// What a mechanism's parameters say that it concerns: actors, a material, walls, a pose, of a law its variable; "" for
-/// nothing of the kind.
-std::string subjectOf(const NamedParameters& mechanism);
-/// True where a twin cannot have both: the same mechanism for the same thing, or twice where it stands once.
-bool excludeEachOther(const NamedParameters& a, const NamedParameters& b);
-
-/// twin.yaml, checked: scene, radar and mechanisms.
-struct TwinDescription {
-  std::string file;  ///< "" where the base twin stands in
-  std::string scene_file;
-  std::string radar_file;  ///< where twin.yaml names a radar of its own, else ""
-  RadarConfig radar;
-  std::vector<NamedParameters> mechanisms;  ///< in the order of the file
-  std::string toYaml() const;               ///< resolved: all parameters with their values
-};
-
-/// Neither twin.yaml nor its caller names a scene; nothing else is wrong.
-class MissingScene : public InputError {
- public:
-  using InputError::InputError;
-};
-
-/// Reads twin.yaml strictly; scene and radar default to the given ones. twin_file empty: base mechanisms.
-/// Throws InputError (unknown mechanism or parameter, value out of range), MissingScene.
-TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::string>& default_scene,
-                         const RadarConfig& default_radar);
-
-/// Throws InputError where the twin's channel_phase_error is the error that `correction` takes out of the measurement:
-/// it would count twice. Tells by likeness: a smaller error that was found in corrected data may stand in a twin.
-void refuseSameChannelError(const TwinDescription& twin, const ChannelCorrection& correction);
 
 struct Simulation {
   std::int64_t stamp_ns = 0;
@@ -150,9 +113,6 @@ class Twin {
   /// Where all that the receiver does beyond filters is one complex matrix over the channels, the same at all samples:
   /// that matrix [M][M]; else nothing.
   std::optional<Eigen::MatrixXcd> channelMatrix(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
-  /// The same of what a trace was condensed to (traced_session.h): some sixty times as fast as tracing. Mechanisms
-  /// that look at the paths for what they do to the grid (second_harmonic) see those that stayed records.
-  Simulation weigh(const Eigen::Isometry3d& T_map_radar, const CondensedTrace& traced, std::int64_t stamp_ns = 0) const;
   /// Throws InputError for a pose that is NaN or inside an actor (names it).
   Simulation simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
 
@@ -177,8 +137,6 @@ class Twin {
                    const std::function<void(const ChirpContext&, const ComplexGrid&)>& visit) const;
 
  private:
-  Simulation weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced, std::int64_t stamp_ns,
-                   const CondensedTrace* condensed) const;
   void forEachChirp(const Simulation& pose, int frames,
                     const std::function<void(const ChirpContext&, ComplexGrid&)>& visit) const;
   friend class MovingTwin;

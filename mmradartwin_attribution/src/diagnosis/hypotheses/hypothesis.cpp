@@ -9,6 +9,7 @@
 #include "diagnosis/likelihood/expected_echoes.h"
 #include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/mechanism_registry.h"
 
 namespace mmradartwin::diagnosis::hypotheses {
 namespace {

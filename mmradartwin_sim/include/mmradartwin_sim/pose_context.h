@@ -1,0 +1,63 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_sim/ray_caster.h"
+#include "mmradartwin_sim/scatter_cells.h"
+#include "mmradartwin_sim/scene.h"
+#include "mmradartwin_sim/scene_change.h"
+
+namespace mmradartwin {
+
+/// Base field of view of emission and arrival: |azimuth| < 90 deg, |elevation| <= 20 deg of a direction in radar_link.
+bool inFieldOfView(const Eigen::Vector3d& direction_radar);
+
+/// Everything a mechanism may look at for one pose.
+struct PoseContext {
+  const RadarConfig& radar;
+  const Scene& scene;
+  const RayCaster& rays;
+  Eigen::Isometry3d T_map_radar;  ///< where the twin's radar is, after all pose() calls
+  double frequency_hz;            ///< of the coefficients: the window's centre
+  bool inFieldOfView(const Eigen::Vector3d& direction_radar) const;  ///< the free function
+  double max_range_m;                                                ///< paths with length/2 beyond are left out
+  std::uint64_t seed;  ///< of what is random by nature (phases of scatter points)
+  /// Strongest A_p of the session's poses, for levels that are relative to it.
+  std::function<double()> strongest_amplitude;
+  /// |gain| of the receiver's filters at a path length: what a level stated after the IF filter has to make up for.
+  std::function<double(double length_m)> receiver_gain;
+  /// When the pose was taken: after the session's first pose, and its place among the session's poses in time order.
+  /// Zero, and 0 of 1, where no session is known (Twin::setSession).
+  double session_s = 0;
+  int pose_index = 0, pose_count = 1;
+  /// Where the pose's paths are known but for what a change touches; else null (Mechanism::tracesChanges).
+  const SceneChange* change = nullptr;
+  const CloudCells* cloud = nullptr;  ///< null: every scatter point is a path
+  /// Paths that meet this actor (index in `scene`) are wanted alone; others that are added are thrown away. -1: all
+  /// are.
+  int only_actor = -1;
+};
+
+/// One chirp of one frame of a pose, for what differs from chirp to chirp (DESIGN section 3: chirps come as
+/// loop * slots + slot).
+struct ChirpContext {
+  const PoseContext& pose;
+  std::int64_t stamp_ns = 0;  ///< start of the pose's first frame
+  int frame = 0, chirp = 0, slot = 0;
+  double time_s = 0;             ///< centre of the chirp's ADC window after stamp_ns
+  std::uint64_t draw = 0;        ///< key of this chirp's random numbers: seed, stamp, frame and chirp make it
+  std::uint64_t frame_draw = 0;  ///< the same for all chirps of a frame
+};
+
+/// The bytes of one pose on their way from the ADC: frames back to back in the radar's capture layout.
+struct PayloadContext {
+  const RadarConfig& radar;
+  std::string pose;  ///< its name, "" where it has none
+  std::uint64_t draw = 0;
+};
+
+}  // namespace mmradartwin

@@ -1,0 +1,60 @@
+#include <algorithm>
+
+#include "mechanisms/base/built_in_mechanism.h"
+#include "physics/elements_in_map.h"
+#include "physics/trihedral.h"
+
+namespace mmradartwin {
+namespace {
+
+const std::string kName = "corner";
+
+/// The retro paths of two and of three facets that meet at concave right angles.
+class Corner : public Mechanism, public PathStage {
+ public:
+  const std::string& name() const override { return kName; }
+  std::vector<ParameterSpec> parameters() const override { return {}; }
+  void configure(const Parameters&, const Scene&, const RadarConfig&) override {}
+
+  void build(const Scene& scene, const RadarConfig&) override {
+    edges_ = findCornerEdges(
+        scene, kFacesMeet_m, [](const Facet& f) { return f.reflects; },
+        [](const Facet&, const Facet&) { return true; });
+    trihedra_ = findTrihedra(scene, edges_, kFacesMeet_m);
+  }
+
+  void sceneChanged(const Scene& scene, const RadarConfig&, const SceneChange& change) override {
+    const auto moved = [&](int facet) { return change.moved(scene.facets[facet].actor); };
+    edges_.erase(
+        std::remove_if(edges_.begin(), edges_.end(), [&](const CornerEdge& e) { return moved(e.a) || moved(e.b); }),
+        edges_.end());
+    const std::vector<CornerEdge> again = findCornerEdges(
+        scene, kFacesMeet_m, [](const Facet& f) { return f.reflects; },
+        [&](const Facet& a, const Facet& b) { return moved(a.id) || moved(b.id); });
+    edges_.insert(edges_.end(), again.begin(), again.end());
+    std::stable_sort(edges_.begin(), edges_.end(), [](const CornerEdge& a, const CornerEdge& b) {
+      return std::make_pair(a.a, a.b) < std::make_pair(b.a, b.b);
+    });
+    trihedra_ = findTrihedra(scene, edges_, kFacesMeet_m);
+  }
+
+  void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
+    const ElementsInMap elements(context);
+    const auto wanted = [&](int facet) { return context.scene.facets[facet].actor == context.only_actor; };
+    for (const CornerEdge& edge : edges_) {
+      if (context.only_actor >= 0 && !wanted(edge.a) && !wanted(edge.b)) continue;
+      addCornerPath(context, elements, edge, kName, 1, records);
+    }
+    for (const Trihedral& t : trihedra_) addTrihedralPath(context, elements, t, kName, 1, records);
+  }
+
+ private:
+  std::vector<CornerEdge> edges_;
+  std::vector<Trihedral> trihedra_;
+};
+
+}  // namespace
+
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(Corner)
+
+}  // namespace mmradartwin

@@ -1,0 +1,210 @@
+#include <atomic>
+#include <cmath>
+
+#include "mechanisms/base/built_in_mechanism.h"
+#include "physics/aperture.h"
+#include "physics/curved_surface.h"
+#include "physics/elements_in_map.h"
+#include "physics/image_record.h"
+#include "physics/polarisation.h"
+#include "rays/image_paths.h"
+
+namespace mmradartwin {
+namespace {
+
+const std::string kName = "specular";
+constexpr double kInset_m = 0.01;  // where a return beside a facet is taken to come from
+constexpr double kSmallestFactor = 0.01;
+
+class Specular : public Mechanism, public PathStage {
+ public:
+  const std::string& name() const override { return kName; }
+
+  std::vector<ParameterSpec> parameters() const override {
+    ParameterSpec bounces = numberSpec("max_bounces", "1", 0, 8, 3, "highest order of reflection");
+    bounces.kind = ParameterKind::kInteger;
+    ParameterSpec budget = numberSpec("ray_budget", "1", 0, 1e7, 20000,
+                                      "rays launched per pose to seed the orders that cannot be searched exhaustively");
+    budget.kind = ParameterKind::kInteger;
+    return {bounces, numberSpec("power_cutoff_db", "dB", -400, 0, -200, "paths with 20 log10(A_p) below are dropped"),
+            budget};
+  }
+
+  void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
+    max_bounces_ = static_cast<int>(values.number("max_bounces"));
+    ray_budget_ = static_cast<int>(values.number("ray_budget"));
+    cutoff_ = std::pow(10.0, values.number("power_cutoff_db") / 20);
+  }
+
+  void build(const Scene& scene, const RadarConfig&) override {
+    search_ = std::make_unique<ImageSearch>(scene);
+    exhaustive_ = std::min(max_bounces_, search_->exhaustiveOrder());
+  }
+
+  void sceneChanged(const Scene&, const RadarConfig&, const SceneChange& change) override {
+    search_->update(change.actors);
+    exhaustive_ = std::min(max_bounces_, search_->exhaustiveOrder());
+  }
+
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes;
+    if (exhaustive_ < max_bounces_ && !(max_bounces_ > 3 && exhaustive_ == 3)) {
+      notes.push_back("specular: " + std::to_string(search_->reflectors().size()) +
+                      " facets are too many to try all sequences of more than " + std::to_string(exhaustive_) +
+                      "; higher orders come from " + std::to_string(ray_budget_) + " launched rays per pose");
+    }
+    if (seeded_poses_ > 0) {
+      notes.push_back("specular: launched rays found " + std::to_string(seeded_paths_) + " paths at " +
+                      std::to_string(seeded_poses_) + " poses, " +
+                      (late_paths_ == 0
+                           ? "half as many rays would have found the same"
+                           : std::to_string(late_paths_) +
+                                 " of them only when the rays were doubled; raise ray_budget until none is"));
+    }
+    return notes;
+  }
+
+  void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
+    if (max_bounces_ < 1) return;
+    const ElementsInMap elements(context);
+    const int only = context.only_actor;
+    for (int id : search_->reflectors()) {
+      if (only < 0 || context.scene.facets[id].actor == only) {
+        addFirstOrder(context, elements, context.scene.facets[id], records);
+      }
+    }
+    for (std::size_t i = 0; i < context.scene.curved.size(); ++i) {
+      if (only < 0 || context.scene.curved[i].actor == only) {
+        addCurved(context, elements, static_cast<int>(i), records);
+      }
+    }
+    if (max_bounces_ < 2) return;
+    ImageSearch::Limits limits;
+    limits.max_order = exhaustive_;
+    limits.max_length_m = 2 * context.max_range_m;
+    limits.forward = context.T_map_radar.linear().col(0);
+    const Eigen::Matrix3d to_radar = context.T_map_radar.linear().transpose();
+    limits.only_actor = only;
+    limits.in_view = [&](const Eigen::Vector3d& d) { return context.inFieldOfView(to_radar * d); };
+    if (exhaustive_ >= 2) {
+      for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2))
+        addImageRecord(context, elements, path, kName, 1, cutoff_, records);
+    }
+    if (exhaustive_ < max_bounces_ && ray_budget_ > 0) {
+      limits.max_order = max_bounces_;
+      ImagePath path;
+      ++seeded_poses_;
+      for (const auto& [sequence, by_half] : search_->seeds(elements.p, context.rays, limits, ray_budget_,
+                                                            context.T_map_radar.linear(), 20 * M_PI / 180)) {
+        if (static_cast<int>(sequence.size()) <= std::max(1, exhaustive_)) continue;
+        if (sequence.size() == 2 && perpendicular(context.scene.facets[sequence[0]], context.scene.facets[sequence[1]]))
+          continue;
+        if (!search_->solve(elements.p, sequence, context.rays, limits, path)) continue;
+        const std::size_t before = records.size();
+        addImageRecord(context, elements, path, kName, 1, cutoff_, records);
+        if (records.size() == before) continue;
+        ++seeded_paths_;
+        late_paths_ += !by_half;
+      }
+    }
+  }
+
+ private:
+  void addFirstOrder(const PoseContext& context, const ElementsInMap& elements, const Facet& facet,
+                     std::vector<PathRecord>& records) const {
+    const double signed_distance = facet.planeDistance(elements.p), R = std::abs(signed_distance);
+    if (R < 1e-6 || R > context.max_range_m) return;
+    const double wavelength = context.radar.wavelength_m();
+    const Eigen::Vector3d foot = elements.p - signed_distance * facet.normal;
+    const Eigen::Vector3d middle = facet.origin + 0.5 * (facet.size1_m * facet.e1 + facet.size2_m * facet.e2);
+    const double radius = 0.5 * std::hypot(facet.size1_m, facet.size2_m);
+    const double away = (foot - middle).norm();
+    if (away > radius) {
+      // Bounds of |factor|: the angle the facet fills as seen from the foot, twice over 2 pi, and its area in Fresnel
+      // units.
+      if (2 * std::asin(radius / away) < M_PI * kSmallestFactor) return;
+      if (2 * facet.area_m2 / (wavelength * R) < kSmallestFactor) return;
+      if (2 * (away - radius) / std::sqrt(wavelength * R) > 60) return;
+    }
+    const bool inside = facet.contains(foot);
+    const Eigen::Vector3d vertex = inside ? foot : facet.nearest(foot, kInset_m);
+    const Eigen::Vector3d way = vertex - elements.p;
+    const double distance = way.norm();
+    if (distance > context.max_range_m) return;
+    const Eigen::Vector3d direction = way / distance;
+    const Eigen::Vector3d direction_radar = context.T_map_radar.linear().transpose() * direction;
+    if (!context.inFieldOfView(direction_radar)) return;
+    const double gap = std::max(1e-3, 2 * facet.flatness_m / std::max(0.1, std::abs(direction.dot(facet.normal))));
+    if (!context.rays.visible(elements.p, vertex, gap)) return;
+    const Eigen::Vector3d straight =
+        -signed_distance / R * facet.normal;  // the image's direction, also beside the facet
+    const std::complex<double> factor = apertureFactor(facet, foot, straight, R, R, wavelength);
+    if (std::abs(factor) < kSmallestFactor) return;
+
+    const Material& material = context.scene.actors[facet.actor].material;
+    const Eigen::Vector3d e = verticalField(elements.up, straight);
+    const ComplexVector back =
+        reflectField(e.cast<std::complex<double>>(), straight, facet.normal, material, context.frequency_hz);
+    const std::complex<double> gamma = (e.cast<std::complex<double>>().transpose() * back)(0);
+    const std::complex<double> coefficient = wavelength / (4 * M_PI * 2 * R) * specularShare(material) * gamma * factor;
+    if (std::abs(coefficient) < cutoff_) return;
+    PathRecord record;
+    record.event = &kName;
+    record.actors = {facet.actor};
+    record.facets = {facet.id};
+    record.vertices = {vertex};
+    record.departure = record.arrival = direction_radar;
+    record.bounces = 1;
+    record.reflection_cosine = {1.0};  // the level is that of the perpendicular, also beside the facet
+    record.length_m = inside ? elements.lengthsByImage([&](const Eigen::Vector3d& t) { return mirror(t, facet); })
+                             : elements.lengthsVia(vertex);
+    setContribution(context.radar, std::conj(coefficient), record);
+    records.push_back(std::move(record));
+  }
+
+  void addCurved(const PoseContext& context, const ElementsInMap& elements, int index,
+                 std::vector<PathRecord>& records) const {
+    const CurvedSurface& surface = context.scene.curved[index];
+    const Actor& actor = context.scene.actors[surface.actor];
+    if (!actor.present) return;
+    const std::optional<CurvedEcho> echo = curvedEcho(context, elements, surface);
+    if (!echo || std::abs(echo->straight.z()) > std::sqrt(0.5)) return;  // facets there take no part
+    // The facets lie a little behind the surface; one of them has to be what is met first. A second ray beside the
+    // first, where that slips through between two triangles.
+    const double reach = echo->distance_m + 4 * surface.sagitta_m + 2 * kInset_m;
+    const auto met = [&](const Eigen::Vector3d& direction) {
+      const auto hit = context.rays.firstHit(elements.p, direction, reach);
+      return hit && hit->facet >= 0 && context.scene.facets[hit->facet].curved == index;
+    };
+    if (!met(echo->direction) && !met(echo->direction + 1e-4 * echo->direction.unitOrthogonal())) return;
+    const Eigen::Vector3d e = verticalField(elements.up, echo->straight);
+    const ComplexVector back = reflectField(e.cast<std::complex<double>>(), echo->straight, echo->straight,
+                                            actor.material, context.frequency_hz);
+    const std::complex<double> gamma = (e.cast<std::complex<double>>().transpose() * back)(0);
+    const std::complex<double> coefficient = echo->coefficient * specularShare(actor.material) * gamma;
+    if (std::abs(coefficient) < cutoff_ || !(std::abs(coefficient) > 0)) return;
+    PathRecord record;
+    record.event = &kName;
+    record.actors = {surface.actor};
+    record.facets = {surface.facets.front()};
+    record.vertices = {echo->vertex};
+    record.departure = record.arrival = echo->direction_radar;
+    record.bounces = 1;
+    record.reflection_cosine = {1.0};
+    record.length_m = echo->length_m;
+    setContribution(context.radar, std::conj(coefficient), record);
+    records.push_back(std::move(record));
+  }
+
+  int max_bounces_ = 3, ray_budget_ = 0, exhaustive_ = 0;
+  double cutoff_ = 0;
+  std::unique_ptr<ImageSearch> search_;
+  // What notes() says of convergence; no result depends on it.
+  mutable std::atomic<int> seeded_poses_{0}, seeded_paths_{0}, late_paths_{0};
+};
+
+}  // namespace
+
+MMRADARTWIN_REGISTER_BUILT_IN_MECHANISM(Specular)
+
+}  // namespace mmradartwin

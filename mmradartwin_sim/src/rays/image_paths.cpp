@@ -1,0 +1,301 @@
+#include "rays/image_paths.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kInside_m = 1e-9;
+constexpr double kOnPlane_m = 1e-7;
+
+/// Gap at the ends of a leg: a merged facet of a scan lies off the triangles that Embree sees.
+double legGap(const Facet& facet, const Eigen::Vector3d& direction) {
+  const double cosine = std::max(0.1, std::abs(facet.normal.dot(direction)));
+  return std::max(1e-3, 2 * facet.flatness_m / cosine);
+}
+
+/// What a point sees through a rectangle: the pyramid over it, outward normals as rows.
+class Beam {
+ public:
+  Beam(const Eigen::Vector3d& apex, const Eigen::Matrix<double, 3, 4>& window) {
+    const Eigen::Matrix<double, 3, 4> way = window.colwise() - apex;
+    const Eigen::Vector3d middle = way.rowwise().sum();
+    for (int i = 0; i < 4; ++i) {
+      Eigen::Vector3d n = way.col(i).cross(way.col((i + 1) % 4));
+      if (n.dot(middle) > 0) n = -n;
+      sides_.row(i) = n;
+    }
+    limit_ = sides_ * apex + Eigen::Vector4d::Constant(1e-9);
+  }
+  /// False where all of a rectangle lies beyond one side.
+  bool meets(const Eigen::Matrix<double, 3, 4>& corners) const {
+    return ((sides_ * corners).rowwise().minCoeff() - limit_).maxCoeff() <= 0;
+  }
+
+ private:
+  Eigen::Matrix<double, 4, 3> sides_;
+  Eigen::Vector4d limit_;
+};
+
+}  // namespace
+
+ImageSearch::ImageSearch(const Scene& scene, bool all_orientations)
+    : scene_(scene), all_orientations_(all_orientations) {
+  build();
+}
+
+void ImageSearch::build() {
+  reflectors_.clear();
+  on_side_.clear();
+  for (const Facet& f : scene_.facets) {
+    if (takesPart(f)) reflectors_.push_back(f.id);
+  }
+  corners_.resize(reflectors_.size());
+  mirrors_.resize(reflectors_.size());
+  for (std::size_t i = 0; i < reflectors_.size(); ++i) place(i);
+  if (exhaustiveOrder() >= 3) findSides(std::vector<char>(reflectors_.size(), 1));
+}
+
+bool ImageSearch::takesPart(const Facet& f) const {
+  return f.present && f.curved < 0 && (f.reflects || all_orientations_);
+}
+
+void ImageSearch::place(std::size_t reflector) {
+  const Facet& f = scene_.facets[static_cast<std::size_t>(reflectors_[reflector])];
+  corners_[reflector].point << f.origin, f.origin + f.size1_m * f.e1, f.origin + f.size1_m * f.e1 + f.size2_m * f.e2,
+      f.origin + f.size2_m * f.e2;
+  mirrors_[reflector] = {f.normal,           f.e1,      f.e2,     f.normal.dot(f.origin), f.e1.dot(f.origin),
+                         f.e2.dot(f.origin), f.size1_m, f.size2_m};
+}
+
+void ImageSearch::findSides(const std::vector<char>& marked) {
+  const int count = static_cast<int>(reflectors_.size());
+  const auto n = static_cast<std::size_t>(count);
+  sides_.resize(n * n);
+  on_side_.resize(2 * n);
+  for (auto& list : on_side_) list.clear();
+  for (int a = 0; a < count; ++a) {
+    for (int b = 0; b < count; ++b) {
+      char& known = sides_[static_cast<std::size_t>(a) * n + static_cast<std::size_t>(b)];
+      if (marked[static_cast<std::size_t>(a)] || marked[static_cast<std::size_t>(b)]) {
+        known = static_cast<char>((faces(a, false, b) ? 1 : 0) + (faces(a, true, b) ? 2 : 0));
+      }
+      if (known & 1) on_side_[static_cast<std::size_t>(2 * a)].push_back(b);
+      if (known & 2) on_side_[static_cast<std::size_t>(2 * a + 1)].push_back(b);
+    }
+  }
+}
+
+void ImageSearch::update(const std::vector<int>& actors) {
+  std::vector<char> marked(reflectors_.size(), 0);
+  for (int actor : actors) {
+    for (int id : scene_.actors[static_cast<std::size_t>(actor)].facets) {
+      const auto at = std::lower_bound(reflectors_.begin(), reflectors_.end(), id);
+      const bool known = at != reflectors_.end() && *at == id;
+      if (known != takesPart(scene_.facets[static_cast<std::size_t>(id)])) {
+        build();  // it lies down, or stands up again: other reflectors take part
+        return;
+      }
+      if (!known) continue;
+      const auto i = static_cast<std::size_t>(at - reflectors_.begin());
+      marked[i] = 1;
+      place(i);
+    }
+  }
+  if (exhaustiveOrder() >= 3) findSides(marked);
+}
+
+int ImageSearch::exhaustiveOrder() const {
+  const double n = static_cast<double>(reflectors_.size());
+  if (n * n * n < 5e8) return 3;
+  return n * n < 4e6 ? 2 : 1;
+}
+
+bool ImageSearch::faces(int a, bool positive_side, int b) const {
+  const Facet& plane = scene_.facets[reflectors_[a]];
+  const Eigen::RowVector4d d = plane.normal.transpose() * (corners_[b].point.colwise() - plane.origin);
+  return positive_side ? d.maxCoeff() > kOnPlane_m : d.minCoeff() < -kOnPlane_m;
+}
+
+bool ImageSearch::solve(const Eigen::Vector3d& p, const PerInteraction<int>& sequence, const RayCaster& rays,
+                        const Limits& limits, ImagePath& path) const {
+  const int order = static_cast<int>(sequence.size());
+  if (order < 1 || order > 8) return false;
+  std::array<Eigen::Vector3d, 8> image;
+  image.fill(p);
+  Eigen::Vector3d at = p;
+  for (int i = 0; i < order; ++i) image[i] = at = mirror(at, scene_.facets[sequence[i]]);
+  if ((image[order - 1] - p).norm() > limits.max_length_m) return false;
+  std::array<Eigen::Vector3d, 8> vertex = image;
+  at = p;
+  for (int i = order - 1; i >= 0; --i) {
+    const Facet& f = scene_.facets[sequence[i]];
+    const double here = f.planeDistance(at), there = f.planeDistance(image[i]);
+    if (!(here * there < 0) || std::abs(here) < kOnPlane_m || std::abs(there) < kOnPlane_m) return false;
+    vertex[i] = at + here / (here - there) * (image[i] - at);
+    if (!f.contains(vertex[i], kInside_m)) return false;
+    at = vertex[i];
+  }
+  if (limits.in_view &&
+      (!limits.in_view((vertex[0] - p).normalized()) || !limits.in_view((vertex[order - 1] - p).normalized()))) {
+    return false;
+  }
+  for (int i = 0; i <= order; ++i) {
+    const Eigen::Vector3d& a = i == 0 ? p : vertex[i - 1];
+    const Eigen::Vector3d& b = i == order ? p : vertex[i];
+    const Eigen::Vector3d d = b - a;
+    const double length = d.norm();
+    if (length < 1e-9) return false;
+    double gap = 1e-3;
+    if (i > 0) gap = std::max(gap, legGap(scene_.facets[sequence[i - 1]], d / length));
+    if (i < order) gap = std::max(gap, legGap(scene_.facets[sequence[i]], d / length));
+    if (!rays.visible(a, b, gap)) return false;
+  }
+  path.facets = sequence;
+  path.vertices.assign(vertex.begin(), vertex.begin() + order);
+  path.image = image[order - 1];
+  return true;
+}
+
+std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
+                                         int min_order) const {
+  std::vector<ImagePath> found;
+  const int count = static_cast<int>(reflectors_.size());
+  ImagePath path;
+  // Facets that can be first or last: some of them lies in front of the radar.
+  std::vector<char> in_front(static_cast<std::size_t>(count), 1);
+  if (limits.forward.squaredNorm() > 0) {
+    for (int a = 0; a < count; ++a) {
+      in_front[a] = (limits.forward.transpose() * (corners_[a].point.colwise() - p)).maxCoeff() > 0;
+    }
+  }
+  // Of the point itself: distance from each plane, and place in each rectangle's axes.
+  struct Own {
+    double distance_m, along1_m, along2_m;
+  };
+  std::vector<Own> own;
+  for (const Mirror& m : mirrors_) {
+    own.push_back({m.normal.dot(p) - m.offset_m, m.e1.dot(p) - m.first1_m, m.e2.dot(p) - m.first2_m});
+  }
+  // The last facet is tried by where the straight line from p to the image meets its plane, which is cheap. beyond_m:
+  // distance of the image before from the plane.
+  const auto meetsLast = [&](int b, double beyond_m, const Eigen::Vector3d& image_before) {
+    const Mirror& m = mirrors_[static_cast<std::size_t>(b)];
+    const Own& o = own[static_cast<std::size_t>(b)];
+    if (!(o.distance_m * beyond_m > 0)) return false;
+    const double share = o.distance_m / (o.distance_m + beyond_m);
+    const double x = o.along1_m + share * (m.e1.dot(image_before) - m.first1_m - o.along1_m);
+    if (!(x > -1e-6 && x < m.size1_m + 1e-6)) return false;
+    const double y = o.along2_m + share * (m.e2.dot(image_before) - m.first2_m - o.along2_m);
+    return y > -1e-6 && y < m.size2_m + 1e-6;
+  };
+  const bool all_wanted = limits.only_actor < 0;
+  std::vector<char> wanted(static_cast<std::size_t>(count), 1);
+  for (int i = 0; !all_wanted && i < count; ++i) {
+    wanted[i] = scene_.facets[static_cast<std::size_t>(reflectors_[i])].actor == limits.only_actor;
+  }
+  const auto beyond = [this](int b, const Eigen::Vector3d& image) {
+    const Mirror& m = mirrors_[static_cast<std::size_t>(b)];
+    return m.normal.dot(image) - m.offset_m;
+  };
+  std::vector<int> all;
+  for (int i = 0; on_side_.empty() && i < count; ++i) all.push_back(i);
+  // Ways over one facet towards another, by the side of the other that they come to. A path of three bounces runs both
+  // ways: it is one of these from either end, in the middle.
+  struct Way {
+    int first;
+    Eigen::Vector3d image;  // of p in the first facet
+  };
+  std::vector<std::array<std::vector<Way>, 2>> ways_to(limits.max_order < 3 ? 0 : static_cast<std::size_t>(count));
+  for (int a = 0; a < count; ++a) {
+    if (!in_front[a]) continue;
+    const Facet& fa = scene_.facets[reflectors_[a]];
+    const double da = fa.planeDistance(p);
+    if (std::abs(da) < kOnPlane_m) continue;
+    if (min_order <= 1 && wanted[a] && solve(p, {fa.id}, rays, limits, path)) found.push_back(path);
+    if (limits.max_order < 2) continue;
+    const Eigen::Vector3d image1 = mirror(p, fa);
+    const Beam beam(image1, corners_[a].point);
+    for (int b : on_side_.empty() ? all : on_side_[static_cast<std::size_t>(2 * a + (da > 0))]) {
+      // Cheap tests first: few facets pass them where no third bounce follows.
+      const double db = beyond(b, image1);
+      if (b == a || std::abs(db) < kOnPlane_m) continue;
+      const bool last = min_order <= 2 && (wanted[a] || wanted[b]) && in_front[b] && meetsLast(b, db, image1);
+      if ((!last && limits.max_order < 3) || (on_side_.empty() && !faces(a, da > 0, b))) continue;
+      if (!beam.meets(corners_[b].point)) continue;
+      const Facet& fb = scene_.facets[reflectors_[b]];
+      if (last && !perpendicular(fa, fb) && solve(p, {fa.id, fb.id}, rays, limits, path)) found.push_back(path);
+      if (limits.max_order >= 3) ways_to[static_cast<std::size_t>(b)][db > 0].push_back({a, image1});
+    }
+  }
+  for (std::size_t b = 0; b < ways_to.size(); ++b) {
+    const Facet& fb = scene_.facets[reflectors_[b]];
+    for (const std::vector<Way>& ways : ways_to[b]) {
+      for (std::size_t i = 0; i < ways.size(); ++i) {
+        const int a = ways[i].first;
+        const Facet& fa = scene_.facets[reflectors_[a]];
+        const Eigen::Vector3d image2 = mirror(ways[i].image, fb);
+        for (std::size_t j = i; j < ways.size(); ++j) {
+          const int c = ways[j].first;
+          if (!(wanted[a] || wanted[b] || wanted[c]) || !meetsLast(c, beyond(c, image2), image2)) continue;
+          const int fc = reflectors_[c];
+          if (solve(p, {fa.id, fb.id, fc}, rays, limits, path)) found.push_back(path);
+          if (c != a && solve(p, {fc, fb.id, fa.id}, rays, limits, path)) found.push_back(path);
+        }
+      }
+    }
+  }
+  std::sort(found.begin(), found.end(), [](const ImagePath& a, const ImagePath& b) { return a.facets < b.facets; });
+  // Where the line to an image runs through an edge, several orders of the same facets are one path.
+  std::vector<ImagePath> unique;
+  for (const ImagePath& f : found) {
+    PerInteraction<int> set = f.facets;
+    std::sort(set.begin(), set.end());
+    bool known = false;
+    for (const ImagePath& u : unique) {
+      if (u.facets.size() != f.facets.size() || f.facets.size() < 2 || (u.image - f.image).norm() > 1e-6) continue;
+      PerInteraction<int> other = u.facets;
+      std::sort(other.begin(), other.end());
+      known = known || other == set;
+    }
+    if (!known) unique.push_back(f);
+  }
+  return unique;
+}
+
+std::vector<ImageSearch::Seed> ImageSearch::seeds(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
+                                                  int rays_launched, const Eigen::Matrix3d& R_map_radar,
+                                                  double max_elevation_rad) const {
+  std::map<PerInteraction<int>, bool> sequences;  // and whether an even ray met it
+  const double golden = 0.6180339887498949;
+  for (int i = 0; i < rays_launched; ++i) {
+    const double azimuth = M_PI * ((i + 0.5) / rays_launched - 0.5);
+    const double elevation = std::asin(std::sin(max_elevation_rad) * (2 * std::fmod(i * golden, 1.0) - 1));
+    Eigen::Vector3d d = R_map_radar * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
+                                                      std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+    Eigen::Vector3d from = p;
+    PerInteraction<int> sequence;
+    double length = 0;
+    while (static_cast<int>(sequence.size()) < limits.max_order) {
+      const auto hit = rays.firstHit(from, d, limits.max_length_m - length);
+      if (!hit || hit->facet < 0) break;
+      const Facet& f = scene_.facets[hit->facet];
+      if (!f.reflects || !f.present || f.curved >= 0) break;
+      sequence.push_back(f.id);
+      bool& even = sequences[sequence];
+      even = even || i % 2 == 0;
+      length += hit->distance_m;
+      d -= 2 * d.dot(f.normal) * f.normal;
+      const double side = f.planeDistance(from) > 0 ? 1.0 : -1.0;
+      from = hit->point + (1e-4 + f.flatness_m) * side * f.normal;
+    }
+  }
+  std::vector<Seed> found;
+  for (const auto& [facets, even] : sequences) found.push_back({facets, even});
+  return found;
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,120 @@
+#include "mmradartwin_sim/mesh_notes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <sstream>
+
+#include "physics/curved_surface.h"
+#include "scene/vertex_weld.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr std::size_t kMostNamed = 5;
+constexpr std::size_t kBody = 3;         ///< facets: fewer are sheets, a folded one among them
+constexpr std::size_t kFragments = 20;   ///< facets that gentle folds join, on no sphere nor cylinder
+constexpr double kInset = 0.02;          ///< of a triangle: its rim may touch its neighbours
+constexpr double kLeastLength_m = 2e-3;  ///< of a ray within a triangle: shorter ones see rounding
+
+/// Edges that one triangle alone has.
+std::size_t openEdges(const Actor& actor, const std::vector<int>& weld) {
+  std::map<std::pair<int, int>, int> count;
+  for (std::size_t t = 0; t < actor.triangles.size(); ++t) {
+    if (actor.triangle_facet[t] < 0) continue;
+    for (int k = 0; k < 3; ++k) {
+      const int a = weld[actor.triangles[t][k]], b = weld[actor.triangles[t][(k + 1) % 3]];
+      ++count[std::minmax(a, b)];
+    }
+  }
+  return static_cast<std::size_t>(
+      std::count_if(count.begin(), count.end(), [](const auto& c) { return c.second == 1; }));
+}
+
+/// Where one of the actor's facets comes through another.
+std::optional<Eigen::Vector3d> cut(const Scene& scene, const Actor& actor) {
+  Scene alone;
+  alone.actors = {actor};
+  alone.actors[0].occludes = alone.actors[0].present = true;
+  const RayCaster rays(alone);
+  for (std::size_t t = 0; t < actor.triangles.size(); ++t) {
+    const int facet = actor.triangle_facet[t];
+    if (facet < 0) continue;
+    std::array<Eigen::Vector3d, 3> corner;
+    for (int k = 0; k < 3; ++k) corner[k] = actor.vertices[actor.triangles[t][k]];
+    const Eigen::Vector3d middle = (corner[0] + corner[1] + corner[2]) / 3;
+    for (Eigen::Vector3d& c : corner) c += kInset * (middle - c);
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d way = corner[(k + 1) % 3] - corner[k];
+      if (way.norm() < kLeastLength_m) continue;
+      const auto hit = rays.firstHit(corner[k], way, way.norm());
+      if (!hit || hit->facet == facet || hit->facet < 0) continue;
+      // Through it, not along it or up to it.
+      const Facet& other = scene.facets[static_cast<std::size_t>(hit->facet)];
+      const double from = other.planeDistance(corner[k]), to = other.planeDistance(corner[(k + 1) % 3]);
+      const double clear = kLeastLength_m + other.flatness_m;
+      if (from * to < 0 && std::abs(from) > clear && std::abs(to) > clear) return hit->point;
+    }
+  }
+  return std::nullopt;
+}
+
+/// Facets of the actor that gentle folds join though they stand for nothing round: a scan's noise breaks a wall so.
+std::size_t fragments(const Scene& scene, const Actor& actor, const std::vector<int>& weld) {
+  std::size_t most = 0;
+  for (const std::vector<int>& part : smoothParts(scene, actor, weld)) {
+    if (scene.facets[static_cast<std::size_t>(part.front())].curved < 0) most = std::max(most, part.size());
+  }
+  return most;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::ostringstream out;
+  for (std::size_t i = 0; i < std::min(kMostNamed, names.size()); ++i) out << (i ? ", " : "") << names[i];
+  if (names.size() > kMostNamed) out << " and " << names.size() - kMostNamed << " more";
+  return out.str();
+}
+
+}  // namespace
+
+std::vector<std::string> meshNotes(const Scene& scene) {
+  std::vector<std::string> open, crossed, broken;
+  for (const Actor& actor : scene.actors) {
+    const std::vector<int> weld = weldVertices(actor.vertices);
+    const std::size_t edges = actor.facets.size() >= kBody ? openEdges(actor, weld) : 0;
+    if (edges > 0) open.push_back(actor.name + " (" + std::to_string(edges) + " open edges)");
+    const std::size_t pieces = fragments(scene, actor, weld);
+    if (pieces >= kFragments) broken.push_back(actor.name + " (" + std::to_string(pieces) + " facets)");
+    if (const auto at = cut(scene, actor)) {
+      std::ostringstream text;
+      text.precision(3);
+      text << actor.name << " (at " << at->x() << ", " << at->y() << ", " << at->z() << " m)";
+      crossed.push_back(text.str());
+    }
+  }
+  std::vector<std::string> notes;
+  if (!open.empty()) {
+    notes.push_back(scene.file +
+                    ": open meshes are traced as surfaces without an inside, so that a radar within them is "
+                    "not noticed; close them where they stand for bodies: " +
+                    listed(open));
+  }
+  if (!crossed.empty()) {
+    notes.push_back(scene.file +
+                    ": surfaces that cut through each other are traced as they are, and their parts inside "
+                    "a body scatter nothing that shows; cut the meshes there: " +
+                    listed(crossed));
+  }
+  if (!broken.empty()) {
+    std::ostringstream text;
+    text << scene.file << ": facets at small angles return each on its own; where they are a scan's noise on something "
+         << "flat, widen scene.yaml's facets: {angle_deg: " << scene.tolerance.angle_deg
+         << ", offset_m: " << scene.tolerance.offset_m << "}: " << listed(broken);
+    notes.push_back(text.str());
+  }
+  return notes;
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,216 @@
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <unordered_map>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/scene.h"
+#include "scene/ply_reader.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kHuge_m = 1e6;
+
+struct FloatHash {
+  std::size_t operator()(const std::array<float, 3>& v) const {
+    std::size_t h = 1469598103934665603ULL;
+    for (float f : v) {
+      std::uint32_t bits;
+      std::memcpy(&bits, &f, sizeof bits);
+      h = (h ^ bits) * 1099511628211ULL;
+    }
+    return h;
+  }
+};
+
+/// assimp keeps single precision; an OBJ or PLY file's own digits are looked up by the float they round to.
+using FullPrecision = std::unordered_map<std::array<float, 3>, Eigen::Vector3d, FloatHash>;
+
+void keep(const Eigen::Vector3d& v, FullPrecision& exact) {
+  exact.emplace(std::array<float, 3>{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])}, v);
+}
+
+FullPrecision readObjVertices(const std::string& file) {
+  FullPrecision exact;
+  std::ifstream in(file);
+  std::string line;
+  while (std::getline(in, line)) {
+    if (line.size() < 2 || line[0] != 'v' || (line[1] != ' ' && line[1] != '\t')) continue;
+    const char* at = line.c_str() + 1;
+    Eigen::Vector3d v;
+    bool good = true;
+    for (int i = 0; i < 3 && good; ++i) {
+      char* end = nullptr;
+      v[i] = std::strtod(at, &end);
+      good = end != at;
+      at = end;
+    }
+    if (good) keep(v, exact);
+  }
+  return exact;
+}
+
+/// assimp's own reading of digits may differ by an ulp from the nearest float, so neighbours are tried too.
+Eigen::Vector3d restore(const FullPrecision& exact, const aiVector3D& p) {
+  const Eigen::Vector3d coarse(p.x, p.y, p.z);
+  if (exact.empty()) return coarse;
+  const auto near = [](float f, int step) {
+    return step == 0 ? f : std::nextafter(f, step > 0 ? HUGE_VALF : -HUGE_VALF);
+  };
+  for (int dx : {0, 1, -1}) {
+    for (int dy : {0, 1, -1}) {
+      for (int dz : {0, 1, -1}) {
+        const auto found = exact.find({near(p.x, dx), near(p.y, dy), near(p.z, dz)});
+        if (found != exact.end()) return found->second;
+      }
+    }
+  }
+  return coarse;
+}
+
+std::string lowerExtension(const std::string& file) {
+  std::string e = std::filesystem::path(file).extension().string();
+  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return std::tolower(c); });
+  return e;
+}
+
+class Collector {
+ public:
+  Collector(const std::string& file, const aiScene& scene, FullPrecision exact)
+      : file_(file), scene_(scene), extension_(lowerExtension(file)), exact_(std::move(exact)) {
+    stem_ = std::filesystem::path(file).stem().string();
+    // glTF is y-up by its specification; the others are taken as they are.
+    if (extension_ == ".gltf" || extension_ == ".glb")
+      up_ = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  }
+
+  std::vector<Actor> collect() {
+    visit(*scene_.mRootNode, aiMatrix4x4());
+    return std::move(actors_);
+  }
+
+ private:
+  std::string actorName(const aiNode& node, const aiMesh& mesh) const {
+    if (extension_ == ".ply" || extension_ == ".stl") return stem_;
+    std::string name = node.mName.C_Str();
+    if (extension_ == ".obj") {
+      if (name.empty() || name == "defaultobject" || &node == scene_.mRootNode) name = stem_;
+      return name;
+    }
+    if (name.empty()) name = mesh.mName.C_Str();
+    return name.empty() ? stem_ : name;
+  }
+
+  void visit(const aiNode& node, const aiMatrix4x4& above) {
+    const aiMatrix4x4 T = above * node.mTransformation;
+    for (unsigned i = 0; i < node.mNumMeshes; ++i) add(node, *scene_.mMeshes[node.mMeshes[i]], T);
+    for (unsigned i = 0; i < node.mNumChildren; ++i) visit(*node.mChildren[i], T);
+  }
+
+  void add(const aiNode& node, const aiMesh& mesh, const aiMatrix4x4& T) {
+    if (!(mesh.mPrimitiveTypes & aiPrimitiveType_TRIANGLE)) return;
+    std::string name = actorName(node, mesh);
+    aiString tag_text;
+    scene_.mMaterials[mesh.mMaterialIndex]->Get(AI_MATKEY_NAME, tag_text);
+    const std::string tag = tag_text.C_Str();
+    Actor* actor = nullptr;
+    // One surface material per actor: what an object has in further materials becomes actors NAME.TAG of its own.
+    for (int attempt = 0; attempt < 2 && !actor; ++attempt) {
+      const auto key = std::make_pair(&node, name);
+      const auto found = index_.find(key);
+      const bool same_group = found == index_.end() && extension_ == ".obj" && by_name_.count(name);
+      if (found == index_.end() && !same_group) {
+        index_[key] = actors_.size();
+        if (extension_ == ".obj") by_name_[name] = actors_.size();
+        actors_.emplace_back();
+        actors_.back().name = name;
+        actors_.back().material_tag = tag;
+        actor = &actors_.back();
+      } else {
+        Actor& candidate = actors_[same_group ? by_name_[name] : found->second];
+        if (candidate.material_tag == tag)
+          actor = &candidate;
+        else
+          name += "." + tag;
+      }
+    }
+    if (!actor) throw InputError(file_ + ": object " + name + " is there twice; give objects names of their own");
+    const int base = static_cast<int>(actor->vertices.size());
+    const bool identity = T.IsIdentity();
+    for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
+      const aiVector3D& p = mesh.mVertices[i];
+      Eigen::Vector3d v = identity
+                              ? restore(exact_, p)
+                              : Eigen::Vector3d(double(T.a1) * p.x + double(T.a2) * p.y + double(T.a3) * p.z + T.a4,
+                                                double(T.b1) * p.x + double(T.b2) * p.y + double(T.b3) * p.z + T.b4,
+                                                double(T.c1) * p.x + double(T.c2) * p.y + double(T.c3) * p.z + T.c4);
+      v = up_ * v;
+      if (!v.allFinite() || v.cwiseAbs().maxCoeff() > kHuge_m) {
+        throw InputError(file_ + ": object " + name + ": a vertex is not a finite number within 1e6; repair the mesh");
+      }
+      actor->vertices.push_back(v);
+    }
+    for (unsigned i = 0; i < mesh.mNumFaces; ++i) {
+      const aiFace& face = mesh.mFaces[i];
+      if (face.mNumIndices != 3) continue;
+      for (int k = 0; k < 3; ++k) {
+        if (face.mIndices[k] >= mesh.mNumVertices)
+          throw InputError(file_ + ": object " + name + ": a face names a vertex that is not there");
+      }
+      actor->triangles.push_back({base + static_cast<int>(face.mIndices[0]), base + static_cast<int>(face.mIndices[1]),
+                                  base + static_cast<int>(face.mIndices[2])});
+    }
+  }
+
+  const std::string file_;
+  const aiScene& scene_;
+  std::string extension_, stem_;
+  FullPrecision exact_;
+  Eigen::Matrix3d up_ = Eigen::Matrix3d::Identity();
+  std::vector<Actor> actors_;
+  std::map<std::pair<const aiNode*, std::string>, std::size_t> index_;
+  std::map<std::string, std::size_t> by_name_;
+};
+
+}  // namespace
+
+std::vector<Actor> loadMesh(const std::string& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) throw InputError(file + ": no such mesh file");
+  Assimp::Importer importer;
+  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_LINE | aiPrimitiveType_POINT);
+  const unsigned steps = aiProcess_Triangulate | aiProcess_SortByPType;
+  const std::string extension = lowerExtension(file);
+  FullPrecision exact;
+  const aiScene* scene = nullptr;
+  if (extension == ".ply") {
+    const PlyMesh mesh = readPly(file);
+    for (const Eigen::Vector3d& v : mesh.vertices) keep(v, exact);
+    const std::string text = mesh.toObj();
+    scene = importer.ReadFileFromMemory(text.data(), text.size(), steps, "obj");
+  } else {
+    if (extension == ".obj") exact = readObjVertices(file);
+    scene = importer.ReadFile(file, steps);
+  }
+  if (!scene || !scene->mRootNode) {
+    std::string why = importer.GetErrorString();
+    std::replace(why.begin(), why.end(), '\n', ' ');
+    throw InputError(file + ": cannot be read as a mesh (" + why + "); OBJ, PLY, STL and glTF are known");
+  }
+  std::vector<Actor> actors = Collector(file, *scene, std::move(exact)).collect();
+  actors.erase(std::remove_if(actors.begin(), actors.end(), [](const Actor& a) { return a.triangles.empty(); }),
+               actors.end());
+  if (actors.empty()) throw InputError(file + ": holds no triangles; export the surfaces as a triangle mesh");
+  return actors;
+}
+
+}  // namespace mmradartwin
