@@ -59,7 +59,7 @@ TEST_F(BiasedCabinet, OnePlaceAloneHoldsNothingOut) {
 }
 
 TEST_F(BiasedCabinet, ItsMapMetricsAreTheTwinsBeforeAndAfter) {
-  for (PoseChannels& pose : data_.poses) pose.plain = pose.grid;
+  for (PoseChannels& pose : data_.poses) pose.uncorrected_average = pose.grid;
   recording_.radar = data_.radar;
   ExpectedEchoes echoes(twin_, data_, PoseAccuracy());
   const ChannelLikelihood likelihood(data_, twin_.scene().actors.size(), PoseAccuracy());
