@@ -8,6 +8,7 @@
 #include "mmradartwin_attribution/attribution_config.h"
 #include "mmradartwin_attribution/response.h"
 #include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_sim/ray_caster.h"
 #include "mmradartwin_sim/scene.h"
 
 namespace mmradartwin {

@@ -1,3 +1,5 @@
+#include "mmradartwin_sim/ray_caster.h"
+
 #include <embree3/rtcore.h>
 #include <tbb/global_control.h>
 
@@ -7,8 +9,6 @@
 #include <cstring>
 #include <limits>
 #include <stdexcept>
-
-#include "mmradartwin_sim/scene.h"
 
 namespace mmradartwin {
 

@@ -7,6 +7,7 @@
 #include <optional>
 #include <sstream>
 
+#include "mmradartwin_sim/ray_caster.h"
 #include "physics/curved_surface.h"
 #include "scene/vertex_weld.h"
 
