@@ -27,7 +27,7 @@ std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
                                         const std::function<bool(const Facet&)>& takes_part,
                                         const std::function<bool(const Facet&, const Facet&)>& pair);
 
-/// What of two faces across the ray makes up a corner's aperture.
+/// The part of two faces across the ray that makes up a corner's aperture.
 enum class CornerAperture {
   kBothFaces,     ///< from the far end of the one to the far end of the other (DESIGN section 4, `corner`)
   kNarrowerFace,  ///< as far to both sides as the narrower reaches: what meets one face leaves as far on the other

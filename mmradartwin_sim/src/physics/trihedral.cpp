@@ -25,7 +25,7 @@ double signedArea(const Polygon& polygon) {
   return 0.5 * sum;
 }
 
-/// What of a polygon lies where normal . p >= 0 (Sutherland and Hodgman).
+/// The part of a polygon where normal . p >= 0 (Sutherland and Hodgman).
 Polygon clip(const Polygon& polygon, const Eigen::Vector2d& point, const Eigen::Vector2d& normal) {
   Polygon kept;
   for (std::size_t i = 0; i < polygon.size(); ++i) {

@@ -14,7 +14,7 @@ struct Trihedral {
   std::array<int, 3> facets;  ///< ids, rising
   Eigen::Vector3d apex;
   std::array<Eigen::Vector3d, 3> edge;  ///< unit, along the octant's edges; edge[i] is across facet i
-  /// What of each facet lies in the octant, from the apex; taken as convex, without its holes.
+  /// The part of each facet in the octant, from the apex; taken as convex, without its holes.
   std::array<std::vector<Eigen::Vector3d>, 3> outline;
 };
 

@@ -17,7 +17,7 @@ double legGap(const Facet& facet, const Eigen::Vector3d& direction) {
   return std::max(1e-3, 2 * facet.flatness_m / cosine);
 }
 
-/// What a point sees through a rectangle: the pyramid over it, outward normals as rows.
+/// The view of a point through a rectangle: the pyramid over it, outward normals as rows.
 class Beam {
  public:
   Beam(const Eigen::Vector3d& apex, const Eigen::Matrix<double, 3, 4>& window) {
@@ -195,7 +195,7 @@ class ImageSearch::Finder {
   }
 
  private:
-  // Of the point itself: distance from a plane, and place in its rectangle's axes.
+  // The point's distance from a plane, and its place in the rectangle's axes.
   struct Own {
     double distance_m, along1_m, along2_m;
   };
@@ -270,7 +270,7 @@ class ImageSearch::Finder {
     }
   }
 
-  /// What was found, in the order of facets. Where the line to an image runs through an edge, several orders of the
+  /// The paths found, in the order of facets. Where the line to an image runs through an edge, several orders of the
   /// same facets are one path.
   std::vector<ImagePath> distinct() {
     std::sort(found_.begin(), found_.end(), [](const ImagePath& a, const ImagePath& b) { return a.facets < b.facets; });

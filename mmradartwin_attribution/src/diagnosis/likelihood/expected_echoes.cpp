@@ -145,9 +145,9 @@ const ExpectedEchoes::Edit& ExpectedEchoes::editOf(const NamedParameters& mechan
   const auto at = edits_.find(key);
   if (at != edits_.end()) return at->second;
   const Twin twin = base_.changed({mechanism});
-  const Geometry geometry = twin.addsScreensAlone() ? Geometry::kMoreScreens
-                            : twin.altersGeometry() ? Geometry::kOther
-                                                    : Geometry::kSame;
+  const Geometry geometry = twin.addsOccludersOnly() ? Geometry::kMoreScreens
+                            : twin.altersGeometry()  ? Geometry::kOther
+                                                     : Geometry::kSame;
   return edits_[key] = {geometry, twin.placesOneActor()};
 }
 
@@ -243,7 +243,7 @@ const ExpectedEchoes::Traced& ExpectedEchoes::traced(const std::vector<NamedPara
     }
     if (before != nullptr) change = twin->changesFrom(*twinOf(within(rest)));
   }
-  const bool opens = twin->opensActors();
+  const bool opens = twin->removesActors();
   tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t j) {
     const std::size_t i = static_cast<std::size_t>(missing[j]);
     const Eigen::Isometry3d& T = data_.poses[i].pose.T_map_radar;
@@ -252,8 +252,8 @@ const ExpectedEchoes::Traced& ExpectedEchoes::traced(const std::vector<NamedPara
       entry.paths[i] = known;
       return;
     }
-    CloudCells cells{T, kCloud_bins * base_.radar().range_bin_m(), kCloud_lobes * 2 / base_.radar().channels(),
-                     kCloudElevation};
+    ScatterCells cells{T, kCloud_bins * base_.radar().range_bin_m(), kCloud_lobes * 2 / base_.radar().channels(),
+                       kCloudElevation};
     // What the scene as given hides stays apart where rays come through: it is weighed otherwise.
     if (opens) {
       cells.sides = [&](const std::vector<Eigen::Vector3d>& points) {

@@ -36,7 +36,7 @@ struct MeasuredPath {
 };
 struct MeasuredPose {
   int location = 0;
-  LawVariable::Where where;
+  LawVariable::PathPlace where;
   std::vector<MeasuredPath> paths;
 };
 

@@ -199,7 +199,7 @@ class Specular : public Mechanism, public PathStage {
   int max_bounces_ = 3, ray_budget_ = 0, exhaustive_ = 0;
   double cutoff_ = 0;
   std::unique_ptr<ImageSearch> search_;
-  // What notes() says of convergence; no result depends on it.
+  // Convergence as notes() states it; no result depends on it.
   mutable std::atomic<int> seeded_poses_{0}, seeded_paths_{0}, late_paths_{0};
 };
 
