@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# mmradartwin's commands: ./run.sh demo | test | setup | build | bench | fuzz | tsan | lint | exec CMD...
+# mmradartwin's commands: ./run.sh demo | test | setup | build | bench | fuzz | tsan | core | lint | exec CMD...
 set -euo pipefail
 
 root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
@@ -22,6 +22,7 @@ usage() {
 usage: ./run.sh VERB
   demo [OUT]   install, build, then play a generated session through the whole loop; results in OUT (default demo_out)
   test         install, build, run the tests; the last line is "N passed, N failed, N skipped"
+  test long    the same with more sessions of the diagnosis, another third each day; test all takes every one
   setup        install the Debian packages that are missing
   build        build the workspace (.ws/)
   bench [OUT]  build, then run all benchmarks; JSON and a table in OUT (default bench_out). Its last part, the blind
@@ -29,6 +30,7 @@ usage: ./run.sh VERB
   fuzz [S]     every reader of foreign bytes under libFuzzer with address and undefined-behaviour sanitizer, S seconds
                each (60); needs clang; corpus and findings stay in .ws/fuzz
   tsan         the streaming path's tests under the thread sanitizer
+  core [...]   build what needs no ROS by cmake alone, without catkin, and run its tests; arguments go to ctest
   lint         catkin_lint over all packages
   exec CMD...  run CMD in the sourced workspace, e.g. ./run.sh exec rosrun mmradartwin_attribution evaluate --help
 U
@@ -82,18 +84,31 @@ data_folder() {
   export MMRADARTWIN_DATA=${MMRADARTWIN_DATA:-$(readlink -m "$root/../shared/data")}
 }
 
+# run_tests [long|all]: which diagnosis sessions run beside the fixed ones
 run_tests() {
+  local limit_s=1800
+  case ${1:-} in
+    '') ;;
+    long | all) export MMRADARTWIN_LONG=$1 ;;
+    *) usage ;;
+  esac
+  [ -z "${MMRADARTWIN_LONG:-}" ] || limit_s=14400
   build
   # Configured again: ctest's environment has only the folders that were there, and the first build made the messages' one.
   build tests --force-cmake
   source_workspace
   data_folder
   rm -rf "$ws/build/test_results"
-  # Side by side but for those that keep time; seeds are shown as they are drawn. What failed is read from the XML files.
+  rm -f "$ws/build/ctest.xml"
+  (cd "$ws/build" && ctest --show-only=json-v1) >"$ws/build/ctest_list.json"
+  # Side by side but for those that keep time; seeds and the day are shown. Cases are read from the XML files, and ctest
+  # says which modules ended badly or left none.
   say "running the tests (log: $ws/build/Testing/Temporary/LastTest.log)"
-  (cd "$ws/build" && ctest -V -j"$(jobs)" --timeout 5400) |
-    awk '/^ *[0-9]+\/[0-9]+ Test|^ +Start|^[0-9]+: MMRADARTWIN_[A-Z_]*SEED=/ {print; fflush()}' >&2 || true
-  python3 "$root/test/summarise_results.py" "$ws/build/test_results"
+  local status=0
+  (cd "$ws/build" && ctest -V -j"$(jobs)" --timeout "$limit_s" --output-junit ctest.xml) |
+    awk '/^ *[0-9]+\/[0-9]+ Test|^ +Start|^[0-9]+: MMRADARTWIN_[A-Z_]*(SEED|DAY)=/ {print; fflush()}' >&2 || status=$?
+  python3 "$root/test/summarise_results.py" "$ws/build/test_results" --list "$ws/build/ctest_list.json" \
+    --ran "$ws/build/ctest.xml" --status "$status"
 }
 
 run_bench() {
@@ -168,20 +183,33 @@ run_tsan() {
   return $status
 }
 
+# core [ctest arguments]: no part of catkin's workspace is seen, but the same paths, so that ccache knows the files.
+core() {
+  workspace
+  [ -d /usr/lib/ccache ] && export PATH=/usr/lib/ccache:$PATH
+  unset CMAKE_PREFIX_PATH ROS_PACKAGE_PATH LD_LIBRARY_PATH PYTHONPATH
+  cmake -S "$ws/src/mmradartwin" -B "$ws/core" -DCMAKE_BUILD_TYPE=Release >&2
+  cmake --build "$ws/core" -j"$(jobs)" >&2
+  data_folder
+  ctest --test-dir "$ws/core" -j"$(jobs)" --output-on-failure "$@" >&2
+}
+
 lint() {
-  catkin_lint --offline -W2 --ignore package_path_name "$root"/mmradartwin_* "$root/launch" "$root/config" "$root/test"
+  # Include folders stand at each target, not at the directory.
+  catkin_lint --offline -W2 --ignore package_path_name --ignore unused_catkin_include_dirs "$root"/mmradartwin_* "$root/launch" "$root/config" "$root/test"
 }
 
 verb=${1:-}
 [ -n "$verb" ] && shift
 case $verb in
   demo) setup; build >&2; source_workspace; exec "$root/launch/scripts/demo.sh" "$(readlink -m "${1:-$root/demo_out}")" ;;
-  test) setup; run_tests ;;
+  test) setup; run_tests "$@" ;;
   setup) setup ;;
   build) setup; build ;;
   bench) setup; run_bench "$@" ;;
   fuzz) setup; run_fuzz "$@" ;;
   tsan) setup; run_tsan ;;
+  core) setup; core "$@" ;;
   lint) setup; lint ;;
   exec) [ $# -gt 0 ] || usage; source_workspace; data_folder; exec "$@" ;;
   *) usage ;;

@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
 """Counts the test cases of a catkin test_results folder and closes with `N passed, N failed, N skipped`.
 
-catkin_test_results counts a gtest twice and is content with no results at all, so cases are counted from the XML files.
-Exit status 0 only where something passed and nothing failed.
+Cases are counted from the XML files: catkin_test_results counts a gtest twice and is content with no results at all.
+What ctest ran is compared with them: a module that hung, crashed or left no case is a failed case of its own name.
+The exit status is 0 only where something passed, nothing failed and ctest ended well.
 """
+import argparse
+import json
 import pathlib
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -31,16 +34,73 @@ def cases_of(file):
             yield name, "passed", ""
 
 
+def modules_of(list_file, folder):
+    """{module: result file or None} of what `ctest --show-only=json-v1` lists; its command names the file."""
+    with open(list_file, encoding="utf-8") as text:
+        tests = json.load(text)["tests"]
+    return {test["name"]: next((pathlib.Path(word).resolve() for word in test.get("command", [])
+                                if word.endswith(".xml") and folder in pathlib.Path(word).resolve().parents), None)
+            for test in tests}
+
+
+def endings_of(junit_file):
+    """{module: "" or why it did not end well} of ctest's own JUnit file; empty where ctest left none."""
+    try:
+        root = ElementTree.parse(junit_file).getroot()
+    except (OSError, ElementTree.ParseError):
+        return {}
+    endings = {}
+    for case in root.iter("testcase"):
+        problem = case.find("failure")
+        if problem is None:
+            problem = case.find("skipped")
+        ended_well = case.get("status") == "run" and problem is None
+        reason = None if problem is None else problem.get("message")
+        endings[case.get("name")] = "" if ended_well else \
+            reason or f"not passed after {float(case.get('time') or 0):.0f} s"
+    return endings
+
+
+def check_modules(modules, endings, cases):
+    """Yields (name, message) of every module that ended badly without a failed case, or left no case at all."""
+    for module, file in modules.items():
+        outcomes = [outcome for _, outcome, _ in cases.get(file, [])]
+        ending = endings.get(module)
+        if ending is None:
+            ending = "ctest does not say how it ended"
+        if ending and "failed" not in outcomes:
+            yield module, f"{ending}; {len(outcomes)} cases of it are on record" if outcomes else \
+                f"{ending}; it left no results"
+        elif not ending and not outcomes:
+            yield module, "it left no results"
+
+
 def main():
-    folder = pathlib.Path(sys.argv[1])
+    """Prints what was skipped, what failed and the closing line; returns the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("results", help="catkin's folder test_results")
+    parser.add_argument("--list", help="what `ctest --show-only=json-v1` says")
+    parser.add_argument("--ran", help="file of `ctest --output-junit`")
+    parser.add_argument("--status", type=int, default=0, help="exit status of ctest")
+    arguments = parser.parse_args()
+    if (arguments.list is None) != (arguments.ran is None):
+        parser.error("--list and --ran go together")
+
+    folder = pathlib.Path(arguments.results).resolve()
     outcomes = {"passed": [], "failed": [], "skipped": []}
+    recorded = {}
     for file in sorted(folder.rglob("*.xml")):
-        cases = list(cases_of(file))
+        cases = recorded[file] = list(cases_of(file))
         # rostest writes one case per test node beside the node's own file with its real cases.
         if file.name.startswith("rostest-"):
             cases = [case for case in cases if case[1] == "failed"]
         for name, outcome, message in cases:
             outcomes[outcome].append((file.parent.name, name, message))
+    if arguments.list is not None:
+        for name, message in check_modules(modules_of(arguments.list, folder), endings_of(arguments.ran), recorded):
+            outcomes["failed"].append(("ctest", name, message))
+    if arguments.status != 0 and not outcomes["failed"]:
+        outcomes["failed"].append(("ctest", "itself", f"it ended with status {arguments.status}"))
     for outcome in ("skipped", "failed"):
         for package, name, message in outcomes[outcome]:
             print(f"{outcome}: {package} {name}: {' '.join(message.split())[:600]}")

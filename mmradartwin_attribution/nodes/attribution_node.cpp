@@ -7,11 +7,11 @@
 #include <memory>
 #include <sstream>
 
+#include "mmradartwin_attribution/live_ledger.h"
 #include "mmradartwin_attribution/residual.h"
 #include "mmradartwin_attribution/response_region.h"
 #include "mmradartwin_attribution/ros/conversions.h"
 #include "mmradartwin_attribution/ros/markers.h"
-#include "mmradartwin_attribution/standing_ledger.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/master_watch.h"
@@ -175,14 +175,14 @@ class AttributionNode {
   // next at the same place, since of a stretch the last of the longest averages counts. The last measured map is
   // compared once more, with what the new twin makes of it.
   void beginAnew() {
-    standing_ = StandingLedger();
+    live_ledger_ = LiveLedger();
     publishLedger(ros::Time::now());
     if (const MapMsg::ConstPtr measured = last_measured_) onMeasured(measured);
     ROS_INFO("another twin is simulated: the ledger begins anew");
   }
 
   void publishLedger(const ros::Time& stamp) {
-    mmradartwin_msgs::Ledger ledger = toMsg(standing_.summary(), standing_.duplicates());
+    mmradartwin_msgs::Ledger ledger = toMsg(live_ledger_.summary(), live_ledger_.duplicates());
     ledger.header.stamp = stamp;
     ledger.header.frame_id = radar_frame_;
     ledger_.publish(ledger);
@@ -226,7 +226,7 @@ class AttributionNode {
       records_.clear();
       records_of_.reset();
     }
-    const PoseAttribution pose = compareMaps(*field_, measured, simulated, regionsAt(T), records_);
+    const PoseAttribution pose = attributePose(*field_, measured, simulated, regionsAt(T), records_);
     const std::string name = nameAt(measured.stamp_ns);
 
     mmradartwin_msgs::Residuals residuals = toMsg(*field_, pose, name, T);
@@ -234,7 +234,7 @@ class AttributionNode {
     residuals.header.frame_id = radar_frame_;
     residuals_.publish(residuals);
 
-    standing_.add(measured.stamp_ns, T, name, measured.frames, pose.central);
+    live_ledger_.add(measured.stamp_ns, T, name, measured.frames, pose.central);
     const ros::WallTime now = ros::WallTime::now();
     if ((now - last_markers_).toSec() >= 1 / markers_hz_) {
       last_markers_ = now;
@@ -298,7 +298,7 @@ class AttributionNode {
   std::vector<ResponseRegion> regions_of_pose_;
   Eigen::Isometry3d regions_T_ = Eigen::Isometry3d::Identity();
   bool regions_valid_ = false;
-  StandingLedger standing_;
+  LiveLedger live_ledger_;
 };
 
 }  // namespace

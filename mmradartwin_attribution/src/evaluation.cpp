@@ -65,7 +65,7 @@ Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated
       }
       out.frames = map.frames;
       SimulatedPose other = simulated(out.pose);
-      out.attribution = compareMaps(field, map, other.map, regions.regions(out.pose.T_map_radar), other.records);
+      out.attribution = attributePose(field, map, other.map, regions.regions(out.pose.T_map_radar), other.records);
       for (const Residual& residual : out.attribution.residuals) {
         for (int index : residual.records) out.residual_records.emplace(index, other.records[index]);
       }

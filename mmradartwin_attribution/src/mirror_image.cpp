@@ -1,3 +1,7 @@
+// Image search in geometry of its own: expected regions come from scene and pose alone and share nothing with
+// the simulator but facets and occlusion, so that an error of the simulator's geometry shows as a residual (DESIGN
+// section 6).
+
 #include "mirror_image.h"
 
 #include <algorithm>
@@ -9,11 +13,12 @@ namespace mmradartwin {
 namespace {
 
 constexpr double kOnPlane_m = 1e-7;
-constexpr std::size_t kMaxMirrors = 300;  // largest ones first: the search takes their number to the third power
+constexpr std::size_t kMaxMirrors = 300;  // the largest facets; the search grows with the third power of their number
 
 Eigen::Vector3d mirrored(const Eigen::Vector3d& p, const Facet& f) { return p - 2 * f.planeDistance(p) * f.normal; }
 
-// Where the straight line from p to its image behind the facet meets it; false where it passes beside the rectangle.
+// Finds where the straight line from p to its image meets the facet; false where it passes beside the facet's
+// rectangle.
 bool crossing(const Facet& f, const Eigen::Vector3d& p, const Eigen::Vector3d& image, Eigen::Vector3d& vertex) {
   const double here = f.planeDistance(p), there = f.planeDistance(image);
   if (!(here * there < 0) || std::abs(here) < kOnPlane_m || std::abs(there) < kOnPlane_m) return false;
@@ -23,7 +28,8 @@ bool crossing(const Facet& f, const Eigen::Vector3d& p, const Eigen::Vector3d& i
   return x >= 0 && y >= 0 && x <= f.size1_m && y <= f.size2_m;
 }
 
-// Aperture of a facet met at a vertex, the path before and after it being d1 and d2 long; ends measured across the ray.
+// Fresnel aperture factor of a facet that a path meets at a vertex, d1 and d2 [m] along the path from either end. The
+// facet's sides are projected across the ray.
 double apertureFactor(const Facet& f, const Eigen::Vector3d& vertex, const Eigen::Vector3d& ray, double d1, double d2,
                       double wavelength_m) {
   const double scale = std::sqrt(2 * (d1 + d2) / (wavelength_m * d1 * d2));
@@ -66,7 +72,7 @@ std::vector<MirrorImage> MirrorSearch::find(const Eigen::Isometry3d& T_map_radar
     ahead.push_back((T_radar_map.linear().row(0) * (m.corners.colwise() - radar)).maxCoeff() > 0);
   }
   std::vector<MirrorImage> found;
-  // Walks back from the image over the facets to the radar, then looks whether each leg is free.
+  // Finds the vertices from the last mirror to the first, then checks that each leg is free.
   const auto solve = [&](const std::vector<const Facet*>& sequence, const std::vector<Eigen::Vector3d>& images) {
     const int order = static_cast<int>(sequence.size());
     MirrorImage path;

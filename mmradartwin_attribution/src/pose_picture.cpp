@@ -11,7 +11,8 @@
 namespace mmradartwin {
 namespace {
 
-const cv::Scalar kWhite(255, 255, 255), kMagenta(255, 0, 255), kInk(40, 40, 40), kSoft(120, 120, 120);
+const cv::Scalar kWhite(255, 255, 255), kMagenta(255, 0, 255), kInk(40, 40, 40), kSoft(120, 120, 120),
+    kStation(178, 114, 0);
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
 constexpr int kFanHeight_px = 470;
 constexpr double kDegree = M_PI / 180.0;
@@ -103,6 +104,138 @@ std::string describe(const Residual& r) {
   return line + format(" dB, simulated %.1f dB", r.simulated_db);
 }
 
+/// A triangle of the scene as the coverage picture shows it.
+struct CoverageTriangle {
+  std::array<Eigen::Vector3d, 3> corner;
+  double height;  ///< of its highest corner, map
+  bool upright;
+  cv::Scalar color;
+};
+
+/// Materials of a scene with their colours, in order of appearance.
+using Legend = std::vector<std::pair<std::string, cv::Scalar>>;
+
+/// The scene from above: x to the right, y up, with a margin for names and a column for the legend.
+class CoverageView {
+ public:
+  static constexpr int kMargin_px = 46, kLegend_px = 190;
+
+  explicit CoverageView(const Eigen::AlignedBox2d& bounds)
+      : bounds_(bounds),
+        size_m_(bounds.sizes().cwiseMax(0.5)),
+        px_per_m_(std::min(900.0 / size_m_.x(), 700.0 / size_m_.y())),
+        picture_(cvRound(size_m_.y() * px_per_m_) + 2 * kMargin_px + 24,
+                 cvRound(size_m_.x() * px_per_m_) + 2 * kMargin_px + kLegend_px, CV_8UC3, kWhite) {}
+
+  void drawSurfaces(std::vector<CoverageTriangle> triangles) {
+    std::stable_sort(triangles.begin(), triangles.end(),
+                     [](const CoverageTriangle& a, const CoverageTriangle& b) { return a.height < b.height; });
+    for (const CoverageTriangle& t : triangles) {
+      std::vector<cv::Point> corners;
+      for (const Eigen::Vector3d& v : t.corner) corners.push_back(fine(v.head<2>()));
+      // An upright surface is a line from above: drawn as one, darker.
+      if (t.upright) {
+        cv::polylines(picture_, corners, true, t.color * 0.7, 3, cv::LINE_AA, kShift);
+      } else {
+        cv::fillConvexPoly(picture_, corners, t.color * 0.35 + cv::Scalar(255, 255, 255) * 0.65, cv::LINE_AA, kShift);
+      }
+    }
+  }
+
+  /// Names of what stands in the room; surfaces as large as the room itself go without.
+  void drawNames(const Scene& scene, double cut_height_m) {
+    for (const Actor& actor : scene.actors) {
+      const Eigen::Vector3d extent = actor.bounds.sizes();
+      if (extent.head<2>().maxCoeff() > 0.6 * size_m_.maxCoeff() || actor.bounds.min().z() > cut_height_m) continue;
+      int baseline = 0;
+      const cv::Size words = cv::getTextSize(actor.name, kFont, 0.36, 1, &baseline);
+      const cv::Point2d p = at(actor.bounds.center().head<2>());
+      put(picture_, actor.name, cvRound(p.x) - words.width / 2, cvRound(p.y) + 4, 0.36, kSoft);
+    }
+  }
+
+  void drawStations(const std::vector<Pose>& poses) {
+    std::vector<std::string> locations;
+    for (const Pose& pose : poses) {
+      const Eigen::Vector2d p = pose.T_map_radar.translation().head<2>();
+      const Eigen::Vector2d heading = pose.T_map_radar.linear().col(0).head<2>();
+      if (heading.norm() > 1e-6) {
+        cv::arrowedLine(picture_, at(p), at(p + 0.42 * heading.normalized()), kStation, 1, cv::LINE_AA, 0, 0.25);
+      }
+    }
+    for (const Pose& pose : poses) {
+      if (std::find(locations.begin(), locations.end(), pose.location) != locations.end()) continue;
+      locations.push_back(pose.location);
+      const cv::Point2d p = at(pose.T_map_radar.translation().head<2>());
+      cv::circle(picture_, p, 6, kStation, cv::FILLED, cv::LINE_AA);
+      cv::circle(picture_, p, 6, kWhite, 1, cv::LINE_AA);
+      put(picture_, pose.location, cvRound(p.x) + 9, cvRound(p.y) - 8, 0.42, kInk);
+    }
+    put(picture_,
+        format("coverage: %.0f poses at %.0f locations", static_cast<double>(poses.size()),
+               static_cast<double>(locations.size())),
+        kMargin_px, 26, 0.6, kInk);
+  }
+
+  void drawLegend(const Legend& legend) {
+    const int x = picture_.cols - kLegend_px + 6;
+    int y = kMargin_px + 8;
+    for (const auto& [name, color] : legend) {
+      cv::rectangle(picture_, {x, y - 10}, {x + 14, y + 2}, color, cv::FILLED);
+      cv::rectangle(picture_, {x, y - 10}, {x + 14, y + 2}, kInk, 1);
+      put(picture_, name, x + 22, y, 0.45, kInk);
+      y += 20;
+    }
+    cv::circle(picture_, {x + 7, y - 4}, 6, kStation, cv::FILLED, cv::LINE_AA);
+    put(picture_, "radar, heading", x + 22, y, 0.45, kInk);
+    const int bar = picture_.rows - 22, metre = cvRound(px_per_m_);
+    cv::line(picture_, {kMargin_px, bar}, {kMargin_px + metre, bar}, kInk, 2);
+    put(picture_, "1 m   (x to the right, y up, map)", kMargin_px + metre + 8, bar + 5, 0.45, kInk);
+  }
+
+  const cv::Mat& picture() const { return picture_; }
+
+ private:
+  static constexpr int kShift = 4;  ///< of fine(): 1/16 pixel
+  cv::Point2d at(const Eigen::Vector2d& p_m) const {
+    return {kMargin_px + (p_m.x() - bounds_.min().x()) * px_per_m_,
+            kMargin_px + (bounds_.max().y() - p_m.y()) * px_per_m_};
+  }
+  cv::Point fine(const Eigen::Vector2d& p_m) const {
+    const cv::Point2d q = at(p_m);
+    return cv::Point(cvRound(q.x * (1 << kShift)), cvRound(q.y * (1 << kShift)));
+  }
+
+  Eigen::AlignedBox2d bounds_;
+  Eigen::Vector2d size_m_;
+  double px_per_m_;
+  cv::Mat picture_;
+};
+
+/// Surfaces below the cut and upright ones; bounds grows by all of the scene.
+std::vector<CoverageTriangle> coverageTriangles(const Scene& scene, double cut_height_m, Legend& legend,
+                                                Eigen::AlignedBox2d& bounds) {
+  std::vector<CoverageTriangle> triangles;
+  for (const Actor& actor : scene.actors) {
+    const auto& c = actor.material.color;
+    const cv::Scalar color(255 * c[2], 255 * c[1], 255 * c[0]);
+    const bool listed =
+        std::any_of(legend.begin(), legend.end(), [&](const auto& l) { return l.first == actor.material_tag; });
+    if (!listed) legend.emplace_back(actor.material_tag, color);
+    for (const auto& t : actor.triangles) {
+      CoverageTriangle triangle{{actor.vertices[t[0]], actor.vertices[t[1]], actor.vertices[t[2]]}, 0, false, color};
+      const Eigen::Vector3d n =
+          (triangle.corner[1] - triangle.corner[0]).cross(triangle.corner[2] - triangle.corner[0]).normalized();
+      triangle.upright = std::abs(n.z()) < std::sqrt(0.5);
+      triangle.height = std::max({triangle.corner[0].z(), triangle.corner[1].z(), triangle.corner[2].z()});
+      for (const Eigen::Vector3d& v : triangle.corner) bounds.extend(v.head<2>());
+      if (!triangle.upright && triangle.height > cut_height_m) continue;
+      triangles.push_back(triangle);
+    }
+  }
+  return triangles;
+}
+
 }  // namespace
 
 cv::Scalar classColor_bgr(ResidualClass c) {
@@ -167,104 +300,19 @@ cv::Mat drawPose(const EvaluationField& field, const PoseResult& result) {
 }
 
 cv::Mat drawCoverage(const Scene& scene, const std::vector<Pose>& poses, double cut_height_m) {
-  struct Triangle {
-    std::array<Eigen::Vector3d, 3> corner;
-    double height;
-    bool upright;
-    cv::Scalar color;
-  };
-  std::vector<Triangle> triangles;
-  std::vector<std::pair<std::string, cv::Scalar>> legend;
+  Legend legend;
   Eigen::AlignedBox2d bounds;
-  for (const Actor& actor : scene.actors) {
-    const auto& c = actor.material.color;
-    const cv::Scalar color(255 * c[2], 255 * c[1], 255 * c[0]);
-    const bool listed =
-        std::any_of(legend.begin(), legend.end(), [&](const auto& l) { return l.first == actor.material_tag; });
-    if (!listed) legend.emplace_back(actor.material_tag, color);
-    for (const auto& t : actor.triangles) {
-      Triangle triangle{{actor.vertices[t[0]], actor.vertices[t[1]], actor.vertices[t[2]]}, 0, false, color};
-      const Eigen::Vector3d n =
-          (triangle.corner[1] - triangle.corner[0]).cross(triangle.corner[2] - triangle.corner[0]).normalized();
-      triangle.upright = std::abs(n.z()) < std::sqrt(0.5);
-      triangle.height = std::max({triangle.corner[0].z(), triangle.corner[1].z(), triangle.corner[2].z()});
-      for (const Eigen::Vector3d& v : triangle.corner) bounds.extend(v.head<2>());
-      if (!triangle.upright && triangle.height > cut_height_m) continue;
-      triangles.push_back(triangle);
-    }
-  }
+  const std::vector<CoverageTriangle> triangles = coverageTriangles(scene, cut_height_m, legend, bounds);
   for (const Pose& pose : poses) bounds.extend(Eigen::Vector2d(pose.T_map_radar.translation().head<2>()));
-  constexpr int kMargin = 46, kLegend = 190;
-  if (bounds.isEmpty()) return cv::Mat(2 * kMargin, 2 * kMargin, CV_8UC3, kWhite);
-  const Eigen::Vector2d size = bounds.sizes().cwiseMax(0.5);
-  const double px_per_m = std::min(900.0 / size.x(), 700.0 / size.y());
-  cv::Mat picture(cvRound(size.y() * px_per_m) + 2 * kMargin + 24, cvRound(size.x() * px_per_m) + 2 * kMargin + kLegend,
-                  CV_8UC3, kWhite);
-  constexpr int kShift = 4;  // 1/16 pixel
-  const auto at = [&](const Eigen::Vector2d& p) {
-    return cv::Point2d(kMargin + (p.x() - bounds.min().x()) * px_per_m,
-                       kMargin + (bounds.max().y() - p.y()) * px_per_m);
-  };
-  const auto fine = [&](const Eigen::Vector2d& p) {
-    const cv::Point2d q = at(p);
-    return cv::Point(cvRound(q.x * (1 << kShift)), cvRound(q.y * (1 << kShift)));
-  };
-  std::stable_sort(triangles.begin(), triangles.end(),
-                   [](const Triangle& a, const Triangle& b) { return a.height < b.height; });
-  for (const Triangle& t : triangles) {
-    std::vector<cv::Point> corners;
-    for (const Eigen::Vector3d& v : t.corner) corners.push_back(fine(v.head<2>()));
-    // Seen from above an upright surface is a line: drawn as one, darker.
-    if (t.upright) {
-      cv::polylines(picture, corners, true, t.color * 0.7, 3, cv::LINE_AA, kShift);
-    } else {
-      cv::fillConvexPoly(picture, corners, t.color * 0.35 + cv::Scalar(255, 255, 255) * 0.65, cv::LINE_AA, kShift);
-    }
+  if (bounds.isEmpty()) {
+    return cv::Mat(2 * CoverageView::kMargin_px, 2 * CoverageView::kMargin_px, CV_8UC3, kWhite);
   }
-  for (const Actor& actor : scene.actors) {
-    // Names of what stands in the room; surfaces as large as the room itself go without.
-    const Eigen::Vector3d extent = actor.bounds.sizes();
-    if (extent.head<2>().maxCoeff() > 0.6 * size.maxCoeff() || actor.bounds.min().z() > cut_height_m) continue;
-    int baseline = 0;
-    const cv::Size words = cv::getTextSize(actor.name, kFont, 0.36, 1, &baseline);
-    const cv::Point2d p = at(actor.bounds.center().head<2>());
-    put(picture, actor.name, cvRound(p.x) - words.width / 2, cvRound(p.y) + 4, 0.36, kSoft);
-  }
-  const cv::Scalar blue(178, 114, 0);
-  std::vector<std::string> locations;
-  for (const Pose& pose : poses) {
-    const Eigen::Vector2d p = pose.T_map_radar.translation().head<2>();
-    const Eigen::Vector2d heading = pose.T_map_radar.linear().col(0).head<2>();
-    if (heading.norm() > 1e-6) {
-      cv::arrowedLine(picture, at(p), at(p + 0.42 * heading.normalized()), blue, 1, cv::LINE_AA, 0, 0.25);
-    }
-  }
-  for (const Pose& pose : poses) {
-    if (std::find(locations.begin(), locations.end(), pose.location) != locations.end()) continue;
-    locations.push_back(pose.location);
-    const cv::Point2d p = at(pose.T_map_radar.translation().head<2>());
-    cv::circle(picture, p, 6, blue, cv::FILLED, cv::LINE_AA);
-    cv::circle(picture, p, 6, kWhite, 1, cv::LINE_AA);
-    put(picture, pose.location, cvRound(p.x) + 9, cvRound(p.y) - 8, 0.42, kInk);
-  }
-  put(picture,
-      format("coverage: %.0f poses at %.0f locations", static_cast<double>(poses.size()),
-             static_cast<double>(locations.size())),
-      kMargin, 26, 0.6, kInk);
-  const int x = picture.cols - kLegend + 6;
-  int y = kMargin + 8;
-  for (const auto& [name, color] : legend) {
-    cv::rectangle(picture, {x, y - 10}, {x + 14, y + 2}, color, cv::FILLED);
-    cv::rectangle(picture, {x, y - 10}, {x + 14, y + 2}, kInk, 1);
-    put(picture, name, x + 22, y, 0.45, kInk);
-    y += 20;
-  }
-  cv::circle(picture, {x + 7, y - 4}, 6, blue, cv::FILLED, cv::LINE_AA);
-  put(picture, "radar, heading", x + 22, y, 0.45, kInk);
-  const int bar = picture.rows - 22;
-  cv::line(picture, {kMargin, bar}, {kMargin + cvRound(px_per_m), bar}, kInk, 2);
-  put(picture, "1 m   (x to the right, y up, map)", kMargin + cvRound(px_per_m) + 8, bar + 5, 0.45, kInk);
-  return picture;
+  CoverageView view(bounds);
+  view.drawSurfaces(triangles);
+  view.drawNames(scene, cut_height_m);
+  view.drawStations(poses);
+  view.drawLegend(legend);
+  return view.picture();
 }
 
 }  // namespace mmradartwin

@@ -10,18 +10,18 @@ namespace {
 
 double power(double level_db) { return std::pow(10.0, level_db / 10); }
 
-// Classes of one pose by the rules of the design, section 6.
-class Router {
+// Assigns each response that the branches do not share to one residual class (DESIGN section 6).
+class ResidualClassifier {
  public:
-  Router(const EvaluationField& field, const std::vector<PathRecord>& records, PoseAttribution& pose)
+  ResidualClassifier(const EvaluationField& field, const std::vector<PathRecord>& records, PoseAttribution& pose)
       : field_(field), config_(field.config()), records_(records), pose_(pose) {}
 
   void run() {
     for (const Response& m : pose_.measured.responses) {
-      if (m.field == Field::kCentral && m.level_db >= config_.strong_db) routeMeasured(m);
+      if (m.field == Field::kCentral && m.level_db >= config_.strong_db) classifyMeasured(m);
     }
     for (const Response& s : pose_.simulated.responses) {
-      if (s.field == Field::kCentral && s.level_db >= config_.strong_db) routeSimulated(s);
+      if (s.field == Field::kCentral && s.level_db >= config_.strong_db) classifySimulated(s);
     }
   }
 
@@ -36,7 +36,8 @@ class Router {
         (response.azimuth_rad - region.azimuth_rad) / field_.halfAzimuth_rad(config_.wide, region.azimuth_rad));
   }
 
-  // A response inside another region's tight window does not count for this one (unless it is in its own as well).
+  // True where a simulated response supports a region: it lies in the region's wide window, and in another region's
+  // tight window only if it lies in this region's tight window, too.
   bool countsFor(int region, const Response& simulated) const {
     if (!at(config_.wide, pose_.regions[region], simulated)) return false;
     if (at(config_.tight, pose_.regions[region], simulated)) return true;
@@ -46,7 +47,7 @@ class Router {
     return true;
   }
 
-  void routeMeasured(const Response& m) {
+  void classifyMeasured(const Response& m) {
     for (const Response& s : pose_.simulated.responses) {
       if (s.level_db >= config_.strong_db &&
           field_.inWindow(config_.tight, m.range_m, m.azimuth_rad, s.range_m, s.azimuth_rad)) {
@@ -76,7 +77,7 @@ class Router {
     add(m, true, best, best_region);
   }
 
-  void routeSimulated(const Response& s) {
+  void classifySimulated(const Response& s) {
     if (pose_.measured.level_db(s.range_bin, s.angle_bin) >= config_.weak_db) return;
     int nearest = -1;
     for (std::size_t i = 0; i < pose_.regions.size(); ++i) {
@@ -257,8 +258,9 @@ ConventionCheck checkConvention(const EvaluationField& field, const RangeAngleMa
   return {agreement(false, false), agreement(false, true), agreement(true, true)};
 }
 
-PoseAttribution compareMaps(const EvaluationField& field, const RangeAngleMap& measured, const RangeAngleMap& simulated,
-                            std::vector<ResponseRegion> regions, const std::vector<PathRecord>& records) {
+PoseAttribution attributePose(const EvaluationField& field, const RangeAngleMap& measured,
+                              const RangeAngleMap& simulated, std::vector<ResponseRegion> regions,
+                              const std::vector<PathRecord>& records) {
   PoseAttribution pose;
   pose.measured = field.normalise(measured);
   pose.simulated = field.normalise(simulated);
@@ -268,7 +270,7 @@ PoseAttribution compareMaps(const EvaluationField& field, const RangeAngleMap& m
   compareCells(field, Field::kOuter, pose, pose.outer);
   compareTop(field, Field::kCentral, pose, pose.central);
   compareTop(field, Field::kOuter, pose, pose.outer);
-  Router(field, records, pose).run();
+  ResidualClassifier(field, records, pose).run();
   pose.residual_db = pose.simulated.level_db - pose.measured.level_db;
   for (int r = 0; r < pose.residual_db.rows(); ++r) {
     for (int a = 0; a < pose.residual_db.cols(); ++a) {

@@ -18,7 +18,7 @@ double dirichlet(int n, double x) {
   return std::abs(std::sin(n * M_PI * x) / (n * denominator));
 }
 
-// Offset of the vertex of the parabola through three equidistant values, within half a step.
+// Offset of the vertex of the parabola through three equidistant values, in steps, at most half a step.
 double vertex(double before, double at, double after) {
   const double curvature = before - 2 * at + after;
   if (!(curvature < 0) || !std::isfinite(curvature)) return 0;
@@ -158,7 +158,7 @@ std::vector<Response> EvaluationField::findResponses(const RealGrid& relative_db
       for (int dr = -1; dr <= 1 && maximum; ++dr) {
         for (int da = -1; da <= 1 && maximum; ++da) {
           if (dr == 0 && da == 0) continue;
-          const bool earlier = dr < 0 || (dr == 0 && da < 0);  // of a plateau, the first cell
+          const bool earlier = dr < 0 || (dr == 0 && da < 0);  // the first cell of a plateau is its maximum
           maximum = earlier ? v > at(r + dr, a + da) : v >= at(r + dr, a + da);
         }
       }
@@ -182,7 +182,7 @@ std::vector<Response> EvaluationField::findResponses(const RealGrid& relative_db
   std::vector<Candidate> accepted;
   std::vector<Response> responses;
   for (const Candidate& c : candidates) {
-    double predicted = 0;  // expected power over the unknown phases of the stronger ones
+    double predicted = 0;  // power expected of the stronger responses, whose phases are unknown
     for (const Candidate& s : accepted) {
       const double own = pointResponse(s.response.range_bin - s.range_bin, s.response.angle_bin - s.angle_bin);
       const double here = pointResponse(c.response.range_bin - s.range_bin, c.response.angle_bin - s.angle_bin);

@@ -1,3 +1,7 @@
+// Apertures, corners and edges in geometry of its own: expected regions come from scene and pose alone and share
+// nothing with the simulator but facets and occlusion, so that an error of the simulator's geometry shows as a residual
+// (DESIGN section 6).
+
 #include "mmradartwin_attribution/response_region.h"
 
 #include <algorithm>
@@ -35,7 +39,8 @@ std::vector<Eigen::Vector3d> boundary(const Facet& facet) {
   return points;
 }
 
-// Position along the line and least and greatest distance from it of the points that come within gap of it.
+// Extent of points along a line: from begin to end those within a gap of it, nearest and farthest the least and
+// greatest distance of any from it.
 struct Along {
   double begin = 1e9, end = -1e9, nearest = 1e9, farthest = 0;
 };
@@ -55,7 +60,7 @@ Along along(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& o
   return result;
 }
 
-// Greatest plane distance to either side; 0 where no point lies there.
+// Greatest distance of points from a plane to either side; 0 where no point lies there.
 std::pair<double, double> reach(const Facet& plane, const std::vector<Eigen::Vector3d>& points) {
   double positive = 0, negative = 0;
   for (const Eigen::Vector3d& p : points) {
@@ -65,7 +70,7 @@ std::pair<double, double> reach(const Facet& plane, const std::vector<Eigen::Vec
   return {positive, negative};
 }
 
-constexpr double kLobeFloor_db = -6;  // lobes of an image's beam: half of the strongest, sidelobes stay below
+constexpr double kLobeFloor_db = -6;  // weakest lobe of an image's beam against its strongest; sidelobes stay below
 
 double level_db(double amplitude) { return 20 * std::log10(std::max(amplitude, 1e-12)); }
 
@@ -236,8 +241,8 @@ void RegionModel::addCorners(const Eigen::Isometry3d& T, std::vector<ResponseReg
   }
 }
 
-// Paths over the same facets back and forth are equally long and so add up with a known phase. Where departure and
-// arrival differ, the array steers neither way: the region is where its beam has the lobes of both together.
+// Paths over the same facets to and fro are equally long and add up with a known phase. Where departure and arrival
+// differ, the array steers to neither: the regions are the lobes of the beam that both paths make together.
 void RegionModel::addImages(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const {
   const RegionConfig& config = field_.config().regions;
   if (config.image_order < 2) return;
@@ -323,8 +328,8 @@ void RegionModel::addExtentsOf(int actor, const Eigen::Isometry3d& T, double flo
                        place_of.field});
   }
   const MatchWindow &tight = field_.config().tight, &wide = field_.config().wide;
-  // The tight window of an extent stays clear of the wide windows of the actor's other regions on its surface, and of
-  // the tight ones of its images.
+  // The tight window of an extent keeps off the wide windows of the actor's other regions on its surface, and off the
+  // tight windows of its images.
   const auto around = [&](const ResponseRegion& r) -> const MatchWindow& {
     return r.kind == RegionKind::kImage ? tight : wide;
   };
@@ -396,7 +401,7 @@ std::vector<ResponseRegion> RegionModel::regions(const Eigen::Isometry3d& T_map_
   found = merged(std::move(found));
   const double extent_floor = field_.config().regions.extent_floor_db;
   addExtents(T_map_radar, strongest + extent_floor, found);
-  // Where nothing faces the radar, the strongest extent is what the others are measured by.
+  // Where nothing faces the radar, the strongest extent sets the level.
   for (const ResponseRegion& r : found) {
     if (r.field == Field::kCentral) strongest = std::max(strongest, r.support_db);
   }

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mmradartwin_attribution/standing_ledger.h"
+#include "mmradartwin_attribution/live_ledger.h"
 #include "synthetic_map.h"
 
 namespace mmradartwin {
@@ -75,7 +75,7 @@ TEST(Ledger, PrintsThePapersTable) {
   }
 }
 
-class StandingLedgerTest : public ::testing::Test {
+class LiveLedgerTest : public ::testing::Test {
  protected:
   void stand(double begin_s, double seconds, double x_m, double heading_deg, const std::string& name, double q1) {
     for (int i = 0; i <= static_cast<int>(seconds * 20); ++i) {
@@ -88,10 +88,10 @@ class StandingLedgerTest : public ::testing::Test {
     return Eigen::Translation3d(x_m, 0, 1) *
            Eigen::AngleAxisd(heading_deg * synthetic::kDegree, Eigen::Vector3d::UnitZ());
   }
-  StandingLedger ledger_;
+  LiveLedger ledger_;
 };
 
-TEST_F(StandingLedgerTest, AStretchCountsOnce) {
+TEST_F(LiveLedgerTest, AStretchCountsOnce) {
   stand(0, 5, 0, 0, "a", 0.2);
   EXPECT_EQ(ledger_.summary().poses, 1);
   stand(10, 5, 1, 0, "b", 0.4);
@@ -101,13 +101,13 @@ TEST_F(StandingLedgerTest, AStretchCountsOnce) {
   EXPECT_EQ(ledger_.summary().poses, 3) << "a turn is another pose";
 }
 
-TEST_F(StandingLedgerTest, ShortStretchesAreMovement) {
+TEST_F(LiveLedgerTest, ShortStretchesAreMovement) {
   stand(0, 5, 0, 0, "a", 0.2);
   for (int i = 1; i < 20; ++i) stand(5 + i * 0.5, 0.4, i * 0.1, 0, "moving", 1);
   EXPECT_EQ(ledger_.summary().poses, 1);
 }
 
-TEST_F(StandingLedgerTest, TheLongestAverageIsWhatCounts) {
+TEST_F(LiveLedgerTest, TheLongestAverageIsWhatCounts) {
   FieldMetrics early, late;
   early.q1_energy = 0.9;
   late.q1_energy = 0.1;
@@ -117,7 +117,7 @@ TEST_F(StandingLedgerTest, TheLongestAverageIsWhatCounts) {
   EXPECT_DOUBLE_EQ(ledger_.summary().q1_energy, 0.1);
 }
 
-TEST_F(StandingLedgerTest, DuplicatesAreLeftOutAndListed) {
+TEST_F(LiveLedgerTest, DuplicatesAreLeftOutAndListed) {
   stand(0, 5, 0, 0, "a", 0.2);
   stand(10, 5, 1, 0, "b", 0.4);
   stand(20, 5, 0.05, 0.5, "again", 0.9);

@@ -31,7 +31,7 @@ class ResidualTest : public ::testing::Test {
     measured.push_back(anchor_);
     simulated.push_back(anchor_);
     regions.push_back(region("anchor", anchor_.range_m, anchor_.azimuth_deg));
-    return compareMaps(field_, synthetic::map(radar_, measured), synthetic::map(radar_, simulated), regions, {});
+    return attributePose(field_, synthetic::map(radar_, measured), synthetic::map(radar_, simulated), regions, {});
   }
 
   // The only residual.
@@ -224,7 +224,7 @@ TEST_F(MetricTest, EnergiesAndDifferencesOfHandMadeMaps) {
   m.power_db(60, 30) = -12;  // both strong, at no region
   s.power_db(60, 30) = -12;
   ResponseRegion expected = region("wall", chain_.axes().range_m[20], 0);
-  const PoseAttribution pose = compareMaps(field_, m, s, {expected}, {});
+  const PoseAttribution pose = attributePose(field_, m, s, {expected}, {});
   const int rest = evaluatedCells() - 5;
   const double m_all = 1 + std::pow(10, -0.3) + 0.1 + 1e-4 + std::pow(10, -1.2) + rest * 1e-5;
   const double s_all =
@@ -248,7 +248,7 @@ TEST_F(MetricTest, TopKCountsAgreementWithinItsWindow) {
   const std::vector<Target> measured = {{3, 0, 0}, {5, 20, -4}, {7, -30, -8}};
   const std::vector<Target> simulated = {{5.3, 24, 0}, {1.5, 40, -4}, {3.2, -8, -8}};
   const PoseAttribution pose =
-      compareMaps(field_, synthetic::map(radar_, measured), synthetic::map(radar_, simulated), {}, {});
+      attributePose(field_, synthetic::map(radar_, measured), synthetic::map(radar_, simulated), {}, {});
   EXPECT_EQ(pose.central.top_count[0], 1);
   EXPECT_EQ(pose.central.top_hits[0], 0);
   EXPECT_EQ(pose.central.top_count[1], 3);
@@ -258,7 +258,7 @@ TEST_F(MetricTest, TopKCountsAgreementWithinItsWindow) {
 TEST_F(MetricTest, RecallByBand) {
   const std::vector<Target> measured = {{1.0, 0, -3}, {3.0, 20, 0}, {3.5, -25, -6}, {6.0, 10, -6}};
   const std::vector<Target> simulated = {{1.0, 0, -3}, {3.0, 20, 0}, {6.0, 10, -20}};
-  const PoseAttribution pose = compareMaps(
+  const PoseAttribution pose = attributePose(
       field_, synthetic::map(radar_, measured), synthetic::map(radar_, simulated),
       {region("a", 1, 0), region("b", 3, 20), region("c", 3.5, -25), region("d", 6, 10), region("e", 8, 0)}, {});
   EXPECT_EQ(pose.central.active, (std::array<int, 3>{1, 2, 1}));

@@ -49,8 +49,8 @@ int wholeNumber(double value, const std::string& what);
 void readLuaSettings(const std::string& file, RawSettings& settings);
 /// Adds what mmWave Studio's XML says: <configuration>, sections <apiname_profile_cfg> and so on, in them
 /// <param name="..." value="..."/> in the units of its windows (GHz, MHz/us, us, ksps, ms). It keeps one profile and
-/// one range of chirps: those that were set last. Of the codes in its data path section one set is known; throws InputError
-/// for others.
+/// one range of chirps: those that were set last. Of the codes in its data path section one set is known; throws
+/// InputError for others.
 void readXmlSettings(const std::string& file, RawSettings& settings);
 
 }  // namespace mmradartwin

@@ -52,7 +52,8 @@ TEST_P(ShippedConfiguration, Loads) {
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedConfiguration, testing::ValuesIn(shippedFiles()), [](const auto& info) {
   std::string name = info.param;
-  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c); }, '_');
+  std::replace_if(
+      name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c); }, '_');
   return name;
 });
 

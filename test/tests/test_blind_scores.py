@@ -75,7 +75,7 @@ class Scoring(unittest.TestCase):
         truth = {"cause": "channel_conjugation", "parameters": {}}
         self.assertTrue(score("single", [truth], [finding("channel_permutation")])["first"])
 
-    def test_pairs(self):
+    def test_of_a_pair_each_cause_is_scored_and_a_third_is_wrong(self):
         s = score("pair", [BIAS, YAW], [finding("radar_yaw_offset"), finding("range_bias")])
         self.assertEqual((s["named"], s["wrong"]), ([True, True], False))
         s = score("pair", [BIAS, YAW], [finding("radar_yaw_offset"), finding("if_lowpass")])
@@ -107,7 +107,7 @@ class Scoring(unittest.TestCase):
             truth = {"cause": made.name, "parameters": made.truth(measurement)}
             self.assertFalse(score("outside", [truth], [])["unknown"], msg=made.name)
 
-    def test_decoys(self):
+    def test_a_decoy_called_a_material_is_blamed(self):
         truth = {"cause": "window_mismatch", "parameters": {}}
         for cause, blamed in (("material_reflectivity", True), ("surface_roughness", True), ("if_highpass", False)):
             self.assertEqual(score("decoy", [truth], [finding(cause)])["material_blamed"], blamed)
@@ -127,7 +127,7 @@ class Scoring(unittest.TestCase):
         s = score("single", [truth], [finding("channel_phase_error", phase_deg=found)])
         self.assertEqual([c[1] for c in s["coverage"]], [True, False])
 
-    def test_subjects(self):
+    def test_a_right_cause_of_the_wrong_subject_is_told(self):
         truth = {"cause": "wall_ghost", "parameters": {"walls": ["a", "b"]}}
         right = finding("wall_ghost", walls={"value": ["b", "a"]})
         self.assertEqual(score("single", [truth], [right])["subjects"], [True])
@@ -163,7 +163,7 @@ class Table(InFolder):
     def measured(self, scores):
         return {row[0]: row[2:] for row in scores.table()}
 
-    def test_counts(self):
+    def test_shares_count_finished_sessions_with_their_intervals(self):
         told = self.measured(self.scores([
             ("clean", [], [], "ok"), ("clean", [], [finding("range_bias")], "ok"), ("clean", [], [], "timeout"),
             ("single", [BIAS], [finding("range_bias")], "ok"), ("single", [BIAS], [finding("range_scale")], "ok"),

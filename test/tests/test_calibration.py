@@ -295,7 +295,7 @@ class Calibrated(unittest.TestCase):
         self.assertIn("pose '003'", errors)
         self.assertIn("the laser says", errors)
 
-    def test_bad_input(self):
+    def test_what_cannot_be_calibrated_is_refused_with_its_reason(self):
         one = self.session("one", count=1)
         status, _, _, errors = self.calibrate(one, *self.REFLECTOR_OPTIONS)
         self.assertEqual(status, 2)

@@ -1,7 +1,11 @@
 #!/usr/bin/env python3
 """The demo on a small session, as a user runs it: emulator, UDP, driver, tf, signal chain, twin, attribution, rviz, report."""
+import collections
+import csv
+import html
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -27,6 +31,45 @@ def fan_columns(pixels):
     floor = (numpy.abs(pixels - numpy.array([68, 1, 84])).sum(axis=2) < 24).sum(axis=0) > 40
     edges = numpy.flatnonzero(numpy.diff(numpy.concatenate([[0], floor.astype(int), [0]])))
     return [(a, b) for a, b in zip(edges[::2], edges[1::2]) if b - a >= 100]
+
+
+def rows_of(*parts):
+    """Rows of a CSV file as dictionaries."""
+    with open(os.path.join(*parts), encoding="utf-8") as text:
+        return list(csv.DictReader(text))
+
+
+def check_report(test, folder, names):
+    """index.html has a figure of each pose, whose caption says what poses.csv and residuals.csv hold of it."""
+    with open(os.path.join(folder, "index.html"), encoding="utf-8") as file:
+        page = html.unescape(file.read())
+    with open(os.path.join(folder, "summary.json"), encoding="utf-8") as file:
+        central = json.load(file)["central"]
+    rows = rows_of(folder, "poses.csv")
+    test.assertEqual([row["pose"] for row in rows], names)
+    active, recalled = (sum(int(row[column]) for row in rows) for column in ("active", "recalled"))
+    test.assertGreater(active, 0)
+    test.assertAlmostEqual(central["recall"], recalled / active)
+    classes = collections.Counter((row["pose"], row["class"]) for row in rows_of(folder, "residuals.csv"))
+    captions = dict(re.findall(r"<figcaption>Pose (\d+): ([^<]*)", page))
+    test.assertEqual(set(captions), set(names))
+    for row in rows:
+        name = row["pose"]
+        counted = "/".join(str(classes[name, f"C{i}"]) for i in range(1, 6))
+        test.assertEqual(counted, "/".join(row[f"c{i}"] for i in range(1, 6)), name)
+        said = re.fullmatch(r"(\d+) of (\d+) measured regions recalled, Q1 ([\d.]*), Q2 ([\d.]*), C1–C5 ([\d/]+)",
+                            captions[name])
+        test.assertTrue(said, captions[name])
+        test.assertEqual(said.group(1, 2, 5), (row["recalled"], row["active"], counted), name)
+        for text, column in zip(said.group(3, 4), ("q1_energy", "q2_energy")):
+            test.assertEqual(bool(text), bool(row[column]), name)   # neither says a number where nothing was measured
+            test.assertAlmostEqual(float(text or 0), float(row[column] or 0), delta=0.00051, msg=name)   # of three decimals
+        picture = os.path.join("pictures", name + ".png")
+        test.assertIn(f'src="{picture}"', page)
+        test.assertGreaterEqual(len(fan_columns(picture_pixels(os.path.join(folder, picture)))), 2, name)
+    test.assertIn('src="coverage.png"', page)
+    coverage = picture_pixels(os.path.join(folder, "coverage.png"))
+    test.assertGreater(len(numpy.unique(coverage.reshape(-1, 3), axis=0)), 4, "nothing is drawn")
 
 
 class DemoLoop(unittest.TestCase):
@@ -98,12 +141,8 @@ class DemoLoop(unittest.TestCase):
         self.assertGreater(echo[:, fans[0][0]:middle].sum(), 100)
         self.assertGreater(echo[:, middle:fans[1][1]].sum(), 100)
 
-    def test_report_names_every_pose(self):
-        with open(self.path("report", "index.html")) as file:
-            page = file.read()
-        for name in ("coverage.png", "001.png", "002.png", "003.png"):
-            self.assertIn(name, page)
-            self.assertTrue(os.path.exists(self.path("report", name)) or os.path.exists(self.path("report", "pictures", name)))
+    def test_report_shows_every_pose_and_what_was_counted_there(self):
+        check_report(self, self.path("report"), [f"{i:03d}" for i in range(1, POSES + 1)])
 
 
 if __name__ == "__main__":

@@ -11,9 +11,9 @@ import yaml
 from mmradartwin_tests import effects
 from mmradartwin_tests.blind import draws, trials
 from mmradartwin_tests.session import Measurement, Settings
+from chosen_sessions import NOT_TAKEN, every_run, is_taken
 from diagnose_program import PROGRAM, diagnose
 from in_folder import InFolder
-from share_of_sessions import NOT_TAKEN, is_taken
 
 
 @unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
@@ -21,12 +21,12 @@ class HiddenEffects(InFolder):
     """24 poses at nine places, or 17 with two headings at most, 20 frames each: the smallest campaign that tells laws
     over angle from materials.
 
-    MMRADARTWIN_DIAGNOSIS_SEED gives other sessions than the usual ones. A run takes a share of the tests.
+    MMRADARTWIN_DIAGNOSIS_SEED gives other sessions than the usual ones. A usual run takes what every_run marks.
     """
 
     def setUp(self):
         super().setUp()
-        if not is_taken():
+        if not is_taken(self._testMethodName, hasattr(getattr(self, self._testMethodName), "in_every_run")):
             self.skipTest(NOT_TAKEN)
 
     def measured(self, seed, hidden, headings=7, strength=None, tier="default"):
@@ -53,6 +53,7 @@ class HiddenEffects(InFolder):
         self.assertEqual(first["cause"], truth[0]["cause"], msg=f"seed {seed}")
         return findings, first, truth[0]["parameters"]
 
+    @every_run
     def test_an_element_pattern_is_named_and_its_gain_is_real(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "31"))
         findings, first, truth = self.found(seed, {"element_pattern": {}})
@@ -140,6 +141,7 @@ class HiddenEffects(InFolder):
             self.assertGreater(high - low, 0.004, msg=f"seed {seed}: {name}")
             self.assertLess(high - low, 0.1, msg=f"seed {seed}: {name}")
 
+    @every_run
     def test_a_law_without_a_name_is_unknown_and_its_variable_is_found(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "36"))
         self.measured(seed, {"range_ripple": {}}, headings=2, strength=1.3)
@@ -186,6 +188,7 @@ class HiddenEffects(InFolder):
         self.assertEqual([f["cause"] for f in findings["findings"]], ["unknown"], msg=f"seed {seed}: {findings}")
         return findings["findings"][0]["mechanism"], truth[0]["parameters"]
 
+    @every_run
     def test_a_tag_that_answers_late_is_unknown_and_placed(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "41"))
         mechanism, truth = self.unknown(seed, {"late_tag": {}})
@@ -245,6 +248,7 @@ class HiddenEffects(InFolder):
         self.assertEqual({f["cause"] for f in findings["findings"]}, {"unknown"}, msg=f"seed {seed}: {findings}")
         self.assertIn("from frame to frame", findings["findings"][0]["description"])
 
+    @every_run
     def test_a_gain_that_settles_within_a_pose_is_unknown(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "39"))
         self.measured(seed, {"slow_start": {}}, headings=2)
@@ -279,6 +283,7 @@ class HiddenEffects(InFolder):
         turned = (mechanism["yaw_deg"] - truth["yaw_deg"] + 45) % 90 - 45
         self.assertAlmostEqual(turned, 0, delta=3, msg=f"seed {seed}: {mechanism}")
 
+    @every_run
     def test_two_objects_that_the_scene_lacks_are_both_placed(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "92"))
         truth = self.measured(seed, [("actor_unmodelled", {"size_m": 0.4}), ("actor_unmodelled", {"size_m": 0.3})],
@@ -361,6 +366,7 @@ class HiddenEffects(InFolder):
         self.assertAlmostEqual(first["parameters"]["roughness_rms_m"]["value"], truth["roughness_rms_m"], delta=8e-5,
                                msg=f"seed {seed}")
 
+    @every_run
     def test_a_transmitter_and_a_turned_mount_are_no_error_of_every_channel(self):
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "48"))
         self.measured(seed, {"radar_yaw_offset": {"yaw_deg": 3.0}, "tx_imbalance": {"phase_deg": 20, "gain_db": 1.0}},
@@ -391,6 +397,7 @@ class HiddenEffects(InFolder):
         power = first["gain"]["explained_power"]
         self.assertAlmostEqual(power["after"], power["before"], delta=0.01, msg=f"seed {seed}")
 
+    @every_run
     def test_what_the_twin_states_is_fitted_anew(self):
         # As after a calibration, when the mount was bumped: the heading is not what the twin says, the transmitter is.
         seed = int(os.environ.get("MMRADARTWIN_DIAGNOSIS_SEED", "411"))
@@ -416,6 +423,7 @@ class HiddenEffects(InFolder):
         self.assertEqual(status, 0, msg=errors)
         self.assertEqual(findings["findings"], [])
 
+    @every_run
     def test_nothing_hidden_is_none(self):
         # One seed, so that the one false alarm in a hundred that the threshold allows does not stop everybody's work;
         # many seeds belong to the protocol.

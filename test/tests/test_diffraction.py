@@ -7,14 +7,14 @@ from mmradartwin_tests.diffraction import transition, wedge
 
 
 class Transition(unittest.TestCase):
-    def test_table(self):
+    def test_the_transition_function_is_that_of_the_published_table(self):
         for x, size, angle in ((.01, .1637, 40.632), (.1, .4364, 32.494), (.3, .6335, 25.524), (1, .8422, 16.005),
                                (3, .9565, 7.967), (10, .9942, 2.788)):
             value = complex(transition(x))
             self.assertAlmostEqual(abs(value), size, delta=1e-4)
             self.assertAlmostEqual(math.degrees(cmath.phase(value)), angle, delta=2e-3)
 
-    def test_series_joins(self):
+    def test_the_series_goes_over_into_the_integral_without_a_step(self):
         self.assertAlmostEqual(abs(complex(transition(29.999)) - complex(transition(30.001))), 0, delta=1e-5)
 
 

@@ -72,7 +72,7 @@ class Files(unittest.TestCase):
         rms = math.sqrt((np.abs(spread)**2).sum() / (3 * 512)) / (self.measurement.gain * 32768)
         self.assertAlmostEqual(rms / self.measurement.noise_rms, 1.0, delta=0.05)
 
-    def test_headroom(self):
+    def test_the_strongest_sample_is_some_10_db_below_full_scale(self):
         peak = max(np.abs(np.fromfile(os.path.join(self.directory.name, "session", "captures", row["pose"] + ".bin"),
                                       "<i2").astype(int)).max()
                    for row in poses_of(self.directory.name))
@@ -102,7 +102,7 @@ class Campaign(unittest.TestCase):
         cls.measurement = Measurement(Settings(output="", seed=11))
         cls.stations = cls.measurement.stations
 
-    def test_counts(self):
+    def test_the_whole_campaign_has_156_poses_at_22_places(self):
         self.assertEqual(len(self.stations), 156)
         self.assertEqual(len({s.location for s in self.stations}), 22)
         self.assertEqual(len({s.name for s in self.stations}), 156)

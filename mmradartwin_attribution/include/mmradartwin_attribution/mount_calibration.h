@@ -77,8 +77,8 @@ struct MountCalibration {
 /// absolute phase and level are free. Intervals come from the scatter of the poses (Student's t), with a heading error
 /// and a range error of each pose's own. Throws InputError where fewer than three poses show the target, and where a
 /// laser's distance contradicts its pose (names it). With a twin, poses at which something else hides a wall or shares
-/// its range cell are left out and listed. Yaw and channels whose intervals are too wide to be of use, as before a rough
-/// wall, are not given: `undetermined` says so. `progress` is told poses done.
+/// its range cell are left out and listed. Yaw and channels whose intervals are too wide to be of use, as before a
+/// rough wall, are not given: `undetermined` says so. `progress` is told poses done.
 MountCalibration calibrateMount(const Recording& recording, const CalibrationTarget& target,
                                 const std::vector<LaserDistance>& lasers, const MountCalibrationOptions& options = {},
                                 const Twin* twin = nullptr, const std::function<void(int)>& progress = {});

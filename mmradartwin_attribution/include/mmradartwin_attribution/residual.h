@@ -34,7 +34,7 @@ struct Residual {
   std::vector<int> records;                  ///< indices of the path records in its cell, strongest first
 };
 
-/// Counts and sums of one pose and one field of view; a ledger adds them up.
+/// Counts and sums of one pose in one field of view; a ledger adds them up.
 struct FieldMetrics {
   std::array<int, 3> active{}, recalled{};     ///< regions by band: near, mid, far
   std::array<int, 3> top_hits{}, top_count{};  ///< by config.top_k
@@ -47,8 +47,8 @@ struct FieldMetrics {
   double measured_peak_db = 0;  ///< strongest level of the field relative to the central peak
 };
 
-/// How well either reading of the measurement agrees with the simulation: Sum sqrt(Pm Ps)/sqrt(Sum Pm Sum Ps) over the
-/// evaluated cells.
+/// Agreement of the simulation with the measurement under three readings of its samples:
+/// Sum sqrt(Pm Ps)/sqrt(Sum Pm Sum Ps) over the evaluated cells.
 struct ConventionCheck {
   double as_recorded = 0;
   double channel_conjugated = 0;  ///< mirrored in azimuth
@@ -67,8 +67,9 @@ struct PoseAttribution {
 
 /// Compares a measured with a simulated map of one pose. `regions` come from RegionModel; `records` are the paths
 /// behind the simulated map (may be empty). Both maps need the field's axes; throws InputError otherwise.
-PoseAttribution compareMaps(const EvaluationField& field, const RangeAngleMap& measured, const RangeAngleMap& simulated,
-                            std::vector<ResponseRegion> regions, const std::vector<PathRecord>& records);
+PoseAttribution attributePose(const EvaluationField& field, const RangeAngleMap& measured,
+                              const RangeAngleMap& simulated, std::vector<ResponseRegion> regions,
+                              const std::vector<PathRecord>& records);
 
 /// Indices of the records whose own contribution lies in the cell at a place (recordShare >= 1/2, -6 dB), strongest
 /// first, down to config.record_span_db below the strongest.

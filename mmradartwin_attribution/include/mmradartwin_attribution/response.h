@@ -11,7 +11,7 @@ namespace mmradartwin {
 
 enum class Field { kExcluded, kCentral, kOuter };
 
-/// A response of a map: a local maximum that is no point response of a stronger one.
+/// A response of a map: a local maximum that is not part of a stronger one's point response.
 struct Response {
   int range_bin = 0, angle_bin = 0;     ///< cell of the maximum
   double range_m = 0, azimuth_rad = 0;  ///< interpolated within that cell
@@ -26,8 +26,8 @@ struct NormalisedMap {
   std::vector<Response> responses;  ///< strongest first, down to the floor; central and outer field
 };
 
-/// What the evaluation looks at in maps of one radar: which cells count, how a point appears there, which
-/// neighbourhoods belong together. All methods are const and may be called from several threads.
+/// Geometry of the evaluation in maps of one radar: the cells that count, the shape of a point response, the windows of
+/// a match. All methods are const and may be called from several threads.
 class EvaluationField {
  public:
   /// Throws InputError where no cell is left to evaluate.
@@ -44,9 +44,9 @@ class EvaluationField {
                 double azimuth_rad) const;
   double halfRange_m(const MatchWindow& window) const;
   double halfAzimuth_rad(const MatchWindow& window, double center_azimuth_rad) const;
-  /// How much of a record's amplitude the chain puts into the map at a place, 0 to 1: its range offset through the
-  /// window, its contributions c_k steered to the azimuth. Follows a path with different departure and arrival, which
-  /// has no single direction. 0 for a record without contributions.
+  /// Share of a record's amplitude that the signal chain puts into the map at a place, 0 to 1: the window's response at
+  /// the record's range offset times the contributions c_k steered to the azimuth. Holds for paths whose departure and
+  /// arrival differ, too. 0 for a record without contributions.
   double recordShare(const PathRecord& record, double range_m, double azimuth_rad) const;
 
   /// Power of a point response (1 at its peak) `range_bins` and `angle_bins` (of 64) away from it: the periodic Hann

@@ -22,7 +22,7 @@ enum class RegionKind {
 };
 const std::string& regionKindName(RegionKind kind);
 
-/// Where scene and pose alone say that a strong response should be.
+/// A place in a pose's map where scene and pose alone call for a strong response.
 struct ResponseRegion {
   double range_m = 0;
   double azimuth_rad = 0;  ///< as a line array along y sees it: asin of the direction's y
@@ -30,10 +30,10 @@ struct ResponseRegion {
   std::vector<int> actors;      ///< Scene::actors; two for a corner between actors
   std::string actor, material;  ///< names and tags, joined with ";"
   Eigen::Vector3d point;        ///< map
-  /// Level by geometry alone, 20 log10 of: lambda/(8 pi R) times the aperture factor of a perfect reflector (an image:
-  /// of all its mirrors, and times how far the array adds the paths up there), for an
-  /// extent lambda/(4 pi) sqrt(S^2 sum(cos^2 dA/(pi r^4))) over the visible surface in the tight window, S =
-  /// regions.extent_scattering.
+  /// Level by geometry alone, 20 log10 of the amplitude of a perfect reflector: lambda/(8 pi R) times its aperture
+  /// factor. An image has the factors of all its mirrors and of the array, which adds its paths up there. An extent has
+  /// lambda/(4 pi) sqrt(S^2 sum(cos^2 dA/(pi r^4))) over the visible surface in the tight window, with
+  /// S = regions.extent_scattering.
   double support_db = 0;
   Field field = Field::kCentral;
   bool measured_strong = false;   ///< filled by the comparison: a measured response >= strong in the tight window
@@ -42,14 +42,14 @@ struct ResponseRegion {
 
 class MirrorSearch;
 
-/// Expected regions of one scene. What depends on the scene alone is found once; regions() is const and thread-safe.
+/// Expected regions of one scene. The constructor finds all that depends on the scene alone; regions() is const and
+/// thread-safe.
 class RegionModel {
  public:
   /// Keeps references: scene and rays must outlive it.
   RegionModel(const Scene& scene, const RayCaster& rays, const EvaluationField& field, const RadarConfig& radar);
   ~RegionModel();
-  /// Regions of a pose in order of range. No two of one actor lie in each other's tight window, so that none share a
-  /// cell.
+  /// Regions of a pose in order of range. No two regions of one actor lie in each other's tight window.
   std::vector<ResponseRegion> regions(const Eigen::Isometry3d& T_map_radar) const;
   /// Concave right-angled corners of the scene: pairs of facets with the segment they share.
   struct Corner {

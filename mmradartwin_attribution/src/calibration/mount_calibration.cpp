@@ -24,9 +24,9 @@ using Eigen::VectorXd;
 
 constexpr double kDeg = M_PI / 180;
 enum Index { kYaw, kForward, kLeft, kRange, kFirstPhase };
-// Beyond these deviations, or 95 % intervals of twice as much to each side, a value says nothing about a mount.
+// Largest standard deviations of a value that is of use for a mount; 95 % intervals may be twice as wide to each side.
 constexpr double kMostYaw_rad = 1 * kDeg, kMostOffset_m = 0.02, kMostPhase_rad = 15 * kDeg;
-// Smaller scatter than this comes of having few poses.
+// Least scatter that few poses can show.
 constexpr double kLeastRange_m = 3e-4, kLeastHeading_rad = 0.02 * kDeg, kLeastChannel = 2e-3;
 
 /// Standard deviations of one pose's own errors.
@@ -210,7 +210,8 @@ double coarseYaw(const Residuals& residuals, const MountCalibrationOptions& opti
   return best;
 }
 
-/// A mount's offset explains what all differences have in common; what one pose has alone is a contradiction.
+/// Throws InputError where one pose contradicts its laser distance. The part of the differences that all poses share is
+/// the mount's offset and no contradiction.
 void checkLasers(const Residuals& residuals, const MountCalibrationOptions& options) {
   std::vector<const Observation*> with;
   for (const Observation& o : residuals.observations) {
@@ -250,6 +251,141 @@ void checkLasers(const Residuals& residuals, const MountCalibrationOptions& opti
        << residuals.target.name << ", the pose " << *worst->laser_m - difference(*worst)
        << " m; measure again, or correct the pose or the target's place";
   throw InputError(text.str());
+}
+
+std::map<std::string, double> laserByPose(const Recording& recording, const std::vector<LaserDistance>& lasers) {
+  std::map<std::string, double> laser_of;
+  for (const LaserDistance& laser : lasers) {
+    if (std::find(recording.pose_names.begin(), recording.pose_names.end(), laser.pose) == recording.pose_names.end()) {
+      throw InputError("the laser's distances name pose '" + laser.pose + "', which " + recording.source + " has not");
+    }
+    laser_of[laser.pose] = laser.distance_m;
+  }
+  return laser_of;
+}
+
+void requireEnough(const Recording& recording, const CalibrationTarget& target,
+                   const std::vector<Observation>& observations, const std::vector<PoseProblem>& problems) {
+  if (observations.size() >= 3) return;
+  throw InputError(recording.source + ": " + std::to_string(observations.size()) + " of " +
+                   std::to_string(recording.poses.size()) + " poses show " + target.name +
+                   "; a calibration needs three or more, at several angles" +
+                   (problems.empty() ? "" : ". First problem: " + problems.front().message));
+}
+
+/// Fit of all that the poses fix; what they do not fix is held at 0, with a note.
+struct MountFit {
+  MountFit(const RadarConfig& radar, const CalibrationTarget& target, const std::vector<Observation>& observations)
+      : residuals{radar, target, observations, {}, {}, false} {
+    for (int i = 0; i < residuals.parameters(); ++i) residuals.free.push_back(i);
+    lasers = std::any_of(observations.begin(), observations.end(), [](const auto& o) { return o.laser_m.has_value(); });
+  }
+
+  void run(const MountCalibrationOptions& options) {
+    VectorXd start = VectorXd::Zero(residuals.parameters());
+    start(kYaw) = coarseYaw(residuals, options);
+    fit = solve(residuals, start);
+    refine();
+    if (fit.deviation(kForward) > kMostOffset_m || fit.deviation(kRange) > kMostOffset_m) {
+      forward_held = true;
+      hold(kForward,
+           "forward_m cannot be told from range_bias with these poses and is held at 0: take poses that hold the "
+           "target up to 40 deg off boresight on both sides, or laser distances");
+    }
+    if (fit.deviation(kLeft) > kMostOffset_m) {
+      left_held = true;
+      hold(kLeft, "left_m is not fixed by these poses and is held at 0: take poses that hold the target off boresight");
+    }
+    const int M = residuals.channels();
+    if (fit.deviation(kYaw) > kMostYaw_rad || fit.deviation.segment(kFirstPhase, M - 1).maxCoeff() > kMostPhase_rad) {
+      notes.push_back(
+          "a phase that grows evenly over the channels cannot be told from yaw with these poses and "
+          "counts as yaw: take poses that hold the target off boresight on both sides");
+      residuals.level_slope = true;
+      fit = solve(residuals, fit.p);
+      refine();
+    }
+    notes.push_back("height, pitch and roll of the mount are not observable with an array along one line");
+  }
+
+  Residuals residuals;
+  bool lasers = false, forward_held = false, left_held = false;
+  Fit fit;
+  std::vector<std::string> notes;
+
+ private:
+  /// Fits again and again with the scatter that the last fit left.
+  void refine() {
+    for (int i = 0; i < 4; ++i) {
+      residuals.scatter = scatterOf(residuals, fit.p, lasers);
+      fit = solve(residuals, fit.p);
+    }
+  }
+  void hold(int parameter, const std::string& why) {
+    residuals.free.erase(std::remove(residuals.free.begin(), residuals.free.end(), parameter), residuals.free.end());
+    notes.push_back(why);
+    VectorXd start = fit.p;
+    start(parameter) = 0;
+    fit = solve(residuals, start);
+    refine();
+  }
+};
+
+/// Why yaw or channels are not fixed, and what would fix them.
+std::string undeterminedBecause(const MountFit& mount, bool yaw, bool channels) {
+  const Residuals& residuals = mount.residuals;
+  const std::string what = yaw ? "channel errors" : channels ? "yaw" : "neither yaw nor channel errors";
+  return residuals.target.name + (yaw || channels ? " does not determine " : " determines ") + what +
+         format(
+             ": from pose to pose its echo's direction scatters by %.1f deg and its channels by "
+             "%.0f %%, ",
+             residuals.scatter.heading_rad / kDeg, 100 * residuals.scatter.channel) +
+         "and there are " + std::to_string(residuals.observations.size()) + " poses of it" +
+         (residuals.target.wall.empty() ? "; take more poses, of a larger or nearer reflector"
+                                        : "; rough walls (concrete, plaster) do that: hold the radar before a "
+                                          "metal board or a corner reflector, or take many more poses");
+}
+
+/// Fills the values with their intervals (Student's t) and `undetermined`. Returns the parameters that correct the
+/// poses: those that are not fixed are 0.
+VectorXd fillValues(const MountFit& mount, MountCalibration& result) {
+  const Fit& fit = mount.fit;
+  const int M = mount.residuals.channels();
+  const double freedom = std::max(1.0, static_cast<double>(mount.residuals.observations.size()) - 3);
+  const double t = boost::math::quantile(boost::math::students_t(freedom), 0.975);
+  const auto fixed = [&](int parameter, double most) { return t * fit.deviation(parameter) <= 2 * most; };
+  const bool yaw = fixed(kYaw, kMostYaw_rad);
+  bool channels = true;
+  for (int k = 1; k < M; ++k) channels = channels && fixed(kFirstPhase + k - 1, kMostPhase_rad);
+  VectorXd used = fit.p;
+  const auto value = [&](const char* name, const char* unit, int parameter, double factor, bool held, bool observable) {
+    CalibratedValue v;
+    v.name = name, v.unit = unit, v.observable = observable && !held;
+    v.value = factor * fit.p(parameter);
+    const double half = t * factor * fit.deviation(parameter);
+    v.ci95 = {v.value - half, v.value + half};
+    if (v.observable) return v;
+    v.note =
+        held ? "not observable with these poses, held at 0"
+             : "not fixed by these poses, 95 %: " + format("%.3g to %.3g ", v.ci95[0], v.ci95[1]) + unit + "; not used";
+    used(parameter) = v.value = 0;
+    return v;
+  };
+  result.yaw_deg = value("yaw_deg", "deg", kYaw, 1 / kDeg, false, yaw);
+  result.forward_m = value("forward_m", "m", kForward, 1, mount.forward_held, fixed(kForward, kMostOffset_m));
+  result.left_m = value("left_m", "m", kLeft, 1, mount.left_held, fixed(kLeft, kMostOffset_m));
+  result.range_m = value("range_m", "m", kRange, 1, false, fixed(kRange, kMostOffset_m));
+  CalibratedValue zero;
+  zero.name = "phase_deg", zero.unit = "deg", zero.note = "the reference";
+  result.phase_deg.push_back(zero);
+  zero.name = "gain_db", zero.unit = "dB";
+  result.gain_db.push_back(zero);
+  for (int k = 1; k < M; ++k) {
+    result.phase_deg.push_back(value("phase_deg", "deg", kFirstPhase + k - 1, 1 / kDeg, false, channels));
+    result.gain_db.push_back(value("gain_db", "dB", kFirstPhase + M - 1 + k - 1, 20 / std::log(10.0), false, channels));
+  }
+  if (!yaw || !channels) result.undetermined = undeterminedBecause(mount, yaw, channels);
+  return used;
 }
 
 void fillErrors(const Residuals& residuals, const VectorXd& p, int after, const Observation& o, CalibratedPose& pose) {
@@ -329,13 +465,7 @@ MountCalibration calibrateMount(const Recording& recording, const CalibrationTar
                                 const std::vector<LaserDistance>& lasers, const MountCalibrationOptions& options,
                                 const Twin* twin, const std::function<void(int)>& progress) {
   MountCalibration result;
-  std::map<std::string, double> laser_of;
-  for (const LaserDistance& laser : lasers) {
-    if (std::find(recording.pose_names.begin(), recording.pose_names.end(), laser.pose) == recording.pose_names.end()) {
-      throw InputError("the laser's distances name pose '" + laser.pose + "', which " + recording.source + " has not");
-    }
-    laser_of[laser.pose] = laser.distance_m;
-  }
+  const std::map<std::string, double> laser_of = laserByPose(recording, lasers);
   result.problems = recording.problems;
   std::vector<Observation> observations;
   int done = 0;
@@ -357,110 +487,19 @@ MountCalibration calibrateMount(const Recording& recording, const CalibrationTar
     result.poses.push_back(entry);
     if (progress) progress(++done);
   }
-  if (observations.size() < 3) {
-    throw InputError(recording.source + ": " + std::to_string(observations.size()) + " of " +
-                     std::to_string(recording.poses.size()) + " poses show " + target.name +
-                     "; a calibration needs three or more, at several angles" +
-                     (result.problems.empty() ? "" : ". First problem: " + result.problems.front().message));
-  }
-  const int M = recording.radar.channels();
-  Residuals residuals{recording.radar, target, observations, {}, {}, false};
-  for (int i = 0; i < residuals.parameters(); ++i) residuals.free.push_back(i);
-  checkLasers(residuals, options);
-  result.lasers =
-      std::any_of(observations.begin(), observations.end(), [](const auto& o) { return o.laser_m.has_value(); });
-
-  VectorXd start = VectorXd::Zero(residuals.parameters());
-  start(kYaw) = coarseYaw(residuals, options);
-  const VectorXd before = VectorXd::Zero(residuals.parameters());
-  Fit fit = solve(residuals, start);
-  const auto hold = [&](int parameter, const std::string& why) {
-    residuals.free.erase(std::remove(residuals.free.begin(), residuals.free.end(), parameter), residuals.free.end());
-    result.notes.push_back(why);
-    start = fit.p;
-    start(parameter) = 0;
-    fit = solve(residuals, start);
-  };
-  const auto refine = [&] {
-    for (int i = 0; i < 4; ++i) {
-      residuals.scatter = scatterOf(residuals, fit.p, result.lasers);
-      fit = solve(residuals, fit.p);
-    }
-  };
-  refine();
-  bool forward = true, left = true;
-  if (fit.deviation(kForward) > kMostOffset_m || fit.deviation(kRange) > kMostOffset_m) {
-    forward = false;
-    hold(kForward,
-         "forward_m cannot be told from range_bias with these poses and is held at 0: take poses that hold the "
-         "target up to 40 deg off boresight on both sides, or laser distances");
-    refine();
-  }
-  if (fit.deviation(kLeft) > kMostOffset_m) {
-    left = false;
-    hold(kLeft, "left_m is not fixed by these poses and is held at 0: take poses that hold the target off boresight");
-    refine();
-  }
-  if (fit.deviation(kYaw) > kMostYaw_rad || fit.deviation.segment(kFirstPhase, M - 1).maxCoeff() > kMostPhase_rad) {
-    result.notes.push_back(
-        "a phase that grows evenly over the channels cannot be told from yaw with these poses and "
-        "counts as yaw: take poses that hold the target off boresight on both sides");
-    residuals.level_slope = true;
-    fit = solve(residuals, fit.p);
-    refine();
-  }
-  result.notes.push_back("height, pitch and roll of the mount are not observable with an array along one line");
-
-  const double freedom = std::max(1.0, static_cast<double>(observations.size()) - 3);
-  const double t = boost::math::quantile(boost::math::students_t(freedom), 0.975);
-  const auto fixed = [&](int parameter, double most) { return t * fit.deviation(parameter) <= 2 * most; };
-  const bool yaw = fixed(kYaw, kMostYaw_rad);
-  bool channels = true;
-  for (int k = 1; k < M; ++k) channels = channels && fixed(kFirstPhase + k - 1, kMostPhase_rad);
-  VectorXd used = fit.p;  // what is not fixed is not corrected
-  const auto value = [&](const char* name, const char* unit, int parameter, double factor, bool held, bool observable) {
-    CalibratedValue v;
-    v.name = name, v.unit = unit, v.observable = observable && !held;
-    v.value = factor * fit.p(parameter);
-    const double half = t * factor * fit.deviation(parameter);
-    v.ci95 = {v.value - half, v.value + half};
-    if (v.observable) return v;
-    v.note =
-        held ? "not observable with these poses, held at 0"
-             : "not fixed by these poses, 95 %: " + format("%.3g to %.3g ", v.ci95[0], v.ci95[1]) + unit + "; not used";
-    used(parameter) = v.value = 0;
-    return v;
-  };
-  result.yaw_deg = value("yaw_deg", "deg", kYaw, 1 / kDeg, false, yaw);
-  result.forward_m = value("forward_m", "m", kForward, 1, !forward, fixed(kForward, kMostOffset_m));
-  result.left_m = value("left_m", "m", kLeft, 1, !left, fixed(kLeft, kMostOffset_m));
-  result.range_m = value("range_m", "m", kRange, 1, false, fixed(kRange, kMostOffset_m));
-  CalibratedValue zero;
-  zero.name = "phase_deg", zero.unit = "deg", zero.note = "the reference";
-  result.phase_deg.push_back(zero);
-  zero.name = "gain_db", zero.unit = "dB";
-  result.gain_db.push_back(zero);
-  for (int k = 1; k < M; ++k) {
-    result.phase_deg.push_back(value("phase_deg", "deg", kFirstPhase + k - 1, 1 / kDeg, false, channels));
-    result.gain_db.push_back(value("gain_db", "dB", kFirstPhase + M - 1 + k - 1, 20 / std::log(10.0), false, channels));
-  }
-  if (!yaw || !channels) {
-    const std::string what = yaw ? "channel errors" : channels ? "yaw" : "neither yaw nor channel errors";
-    result.undetermined = target.name + (yaw || channels ? " does not determine " : " determines ") + what +
-                          format(
-                              ": from pose to pose its echo's direction scatters by %.1f deg and its channels by "
-                              "%.0f %%, ",
-                              residuals.scatter.heading_rad / kDeg, 100 * residuals.scatter.channel) +
-                          "and there are " + std::to_string(observations.size()) + " poses of it" +
-                          (target.wall.empty() ? "; take more poses, of a larger or nearer reflector"
-                                               : "; rough walls (concrete, plaster) do that: hold the radar before a "
-                                                 "metal board or a corner reflector, or take many more poses");
-  }
+  requireEnough(recording, target, observations, result.problems);
+  MountFit mount(recording.radar, target, observations);
+  checkLasers(mount.residuals, options);
+  mount.run(options);
+  result.lasers = mount.lasers;
+  result.notes = mount.notes;
+  const VectorXd corrected = fillValues(mount, result);
+  const VectorXd uncorrected = VectorXd::Zero(mount.residuals.parameters());
   std::size_t next = 0;
   for (CalibratedPose& pose : result.poses) {
     if (!pose.used) continue;
-    fillErrors(residuals, before, 0, observations[next], pose);
-    fillErrors(residuals, used, 1, observations[next], pose);
+    fillErrors(mount.residuals, uncorrected, 0, observations[next], pose);
+    fillErrors(mount.residuals, corrected, 1, observations[next], pose);
     ++next;
   }
   return result;

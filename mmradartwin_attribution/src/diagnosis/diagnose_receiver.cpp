@@ -26,8 +26,8 @@ Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& o
     result.findings.findings.push_back(std::move(finding));
   };
   if (timed.finding) add(findingOf(*timed.finding));
-  for (const FrameFinding& f : session.frames) add(findingOf(f), f.nats_by_pose);
-  for (const SampleConvention& d : session.conventions) add(findingOf(d, data.radar));
+  for (const FrameFinding& frame : session.frames) add(findingOf(frame), frame.nats_by_pose);
+  for (const SampleConvention& convention : session.conventions) add(findingOf(convention, data.radar));
   if (const BodyFixedTone tone = findBodyFixedTone(data); isPlain(tone)) {
     subtractTone(tone, data);
     add(findingOf(tone, data));

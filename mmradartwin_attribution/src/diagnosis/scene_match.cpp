@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/gain/held_out_gain.h"
 #include "diagnosis/numbers/number_text.h"
 #include "mmradartwin_dsp/input_error.h"
@@ -10,11 +11,11 @@
 namespace mmradartwin::diagnosis {
 namespace {
 
-constexpr double kNoMatch = 0.05;  ///< of the measured power, beyond what chance explains
+/// A pose that stands this far away, or looks this far aside, sees other echoes.
 constexpr double kElsewhere_m = 0.3, kElsewhere_rad = 20 * M_PI / 180;
 
-/// What these expectations explain, each at a pose that stands or looks elsewhere: what chance does. Nothing where all
-/// poses see the same.
+/// Share of the measured power that chance explains: each pose's expected echoes are compared with the data of a pose
+/// that stands or looks elsewhere. Nothing where all poses see the same.
 std::optional<double> explainedByChance(const ChannelData& data, const std::vector<PoseEchoes>& echoes) {
   const std::size_t n = echoes.size();
   std::vector<PoseEchoes> elsewhere(n);
@@ -34,26 +35,27 @@ std::optional<double> explainedByChance(const ChannelData& data, const std::vect
 }  // namespace
 
 void requireSameGrid(const Twin& twin, const RadarConfig& recorded) {
-  const RadarConfig& r = twin.radar();
-  if (r.channels() == recorded.channels() && r.samples_per_chirp == recorded.samples_per_chirp) return;
+  const RadarConfig& simulated = twin.radar();
+  if (simulated.channels() == recorded.channels() && simulated.samples_per_chirp == recorded.samples_per_chirp) return;
   const auto grid = [](const RadarConfig& radar) {
     return std::to_string(radar.channels()) + " virtual channels of " + std::to_string(radar.samples_per_chirp) +
            " samples";
   };
-  const TwinDescription& d = twin.description();
-  throw InputError((d.radar_file.empty() ? d.file : d.radar_file) + ": has " + grid(r) + ", the recording has " +
-                   grid(recorded) + "; give the twin the radar that was recorded");
+  const TwinDescription& description = twin.description();
+  throw InputError((description.radar_file.empty() ? description.file : description.radar_file) + ": has " +
+                   grid(simulated) + ", the recording has " + grid(recorded) +
+                   "; give the twin the radar that was recorded");
 }
 
 void requirePlacesNear(const Scene& scene, const ChannelData& data, const std::string& source) {
   Eigen::AlignedBox3d room;
-  for (const Actor& a : scene.actors) room.extend(a.bounds);
-  const double reach = 2 * room.diagonal().norm();
-  for (const PoseChannels& p : data.poses) {
-    const double apart = room.exteriorDistance(p.pose.T_map_radar.translation());
-    if (apart > reach) {
-      throw InputError(source + ": pose '" + p.pose.name + "' stands " + number(apart) +
-                       " m outside the scene, whose diagonal is " + number(reach / 2) +
+  for (const Actor& actor : scene.actors) room.extend(actor.bounds);
+  const double reach_m = 2 * room.diagonal().norm();
+  for (const PoseChannels& pose : data.poses) {
+    const double outside_m = room.exteriorDistance(pose.pose.T_map_radar.translation());
+    if (outside_m > reach_m) {
+      throw InputError(source + ": pose '" + pose.pose.name + "' stands " + number(outside_m) +
+                       " m outside the scene, whose diagonal is " + number(reach_m / 2) +
                        " m; poses are in metres in the scene's map: check units and origin");
     }
   }
@@ -62,14 +64,14 @@ void requirePlacesNear(const Scene& scene, const ChannelData& data, const std::s
 std::optional<Finding> nothingMatches(const ChannelData& data, const std::vector<PoseEchoes>& echoes,
                                       double explained_power) {
   const std::optional<double> by_chance = explainedByChance(data, echoes);
-  if (!by_chance || explained_power - *by_chance >= kNoMatch) return std::nullopt;
-  Finding f;
-  f.cause = "unknown";
-  f.candidates = {{"unknown", 1.0}};
-  f.description = "nothing matches: the twin explains " + number(explained_power) + " of the measured power, and " +
-                  number(*by_chance) +
-                  " with its poses exchanged; check that scene, poses and captures belong together";
-  return f;
+  if (!by_chance || explained_power - *by_chance >= bounds::kLeastExplainedBeyondChance) return std::nullopt;
+  Finding finding;
+  finding.cause = "unknown";
+  finding.candidates = {{"unknown", 1.0}};
+  finding.description = "nothing matches: the twin explains " + number(explained_power) +
+                        " of the measured power, and " + number(*by_chance) +
+                        " with its poses exchanged; check that scene, poses and captures belong together";
+  return finding;
 }
 
 }  // namespace mmradartwin::diagnosis

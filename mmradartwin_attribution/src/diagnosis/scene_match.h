@@ -14,16 +14,17 @@ namespace mmradartwin::diagnosis {
 
 // Whether a twin and a recording belong together at all.
 
-/// Throws InputError where the twin's radar has other channels or other range bins than the recording; else it may be
-/// another one.
+/// Throws InputError where the twin's radar has another number of channels or of range bins than the recording.
+/// Carrier, slope and antenna positions may differ: they may be what is wrong with the twin.
 void requireSameGrid(const Twin& twin, const RadarConfig& recorded);
 
-/// Throws InputError where a pose stands so far outside the scene that units or origin must differ. source: of the
-/// poses.
+/// Throws InputError where a pose stands so far outside the scene that its units or origin must differ from the
+/// scene's. source: file or bag of the poses, for the message.
 void requirePlacesNear(const Scene& scene, const ChannelData& data, const std::string& source);
 
-/// The only finding where what a twin expects explains (explained_power) no more than it does with the poses exchanged;
-/// nothing where it does, and where all poses see the same.
+/// Finding that scene and recording do not belong together: the twin's expected echoes explain no more of the measured
+/// power (explained_power) than they do after an exchange of poses. Nothing where they explain more, and nothing where
+/// all poses see the same, so that an exchange shows nothing.
 std::optional<Finding> nothingMatches(const ChannelData& data, const std::vector<PoseEchoes>& echoes,
                                       double explained_power);
 

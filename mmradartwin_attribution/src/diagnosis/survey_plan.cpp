@@ -1,12 +1,12 @@
 #include "diagnosis/survey_plan.h"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace mmradartwin::diagnosis {
 namespace {
 
-constexpr double kUpright = 0.7;  ///< sine of a triangle's slope from which on a plan shows it
+constexpr double kUprightSine = 0.7;  ///< least sine of a triangle's slope that a plan shows
 
 }  // namespace
 
@@ -14,12 +14,12 @@ SurveyPlan surveyPlan(const Scene* scene, const std::vector<Pose>& poses) {
   SurveyPlan plan;
   if (scene != nullptr) {
     for (const Actor& actor : scene->actors) {
-      for (const std::array<int, 3>& t : actor.triangles) {
+      for (const std::array<int, 3>& corners : actor.triangles) {
         std::array<Eigen::Vector3d, 3> p;
-        for (std::size_t i = 0; i < 3; ++i) p[i] = actor.vertices[static_cast<std::size_t>(t[i])];
+        for (std::size_t i = 0; i < 3; ++i) p[i] = actor.vertices[static_cast<std::size_t>(corners[i])];
         const Eigen::Vector3d normal = (p[1] - p[0]).cross(p[2] - p[0]);
-        if (!(std::hypot(normal.x(), normal.y()) > kUpright * normal.norm())) continue;
-        // From above, the longest of three sides covers the others of what stands upright.
+        if (!(std::hypot(normal.x(), normal.y()) > kUprightSine * normal.norm())) continue;
+        // Seen from above an upright triangle is a line, its longest side.
         std::size_t longest = 0;
         const auto side_m = [&p](std::size_t i) { return (p[(i + 1) % 3] - p[i]).head<2>().norm(); };
         for (std::size_t i = 1; i < 3; ++i) longest = side_m(i) > side_m(longest) ? i : longest;

@@ -7,7 +7,8 @@
 
 namespace mmradartwin::diagnosis {
 
-/// The survey seen from above. scene: null where there is none.
+/// The survey seen from above: upright surfaces of the scene, and where the radar stood and looked. scene: null where
+/// there is none.
 SurveyPlan surveyPlan(const Scene* scene, const std::vector<Pose>& poses);
 
 }  // namespace mmradartwin::diagnosis

@@ -9,8 +9,9 @@
 
 namespace mmradartwin::diagnosis {
 
-/// What frames show and neither a cause nor the twin explains, as the `unknown` that stands last, and its terms for the
-/// extended twin. Its gain is one in nats per pose: maps of averages do not show it.
+/// Adds what frames show and no cause explains to the findings, as an `unknown` that stands last or as a part of the
+/// one that does, and its terms to the mechanisms of the extended twin. Leaves out what a stated mechanism says
+/// already. The gain is told in nats per pose: maps of averages do not show it.
 void addUnexplained(const std::vector<FrameFinding>& frames, const ChannelData& data,
                     const std::vector<NamedParameters>& stated, Findings& findings,
                     std::vector<NamedParameters>& extended);

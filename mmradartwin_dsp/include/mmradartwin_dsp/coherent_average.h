@@ -28,8 +28,8 @@ class CoherentAverage {
 
  private:
   struct Frame {
-    std::vector<std::int32_t> sum;      // [M][N][2]
-    std::vector<std::int32_t> weight;   // [slot] valid chirps
+    std::vector<std::int32_t> sum;     // [M][N][2]
+    std::vector<std::int32_t> weight;  // [slot] valid chirps
     std::int64_t stamp_ns = 0;
   };
   void sumOverLoops(const AdcCube& cube, Frame& frame) const;
@@ -37,8 +37,8 @@ class CoherentAverage {
   RadarConfig radar_;
   int max_frames_;
   std::deque<Frame> window_;
-  std::vector<std::int64_t> sum_;       // [M][N][2]
-  std::vector<std::int64_t> weight_;    // [slot]
+  std::vector<std::int64_t> sum_;     // [M][N][2]
+  std::vector<std::int64_t> weight_;  // [slot]
   int frames_ = 0;
   std::int64_t stamp_ns_ = 0;
 };

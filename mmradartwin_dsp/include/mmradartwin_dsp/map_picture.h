@@ -1,9 +1,8 @@
 #pragma once
 
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
-
-#include <opencv2/core.hpp>
 
 #include "mmradartwin_dsp/range_angle.h"
 
@@ -11,15 +10,15 @@ namespace mmradartwin {
 
 /// Closed outline in polar coordinates with a label, drawn over a fan.
 struct FanBox {
-  double range_m, azimuth_rad;         ///< centre
+  double range_m, azimuth_rad;  ///< centre
   double half_range_m, half_azimuth_rad;
   cv::Scalar color_bgr;
   std::string label;
 };
 
 struct FanStyle {
-  double min_db = -50, max_db = 0;     ///< colour limits
-  bool normalise = true;               ///< to the peak beyond 0.16 m and within +-60 deg
+  double min_db = -50, max_db = 0;  ///< colour limits
+  bool normalise = true;            ///< to the peak beyond 0.16 m and within +-60 deg
   /// Residual maps: blue (negative) - white - red (positive), never normalised, limits made symmetric.
   bool diverging = false;
   double max_range_m = 10;

@@ -24,11 +24,11 @@ std::optional<CaptureLayout> captureLayoutOf(const std::string& device);
 /// The radar: what radar.yaml says. SI units; positions in radar_link (x boresight, y left, z up).
 struct RadarConfig {
   std::string device;
-  double carrier_hz = 0;        ///< at the start of the ramp
+  double carrier_hz = 0;  ///< at the start of the ramp
   double slope_hz_per_s = 0;
-  int samples_per_chirp = 0;    ///< N
+  int samples_per_chirp = 0;  ///< N
   double sample_rate_hz = 0;
-  double adc_start_s = 0;       ///< from the start of the ramp to sample 0
+  double adc_start_s = 0;  ///< from the start of the ramp to sample 0
   int loops_per_frame = 0;
   double frame_period_s = 0;
   std::vector<Eigen::Vector3d> tx_position_m;  ///< one per TDM slot
@@ -51,17 +51,17 @@ struct RadarConfig {
   Eigen::Vector3d virtual_element_m(int k) const;
   /// Receivers that a capture has room for: four lanes always carry four, those not in use as zeros (SWRA581B).
   int capture_receivers() const;
-  std::size_t bytes_per_chirp() const;          ///< in a capture: samples x capture_receivers x 4
-  std::size_t bytes_per_frame() const;          ///< in a capture: chirps x bytes_per_chirp
+  std::size_t bytes_per_chirp() const;  ///< in a capture: samples x capture_receivers x 4
+  std::size_t bytes_per_frame() const;  ///< in a capture: chirps x bytes_per_chirp
   /// Start of frame i after that of frame 0, rounded once, so that it does not drift.
   std::int64_t frame_offset_ns(std::int64_t i) const;
-  double bandwidth_hz() const;                  ///< B = slope N / f_s
-  double range_bin_m() const;                   ///< c / (2B)
-  double max_range_m() const;                   ///< N c / (2B)
-  double sample_time_s(int n) const;            ///< t_n = adc_start + n/f_s, from the ramp's start
-  double window_center_s() const;               ///< t_c = adc_start + N/(2 f_s)
-  double center_frequency_hz() const;           ///< carrier + slope t_c
-  double wavelength_m() const;                  ///< lambda_c, at the centre of the ADC window
+  double bandwidth_hz() const;         ///< B = slope N / f_s
+  double range_bin_m() const;          ///< c / (2B)
+  double max_range_m() const;          ///< N c / (2B)
+  double sample_time_s(int n) const;   ///< t_n = adc_start + n/f_s, from the ramp's start
+  double window_center_s() const;      ///< t_c = adc_start + N/(2 f_s)
+  double center_frequency_hz() const;  ///< carrier + slope t_c
+  double wavelength_m() const;         ///< lambda_c, at the centre of the ADC window
   /// Pitch d of the virtual array, which must be a uniform line along y in order of k. Throws InputError otherwise.
   double virtual_pitch_m() const;
 };

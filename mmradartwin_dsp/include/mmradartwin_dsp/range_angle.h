@@ -14,15 +14,15 @@ using RealGrid = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 
 /// Axes of all range-angle maps of one radar.
 struct RangeAngleAxes {
-  std::vector<double> range_m;       ///< [N] r c/(2B)
-  std::vector<double> azimuth_rad;   ///< [64] asin((a-32)/32 lambda_c/(2d)), ascending; NaN where |sine| > 1
+  std::vector<double> range_m;      ///< [N] r c/(2B)
+  std::vector<double> azimuth_rad;  ///< [64] asin((a-32)/32 lambda_c/(2d)), ascending; NaN where |sine| > 1
 };
 
 struct RangeAngleMap {
   std::int64_t stamp_ns = 0;
   Branch source = Branch::kMeasured;
   RangeAngleAxes axes;
-  RealGrid power_db;                 ///< [N][64] dBFS, not normalised; -400 where nothing is, NaN where azimuth is
+  RealGrid power_db;  ///< [N][64] dBFS, not normalised; -400 where nothing is, NaN where azimuth is
   int frames = 0;
   bool pose_valid = false;
   Eigen::Isometry3d T_map_radar = Eigen::Isometry3d::Identity();

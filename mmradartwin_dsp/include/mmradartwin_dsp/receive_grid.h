@@ -16,9 +16,9 @@ using ComplexGrid = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, Eigen::D
 struct ReceiveGrid {
   std::int64_t stamp_ns = 0;
   Branch source = Branch::kMeasured;
-  ComplexGrid x;                 ///< [M][N], in units of full_scale
-  double full_scale = 32768.0;   ///< 32768 for ADC counts, 1 for path amplitudes
-  int frames = 0;                ///< frames averaged
+  ComplexGrid x;                ///< [M][N], in units of full_scale
+  double full_scale = 32768.0;  ///< 32768 for ADC counts, 1 for path amplitudes
+  int frames = 0;               ///< frames averaged
   bool pose_valid = false;
   Eigen::Isometry3d T_map_radar = Eigen::Isometry3d::Identity();
 };

@@ -16,7 +16,7 @@ namespace mmradartwin {
 struct Pose {
   std::string name;
   std::string location;
-  std::int64_t stamp_ns = 0;            ///< start of the first frame
+  std::int64_t stamp_ns = 0;  ///< start of the first frame
   Eigen::Isometry3d T_map_radar = Eigen::Isometry3d::Identity();
 };
 
@@ -29,24 +29,24 @@ struct StampedTransform {
 /// What was left out or is wrong with one pose; the others go on.
 struct PoseProblem {
   std::string pose;
-  std::string message;                  ///< one line for the user
+  std::string message;  ///< one line for the user
 };
 
 /// A recorded session, whatever it was read from: a session directory, a bag, a bare capture.
 struct Recording {
-  std::string source;                            ///< path it was read from
-  std::string name;                              ///< of the session
+  std::string source;  ///< path it was read from
+  std::string name;    ///< of the session
   RadarConfig radar;
-  std::string radar_file;                        ///< path or label, for errors
-  std::optional<std::string> scene_file;         ///< absolute path of scene.yaml, where the session names one
-  std::optional<std::string> twin_file;          ///< absolute path of twin.yaml, where the session names one
-  std::optional<double> gain_db;                 ///< of a simulated session
-  std::optional<ChannelCorrection> channels;     ///< what averages of its frames are corrected by; set by the user
-  std::vector<Pose> poses;                       ///< in file order, duplicates and unusable ones left out
-  std::vector<std::string> duplicates;           ///< names of excluded poses (10 cm, 2 cm, 1 deg of an earlier one)
-  std::vector<PoseProblem> problems;             ///< poses that cannot be used (NaN, unreadable, ...)
-  std::vector<std::string> pose_names;           ///< every pose that the session names, in its order
-  std::string capture_pattern;                   ///< path of a capture, {pose} for the name; "" without files
+  std::string radar_file;                     ///< path or label, for errors
+  std::optional<std::string> scene_file;      ///< absolute path of scene.yaml, where the session names one
+  std::optional<std::string> twin_file;       ///< absolute path of twin.yaml, where the session names one
+  std::optional<double> gain_db;              ///< of a simulated session
+  std::optional<ChannelCorrection> channels;  ///< what averages of its frames are corrected by; set by the user
+  std::vector<Pose> poses;                    ///< in file order, duplicates and unusable ones left out
+  std::vector<std::string> duplicates;        ///< names of excluded poses (10 cm, 2 cm, 1 deg of an earlier one)
+  std::vector<PoseProblem> problems;          ///< poses that cannot be used (NaN, unreadable, ...)
+  std::vector<std::string> pose_names;        ///< every pose that the session names, in its order
+  std::string capture_pattern;                ///< path of a capture, {pose} for the name; "" without files
   /// Visits the frames of a pose in order. Throws InputError where its capture is missing or damaged; TruncatedCapture
   /// where it holds no whole number of frames, after the whole ones where most captures of the session are whole.
   std::function<void(const Pose&, const std::function<void(const AdcCube&)>&)> forEachFrame;
@@ -65,8 +65,8 @@ struct Recording {
 struct SessionOptions {
   bool need_captures = true;
   bool exclude_duplicates = true;
-  std::string radar_file;                        ///< instead of the one that the session names
-  std::optional<CaptureLayout> layout;           ///< instead of the radar's
+  std::string radar_file;               ///< instead of the one that the session names
+  std::optional<CaptureLayout> layout;  ///< instead of the radar's
 };
 Recording openSession(const std::string& path, const SessionOptions& options = {});
 
@@ -85,9 +85,9 @@ std::string resolvePath(const std::string& path, const std::string& base_file);
 /// Writes a session directory that openSession reads back.
 class SessionWriter {
  public:
-  struct Files {                                 ///< texts; scene and twin optional
+  struct Files {  ///< texts; scene and twin optional
     std::string radar_yaml;
-    std::optional<std::string> scene;            ///< path as it is to stand in session.yaml
+    std::optional<std::string> scene;  ///< path as it is to stand in session.yaml
     std::optional<std::string> twin;
     std::optional<double> gain_db;
   };

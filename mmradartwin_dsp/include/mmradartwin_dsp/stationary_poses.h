@@ -14,7 +14,7 @@ bool standsStill(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double 
 
 /// A stretch of frames [first, last] of one pose.
 struct Stretch {
-  Pose pose;                     ///< T_map_radar is the stretch's median
+  Pose pose;  ///< T_map_radar is the stretch's median
   std::int64_t last_stamp_ns = 0;
 };
 

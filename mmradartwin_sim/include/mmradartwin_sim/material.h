@@ -44,9 +44,9 @@ double specularShare(const Material& material);
 ///   lobe(theta)        = cos(theta)^(back_exp/2)
 ///   |Gamma|(theta)     = 10^(base_rcs_db/20) ((1 - mix) + mix lobe)
 ///   backscatter(theta) = 10^(diff_back_db/20) cos(theta)^norm_exp lobe
-/// lobe is the amplitude of the backscatter lobe (power cos^back_exp); base_rcs_db holds at normal incidence, of which the
-/// share mix falls off like the lobe; norm_exp = 1 is Lambert's projected area.
-/// diff_back_db <= -90 means none. Signs are those of a conductor (TE -, TM +).
+/// lobe is the amplitude of the backscatter lobe (power cos^back_exp); base_rcs_db holds at normal incidence, of which
+/// the share mix falls off like the lobe; norm_exp = 1 is Lambert's projected area. diff_back_db <= -90 means none.
+/// Signs are those of a conductor (TE -, TM +).
 double scalarReflection(const Material& material, double cos_theta);
 
 /// Reads materials.yaml strictly. Throws InputError.

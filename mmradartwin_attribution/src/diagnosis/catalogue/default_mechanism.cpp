@@ -6,8 +6,8 @@ namespace mmradartwin::diagnosis::catalogue {
 
 NamedParameters defaultMechanism(const std::string& name) {
   NamedParameters named{name, {}};
-  for (const ParameterSpec& s : MechanismRegistry::instance().create(name)->parameters()) {
-    named.values.set(s.name, s.default_value);
+  for (const ParameterSpec& spec : MechanismRegistry::instance().create(name)->parameters()) {
+    named.values.set(spec.name, spec.default_value);
   }
   return named;
 }

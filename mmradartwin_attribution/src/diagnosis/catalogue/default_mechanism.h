@@ -7,7 +7,7 @@
 
 namespace mmradartwin::diagnosis::catalogue {
 
-/// Defaults of every parameter of a mechanism. Throws InputError for an unknown name.
+/// A mechanism with all of its parameters at their defaults. Throws InputError for an unknown name.
 NamedParameters defaultMechanism(const std::string& name);
 
 }  // namespace mmradartwin::diagnosis::catalogue

@@ -11,6 +11,7 @@
 #include <memory>
 #include <numeric>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/hypotheses/evidence_bounds.h"
 #include "diagnosis/likelihood/profiled_scores.h"
 #include "mmradartwin_attribution/finding.h"
@@ -18,41 +19,31 @@
 namespace mmradartwin::diagnosis::fit {
 namespace {
 
-constexpr int kSteps = 4, kStepsTogether = 3;
-constexpr double kEnough = 0.2;              ///< nats: a further step promises less
-constexpr int kMostExpansions = 8;           ///< of a state about the ranges that it was fitted to,
-constexpr double kSettled = 1;               ///< until one more gains less nats
-constexpr double kRising = 5;                ///< nats of the last step that are worth going on for
-constexpr double kClimb = 4;                 ///< steps like the last within which a climb has to get somewhere
-constexpr double kWorthASearch = 25;         ///< nats gained by slopes, before a rough likelihood is searched
-constexpr double kSearched[] = {0.3, 0.15};  ///< of the scale, around where slopes end
-constexpr double kImprovement = 0.5;         ///< nats by which latents have to be better to be taken over
-constexpr double kSameTop = 1;               ///< nats: latents no further from the null's than that climb to its top
-// Nats a pose without the best place: seven clean sessions of 66 to 154 poses brought at most 1.9 by any hypothesis. At
-// few places the scatter of a rough likelihood's slopes hides gains ten times that.
-constexpr double kPlain = 5, kPlainFalseAlarm = 0.01;
-constexpr Eigen::Index kMostRough = 4;  ///< coordinates for which values without slopes are worth their number
-constexpr double kFoldShares[] = {1, 0.4, 0.1, 0};  // of a fold's step; the fit is its own where nothing is better
-constexpr double kPrice = 5;  ///< nats per number, some inflation included: fewer numbers win where all explain alike
-
-// A law bends to all that a name leaves over, too: it takes the name's place where it explains half as much again.
-constexpr double kLawShare = 2.0 / 3;
-// So do several steps of the gain that are looked for, places being visited in turn (three gained 361 of the 509 nats
-// of a field over the room), though less than a curve.
-constexpr double kStepsShare = 0.9;
-// One of channels or of directions holds the name that looks like it as its constant: where that is the cause, it gains
-// little more.
-constexpr double kNestingLawShare = 0.9;
-// Scenes are wrong by some 2 cm an actor: a move of less than three times that is no likely cause, and bends to much
-// that is another's (the corner with a wall that a cabinet stands too near to).
+constexpr int kSteps = 4, kStepsTogether = 3;       ///< Fisher steps of one hypothesis, of several together
+constexpr int kFirstSteps = 14, kFurtherSteps = 3;  ///< Fisher steps of the latents, from scratch and from others
+constexpr int kRisingFactor = 12;                   ///< times as many steps while each still gains kRising_nats
+constexpr double kLeastStep_nats = 0.2;             ///< promised gain below which a climb ends
+constexpr int kMostExpansions = 8;                  ///< of a state's echoes about the ranges that were fitted
+constexpr double kSettled_nats = 1;                 ///< gain of an expansion below which they end
+constexpr double kRising_nats = 5;                  ///< gain of the last step for which a climb goes on
+constexpr double kClimb_steps = 4;                  ///< like the last one, within which a climb has to reach its gain
+constexpr double kWorthASearch_nats = 25;           ///< gain by slopes from which on a rough likelihood is searched
+constexpr double kSearched[] = {0.3, 0.15};         ///< first steps of that search, in the coordinates' scale
+constexpr double kSearchTolerance = 0.02;           ///< in the coordinates' scale
+constexpr int kSearchPlaces = 12;                   ///< per coordinate
+constexpr double kLongestStep = 3;                  ///< in the coordinate's scale
+constexpr double kStepShares[] = {1.0, 0.4, 0.1};   ///< of a promised step, until one gains
+constexpr double kOneSidedFactors[] = {0.4, 2.0};   ///< of a start that rises from nothing
+constexpr Eigen::Index kMostRough = 4;              ///< coordinates that are searched without slopes
+constexpr double kFoldShares[] = {1, 0.4, 0.1, 0};  ///< of a fold's step, until its places are no worse
+constexpr double kLeastShareKept = 0.2;             ///< bound of the share of places that a fold is fitted to
+// Three times what an actor's place is wrong by. A shorter move is no likely cause and explains part of other causes.
 constexpr double kLeastMove_m = 0.06;
 
-// Six times what a scene's actors err by. Of 30 sessions with nothing hidden none had one there for more than 3 nats.
-constexpr double kFarAway_m = 0.12, kFarAway = 60;
+// Six times what a scene's actors err by.
+constexpr double kFarAway_m = 0.12;
 
-constexpr double kSomewhere = 10;  ///< nats more for an object: it is the best of some 500 places of a room
-
-/// Calls `value` at places that lead to its maximum (BOBYQA, Powell 2009: no slopes).
+/// Calls `value` at places that lead to its maximum, without slopes (BOBYQA, Powell 2009).
 void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector<double> scaled_values,
                          double initial_step, const std::function<double(const std::vector<double>&)>& value) {
   const unsigned n = static_cast<unsigned>(coordinates.size());
@@ -70,8 +61,8 @@ void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector
   nlopt_set_upper_bounds(search.get(), high.data());
   nlopt_set_max_objective(search.get(), call, const_cast<std::function<double(const std::vector<double>&)>*>(&value));
   nlopt_set_initial_step1(search.get(), initial_step);
-  nlopt_set_xtol_abs1(search.get(), 0.02);
-  nlopt_set_maxeval(search.get(), 12 * static_cast<int>(n));
+  nlopt_set_xtol_abs1(search.get(), kSearchTolerance);
+  nlopt_set_maxeval(search.get(), kSearchPlaces * static_cast<int>(n));
   double best = 0;
   nlopt_optimize(search.get(), scaled_values.data(), &best);
 }
@@ -92,13 +83,13 @@ double HypothesisFit::ranking() const {
   const NamedParameters& m = hypothesis.mechanism;
   const bool nests = m.mechanism == "empirical_law" &&
                      !(m.values.numbers("channels").empty() && m.values.numbers("angle_deg").empty());
-  const double share = nests                        ? kNestingLawShare
-                       : !isCatalogued(m.mechanism) ? kLawShare
-                       : hypothesis.searched > 1    ? kStepsShare
+  const double share = nests                        ? bounds::kRankedShareOfNestingLaw
+                       : !isCatalogued(m.mechanism) ? bounds::kRankedShareOfLaw
+                       : hypothesis.searched > 1    ? bounds::kRankedShareOfSteps
                                                     : 1;
-  double nats = share * gain - kPrice * static_cast<double>(numbers());
-  if (hypothesis.mechanism.mechanism == "actor_unmodelled") nats -= kSomewhere;
-  if (hypothesis.isMove() && moved_m() < kLeastMove_m) nats -= kPrice;
+  double nats = share * gain - bounds::kPriceOfNumber_nats * static_cast<double>(numbers());
+  if (hypothesis.mechanism.mechanism == "actor_unmodelled") nats -= bounds::kPriceOfPlace_nats;
+  if (hypothesis.isMove() && moved_m() < kLeastMove_m) nats -= bounds::kPriceOfNumber_nats;
   return nats;
 }
 
@@ -116,7 +107,7 @@ double HypothesisFit::moved_m() const {
 }
 
 bool HypothesisFit::isFarAway() const {
-  return moved_m() > kFarAway_m && (plain || gain_without_best_place / overdispersion > kFarAway);
+  return moved_m() > kFarAway_m && (plain || gain_without_best_place / overdispersion > bounds::kLeastNatsOfFarAway);
 }
 
 double HypothesisFit::size_m() const {
@@ -133,15 +124,15 @@ ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanism
   if (start != nullptr) s.actor_range_m = start->actor_range_m;
   s.echoes = source_.echoes(mechanisms, s.actor_range_m);
   s.nuisance = start != nullptr ? *start : model_.start(s.echoes);
-  double reached = model_.fit(s.echoes, s.nuisance, start != nullptr ? 3 : 14);
-  // Ranges that are far off are no matter of first order. What is left below the top here is a gain of whatever is
-  // tried next: two steps were 86 nats short on a clean session.
+  double reached = model_.fit(s.echoes, s.nuisance, start != nullptr ? kFurtherSteps : kFirstSteps);
+  // Echoes depend on ranges to first order only: they are collected again about the fitted ranges. Nats left below the
+  // top would count as a gain of whatever is tried next.
   for (int i = 0; i < kMostExpansions; ++i) {
     const double before = reached;
     s.actor_range_m = s.nuisance.actor_range_m;
     s.echoes = source_.echoes(mechanisms, s.actor_range_m);
-    reached = model_.fit(s.echoes, s.nuisance, 3);
-    if (i > 0 && reached < before + kSettled) break;
+    reached = model_.fit(s.echoes, s.nuisance, kFurtherSteps);
+    if (i > 0 && reached < before + kSettled_nats) break;
   }
   s.log_likelihood = model_.logLikelihood(s.echoes, s.nuisance, &s.by_pose);
   s.basis = model_.basis(s.echoes, s.nuisance);
@@ -154,12 +145,13 @@ std::optional<ModelState> HypothesisFitter::improved(const ModelState& null, con
   Eigen::VectorXd apart(latents.globals());
   for (int j = 0; j < latents.globals(); ++j) apart[j] = latents.global(j) - null.nuisance.global(j);
   const Eigen::MatrixXd information = model_.scores(null.basis, {}, everyPose(null)).information;
-  if (0.5 * apart.dot(information * apart) < kSameTop) return std::nullopt;
+  if (0.5 * apart.dot(information * apart) < bounds::kSameOptimum_nats) return std::nullopt;
   const auto echoes = source_.echoes(null.mechanisms, other.actor_range_m);
-  model_.fit(echoes, other, 3);
-  if (model_.logLikelihood(echoes, other) < null.log_likelihood + kImprovement) return std::nullopt;
+  model_.fit(echoes, other, kFurtherSteps);
+  if (model_.logLikelihood(echoes, other) < null.log_likelihood + bounds::kLeastNatsOfBetterLatents)
+    return std::nullopt;
   ModelState s = state(null.mechanisms, &other);
-  if (s.log_likelihood < null.log_likelihood + kImprovement) return std::nullopt;
+  if (s.log_likelihood < null.log_likelihood + bounds::kLeastNatsOfBetterLatents) return std::nullopt;
   return s;
 }
 
@@ -183,7 +175,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
     s.log_likelihood = model_.logLikelihood(s.echoes, with_nuisance, &s.by_pose);
     return s;
   };
-  // A cause may have been fitted as the latents of all poses or actors: it starts without them, too.
+  // Latents of all poses or actors may stand in for the cause: it starts without them, too.
   SessionLatents without = nuisance;
   std::fill(without.yaw_rad.begin(), without.yaw_rad.end(), 0.0);
   SessionLatents placed = without;
@@ -211,7 +203,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
     for (const SessionLatents& candidate : candidates) {
       if (s.echoes.empty() || s.actor_range_m != candidate.actor_range_m) {
         s = evaluate(scaled_values, candidate);
-      } else {  // the same ranges: the same echoes
+      } else {  // equal ranges have the same echoes
         s.nuisance = candidate;
         s.log_likelihood = model_.logLikelihood(s.echoes, candidate, &s.by_pose);
       }
@@ -223,15 +215,15 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   for (const std::vector<double>& start : starts) {
     const ModelState s = consider(start);
     if (null == nullptr || known != nullptr || starts.size() < 2 || !parts.front().isGeometry()) continue;
-    // Of several starts the right one may lose to a small one as long as the latents stand as that one needs them.
+    // The right start may lose to a smaller one before the latents have settled on it.
     SessionLatents settled = s.nuisance;
     model_.fit(s.echoes, settled, kSettling);
     take(evaluate(start, settled), start);
   }
-  // A quadratic's promise is far off where a level rises from nothing.
+  // The promise of a quadratic is far off where a level rises from nothing.
   const bool one_sided = parts.size() == 1 && std::any_of(coordinates.begin(), coordinates.end(),
                                                           [](const Coordinate& c) { return c.oneSided(); });
-  for (double factor : {0.4, 2.0}) {
+  for (double factor : kOneSidedFactors) {
     if (!one_sided) break;
     std::vector<double> other = starts.front();
     for (double& v : other) v *= factor;
@@ -240,7 +232,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   const bool geometric = std::any_of(parts.begin(), parts.end(), [&](const Hypothesis& h) {
     return source_.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0)));
   });
-  // A start that is worse than nothing is a quadratic's error; only geometry has a valley to cross.
+  // A start that is worse than nothing is an error of the quadratic; only geometry has a valley to cross.
   if (!one_sided && !geometric && parts.size() == 1) consider(std::vector<double>(coordinates.size(), 0.0));
   const std::vector<int> everyone = everyPose(o.state);
   const auto derivatives = [&](const ModelState& s, const std::vector<double>& scaled_values) {
@@ -257,7 +249,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
         return model_.covariance(source_.echoesNear(mechanisms(moved), s.mechanisms, everyone, s.actor_range_m),
                                  s.nuisance, everyone);
       };
-      // The channels of one strong path are a narrow ridge: a secant to one side climbs out of it with the square of a
+      // The likelihood of one strong path is a narrow ridge. A difference to one side would contain the square of a
       // turn or of a gain, which hides the slope and makes the information many times too large.
       if (!c.oneSided()) {
         directions.push_back(difference(covarianceAt(step), covarianceAt(-step), 2 * step));
@@ -272,19 +264,20 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
   for (int i = 0;; ++i) {
     o.scores = derivatives(o.state, o.scaled_values);
     const Eigen::VectorXd step = regularised(o.scores.information).ldlt().solve(o.scores.total);
-    // On a ridge between a cause and the latents that stood in for it, every step widens the next.
     const double screened_nats = 0.5 * o.scores.total.dot(step);
     const bool hopeless =
         null != nullptr && i >= 2 &&
-        o.state.log_likelihood + kClimb * std::max(risen, screened_nats) < null->log_likelihood + least_nats;
-    if (i >= (risen > kRising ? 12 * steps : steps) || screened_nats < kEnough || hopeless) break;
+        o.state.log_likelihood + kClimb_steps * std::max(risen, screened_nats) < null->log_likelihood + least_nats;
+    // On a ridge between a cause and the latents that stood in for it, every step is longer than the one before.
+    if (i >= (risen > kRising_nats ? kRisingFactor * steps : steps) || screened_nats < kLeastStep_nats || hopeless)
+      break;
     bool better = false;
-    for (double share : {1.0, 0.4, 0.1}) {
+    for (double share : kStepShares) {
       std::vector<double> next = o.scaled_values;
       for (Eigen::Index j = 0; j < n; ++j) {
         const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
         double& v = next[static_cast<std::size_t>(j)];
-        v += share * std::clamp(step[globals + j], -3.0, 3.0);
+        v += share * std::clamp(step[globals + j], -kLongestStep, kLongestStep);
         if (c.logarithmic()) v = std::max(v, 0.3 * o.scaled_values[static_cast<std::size_t>(j)]);
         const double low = std::min(c.scaled_values(c.min), c.scaled_values(c.max)),
                      high = std::max(c.scaled_values(c.min), c.scaled_values(c.max));
@@ -301,16 +294,16 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
     if (!better) break;
   }
   if (!geometric || n == 0 || n > kMostRough) return o;
-  if (null != nullptr && broadGain(*null, o.state) < kWorthASearch) return o;
+  if (null != nullptr && broadGain(*null, o.state) < kWorthASearch_nats) return o;
   if (known != nullptr) {
     const double higher = o.state.log_likelihood - known->state.log_likelihood;
     double apart = 0;
     for (std::size_t j = 0; j < o.scaled_values.size(); ++j) {
       apart = std::max(apart, std::abs(o.scaled_values[j] - known->scaled_values[j]));
     }
-    if (higher < -kWorthASearch || (apart < kSearched[1] && higher < kRising)) return o;
+    if (higher < -kWorthASearch_nats || (apart < kSearched[1] && higher < kRising_nats)) return o;
   }
-  // Where paths come and go with every millimetre the likelihood is rough: slopes end at the first bump, a quadratic
+  // The likelihood is rough where paths come and go with every millimetre: slopes end at the first bump, a quadratic
   // through values some millimetres apart does not. The latents follow to first order.
   for (double initial : kSearched) {
     const Optimum from = o;
@@ -330,7 +323,7 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
       return value;
     });
     o.scores = derivatives(o.state, o.scaled_values);
-    if (o.state.log_likelihood - from.state.log_likelihood < kRising) break;
+    if (o.state.log_likelihood - from.state.log_likelihood < kRising_nats) break;
   }
   return o;
 }
@@ -354,7 +347,7 @@ Eigen::MatrixXd HypothesisFitter::robustCovariance(const ProfiledScores& e) cons
   const Eigen::MatrixXd covariance = e.information.inverse();
   if (locations <= 2) return covariance;
   Eigen::MatrixXd robust = covariance * e.scatter * covariance;
-  for (Eigen::Index j = 0; j < robust.rows(); ++j) {  // never below what the likelihood itself says
+  for (Eigen::Index j = 0; j < robust.rows(); ++j) {  // at least the likelihood's own variance
     const double factor = std::sqrt(std::max(1.0, covariance(j, j) / robust(j, j)));
     robust.row(j) *= factor;
     robust.col(j) *= factor;
@@ -403,7 +396,7 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
     EvidenceShare worth;
     if (n > 0 && !h.isOneSided())
       worth = evidenceShareOf(h, v, covariance.block(at, at, n, n), robust.block(at, at, n, n));
-    // What a turn of the view lets in and out shows in no slope (5 degrees of pitch: 230 nats, 3 by the errors there).
+    // Paths that a turn of the view lets in and out show in no slope.
     const bool turns = h.isGeometry() && n == 1 && source_.altersGeometry(h.at({1.0}));
     if (n > 0 && (h.isOneSided() || turns)) {
       const EvidenceShare presence = worthOfPresence(base, parts, o, e, at, n);
@@ -424,7 +417,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());
   Optimum o = maximise(null.mechanisms, known != nullptr ? known->state.nuisance : null.nuisance, {hypothesis}, starts,
-                       kSteps, &null, std::max(kWorthASearch, least_nats), known);
+                       kSteps, &null, std::max(kWorthASearch_nats, least_nats), known);
   f.scaled_values = std::move(o.scaled_values);
   f.state = std::move(o.state);
   f.state.echoes = {};  // 80 MB and more a fit, of 154 poses
@@ -432,7 +425,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
   gainOver(null, f);
   const std::vector<double> gain_at = gainByLocation(null, f.state);
 
-  // Scatter over places: of the scores at the fit where there is a number, else of the gain itself.
+  // Scatter over places is that of the scores at the fit, or of the gain where nothing has a slope.
   const double locations = static_cast<double>(gain_at.size());
   if (n > 0) {
     const ProfiledScores e = profiledScores(scores, globals);
@@ -443,7 +436,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
                                  std::abs(hypothesis.coordinates[static_cast<std::size_t>(j)].slope(
                                      f.scaled_values[static_cast<std::size_t>(j)])));
     }
-    // Without a fold: one step away from the fit by that fold's scores.
+    // Values without a fold lie one step away from the fit, by that fold's scores.
     for (int k = 0; k < folds_; ++k) {
       Eigen::VectorXd left_out = Eigen::VectorXd::Zero(n);
       double share = 0;
@@ -452,7 +445,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
         left_out += e.by_location.row(l).transpose();
         share += 1 / locations;
       }
-      const Eigen::VectorXd shift = covariance * left_out / std::max(0.2, 1 - share);
+      const Eigen::VectorXd shift = covariance * left_out / std::max(kLeastShareKept, 1 - share);
       std::vector<double> scaled_values = f.scaled_values;
       for (Eigen::Index j = 0; j < n; ++j) scaled_values[static_cast<std::size_t>(j)] -= shift[j];
       f.fold_scaled.push_back(scaled_values);
@@ -497,19 +490,19 @@ void HypothesisFitter::gainOver(const ModelState& null, HypothesisFit& f) const 
 }
 
 bool HypothesisFitter::isPlain(double nats) const {
-  return nats > kPlain * static_cast<double>(model_.data().poses.size());
+  return nats > bounds::kPlain_nats_per_pose * static_cast<double>(model_.data().poses.size());
 }
 
 void HypothesisFitter::judge(HypothesisFit& f, std::size_t family) const {
   f.false_alarm_rate = falseAlarmRate(f.gain_without_best_place / f.overdispersion, f.hypothesis, f.numbers(), family);
   f.plain = isPlain(f.gain_without_best_place);
-  if (f.plain) f.false_alarm_rate = std::min(f.false_alarm_rate, kPlainFalseAlarm);
+  if (f.plain) f.false_alarm_rate = std::min(f.false_alarm_rate, bounds::kFalseAlarmRateOfPlain);
 }
 
 double HypothesisFitter::falseAlarmRate(double gain, const Hypothesis& hypothesis, std::size_t numbers,
                                         std::size_t family) const {
-  // Twice the gain against F (Smyth 2004's moderated one): the inflation that it was divided by was estimated from the
-  // places, of which the fit has followed as many as it has coordinates, and from what is usual.
+  // Twice the gain per number follows a moderated F distribution (Smyth 2004). The overdispersion that the gain was
+  // divided by was estimated from the places, less the fitted coordinates, and from the usual scatter.
   const double n = static_cast<double>(std::max<std::size_t>(1, numbers));
   const double followed = static_cast<double>(hypothesis.coordinates.size());
   const double places = static_cast<double>(model_.data().locations.size()) + usualScatter(hypothesis).places;

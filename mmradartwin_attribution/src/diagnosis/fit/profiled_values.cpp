@@ -11,41 +11,39 @@
 namespace mmradartwin::diagnosis::fit {
 namespace {
 
-constexpr int kRefits = 3;                ///< of the latents, at each place
-constexpr std::size_t kMostProfiled = 6;  ///< numbers: each pair of them is a place
-constexpr int kWidths = 3;                ///< that are tried of a step
+constexpr int kRefits = 3;                ///< Fisher steps of the latents at each place
+constexpr std::size_t kMostProfiled = 6;  ///< numbers profiled together: each pair of them is a place
+constexpr int kWidths = 3;                ///< widths that are tried of a step
+constexpr double kWidest = 1;             ///< first width where geometry is profiled, in the coordinate's scale
 
-constexpr double kWidest = 1;  ///< of the scale, where geometry is first looked at: slopes may know nothing of it
-
-/// What a step should cost, in nats, and how narrow it may be.
+/// Fall of the likelihood that a step should bring, in nats, and the narrowest step.
 struct Fall {
   double least, wanted, most;
-  double narrowest;  ///< of the scale
+  double narrowest;  ///< in the coordinate's scale
 };
 constexpr Fall kSmooth = {1, 3, 15, 1e-6};
-// Beside what paths that come and go within millimetres bring.
-constexpr Fall kRough = {10, 25, 80, 0.1};
-constexpr double kMostAlike = 0.95;  ///< correlation of two values in the likelihood's fall, and of more together
+constexpr Fall kRough = {10, 25, 80, 0.1};  ///< well above what paths that come and go within millimetres bring
+constexpr double kMostAlike = 0.95;         ///< bound of the correlation of two values, and of more together
 
 /// The likelihood at one place, all latents refitted.
 struct Place {
   double log_likelihood = 0;
   Eigen::VectorXd by_location;  ///< [locations] with the prior of the headings there
-  Eigen::VectorXd latents;      ///< [2 actors] in standard deviations
+  Eigen::VectorXd latents;      ///< [2 errors] of the actors, in standard deviations
 };
 
-// Where paths begin and end tells of places, too, so that ranges and directions do not say all.
-constexpr double kMostBlurred = 10;     ///< times the likelihood's own error
-constexpr double kCarries = 0.1;        ///< of the pose's strongest amplitude: echoes that places are known by
-constexpr double kSmallChange = 0.125;  ///< of the scale, for derivatives
-constexpr double kShows = 1;            ///< information about a typical value from which on ranges know of it
+// Places are known by where paths begin and end, too: ranges and directions do not say everything.
+constexpr double kMostBlurred = 10;     ///< bound of the geometric error, times the likelihood's own
+constexpr double kCarriesShare = 0.1;   ///< of the pose's strongest amplitude, for an echo that places are known by
+constexpr double kSmallChange = 0.125;  ///< step of derivatives, in the coordinate's scale
+constexpr double kShows = 1;            ///< least information about a typical value by which ranges know of it
 
-/// Variance of the coordinates as ranges and directions of the strong echoes know them, where actors have range errors
-/// of their own and poses heading errors of their own: those errors are the same in all echoes of one actor or pose,
-/// however many there are. 0 for a coordinate that moves no echo.
+/// Variance of the coordinates by the ranges and directions of strong echoes, where actors have range errors and poses
+/// have heading errors. These errors are the same in all echoes of one actor or pose, however many there are. 0 for a
+/// coordinate that moves no echo.
 Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_coordinate, int actors, int poses,
                                   const PoseAccuracy& accuracy, const LatentSpread& spread) {
-  // What the scene lacks has a range error of its own, too: it stands behind the actors.
+  // Unknowns: the coordinates, range errors of the actors and of what the scene lacks, headings of the poses.
   const Eigen::Index n = static_cast<Eigen::Index>(by_coordinate.size()), all = n + actors + 1 + poses;
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(all, all);
   information.diagonal().segment(n, actors + 1).setOnes();
@@ -60,21 +58,21 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
   for (std::size_t j = 0; j < shifts.size(); ++j) {
     for (const PathShift& p : by_coordinate[j]) shifts[j][{p.place, p.event, p.facets}] = &p;
   }
-  // A pose's own place is as wrong in all its echoes: together they know a range as one of them does.
+  // The error of a pose's own place is the same in all its echoes: together they know a range as well as one does.
   std::vector<double> echoes(strongest.size(), 0.0);
-  const auto carries = [&](const PathShift& p) { return p.amplitude >= kCarries * strongest[p.place]; };
+  const auto carries = [&](const PathShift& p) { return p.amplitude >= kCarriesShare * strongest[p.place]; };
   for (const auto& [key, path] : shifts.front()) echoes[path->place] += carries(*path);
   for (const auto& [key, path] : shifts.front()) {
     if (!carries(*path)) continue;
     Eigen::VectorXd range = Eigen::VectorXd::Zero(all), azimuth = Eigen::VectorXd::Zero(all);
     bool shared = true;
     for (Eigen::Index j = 0; j < n && shared; ++j) {
-      const auto& of = shifts[static_cast<std::size_t>(j)];
-      const auto at = of.find(key);
-      shared = at != of.end();
+      const auto& of_coordinate = shifts[static_cast<std::size_t>(j)];
+      const auto shift = of_coordinate.find(key);
+      shared = shift != of_coordinate.end();
       if (!shared) break;
-      range[j] = at->second->range_m / kSmallChange / range_m;
-      azimuth[j] = at->second->azimuth_rad / kSmallChange / accuracy.path_angle_rad;
+      range[j] = shift->second->range_m / kSmallChange / range_m;
+      azimuth[j] = shift->second->azimuth_rad / kSmallChange / accuracy.path_angle_rad;
     }
     if (!shared) continue;
     for (int a : path->actors) range[n + (a >= 0 ? a : actors)] += spread.actor_range_m / range_m;
@@ -88,8 +86,8 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
   return (own > kShows).select(variance, 0.0);
 }
 
-/// The likelihood's fall with the same curvatures, but falling to all sides: differences of a rough likelihood do not
-/// add up to a top. No direction is flatter than that of two values so much alike.
+/// Matrix of curvatures made definite: differences of a rough likelihood need not describe a top. No direction is
+/// flatter than that of two values with correlation kMostAlike.
 Eigen::MatrixXd fallingToAllSides(const Eigen::MatrixXd& fall) {
   const Eigen::VectorXd scale = fall.diagonal().cwiseSqrt();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> alike(scale.cwiseInverse().asDiagonal() * fall *
@@ -103,163 +101,225 @@ struct Step {
   double width = 0;
   Place ahead, behind;
   double curvature = 0;
-  bool flat = false;  ///< the likelihood does not fall: its width is all that is known of an error
+  bool flat = false;  ///< the likelihood does not fall: the width is all that is known of an error
 };
 
-}  // namespace
+/// The likelihood about a fit, looked at along each coordinate and in the corner of each pair.
+class Profile {
+ public:
+  Profile(const ProfiledModel& model, const std::vector<Hypothesis>& parts, const ProfiledValues& fit);
+  /// Values at the best place that was looked at, with the fit's errors still.
+  const ProfiledValues& best() const { return best_; }
+  /// True where the top lies beyond the steps: they tell no width.
+  bool endsBeyondItsSteps() const;
+  /// Values at the best place with their standard errors.
+  ProfiledValues withErrors() const;
 
-ProfiledValues profiled(ExpectedEchoes& source, const ChannelLikelihood& model,
-                        const std::vector<NamedParameters>& base, const SessionLatents& nuisance,
-                        const PoseAccuracy& accuracy, const std::vector<Hypothesis>& parts, const ProfiledValues& fit,
-                        int again) {
-  std::vector<Coordinate> coordinates;
-  std::vector<char> traces;  // by coordinate
+ private:
+  std::vector<NamedParameters> mechanismsAt(const std::vector<double>& scaled_values) const {
+    return mechanismsWith(model_.base, parts_, scaled_values);
+  }
+  Place look(const std::vector<double>& scaled_values) const;
+  /// Takes a place for the best one where the likelihood is higher there.
+  void consider(const Place& place, const std::vector<double>& scaled_values);
+  /// Values of the scale that coordinate j may have.
+  std::pair<double, double> limits(std::size_t j) const;
+  Step stepAlong(std::size_t j, const Fall& wanted);
+  void lookAtCorners();
+  void climbToTop();
+  Eigen::VectorXd geometricVarianceHere() const;
+
+  const ProfiledModel& model_;
+  const std::vector<Hypothesis>& parts_;
+  const ProfiledValues& fit_;
+  std::vector<Coordinate> coordinates_;
+  std::vector<char> traces_;  ///< by coordinate: it moves what is traced
+  Place here_;
+  double highest_ = 0;
+  ProfiledValues best_;
+  std::vector<Step> steps_;
+  Eigen::VectorXd slope_;
+  Eigen::MatrixXd fall_, scores_, latents_;  ///< [n][n], [locations][n], [2 errors][n]
+  Eigen::MatrixXd covariance_;               ///< [n][n] by the fall
+  Eigen::VectorXd to_top_;
+  std::vector<double> top_;
+  Eigen::VectorXd geometric_;
+};
+
+Profile::Profile(const ProfiledModel& model, const std::vector<Hypothesis>& parts, const ProfiledValues& fit)
+    : model_(model), parts_(parts), fit_(fit), best_(fit) {
   for (const Hypothesis& h : parts) {
-    coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
-    traces.resize(coordinates.size(), source.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0))));
+    coordinates_.insert(coordinates_.end(), h.coordinates.begin(), h.coordinates.end());
+    traces_.resize(coordinates_.size(),
+                   model.source.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0))));
   }
-  const bool rough = std::count(traces.begin(), traces.end(), 1) > 0;
-  const ChannelData& data = model.data();
-  const LatentSpread spread = model.spread();
-  const Eigen::Index locations = static_cast<Eigen::Index>(data.locations.size());
-  const Eigen::Index n = static_cast<Eigen::Index>(coordinates.size());
-  const auto mechanismsAt = [&](const std::vector<double>& at) { return mechanismsWith(base, parts, at); };
-  const auto look = [&](const std::vector<double>& at) {
-    SessionLatents fitted = nuisance;
-    const std::vector<PoseEchoes> echoes = source.echoes(mechanismsAt(at), fitted.actor_range_m);
-    model.fit(echoes, fitted, kRefits);
-    std::vector<double> by_pose;
-    Place place;
-    place.log_likelihood = model.logLikelihood(echoes, fitted, &by_pose);
-    place.by_location = Eigen::VectorXd::Zero(locations);
-    for (std::size_t i = 0; i < by_pose.size(); ++i) {
-      const double heading = fitted.yaw_rad[i] / accuracy.heading_rad;
-      place.by_location[data.poses[i].location] += by_pose[i] - 0.5 * heading * heading;
-    }
-    const Eigen::Index actors = static_cast<Eigen::Index>(fitted.actor_gain.size());
-    place.latents.resize(2 * actors);
-    place.latents << Eigen::Map<const Eigen::VectorXd>(fitted.actor_gain.data(), actors) / spread.actor_gain,
-        Eigen::Map<const Eigen::VectorXd>(fitted.actor_range_m.data(), actors) / spread.actor_range_m;
-    return place;
-  };
-  const auto limits = [&](Eigen::Index j) {
-    const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
-    return std::minmax({c.scaled_values(c.min), c.scaled_values(c.max)});
-  };
-  const std::vector<double>& scaled_values = fit.scaled_values;
-  const Fall wanted = rough ? kRough : kSmooth;
-  const Place here = look(scaled_values);
-  // The best place of all that are looked at.
-  double highest = here.log_likelihood;
-  std::vector<double> highest_at = scaled_values;
-  const auto consider = [&](const Place& place, const std::vector<double>& at) {
-    if (place.log_likelihood <= highest) return;
-    highest = place.log_likelihood;
-    highest_at = at;
-  };
-  std::vector<Step> steps;
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const std::size_t k = static_cast<std::size_t>(j);
-    const double slope = std::abs(coordinates[k].slope(scaled_values[k]));
-    const auto [low, high] = limits(j);
-    const double widest = std::min(scaled_values[k] - low, high - scaled_values[k]);
-    Step step;
-    step.width = std::max(wanted.narrowest, 2 * fit.standard_error[k] / slope);
-    if (traces[k]) step.width = std::min(step.width, kWidest);
-    for (int i = 1;; ++i) {
-      if (widest > 0) step.width = std::min(step.width, widest);
-      std::vector<double> at = scaled_values;
-      at[k] = scaled_values[k] + step.width;
-      step.ahead = look(at);
-      at[k] = scaled_values[k] - step.width;
-      step.behind = look(at);
-      const double fall = here.log_likelihood - 0.5 * (step.ahead.log_likelihood + step.behind.log_likelihood);
-      step.curvature = 2 * fall / (step.width * step.width);
-      const bool narrower = fall > wanted.most && step.width > wanted.narrowest;
-      if (i == kWidths || (fall >= wanted.least && !narrower)) break;
-      step.width *= std::clamp(std::sqrt(wanted.wanted / std::max(fall, 0.1)), 0.1, 4.0);
-      step.width = std::max(step.width, wanted.narrowest);
-    }
-    const double least = 0.2 / (step.width * step.width);
-    step.flat = step.curvature < least;
-    step.curvature = std::max(step.curvature, least);
-    for (double side : {-1.0, 1.0}) {
-      std::vector<double> at = scaled_values;
-      at[k] += side * step.width;
-      consider(side < 0 ? step.behind : step.ahead, at);
-    }
-    steps.push_back(std::move(step));
+  const bool rough = std::count(traces_.begin(), traces_.end(), 1) > 0;
+  here_ = look(fit.scaled_values);
+  highest_ = here_.log_likelihood;
+  for (std::size_t j = 0; j < coordinates_.size(); ++j) steps_.push_back(stepAlong(j, rough ? kRough : kSmooth));
+  lookAtCorners();
+  climbToTop();
+}
+
+Place Profile::look(const std::vector<double>& scaled_values) const {
+  const ChannelData& data = model_.likelihood.data();
+  const LatentSpread& spread = model_.likelihood.spread();
+  SessionLatents fitted = model_.nuisance;
+  const std::vector<PoseEchoes> echoes = model_.source.echoes(mechanismsAt(scaled_values), fitted.actor_range_m);
+  model_.likelihood.fit(echoes, fitted, kRefits);
+  std::vector<double> by_pose;
+  Place place;
+  place.log_likelihood = model_.likelihood.logLikelihood(echoes, fitted, &by_pose);
+  place.by_location = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.locations.size()));
+  for (std::size_t i = 0; i < by_pose.size(); ++i) {
+    const double heading = fitted.yaw_rad[i] / model_.accuracy.heading_rad;
+    place.by_location[data.poses[i].location] += by_pose[i] - 0.5 * heading * heading;
   }
-  Eigen::VectorXd slope = Eigen::VectorXd::Zero(n);
-  Eigen::MatrixXd fall = Eigen::MatrixXd::Zero(n, n), scores = Eigen::MatrixXd::Zero(locations, n),
-                  latents = Eigen::MatrixXd::Zero(here.latents.size(), n);
+  const Eigen::Index errors = static_cast<Eigen::Index>(fitted.actor_gain.size());
+  place.latents.resize(2 * errors);
+  place.latents << Eigen::Map<const Eigen::VectorXd>(fitted.actor_gain.data(), errors) / spread.actor_gain,
+      Eigen::Map<const Eigen::VectorXd>(fitted.actor_range_m.data(), errors) / spread.actor_range_m;
+  return place;
+}
+
+void Profile::consider(const Place& place, const std::vector<double>& scaled_values) {
+  if (place.log_likelihood <= highest_) return;
+  highest_ = place.log_likelihood;
+  best_.scaled_values = scaled_values;
+}
+
+std::pair<double, double> Profile::limits(std::size_t j) const {
+  const Coordinate& c = coordinates_[j];
+  return std::minmax({c.scaled_values(c.min), c.scaled_values(c.max)});
+}
+
+Step Profile::stepAlong(std::size_t j, const Fall& wanted) {
+  const std::vector<double>& fitted = fit_.scaled_values;
+  const double slope = std::abs(coordinates_[j].slope(fitted[j]));
+  const auto [low, high] = limits(j);
+  const double widest = std::min(fitted[j] - low, high - fitted[j]);
+  Step step;
+  step.width = std::max(wanted.narrowest, 2 * fit_.standard_error[j] / slope);
+  if (traces_[j]) step.width = std::min(step.width, kWidest);
+  std::vector<double> moved = fitted;
+  for (int i = 1;; ++i) {
+    if (widest > 0) step.width = std::min(step.width, widest);
+    moved[j] = fitted[j] + step.width;
+    step.ahead = look(moved);
+    moved[j] = fitted[j] - step.width;
+    step.behind = look(moved);
+    const double fall = here_.log_likelihood - 0.5 * (step.ahead.log_likelihood + step.behind.log_likelihood);
+    step.curvature = 2 * fall / (step.width * step.width);
+    const bool narrower = fall > wanted.most && step.width > wanted.narrowest;
+    if (i == kWidths || (fall >= wanted.least && !narrower)) break;
+    step.width *= std::clamp(std::sqrt(wanted.wanted / std::max(fall, 0.1)), 0.1, 4.0);
+    step.width = std::max(step.width, wanted.narrowest);
+  }
+  const double least = 0.2 / (step.width * step.width);
+  step.flat = step.curvature < least;
+  step.curvature = std::max(step.curvature, least);
+  for (double side : {-1.0, 1.0}) {
+    moved = fitted;
+    moved[j] += side * step.width;
+    consider(side < 0 ? step.behind : step.ahead, moved);
+  }
+  return step;
+}
+
+void Profile::lookAtCorners() {
+  const Eigen::Index n = static_cast<Eigen::Index>(coordinates_.size());
+  slope_ = Eigen::VectorXd::Zero(n);
+  fall_ = Eigen::MatrixXd::Zero(n, n);
+  scores_ = Eigen::MatrixXd::Zero(here_.by_location.size(), n);
+  latents_ = Eigen::MatrixXd::Zero(here_.latents.size(), n);
   for (Eigen::Index j = 0; j < n; ++j) {
-    const Step& a = steps[static_cast<std::size_t>(j)];
-    fall(j, j) = a.curvature;
+    const Step& a = steps_[static_cast<std::size_t>(j)];
+    fall_(j, j) = a.curvature;
     if (a.flat) continue;
-    slope[j] = (a.ahead.log_likelihood - a.behind.log_likelihood) / (2 * a.width);
-    scores.col(j) = (a.ahead.by_location - a.behind.by_location) / (2 * a.width);
-    latents.col(j) = (a.ahead.latents - a.behind.latents) / (2 * a.width);
+    slope_[j] = (a.ahead.log_likelihood - a.behind.log_likelihood) / (2 * a.width);
+    scores_.col(j) = (a.ahead.by_location - a.behind.by_location) / (2 * a.width);
+    latents_.col(j) = (a.ahead.latents - a.behind.latents) / (2 * a.width);
     for (Eigen::Index k = 0; k < j; ++k) {
-      const Step& b = steps[static_cast<std::size_t>(k)];
+      const Step& b = steps_[static_cast<std::size_t>(k)];
       if (b.flat) continue;
-      std::vector<double> at = scaled_values;
-      at[static_cast<std::size_t>(j)] += a.width;
-      at[static_cast<std::size_t>(k)] += b.width;
-      const Place corner = look(at);
-      consider(corner, at);
+      std::vector<double> moved = fit_.scaled_values;
+      moved[static_cast<std::size_t>(j)] += a.width;
+      moved[static_cast<std::size_t>(k)] += b.width;
+      const Place corner = look(moved);
+      consider(corner, moved);
       const double both = corner.log_likelihood - a.ahead.log_likelihood - b.ahead.log_likelihood;
       const double most = kMostAlike * std::sqrt(a.curvature * b.curvature);
-      fall(j, k) = fall(k, j) = std::clamp(-(both + here.log_likelihood) / (a.width * b.width), -most, most);
+      fall_(j, k) = fall_(k, j) = std::clamp(-(both + here_.log_likelihood) / (a.width * b.width), -most, most);
     }
   }
-  const Eigen::MatrixXd centred = scores.rowwise() - scores.colwise().mean();
-  const double count = static_cast<double>(locations);
-  // Errors of actors are the same at all places: their priors say how far they reach.
-  const Eigen::MatrixXd scatter =
-      centred.transpose() * centred * (count / std::max(1.0, count - 1)) + latents.transpose() * latents;
-  const Eigen::MatrixXd covariance = fallingToAllSides(fall).inverse();
-  const Eigen::MatrixXd robust = covariance * scatter * covariance;
-  const Eigen::VectorXd to_top = covariance * slope;
-  std::vector<double> top = scaled_values;
-  Eigen::VectorXd widths(n);
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const std::size_t k = static_cast<std::size_t>(j);
+}
+
+void Profile::climbToTop() {
+  covariance_ = fallingToAllSides(fall_).inverse();
+  to_top_ = covariance_ * slope_;
+  top_ = fit_.scaled_values;
+  for (std::size_t j = 0; j < top_.size(); ++j) {
     const auto [low, high] = limits(j);
-    widths[j] = steps[k].width;
-    top[k] = std::clamp(scaled_values[k] + std::clamp(to_top[j], -steps[k].width, steps[k].width), low, high);
+    const double width = steps_[j].width;
+    top_[j] =
+        std::clamp(fit_.scaled_values[j] + std::clamp(to_top_[static_cast<Eigen::Index>(j)], -width, width), low, high);
   }
-  std::vector<int> everyone(data.poses.size());
+  geometric_ = geometricVarianceHere();
+  consider(look(top_), top_);
+}
+
+Eigen::VectorXd Profile::geometricVarianceHere() const {
+  std::vector<int> everyone(model_.likelihood.data().poses.size());
   std::iota(everyone.begin(), everyone.end(), 0);
   std::vector<std::vector<PathShift>> by_coordinate;
-  for (std::size_t k = 0; k < coordinates.size(); ++k) {
-    std::vector<double> at = scaled_values;
-    at[k] += kSmallChange;
-    by_coordinate.push_back(source.pathShifts(mechanismsAt(at), mechanismsAt(scaled_values), everyone));
+  for (std::size_t j = 0; j < coordinates_.size(); ++j) {
+    std::vector<double> moved = fit_.scaled_values;
+    moved[j] += kSmallChange;
+    by_coordinate.push_back(model_.source.pathShifts(mechanismsAt(moved), mechanismsAt(fit_.scaled_values), everyone));
   }
-  const Eigen::VectorXd geometric = geometricVariance(by_coordinate, static_cast<int>(nuisance.actor_gain.size()) - 1,
-                                                      static_cast<int>(everyone.size()), accuracy, spread);
-  ProfiledValues result = fit;
-  consider(look(top), top);
-  result.scaled_values = highest_at;
-  // A slope so long was no top, and its steps tell no width.
-  const bool further = (to_top.cwiseAbs().array() > widths.array()).any();
-  if (result.scaled_values != scaled_values && (further || result.scaled_values != top) && again > 0) {
-    return profiled(source, model, base, nuisance, accuracy, parts, result, again - 1);
+  return geometricVariance(by_coordinate, static_cast<int>(model_.nuisance.actor_gain.size()) - 1,
+                           static_cast<int>(everyone.size()), model_.accuracy, model_.likelihood.spread());
+}
+
+bool Profile::endsBeyondItsSteps() const {
+  bool further = false;
+  for (std::size_t j = 0; j < steps_.size(); ++j) {
+    further = further || std::abs(to_top_[static_cast<Eigen::Index>(j)]) > steps_[j].width;
   }
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const std::size_t k = static_cast<std::size_t>(j);
-    double variance = locations > 2 ? std::max(robust(j, j), covariance(j, j)) : covariance(j, j);
-    variance = std::max(variance, std::min(geometric[j], kMostBlurred * kMostBlurred * variance));
+  return best_.scaled_values != fit_.scaled_values && (further || best_.scaled_values != top_);
+}
+
+ProfiledValues Profile::withErrors() const {
+  const Eigen::MatrixXd centred = scores_.rowwise() - scores_.colwise().mean();
+  const double locations = static_cast<double>(scores_.rows());
+  // An actor's error is the same at all places: its prior says how far it reaches, scatter over places does not.
+  const Eigen::MatrixXd scatter =
+      centred.transpose() * centred * (locations / std::max(1.0, locations - 1)) + latents_.transpose() * latents_;
+  const Eigen::MatrixXd robust = covariance_ * scatter * covariance_;
+  ProfiledValues result = best_;
+  for (std::size_t k = 0; k < coordinates_.size(); ++k) {
+    const Eigen::Index j = static_cast<Eigen::Index>(k);
+    double variance = locations > 2 ? std::max(robust(j, j), covariance_(j, j)) : covariance_(j, j);
+    variance = std::max(variance, std::min(geometric_[j], kMostBlurred * kMostBlurred * variance));
     result.standard_error[k] =
-        std::sqrt(std::max(0.0, variance)) * std::abs(coordinates[k].slope(result.scaled_values[k]));
+        std::sqrt(std::max(0.0, variance)) * std::abs(coordinates_[k].slope(result.scaled_values[k]));
   }
   return result;
 }
 
-void profileParts(ExpectedEchoes& source, const ChannelLikelihood& model, const std::vector<NamedParameters>& base,
-                  const SessionLatents& nuisance, const PoseAccuracy& accuracy, const std::vector<Hypothesis>& parts,
-                  std::vector<ProfiledValues>& fits) {
+}  // namespace
+
+ProfiledValues profiled(const ProfiledModel& model, const std::vector<Hypothesis>& parts, const ProfiledValues& fit,
+                        int again) {
+  ProfiledValues values = fit;
+  for (;; --again) {
+    const Profile profile(model, parts, values);
+    if (!profile.endsBeyondItsSteps() || again <= 0) return profile.withErrors();
+    values = profile.best();
+  }
+}
+
+void profileParts(const ProfiledModel& model, const std::vector<Hypothesis>& parts, std::vector<ProfiledValues>& fits) {
   std::vector<std::size_t> few;
   std::size_t numbers = 0;
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -273,20 +333,21 @@ void profileParts(ExpectedEchoes& source, const ChannelLikelihood& model, const 
     if (numbers > kMostProfiled) groups.push_back({i});
   }
   for (const std::vector<std::size_t>& group : groups) {
-    std::vector<NamedParameters> beside = base;
+    std::vector<NamedParameters> beside = model.base;
     for (std::size_t i = 0; i < parts.size(); ++i) {
-      if (std::find(group.begin(), group.end(), i) == group.end())
-        replaceOrAppend(parts[i].at(fits[i].scaled_values), beside);
+      const bool member = std::find(group.begin(), group.end(), i) != group.end();
+      if (!member) replaceOrAppend(parts[i].at(fits[i].scaled_values), beside);
     }
     std::vector<Hypothesis> members;
-    ProfiledValues all;
+    ProfiledValues joint;
     for (std::size_t i : group) {
       members.push_back(parts[i]);
-      all.scaled_values.insert(all.scaled_values.end(), fits[i].scaled_values.begin(), fits[i].scaled_values.end());
-      all.standard_error.insert(all.standard_error.end(), fits[i].standard_error.begin(), fits[i].standard_error.end());
+      joint.scaled_values.insert(joint.scaled_values.end(), fits[i].scaled_values.begin(), fits[i].scaled_values.end());
+      joint.standard_error.insert(joint.standard_error.end(), fits[i].standard_error.begin(),
+                                  fits[i].standard_error.end());
     }
-    all = profiled(source, model, beside, nuisance, accuracy, members, all);
-    auto scaled_values = all.scaled_values.begin(), error = all.standard_error.begin();
+    joint = profiled({model.source, model.likelihood, model.accuracy, beside, model.nuisance}, members, joint);
+    auto scaled_values = joint.scaled_values.begin(), error = joint.standard_error.begin();
     for (std::size_t i : group) {
       const auto count = static_cast<std::ptrdiff_t>(fits[i].scaled_values.size());
       fits[i] = {{scaled_values, scaled_values + count}, {error, error + count}};

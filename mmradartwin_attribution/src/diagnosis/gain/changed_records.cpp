@@ -12,49 +12,52 @@
 namespace mmradartwin::diagnosis::gain {
 namespace {
 
-constexpr std::size_t kMostPerPose = 20, kMostPoses = 10;
-constexpr double kSameLevel_db = 0.05, kSameRange_m = 5e-4, kSameAzimuth_deg = 0.02;  ///< no change
+constexpr std::size_t kMostPerPose = 20, kMostPoses = 10;  ///< length of the list that a person reads
+/// Changes below these are not listed.
+constexpr double kSameLevel_db = 0.05, kSameRange_m = 5e-4, kSameAzimuth_deg = 0.02;
 
-/// Of one mechanism by the same facets and actors: sums over power.
+/// Paths of one mechanism over the same facets and actors: their power, and range and azimuth summed by power.
 struct Bundle {
   double power = 0, range_m = 0, azimuth_rad = 0;
-  void add(const PathRecord& r) {
-    const double p = r.amplitude * r.amplitude;
-    power += p;
-    range_m += p * 0.5 * meanLength_m(r);
-    azimuth_rad += p * std::atan2(r.arrival.y(), r.arrival.x());
+  void add(const PathRecord& path) {
+    const double path_power = path.amplitude * path.amplitude;
+    power += path_power;
+    range_m += path_power * 0.5 * meanLength_m(path);
+    azimuth_rad += path_power * std::atan2(path.arrival.y(), path.arrival.x());
   }
   RecordState state() const { return {10 * std::log10(power), range_m / power, azimuth_rad / power * 180 / M_PI}; }
 };
 
+/// Mechanism, facets and actors.
 using Key = std::tuple<std::string, std::vector<int>, std::vector<int>>;
 using Bundles = std::map<Key, Bundle>;
 
+/// Paths that a twin receives at a pose, bundled.
 Bundles bundles(const Twin& twin, const Pose& pose) {
-  Bundles all;
+  Bundles bundled;
   const std::vector<PathRecord> traced = twin.trace(pose.T_map_radar, pose.stamp_ns);
-  for (const PathRecord& r : twin.receivedPaths(pose.T_map_radar, traced, pose.stamp_ns)) {
-    if (!(r.amplitude > 0)) continue;
-    all[{*r.event, {r.facets.begin(), r.facets.end()}, {r.actors.begin(), r.actors.end()}}].add(r);
+  for (const PathRecord& path : twin.receivedPaths(pose.T_map_radar, traced, pose.stamp_ns)) {
+    if (!(path.amplitude > 0)) continue;
+    bundled[{*path.event, {path.facets.begin(), path.facets.end()}, {path.actors.begin(), path.actors.end()}}].add(
+        path);
   }
-  return all;
+  return bundled;
 }
 
-bool differ(const ChangedRecord& c) {
-  if (!c.before || !c.after) return true;
-  return std::abs(c.after->amplitude_db - c.before->amplitude_db) > kSameLevel_db ||
-         std::abs(c.after->range_m - c.before->range_m) > kSameRange_m ||
-         std::abs(c.after->azimuth_deg - c.before->azimuth_deg) > kSameAzimuth_deg;
+bool differs(const ChangedRecord& record) {
+  if (!record.before || !record.after) return true;
+  return std::abs(record.after->amplitude_db - record.before->amplitude_db) > kSameLevel_db ||
+         std::abs(record.after->range_m - record.before->range_m) > kSameRange_m ||
+         std::abs(record.after->azimuth_deg - record.before->azimuth_deg) > kSameAzimuth_deg;
 }
 
 std::vector<ChangedRecord> changedAt(const Twin& before, const Twin& after, const Pose& pose) {
-  const Bundles b = bundles(before, pose), a = bundles(after, pose);
-  std::map<Key, ChangedRecord> all;
-  for (const auto& [key, bundle] : b) all[key].before = bundle.state();
-  for (const auto& [key, bundle] : a) all[key].after = bundle.state();
+  std::map<Key, ChangedRecord> records;
+  for (const auto& [key, bundle] : bundles(before, pose)) records[key].before = bundle.state();
+  for (const auto& [key, bundle] : bundles(after, pose)) records[key].after = bundle.state();
   std::vector<ChangedRecord> changed;
-  for (auto& [key, record] : all) {
-    if (!differ(record)) continue;
+  for (auto& [key, record] : records) {
+    if (!differs(record)) continue;
     record.pose = pose.name;
     record.event = std::get<0>(key);
     for (int actor : std::get<2>(key)) record.actors.push_back(before.scene().actorOf(actor).name);
@@ -82,7 +85,7 @@ std::vector<ChangedRecord> changedRecords(const Twin& twin, const ChannelData& d
   tbb::parallel_for(std::size_t{0}, shown.size(), [&](std::size_t i) {
     try {
       by_pose[i] = changedAt(without, with, *shown[i]);
-    } catch (const InputError&) {  // one of the two has something where the radar stands
+    } catch (const InputError&) {  // one of the twins has an actor where the radar stands
     }
   });
   std::vector<ChangedRecord> all;

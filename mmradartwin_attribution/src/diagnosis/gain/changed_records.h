@@ -10,9 +10,10 @@
 
 namespace mmradartwin::diagnosis::gain {
 
-/// The path records that `after` has otherwise than `before`, two lists of mechanisms of one twin, at the poses named
-/// (all of them where none is): those of one mechanism by the same facets and actors are told as one, with their power
-/// and its means of place. The strongest of each pose first, at most 20 of each.
+/// Path records that differ between two lists of mechanisms of one twin, `before` and `after`, at the poses named (all
+/// poses where none is named), at most ten poses. Paths of one mechanism over the same facets and actors count as one
+/// record, with their summed power and the power-weighted means of range and azimuth. Of each pose the strongest come
+/// first, at most 20.
 std::vector<ChangedRecord> changedRecords(const Twin& twin, const ChannelData& data,
                                           const std::vector<std::string>& poses,
                                           const std::vector<NamedParameters>& before,

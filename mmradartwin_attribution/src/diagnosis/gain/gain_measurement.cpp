@@ -23,22 +23,23 @@ std::vector<PoseEchoes> GainMeasurement::heldOutEchoes(const std::vector<NamedPa
   return echoes;
 }
 
-void GainMeasurement::ofFit(const ModelState& before, HypothesisFit& fit, Finding& f) {
+void GainMeasurement::ofFit(const ModelState& before, HypothesisFit& fit, Finding& finding) {
   fitter_.settleFolds(before, fit);
-  compareMaps(data_, cellPowers(data_, source_.echoes(before.mechanisms)),
-              cellPowers(data_, heldOutEchoes(before.mechanisms, fit, {})), f);
+  measureHeldOutGain(data_, cellPowers(data_, source_.echoes(before.mechanisms)),
+                     cellPowers(data_, heldOutEchoes(before.mechanisms, fit, {})), finding);
   std::vector<double> likelihood;
   model_.logLikelihood(heldOutEchoes(before.mechanisms, fit, fit.state.actor_range_m), fit.state.nuisance, &likelihood);
   source_.setBaseline(before.mechanisms);
-  f.gain->log_likelihood_per_pose = likelihoodGain(data_, before.by_pose, likelihood);
+  finding.gain->log_likelihood_per_pose = likelihoodGain(data_, before.by_pose, likelihood);
 }
 
 void GainMeasurement::ofChange(const ChannelData& before_data, const std::vector<NamedParameters>& before,
-                               const ChannelData& after_data, const std::vector<NamedParameters>& after, Finding& f) {
+                               const ChannelData& after_data, const std::vector<NamedParameters>& after,
+                               Finding& finding) {
   if (data_.locations.size() < 2) return;
-  const std::vector<PoseEchoes> b = source_.echoes(before), a = source_.echoes(after);
+  const std::vector<PoseEchoes> echoes_before = source_.echoes(before), echoes_after = source_.echoes(after);
   source_.setBaseline(before);
-  compareMaps(data_, cellPowers(before_data, b), cellPowers(after_data, a), f);
+  measureHeldOutGain(data_, cellPowers(before_data, echoes_before), cellPowers(after_data, echoes_after), finding);
 }
 
 EvaluationOptions GainMeasurement::evaluationOptions() const {

@@ -13,7 +13,8 @@
 
 namespace mmradartwin::diagnosis::gain {
 
-/// What findings gain, on held-out places wherever something was fitted.
+/// Measures how much better a twin describes the session with a finding than without it, on held-out locations wherever
+/// something was fitted.
 class GainMeasurement {
  public:
   /// Keeps references.
@@ -27,19 +28,21 @@ class GainMeasurement {
         fitter_(fitter),
         options_(options) {}
 
-  /// In explained power and likelihood: of a fit over `before`, each fold of places by the values of the others.
-  void ofFit(const ModelState& before, HypothesisFit& fit, Finding& f);
-  /// In explained power: of data and mechanisms against others, as they are. Nothing with fewer than two locations.
-  /// Leaves the source settled on `before`.
+  /// Gain of a fit over `before` in explained power and log-likelihood: each fold of locations is expected with the
+  /// values that the other folds gave.
+  void ofFit(const ModelState& before, HypothesisFit& fit, Finding& finding);
+  /// Gain in explained power of one list of mechanisms and its data over another, nothing being fitted. Does nothing
+  /// with fewer than two locations. Leaves the expected echoes with `before` as their baseline.
   void ofChange(const ChannelData& before_data, const std::vector<NamedParameters>& before,
-                const ChannelData& after_data, const std::vector<NamedParameters>& after, Finding& f);
-  /// In the paper's metrics: of a fit over `before`, mechanisms as the recording has them.
+                const ChannelData& after_data, const std::vector<NamedParameters>& after, Finding& finding);
+  /// Gain of a fit over `before` in the paper's metrics, on maps of the recording's averages as they came.
   void addMetrics(const std::vector<NamedParameters>& before, const HypothesisFit& fit, FindingGain& gain) const;
-  /// The same of two lists of mechanisms as they are.
+  /// Gain in the paper's metrics of one list of mechanisms over another, nothing being fitted.
   void addMetrics(const std::vector<NamedParameters>& before, const std::vector<NamedParameters>& after,
                   FindingGain& gain) const;
 
  private:
+  /// Echoes of every pose with the fit's values of the fold that did not see it. actor_range_m: as ExpectedEchoes.
   std::vector<PoseEchoes> heldOutEchoes(const std::vector<NamedParameters>& before, const HypothesisFit& fit,
                                         const std::vector<double>& actor_range_m);
   EvaluationOptions evaluationOptions() const;

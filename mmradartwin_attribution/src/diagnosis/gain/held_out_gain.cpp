@@ -12,11 +12,14 @@
 namespace mmradartwin::diagnosis::gain {
 namespace {
 
-constexpr double kLeastDrawn = 3e-4;   ///< of the strongest cell's power
-constexpr double kBesideCells = 0.05;  ///< of what changes, beyond either end of the cells that are told
-constexpr double kMinRange_m = 0.16, kMaxAzimuth_rad = M_PI / 3;
+constexpr double kLeastDrawnShare = 3e-4;  ///< weakest cell of a figure, as a share of the strongest cell's power
+constexpr double kShareBesidePlace =
+    0.05;                             ///< share of a change that may lie beyond either end of its place in the maps
+constexpr double kMinRange_m = 0.16;  ///< nearest cell that is evaluated
+constexpr double kMaxAzimuth_rad = M_PI / 3;  ///< widest cell that is evaluated, to either side
 
-struct Sums {
+/// Numerator and denominator of the power that is not explained.
+struct PowerSums {
   double missed = 0, measured = 0;
 };
 
@@ -41,28 +44,27 @@ std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<Po
   const Eigen::MatrixXcd weights = steering.leftCols(static_cast<Eigen::Index>(angles.size()));
   std::vector<CellPowers> result(data.poses.size());
   tbb::parallel_for(std::size_t{0}, result.size(), [&](std::size_t i) {
-    Eigen::MatrixXcd s(channels, channels);
+    Eigen::MatrixXcd covariance(channels, channels);
     for (int bin = 0; bin < samples; ++bin) {
       if (axes.range_m[static_cast<std::size_t>(bin)] <= kMinRange_m) continue;
-      s.setZero();
+      covariance.setZero();
       for (const auto& group : echoes[i].groups) {
-        const EchoGroup& g = *group;
-        const auto own = g.bins.at(bin, size);
-        if (!own) continue;
+        const auto cell = group->bins.at(bin, size);
+        if (!cell) continue;
         std::size_t j = 0;
         for (int k = 0; k < channels; ++k) {
-          for (int l = 0; l <= k; ++l) s(k, l) += std::complex<double>(own->power[j++]);
+          for (int l = 0; l <= k; ++l) covariance(k, l) += std::complex<double>(cell->power[j++]);
         }
       }
       for (int k = 0; k < channels; ++k) {
-        for (int l = 0; l < k; ++l) s(l, k) = std::conj(s(k, l));
+        for (int l = 0; l < k; ++l) covariance(l, k) = std::conj(covariance(k, l));
       }
       const Eigen::VectorXcd y = data.poses[i].y.col(bin);
       for (Eigen::Index a = 0; a < weights.cols(); ++a) {
-        // |w^T y|^2 and its expectation w^T S conj(w).
+        // |w^T y|^2 and its expectation w^T R conj(w).
         result[i].measured.push_back(std::norm((weights.col(a).transpose() * y)(0)));
-        const std::complex<double> e = (weights.col(a).transpose() * s * weights.col(a).conjugate())(0);
-        result[i].expected.push_back(std::max(0.0, e.real()));
+        const std::complex<double> expected = (weights.col(a).transpose() * covariance * weights.col(a).conjugate())(0);
+        result[i].expected.push_back(std::max(0.0, expected.real()));
       }
     }
   });
@@ -71,7 +73,8 @@ std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<Po
 
 namespace {
 
-double sessionGain(const std::vector<CellPowers>& poses) {
+/// Root of the session's power gain: the amplitude gain that fits all cells best.
+double amplitudeGain(const std::vector<CellPowers>& poses) {
   double cross = 0, own = 0;
   for (const CellPowers& p : poses) {
     for (std::size_t j = 0; j < p.measured.size(); ++j) {
@@ -82,30 +85,31 @@ double sessionGain(const std::vector<CellPowers>& poses) {
   return own > 0 ? cross / own : 0;
 }
 
-/// Sums of one pose under the session's gain.
-Sums sumsOf(const CellPowers& pose, double root_gain) {
-  Sums s;
+/// Sums of one pose under the session's amplitude gain.
+PowerSums sumsOf(const CellPowers& pose, double amplitude_gain) {
+  PowerSums sums;
   for (std::size_t j = 0; j < pose.measured.size(); ++j) {
-    const double d = std::sqrt(pose.measured[j]) - root_gain * std::sqrt(pose.expected[j]);
-    s.missed += d * d;
-    s.measured += pose.measured[j];
-  }
-  return s;
-}
-
-std::vector<Sums> sumsByLocation(const ChannelData& data, const std::vector<CellPowers>& poses) {
-  const double root = sessionGain(poses);
-  std::vector<Sums> sums(data.locations.size());
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Sums own = sumsOf(poses[i], root);
-    Sums& s = sums[static_cast<std::size_t>(data.poses[i].location)];
-    s.missed += own.missed;
-    s.measured += own.measured;
+    const double difference = std::sqrt(pose.measured[j]) - amplitude_gain * std::sqrt(pose.expected[j]);
+    sums.missed += difference * difference;
+    sums.measured += pose.measured[j];
   }
   return sums;
 }
 
-double explained(const std::vector<Sums>& sums, const std::vector<int>* times) {
+std::vector<PowerSums> sumsByLocation(const ChannelData& data, const std::vector<CellPowers>& poses) {
+  const double gain = amplitudeGain(poses);
+  std::vector<PowerSums> sums(data.locations.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const PowerSums of_pose = sumsOf(poses[i], gain);
+    PowerSums& of_location = sums[static_cast<std::size_t>(data.poses[i].location)];
+    of_location.missed += of_pose.missed;
+    of_location.measured += of_pose.measured;
+  }
+  return sums;
+}
+
+/// Explained power of locations counted `times` times each, once where that is null.
+double explained(const std::vector<PowerSums>& sums, const std::vector<int>* times) {
   double missed = 0, measured = 0;
   for (std::size_t l = 0; l < sums.size(); ++l) {
     const double n = times != nullptr ? (*times)[l] : 1;
@@ -118,37 +122,38 @@ double explained(const std::vector<Sums>& sums, const std::vector<int>* times) {
 }  // namespace
 
 double explainedPower(const std::vector<CellPowers>& poses) {
-  const double root = sessionGain(poses);
-  std::vector<Sums> sums;
-  for (const CellPowers& p : poses) sums.push_back(sumsOf(p, root));
+  const double gain = amplitudeGain(poses);
+  std::vector<PowerSums> sums;
+  for (const CellPowers& pose : poses) sums.push_back(sumsOf(pose, gain));
   return explained(sums, nullptr);
 }
 
 GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPowers>& before,
                               const std::vector<CellPowers>& after) {
-  const std::vector<Sums> b = sumsByLocation(data, before), a = sumsByLocation(data, after);
-  GainMetric m;
-  m.before = explained(b, nullptr);
-  m.after = explained(a, nullptr);
-  m.difference_ci95 = intervalOverLocations(data.locations.size(), [&](const std::vector<int>& times) {
-    return explained(a, &times) - explained(b, &times);
+  const std::vector<PowerSums> sums_before = sumsByLocation(data, before), sums_after = sumsByLocation(data, after);
+  GainMetric gain;
+  gain.before = explained(sums_before, nullptr);
+  gain.after = explained(sums_after, nullptr);
+  gain.difference_ci95 = intervalOverLocations(data.locations.size(), [&](const std::vector<int>& times) {
+    return explained(sums_after, &times) - explained(sums_before, &times);
   });
-  return m;
+  return gain;
 }
 
 namespace {
 
-/// Simulated over measured power of a cell, over all poses.
+/// Simulated over measured power by cell [N][64], both summed over all poses. NaN where neither has an echo to speak
+/// of.
 RealGrid differences_db(const RangeAngleAxes& axes, const std::vector<CellPowers>& poses) {
   std::vector<double> measured(poses.front().measured.size(), 0.0), expected(measured);
-  const double gain = std::pow(sessionGain(poses), 2);
+  const double gain = std::pow(amplitudeGain(poses), 2);
   for (const CellPowers& p : poses) {
     for (std::size_t j = 0; j < measured.size(); ++j) {
       measured[j] += p.measured[j];
       expected[j] += gain * p.expected[j];
     }
   }
-  const double least = kLeastDrawn * *std::max_element(measured.begin(), measured.end());
+  const double least = kLeastDrawnShare * *std::max_element(measured.begin(), measured.end());
   RealGrid grid = RealGrid::Constant(static_cast<Eigen::Index>(axes.range_m.size()), kAngleBins,
                                      std::numeric_limits<double>::quiet_NaN());
   std::size_t j = 0;
@@ -166,29 +171,30 @@ RealGrid differences_db(const RangeAngleAxes& axes, const std::vector<CellPowers
   return grid;
 }
 
-/// From where to where `weights` of falling or rising `axis` hold all but 5 % at either end.
+/// Interval of an axis that holds all of a weight but kShareBesidePlace at either end. weights: pairs of place on the
+/// axis and weight, in any order.
 std::array<double, 2> middle(std::vector<std::pair<double, double>> weights) {
   std::sort(weights.begin(), weights.end());
   double all = 0, below = 0;
-  for (const auto& [at, weight] : weights) all += weight;
+  for (const auto& [place, weight] : weights) all += weight;
   std::array<double, 2> ends = {weights.front().first, weights.back().first};
   bool begun = false;
-  for (const auto& [at, weight] : weights) {
+  for (const auto& [place, weight] : weights) {
     below += weight;
-    if (!begun && below >= kBesideCells * all) {
-      ends[0] = at;
+    if (!begun && below >= kShareBesidePlace * all) {
+      ends[0] = place;
       begun = true;
     }
-    if (below >= (1 - kBesideCells) * all) {
-      ends[1] = at;
+    if (below >= (1 - kShareBesidePlace) * all) {
+      ends[1] = place;
       break;
     }
   }
   return ends;
 }
 
-/// The cells that hold nine tenths, in range and in azimuth, of what a change does to amplitudes, all poses taken
-/// together. Nothing where it does nothing to them.
+/// Sets the ranges and azimuths that hold nine tenths of the squared change of amplitude, summed over all poses. Does
+/// nothing where no amplitude changes.
 void placeInMaps(const RangeAngleAxes& axes, const std::vector<CellPowers>& before,
                  const std::vector<CellPowers>& after, FindingPlace& place) {
   std::vector<std::pair<double, double>> by_range, by_azimuth;
@@ -215,28 +221,30 @@ void placeInMaps(const RangeAngleAxes& axes, const std::vector<CellPowers>& befo
 
 }  // namespace
 
-void compareMaps(const ChannelData& data, const std::vector<CellPowers>& before, const std::vector<CellPowers>& after,
-                 Finding& f) {
-  if (!f.gain) f.gain.emplace();
-  f.gain->explained_power = explainedPowerGain(data, before, after);
+void measureHeldOutGain(const ChannelData& data, const std::vector<CellPowers>& before,
+                        const std::vector<CellPowers>& after, Finding& finding) {
+  if (!finding.gain) finding.gain.emplace();
+  finding.gain->explained_power = explainedPowerGain(data, before, after);
   const RangeAngleAxes axes = SignalChain(data.radar).axes();
-  if (f.where.size() == 1 && !f.where.front().range_m) placeInMaps(axes, before, after, f.where.front());
-  f.maps = std::make_shared<FindingMaps>(FindingMaps{axes, differences_db(axes, before), differences_db(axes, after)});
+  if (finding.where.size() == 1 && !finding.where.front().range_m)
+    placeInMaps(axes, before, after, finding.where.front());
+  finding.maps =
+      std::make_shared<FindingMaps>(FindingMaps{axes, differences_db(axes, before), differences_db(axes, after)});
 }
 
 GainMetric likelihoodGain(const ChannelData& data, const std::vector<double>& before,
                           const std::vector<double>& after) {
   std::vector<double> by_location(data.locations.size(), 0.0), count(data.locations.size(), 0.0);
-  GainMetric m;
-  m.before = m.after = 0;
+  GainMetric gain;
+  gain.before = gain.after = 0;
   for (std::size_t i = 0; i < before.size(); ++i) {
-    const std::size_t l = static_cast<std::size_t>(data.poses[i].location);
-    by_location[l] += after[i] - before[i];
-    count[l] += 1;
-    m.before += before[i] / static_cast<double>(before.size());
-    m.after += after[i] / static_cast<double>(before.size());
+    const std::size_t location = static_cast<std::size_t>(data.poses[i].location);
+    by_location[location] += after[i] - before[i];
+    count[location] += 1;
+    gain.before += before[i] / static_cast<double>(before.size());
+    gain.after += after[i] / static_cast<double>(before.size());
   }
-  m.difference_ci95 = intervalOverLocations(data.locations.size(), [&](const std::vector<int>& times) {
+  gain.difference_ci95 = intervalOverLocations(data.locations.size(), [&](const std::vector<int>& times) {
     double sum = 0, n = 0;
     for (std::size_t l = 0; l < times.size(); ++l) {
       sum += times[l] * by_location[l];
@@ -244,23 +252,23 @@ GainMetric likelihoodGain(const ChannelData& data, const std::vector<double>& be
     }
     return n > 0 ? sum / n : 0.0;
   });
-  return m;
+  return gain;
 }
 
-void addGainInNats(const ChannelData& data, const std::map<std::string, double>& by_pose, Finding& f) {
+void addGainInNats(const ChannelData& data, const std::map<std::string, double>& by_pose, Finding& finding) {
   if (data.locations.size() < 2) return;
-  if (!f.gain) f.gain.emplace();
+  if (!finding.gain) finding.gain.emplace();
   if (by_pose.empty()) {
     const double poses = static_cast<double>(data.poses.size());
-    f.gain->log_likelihood_per_pose = {0, f.evidence.log_likelihood_gain / poses, {}};
+    finding.gain->log_likelihood_per_pose = {0, finding.evidence.log_likelihood_gain / poses, {}};
     return;
   }
   std::vector<double> nats;
   for (const PoseChannels& p : data.poses) {
-    const auto at = by_pose.find(p.pose.name);
-    nats.push_back(at == by_pose.end() ? 0 : at->second);
+    const auto entry = by_pose.find(p.pose.name);
+    nats.push_back(entry == by_pose.end() ? 0 : entry->second);
   }
-  f.gain->log_likelihood_per_pose = likelihoodGain(data, std::vector<double>(nats.size(), 0.0), nats);
+  finding.gain->log_likelihood_per_pose = likelihoodGain(data, std::vector<double>(nats.size(), 0.0), nats);
 }
 
 }  // namespace mmradartwin::diagnosis::gain

@@ -11,29 +11,34 @@
 
 namespace mmradartwin::diagnosis::gain {
 
-/// Measured and expected power in the cells of a map beyond 0.16 m and within 60 deg (DESIGN section 5).
+/// Linear power in the evaluated cells of one pose's map: beyond 0.16 m and within 60 deg of the boresight. Range is
+/// the outer index, azimuth the inner one. Both lists are as long.
 struct CellPowers {
-  std::vector<double> measured, expected;
+  std::vector<double> measured;  ///< |S|^2 of the pose's average
+  std::vector<double> expected;  ///< its expectation under a twin, before the session's gain
 };
+/// Cell powers of all poses; echoes by pose, as data.poses.
 std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<PoseEchoes>& echoes);
 
-/// explained_power = 1 - sum (sqrt(P_meas) - sqrt(g P_twin))^2 / sum P_meas over all poses, with the one gain of the
-/// session sqrt(g) = sum sqrt(P_meas P_twin)/sum P_twin.
+/// Share of the measured power that a twin explains, 1 where the maps agree up to a gain:
+/// 1 - sum (sqrt(P_meas) - sqrt(g P_twin))^2 / sum P_meas over the cells of all poses, with one gain for the session,
+/// sqrt(g) = sum sqrt(P_meas P_twin)/sum P_twin.
 double explainedPower(const std::vector<CellPowers>& poses);
-/// Before and after, and the difference's 95 % interval by bootstrap over locations.
+/// Explained power before and after, and the 95 % interval of its difference by bootstrap over locations.
 GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPowers>& before,
                               const std::vector<CellPowers>& after);
 
-/// A finding's explained power before and after, held out where `after` is, the maps for its figure, and the cells that
-/// carry it where it has no place in the maps yet.
-void compareMaps(const ChannelData& data, const std::vector<CellPowers>& before, const std::vector<CellPowers>& after,
-                 Finding& f);
+/// Fills a finding's explained power before and after, the maps of its figure, and the cells that carry it where its
+/// one place has none yet. The gain is held out if `after` was expected by fits that did not see the pose.
+void measureHeldOutGain(const ChannelData& data, const std::vector<CellPowers>& before,
+                        const std::vector<CellPowers>& after, Finding& finding);
 
-/// Mean difference per pose with its 95 % interval by bootstrap over locations.
+/// Mean log-likelihood per pose [nats] before and after, and the 95 % interval of the mean difference by bootstrap over
+/// locations. before, after: by pose.
 GainMetric likelihoodGain(const ChannelData& data, const std::vector<double>& before, const std::vector<double>& after);
 
-/// Sets a finding's gain in nats per pose, over nothing, from those by pose where there are any, else from its
-/// evidence; nothing with fewer than two locations.
-void addGainInNats(const ChannelData& data, const std::map<std::string, double>& by_pose, Finding& f);
+/// Sets a finding's gain in nats per pose over a likelihood of 0: from `by_pose` (nats by the pose's name) or, where
+/// that is empty, from the finding's evidence. Does nothing with fewer than two locations.
+void addGainInNats(const ChannelData& data, const std::map<std::string, double>& by_pose, Finding& finding);
 
 }  // namespace mmradartwin::diagnosis::gain

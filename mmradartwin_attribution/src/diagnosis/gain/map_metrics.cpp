@@ -11,17 +11,18 @@
 namespace mmradartwin::diagnosis::gain {
 namespace {
 
-/// Of one set of twins: each pose's counts and sums, by location.
+/// Counts and sums of each pose, by location.
 using FieldsByLocation = std::vector<std::vector<FieldMetrics>>;
 
-std::vector<GainMetric*> metricsOf(FindingGain& g) {
-  std::vector<GainMetric*> all = {&g.recall, &g.q1, &g.q2, &g.q3_median_db};
-  for (GainMetric& m : g.recall_band) all.push_back(&m);
-  for (GainMetric& m : g.classes) all.push_back(&m);
-  return all;
+/// Metrics that are filled here, in the order of valuesOf().
+std::vector<GainMetric*> metricsOf(FindingGain& gain) {
+  std::vector<GainMetric*> metrics = {&gain.recall, &gain.q1, &gain.q2, &gain.q3_median_db};
+  for (GainMetric& metric : gain.recall_band) metrics.push_back(&metric);
+  for (GainMetric& metric : gain.classes) metrics.push_back(&metric);
+  return metrics;
 }
 
-/// In the order of metricsOf(); each location `times` times.
+/// Values of the metrics, in the order of metricsOf(), each location counted `times` times.
 std::vector<double> valuesOf(const FieldsByLocation& fields, const std::vector<int>& times) {
   Ledger ledger;
   for (std::size_t l = 0; l < fields.size(); ++l) {
@@ -29,10 +30,10 @@ std::vector<double> valuesOf(const FieldsByLocation& fields, const std::vector<i
       for (const FieldMetrics& pose : fields[l]) ledger.add(pose);
     }
   }
-  const LedgerSummary s = ledger.summary();
-  std::vector<double> values = {s.recall, s.q1_energy, s.q2_energy, s.q3_median_db};
-  values.insert(values.end(), s.recall_band.begin(), s.recall_band.end());
-  values.insert(values.end(), s.class_count.begin(), s.class_count.end());
+  const LedgerSummary summary = ledger.summary();
+  std::vector<double> values = {summary.recall, summary.q1_energy, summary.q2_energy, summary.q3_median_db};
+  values.insert(values.end(), summary.recall_band.begin(), summary.recall_band.end());
+  values.insert(values.end(), summary.class_count.begin(), summary.class_count.end());
   return values;
 }
 
@@ -51,32 +52,32 @@ void addMapMetrics(const Recording& recording, const Twin& twin, const ChannelDa
     used.poses.push_back(p.pose);
   }
   const MeasuredBranch measured = [&](const Pose& pose) { return chain.map(by_name.at(pose.name)->plain); };
-  const auto fields = [&](const std::vector<std::vector<NamedParameters>>& folds) {
+  const auto fieldsOf = [&](const std::vector<std::vector<NamedParameters>>& folds) {
     std::vector<Twin> twins;
     for (const auto& mechanisms : folds) twins.push_back(twin.changed(mechanisms));
     std::vector<SimulatedBranch> branches;
-    for (const Twin& t : twins) branches.push_back(simulatedByTwin(t));
+    for (const Twin& of_fold : twins) branches.push_back(simulatedByTwin(of_fold));
     const SimulatedBranch simulated = [&](const Pose& pose) {
       return branches[static_cast<std::size_t>(fold_of(by_name.at(pose.name)->location)) % branches.size()](pose);
     };
-    FieldsByLocation all(data.locations.size());
+    FieldsByLocation fields(data.locations.size());
     for (const PoseResult& pose : evaluate(used, simulated, twin.scene(), twin.rays(), options, measured).poses) {
       if (!pose.used) continue;
-      all[static_cast<std::size_t>(by_name.at(pose.pose.name)->location)].push_back(pose.attribution.central);
+      fields[static_cast<std::size_t>(by_name.at(pose.pose.name)->location)].push_back(pose.attribution.central);
     }
-    return all;
+    return fields;
   };
-  const FieldsByLocation b = fields({before}), a = fields(after);
+  const FieldsByLocation fields_before = fieldsOf({before}), fields_after = fieldsOf(after);
   const std::vector<int> once(data.locations.size(), 1);
-  const std::vector<double> from = valuesOf(b, once), to = valuesOf(a, once);
+  const std::vector<double> values_before = valuesOf(fields_before, once), values_after = valuesOf(fields_after, once);
   const auto intervals = intervalsOverLocations(data.locations.size(), [&](const std::vector<int>& times) {
-    std::vector<double> difference = valuesOf(a, times);
-    const std::vector<double> without = valuesOf(b, times);
+    std::vector<double> difference = valuesOf(fields_after, times);
+    const std::vector<double> without = valuesOf(fields_before, times);
     for (std::size_t k = 0; k < difference.size(); ++k) difference[k] -= without[k];
     return difference;
   });
   const std::vector<GainMetric*> metrics = metricsOf(gain);
-  for (std::size_t k = 0; k < metrics.size(); ++k) *metrics[k] = {from[k], to[k], intervals[k]};
+  for (std::size_t k = 0; k < metrics.size(); ++k) *metrics[k] = {values_before[k], values_after[k], intervals[k]};
 }
 
 }  // namespace mmradartwin::diagnosis::gain

@@ -11,9 +11,9 @@
 
 namespace mmradartwin::diagnosis::gain {
 
-/// The paper's metrics of the poses in `data` (recall by band, Q1, Q2, Q3, C1 to C5) before and after, and their
-/// differences' 95 % intervals by bootstrap over locations. After: mechanisms by fold, or one list for all; `fold_of` a
-/// location. Poses without a plain average are left out.
+/// Fills the paper's metrics (recall by band, Q1, Q2, Q3, counts of C1 to C5) over the poses in `data`, before and
+/// after, with 95 % intervals of their differences by bootstrap over locations. after: mechanisms by fold, or one list
+/// for all folds; fold_of: fold of a location's index. Poses without an uncorrected average are left out.
 void addMapMetrics(const Recording& recording, const Twin& twin, const ChannelData& data,
                    const std::vector<NamedParameters>& before, const std::vector<std::vector<NamedParameters>>& after,
                    const std::function<int(int)>& fold_of, const EvaluationOptions& options, FindingGain& gain);

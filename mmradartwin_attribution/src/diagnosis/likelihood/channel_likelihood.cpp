@@ -11,17 +11,19 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr double kTail = 4;  ///< degrees of freedom of the complex t
+constexpr double kTailFreedom = 4;  ///< degrees of freedom of the complex t distribution
 
-// Hann's neighbours are so alike that a beam's least eigenvalue drowns in single precision's errors without this share
-// of its power.
+/// Share of a beam's power that keeps its covariance definite in single precision: neighbouring bins of a Hann window
+/// are almost the same.
 constexpr double kBeamShare = 3e-6;
 
-// A group that changes a cell's covariance by less than this share even where it moves so far has no slope there.
-constexpr double kNegligible = 3e-4, kMoved_m = 0.03;
+/// Change of a cell's covariance, as a share, below which a group of echoes gives the cell no slope, and the range
+/// error that the change is judged at.
+constexpr double kNegligibleShare = 3e-4, kMoved_m = 0.03;
 
-constexpr double kEnough = 0.1;  ///< nats: what a further step would bring is not worth it
+constexpr double kLeastStep_nats = 0.1;  ///< promised gain below which fit() ends
 
+/// Places of the globals in scores; kShape and kActors are the first of several.
 enum Global {
   kGain,
   kFloor,
@@ -32,7 +34,7 @@ enum Global {
   kActors = kShape + std::tuple_size_v<decltype(SessionLatents::floor_shape)>
 };
 
-/// Where a number of the nuisance may stand, and how far it may go in one step.
+/// Values that a global may have, and how far it may go in one step.
 struct Limits {
   double low, high, step;
 };
@@ -42,7 +44,7 @@ Limits limitsOf(int global, int errors) {
   if (global >= kActors) return {-2, 2, 0.5};
   if (global >= kShape) return {-8, 8, 1};
   switch (global) {
-    case kRelative:  // lower, and single precision would no longer keep every matrix definite
+    case kRelative:  // below -11.5 single precision would not keep every matrix definite
       return {-11.5, -2, 2};
     case kGraze:
       return {-6, 6, 2};
@@ -53,13 +55,13 @@ Limits limitsOf(int global, int errors) {
   }
 }
 
-/// A heading's error turns the mean direction of a group's echoes in a bin by so many radians of sine.
+/// Change of the sine of a group's mean direction in a bin by an error of the heading.
 double turnOf(double yaw_rad, const EchoGroup::Cell& cell) {
   if (yaw_rad == 0 || cell.cosine == 0 || !(cell.power[0].real() > 0)) return 0;
   return yaw_rad * cell.cosine / cell.power[0].real();
 }
 
-/// 2 pi y_k / lambda of the virtual elements.
+/// Phases 2 pi y_k / lambda of the virtual elements.
 std::vector<double> elementPhases(const RadarConfig& radar) {
   std::vector<double> phases;
   for (int k = 0; k < radar.channels(); ++k) {
@@ -74,7 +76,7 @@ double groupGain(const EchoGroup& group, const SessionLatents& nuisance) {
   return std::exp(sum);
 }
 
-/// One-way range that the group's actors add beyond what its fields hold already.
+/// One-way range that a group's actors add beyond what its fields hold already.
 double groupShift_m(const EchoGroup& group, const SessionLatents& nuisance) {
   double sum = -group.added_range_m;
   for (int a : group.actors) sum += nuisance.actor_range_m[errorOf(a, nuisance.actor_range_m.size())];
@@ -148,7 +150,7 @@ void ChannelLikelihood::addApart(int cell, double power, PackedHermitian& to) co
     const std::size_t at = static_cast<std::size_t>(PackedHermitian::diagonal(k));
     to.re[at] += power;
     if (!isBeam(cell)) continue;
-    // Hann's neighbours share what falls between them: sum of w^2 exp(j 2 pi n/N) over that of w^2.
+    // White noise in neighbouring bins is correlated through the Hann window: sum w^2 exp(j 2 pi n/N) / sum w^2.
     if (k > 0) to.re[at - 1] += 2.0 / 3 * power;
     if (k > 1) to.re[at - 2] += 1.0 / 6 * power;
   }
@@ -193,7 +195,7 @@ PackedHermitian ChannelLikelihood::sigma(const PoseEchoes& echoes, const std::ve
     turn.set(apart_, turnOf(n.yaw_rad[pose], *f));
     s.addTurned({f->power, f->shift, f->curvature}, {u, u * shift, u * (shift * shift + range_variance)}, turn);
   }
-  // At least a share of the mean power everywhere keeps the matrix definite where the first-order terms would not.
+  // The channels' independent share keeps the matrix definite where the first-order terms alone would not.
   if (s.trace() > 0) addRelative(n, cell, s);
   addApart(cell, noiseOf(pose, cell), s);
   addClutter(n, pose, cell, 1, s);
@@ -218,7 +220,7 @@ double ChannelLikelihood::poseLikelihood(const PoseEchoes& echoes, const Session
     factor.apply(dataOf(pose, cell), y.data());
     double q = 0;
     for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
-    sum += -factor.logDeterminant() - (channels_ + kTail) * std::log1p(q / kTail);
+    sum += -factor.logDeterminant() - (channels_ + kTailFreedom) * std::log1p(q / kTailFreedom);
   }
   return weight() * sum;
 }
@@ -281,10 +283,10 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
   out.bins.clear();
   const double relative = std::exp(n.log_relative);
   const double range_variance = rangeVariance_m2(n);
-  // Only directions that do something in a bin enter its products.
+  // Only directions that act in a cell enter its products.
   std::vector<int> active;
   PackedTurn turn;
-  PackedHermitian own(channels_);  // of a group
+  PackedHermitian own(channels_);  // covariance of one group
   std::vector<char> is_active(static_cast<std::size_t>(globals + 1));
   std::vector<PackedHermitian> raw(static_cast<std::size_t>(globals + 1), PackedHermitian(channels_));
   const auto touch = [&](int j) -> PackedHermitian& {
@@ -299,7 +301,7 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
   const std::vector<GroupLevel> of_groups = levels(echoes, n);
   std::vector<double> products(static_cast<std::size_t>((globals + 1) * (globals + 1)));
   BinBasis basis;
-  Eigen::MatrixXd whitened(numbers, globals + 1);  // of the active ones, in its first columns
+  Eigen::MatrixXd whitened(numbers, globals + 1);  // the active directions, in the first columns
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
     for (int j : active) is_active[j] = 0;
     active.clear();
@@ -310,9 +312,9 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
     basis.factor.apply(dataOf(pose, cell), y.data());
     double q = 0;
     for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
-    const double w = (channels_ + kTail) / (kTail + q);
+    const double w = (channels_ + kTailFreedom) / (kTailFreedom + q);
     const PackedHermitian inverse = basis.factor.inverse();
-    out.log_likelihood += -basis.factor.logDeterminant() - (channels_ + kTail) * std::log1p(q / kTail);
+    out.log_likelihood += -basis.factor.logDeterminant() - (channels_ + kTailFreedom) * std::log1p(q / kTailFreedom);
 
     for (std::size_t i = 0; i < echoes.all(); ++i) {
       const EchoGroup& g = echoes.at(i);
@@ -321,7 +323,7 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
       const std::complex<float>*power = fields->power, *shift = fields->shift, *curvature = fields->curvature;
       const auto [f, moved] = of_groups[i];
       const double share = inverse.traceOfProduct(power) + kMoved_m * kMoved_m * inverse.traceOfProduct(curvature);
-      if (f * share < kNegligible) continue;
+      if (f * share < kNegligibleShare) continue;
       turn.set(apart_, turnOf(n.yaw_rad[pose], *fields));
       own.setZero();
       own.addTurned({power, shift, curvature}, {f, f * moved, f * (moved * moved + range_variance)}, turn);
@@ -352,7 +354,7 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
     basis.active = active;
     const int count = static_cast<int>(active.size());
     for (int a = 0; a < count; ++a) basis.factor.whiten(raw[active[a]], whitened.col(a).data());
-    // Data in the same numbers: w y y^H - I.
+    // The data in the same numbers: w y y^H - I.
     basis.data.resize(numbers);
     int i = 0;
     for (std::size_t k = 0; k < static_cast<std::size_t>(channels_); ++k) {
@@ -384,9 +386,10 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
   out.log_likelihood *= weight();
 }
 
-/// Information of the complex t about its covariance (Lange, Little and Taylor 1989, in complex form).
+/// Fisher information of the complex t distribution about its covariance (Lange, Little and Taylor 1989, in complex
+/// form).
 double ChannelLikelihood::informationOf(double product, double trace_a, double trace_b) const {
-  return ((channels_ + kTail) * product - trace_a * trace_b) / (channels_ + kTail + 1);
+  return ((channels_ + kTailFreedom) * product - trace_a * trace_b) / (channels_ + kTailFreedom + 1);
 }
 
 Basis ChannelLikelihood::basis(const std::vector<PoseEchoes>& echoes, const SessionLatents& n, bool further) const {
@@ -485,14 +488,14 @@ Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCo
     s.information(kActors + errors_ + a, kActors + errors_ + a) += range;
     s.total[kActors + errors_ + a] -= range * n.actor_range_m[a];
   }
-  // Levels of errors are known roughly (a factor of 10 in power), so that none runs away where nothing shows it.
+  // Levels of errors have a wide prior (a factor of 10 in power): none runs away where no data shows it.
   const double rough = 1 / (2.3 * 2.3);
   const SessionLatents usual;
   for (int j = kRelative; j < kActors; ++j) {
     s.information(j, j) += rough;
     s.total[j] -= rough * (n.global(j) - usual.global(j));
   }
-  // What stands at a limit and would go beyond it moves no more, and nothing else moves as if it did.
+  // A number at its limit that would go beyond it stays, and no other number moves as if it did not.
   for (int j = 0; j < globals; ++j) {
     const Limits limits = limitsOf(j, errors_);
     const double v = n.global(j);
@@ -536,7 +539,7 @@ double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLate
     const double screened_nats = 0.5 * s.total.dot(step);
     bool better = false;
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(step.size());
-    // Together; else, where the headings are far off, one after the other.
+    // All numbers together; where that fails, headings alone, then globals alone.
     for (int attempt = 0; attempt < 6 && !better; ++attempt) {
       constexpr double kShares[] = {1.0, 0.5, 0.2, 0.05};
       SessionLatents next = attempt < 4    ? stepped(nuisance, step, s, step, kShares[attempt])
@@ -549,7 +552,7 @@ double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLate
       best = value;
       better = true;
     }
-    if (!better || screened_nats < kEnough) break;
+    if (!better || screened_nats < kLeastStep_nats) break;
   }
   return best;
 }
@@ -559,7 +562,7 @@ SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) c
   n.actor_gain.assign(static_cast<std::size_t>(errors_), 0.0);
   n.actor_range_m.assign(static_cast<std::size_t>(errors_), 0.0);
   n.yaw_rad.assign(data_.poses.size(), 0.0);
-  // Gain: median over poses of power over expected power. Floor: the lower quartile of cells, taken to 3 m.
+  // Gain: median over poses of measured over expected power. Floor: lower quartile over cells of power over clutter.
   std::vector<double> ratio, low;
   for (std::size_t i = 0; i < echoes.size(); ++i) {
     double expected = 0;
@@ -587,7 +590,7 @@ SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) c
   };
   n.log_gain = quantile(ratio, 0.5);
   n.log_floor = quantile(low, 0.25);
-  // Wide errors first: far outliers of a narrow t pull on nothing, and headings would not find their place.
+  // Wide channel errors to start with: far outliers of a narrow t distribution would give headings no slope.
   n.log_relative = -3;
   return n;
 }
@@ -608,7 +611,7 @@ ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes
   w.inverse = llt.solve(Eigen::MatrixXcd::Identity(channels_, channels_));
   const Eigen::VectorXcd y = data_.poses[pose].y.col(bin);
   w.solved = w.inverse * y;
-  w.weight = (channels_ + kTail) / (kTail + y.dot(w.solved).real());
+  w.weight = (channels_ + kTailFreedom) / (kTailFreedom + y.dot(w.solved).real());
   return w;
 }
 
@@ -621,9 +624,10 @@ std::vector<ChannelLikelihood::Whitened> ChannelLikelihood::whitened(const PoseE
 
 double ChannelLikelihood::gainOfPoint(const Whitened& cell, double power, double noise, double found) const {
   // Sigma + power v v^H, by the determinant lemma and Sherman and Morrison.
-  const double more = 1 + power * noise, q = (channels_ + kTail) / cell.weight - kTail;
+  const double more = 1 + power * noise, q = (channels_ + kTailFreedom) / cell.weight - kTailFreedom;
   const double after = std::max(0.0, q - power * found / more);
-  return weight() * (-std::log(more) + (channels_ + kTail) * (std::log1p(q / kTail) - std::log1p(after / kTail)));
+  return weight() * (-std::log(more) +
+                     (channels_ + kTailFreedom) * (std::log1p(q / kTailFreedom) - std::log1p(after / kTailFreedom)));
 }
 
 }  // namespace mmradartwin::diagnosis::likelihood

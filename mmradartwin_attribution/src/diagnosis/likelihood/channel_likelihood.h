@@ -13,25 +13,26 @@
 
 namespace mmradartwin::diagnosis::likelihood {
 
-/// What no cause is: fitted in every hypothesis alike. Powers as natural logarithms.
+/// Latent numbers of a session: levels and small errors that every hypothesis has beside its cause. They are fitted
+/// along with each hypothesis. Powers are natural logarithms.
 struct SessionLatents {
-  double log_gain = 0;                  ///< of measured power over the twin's
+  double log_gain = 0;                  ///< measured power over the twin's
   double log_floor = 0;                 ///< clutter's power in a cell over PoseChannels::clutter
-  std::array<double, 6> floor_shape{};  ///< departs from that at ranges, even in their logarithm; linear between
-  double log_relative = -8;             ///< what differs from channel to channel of an echo, of its power
+  std::array<double, 6> floor_shape{};  ///< added to log_floor at ranges that are even in log range; linear between
+  double log_relative = -8;             ///< share of an echo's power that no two channels have in common
   double log_graze = 0;                 ///< factor of PoseEchoes::grazing
   double log_range = 0;                 ///< factor of the variance of a path's own range
-  std::vector<double> actor_gain;       ///< as errorOf() has it: natural logarithm of power, per interaction
-  std::vector<double> actor_range_m;    ///< the same: added one-way range, per interaction
+  std::vector<double> actor_gain;       ///< [errors, see errorOf()] natural logarithm of power, per interaction
+  std::vector<double> actor_range_m;    ///< [errors, see errorOf()] added one-way range, per interaction
   std::vector<double> yaw_rad;          ///< [poses] error of the heading
 
-  /// Numbers that all poses share, in the order of scores.
+  /// Number j of those that all poses share ("globals"), in the order of Scores.
   double& global(int j);
   double global(int j) const { return const_cast<SessionLatents*>(this)->global(j); }
   int globals() const { return 5 + static_cast<int>(floor_shape.size() + actor_gain.size() + actor_range_m.size()); }
 };
 
-/// Standard deviations that the latent errors are given.
+/// Prior standard deviations of the actors' latent errors.
 struct LatentSpread {
   double actor_gain = 1.5 / 4.343;  ///< 1.5 dB of power
   double actor_range_m = 0.02;
@@ -43,111 +44,119 @@ constexpr double kMostRangeError_m = 0.08;
 using PoseCovariance = std::vector<std::complex<float>>;
 using SessionCovariance = std::vector<PoseCovariance>;
 
-/// Derivatives of the log-likelihood at one place: by location, so that their scatter shows what the model omits.
+/// Derivatives of the log-likelihood by a set of directions (globals, then changes of covariance). They are kept by
+/// location: their scatter over locations shows what the model omits. Each pose's heading is eliminated.
 struct Scores {
   double log_likelihood = 0;     ///< with the priors of the latents
-  Eigen::MatrixXd by_location;   ///< [locations][directions] scores; the heading of each pose eliminated
-  Eigen::MatrixXd information;   ///< [directions][directions], priors included; the same
+  Eigen::MatrixXd by_location;   ///< [locations][directions] scores
+  Eigen::MatrixXd information;   ///< [directions][directions] Fisher information, priors included
   Eigen::VectorXd total;         ///< [directions] scores, priors included
-  Eigen::VectorXd prior;         ///< [globals] precision of what the latents of actors are known by beforehand
-  std::vector<double> yaw_step;  ///< [poses] best change of the heading, all else as it is
-  Eigen::MatrixXd yaw_coupling;  ///< [poses][directions] of that change by a change of the directions
+  Eigen::VectorXd prior;         ///< [globals] prior precision of the actors' errors, 0 elsewhere
+  std::vector<double> yaw_step;  ///< [poses] Newton step of the heading, all else fixed
+  Eigen::MatrixXd yaw_coupling;  ///< [poses][directions] how much the best heading falls per step of a direction
 };
 
-/// One cell's whitened directions of the nuisance and the data in the same numbers: the likelihood's derivatives are
-/// then products, and a further direction costs nothing but its own.
+/// One cell's whitened directions and its data in the same M^2 real numbers (InverseFactor::whiten()). Derivatives of
+/// the likelihood are then dot products, and a further direction costs only its own products.
 struct BinBasis {
   int cell = 0;
   InverseFactor factor;
-  std::vector<int> active;   ///< directions that do something here; the heading is the last of all
-  Eigen::MatrixXf whitened;  ///< [M^2][active]; kept in single precision: half of a long session's memory
-  Eigen::VectorXd data, traces;
+  std::vector<int> active;   ///< globals that act in this cell; index `globals` stands for the heading
+  Eigen::MatrixXf whitened;  ///< [M^2][active]; single precision halves a long session's memory
+  Eigen::VectorXd data;      ///< [M^2] w L^-1 y y^H L^-H - I, with the t distribution's weight w
+  Eigen::VectorXd traces;    ///< [active] trace of each whitened direction
 };
+
+/// Scores and information of one pose by the globals and its heading.
 struct PoseBasis {
   double log_likelihood = 0;
   Eigen::VectorXd score;        ///< [globals + 1]
   Eigen::MatrixXd information;  ///< [globals + 1][globals + 1], the heading last
-  std::vector<BinBasis> bins;
+  std::vector<BinBasis> bins;   ///< empty where no further directions are wanted
 };
+
+/// Derivatives of all poses at one set of latents.
 struct Basis {
   SessionLatents nuisance;
   std::vector<PoseBasis> poses;
 };
 
-/// Likelihood of a session's channels under expected echoes. Every bin's channels are complex t-distributed (4 degrees
-/// of freedom in their complex form) about zero, with the covariance
-///   gain * (echoes + grazing echoes + range errors + relative) + clutter + noise,
-/// and so are every beam's bins (EchoBeam). Cells are the bins and, after them, the beams. Neighbouring bins overlap
-/// through the window and beams are formed of them, so that each counts half (composite likelihood).
+/// Likelihood of a session's channels under expected echoes. The channels of a range bin are complex t-distributed (4
+/// complex degrees of freedom) about zero, with the covariance
+///   gain * (echoes + grazing echoes + range errors + relative) + clutter + noise.
+/// The bins of a beam (EchoBeam) are distributed in the same way. A *cell* is a range bin or a beam; beams come after
+/// the bins. Neighbouring bins overlap through the window, and beams are formed of bins: each cell counts half
+/// (composite likelihood).
 class ChannelLikelihood {
  public:
-  /// Keeps a reference. actors: Scene::actors' number.
+  /// Keeps a reference to data. actors: how many Scene::actors has.
   ChannelLikelihood(const ChannelData& data, int actors, const PoseAccuracy& accuracy, const LatentSpread& spread = {});
 
-  /// A start for fit(): levels from the data.
+  /// Latents to start fit() from: levels from the data, errors zero.
   SessionLatents start(const std::vector<PoseEchoes>& echoes) const;
-  /// Log-likelihood with priors; by_pose without.
+  /// Log-likelihood of all poses with the priors of the latents; by_pose is without priors.
   double logLikelihood(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance,
                        std::vector<double>* by_pose = nullptr) const;
-  /// The same of the poses named alone, without priors; echoes[i] are those of poses[i].
+  /// Log-likelihood of each pose named, without priors; echoes[i] are those of poses[i].
   std::vector<double> byPose(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance,
                              const std::vector<int>& poses) const;
-  /// Expected covariance of the echoes alone, with their gain and latents and what they have of range errors;
-  /// echoes[i] are those of poses[i].
+  /// Expected covariance of the echoes alone (no clutter, no noise), with gain, latents and range errors; echoes[i] are
+  /// those of poses[i].
   SessionCovariance covariance(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance,
                                const std::vector<int>& poses) const;
-  /// further: what scores() needs of directions beside the globals is kept, too.
+  /// Derivatives by the globals and headings. further: keeps what scores() needs for directions beside the globals.
   Basis basis(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance, bool further = true) const;
-  /// Scores by the globals of Nuisance and by more directions: changes of covariance(),
-  /// [poses named]. Poses that are not named do not count.
+  /// Scores by the globals of SessionLatents and by more directions, each a change of covariance() at the poses named.
+  /// Other poses do not count.
   Scores scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
                 const std::vector<int>& poses) const;
-  /// Improves nuisance by Fisher scoring from where it is; returns the log-likelihood.
+  /// Fisher scoring of the latents from where they are; returns the log-likelihood.
   double fit(const std::vector<PoseEchoes>& echoes, SessionLatents& nuisance, int iterations) const;
-  /// A step of the globals and what the headings do with it; held within sane bounds.
+  /// Latents after a share of a step of the globals, with each heading's best answer to whole_step. Numbers and steps
+  /// stay within limits.
   SessionLatents stepped(const SessionLatents& from, const Eigen::VectorXd& globals, const Scores& scores,
                          const Eigen::VectorXd& whole_step, double share) const;
 
-  /// Rank one sums for a point scatterer: see back_projection.h.
+  /// One bin's covariance, inverted for tests of a further point scatterer (back_projection.h).
   struct Whitened {
     Eigen::MatrixXcd inverse;  ///< [M][M] Sigma^-1
     Eigen::VectorXcd solved;   ///< [M] Sigma^-1 y
-    double weight;             ///< of the tail
+    double weight;             ///< weight of the bin under the t distribution
   };
   Whitened whitened(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose, int bin) const;
-  /// Of all bins, those before firstBin() as that one.
+  /// All bins of a pose; bins before firstBin() stand as firstBin() does.
   std::vector<Whitened> whitened(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose) const;
-  /// Nats that a cell gains by a point of this power and channel vector v; noise: v^H Sigma^-1 v, found: |v^H Sigma^-1
-  /// y|^2.
+  /// Nats that a bin gains by a further point of this power and channel vector v. noise: v^H Sigma^-1 v; found:
+  /// |v^H Sigma^-1 y|^2.
   double gainOfPoint(const Whitened& cell, double power, double noise, double found) const;
 
   const ChannelData& data() const { return data_; }
   const LatentSpread& spread() const { return spread_; }
-  int firstBin() const { return 2; }  ///< the radar's own near range is judged apart
-  double weight() const { return 0.5; }
+  int firstBin() const { return 2; }     ///< nearer bins hold the radar's own leakage and are judged apart
+  double weight() const { return 0.5; }  ///< of a cell in the composite likelihood
 
  private:
   int cells(int pose) const { return samples_ + static_cast<int>(data_.poses[pose].beams.size()); }
   bool isBeam(int cell) const { return cell >= samples_; }
   int binOf(int pose, int cell) const;
-  /// Two neighbours of floor_shape that hold for a bin: the first one's index and the second one's share.
+  /// Neighbours in floor_shape that a bin lies between: the first one's index and the second one's share.
   std::pair<int, double> shapeAt(int bin) const;
   const std::complex<double>* dataOf(int pose, int cell) const;
-  /// Power in a cell in which the average is uncertain by noise and by what moves.
+  /// Noise power of the average in a cell, raised where something moves.
   double noiseOf(int pose, int cell) const;
-  /// Adds power that no two channels share, and that a beam's bins share as their window has it.
+  /// Adds power that is independent between channels; in a beam, neighbouring bins share it through the window.
   void addApart(int cell, double power, PackedHermitian& to) const;
-  /// Adds what is not shared between the channels of the echoes that a cell holds so far, or of a change of them.
+  /// Adds the channels' independent share (log_relative) of the echoes that `to` holds, or of a change of them.
   void addRelative(const SessionLatents& nuisance, int cell, PackedHermitian& to) const;
   double rangeVariance_m2(const SessionLatents& nuisance) const;
-  /// Factor of a group's power, and one-way range that its actors add.
+  /// Factor of a group's power, and one-way range that its actors add beyond what its fields hold.
   struct GroupLevel {
     double gain, shift_m;
   };
   std::vector<GroupLevel> levels(const PoseEchoes& echoes, const SessionLatents& nuisance) const;
   PackedHermitian sigma(const PoseEchoes& echoes, const std::vector<GroupLevel>& levels, const SessionLatents& nuisance,
                         int pose, int cell) const;
-  /// Clutter's covariance in a cell, times factor.
+  /// Adds clutter's covariance in a cell, times factor.
   void addClutter(const SessionLatents& nuisance, int pose, int cell, double factor, PackedHermitian& to) const;
   double prior(const SessionLatents& nuisance) const;
   double poseLikelihood(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose) const;
@@ -155,7 +164,7 @@ class ChannelLikelihood {
   double informationOf(double product, double trace_a, double trace_b) const;
 
   const ChannelData& data_;
-  int errors_;  ///< of actors, as errorOf() has them
+  int errors_;  ///< number of the actors' errors, see errorOf()
   PoseAccuracy accuracy_;
   LatentSpread spread_;
   int channels_, samples_;

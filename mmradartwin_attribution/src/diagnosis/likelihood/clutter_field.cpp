@@ -11,11 +11,11 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr double kGrid_m = 0.2;
-constexpr double kHeights_m[] = {-0.6, 0.0, 0.6};  // about the radar
-constexpr double kNearest_m = 0.3;
-constexpr double kElsewhere = 0.05;
-constexpr double kReference_m = 3, kAbout_m = 0.5;
+constexpr double kGrid_m = 0.2;                              ///< spacing of the things in the floor plan
+constexpr double kHeights_m[] = {-0.6, 0.0, 0.6};            ///< of the things, from the radar's
+constexpr double kNearest_m = 0.3;                           ///< things nearer to the radar are left out
+constexpr double kElsewhereShare = 0.05;                     ///< of the power at kReference_m, from no place
+constexpr double kReference_m = 3, kReferenceWidth_m = 0.5;  ///< where the mean power is 1, and to either side of it
 
 }  // namespace
 
@@ -60,7 +60,7 @@ void expectClutter(const Scene& scene, ChannelData& data) {
       }
     }
   });
-  // Mean power over the session by bin; channel 0 has what each has.
+  // Mean power over the session by bin; all channels have the same.
   std::vector<double> mean(static_cast<std::size_t>(bins), 0.0);
   for (const PoseChannels& p : data.poses) {
     for (int b = 0; b < bins; ++b) {
@@ -70,7 +70,7 @@ void expectClutter(const Scene& scene, ChannelData& data) {
   double reference = 0, count = 0, all = 0;
   for (int b = 0; b < bins; ++b) {
     all += mean[static_cast<std::size_t>(b)] / bins;
-    if (std::abs(b * radar.range_bin_m() - kReference_m) > kAbout_m) continue;
+    if (std::abs(b * radar.range_bin_m() - kReference_m) > kReferenceWidth_m) continue;
     reference += mean[static_cast<std::size_t>(b)];
     ++count;
   }
@@ -81,7 +81,7 @@ void expectClutter(const Scene& scene, ChannelData& data) {
       std::complex<float>* packed = p.clutter.at(b, size);
       for (std::size_t j = 0; j < size; ++j) packed[j] *= static_cast<float>(1 / reference);
       const double range_m = std::max(kNearest_m, b * radar.range_bin_m());
-      const double elsewhere = kElsewhere * std::pow(range_m / kReference_m, -3);
+      const double elsewhere = kElsewhereShare * std::pow(range_m / kReference_m, -3);
       for (int k = 0; k < channels; ++k) {
         packed[static_cast<std::size_t>(k) * (k + 3) / 2] += static_cast<float>(elsewhere);
       }

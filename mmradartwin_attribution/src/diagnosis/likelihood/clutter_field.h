@@ -6,9 +6,9 @@
 
 namespace mmradartwin::diagnosis::likelihood {
 
-/// Fills the covariance that small things would have which no scene lists: as likely anywhere in the room as anywhere
-/// else, each with power by r^-4, so that a wall close by leaves little room for them. The mean power of a cell at 3 m
-/// is 1 over the session. One in twenty comes from nowhere in particular: no bin is left without.
+/// Fills PoseChannels::clutter: the covariance of small things that no scene lists. They are equally likely anywhere in
+/// the room, each with a power by r^-4. The mean power of a cell at 3 m over the session is 1. A twentieth more, by
+/// r^-3 and independent between channels, comes from no place: every bin has some.
 void expectClutter(const Scene& scene, ChannelData& data);
 
 }  // namespace mmradartwin::diagnosis::likelihood

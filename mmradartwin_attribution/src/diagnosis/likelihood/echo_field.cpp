@@ -11,21 +11,19 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr int kLobe = 2;   ///< bins to either side that a weak path reaches
-constexpr int kSkirt = 6;  ///< and a strong one
-constexpr int kFarSkirt =
-    32;  ///< and the strongest: at -60 to -100 dB, but where no clutter stands that is above the noise
-// Where a path passes from one of these to the next, its likelihood jumps: where a strong path's skirt ended near, at
-// -30 dB, that was worth 100 nats and looked like a law over range; where it began at -20 dB, 4 nats at a pose, and an
-// attenuation's interval at 154 poses ended short of the truth. At -30 dB 154 poses took more than 2 GiB.
-constexpr double kWeak = 1e-6, kStrong = 0.003;  ///< of the pose's strongest path's power
-constexpr double kLeastResponse = 1e-7;          ///< of the strongest bin of what a receiver made of a path
-constexpr std::size_t kMostBeamBins = 16;
-constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;  ///< of a path's power: a beam that takes less does not see it
+constexpr int kLobe_bins = 2;       ///< reach of a weak path to either side
+constexpr int kSkirt_bins = 6;      ///< reach of a usual path
+constexpr int kFarSkirt_bins = 32;  ///< reach of a strong path: -60 to -100 dB, above the noise where no clutter is
+/// Shares of the power of the pose's strongest path below which a path is weak, and from which on it is strong. The
+/// likelihood jumps where a path passes one of them: see docs/calibration_of_bounds.md, likelihood.
+constexpr double kWeakShare = 1e-6, kStrongShare = 0.003;
+constexpr double kLeastResponse = 1e-7;    ///< share of the strongest bin below which a changed response is left out
+constexpr std::size_t kMostBeamBins = 16;  ///< kMaxChannels
+constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;  ///< share of a path's, of a weak path's power that a beam sees
 
 using Fields = EchoGroup::Fields;
 
-/// What stands in a cell, for which room is made: [kOfCell][size].
+/// Fields of a cell, [kOfCell][size]; makes room for them.
 std::complex<float>* cover(Fields& fields, int cell, std::size_t size) {
   const std::size_t of_cell = Fields::kOfCell * size;
   if (fields.cells == 0) fields.first = cell;
@@ -66,7 +64,7 @@ double hannResponse(double offset) {
 
 namespace {
 
-/// hannResponse() and its slope where a path may reach, straight between entries: right to 2e-6.
+/// Table of hannResponse() and its slope per bin, linear between entries; error below 2e-6.
 class HannTable {
  public:
   HannTable() {
@@ -85,7 +83,7 @@ class HannTable {
   }
 
  private:
-  static constexpr int kPerBin = 512, kSize = (kFarSkirt + 1) * kPerBin;
+  static constexpr int kPerBin = 512, kSize = (kFarSkirt_bins + 1) * kPerBin;
   std::array<double, kSize + 1> response_, slope_;
 };
 const HannTable kHann;
@@ -123,7 +121,7 @@ double EchoCollector::addedRange_m(const PerInteraction<int>& actors) const {
 }
 
 const PerInteraction<int>& actorsOf(const PathRecord& record) {
-  static const PerInteraction<int> lacking{-1};  // a bounce of no actor
+  static const PerInteraction<int> lacking{-1};  // bounces off no actor
   return record.actors.empty() && record.bounces > 0 ? lacking : record.actors;
 }
 
@@ -143,7 +141,7 @@ EchoGroup& EchoCollector::group(const PathRecord& record) {
 void EchoCollector::outer(const std::complex<double>* c, double cosine,
                           std::vector<std::complex<float>>& packed) const {
   packed.resize(size_);
-  if (cosine == 0) {  // no direction to be wrong about
+  if (cosine == 0) {  // nothing that an error of direction changes
     std::size_t i = 0;
     for (int k = 0; k < channels_; ++k) {
       for (int l = 0; l <= k; ++l) packed[i++] = std::complex<float>(c[k] * std::conj(c[l]));
@@ -154,9 +152,9 @@ void EchoCollector::outer(const std::complex<double>* c, double cosine,
   std::size_t i = 0;
   for (int k = 0; k < channels_; ++k) {
     for (int l = 0; l <= k; ++l) {
-      // A direction known to angle_error: E exp(j(s_k - s_l)e) of a normal e.
+      // Expectation of exp(j(s_k - s_l)e) over a normal error e of the direction.
       const double apart = element_phase_[k] - element_phase_[l], x = spread * apart * apart;
-      const double known = x < 0.01 ? 1 - x + 0.5 * x * x : std::exp(-x);  // to single precision
+      const double known = x < 0.01 ? 1 - x + 0.5 * x * x : std::exp(-x);  // equal in single precision
       packed[i++] = std::complex<float>(c[k] * std::conj(c[l]) * known);
     }
   }
@@ -164,7 +162,7 @@ void EchoCollector::outer(const std::complex<double>* c, double cosine,
 
 namespace {
 
-/// Fields of a group while its paths are added, of all bins. Kept from group to group, zero where nothing was added.
+/// Fields of all bins of a group while its paths are added. The memory is kept from group to group and zero between.
 struct OpenFields {
   std::vector<std::complex<float>> sums;
   std::vector<float> cosine;
@@ -216,12 +214,12 @@ std::shared_ptr<const EchoGroup> EchoCollector::addTones(const std::vector<const
 }
 
 void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g) {
-  const bool weak = share < kWeak;
+  const bool weak = share < kWeakShare;
   const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + g.added_range_m) / bin_m_;
   thread_local std::vector<std::complex<float>> packed;
   outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error drowns in the others
-  const bool strong = share >= kStrong;
-  const int reach = weak ? kLobe : strong ? std::min(kFarSkirt, samples_ / 2 - 1) : kSkirt;
+  const bool strong = share >= kStrongShare;
+  const int reach = weak ? kLobe_bins : strong ? std::min(kFarSkirt_bins, samples_ / 2 - 1) : kSkirt_bins;
   const int middle = static_cast<int>(std::lround(place));
   if (middle + reach < 0 || middle - reach > samples_ - 1) return;
   // Spectra are periodic: the skirt of an echo near the first bin stands in the last ones.
@@ -249,7 +247,7 @@ void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, con
   int first = 0, last = samples_ - 1;
   while (level[first] < least) ++first;
   while (level[last] < least) --last;
-  // Responses and their derivatives as one: what a shift makes of their outer products is then definite again.
+  // Responses and their derivatives are taken together: the covariance stays definite when it is shifted.
   std::vector<std::complex<float>> packed;
   const auto addProducts = [&](Fields& f, int at, const Eigen::VectorXcd& c, const Eigen::VectorXcd& d, double turns) {
     std::complex<float>*power = cover(f, at, size_), *shift = power + size_, *curvature = shift + size_;
@@ -282,7 +280,7 @@ void EchoCollector::addToBeams(const std::complex<double>* c, double place, doub
   for (std::size_t b = 0; b < beams_.size(); ++b) {
     const EchoBeam& beam = beams_[b];
     const double middle = place - beam.first_bin;
-    if (middle < -kLobe || middle > channels_ - 1 + kLobe) continue;
+    if (middle < -kLobe_bins || middle > channels_ - 1 + kLobe_bins) continue;
     std::complex<double> formed = 0;
     for (int k = 0; k < channels_; ++k) formed += std::conj(beam.weights[k]) * c[k];
     const double level = std::norm(formed);

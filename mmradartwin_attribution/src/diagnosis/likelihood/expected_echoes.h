@@ -3,14 +3,15 @@
 #include <array>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "diagnosis/catalogue/default_mechanism.h"
 #include "diagnosis/channels/channel_data.h"
 #include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/likelihood/path_matching.h"
 #include "diagnosis/likelihood/receiver_mixture.h"
+#include "diagnosis/likelihood/traced_paths.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_sim/twin.h"
 
@@ -23,23 +24,8 @@ struct PoseAccuracy {
   double path_range_m = 0.005;
 };
 
-/// How far a change of mechanisms moves one echo.
-struct PathShift {
-  std::size_t place;  ///< of its pose among the poses named
-  const std::string* event;
-  PerInteraction<int> facets, actors;
-  double amplitude;
-  double range_m, azimuth_rad;
-};
-
-/// How far it moves echoes on the whole.
-struct EchoShift {
-  std::vector<double> range_m;      ///< [actors] one-way, mean over echoes that meet this actor alone, by amplitude
-  std::vector<double> azimuth_rad;  ///< [poses named] the same over a pose's echoes
-};
-
-/// The expected channels of a session for any list of mechanisms. Paths are traced once per mechanism and geometry;
-/// what only weighs or receives traces nothing (DESIGN section 4).
+/// Expected channels of a session for any list of mechanisms: paths (TracedPaths), received and collected into groups
+/// of echoes. Mechanisms that only weigh or receive paths trace nothing.
 class ExpectedEchoes {
  public:
   /// Keeps references to base and data.
@@ -49,95 +35,74 @@ class ExpectedEchoes {
   /// where the scene does not know what a mechanism names.
   std::vector<PoseEchoes> echoes(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
                                  const std::vector<double>& actor_range_m);
-  /// Of all poses.
+  /// Echoes of all poses.
   std::vector<PoseEchoes> echoes(const std::vector<NamedParameters>& mechanisms,
                                  const std::vector<double>& actor_range_m = {});
-  /// The same a small step away from `from`, of the paths that both have: what comes or goes within the step says
-  /// nothing about the slope, nor does what grazes, which is left out where the geometry is another.
+  /// Echoes a small step away from `from`, made of the paths that both have. Paths that come or go within the step say
+  /// nothing about a slope, nor do grazing paths, which are left out where the geometry differs.
   std::vector<PoseEchoes> echoesNear(const std::vector<NamedParameters>& mechanisms,
                                      const std::vector<NamedParameters>& from, const std::vector<int>& poses,
                                      const std::vector<double>& actor_range_m);
-  /// What `mechanisms` do to the echoes that they share with `from`, those of scatter points left out.
+  /// Shifts of the echoes that `mechanisms` and `from` have in common, scatter points left out.
   std::vector<PathShift> pathShifts(const std::vector<NamedParameters>& mechanisms,
                                     const std::vector<NamedParameters>& from, const std::vector<int>& poses);
+  /// Mean of pathShifts() by actor and by pose.
   EchoShift shift(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& from,
                   const std::vector<int>& poses, int actors);
-  /// What hypotheses are compared with from now on: paths of other mechanisms are forgotten (memory stays bounded so),
-  /// and what grazes an edge within the pose's accuracy is found for these.
-  void setBaseline(const std::vector<NamedParameters>& mechanisms);
-  /// Points beams at what the mechanisms expect, in the data given to the constructor.
+  /// Sets the mechanisms that hypotheses are compared with from now on. Paths of other mechanisms are forgotten, which
+  /// bounds the memory, and the grazing paths of these are found.
+  void setBaseline(const std::vector<NamedParameters>& mechanisms) { paths_.setBaseline(mechanisms); }
+  /// Points beams at the echoes expected of the mechanisms, in the data given to the constructor.
   void pointBeams(ChannelData& data, const std::vector<NamedParameters>& mechanisms, int first_bin);
   /// True where the mechanism edits the scene or moves the radar: trying it traces everything again.
-  bool altersGeometry(const NamedParameters& mechanism);
+  bool altersGeometry(const NamedParameters& mechanism) { return paths_.altersGeometry(mechanism); }
   const Twin& base() const { return base_; }
 
  private:
-  using Paths = std::vector<PathRecord>;
-  /// By pose; null where not traced. What a change does not touch is shared with what stood before it.
-  using Traced = std::vector<std::shared_ptr<const Paths>>;
-  /// Paths of one mechanism, and, of a small step, those that it starts from.
+  using Paths = TracedPaths::Paths;
+  /// Paths of one mechanism and, for a small step, those that it starts from.
   struct Part {
-    const Traced* there;
-    const Traced* here = nullptr;
+    const TracedPaths::ByPose* there;
+    const TracedPaths::ByPose* here = nullptr;
   };
-  /// Paths of one of the mechanisms.
-  const Traced& traced(const std::vector<NamedParameters>& geometry, const NamedParameters& mechanism,
-                       const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
-  /// True where its receiver makes of a path more than its tone in all channels (an image, a harmonic).
-  bool mixesRanges(const NamedParameters& mechanism);
-  std::shared_ptr<const Twin> twinOf(const std::vector<NamedParameters>& mechanisms);
-  std::vector<int> everyPose() const;
-  /// Keeps memory bounded while one hypothesis' geometry is searched for.
-  void forgetLongUnused();
-  std::vector<NamedParameters> geometryOf(const std::vector<NamedParameters>& mechanisms);
-  /// grazing: of these paths, by pose; none where it is null.
-  std::vector<PoseEchoes> collect(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
-                                  const std::vector<double>& actor_range_m, const std::vector<Part>& parts,
-                                  const Traced* grazing);
-  /// Adds records as their tones, those that meet the same actors together; what is the same as before is not collected
-  /// again.
-  void addGroups(std::size_t pose, const std::vector<PathRecord>& records, double strongest, EchoCollector& to);
-  /// What of a geometry's paths is uncertain within the pose's accuracy.
-  const Traced& grazing(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
-  std::shared_ptr<const Paths> grazeAt(const Twin& twin, std::size_t pose) const;
-
-  const Twin& base_;
-  const ChannelData& data_;
-  PoseAccuracy accuracy_;
-  struct Entry {
-    Traced paths;
-    std::size_t used = 0;  // when, in calls
+  /// Everything that echoes follow from: paths, and what is made of them alike at all poses.
+  struct Collection {
+    const std::vector<Part>& parts;
+    const TracedPaths::ByPose* grazing;  ///< null where they are left out
+    const std::vector<double>& actor_range_m;
+    std::shared_ptr<const Twin> twin = {};
+    std::shared_ptr<const Twin> without_mixing = {};  ///< without what mixes ranges; null where nothing does
+    std::size_t mixing_key = 0;                       ///< tells one receiver that mixes from another
+    std::size_t signature = 0;                        ///< of weights and actor_range_m
   };
-  std::map<std::string, Entry> cache_;
-  std::size_t calls_ = 0;
-  struct Kept {
+  /// Group of echoes that was collected before.
+  struct KeptGroup {
     std::size_t signature = 0;
     std::shared_ptr<const EchoGroup> group;
   };
-  /// [poses] by actors: one that was met again last, and the last one that was new.
-  std::vector<std::map<PerInteraction<int>, std::array<Kept, 2>>> kept_;
-  /// What was collected of the same paths, weighed alike: as kept_. Holds the paths, so that no others come to stand
-  /// there.
+  /// Echoes of a pose that were collected before. Holds their paths, so that no others take their address.
   struct KeptPose {
     std::size_t signature = 0;
     std::vector<std::shared_ptr<const Paths>> paths;
     PoseEchoes echoes;
   };
+  /// True where a mechanism's receiver makes of a path more than its tone in all channels (an image, a harmonic).
+  bool mixesRanges(const NamedParameters& mechanism);
+  std::vector<PoseEchoes> collect(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses,
+                                  Collection collection);
+  PoseEchoes collectAt(const Collection& collection, std::size_t pose);
+  /// Adds records as tones, grouped by actors. A group that is the same as before is not collected again.
+  void addGroups(std::size_t pose, const std::vector<PathRecord>& records, double strongest, EchoCollector& to);
+
+  const Twin& base_;
+  const ChannelData& data_;
+  PoseAccuracy accuracy_;
+  TracedPaths paths_;
+  std::map<std::string, bool> mixes_ranges_;  // by mechanism name
+  // By pose. Two are kept: the one that was met again last, and the last new one.
+  std::vector<std::map<PerInteraction<int>, std::array<KeptGroup, 2>>> kept_groups_;
   std::vector<std::array<KeptPose, 2>> kept_poses_;
-  std::vector<ReceiverMixture::Cache> mixed_;  // by pose
-  std::map<std::string, Entry> grazing_;       // by what moves actors or the radar
-  std::vector<std::string> settled_;
-  enum class Geometry { kSame, kMoreScreens, kOther };
-  struct Edit {
-    Geometry geometry = Geometry::kSame;
-    std::optional<Twin::PlacedActor> placed = {};
-  };
-  /// True where it only puts something beside paths that are known without it.
-  static bool addsToOthers(const Edit& edit);
-  const Edit& editOf(const NamedParameters& mechanism);
-  std::map<std::string, Edit> edits_;                                       // by mechanism text
-  std::vector<std::pair<std::string, std::shared_ptr<const Twin>>> twins_;  // last used first
-  std::map<std::string, bool> mixes_ranges_;                                // by mechanism name
+  std::vector<ReceiverMixture::Cache> mixed_;
 };
 
 }  // namespace mmradartwin::diagnosis::likelihood

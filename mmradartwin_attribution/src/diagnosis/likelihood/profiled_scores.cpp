@@ -24,7 +24,7 @@ ProfiledScores profiledScores(const Scores& s, int globals) {
   if (locations > 1 && n > 0) {
     const Eigen::MatrixXd centred = e.by_location.rowwise() - e.by_location.colwise().mean();
     e.scatter = centred.transpose() * centred * (locations / (locations - 1));
-    // Errors of actors are the same at all places: no scatter over places shows them, their priors do.
+    // An actor's error is the same at all places: scatter over places does not show it, its prior does.
     e.scatter += projection.transpose() * s.prior.asDiagonal() * projection;
     const Eigen::MatrixXd ratio = e.information.ldlt().solve(e.scatter);
     e.overdispersion = std::min(ratio.trace() / static_cast<double>(n), kMostOverdispersion);

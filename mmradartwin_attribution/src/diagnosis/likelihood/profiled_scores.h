@@ -8,32 +8,33 @@
 
 namespace mmradartwin::diagnosis::likelihood {
 
-constexpr double kSmallStep = 0.125;        ///< of a coordinate's scale, for derivatives
-constexpr double kMostOverdispersion = 50;  ///< of a gain's or a score's scatter over places
+constexpr double kSmallStep = 0.125;        ///< step of numerical derivatives, in a coordinate's scale
+constexpr double kMostOverdispersion = 50;  ///< bound of every overdispersion over places
 
-/// Scores of a hypothesis' coordinates with everything else of the model refitted to first order.
+/// Scores of a hypothesis' coordinates with everything else of the model refitted to first order (Schur complement).
 struct ProfiledScores {
-  Eigen::MatrixXd by_location;  // [L][n]
-  Eigen::MatrixXd information;  // [n][n]
-  Eigen::MatrixXd scatter;      // [n][n] of the scores' sums, over places and the latents' priors
-  Eigen::VectorXd total;
-  double overdispersion = 1;  ///< of their scatter over places against what the likelihood expects
+  Eigen::MatrixXd by_location;  ///< [locations][n]
+  Eigen::MatrixXd information;  ///< [n][n]
+  Eigen::MatrixXd scatter;      ///< [n][n] covariance of the total score, from its scatter over places and the priors
+  Eigen::VectorXd total;        ///< [n]
+  double overdispersion = 1;    ///< scatter over places against what the likelihood expects
 };
 
-/// An information that can be solved with, also where a direction does nothing.
+/// Information with a tiny diagonal added: can be solved with also where a direction does nothing.
 Eigen::MatrixXd regularised(Eigen::MatrixXd information);
 ProfiledScores profiledScores(const Scores& scores, int globals);
-/// Of a gain that scatters over places more than one by chance would: of G nats, sqrt(2 G).
+/// Factor by which a gain's variance over places exceeds that of a gain by chance (2 G for G nats); 1 to
+/// kMostOverdispersion.
 double overdispersionOf(double gain, const std::vector<double>& by_location);
-/// The same for what is there or not, whose paths may be seen from few places: those that see none do not gain, and it
-/// is those that lose that tell of chance.
+/// Overdispersion of the gain of something that is there or not. Few places may see it, so that its gain is uneven by
+/// nature: only places that lose are counted.
 double overdispersionOfPresence(double gain, const std::vector<double>& by_location);
-/// A change of covariances by `per`. of[i] is of poses[i], from is of all poses.
+/// Change of covariances from `from` to `of`, divided by `per`. of[i] is of poses[i], from is of all poses.
 SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, const std::vector<int>& poses,
                              double per);
-/// The same between two sides; both are of the same poses.
+/// Change of covariances between two sides, divided by `per`; both are of the same poses.
 SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, double per);
-/// With no error of this actor's own.
+/// Latents with the errors of one actor set to zero.
 SessionLatents withoutErrors(SessionLatents nuisance, int actor);
 
 }  // namespace mmradartwin::diagnosis::likelihood

@@ -10,11 +10,12 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-// Of the pose's strongest echo's power; what is made of weaker paths lies below all clutter.
-constexpr double kStrong = 1e-2;
-constexpr std::size_t kMostPaired = 8;
-constexpr double kNothing = 1e-12;  ///< of a path's power: rounding
-constexpr std::size_t kMostKept = 64;
+/// Share of the power of the pose's strongest echo from which on a path is sent through the receiver; products of
+/// weaker paths lie below all clutter.
+constexpr double kStrongShare = 1e-2;
+constexpr std::size_t kMostPaired = 8;    ///< paths whose products in pairs are made
+constexpr double kRoundingShare = 1e-12;  ///< of a path's power
+constexpr std::size_t kMostKept = 64;     ///< responses of a pose
 
 /// Derivative of a path's samples by its one-way range, per metre, the phase in the window's middle held.
 ComplexGrid byRange(const RadarConfig& radar, const ComplexGrid& x) {
@@ -27,7 +28,7 @@ ComplexGrid byRange(const RadarConfig& radar, const ComplexGrid& x) {
   return slope;
 }
 
-/// One of both paths' actors, whose errors a product of the two has.
+/// Record of a product of two paths: it has the errors of the actors of both.
 PathRecord productOf(const PathRecord& a, const PathRecord& b) {
   PathRecord product = a;
   product.actors.insert(product.actors.end(), b.actors.begin(), b.actors.end());
@@ -62,7 +63,7 @@ void ReceiverMixture::send(Alone& path) const {
   if (path.sent) return;
   path.sent = true;
   path.x = through(twin_, {path.path}) - nothing_;
-  // What stays in the path's own tone belongs to it, the rest is an echo of its own.
+  // The part along the path's own tone belongs to the path; the rest is an echo of its own.
   const ComplexGrid tone = through(linear_, {path.path});
   const std::complex<double> kept =
       tone.conjugate().cwiseProduct(path.x).sum() / std::max(tone.squaredNorm(), std::numeric_limits<double>::min());
@@ -73,7 +74,7 @@ void ReceiverMixture::send(Alone& path) const {
 void ReceiverMixture::scaleTones(std::vector<PathRecord>& paths, const EchoCollector& collector) {
   std::sort(paths.begin(), paths.end(),
             [](const PathRecord& a, const PathRecord& b) { return a.amplitude > b.amplitude; });
-  const double least = paths.empty() ? 0 : std::sqrt(kStrong) * paths.front().amplitude;
+  const double least = paths.empty() ? 0 : std::sqrt(kStrongShare) * paths.front().amplitude;
   for (PathRecord& r : paths) {
     if (r.amplitude <= least) break;
     Alone path{r, receiver_};
@@ -98,7 +99,7 @@ void ReceiverMixture::scaleTones(std::vector<PathRecord>& paths, const EchoColle
 std::shared_ptr<const EchoGroup> ReceiverMixture::groupOf(const PathRecord& record, const ComplexGrid& x,
                                                           EchoCollector& collector) const {
   const SignalChain chain(radar_);
-  const double window = 0.5 * radar_.samples_per_chirp;  // Hann's sum
+  const double window = 0.5 * radar_.samples_per_chirp;  // sum of the Hann window
   const auto spectra = [&](const ComplexGrid& grid) -> Eigen::MatrixXcd { return chain.rangeSpectra(grid) / window; };
   collector.add(record, spectra(x), spectra(byRange(radar_, x)));
   return collector.finishGroup();
@@ -126,7 +127,7 @@ void ReceiverMixture::addTo(EchoCollector& collector) {
                        send(alone_[b]);
                        const ComplexGrid x =
                            through(twin_, {alone_[a].path, alone_[b].path}) - nothing_ - alone_[a].x - alone_[b].x;
-                       if (x.squaredNorm() <= kNothing * alone_[a].x.norm() * alone_[b].x.norm()) return nullptr;
+                       if (x.squaredNorm() <= kRoundingShare * alone_[a].x.norm() * alone_[b].x.norm()) return nullptr;
                        return groupOf(productOf(alone_[a].received, alone_[b].received), x, collector);
                      }) ||
                  products;
@@ -137,12 +138,12 @@ void ReceiverMixture::addTo(EchoCollector& collector) {
     boost::hash_combine(signature, products);
     add(signature, [&]() -> std::shared_ptr<const EchoGroup> {
       send(path);
-      if (path.rest.squaredNorm() <= kNothing * path.x.squaredNorm()) return nullptr;
+      if (path.rest.squaredNorm() <= kRoundingShare * path.x.squaredNorm()) return nullptr;
       return groupOf(products ? productOf(path.received, path.received) : path.received, path.rest, collector);
     });
   }
   if (nothing_.squaredNorm() > 0) {
-    PathRecord fixed;  // to the radar: it turns with it and has no range
+    PathRecord fixed;  // fixed to the radar: turns with it and has no range
     fixed.departure = fixed.arrival = Eigen::Vector3d::UnitY();
     fixed.length_m.assign(static_cast<std::size_t>(radar_.channels()), 0.0);
     groupOf(fixed, nothing_, collector);

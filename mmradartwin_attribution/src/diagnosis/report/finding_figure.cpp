@@ -13,11 +13,11 @@ namespace mmradartwin::diagnosis::report {
 namespace {
 
 constexpr int kHeight_px = 470, kMargin_px = 34;
-constexpr double kLimit_db = 12;  ///< of the maps' colours
+constexpr double kLimit_db = 12;  ///< end of the maps' colour scale
 const cv::Scalar kPaper(255, 255, 255), kInk(40, 40, 40), kSoft(205, 205, 205), kWall(150, 150, 150),
     kBlue(200, 100, 20), kRed(30, 30, 220), kFaint(170, 170, 240);
 
-/// A part of map drawn upright, x to the right.
+/// A part of the map, drawn with x to the right and y up.
 class PlanView {
  public:
   explicit PlanView(const Eigen::AlignedBox2d& shown)
@@ -44,7 +44,7 @@ class PlanView {
   cv::Mat picture_;
 };
 
-/// Whole metres about all that is to be seen.
+/// Whole metres around walls, stations and places.
 Eigen::AlignedBox2d extent(const SurveyPlan& plan, const std::vector<Eigen::Vector2d>& places) {
   Eigen::AlignedBox2d box;
   for (const SurveyPlan::Wall& w : plan.walls) box.extend(w.from_m).extend(w.to_m);
@@ -65,7 +65,7 @@ void drawGrid(PlanView& view, const Eigen::AlignedBox2d& shown) {
   }
 }
 
-/// How a finding says that its actor moved, in the floor plane about `to_m`, where its middle then is.
+/// Move of an actor in the floor plane, by a mechanism actor_moved that leaves its middle at `to_m`.
 Eigen::Isometry2d moveOf(const NamedParameters& moved, const Eigen::Vector2d& to_m) {
   const Eigen::Vector2d by_m(moved.values.number("dx_m"), moved.values.number("dy_m"));
   return Eigen::Translation2d(to_m) * Eigen::Rotation2Dd(moved.values.number("dyaw_deg") * M_PI / 180) *

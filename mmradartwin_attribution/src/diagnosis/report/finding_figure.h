@@ -8,8 +8,8 @@
 
 namespace mmradartwin::diagnosis::report {
 
-/// The maps' differences without and with the finding, where it has any, and the survey from above with the poses and
-/// actors that carry it and the place where it sits.
+/// Figure of a finding: the maps' differences without and with it, where the finding has maps, and beside them the
+/// survey from above with the finding's poses, actors and places.
 cv::Mat drawFinding(const Finding& finding, const SurveyPlan& plan);
 
 }  // namespace mmradartwin::diagnosis::report

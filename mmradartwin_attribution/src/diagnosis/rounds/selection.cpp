@@ -174,7 +174,7 @@ void Selection::profileFound() {
     parts.push_back(a.hypothesis);
     fits.push_back({a.scaled_values, a.standard_error});
   }
-  profileParts(source_, model_, before_rounds_, state_.nuisance, accuracy_, parts, fits);
+  profileParts({source_, model_, accuracy_, before_rounds_, state_.nuisance}, parts, fits);
   for (std::size_t i = 0; i < accepted_.size(); ++i) {
     Accepted& a = accepted_[i];
     a.scaled_values = fits[i].scaled_values;

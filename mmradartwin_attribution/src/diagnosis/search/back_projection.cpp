@@ -10,16 +10,20 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kGrid_m = 0.1;
-constexpr double kNearest_m = 0.4;
-constexpr double kWidest_sine = 0.95;
-constexpr double kSizes_m[] = {0.04, 0.15, 0.3, 0.5};  // diameters that are tried
-constexpr double kLateGrid_m = 0.2, kLeastLate_m = 0.4, kMostLate_m = 3;
-constexpr double kLateRcs_dbsm[] = {-15, -5, 5}, kLeastRcs_dbsm = -25;  ///< less is what lies about
-constexpr double kWide_m[] = {0.12, 0.25};                              // radii of something wide
-constexpr double kApart_m = 0.5;
-constexpr std::size_t kMostPlaces = 4;
-constexpr double kNearby_m = 0.6, kLargest_m = 2.5;  // of an actor that may have been moved to a place
+constexpr double kGrid_m = 0.1, kLateGrid_m = 0.2;     ///< spacing of the places, of those of late points
+constexpr double kNearest_m = 0.4;                     ///< to the radar, for a pose to see a place
+constexpr double kWidest_sine = 0.95;                  ///< of the azimuth at which a pose sees a place
+constexpr double kSizes_m[] = {0.04, 0.15, 0.3, 0.5};  ///< diameters that are tried
+constexpr double kLeastLate_m = 0.4, kMostLate_m = 3;  ///< of a late echo behind its place
+constexpr double kLateRcs_dbsm[] = {-15, -5, 5};       ///< levels of late points that are tried
+constexpr double kLeastRcs_dbsm = -25;                 ///< small things lie about with less
+constexpr double kWide_m[] = {0.12, 0.25};             ///< radii of something wide
+constexpr double kApart_m = 0.5;                       ///< between places that are kept
+constexpr std::size_t kMostPlaces = 4;                 ///< kept
+constexpr double kMostCells = 1e6;                     ///< of a room that is searched
+constexpr double kNearby_m = 0.6;                      ///< from a place, for an actor that may have been moved there
+constexpr double kLargest_m = 2.5;                     ///< diagonal of an actor that can be moved
+constexpr double kOffset_m = 0.1;                      ///< typical change of a place that is fitted
 
 std::string placeName(const ProjectedPlace& place) {
   std::ostringstream at;
@@ -27,10 +31,10 @@ std::string placeName(const ProjectedPlace& place) {
   return at.str();
 }
 
-/// What may stand at a place, as seen from a pose.
+/// Thing that may stand at a place.
 struct Source {
-  double size_m = 0;                  ///< diameter of an upright metal cylinder, whose nearest line echoes; 0: a point,
-  double behind_m = 0, rcs_dbsm = 0;  ///< that answers late
+  double size_m = 0;                  ///< diameter of an upright metal cylinder, whose nearest line echoes; 0: a point
+  double behind_m = 0, rcs_dbsm = 0;  ///< of a point: how late it answers, and its level
 };
 
 }  // namespace
@@ -43,13 +47,14 @@ Eigen::Vector2d awayFromRadar(const ChannelData& data, const Eigen::Vector2d& pl
 
 namespace {
 
-/// One more source at every place of a grid over the scene, all poses together and nothing refitted; best first.
+/// Nats of one more source at every place of a grid over the scene, all poses together and nothing refitted; best
+/// first.
 std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& model, const ModelState& null,
                                     const std::vector<Source>& sources, double grid_m) {
   const ChannelData& data = model.data();
   const RadarConfig& radar = data.radar;
   const int channels = radar.channels(), samples = radar.samples_per_chirp;
-  // All that the test needs of a bin.
+  // Covariances of all bins, inverted once.
   std::vector<std::vector<ChannelLikelihood::Whitened>> cells(data.poses.size());
   tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t i) {
     cells[i] = model.whitened(null.echoes[i], null.nuisance, static_cast<int>(i));
@@ -57,7 +62,7 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
   Eigen::AlignedBox3d bounds;
   for (const Actor& a : twin.scene().actors) bounds.extend(a.bounds);
   const int nx = static_cast<int>(bounds.sizes().x() / grid_m), ny = static_cast<int>(bounds.sizes().y() / grid_m);
-  if (nx < 1 || ny < 1 || static_cast<double>(nx) * ny > 1e6) return {};
+  if (nx < 1 || ny < 1 || static_cast<double>(nx) * ny > kMostCells) return {};
   std::vector<ProjectedPlace> places(static_cast<std::size_t>(nx) * ny);
   const double wave = 2 * M_PI / radar.wavelength_m(), gain = std::exp(null.nuisance.log_gain);
   tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t j) {
@@ -75,7 +80,7 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
       const double r = way.norm();
       if (r < kNearest_m || way.x() <= 0 || std::abs(way.y()) > kWidest_sine * r) continue;
       for (int k = 0; k < channels; ++k) v[k] = std::polar(1.0, -wave * radar.virtual_element_m(k).y() * way.y() / r);
-      double looked_m = -1;  // radius at which the line of sight was looked at
+      double looked_m = -1;  // radius for which `visible` holds
       bool visible = false;
       for (std::size_t k = 0; k < sources.size(); ++k) {
         const Source& s = sources[k];
@@ -89,7 +94,7 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
         if (!visible) continue;
         const ChannelLikelihood::Whitened& cell = cells[i][static_cast<std::size_t>(bin)];
         const double w = hannResponse(bin - at_m / radar.range_bin_m());
-        // Of a metal cylinder: (lambda/(8 pi r))^2 a/(a + r); of a point: lambda^2 sigma/((4 pi)^3 r^4).
+        // Power of a metal cylinder: (lambda/(8 pi r))^2 a/(a + r); of a point: lambda^2 sigma/((4 pi)^3 r^4).
         const double level = radar.wavelength_m() / (8 * M_PI * near_m);
         const double spread =
             radius_m > 0 ? radius_m / (radius_m + near_m) : std::pow(10.0, s.rcs_dbsm / 10) / (M_PI * near_m * near_m);
@@ -98,7 +103,7 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
       }
     }
     for (std::size_t k = 0; k < sources.size(); ++k) {
-      // What one place sees alone is no object.
+      // The place that gains most does not count: something that only one place sees is no object.
       const auto nats = gained.col(static_cast<Eigen::Index>(k));
       const double broad = nats.sum() - std::max(0.0, nats.maxCoeff());
       if (broad <= place.screened_nats) continue;
@@ -113,8 +118,8 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
   return places;
 }
 
-/// The best that lie apart, from each other and from what the twin has by that mechanism: what remains around it is of
-/// its shape.
+/// The best places that lie apart from each other and from the twin's own things of that mechanism: residuals around
+/// one of them come from its shape.
 std::vector<ProjectedPlace> apart(const std::vector<ProjectedPlace>& places, const ModelState& null,
                                   const std::string& mechanism) {
   std::vector<ProjectedPlace> known;
@@ -175,7 +180,7 @@ void freePlace(const ChannelData& data, Screened& object) {
   Hypothesis& h = object.hypothesis;
   const Eigen::Vector2d place(h.mechanism.values.number("x_m"), h.mechanism.values.number("y_m"));
   const bool late = h.mechanism.mechanism == "empirical_echo";
-  std::vector<std::pair<const char*, double>> free = {{"y_m", 0.1}, {"x_m", 0.1}};
+  std::vector<std::pair<const char*, double>> free = {{"y_m", kOffset_m}, {"x_m", kOffset_m}};
   if (late) free.insert(free.begin(), {"behind_m", 0.5 * data.radar.range_bin_m()});
   for (const auto& [key, step_m] : free) {
     const double at_m = h.mechanism.values.number(key);
@@ -184,7 +189,7 @@ void freePlace(const ChannelData& data, Screened& object) {
     for (std::vector<double>& start : object.starts) start.insert(start.begin(), 0.0);
   }
   if (late) return;
-  // What echoes is the side that faces the radar: of something wide the axis stands behind it.
+  // The side that faces the radar echoes: the axis of something wide stands behind the place.
   const Eigen::Vector2d away = awayFromRadar(data, place);
   for (double radius_m : kWide_m) {
     const Eigen::Vector2d axis = place + radius_m * away;

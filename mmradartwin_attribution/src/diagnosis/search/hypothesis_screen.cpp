@@ -10,21 +10,24 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kSome = 0.3, kLittle = 0.05;  ///< of the scale, where what rises from nothing is looked at first
-constexpr double kMore[] = {4, 16};            ///< of the scale, as long as that gains
-constexpr double kInstead[] = {0.7, 1, 1.5};   ///< of the scale, where latents have stood in for it
-constexpr double kStoodIn = 1;                 ///< nats of theirs
-constexpr double kShifts_m[] = {-0.3, -0.14, -0.06, 0.06, 0.14, 0.3};  ///< of all of an actor's echoes
-constexpr double kRadii[] = {1, 2, 4, 7};  ///< of the scale, about a place where an object may have stood before
-constexpr double kFiner[] = {0.35, 0.18};  ///< of the distance of the best of them
-constexpr int kDirections = 8;
-constexpr double kTurns_deg[] = {-8, -5, -3, 3, 5, 8};  ///< of that object about itself
-constexpr std::size_t kLookedAtFirst = 3;               ///< every third pose,
-constexpr double kHopeless = 60;  ///< and nats, of all poses, that a value loses there to be looked at no more
-constexpr std::size_t kStartsKept = 6;
-constexpr double kNearlyAsLikely = 10;  ///< nats that a place may be less likely, before latents settle there
+// Values of a coordinate are in its scale: 0 does nothing, 1 is typical.
+constexpr double kSome = 0.3, kLittle = 0.05;  ///< first values of something that rises from nothing
+constexpr double kMore[] = {4, 16};            ///< further ones, as long as they gain
+constexpr double kEdges[] = {0.8, 1.0, 1.3};   ///< of a steep edge among the tones
+constexpr double kInstead[] = {0.7, 1, 1.5};   ///< values where latents have stood in for a material
+constexpr double kStoodIn_nats = 1;            ///< least nats of those latents
+constexpr double kShifts_m[] = {-0.3, -0.14, -0.06, 0.06, 0.14, 0.3};  ///< of all echoes of an actor
+constexpr double kRadii[] = {1, 2, 4, 7};                              ///< about the place where an actor stood before
+constexpr double kFiner[] = {0.35, 0.18};                              ///< shares of the best one's distance
+constexpr int kDirections = 8;                                         ///< at each radius
+constexpr double kTurns_deg[] = {-8, -5, -3, 3, 5, 8};                 ///< of an actor about itself
+constexpr std::size_t kLookedAtFirst = 3;                              ///< every third pose is looked at first
+constexpr double kHopeless_nats = 60;        ///< loss of all poses by which a value is given up then
+constexpr std::size_t kStartsKept = 6;       ///< of several
+constexpr double kNearlyAsLikely_nats = 10;  ///< loss for which a place is still looked at with settled latents
+constexpr double kMostStart = 8, kLeastOneSidedStart = 0.02;  ///< bounds of a start
 
-/// Without gains of their own of the actors of a material; and nats of what is known of those beforehand.
+/// Latents without own gains of a material's actors, and the nats that the prior charged for these gains.
 std::pair<SessionLatents, double> withoutGains(SessionLatents nuisance, const Scene& scene, const std::string& material,
                                                double spread) {
   double nats = 0;
@@ -81,7 +84,7 @@ std::pair<double, double> HypothesisScreen::valueAt(const ModelState& null, cons
   std::vector<double> there = likelihoodsAt(null, hypothesis, scaled_values, looked_at, nuisance);
   auto [gain, screened_nats] = promiseOf(null, hypothesis, there, looked_at);
   gain *= static_cast<double>(poses.size()) / static_cast<double>(looked_at.size());
-  if (gain < beside - kHopeless) return {gain, screened_nats};
+  if (gain < beside - kHopeless_nats) return {gain, screened_nats};
   const std::vector<double> more = likelihoodsAt(null, hypothesis, scaled_values, rest, nuisance);
   there.insert(there.end(), more.begin(), more.end());
   looked_at.insert(looked_at.end(), rest.begin(), rest.end());
@@ -91,8 +94,8 @@ std::pair<double, double> HypothesisScreen::valueAt(const ModelState& null, cons
 std::vector<double> HypothesisScreen::likelihoodsAt(const ModelState& null, const Hypothesis& hypothesis,
                                                     const std::vector<double>& scaled_values,
                                                     const std::vector<int>& poses, const SessionLatents& nuisance) {
-  // About the same ranges as the null's, so that a hypothesis that does nothing gains nothing; but for an actor whose
-  // own error was changed.
+  // Echoes are collected about the null's ranges, so that a hypothesis that does nothing gains nothing. An actor whose
+  // error was changed has its new range.
   std::vector<double> about_m = null.actor_range_m;
   for (std::size_t a = 0; a < about_m.size(); ++a) {
     if (nuisance.actor_range_m[a] != null.nuisance.actor_range_m[a]) about_m[a] = nuisance.actor_range_m[a];
@@ -134,7 +137,7 @@ std::pair<double, double> HypothesisScreen::promiseOf(const ModelState& null, co
     by_location[static_cast<std::size_t>(model_.data().poses[pose].location)] += v;
   }
   const double whole = static_cast<double>(null.echoes.size()) / static_cast<double>(poses.size());
-  // All places see what a geometry does; what is there or not, or elsewhere, gains at the few that see it.
+  // A geometry acts at all places; something that is there or not, or elsewhere, gains at the few that see it.
   const double overdispersion =
       hypothesis.isGeometry() ? overdispersionOf(gain, by_location) : overdispersionOfPresence(gain, by_location);
   return {gain, whole * gain / overdispersion};
@@ -143,7 +146,7 @@ std::pair<double, double> HypothesisScreen::promiseOf(const ModelState& null, co
 Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypothesis, int actor,
                                   const std::vector<int>& poses) {
   Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 0.0)}};
-  const SessionLatents nuisance = withoutErrors(null.nuisance, actor);  // they have stood in for the move
+  const SessionLatents nuisance = withoutErrors(null.nuisance, actor);  // the actor's errors stood in for the move
   double gained = -INFINITY, screened_nats = 0;
   std::vector<double> likeliest(hypothesis.coordinates.size(), 0.0), most_promising;
   const auto tryAt = [&](const std::vector<double>& at) {
@@ -166,7 +169,7 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
       tryAt(at);
     }
   };
-  // A wide side shows elsewhere once it is turned by some degrees, wherever it stands.
+  // A wide side that is turned by some degrees echoes to other poses, wherever it stands.
   const auto tryTurned = [&](const std::vector<double>& middle, double share) {
     for (std::size_t j = 2; j < hypothesis.coordinates.size(); ++j) {
       for (double turn_deg : kTurns_deg) {
@@ -183,16 +186,16 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
     const std::vector<double> turned = likeliest;
     for (double radius : kRadii) tryAbout(turned, radius);
   }
-  // Echoes stand within centimetres of the right place, and these places are farther from each other.
+  // The likelihood's top is some centimetres wide, and the places so far lie farther apart.
   for (double share : kFiner) {
     tryAbout(likeliest, share * std::max(kRadii[0], std::hypot(likeliest[0], likeliest[1])));
     tryTurned(likeliest, share);
   }
-  if (gained <= -kNearlyAsLikely) likeliest.clear();
+  if (gained <= -kNearlyAsLikely_nats) likeliest.clear();
   if (most_promising == likeliest) most_promising.clear();
   for (const std::vector<double>& at : {likeliest, most_promising}) {
     if (at.empty()) continue;
-    // Latents have covered with wide errors what is wrong where the actor is not: they settle before it is judged.
+    // Latents have covered the wrong place by wide errors: they settle before a place is judged.
     const double settled = settledAt(null, hypothesis, at, nuisance);
     source_.setBaseline(null.mechanisms);
     if (settled <= result.screened_nats) continue;
@@ -243,8 +246,8 @@ Screened HypothesisScreen::directly(const ModelState& null, const Hypothesis& hy
   if (hypothesis.coordinates.empty()) {
     tryAt(1);
   } else if (std::all_of(hypothesis.coordinates.begin(), hypothesis.coordinates.end(), reciprocal)) {
-    // A steep edge far above all tones does nothing: it is looked for among them.
-    for (double scaled_values : {0.8, 1.0, 1.3}) tryAt(scaled_values);
+    // A steep edge far above all tones does nothing: values among the tones are tried.
+    for (double scaled_values : kEdges) tryAt(scaled_values);
   } else {
     const double gain = tryAt(kSome);
     const bool costly = source_.altersGeometry(hypothesis.at(start));
@@ -260,11 +263,11 @@ Screened HypothesisScreen::directly(const ModelState& null, const Hypothesis& hy
       }
     }
   }
-  // What a material does may have been fitted as gains of its actors, beside which it has nothing to do.
+  // Gains of a material's actors may stand in for what the material does: values are tried without them.
   const auto [freed, nats] =
       withoutGains(null.nuisance, source_.base().scene(), hypothesis.subject, model_.spread().actor_gain);
   for (double scaled_values : kInstead) {
-    if (nats < kStoodIn) break;
+    if (nats < kStoodIn_nats) break;
     const std::vector<double> at(hypothesis.coordinates.size(), scaled_values);
     const double screened_nats = nats + valueAt(null, hypothesis, at, poses, freed).second;
     if (screened_nats <= best) continue;
@@ -280,8 +283,8 @@ Screened HypothesisScreen::screen(const ModelState& null, const Hypothesis& hypo
   std::vector<SessionCovariance> directions;
   for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
     const std::vector<double> nothing(hypothesis.coordinates.size(), 0.0);
-    // What rises from nothing does so with its power: its typical value shows more than the slope at nothing. What
-    // shifts or turns does so to first order for small amounts alone.
+    // A power that rises from nothing shows more at its typical value than by its slope at nothing. A shift or a turn
+    // is of first order for small amounts only.
     const double step = hypothesis.coordinates[j].oneSided() ? 1 : kSmallStep;
     const auto covarianceAt = [&](double scaled_values) {
       std::vector<double> at = nothing;
@@ -304,12 +307,13 @@ Screened HypothesisScreen::screen(const ModelState& null, const Hypothesis& hypo
   for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
     const bool one_sided = hypothesis.coordinates[j].oneSided();
     if (one_sided && step[static_cast<Eigen::Index>(j)] <= 0) possible = false;
-    result.starts.front()[j] = std::clamp(step[static_cast<Eigen::Index>(j)], one_sided ? 0.02 : -8.0, 8.0);
+    result.starts.front()[j] =
+        std::clamp(step[static_cast<Eigen::Index>(j)], one_sided ? kLeastOneSidedStart : -kMostStart, kMostStart);
   }
   if (possible)
     result.screened_nats = whole * 0.5 * e.total.dot(step) /
                            shrunkOverdispersion(e.overdispersion, hypothesis, model_.data().locations.size());
-  // Slopes are of paths that stay. What a turn of the view lets in and out shows in the likelihood itself.
+  // Slopes know only paths that stay. Paths that a turn of the view lets in and out show in the likelihood itself.
   if (hypothesis.isGeometry() && hypothesis.coordinates.size() == 1 && source_.altersGeometry(hypothesis.at({1.0}))) {
     for (double scaled_values : {-1.0, 1.0}) {
       const double screened_nats = valueAt(null, hypothesis, {scaled_values}, poses, null.nuisance).second;

@@ -4,15 +4,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/catalogue/bounds.h"
+
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kSharedLatent = 3;     // standard deviations from none at which a common error is tried as a cause
-constexpr double kStep = 0.125;         // of the scale, for derivatives
-constexpr Eigen::Index kAlongLaw = 25;  // places of a law that a name is compared at
+constexpr double kStep = 0.125;         ///< of derivatives, in the coordinate's scale
+constexpr double kMostStart = 8;        ///< bound of a start, in the coordinate's scale
+constexpr Eigen::Index kAlongLaw = 25;  ///< places of a law at which a name is compared
 
-/// What a hypothesis' geometry makes of ranges and directions stands in the latents of actors and poses; least squares
-/// of both takes it out of them, as z = D v with the latents in standard deviations.
+/// Least squares of a geometry's coordinates v to the latents z = D v of actors and poses in standard deviations: they
+/// stand in for what the geometry does to ranges and directions.
 Screened sharedGeometry(ExpectedEchoes& source, const Hypothesis& h, const ModelState& null, const LatentSpread& spread,
                         const PoseAccuracy& accuracy, const std::vector<int>& poses) {
   const SessionLatents& n = null.nuisance;
@@ -39,11 +41,11 @@ Screened sharedGeometry(ExpectedEchoes& source, const Hypothesis& h, const Model
     }
   }
   for (Eigen::Index r = 0; r < rows; ++r) {
-    if (latents[r] == 0) design.row(r).setZero();  // nothing shows these
+    if (latents[r] == 0) design.row(r).setZero();  // no data shows this error
   }
   const Eigen::VectorXd v = design.completeOrthogonalDecomposition().solve(latents);
   std::vector<double> start;
-  for (Eigen::Index c = 0; c < columns; ++c) start.push_back(std::clamp(v[c], -8.0, 8.0));
+  for (Eigen::Index c = 0; c < columns; ++c) start.push_back(std::clamp(v[c], -kMostStart, kMostStart));
   return {h, 0.5 * (design * v).squaredNorm(), {start}};
 }
 
@@ -54,18 +56,18 @@ std::vector<Screened> sharedLatents(ExpectedEchoes& source, const ModelState& nu
                                     const std::vector<int>& poses) {
   const Scene& scene = source.base().scene();
   const SessionLatents& n = null.nuisance;
-  // An error that all poses or all actors share is no error of theirs. The score test cannot see it: the latents hold
-  // it.
+  // An error that all poses or all actors share is a cause. The score test does not see it, since the latents hold it.
   std::vector<Screened> screened;
   for (const Hypothesis& h : all) {
     if (!h.isGeometry()) continue;
     const double numbers = static_cast<double>(h.coordinates.size());
     Screened s = sharedGeometry(source, h, null, spread, accuracy, poses);
     if (!(s.screened_nats > 0)) continue;
-    if (s.screened_nats < 0.5 * kSharedLatent * kSharedLatent * numbers) s.screened_nats = 0;
+    if (s.screened_nats < 0.5 * bounds::kSharedLatent_sigmas * bounds::kSharedLatent_sigmas * numbers)
+      s.screened_nats = 0;
     screened.push_back(std::move(s));
   }
-  // Levels of one material's actors, or of one actor, further off than such errors are: the same for them.
+  // Levels of one material's actors, or of one actor, farther off than such errors are point at the material.
   for (const Hypothesis& h : all) {
     if (h.mechanism.mechanism != "material_reflectivity" || h.coordinates.size() != 1) continue;
     double sum = 0, count = 0;
@@ -76,7 +78,7 @@ std::vector<Screened> sharedLatents(ExpectedEchoes& source, const ModelState& nu
       ++count;
     }
     const double z = count > 0 ? sum / (spread.actor_gain * std::sqrt(count)) : 0;
-    if (std::abs(z) < kSharedLatent) continue;
+    if (std::abs(z) < bounds::kSharedLatent_sigmas) continue;
     const double delta_db = 10 / std::log(10.0) * sum / count;
     const Coordinate& c = h.coordinates.front();
     screened.push_back({h, 0.5 * z * z, {{c.scaled_values(c.neutral + delta_db)}}});
@@ -86,7 +88,7 @@ std::vector<Screened> sharedLatents(ExpectedEchoes& source, const ModelState& nu
 
 namespace {
 
-/// Of a level that falls or rises with range or with time: the name of a straight one, its slope as the start.
+/// Named hypothesis of a level that falls or rises with range or time, with the mean slope as start.
 std::optional<Screened> namedSlope(const Screened& law, const Parameters& values, const std::vector<Hypothesis>& all) {
   const std::vector<double>&at = values.numbers("at"), &gain_db = values.numbers("gain_db");
   const std::string& variable = values.text("variable");

@@ -8,14 +8,14 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr int kFine = 48, kFinest = 128;  ///< nodes of the finest table, and where ranges span a hall
-constexpr double kFineRange_m = 0.2;
-constexpr int kMostNodes = 8;                            ///< of a curve
-constexpr double kShortest = 3.5;                        ///< fine steps in a ripple's period
-constexpr double kMostPeriods = 10, kShortest_m = 0.85;  ///< of range: what ten are in a room
+constexpr int kFine = 48, kFinest = 128;  ///< nodes of the finest table; most of them where ranges span a hall
+constexpr double kFineRange_m = 0.2;      ///< between these nodes of ranges
+constexpr int kMostNodes = 8;             ///< of a curve
+constexpr double kShortest = 3.5;         ///< fine steps in a ripple's period
+constexpr double kMostPeriods = 10, kShortest_m = 0.85;  ///< of a ripple; ten periods of range in a room are so short
 constexpr double kSettling[] = {0.05, 0.1, 0.2, 0.4};    ///< of the variable's span, in which an exponential falls by e
-constexpr int kSectors = 24;                             ///< parts of the variable's span whose edges are tried,
-constexpr int kNarrowestBump = 4;                        ///< and parts between a bump's ends
+constexpr int kSectors = 24;                             ///< parts of the variable's span whose edges are tried
+constexpr int kNarrowestBump = 4;                        ///< parts between a bump's ends
 constexpr double kLeastShare = 0.02;                     ///< of the paths that lie beyond a table's first and last node
 
 std::string threeDigits(double value) {
@@ -24,7 +24,7 @@ std::string threeDigits(double value) {
   return out.str();
 }
 
-/// Weights of a table's nodes at x; beyond its ends the first or last alone.
+/// Adds the weights of a table's nodes at x; beyond the ends the first or last node has all.
 void addHat(const std::vector<double>& at, double x, double weight, Eigen::Ref<Eigen::RowVectorXd> row) {
   const Eigen::Index last = static_cast<Eigen::Index>(at.size()) - 1;
   if (x <= at.front() || last == 0) {
@@ -40,7 +40,7 @@ void addHat(const std::vector<double>& at, double x, double weight, Eigen::Ref<E
   }
 }
 
-/// [fine][nodes]: the coarser table's hats at the finer one's nodes.
+/// [fine][nodes] weights of a coarse table's nodes at the nodes of a finer one.
 Eigen::MatrixXd hats(const std::vector<double>& fine, const std::vector<double>& nodes) {
   Eigen::MatrixXd m =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(fine.size()), static_cast<Eigen::Index>(nodes.size()));
@@ -52,7 +52,7 @@ Eigen::MatrixXd hats(const std::vector<double>& fine, const std::vector<double>&
   return m;
 }
 
-/// Nodes that the sorted numbers lie evenly between.
+/// Nodes between which the sorted numbers lie evenly.
 std::vector<double> evenNodes(const std::vector<double>& sorted, int count) {
   std::vector<double> nodes;
   for (int k = 0; k < count; ++k) {

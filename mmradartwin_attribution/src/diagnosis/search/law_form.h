@@ -8,23 +8,23 @@
 
 namespace mmradartwin::diagnosis::search {
 
-/// One form that a law over a variable may have: a table, linear between its points.
+/// Form of a law over a variable: a table, linear between its points.
 struct LawForm {
   std::vector<double> at;  ///< values of the variable
-  Eigen::MatrixXd shapes;  ///< [at][numbers]: of each number what the table is for 1 of it
-  int searched = 0;        ///< further numbers (edges, a period) that were looked for
+  Eigen::MatrixXd shapes;  ///< [at][numbers] table of each number at 1
+  int searched = 0;        ///< further numbers (edges, a period) that are searched for
   std::string words = "";  ///< "" for a curve, whose numbers are the table's own
-  bool local = false;      ///< nothing outside a part of the variable
+  bool local = false;      ///< zero outside a part of the variable
   bool of_points = false;  ///< each number is one point of the table
 
-  /// Numbers that it has to be worth: a constant is free.
+  /// Numbers that have a price: a constant is free.
   int priced(bool constant) const { return static_cast<int>(shapes.cols()) - (constant ? 1 : 0) + searched; }
 };
 
-/// Forms that a law over one variable may have, by the variable's values.
+/// Forms that a law over one variable may have, given the values of the variable.
 class LawForms {
  public:
-  /// values: of all paths, in any order, one at least. constant: a constant is fitted along; a curve then holds it, of
+  /// values: of all paths, in any order, at least one. constant: a constant is fitted along; a curve contains it, in
   /// other forms it is the first number.
   LawForms(const std::string& variable, std::vector<double> values, bool constant);
 
@@ -32,11 +32,11 @@ class LawForms {
   bool varies() const;
   /// Nodes of the finest table.
   const std::vector<double>& fine() const { return fine_; }
-  /// Weights of the finest table's nodes at x, added to row.
+  /// Adds to row the weights of the finest table's nodes at x.
   void addAt(double x, double weight, Eigen::Ref<Eigen::RowVectorXd> row) const;
-  /// [fine][numbers]: a form's shapes on the finest table.
+  /// [fine][numbers] shapes of a form on the finest table.
   Eigen::MatrixXd onFine(const LawForm& form) const;
-  /// A few nodes.
+  /// Curves of a few nodes.
   std::vector<LawForm> curves() const;
   /// Ripples, exponentials, sectors (steps among them) and bumps.
   std::vector<LawForm> others() const;
@@ -46,7 +46,8 @@ class LawForms {
   LawForm between(int from, int to, bool bump) const;
   void addRipples(bool in_sine, std::vector<LawForm>& to) const;
 
-  bool constant_, turns_;  ///< turns: both ends are one direction
+  bool constant_;
+  bool turns_;  ///< both ends are the same direction
   bool of_azimuth_, of_range_;
   std::vector<double> sorted_, fine_;
   double low_, high_;

@@ -12,7 +12,9 @@
 #include <set>
 #include <string>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/hypotheses/law_words.h"
+#include "diagnosis/likelihood/profiled_scores.h"
 #include "diagnosis/search/law_form.h"
 #include "diagnosis/search/path_measurement.h"
 #include "mmradartwin_sim/law_variable.h"
@@ -20,86 +22,89 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kHuber = 2;  ///< standard deviations from which on a path counts less
-constexpr int kReweighings = 3;
-constexpr double kPricePerNumber = 4;  ///< nats, by which fewer numbers are preferred,
-constexpr double kLeastWorth = -2;     ///< and that may be missing: a fit finds some times what paths alone show
-constexpr double kFewestPlaces = 3;    ///< that tell of a law with nothing outside a part of its variable
-constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;
-constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};
-constexpr int kBearings = 24;  ///< that half a turn is divided into
-constexpr int kOften = 12;     ///< paths of an actor
-constexpr double kMaxInflation = 50;
-constexpr double kBeyondTime = 1.5;    ///< of what time explains: what each pose by itself may, chance left off
-constexpr double kScattersLess = 0.7;  ///< of the scatter before a law, from where on its size is judged by it anew
-constexpr double kWeakest_db = -45;    ///< echoes below this are one for a law over amplitudes
+constexpr double kHuber_sigmas = 2;                         ///< deviation from which on a path counts less
+constexpr int kReweighings = 3;                             ///< of the paths
+constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;  ///< spacing of spots in the floor plan; about the best one
+constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};     ///< of spots
+constexpr std::size_t kMostSpots = 10000;                   ///< a hall has too many to tell apart
+constexpr int kSpotNumbers = 4;                             ///< place (two), radius and level
+constexpr int kBearings = 24;                               ///< directions of half a turn
+constexpr int kOften = 12;                                  ///< least paths of an actor with laws of its own
+constexpr double kScattersLess = 0.7;  ///< of the scatter before a law, at which the law is judged by its own scatter
+constexpr double kWeakest_db = -45;    ///< weaker echoes count as so strong in a law over amplitudes
+constexpr double kGainPerNumber_nats = 0.5;  ///< by chance
+constexpr double kMostStart = 8;             ///< bound of a start, in the coordinate's scale
 
-/// One observable of all paths, robustly weighted.
+/// Deviations of all paths by one observable, robustly weighted. P: paths, G: latents, K: directions of a law.
 struct Sample {
   Observable observable;
-  Eigen::VectorXd off, weight;  // [P], 0 where a path does not show it
-  double scatter = 1;           // of what latents leave
-  Eigen::MatrixXd latent;       // [P][G] a constant and the actors' errors
+  Eigen::VectorXd off;     ///< [P] measured less expected
+  Eigen::VectorXd weight;  ///< [P] 0 where a path does not show the observable
+  double scatter = 1;      ///< of the residuals
+  Eigen::MatrixXd latent;  ///< [P][G] directions of the latents: a constant and the actors' errors
   Eigen::LDLT<Eigen::MatrixXd> latent_solver;
-  Eigen::VectorXd latent_prior;  // [G] precision
-  Eigen::VectorXd latents;       // [G] without a law
-  Eigen::VectorXd rest;          // [P] what they leave
+  Eigen::VectorXd latent_prior;  ///< [G] precision
+  Eigen::VectorXd latents;       ///< [G] values without a law
+  Eigen::VectorXd rest;          ///< [P] residuals without a law
 
-  /// Weighted squares of what is left, with what the latents cost.
+  /// Weighted squares of residuals, with the priors of the latents.
   double squares(const Eigen::VectorXd& left, const Eigen::VectorXd& of_latents) const {
     return left.dot(weight.cwiseProduct(left)) + of_latents.cwiseProduct(latent_prior).dot(of_latents);
   }
 };
 
+/// Regression of an observable on the directions of a law.
 struct Promise {
   double raw = 0;             ///< nats by which the law explains the paths
-  double overdispersion = 1;  ///< of the scores' scatter over places
-  Eigen::VectorXd value;      ///< of the directions, in the observable's unit
-  double constant = 0;        ///< beside them
+  double overdispersion = 1;  ///< scatter of the scores over places against what chance brings
+  Eigen::VectorXd value;      ///< [K] in the observable's unit
+  double constant = 0;        ///< fitted along
 };
 
+/// Measured paths of a session, and the laws that they promise.
 class LawScreen {
  public:
   LawScreen(const Twin& base, const ChannelLikelihood& model, const ModelState& null, const std::vector<int>& poses);
-  /// What a law is over, and whose paths.
+  /// Variable of a law, and whose paths it changes.
   struct Over {
-    std::string variable, actor = "";  ///< all paths where no actor is given
-    double bearing_deg = 0;            ///< of standing_m
+    std::string variable, actor = "";  ///< actor empty: all paths
+    double bearing_deg = 0;            ///< direction of standing_m
   };
+  /// Law of the form that explains most for its numbers.
   std::optional<Screened> best(const Sample& s, const Over& over) const;
-  /// By observable.
+  /// [observables]
   const std::vector<Sample>& samples() const { return samples_; }
   const Sample& gain() const { return samples_.front(); }
-  /// Over where the radar stands, along the direction that promises most.
+  /// Gain over the radar's place, along the direction that promises most.
   std::optional<Screened> bestBearing() const;
-  /// Over how near to a place paths pass, or the radar stands: the place that promises most.
+  /// Gain over the distance to a place at which paths pass or the radar stands, for the place that promises most.
   std::optional<Screened> bestPlace(const std::string& variable) const;
-  /// Steps of all levels, at the times between poses that promise most.
+  /// Steps of the gain, at the times between poses that promise most.
   std::optional<Screened> bestSteps() const;
-  /// False where poses differ in gain by far more than these steps, or a slope over time, explain.
+  /// False where poses differ in gain by far more than these steps, or a slope over time, explains.
   bool gainsFollowTime(const std::optional<Screened>& steps) const;
-  /// Actors of whom enough paths are measured for a law of their own.
+  /// Actors with enough measured paths for a law of their own.
   std::vector<std::string> oftenSeen() const;
 
  private:
   Sample sampleOf(const Observable& observable, std::size_t kind) const;
-  /// Of directions [P][K], beyond what a constant and the actors' own errors explain.
+  /// Regression on directions [P][K], beyond what a constant and the actors' own errors explain.
   Promise promise(const Sample& s, const Eigen::MatrixXd& directions) const;
-  /// Of numbers of each pose, one a column, as directions [P][K] of its paths' gains.
+  /// Directions [P][K] of the paths' gains, from numbers [poses][K] of their poses.
   Eigen::MatrixXd alikeAtPose(const Eigen::MatrixXd& of_poses) const;
-  /// Of each pose and step, 1 after it.
+  /// [poses][steps] 1 for a pose after a step.
   Eigen::MatrixXd afterSteps(const std::vector<double>& steps_s) const;
-  /// How many places tell of a direction, each by its paths' share in it.
+  /// Effective number of places that tell of a direction, by the shares of their paths.
   double places(const Sample& s, const Eigen::VectorXd& direction) const;
   Hypothesis law(const Observable& o, const Over& over, const std::vector<double>& at) const;
 
   const Twin& base_;
-  const Twin twin_;  ///< with the state's mechanisms: paths are of its scene
+  const Twin twin_;  ///< with the state's mechanisms; paths refer to its scene
   const ChannelLikelihood& model_;
   std::vector<MeasuredPose> poses_;
-  std::vector<int> location_;  // [P]
+  std::vector<int> location_;  ///< [P]
   std::vector<Sample> samples_;
-  double whole_ = 1;  // poses of the session over those measured
+  double whole_ = 1;  ///< poses of the session over measured ones
 };
 
 LawScreen::LawScreen(const Twin& base, const ChannelLikelihood& model, const ModelState& null,
@@ -148,7 +153,7 @@ Sample LawScreen::sampleOf(const Observable& o, std::size_t kind) const {
     for (const MeasuredPath& p : pose.paths) {
       const double share = of_gain ? p.share : 1;
       s.off[at] = p.off[kind];
-      // What a pose's likelihood has found of its heading is one number, however many paths it has.
+      // The heading error of a pose is one number, however many paths the pose has.
       shows[at] = o.kind == Kind::kAngleOfPose ? 1 / static_cast<double>(pose.paths.size())
                   : of_actors || p.alone       ? 1
                                                : 0;
@@ -185,7 +190,7 @@ Sample LawScreen::sampleOf(const Observable& o, std::size_t kind) const {
     s.latent_prior[0] = 1e-9;
     setBaseline();
     s.scatter = std::max(o.floor, 1.4826 * median(s.rest.cwiseAbs()));
-    s.weight = shows.cwiseProduct((kHuber * s.scatter / s.rest.array().abs().max(1e-12)).min(1.0).matrix());
+    s.weight = shows.cwiseProduct((kHuber_sigmas * s.scatter / s.rest.array().abs().max(1e-12)).min(1.0).matrix());
   }
   setBaseline();
   return s;
@@ -193,7 +198,7 @@ Sample LawScreen::sampleOf(const Observable& o, std::size_t kind) const {
 
 Promise LawScreen::promise(const Sample& s, const Eigen::MatrixXd& directions) const {
   const Eigen::Index n = directions.cols();
-  // Latents eliminated: what of a direction they cannot follow.
+  // Latents are eliminated: only the part of a direction that they cannot follow counts.
   const Eigen::MatrixXd weighted = s.weight.asDiagonal() * directions;
   const Eigen::MatrixXd follow = s.latent_solver.solve(s.latent.transpose() * weighted);  // [G][K]
   const Eigen::MatrixXd seen_by_paths = directions.transpose() * weighted - (weighted.transpose() * s.latent) * follow;
@@ -212,13 +217,13 @@ Promise LawScreen::promise(const Sample& s, const Eigen::MatrixXd& directions) c
     after = s.off - s.latent * latents_after - directions * p.value;
     const double squares = s.squares(after, latents_after);
     left = squares + prior * p.value.squaredNorm();
-    // What a law of many times the usual size leaves scatters far less than all that it explains did.
+    // Residuals of a law of many times the usual size scatter far less than the paths did before.
     const double own = std::max(s.observable.floor, std::sqrt(squares / std::max(1.0, s.weight.sum())));
     if (own > kScattersLess * scatter) break;
     scatter = own;
   }
   p.constant = latents_after[0];
-  // The scatter is as free as the law: its likelihood's maximum.
+  // The scatter is free as well: nats at its maximum likelihood.
   p.raw = whole_ * 0.5 * s.weight.sum() * std::log(std::max(1.0, s.squares(s.rest, s.latents) / left));
   const double locations = static_cast<double>(model_.data().locations.size());
   if (locations > 1) {
@@ -229,7 +234,7 @@ Promise LawScreen::promise(const Sample& s, const Eigen::MatrixXd& directions) c
     }
     const double own = left / std::max(1.0, s.weight.sum());
     const Eigen::MatrixXd spread = by_location.transpose() * by_location * (locations / (locations - 1) / own);
-    p.overdispersion = std::clamp(solver.solve(spread).trace() / static_cast<double>(n), 1.0, kMaxInflation);
+    p.overdispersion = std::clamp(solver.solve(spread).trace() / static_cast<double>(n), 1.0, kMostOverdispersion);
   }
   return p;
 }
@@ -256,7 +261,7 @@ Hypothesis LawScreen::law(const Observable& o, const Over& over, const std::vect
   return h;
 }
 
-/// The numbers of a form, each typically o.typical.
+/// Coordinates of a form's numbers, o.typical being the typical value.
 std::vector<Coordinate> coordinatesOf(const LawForm& form, const Observable& o) {
   std::vector<Coordinate> coordinates;
   for (Eigen::Index k = 0; k < form.shapes.cols(); ++k) {
@@ -308,14 +313,14 @@ std::optional<Screened> LawScreen::best(const Sample& s, const Over& over) const
     std::vector<LawForm> others = forms.others();
     std::move(others.begin(), others.end(), std::back_inserter(tried));
   }
-  double most = kLeastWorth;
+  double most = bounds::kLeastWorthOfLaw_nats;
   const LawForm* best = nullptr;
   Promise of_best;
   for (const LawForm& form : tried) {
     const Eigen::MatrixXd directions = basis * forms.onFine(form);
-    if (form.local && places(s, directions.rightCols(1)) < kFewestPlaces) continue;
+    if (form.local && places(s, directions.rightCols(1)) < bounds::kFewestPlacesOfLaw) continue;
     const Promise p = promise(s, directions);
-    const double worth = p.raw / p.overdispersion - kPricePerNumber * form.priced(o.constant);
+    const double worth = p.raw / p.overdispersion - bounds::kPriceOfLawNumber_nats * form.priced(o.constant);
     if (worth <= most) continue;
     most = worth;
     best = &form;
@@ -327,13 +332,13 @@ std::optional<Screened> LawScreen::best(const Sample& s, const Over& over) const
   result.hypothesis.variant = best->words;
   result.hypothesis.coordinates = coordinatesOf(*best, o);
   result.hypothesis.searched = best->searched + 1;  // and the variable
-  result.screened_nats = of_best.raw / of_best.overdispersion - 0.5 * best->priced(o.constant);
+  result.screened_nats = of_best.raw / of_best.overdispersion - kGainPerNumber_nats * best->priced(o.constant);
   result.starts = {{}};
   for (Eigen::Index k = 0; k < of_best.value.size(); ++k) {
-    // Of a curve all values have the constant, of another form the first one is it.
+    // All values of a curve contain the constant; in other forms it is the first number.
     const bool has_constant = o.constant && (k == 0 || best->words.empty());
     const double value = of_best.value[k] + (has_constant ? of_best.constant : 0);
-    result.starts.front().push_back(std::clamp(value / o.typical, -8.0, 8.0));
+    result.starts.front().push_back(std::clamp(value / o.typical, -kMostStart, kMostStart));
   }
   return result;
 }
@@ -365,7 +370,7 @@ std::optional<Screened> LawScreen::bestBearing() const {
   }
   if (best_of_all) {
     ++best_of_all->hypothesis.searched;
-    best_of_all->screened_nats -= 0.5;
+    best_of_all->screened_nats -= kGainPerNumber_nats;
   }
   return best_of_all;
 }
@@ -395,7 +400,7 @@ std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const 
   for (double x = bounds.min().x() + 0.5 * kPlanGrid_m; x < bounds.max().x(); x += kPlanGrid_m) {
     for (double y = bounds.min().y() + 0.5 * kPlanGrid_m; y < bounds.max().y(); y += kPlanGrid_m) {
       for (double radius : kPlanRadii_m) spots.push_back({x, y, radius, {}});
-      if (spots.size() > 10000) return std::nullopt;  // no room: a hall's cells are too many to tell apart
+      if (spots.size() > kMostSpots) return std::nullopt;
     }
   }
   const auto better = [](const Spot& a, const Spot& b) {
@@ -419,15 +424,15 @@ std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const 
   }
   const Spot best = bestOf(near);
   const double nats = best.promise.raw / best.promise.overdispersion;
-  if (!(nats > kPricePerNumber * 4)) return std::nullopt;
+  if (!(nats > bounds::kPriceOfLawNumber_nats * kSpotNumbers)) return std::nullopt;
   Screened result;
   result.hypothesis = law(o, {variable}, {0, best.radius_m});
   result.hypothesis.mechanism.values.set("x_m", best.x_m);
   result.hypothesis.mechanism.values.set("y_m", best.y_m);
   result.hypothesis.coordinates = {{o.parameter, o.unit, 0, 0, o.typical, -o.limit, o.limit}};
   result.hypothesis.searched = 4;  // place, radius and the variable
-  result.screened_nats = nats - 0.5 * 4;
-  result.starts = {{std::clamp(best.promise.value[0] / o.typical, -8.0, 8.0)}};
+  result.screened_nats = nats - kGainPerNumber_nats * kSpotNumbers;
+  result.starts = {{std::clamp(best.promise.value[0] / o.typical, -kMostStart, kMostStart)}};
   return result;
 }
 
@@ -464,8 +469,8 @@ bool LawScreen::gainsFollowTime(const std::optional<Screened>& steps) const {
     by_time = std::max(by_time, promise(gain(), alikeAtPose(afterSteps(steps_s))).raw);
   }
   const double by_pose = promise(gain(), alikeAtPose(Eigen::MatrixXd::Identity(poses, poses))).raw;
-  const double by_chance = 0.5 * whole_ * static_cast<double>(poses);
-  return by_pose - by_chance < kBeyondTime * by_time + kPricePerNumber;
+  const double by_chance = kGainPerNumber_nats * whole_ * static_cast<double>(poses);
+  return by_pose - by_chance < bounds::kBeyondTime * by_time + bounds::kPriceOfLawNumber_nats;
 }
 
 std::optional<Screened> LawScreen::bestSteps() const {
@@ -482,7 +487,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
     between_s.push_back(0.5 * (*std::prev(stamp) + *stamp));
   }
   const auto of = [&](const std::vector<double>& steps_s) { return promise(s, alikeAtPose(afterSteps(steps_s))); };
-  // Between two steps lie several places: what one alone sees may be that place's.
+  // At least two places lie between two steps: a gain of one place may be the place's own.
   const auto isTold = [&](std::vector<double> steps_s) {
     std::sort(steps_s.begin(), steps_s.end());
     std::vector<std::set<int>> between(steps_s.size() + 1);
@@ -510,7 +515,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
   };
   std::vector<double> steps_s;
   std::optional<Screened> result;
-  double most = kLeastWorth;
+  double most = bounds::kLeastWorthOfLaw_nats;
   while (steps_s.size() < std::min<std::size_t>(kMostSteps, between_s.size())) {
     steps_s.push_back(-1);
     steps_s = moved(steps_s, steps_s.size() - 1);
@@ -520,8 +525,8 @@ std::optional<Screened> LawScreen::bestSteps() const {
     std::sort(sorted_s.begin(), sorted_s.end());
     const Promise p = of(sorted_s);
     const double count = static_cast<double>(steps_s.size()), nats = p.raw / p.overdispersion;
-    if (nats - kPricePerNumber * 2 * count <= most) continue;
-    most = nats - kPricePerNumber * 2 * count;
+    if (nats - bounds::kPriceOfLawNumber_nats * 2 * count <= most) continue;
+    most = nats - bounds::kPriceOfLawNumber_nats * 2 * count;
     result.emplace();
     const int steps = static_cast<int>(sorted_s.size());
     Hypothesis& h = result->hypothesis;
@@ -530,9 +535,9 @@ std::optional<Screened> LawScreen::bestSteps() const {
     h.mechanism.values.set("steps_s", sorted_s);
     h.variant += steps > 1 ? " where they show" : " where it shows";
     h.searched = steps;  // when
-    result->screened_nats = nats - 0.5 * 2 * count;
+    result->screened_nats = nats - kGainPerNumber_nats * 2 * count;
     result->starts = {{}};
-    for (double step_db : p.value) result->starts.front().push_back(std::clamp(step_db, -8.0, 8.0));
+    for (double step_db : p.value) result->starts.front().push_back(std::clamp(step_db, -kMostStart, kMostStart));
   }
   return result;
 }
@@ -543,14 +548,14 @@ ScreenedLaws screenLaws(const Twin& base, const ChannelLikelihood& model, const 
                         const std::vector<int>& poses) {
   ScreenedLaws result;
   for (const NamedParameters& m : null.mechanisms) {
-    if (m.mechanism == "empirical_law") return result;  // what it leaves is of its own shape
+    if (m.mechanism == "empirical_law") return result;  // what one leaves over looks like another
   }
   if (poses.empty()) return result;
   const LawScreen screen(base, model, null, poses);
   const auto add = [&](std::optional<Screened> s) {
     if (s) result.laws.push_back(std::move(*s));
   };
-  // An error of directions looks like one of each channel: the best stands for all.
+  // An error of directions looks like an error of each channel: the best channel law stands for all.
   std::map<std::string, std::optional<Screened>> of_channels;  // by variable
   for (const Sample& s : screen.samples()) {
     for (const std::string& variable : s.observable.over) {

@@ -3,26 +3,28 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/numbers/number_text.h"
 #include "diagnosis/search/back_projection.h"
 
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kSides_m[] = {0.25, 0.45};
-constexpr double kTurned_deg = 15, kSquare_deg = 90;  // ways in which it may stand, and when they are the same again
-constexpr std::size_t kFacing = 5;                    // poses that a side of it may face
-constexpr double kGrown[] = {0.6, 0.8, 1.25, 1.6};    // of a side
-constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1}, kTurns_deg[] = {-8, -3, 3, 8};
-constexpr double kHides_db = -6;               // of a law over paths that pass a place, at least
-constexpr double kAbout_m[] = {-0.1, 0, 0.1};  // of the place that paths pass which something hides
-constexpr int kSweeps = 4;
-constexpr double kHigher = 5;        // nats of a sweep that are worth another
-constexpr double kWorthSweeps = 15;  // nats of the fit
+constexpr double kSides_m[] = {0.25, 0.45};               ///< sides of a box that are tried
+constexpr double kTurned_deg = 15, kSquare_deg = 90;      ///< between its tried turns; a square is itself again
+constexpr std::size_t kFacing = 5;                        ///< poses that a side of a box may face
+constexpr double kGrown[] = {0.6, 0.8, 1.25, 1.6};        ///< factors of a side
+constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1};  ///< of a place
+constexpr double kTurns_deg[] = {-8, -3, 3, 8};           ///< about itself
+constexpr double kAbout_m[] = {-0.1, 0, 0.1};             ///< from the place that hidden paths pass
+constexpr int kSweeps = 4;                                ///< over the surroundings of a fit
+constexpr double kHigher_nats = 5;                        ///< gain of a sweep that is worth another
+constexpr double kWorthSweeps_nats = 15;                  ///< gain of a fit that is worth sweeps
 
+/// Places of a box's coordinates.
 enum Coordinates { kX, kY, kSide, kYaw };
 
-/// A box with that place for its middle, to start with.
+/// Hypothesis of a box, its middle at a place to start with.
 Hypothesis boxAt(const Eigen::Vector2d& middle) {
   Hypothesis h;
   h.mechanism = defaultMechanism("actor_unmodelled");
@@ -34,7 +36,7 @@ Hypothesis boxAt(const Eigen::Vector2d& middle) {
   return h;
 }
 
-/// Boxes that share something with the one that was fitted, as scaled coordinates.
+/// Boxes that keep a side, a corner or the middle of the fitted one, as scaled coordinates.
 std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
   const std::vector<Coordinate>& c = fit.hypothesis.coordinates;
   const Eigen::Vector2d center(c[kX].value(fit.scaled_values[kX]), c[kY].value(fit.scaled_values[kY]));
@@ -60,7 +62,7 @@ std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
   return boxes;
 }
 
-/// Other places and ways to stand of an actor, places and distances of a late echo, as scaled coordinates.
+/// Places and turns around a fit (of a late echo: places and distances), as scaled coordinates.
 std::vector<std::vector<double>> placesAround(const HypothesisFit& fit) {
   std::vector<std::vector<double>> places;
   const auto add = [&](std::size_t coordinate, double by) {
@@ -91,7 +93,7 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
   Hypothesis& h = box.hypothesis;
   h.variant = "a box " + cylinder.hypothesis.variant;
   const double radius_m = 0.5 * fitted.values.number("size_m");
-  // The cylinder's front stands where sides shine, half a side before the middle of the box.
+  // The cylinder's front is the near side of the box, half a side before its middle.
   const auto startBehind = [&](const Eigen::Vector2d& toward_radar, double yaw_deg) {
     for (double side_m : kSides_m) {
       const Eigen::Vector2d center = axis + (radius_m - 0.5 * side_m) * toward_radar;
@@ -101,7 +103,7 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
   };
   const Eigen::Vector2d toward_most = -awayFromRadar(data, axis);
   for (double yaw_deg = 0; yaw_deg < kSquare_deg; yaw_deg += kTurned_deg) startBehind(toward_most, yaw_deg);
-  // Poses that see most of it may be those that a side faces.
+  // A side may face the poses that gain most.
   std::vector<std::pair<double, std::size_t>> seen;
   for (std::size_t i = 0; i < data.poses.size(); ++i) seen.emplace_back(null.by_pose[i] - cylinder.state.by_pose[i], i);
   std::sort(seen.begin(), seen.end());
@@ -116,7 +118,7 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
 std::optional<Screened> boxThatHides(const Screened& law) {
   const NamedParameters& m = law.hypothesis.mechanism;
   if (m.mechanism != "empirical_law" || m.values.text("variable") != "passing_m" ||
-      law.hypothesis.coordinates.front().value(law.starts.front().front()) > kHides_db) {
+      law.hypothesis.coordinates.front().value(law.starts.front().front()) > bounds::kHides_db) {
     return std::nullopt;
   }
   const Eigen::Vector2d place(m.values.number("x_m"), m.values.number("y_m"));
@@ -140,11 +142,11 @@ std::optional<Screened> boxThatHides(const Screened& law) {
 HypothesisFit fitObject(HypothesisFitter& fitter, const ModelState& null, const Screened& object) {
   const Hypothesis& h = object.hypothesis;
   HypothesisFit best = fitter.fit(null, h, object.starts);
-  for (int i = 0; i < kSweeps && best.gain_without_best_place > kWorthSweeps; ++i) {
+  for (int i = 0; i < kSweeps && best.gain_without_best_place > kWorthSweeps_nats; ++i) {
     HypothesisFit other = fitter.fit(null, h, isUnmodelledBox(h) ? boxesAround(best) : placesAround(best), 0, &best);
     const double higher = other.gain - best.gain;
     if (higher > 0) best = std::move(other);
-    if (higher < kHigher) break;
+    if (higher < kHigher_nats) break;
   }
   return best;
 }

@@ -7,15 +7,17 @@
 
 namespace mmradartwin::diagnosis::search {
 
+/// True for a box that the twin lacks.
 bool isUnmodelledBox(const Hypothesis& hypothesis);
-/// The object that was fitted as a cylinder as a box: turned in many ways, its near side where the cylinder's is.
+/// Box in place of an object that was fitted as a cylinder: starts turn it in many ways, its near side where the
+/// cylinder's front is.
 Screened asBox(const ChannelData& data, const ModelState& null, const HypothesisFit& cylinder);
-/// What a law that dims paths by where they pass may be: a box there that shows no side of its own to most poses;
-/// starts are ways in which it may stand about the place. Nothing of other laws.
+/// Box that hides what is behind it, at the place of a law that dims passing paths; nothing for other laws. It shows no
+/// side of its own to most poses. Starts are turns of it about the place.
 std::optional<Screened> boxThatHides(const Screened& law);
-/// Fits an object whose place is free, moved or unmodelled. A side is seen from few poses, and the likelihood has a top
-/// for each way in which one of them may be explained: from each, places around are tried and of a box those that keep
-/// a side, a corner or the place.
+/// Fits an object whose place is free, moved or unmodelled. Few poses see a side, and the likelihood has an optimum for
+/// each way to explain one of them: around each optimum other places are tried, and boxes that keep a side, a corner or
+/// the middle.
 HypothesisFit fitObject(HypothesisFitter& fitter, const ModelState& null, const Screened& object);
 
 }  // namespace mmradartwin::diagnosis::search

@@ -10,38 +10,40 @@
 
 namespace mmradartwin::diagnosis::search {
 
-/// What of an echo a law without a name may be of: a parameter of empirical_law.
+/// Property of an echo that a law without a name may change: a parameter of empirical_law.
 struct Observable {
   enum class Kind { kGain, kDelay, kAngle, kAngleOfPose, kChannelGain, kChannelPhase } kind;
   const char *parameter, *unit;
-  double typical, limit;
-  double usual;                       ///< standard deviation that a law's values are given beforehand
+  double typical, limit;              ///< values of a law, in `unit`
+  double usual;                       ///< prior standard deviation of a law's values
   double floor;                       ///< least scatter of a path that is believed
-  bool constant;                      ///< a constant of it is fitted along: the session's gain is free already
-  std::vector<std::string> over;      ///< variables that a law of it is looked for over, of all paths
-  std::vector<double> channels = {};  ///< against the others; all where none are given
+  bool constant;                      ///< a constant is fitted along; not for the gain, which the session has already
+  std::vector<std::string> over;      ///< variables over which laws of all paths are looked for
+  std::vector<double> channels = {};  ///< these against the others; empty: all channels
 
   bool isOfChannels() const { return !channels.empty(); }
 };
 
-/// The gain comes first.
+/// Observables of a radar; the gain comes first.
 std::vector<Observable> observables(const RadarConfig& radar);
 
-/// A path that stands out where it is expected, and how far off it is there.
+/// Path that stands out where it is expected, and its deviations.
 struct MeasuredPath {
   PathRecord record;        ///< as received
-  double share = 1;         ///< of the cell's expected power: so much of a law on the path shows
-  bool alone = false;       ///< its channels hold little else
-  std::vector<double> off;  ///< by observable, in its unit
+  double share = 1;         ///< of the cell's expected power; a law on the path shows by this share
+  bool alone = false;       ///< the channels hold little else
+  std::vector<double> off;  ///< [observables] measured less expected, in the observable's unit
 };
+
+/// Measured paths of one pose.
 struct MeasuredPose {
   int location = 0;
   LawVariable::PathPlace where;
   std::vector<MeasuredPath> paths;
 };
 
-/// Measures the paths of one pose, each by itself: level, range, azimuth and channels against what the state expects.
-/// twin: with the state's mechanisms. What is returned refers to its scene.
+/// Measures the paths of one pose one by one: level, range, azimuth and channels against what the state expects. twin:
+/// with the state's mechanisms; the result refers to its scene.
 MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, const ModelState& state, int pose,
                           double session_s, const std::vector<Observable>& of);
 

@@ -26,11 +26,11 @@ struct BagLimits {
 
 /// Looks for everything that would trouble whoever works with the bag later: no or several radar configurations, frames
 /// of another one, gaps in their sequence, lost bytes, invalid chirps, stamps off the frame period, saturated samples,
-/// receivers that are all zero, frames without a transform, within a jump or a gap of tf that leaves them without a pose
-/// or that the radar stood through, jumps and gaps in tf at whose ends the radar stands elsewhere, no pose, several radars.
-/// Where the bag holds several radars, all are looked at (or that of `options.ns`), and findings begin with the
-/// namespace. Empty where all is well. Throws InputError for a file that is no readable bag.
-/// `progress` is called with messages read, of how many.
+/// receivers that are all zero, frames without a transform, within a jump or a gap of tf that leaves them without a
+/// pose or that the radar stood through, jumps and gaps in tf at whose ends the radar stands elsewhere, no pose,
+/// several radars. Where the bag holds several radars, all are looked at (or that of `options.ns`), and findings begin
+/// with the namespace. Empty where all is well. Throws InputError for a file that is no readable bag. `progress` is
+/// called with messages read, of how many.
 std::vector<BagFinding> validateBag(const std::string& file, const BagOptions& options = {},
                                     const BagLimits& limits = {}, const PoseProgress& progress = {});
 

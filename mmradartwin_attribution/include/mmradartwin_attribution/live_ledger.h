@@ -9,10 +9,11 @@
 
 namespace mmradartwin {
 
-/// A ledger over a live stream: a pose is a stretch of at least 1 s in which the radar stands (within 2 cm and 1 deg of
-/// where the stretch began); of each stretch the last of its longest averages counts once. A later stretch within 10 cm
-/// horizontally, 2 cm in height and 1 deg in heading of an earlier one is a duplicate: left out and listed.
-class StandingLedger {
+/// A ledger over a live stream. A pose is a stretch of at least 1 s in which the radar stands: within 2 cm and 1 deg of
+/// where the stretch began. Of each stretch one average counts, the last of those over most frames. A later stretch
+/// within 10 cm horizontally, 2 cm in height and 1 deg in heading of an earlier one is a duplicate: left out and
+/// listed.
+class LiveLedger {
  public:
   void add(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_radar, const std::string& name, int frames,
            const FieldMetrics& central);

@@ -1,4 +1,4 @@
-#include "mmradartwin_attribution/standing_ledger.h"
+#include "mmradartwin_attribution/live_ledger.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,15 +10,15 @@ namespace {
 constexpr double kDegree = M_PI / 180.0;
 }  // namespace
 
-bool StandingLedger::counts(const Stretch& stretch) const { return stretch.end_ns - stretch.begin_ns >= 1000000000; }
+bool LiveLedger::counts(const Stretch& stretch) const { return stretch.end_ns - stretch.begin_ns >= 1000000000; }
 
-bool StandingLedger::duplicate(const Stretch& stretch) const {
+bool LiveLedger::duplicate(const Stretch& stretch) const {
   return std::any_of(finished_.begin(), finished_.end(),
                      [&](const Stretch& earlier) { return sameView(earlier.T, stretch.T); });
 }
 
-void StandingLedger::add(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_radar, const std::string& name,
-                         int frames, const FieldMetrics& central) {
+void LiveLedger::add(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_radar, const std::string& name, int frames,
+                     const FieldMetrics& central) {
   if (!current_.empty()) {
     const Stretch& c = current_.front();
     const bool stands = (T_map_radar.translation() - c.T.translation()).norm() <= 0.02 &&
@@ -49,7 +49,7 @@ void StandingLedger::add(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_r
   }
 }
 
-LedgerSummary StandingLedger::summary() const {
+LedgerSummary LiveLedger::summary() const {
   Ledger ledger;
   for (const Stretch& s : finished_) ledger.add(s.metrics);
   if (!current_.empty() && counts(current_.front()) && !duplicate(current_.front())) {
@@ -58,7 +58,7 @@ LedgerSummary StandingLedger::summary() const {
   return ledger.summary();
 }
 
-std::vector<std::string> StandingLedger::duplicates() const {
+std::vector<std::string> LiveLedger::duplicates() const {
   std::vector<std::string> names = duplicates_;
   if (!current_.empty() && counts(current_.front()) && duplicate(current_.front()))
     names.push_back(current_.front().name);

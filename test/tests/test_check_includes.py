@@ -1,0 +1,114 @@
+"""The include rule on trees made for it: each arrow that is forbidden is found, and no other."""
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+HERE = Path(os.path.realpath(__file__)).parent
+PROGRAM = HERE.parent / "scripts" / "check_includes.py"
+DIAGNOSIS = "mmradartwin_attribution/src/diagnosis"
+ROOM_NAMES = ("catalogue", "numbers", "frames", "channels", "likelihood", "hypotheses", "fit", "receiver", "search", "gain",
+              "rounds", "report")
+
+
+class CheckIncludes(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = Path(folder.name)
+        for room in ROOM_NAMES:
+            self.write(f"{DIAGNOSIS}/{room}/{room}_unit.h", "<vector>")
+        self.write(f"{DIAGNOSIS}/rooms.h")
+        self.write("mmradartwin_dsp/include/mmradartwin_dsp/session.h", "<string>")
+        self.write("mmradartwin_dsp/include/mmradartwin_dsp/ros/bag.h", "<rosbag/bag.h>", '"mmradartwin_dsp/session.h"')
+
+    def write(self, file, *includes):
+        path = self.root / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("".join(f"#include {include}\n" for include in includes), encoding="utf-8")
+
+    def run_program(self, *arguments):
+        return subprocess.run([sys.executable, str(PROGRAM), str(self.root), *arguments], capture_output=True, text=True,
+                              check=False)
+
+    def assert_allowed(self):
+        result = self.run_program()
+        self.assertEqual((result.returncode, result.stderr), (0, ""), result.stdout)
+
+    def assert_forbidden(self, file, *words):
+        result = self.run_program()
+        self.assertEqual(result.returncode, 1, result.stdout)
+        lines = result.stdout.splitlines()
+        self.assertEqual(len(lines), 1, result.stdout)
+        for word in (file, *words):
+            self.assertIn(word, lines[0])
+
+    def test_tree_without_forbidden_arrows_passes(self):
+        self.write(f"{DIAGNOSIS}/rounds/selection.cpp", '"diagnosis/search/search_unit.h"', '"diagnosis/rooms.h"',
+                   '"diagnosis/numbers/numbers_unit.h"', '"mmradartwin_dsp/session.h"')
+        self.write(f"{DIAGNOSIS}/diagnosis.cpp", '"diagnosis/rounds/rounds_unit.h"', '"diagnosis/report/report_unit.h"')
+        self.write("mmradartwin_sim/nodes/twin_node.cpp", "<ros/ros.h>", '"mmradartwin_dsp/ros/bag.h"')
+        self.assert_allowed()
+
+    def test_room_may_not_include_a_room_above_it(self):
+        file = f"{DIAGNOSIS}/numbers/median.cpp"
+        self.write(file, '"diagnosis/search/search_unit.h"')
+        self.assert_forbidden(file, "numbers may not see search")
+
+    def test_room_may_not_include_a_room_beside_it(self):
+        file = f"{DIAGNOSIS}/gain/held_out.cpp"
+        self.write(file, '"../search/search_unit.h"')
+        self.assert_forbidden(file, "gain may not see search")
+
+    def test_room_may_not_include_the_conductor(self):
+        self.write(f"{DIAGNOSIS}/survey_plan.h")
+        file = f"{DIAGNOSIS}/report/figure.cpp"
+        self.write(file, '"diagnosis/survey_plan.h"')
+        self.assert_forbidden(file, "report may not see the files beside the rooms")
+
+    def test_public_header_belongs_to_the_room_of_its_source(self):
+        self.write(f"{DIAGNOSIS}/rounds/plan.cpp", '"mmradartwin_attribution/plan.h"')
+        self.write("mmradartwin_attribution/include/mmradartwin_attribution/plan.h", "<vector>")
+        file = f"{DIAGNOSIS}/channels/channel_data.cpp"
+        self.write(file, '"mmradartwin_attribution/plan.h"')
+        self.assert_forbidden(file, "channels may not see rounds")
+
+    def test_unknown_room_is_told(self):
+        self.write(f"{DIAGNOSIS}/attic/old.cpp", "<vector>")
+        self.assert_forbidden(f"{DIAGNOSIS}/attic", "the table does not have")
+
+    def test_package_may_not_include_one_that_depends_on_it(self):
+        self.write("mmradartwin_sim/include/mmradartwin_sim/twin.h", "<vector>")
+        file = "mmradartwin_dsp/apps/process.cpp"
+        self.write(file, '"mmradartwin_sim/twin.h"')
+        self.assert_forbidden(file, "mmradartwin_dsp does not depend on mmradartwin_sim")
+
+    def test_library_may_not_include_ros(self):
+        for number, name in enumerate(("<ros/ros.h>", "<tf2_ros/buffer.h>", "<sensor_msgs/Imu.h>",
+                                       '"mmradartwin_msgs/AdcCube.h"', '"mmradartwin_dsp/ros/bag.h"')):
+            with self.subTest(name):
+                file = "mmradartwin_driver/src/rig.cpp"
+                self.write(file, name)
+                self.assert_forbidden(file, "free of ROS")
+                self.write(file, f"<vector{number}>")
+        self.write("mmradartwin_driver/src/ros/rig_node.cpp", "<ros/ros.h>", '"mmradartwin_msgs/AdcCube.h"')
+        self.assert_allowed()
+
+    def test_levels_count_the_longest_chain_and_circles(self):
+        src = "mmradartwin_driver/src"
+        self.write(f"{src}/a.h", '"b.h"')
+        self.write(f"{src}/b.h", '"c.h"')
+        self.write(f"{src}/c.h")
+        self.write(f"{src}/c.cpp", '"c.h"', '"d.h"')
+        self.write(f"{src}/d.h", '"c.h"')
+        result = self.run_program("--levels")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        # a over b over the circle of c and d.
+        self.assertIn("mmradartwin_driver  4  3  4  1\n", result.stdout)
+        self.assertIn("circle: src/c, src/d", result.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
