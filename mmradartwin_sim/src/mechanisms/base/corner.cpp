@@ -45,7 +45,7 @@ class Corner : public Mechanism, public PathStage {
       if (context.only_actor >= 0 && !wanted(edge.a) && !wanted(edge.b)) continue;
       addCornerPath(context, elements, edge, {kName, 1}, records);
     }
-    for (const Trihedral& t : trihedra_) addTrihedralPath(context, elements, t, kName, 1, records);
+    for (const Trihedral& t : trihedra_) addTrihedralPath(context, elements, t, {kName, 1}, records);
   }
 
  private:
