@@ -36,12 +36,7 @@ constexpr double kStepShares[] = {1.0, 0.4, 0.1};   ///< of a promised step, unt
 constexpr double kOneSidedFactors[] = {0.4, 2.0};   ///< of a start that rises from nothing
 constexpr Eigen::Index kMostRough = 4;              ///< coordinates that are searched without slopes
 constexpr double kFoldShares[] = {1, 0.4, 0.1, 0};  ///< of a fold's step, until its places are no worse
-constexpr double kLeastShareKept = 0.2;             ///< bound of the share of places that a fold is fitted to
-// Three times what an actor's place is wrong by. A shorter move is no likely cause and explains part of other causes.
-constexpr double kLeastMove_m = 0.06;
-
-// Six times what a scene's actors err by.
-constexpr double kFarAway_m = 0.12;
+constexpr double kLeastShareKept = 0.2;
 
 /// Calls `value` at places that lead to its maximum, without slopes (BOBYQA, Powell 2009).
 void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector<double> scaled_values,
@@ -51,8 +46,8 @@ void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector
                                                                                       nlopt_destroy);
   std::vector<double> low, high;
   for (const Coordinate& c : coordinates) {
-    low.push_back(std::min(c.scaled_values(c.min), c.scaled_values(c.max)));
-    high.push_back(std::max(c.scaled_values(c.min), c.scaled_values(c.max)));
+    low.push_back(std::min(c.scaled(c.min), c.scaled(c.max)));
+    high.push_back(std::max(c.scaled(c.min), c.scaled(c.max)));
   }
   const auto call = [](unsigned size, const double* x, double*, void* function) {
     return (*static_cast<const std::function<double(const std::vector<double>&)>*>(function))({x, x + size});
@@ -89,7 +84,7 @@ double HypothesisFit::ranking() const {
                                                     : 1;
   double nats = share * gain - bounds::kPriceOfNumber_nats * static_cast<double>(numbers());
   if (hypothesis.mechanism.mechanism == "actor_unmodelled") nats -= bounds::kPriceOfPlace_nats;
-  if (hypothesis.isMove() && moved_m() < kLeastMove_m) nats -= bounds::kPriceOfNumber_nats;
+  if (hypothesis.isMove() && moved_m() < stated.leastMove_m()) nats -= bounds::kPriceOfNumber_nats;
   return nats;
 }
 
@@ -107,7 +102,8 @@ double HypothesisFit::moved_m() const {
 }
 
 bool HypothesisFit::isFarAway() const {
-  return moved_m() > kFarAway_m && (plain || gain_without_best_place / overdispersion > bounds::kLeastNatsOfFarAway);
+  return moved_m() > stated.farAway_m() &&
+         (plain || gain_without_best_place / overdispersion > bounds::kLeastNatsOfFarAway);
 }
 
 double HypothesisFit::size_m() const {
@@ -115,8 +111,9 @@ double HypothesisFit::size_m() const {
   return hypothesis.at(scaled_values).values.number("size_m");
 }
 
-HypothesisFitter::HypothesisFitter(ExpectedEchoes& source, const ChannelLikelihood& model, int folds)
-    : source_(source), model_(model), folds_(folds) {}
+HypothesisFitter::HypothesisFitter(ExpectedEchoes& source, const ChannelLikelihood& model, int folds,
+                                   StatedBounds stated)
+    : source_(source), model_(model), folds_(folds), stated_(stated) {}
 
 ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanisms, const SessionLatents* start) {
   ModelState s;
@@ -279,8 +276,8 @@ HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedPara
         double& v = next[static_cast<std::size_t>(j)];
         v += share * std::clamp(step[globals + j], -kLongestStep, kLongestStep);
         if (c.logarithmic()) v = std::max(v, 0.3 * o.scaled_values[static_cast<std::size_t>(j)]);
-        const double low = std::min(c.scaled_values(c.min), c.scaled_values(c.max)),
-                     high = std::max(c.scaled_values(c.min), c.scaled_values(c.max));
+        const double low = std::min(c.scaled(c.min), c.scaled(c.max)),
+                     high = std::max(c.scaled(c.min), c.scaled(c.max));
         v = std::clamp(v, low, high);
       }
       ModelState s = evaluate(next, model_.stepped(o.state.nuisance, step.head(globals), o.scores, step, share));
@@ -413,6 +410,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
                                     const std::vector<std::vector<double>>& starts, double least_nats,
                                     const HypothesisFit* known) {
   HypothesisFit f;
+  f.stated = stated_;
   f.hypothesis = hypothesis;
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());

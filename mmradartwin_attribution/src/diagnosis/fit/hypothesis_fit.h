@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/catalogue/stated_bounds.h"
 #include "diagnosis/hypotheses/hypothesis.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/likelihood/expected_echoes.h"
@@ -29,6 +30,7 @@ struct ModelState {
 /// Fit of one hypothesis, with everything else refitted.
 struct HypothesisFit {
   Hypothesis hypothesis;
+  StatedBounds stated;                ///< which moves are larger than the scene's errors
   std::vector<double> scaled_values;  ///< [coordinates] at the fit
   ModelState state;                   ///< echoes left out
   double gain = 0;                    ///< nats over the state without it
@@ -77,7 +79,8 @@ struct Screened {
 /// Fits hypotheses by maximum likelihood, over a state of the model that has none of them (the *null*).
 class HypothesisFitter {
  public:
-  HypothesisFitter(ExpectedEchoes& source, const ChannelLikelihood& model, int folds);
+  HypothesisFitter(ExpectedEchoes& source, const ChannelLikelihood& model, int folds,
+                   StatedBounds stated = StatedBounds());
 
   /// State of these mechanisms with all latents fitted, from `start` where it is given.
   ModelState state(const std::vector<NamedParameters>& mechanisms, const SessionLatents* start);
@@ -135,6 +138,7 @@ class HypothesisFitter {
   ExpectedEchoes& source_;
   const ChannelLikelihood& model_;
   int folds_;
+  StatedBounds stated_;
 };
 
 }  // namespace mmradartwin::diagnosis::fit

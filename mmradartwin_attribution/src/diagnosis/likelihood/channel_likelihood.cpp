@@ -38,9 +38,11 @@ enum Global {
 struct Limits {
   double low, high, step;
 };
-Limits limitsOf(int global, int errors) {
+Limits limitsOf(int global, int errors, const LatentSpread& spread) {
   constexpr double kAny = std::numeric_limits<double>::infinity();
-  if (global >= kActors + errors) return {-kMostRangeError_m, kMostRangeError_m, 0.02};
+  if (global >= kActors + errors) {
+    return {-spread.most_range_error_m, spread.most_range_error_m, spread.actor_range_m};
+  }
   if (global >= kActors) return {-2, 2, 0.5};
   if (global >= kShape) return {-8, 8, 1};
   switch (global) {
@@ -497,7 +499,7 @@ Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCo
   }
   // A number at its limit that would go beyond it stays, and no other number moves as if it did not.
   for (int j = 0; j < globals; ++j) {
-    const Limits limits = limitsOf(j, errors_);
+    const Limits limits = limitsOf(j, errors_, spread_);
     const double v = n.global(j);
     if (s.total[j] > 0 ? v < limits.high : v > limits.low) continue;
     s.total[j] = 0;
@@ -516,7 +518,7 @@ SessionLatents ChannelLikelihood::stepped(const SessionLatents& from, const Eige
   SessionLatents n = from;
   const auto held = [share](double step, double limit) { return std::clamp(share * step, -limit, limit); };
   for (int j = 0; j < n.globals(); ++j) {
-    const Limits limits = limitsOf(j, errors_);
+    const Limits limits = limitsOf(j, errors_, spread_);
     double& v = n.global(j);
     v = std::clamp(v + held(g[j], limits.step), limits.low, limits.high);
   }

@@ -5,6 +5,7 @@
 #include <complex>
 #include <vector>
 
+#include "diagnosis/catalogue/stated_bounds.h"
 #include "diagnosis/channels/channel_data.h"
 #include "diagnosis/likelihood/echo_field.h"
 #include "diagnosis/likelihood/expected_echoes.h"
@@ -34,11 +35,15 @@ struct SessionLatents {
 
 /// Prior standard deviations of the actors' latent errors.
 struct LatentSpread {
-  double actor_gain = 1.5 / 4.343;  ///< 1.5 dB of power
-  double actor_range_m = 0.02;
+  explicit LatentSpread(const StatedAccuracy& stated = {})
+      : actor_gain(stated.level_db / 4.343),
+        actor_range_m(stated.scene_m),
+        most_range_error_m(StatedBounds(stated).mostRangeError_m()) {}
+
+  double actor_gain;          ///< natural logarithm of power, per interaction
+  double actor_range_m;       ///< one-way, per interaction
+  double most_range_error_m;  ///< limit of an actor's range error
 };
-/// Four times what a scene's actors err by: of some twenty none is farther away.
-constexpr double kMostRangeError_m = 0.08;
 
 /// Expected covariance of the channels in all bins of a pose, packed as BinCovariance.
 using PoseCovariance = std::vector<std::complex<float>>;
@@ -90,7 +95,8 @@ struct Basis {
 class ChannelLikelihood {
  public:
   /// Keeps a reference to data. actors: how many Scene::actors has.
-  ChannelLikelihood(const ChannelData& data, int actors, const PoseAccuracy& accuracy, const LatentSpread& spread = {});
+  ChannelLikelihood(const ChannelData& data, int actors, const PoseAccuracy& accuracy,
+                    const LatentSpread& spread = LatentSpread());
 
   /// Latents to start fit() from: levels from the data, errors zero.
   SessionLatents start(const std::vector<PoseEchoes>& echoes) const;

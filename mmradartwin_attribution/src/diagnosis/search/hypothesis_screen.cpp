@@ -174,7 +174,7 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
     for (std::size_t j = 2; j < hypothesis.coordinates.size(); ++j) {
       for (double turn_deg : kTurns_deg) {
         std::vector<double> at = middle;
-        at[j] += hypothesis.coordinates[j].scaled_values(share * turn_deg);
+        at[j] += hypothesis.coordinates[j].scaled(share * turn_deg);
         tryAt(at);
       }
     }

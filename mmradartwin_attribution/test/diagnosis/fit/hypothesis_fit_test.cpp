@@ -12,7 +12,7 @@ HypothesisFit fitOf(const std::string& mechanism, const std::vector<Coordinate>&
   HypothesisFit fit;
   fit.hypothesis.mechanism.mechanism = mechanism;
   fit.hypothesis.coordinates = coordinates;
-  for (std::size_t i = 0; i < values.size(); ++i) fit.scaled_values.push_back(coordinates[i].scaled_values(values[i]));
+  for (std::size_t i = 0; i < values.size(); ++i) fit.scaled_values.push_back(coordinates[i].scaled(values[i]));
   fit.plain = true;
   return fit;
 }
