@@ -94,7 +94,7 @@ class SampleLevels {
   std::atomic<double> strongest_{0};
 };
 
-/// What all steps of a simulation look at.
+/// The inputs that all steps of a simulation share.
 struct Job {
   const SimulateOptions& options;
   const Recording& recording;

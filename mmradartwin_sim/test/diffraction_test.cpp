@@ -29,7 +29,7 @@ TEST(Transition, HasItsTabulatedValues) {
 /// +1 hard.
 Complex totalField(double n, double rho, double phi_deg, double phi_in_deg, double gamma) {
   const double phi = phi_deg * kDegree, phi_in = phi_in_deg * kDegree;
-  Complex total = wedgeCoefficient(n, phi, phi_in, rho, 1, 1, gamma, gamma) * std::polar(1 / std::sqrt(rho), -rho);
+  Complex total = wedgeCoefficient({n, phi, phi_in, rho, 1}, 1, gamma, gamma) * std::polar(1 / std::sqrt(rho), -rho);
   if (phi < M_PI + phi_in) total += std::polar(1.0, rho * std::cos(phi - phi_in));
   if (phi < M_PI - phi_in) total += gamma * std::polar(1.0, rho * std::cos(phi + phi_in));
   if (phi > (2 * n - 1) * M_PI - phi_in) total += gamma * std::polar(1.0, rho * std::cos(2 * n * M_PI - phi - phi_in));
@@ -76,7 +76,7 @@ TEST(Wedge, HasTheMonostaticLevelsOfABoxEdge) {
   for (const auto& row : rows) {
     const auto level = [&](double gamma) {
       const Complex D =
-          wedgeCoefficient(1.5, row[0] * kDegree, row[0] * kDegree, R / 2, 1, kWavenumber77, gamma, gamma);
+          wedgeCoefficient({1.5, row[0] * kDegree, row[0] * kDegree, R / 2, 1}, kWavenumber77, gamma, gamma);
       return 10 * std::log10(4 * M_PI * R * std::norm(D) / 2);
     };
     expectForm("4.6 box edge at 2 m, " + shortText(row[0]) + " deg, soft", "dBsm", row[1], level(-1), 0.06);
@@ -123,7 +123,7 @@ TEST_F(EdgeTest, OfABoxHasTheClosedFormsLevel) {
     EXPECT_EQ(nearest->bounces, 1);
     EXPECT_EQ(*nearest->event, "edge_diffraction");
     // The conjugate of exp(-jkL)'s coefficient at the path's phase; the soft coefficient acts on the field's sign.
-    const Complex D = wedgeCoefficient(1.5, phi_deg * kDegree, phi_deg * kDegree, R / 2, 1, kWavenumber77, -1, -1);
+    const Complex D = wedgeCoefficient({1.5, phi_deg * kDegree, phi_deg * kDegree, R / 2, 1}, kWavenumber77, -1, -1);
     const double tau = 4 / kSpeedOfLight_m_per_s;
     const Complex expected = std::conj(D) * std::polar(1.0, 2 * M_PI * (77e9 * tau - 0.5 * 75e12 * tau * tau));
     EXPECT_NEAR(std::arg(nearest->c[0] / expected), 0, 0.05) << phi_deg;

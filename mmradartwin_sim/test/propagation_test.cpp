@@ -543,7 +543,7 @@ TEST_F(Propagation, FacetsOfAPathAreThoseOfTheEditedScene) {
     if (r.facets.empty() || r.facets[0] < 0 || r.actors[0] >= 0) continue;
     const LawVariable::Values foot = LawVariable("foot_m").of({scene, T_map_radar, 0, 1}, r);
     ASSERT_EQ(foot.count, 1);
-    EXPECT_LE(std::abs(foot.of[0]), 0.2 + 1e-9);  // on the box's side
+    EXPECT_LE(std::abs(foot.value[0]), 0.2 + 1e-9);  // on the box's side
   }
   EXPECT_GT(box, 0);
   EXPECT_NE(&scene, &twin.scene());
@@ -557,7 +557,7 @@ TEST_F(Propagation, LawVariablesReadPathAndSession) {
   facet.origin = facet.e1 = facet.e2 = Eigen::Vector3d::Zero();
   facet.normal = Eigen::Vector3d::UnitX();
   scene.facets = {facet};
-  LawVariable::Where where{scene, Eigen::Isometry3d::Identity(), 90, 0.5};
+  LawVariable::PathPlace where{scene, Eigen::Isometry3d::Identity(), 90, 0.5};
   PathRecord record;
   record.amplitude = 0.05;
   record.bounces = 1;
@@ -566,14 +566,14 @@ TEST_F(Propagation, LawVariablesReadPathAndSession) {
   record.departure = Eigen::Vector3d(1, 1, 0).normalized();
   record.arrival = Eigen::Vector3d::UnitX();
   const auto value = [&](const char* name) { return LawVariable(name).of(where, record); };
-  EXPECT_DOUBLE_EQ(value("time_s").of[0], 90);
-  EXPECT_NEAR(value("amplitude_db").of[0], -20, 1e-12);
-  EXPECT_NEAR(value("incidence_deg").of[0], 45, 1e-9);  // of a scatter point
+  EXPECT_DOUBLE_EQ(value("time_s").value[0], 90);
+  EXPECT_NEAR(value("amplitude_db").value[0], -20, 1e-12);
+  EXPECT_NEAR(value("incidence_deg").value[0], 45, 1e-9);  // of a scatter point
   ASSERT_EQ(value("azimuth_deg").count, 2);
-  EXPECT_NEAR(value("azimuth_deg").of[0], 45, 1e-9);
-  EXPECT_NEAR(value("azimuth_deg").of[1], 0, 1e-9);
+  EXPECT_NEAR(value("azimuth_deg").value[0], 45, 1e-9);
+  EXPECT_NEAR(value("azimuth_deg").value[1], 0, 1e-9);
   record.reflection_cosine = {0.5};
-  EXPECT_NEAR(value("incidence_deg").of[0], 60, 1e-9);
+  EXPECT_NEAR(value("incidence_deg").value[0], 60, 1e-9);
   where.strongest_amplitude = 0;
   EXPECT_EQ(value("amplitude_db").count, 0);  // no session is known
   EXPECT_EQ(value("foot_m").count, 0);        // the face is no actor's
@@ -581,12 +581,12 @@ TEST_F(Propagation, LawVariablesReadPathAndSession) {
   scene.actors.resize(1);
   scene.actors[0].bounds.extend(Eigen::Vector3d(2, 1, 0));
   scene.actors[0].bounds.extend(Eigen::Vector3d(2, 2, 3));
-  EXPECT_NEAR(value("foot_m").of[0], 0.5, 1e-9);
+  EXPECT_NEAR(value("foot_m").value[0], 0.5, 1e-9);
   where.T_map_radar.translation() = Eigen::Vector3d(3, 4, 1);
-  EXPECT_NEAR(LawVariable("standing_m", {0, 0, 90}).of(where, record).of[0], 4, 1e-9);
+  EXPECT_NEAR(LawVariable("standing_m", {0, 0, 90}).of(where, record).value[0], 4, 1e-9);
   where.T_map_radar = Eigen::Isometry3d::Identity();
-  EXPECT_NEAR(LawVariable("passing_m", {0, 3}).of(where, record).of[0], std::sqrt(4.5), 1e-9);
-  EXPECT_NEAR(LawVariable("distance_m", {3, -4}).of(where, record).of[0], 5, 1e-12);
+  EXPECT_NEAR(LawVariable("passing_m", {0, 3}).of(where, record).value[0], std::sqrt(4.5), 1e-9);
+  EXPECT_NEAR(LawVariable("distance_m", {3, -4}).of(where, record).value[0], 5, 1e-12);
   EXPECT_NE(errorOf([] { LawVariable("colour"); }).find("time_s"), std::string::npos);
 }
 

@@ -399,7 +399,7 @@ TEST_F(DiffuseTest, SumsThePowerOfCells) {
     for (const V& p : points) side.push_back(left(p));
     return side;
   };
-  const CloudCells cells{T, 0.1, 0.07, 0.2, sides};
+  const ScatterCells cells{T, 0.1, 0.07, 0.2, sides};
   using Cell = std::tuple<int, int, int, char>;
   const auto powers = [&](const std::vector<PathRecord>& records) {
     std::map<Cell, std::pair<double, int>> sum;
