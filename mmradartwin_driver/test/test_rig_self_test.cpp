@@ -130,7 +130,7 @@ TEST(SelfTestSource, NoiseHoldsNoTargets) {
 #ifdef MMRADARTWIN_EMULATED_RIG
 /// The program on an emulated rig of this process's own; its output.
 std::string examine(const std::vector<std::string>& wiring, int expected_status) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.05, {20});
   writeText(folder.file("device.yaml"), paperRadarYaml(0.05) + kDevice);
   std::vector<std::string> arguments = {folder.file(""), "--loopback",  "--host-ip",        loopbackIp(1),
