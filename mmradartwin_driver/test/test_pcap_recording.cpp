@@ -267,6 +267,7 @@ void roundTrip(const TestFolder& folder, const std::string& session, const Radar
   EmulatorProcess emulator(
       loopbackIp(1), loopbackIp(2),
       {session, "--radar", folder.file("radar.yaml"), "--start-delay-s", "0.1", "--flush-s", "0.2", "--deaf-s", "0.1"});
+  const std::size_t packets = (sent.size() + 1455) / 1456;
   std::atomic<std::size_t> cubes{0};
   {
     RigOptions options;
@@ -277,14 +278,14 @@ void roundTrip(const TestFolder& folder, const std::string& session, const Radar
         radar, options, [&](AdcCube&&) { ++cubes; }, [](Rig::Level, const std::string&) {});
     EXPECT_TRUE(waitUntil([&] { return cubes >= frames; }));
     ASSERT_TRUE(emulator.waitFor("completed"));
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    EXPECT_TRUE(waitUntil([&] { return rig.state().packets.packets >= packets; }));
   }
   ASSERT_EQ(frames, cubes);
   PcapVisitor visitor;
   std::vector<int> codes;
   visitor.reply = [&](const Dca1000Reply& reply, std::int64_t) { codes.push_back(reply.code); };
   const PcapCounters counters = readPcap(folder.file("packets.pcap"), visitor);
-  EXPECT_EQ((sent.size() + 1455) / 1456, counters.data);
+  EXPECT_EQ(packets, counters.data);
   EXPECT_TRUE(std::count(codes.begin(), codes.end(), 0x05)) << "RECORD_START is not in the recording";
 
   const std::string command = std::string(MMRADARTWIN_PCAP_TO_CAPTURE) + " " + folder.file("packets.pcap") +

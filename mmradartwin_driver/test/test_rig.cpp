@@ -124,7 +124,8 @@ TEST(Rig, WaitsForACardAndComesBackToOneThatWasGone) {
     ASSERT_TRUE(running.waitForCubes(50));
     EXPECT_EQ("", running.rig.state().problem);
   }  // power lost in the middle
-  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  // What the card had sent is taken once the rig has seen nothing for a while.
+  ASSERT_TRUE(waitUntil([&] { return running.rig.state().silent_s > 0.3; }));
   std::size_t before;
   {
     const std::lock_guard<std::mutex> lock(running.mutex);
