@@ -157,7 +157,7 @@ run_fuzz() {
 
 run_tsan() {
   local test status=0
-  local tests="test_hand_over test_emulator_loopback test_rig test_radar_watch test_dca1000_control test_pcap_recording"
+  local tests="test_dropping_worker_queue test_emulator_loopback test_rig test_radar_watch test_dca1000_control test_pcap_recording"
   separate_build tsan "$tests" "-DCATKIN_WHITELIST_PACKAGES=mmradartwin_msgs;mmradartwin_dsp;mmradartwin_driver" \
     "-DCMAKE_CXX_FLAGS=-fsanitize=thread"
   data_folder
