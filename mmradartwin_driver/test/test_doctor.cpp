@@ -8,7 +8,7 @@
 #include <cstdlib>
 
 #include "emulated_rig.h"
-#include "mmradartwin_driver/rig_check.h"
+#include "mmradartwin_driver/rig_doctor.h"
 #include "mmradartwin_driver/udp_socket.h"
 
 namespace mmradartwin {
@@ -67,7 +67,7 @@ class Doctor : public ::testing::Test {
   static bool holds(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
   TestFolder folder_;
-  RigCheckOptions options_;
+  RigDoctorOptions options_;
   std::vector<CheckResult> results_;
 };
 
