@@ -149,6 +149,6 @@ TEST(LiveSession, CubesAndPosesMeetAtTheirStamps) {
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "test_live_session");
+  ros::init(argc, argv, "live_session_test");
   return RUN_ALL_TESTS();
 }
