@@ -1,10 +1,10 @@
+#include "mmradartwin_driver/dropping_worker_queue.h"
+
 #include <gtest/gtest.h>
 
 #include <chrono>
 #include <future>
 #include <vector>
-
-#include "mmradartwin_driver/dropping_worker_queue.h"
 
 namespace mmradartwin {
 namespace {

@@ -1,10 +1,11 @@
 // What card and link carry, against TI's throughput table, and refusals that fit when followed.
+#include "mmradartwin_driver/link_budget.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <regex>
 
-#include "mmradartwin_driver/link_budget.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {

@@ -1,6 +1,7 @@
+#include "../emulator/pose_schedule.h"
+
 #include <gtest/gtest.h>
 
-#include "../emulator/pose_schedule.h"
 #include "emulated_rig.h"
 #include "mmradartwin_dsp/input_error.h"
 

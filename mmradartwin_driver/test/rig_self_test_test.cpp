@@ -1,5 +1,7 @@
 // The doctor's self-test: its judgement on bytes made here, and the program against an emulated rig with good and with
 // wrong wiring.
+#include "mmradartwin_driver/rig_self_test.h"
+
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -9,7 +11,6 @@
 #include <cstdlib>
 
 #include "emulated_rig.h"
-#include "mmradartwin_driver/rig_self_test.h"
 
 namespace mmradartwin {
 namespace {

@@ -1,11 +1,12 @@
 // The rig as a whole against the emulator: configuration, arming, recovery.
+#include "mmradartwin_driver/rig.h"
+
 #include <gtest/gtest.h>
 
 #include <condition_variable>
 #include <mutex>
 
 #include "emulated_rig.h"
-#include "mmradartwin_driver/rig.h"
 #include "mmradartwin_dsp/capture.h"
 
 namespace mmradartwin {
