@@ -175,7 +175,7 @@ run_fuzz() {
 
 run_tsan() {
   local test status=0
-  local tests="test_hand_over test_emulator_loopback test_rig test_radar_watch test_dca1000_control test_pcap_recording"
+  local tests="dropping_worker_queue_test emulator_loopback_test rig_test radar_watch_test dca1000_control_test pcap_recording_test"
   separate_build tsan "$tests" "-DCATKIN_WHITELIST_PACKAGES=mmradartwin_msgs;mmradartwin_dsp;mmradartwin_driver" \
     "-DCMAKE_CXX_FLAGS=-fsanitize=thread"
   data_folder

@@ -6,21 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "mmradartwin_driver/check_result.h"
 #include "mmradartwin_driver/dca1000_protocol.h"
 #include "mmradartwin_dsp/radar_config.h"
 
 namespace mmradartwin {
 
-/// What one look at the rig found.
-struct CheckResult {
-  enum class Level { kFine, kNote, kProblem };
-  Level level = Level::kFine;
-  std::string subject;  ///< "link", "card", ...
-  std::string found;    ///< one line
-  std::string next;     ///< what to do; empty where all is fine
-};
-
-struct RigCheckOptions {
+struct RigDoctorOptions {
   std::string host_ip = "192.168.33.30";
   std::string card_ip = "192.168.33.180";
   std::uint16_t config_port = kDca1000ConfigPort;
@@ -40,7 +32,7 @@ struct RigCheckOptions {
 /// Looks at everything between the radar and this host, from the host outwards, and reports each result as it comes.
 /// What cannot be looked at because of an earlier problem is left out. Arms the card, and stops it again, where `radar`
 /// is given. Returns true where nothing is left to do. Throws InputError for options that make no sense.
-bool checkRig(const RigCheckOptions& options, const std::function<void(const CheckResult&)>& report);
+bool checkRig(const RigDoctorOptions& options, const std::function<void(const CheckResult&)>& report);
 
 /// What may stand in the way of datagrams among these rules; empty where nothing seems to. `nft`: output of
 /// "nft list ruleset", `iptables`: of "iptables -S", `ufw`: text of /etc/ufw/ufw.conf.

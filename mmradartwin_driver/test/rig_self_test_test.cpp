@@ -1,5 +1,7 @@
 // The doctor's self-test: its judgement on bytes made here, and the program against an emulated rig with good and with
 // wrong wiring.
+#include "mmradartwin_driver/rig_self_test.h"
+
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -9,7 +11,6 @@
 #include <cstdlib>
 
 #include "emulated_rig.h"
-#include "mmradartwin_driver/rig_self_test.h"
 
 namespace mmradartwin {
 namespace {
@@ -130,7 +131,7 @@ TEST(SelfTestSource, NoiseHoldsNoTargets) {
 #ifdef MMRADARTWIN_EMULATED_RIG
 /// The program on an emulated rig of this process's own; its output.
 std::string examine(const std::vector<std::string>& wiring, int expected_status) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.05, {20});
   writeText(folder.file("device.yaml"), paperRadarYaml(0.05) + kDevice);
   std::vector<std::string> arguments = {folder.file(""), "--loopback",  "--host-ip",        loopbackIp(1),

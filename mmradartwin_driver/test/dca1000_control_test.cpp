@@ -1,4 +1,6 @@
 // Command and data sockets against a card that this test plays itself.
+#include "mmradartwin_driver/dca1000_control.h"
+
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -7,7 +9,6 @@
 #include <thread>
 
 #include "emulated_rig.h"
-#include "mmradartwin_driver/dca1000_control.h"
 #include "mmradartwin_driver/packet_receiver.h"
 #include "mmradartwin_driver/rig_error.h"
 #include "mmradartwin_dsp/input_error.h"

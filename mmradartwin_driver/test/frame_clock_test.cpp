@@ -1,11 +1,12 @@
 // Frame stamps against the true starts, with arrivals as a busy host sees them.
+#include "mmradartwin_driver/frame_clock.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
 
-#include "mmradartwin_driver/frame_clock.h"
 #include "mmradartwin_dsp/paper_radar.h"
 
 namespace mmradartwin {

@@ -53,7 +53,7 @@ void recordPackets(const std::string& file, const std::vector<std::uint8_t>& byt
 }
 
 TEST(PcapWriter, WritesWhatTheWireCarries) {
-  TemporaryFolder folder;
+  TestFolder folder;
   {
     PcapWriter writer(folder.file("a.pcap"));
     const std::uint8_t reply[] = {0x5a, 0xa5, 0x09, 0x00, 0x00, 0x00, 0xaa, 0xee};
@@ -88,7 +88,7 @@ TEST(PcapWriter, WritesWhatTheWireCarries) {
 }
 
 TEST(PcapWriter, KeepsToItsWordAboutFiles) {
-  TemporaryFolder folder;
+  TestFolder folder;
   EXPECT_THROW(PcapWriter("/nowhere/a.pcap"), InputError);
   writeText(folder.file("a.pcap"), "old");
   EXPECT_THROW(PcapWriter(folder.file("a.pcap")), InputError);
@@ -110,7 +110,7 @@ TEST(PcapWriter, SaysThatTheDiskIsFull) {
 }
 
 TEST(PcapWriter, LeavesSpaceOnTheDisk) {
-  TemporaryFolder folder;
+  TestFolder folder;
   const std::string file = folder.file("a.pcap");
   PcapWriter writer(file, 1 << 20, std::uint64_t{1} << 62);  // more than any disk has
   const std::vector<std::uint8_t> datagram(1466);
@@ -126,7 +126,7 @@ TEST(PcapWriter, LeavesSpaceOnTheDisk) {
 }
 
 TEST(PcapCapture, NamesFramesWithLosses) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   const std::string random = randomBytes(20 * 2048, 7);
@@ -153,7 +153,7 @@ TEST(PcapCapture, NamesFramesWithLosses) {
 }
 
 TEST(PcapCapture, BeginsWithTheFileWhereTheRecordingWasUnderWay) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   const std::string random = randomBytes(20 * 2048, 8);
@@ -173,7 +173,7 @@ TEST(PcapCapture, BeginsWithTheFileWhereTheRecordingWasUnderWay) {
 }
 
 TEST(PcapCapture, TakesRecordingsApart) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   const std::string random = randomBytes(9 * 2048, 8);
@@ -205,7 +205,7 @@ TEST(PcapCapture, TakesRecordingsApart) {
 }
 
 TEST(PcapCapture, SaysThatThereAreNoSamples) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
   recordPackets(folder.file("a.pcap"), {}, {});
   EXPECT_THROW(pcapToCapture(folder.file("a.pcap"), loadRadarConfig(folder.file("radar.yaml")), folder.file("a.bin")),
@@ -213,7 +213,7 @@ TEST(PcapCapture, SaysThatThereAreNoSamples) {
 }
 
 TEST(PacketReplay, ComesThroughTheDriverWithItsLosses) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   const std::string random = randomBytes(20 * 2048, 9);
@@ -262,11 +262,12 @@ TEST(PacketReplay, ComesThroughTheDriverWithItsLosses) {
 }
 
 /// Emulator -> rig -> pcap -> capture.
-void roundTrip(const TemporaryFolder& folder, const std::string& session, const RadarConfig& radar,
+void roundTrip(const TestFolder& folder, const std::string& session, const RadarConfig& radar,
                const std::vector<std::uint8_t>& sent, std::size_t frames) {
-  EmulatorProgram emulator(
+  EmulatorProcess emulator(
       loopbackIp(1), loopbackIp(2),
       {session, "--radar", folder.file("radar.yaml"), "--start-delay-s", "0.1", "--flush-s", "0.2", "--deaf-s", "0.1"});
+  const std::size_t packets = (sent.size() + 1455) / 1456;
   std::atomic<std::size_t> cubes{0};
   {
     RigOptions options;
@@ -277,14 +278,14 @@ void roundTrip(const TemporaryFolder& folder, const std::string& session, const 
         radar, options, [&](AdcCube&&) { ++cubes; }, [](Rig::Level, const std::string&) {});
     EXPECT_TRUE(waitUntil([&] { return cubes >= frames; }));
     ASSERT_TRUE(emulator.waitFor("completed"));
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    EXPECT_TRUE(waitUntil([&] { return rig.state().packets.packets >= packets; }));
   }
   ASSERT_EQ(frames, cubes);
   PcapVisitor visitor;
   std::vector<int> codes;
   visitor.reply = [&](const Dca1000Reply& reply, std::int64_t) { codes.push_back(reply.code); };
   const PcapCounters counters = readPcap(folder.file("packets.pcap"), visitor);
-  EXPECT_EQ((sent.size() + 1455) / 1456, counters.data);
+  EXPECT_EQ(packets, counters.data);
   EXPECT_TRUE(std::count(codes.begin(), codes.end(), 0x05)) << "RECORD_START is not in the recording";
 
   const std::string command = std::string(MMRADARTWIN_PCAP_TO_CAPTURE) + " " + folder.file("packets.pcap") +
@@ -295,7 +296,7 @@ void roundTrip(const TemporaryFolder& folder, const std::string& session, const 
 }
 
 TEST(PcapRecording, RoundTripOfASession) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.01, {40});
   roundTrip(folder, folder.file("captures/a.bin"), loadRadarConfig(folder.file("radar.yaml")),
             readBytes(folder.file("captures/a.bin")), 40);
@@ -304,7 +305,7 @@ TEST(PcapRecording, RoundTripOfASession) {
 TEST(PcapRecording, RoundTripOfARealCapture) {
   const std::string capture = realData("openradar_indoor/xwr22xx_4lane_adc_data.bin");
   SKIP_WITHOUT(capture);
-  TemporaryFolder folder;
+  TestFolder folder;
   // The chirp as the data's README tells it; one frame of 128 loops.
   writeText(folder.file("radar.yaml"),
             "device: iwr1642\ncarrier_hz: 77.4201e+9\nslope_hz_per_s: 60.0e+12\nsamples_per_chirp: 128\n"

@@ -1,9 +1,10 @@
+#include "mmradartwin_driver/dca1000_protocol.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdio>
 
-#include "mmradartwin_driver/dca1000_protocol.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {

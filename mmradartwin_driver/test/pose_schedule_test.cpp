@@ -1,6 +1,7 @@
+#include "../emulator/pose_schedule.h"
+
 #include <gtest/gtest.h>
 
-#include "../emulator/pose_schedule.h"
 #include "emulated_rig.h"
 #include "mmradartwin_dsp/input_error.h"
 
@@ -8,7 +9,7 @@ namespace mmradartwin {
 namespace {
 
 TEST(PoseSchedule, EveryFrameOfAPoseLiesInsideItsStay) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.05, {4, 1, 100});
   const PlayedSession session = openPlayedSession(folder.file(""), "", {});
   ASSERT_EQ(3u, session.poses.size());
@@ -33,7 +34,7 @@ TEST(PoseSchedule, EveryFrameOfAPoseLiesInsideItsStay) {
 }
 
 TEST(PlayedSession, LeavesOutWhatCannotBePlayedAndSaysSo) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.05, {2, 2, 2});
   std::filesystem::remove(folder.file("captures/a.bin"));
   writeText(folder.file("captures/b.bin"), randomBytes(3000, 1));

@@ -1,3 +1,5 @@
+#include "mmradartwin_driver/awr2243_control.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,7 +10,6 @@
 #include <string>
 
 #include "emulated_radar_bus.h"
-#include "mmradartwin_driver/awr2243_control.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {

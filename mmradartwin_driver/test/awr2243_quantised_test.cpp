@@ -1,3 +1,5 @@
+#include "mmradartwin_driver/awr2243_quantised.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -5,7 +7,6 @@
 #include <ostream>
 #include <string>
 
-#include "mmradartwin_driver/awr2243_quantised.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/paper_radar.h"
 

@@ -29,7 +29,7 @@ struct Recorded {
 Recorded record(const RadarConfig& radar, std::vector<std::string> arguments) {
   const std::string host = loopbackIp(1), card = loopbackIp(2);
   for (const char* more : {"--start-delay-s", "0.1", "--flush-s", "0.3", "--deaf-s", "0.1"}) arguments.push_back(more);
-  EmulatorProgram emulator(host, card, arguments);
+  EmulatorProcess emulator(host, card, arguments);
   Recorded recorded;
   PacketReceiver receiver(host, kDca1000DataPort, card);
   Dca1000Control control(host, card, kDca1000ConfigPort);
@@ -51,7 +51,7 @@ Recorded record(const RadarConfig& radar, std::vector<std::string> arguments) {
   assembler.flush();
   control.stopRecord();
   if (const auto completed = emulator.waitFor("completed"))
-    recorded.own_late_ns = EmulatorProgram::ownLate_ns(*completed);
+    recorded.own_late_ns = EmulatorProcess::ownLate_ns(*completed);
   recorded.frames = assembler.counters();
   recorded.packets = receiver.counters();
   return recorded;
@@ -69,7 +69,7 @@ TEST(EmulatorLoopback, RealCaptureInBothLayoutsBitForBit) {
       "adc_start_s: 7.0e-6\nloops_per_frame: 128\nframe_period_s: 0.05\nidle_s: 30.0e-6\nramp_end_s: 62.0e-6\n"
       "tx_position_m: [[0, 0, 0], [0, 0.0077446, 0]]\n"
       "rx_position_m: [[0, 0, 0], [0, 0.0019361, 0], [0, 0.0038723, 0], [0, 0.0058084, 0]]\nlayout: ";
-  TemporaryFolder folder;
+  TestFolder folder;
   std::vector<std::vector<std::int16_t>> samples;
   for (const auto& [layout, capture] : {std::pair<std::string, std::string>{"4lane", four}, {"2lane", two}}) {
     SCOPED_TRACE(layout);
@@ -94,7 +94,7 @@ TEST(EmulatorLoopback, RealCaptureInBothLayoutsBitForBit) {
 }
 
 TEST(EmulatorLoopback, SessionArrivesWholeWithItsStamps) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.02, {5, 8, 3});
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   const Recorded recorded = record(radar, {folder.file("")});
@@ -118,7 +118,7 @@ TEST(EmulatorLoopback, SessionArrivesWholeWithItsStamps) {
 }
 
 TEST(EmulatorLoopback, WhatIsImpairedOnTheWayIsFlaggedAndNothingElse) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.005, {200});
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   const Recorded recorded = record(radar, {folder.file(""), "--loss", "0.05", "--duplicate", "0.05", "--reorder",
@@ -144,7 +144,7 @@ TEST(EmulatorLoopback, WhatIsImpairedOnTheWayIsFlaggedAndNothingElse) {
 }
 
 TEST(EmulatorLoopback, CountsThatBeginAnewAndSilenceMisplaceNothing) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.01, {60});
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   const Recorded recorded = record(radar, {folder.file(""), "--restart-at", "20", "--silence-at", "40:5"});
@@ -173,7 +173,7 @@ TEST(EmulatorLoopback, CountsThatBeginAnewAndSilenceMisplaceNothing) {
 }
 
 TEST(EmulatorLoopback, PlaysTheChosenPosesOnly) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.01, {1, 2, 3, 4, 5});
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   const Recorded recorded = record(radar, {folder.file(""), "--first", "1", "--every", "2", "--count", "2"});
@@ -184,10 +184,10 @@ TEST(EmulatorLoopback, PlaysTheChosenPosesOnly) {
 }
 
 TEST(EmulatorLoopback, CardIsDeafAfterItsConfiguration) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.01, {1});
   const std::string host = loopbackIp(1), card = loopbackIp(2);
-  EmulatorProgram emulator(host, card, {folder.file(""), "--deaf-s", "0.7"});
+  EmulatorProcess emulator(host, card, {folder.file(""), "--deaf-s", "0.7"});
   Dca1000Control control(host, card, kDca1000ConfigPort);
   control.connect();
   const FpgaVersion version = control.readVersion();

@@ -1,3 +1,5 @@
+#include "mmradartwin_driver/awr2243_link.h"
+
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -6,7 +8,6 @@
 #include <string>
 
 #include "emulated_radar_bus.h"
-#include "mmradartwin_driver/awr2243_link.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {

@@ -1,8 +1,9 @@
+#include "mmradartwin_driver/awr2243_messages.h"
+
 #include <gtest/gtest.h>
 
 #include <string>
 
-#include "mmradartwin_driver/awr2243_messages.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {

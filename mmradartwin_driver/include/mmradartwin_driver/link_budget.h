@@ -14,7 +14,7 @@ constexpr double kShortestDelay_us = 5;
 
 /// What a radar's samples ask of the way from its LVDS lanes to this host, and what that way carries. Rates are of
 /// sample bytes only, averaged over a frame: the card's memory evens out what lies within one.
-struct CaptureLink {
+struct LinkBudget {
   double delay_us = 0;               ///< between packets
   double needed_bit_per_s = 0;       ///< bytes_per_frame / frame_period
   double card_bit_per_s = 0;         ///< one full packet every delay + 11.2 us, 706 Mbit/s at most (SPRUIJ4A, table 19)
@@ -26,13 +26,13 @@ struct CaptureLink {
 };
 
 /// `lane_bit_per_s`: of one LVDS lane, 600 Mbit/s as the AWR2243 is configured.
-CaptureLink captureLink(const RadarConfig& radar, double delay_us, double lane_bit_per_s = 600e6);
+LinkBudget linkBudget(const RadarConfig& radar, double delay_us, double lane_bit_per_s = 600e6);
 
 /// Throws InputError where the samples cannot come through: names the rates, and the frame period, the samples per
 /// chirp, the loops and the packet delay (us and the card's ticks) that would fit, as far as there are such.
-void checkCaptureLink(const RadarConfig& radar, double delay_us, double lane_bit_per_s = 600e6);
+void checkLinkBudget(const RadarConfig& radar, double delay_us, double lane_bit_per_s = 600e6);
 
 /// "0.3 of 325.0 Mbit/s at a packet delay of 25 us".
-std::string describe(const CaptureLink& link);
+std::string describe(const LinkBudget& link);
 
 }  // namespace mmradartwin

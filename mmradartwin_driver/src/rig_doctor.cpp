@@ -1,4 +1,4 @@
-#include "mmradartwin_driver/rig_check.h"
+#include "mmradartwin_driver/rig_doctor.h"
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>
@@ -15,8 +15,8 @@
 #include <sstream>
 
 #include "mmradartwin_driver/awr2243_control.h"
-#include "mmradartwin_driver/capture_link.h"
 #include "mmradartwin_driver/dca1000_control.h"
+#include "mmradartwin_driver/link_budget.h"
 #include "mmradartwin_driver/packet_receiver.h"
 #include "mmradartwin_driver/rig_error.h"
 #include "mmradartwin_driver/rig_self_test.h"
@@ -76,7 +76,7 @@ std::optional<Interface> interfaceOf(const in_addr& address) {
 
 class Examination {
  public:
-  Examination(const RigCheckOptions& options, const std::function<void(const CheckResult&)>& report)
+  Examination(const RigDoctorOptions& options, const std::function<void(const CheckResult&)>& report)
       : options_(options), report_(report) {}
 
   bool run() {
@@ -312,8 +312,8 @@ class Examination {
     }
     const RadarConfig& radar = *options_.radar;
     try {
-      checkCaptureLink(radar, options_.packet_delay_us);
-      tell(Level::kFine, "throughput", describe(captureLink(radar, options_.packet_delay_us)));
+      checkLinkBudget(radar, options_.packet_delay_us);
+      tell(Level::kFine, "throughput", describe(linkBudget(radar, options_.packet_delay_us)));
     } catch (const InputError& error) {
       tell(Level::kProblem, "throughput", error.what(), "change radar.yaml or packet_delay_us so");
       return;
@@ -401,7 +401,7 @@ class Examination {
     }
   }
 
-  const RigCheckOptions& options_;
+  const RigDoctorOptions& options_;
   const std::function<void(const CheckResult&)>& report_;
   std::unique_ptr<PacketReceiver> receiver_;
   std::unique_ptr<Dca1000Control> control_;
@@ -411,7 +411,7 @@ class Examination {
 
 }  // namespace
 
-bool checkRig(const RigCheckOptions& options, const std::function<void(const CheckResult&)>& report) {
+bool checkRig(const RigDoctorOptions& options, const std::function<void(const CheckResult&)>& report) {
   parseIpv4(options.host_ip);
   parseIpv4(options.card_ip);
   packetDelayTicks(options.packet_delay_us);

@@ -1,7 +1,8 @@
+#include "mmradartwin_driver/frame_assembler.h"
+
 #include <gtest/gtest.h>
 
 #include "assembly_scenario.h"
-#include "mmradartwin_driver/frame_assembler.h"
 #include "mmradartwin_dsp/paper_radar.h"
 #include "packet_stream.h"
 

@@ -8,7 +8,7 @@
 #include <cstdlib>
 
 #include "emulated_rig.h"
-#include "mmradartwin_driver/rig_check.h"
+#include "mmradartwin_driver/rig_doctor.h"
 #include "mmradartwin_driver/udp_socket.h"
 
 namespace mmradartwin {
@@ -66,13 +66,13 @@ class Doctor : public ::testing::Test {
   }
   static bool holds(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
-  TemporaryFolder folder_;
-  RigCheckOptions options_;
+  TestFolder folder_;
+  RigDoctorOptions options_;
   std::vector<CheckResult> results_;
 };
 
 TEST_F(Doctor, AllFine) {
-  EmulatorProgram card(options_.host_ip, options_.card_ip, emulator());
+  EmulatorProcess card(options_.host_ip, options_.card_ip, emulator());
   EXPECT_TRUE(examine());
   for (const char* subject : {"address", "link", "usb", "ports", "buffer", "card", "version", "throughput", "samples",
                               "losses", "rate", "lanes"}) {
@@ -104,7 +104,7 @@ TEST_F(Doctor, FirewallIsNamedWhereTheCardIsSilent) {
 }
 
 TEST_F(Doctor, SmallBuffer) {
-  EmulatorProgram card(options_.host_ip, options_.card_ip, emulator());
+  EmulatorProcess card(options_.host_ip, options_.card_ip, emulator());
   options_.buffer_bytes = std::size_t{1} << 30;  // the kernel books twice that: more than an int holds
   options_.radar.reset();
   EXPECT_FALSE(examine());
@@ -112,7 +112,7 @@ TEST_F(Doctor, SmallBuffer) {
 }
 
 TEST_F(Doctor, UsbMissing) {
-  EmulatorProgram card(options_.host_ip, options_.card_ip, emulator());
+  EmulatorProcess card(options_.host_ip, options_.card_ip, emulator());
   options_.radar.reset();
   std::filesystem::remove_all(folder_.file("sys"));
   EXPECT_FALSE(examine());
@@ -122,7 +122,7 @@ TEST_F(Doctor, UsbMissing) {
 }
 
 TEST_F(Doctor, UsbNotPermitted) {
-  EmulatorProgram card(options_.host_ip, options_.card_ip, emulator());
+  EmulatorProcess card(options_.host_ip, options_.card_ip, emulator());
   options_.radar.reset();
   // A user without rights and a device that is not there look the same to access(); root may open anything.
   std::filesystem::remove(folder_.file("dev/bus/usb/001/007"));
@@ -131,14 +131,14 @@ TEST_F(Doctor, UsbNotPermitted) {
 }
 
 TEST_F(Doctor, TooManySamples) {
-  EmulatorProgram card(options_.host_ip, options_.card_ip, emulator());
+  EmulatorProcess card(options_.host_ip, options_.card_ip, emulator());
   options_.radar->loops_per_frame = 2000;  // 2 MB every 20 ms
   EXPECT_FALSE(examine());
   EXPECT_TRUE(holds(theProblem(), "this would fit")) << theProblem();
 }
 
 TEST_F(Doctor, NoSamples) {
-  EmulatorProgram card(options_.host_ip, options_.card_ip,
+  EmulatorProcess card(options_.host_ip, options_.card_ip,
                        {folder_.file(""), "--start-delay-s", "30", "--deaf-s", "0.1"});
   options_.first_packet_s = 0.5;
   EXPECT_FALSE(examine());
@@ -146,13 +146,13 @@ TEST_F(Doctor, NoSamples) {
 }
 
 TEST_F(Doctor, CardReportsNoLvds) {
-  EmulatorProgram card(options_.host_ip, options_.card_ip, emulator({"--status-at", "5:0x1"}));
+  EmulatorProcess card(options_.host_ip, options_.card_ip, emulator({"--status-at", "5:0x1"}));
   EXPECT_FALSE(examine());
   EXPECT_TRUE(holds(theProblem(), "NO_LVDS_DATA")) << theProblem();
 }
 
 TEST_F(Doctor, Losses) {
-  EmulatorProgram card(options_.host_ip, options_.card_ip, emulator({"--loss", "0.2"}));
+  EmulatorProcess card(options_.host_ip, options_.card_ip, emulator({"--loss", "0.2"}));
   EXPECT_FALSE(examine());
   const auto lost = std::find_if(results_.begin(), results_.end(),
                                  [](const CheckResult& result) { return result.subject == "losses"; });
@@ -166,27 +166,27 @@ TEST_F(Doctor, ReceiverThatIsAlwaysZero) {
     for (const std::size_t at : {4, 5, 12, 13}) bytes[i + at] = 0;  // I and Q of rx2
   }
   writeText(folder_.file("captures/a.bin"), std::string(bytes.begin(), bytes.end()));
-  EmulatorProgram card(options_.host_ip, options_.card_ip, emulator());
+  EmulatorProcess card(options_.host_ip, options_.card_ip, emulator());
   EXPECT_FALSE(examine());
   EXPECT_TRUE(holds(theProblem(), "lanes: always zero: I of rx2, Q of rx2 ->")) << theProblem();
 }
 
 TEST_F(Doctor, AllZero) {
   writeText(folder_.file("captures/a.bin"), std::string(400 * 2048, '\0'));
-  EmulatorProgram card(options_.host_ip, options_.card_ip, emulator());
+  EmulatorProcess card(options_.host_ip, options_.card_ip, emulator());
   EXPECT_FALSE(examine());
   EXPECT_TRUE(holds(theProblem(), "LVDS ribbon")) << theProblem();
 }
 
 TEST_F(Doctor, DoubledRate) {
-  EmulatorProgram card(options_.host_ip, options_.card_ip, emulator());
+  EmulatorProcess card(options_.host_ip, options_.card_ip, emulator());
   options_.radar->samples_per_chirp /= 2;
   EXPECT_FALSE(examine());
   EXPECT_TRUE(holds(theProblem(), "the rate is doubled")) << theProblem();
 }
 
 TEST(DoctorParts, ReceiversNotInUseMayBeZero) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
   RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   radar.rx_position_m.resize(2);
@@ -206,13 +206,13 @@ TEST(DoctorParts, FirewallRules) {
 }
 
 TEST(DoctorProgram, ExitStatusSaysWhetherThereIsSomethingToDo) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.02, {400});
   const std::string command = std::string(MMRADARTWIN_DOCTOR) + " --no-usb --buffer-mb 0.2 --host-ip " + loopbackIp(1) +
                               " --card-ip " + loopbackIp(2) + " --radar " + folder.file("radar.yaml") + " >" +
                               folder.file("out");
   EXPECT_EQ(2, WEXITSTATUS(std::system(command.c_str())));
-  EmulatorProgram card(loopbackIp(1), loopbackIp(2), {folder.file(""), "--start-delay-s", "0.1", "--deaf-s", "0.1"});
+  EmulatorProcess card(loopbackIp(1), loopbackIp(2), {folder.file(""), "--start-delay-s", "0.1", "--deaf-s", "0.1"});
   EXPECT_EQ(0, WEXITSTATUS(std::system(command.c_str())));
   const std::vector<std::uint8_t> output = readBytes(folder.file("out"));
   EXPECT_NE(std::string::npos, std::string(output.begin(), output.end()).find("all fine"));

@@ -1,3 +1,5 @@
+#include "mmradartwin_driver/pcap_reader.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,7 +9,6 @@
 #include <vector>
 
 #include "mmradartwin_driver/frame_assembler.h"
-#include "mmradartwin_driver/pcap_reader.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "real_data.h"
 

@@ -26,10 +26,10 @@ struct Jitter {
 
 /// Packets leave late by 150 us on average, one in twenty by up to 9 ms more.
 Jitter measure(unsigned seed) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, kPeriod_s, {kFrames});
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
-  EmulatorProgram emulator(loopbackIp(1), loopbackIp(2),
+  EmulatorProcess emulator(loopbackIp(1), loopbackIp(2),
                            {folder.file(""), "--start-delay-s", "0.3", "--deaf-s", "0.1", "--flush-s", "0.3",
                             "--jitter-us", "150", "--stall-us", "9000", "--seed", std::to_string(seed)});
   RigOptions options;
@@ -52,7 +52,7 @@ Jitter measure(unsigned seed) {
     EXPECT_NE(first_ns, 0);
     const std::optional<std::string> completed = emulator.waitFor("completed");
     EXPECT_TRUE(completed);
-    if (completed) own_late_us = 1e-3 * static_cast<double>(EmulatorProgram::ownLate_ns(*completed));
+    if (completed) own_late_us = 1e-3 * static_cast<double>(EmulatorProcess::ownLate_ns(*completed));
   }
   const auto rms_us = [](const std::vector<double>& errors_us) {
     double sum = 0;

@@ -1,10 +1,10 @@
+#include "mmradartwin_driver/mmwavelink_frame.h"
+
 #include <gtest/gtest.h>
 
 #include <random>
 #include <stdexcept>
 #include <string>
-
-#include "mmradartwin_driver/mmwavelink_frame.h"
 
 namespace mmradartwin {
 namespace {

@@ -1,10 +1,11 @@
 // What card and link carry, against TI's throughput table, and refusals that fit when followed.
+#include "mmradartwin_driver/link_budget.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <regex>
 
-#include "mmradartwin_driver/capture_link.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -28,7 +29,7 @@ RadarConfig radarOf(int samples, int loops, double period_s) {
 
 std::string refusal(const RadarConfig& radar, double delay_us) {
   try {
-    checkCaptureLink(radar, delay_us);
+    checkLinkBudget(radar, delay_us);
   } catch (const InputError& error) {
     return error.what();
   }
@@ -40,24 +41,24 @@ double numberAfter(const std::string& text, const std::string& words) {
   return std::regex_search(text, match, std::regex(words + " ([0-9.e+-]+)")) ? std::stod(match[1]) : NAN;
 }
 
-TEST(CaptureLink, CarriesWhatTheTableSays) {
+TEST(LinkBudget, CarriesWhatTheTableSays) {
   // SPRUIJ4A, table 19.
   const std::pair<double, double> table[] = {{5, 706}, {10, 545}, {25, 325}, {50, 193}};
   for (const auto& [delay_us, mbit] : table) {
-    const double carried = captureLink(radarOf(64, 1, 0.05), delay_us).carried_bit_per_s() * 1e-6;
+    const double carried = linkBudget(radarOf(64, 1, 0.05), delay_us).carried_bit_per_s() * 1e-6;
     EXPECT_NEAR(mbit, carried, 0.02 * mbit) << delay_us << " us";
   }
-  EXPECT_LE(captureLink(radarOf(64, 1, 0.05), 0).carried_bit_per_s(), 706e6);
+  EXPECT_LE(linkBudget(radarOf(64, 1, 0.05), 0).carried_bit_per_s(), 706e6);
 }
 
-TEST(CaptureLink, CountsThePaperRadar) {
-  const CaptureLink link = captureLink(radarOf(64, 1, 0.05), 25);
+TEST(LinkBudget, CountsThePaperRadar) {
+  const LinkBudget link = linkBudget(radarOf(64, 1, 0.05), 25);
   EXPECT_DOUBLE_EQ(2048 * 8 / 0.05, link.needed_bit_per_s);
   EXPECT_NEAR(1024 * 8 / 2.4e9, link.lvds_per_chirp_s, 1e-15);  // four lanes of 600 Mbit/s
   EXPECT_EQ("", refusal(radarOf(64, 1, 0.05), 25));
 }
 
-TEST(CaptureLink, RefusesWithFiguresThatFit) {
+TEST(LinkBudget, RefusesWithFiguresThatFit) {
   // 256 samples x 16 bytes x 128 x 2 chirps every 20 ms: 419.4 Mbit/s; 25 us of delay carry about 322.
   const RadarConfig radar = radarOf(256, 128, 0.02);
   const std::string why = refusal(radar, 25);
@@ -88,14 +89,14 @@ TEST(CaptureLink, RefusesWithFiguresThatFit) {
   EXPECT_NE(std::string::npos, why.find("(" + std::to_string(std::lround(delay_us * 125)) + " ticks")) << why;
 }
 
-TEST(CaptureLink, SaysWhereNoDelayHelps) {
+TEST(LinkBudget, SaysWhereNoDelayHelps) {
   // 839 Mbit/s: more than the card ever sends.
   const std::string why = refusal(radarOf(256, 128, 0.01), 5);
   EXPECT_NE(std::string::npos, why.find("no packet delay carries it")) << why;
   EXPECT_EQ(std::string::npos, why.find("packet_delay_us of at most")) << why;
 }
 
-TEST(CaptureLink, RefusesChirpsFasterThanTheLanes) {
+TEST(LinkBudget, RefusesChirpsFasterThanTheLanes) {
   // 512 samples of 16 bytes take 27.3 us on four lanes, the chirp 26 us.
   RadarConfig radar = radarOf(256, 1, 0.05);
   radar.samples_per_chirp = 512;

@@ -48,7 +48,7 @@ std::vector<Row> rowsOf(const mmradartwin_msgs::Session& session) {
 
 TEST(LiveSession, CubesAndPosesMeetAtTheirStamps) {
   const std::vector<int> frames = {6, 4, 5};
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.05, frames);
   ros::NodeHandle nh;
   std::vector<mmradartwin_msgs::AdcCube> cubes;
@@ -87,7 +87,7 @@ TEST(LiveSession, CubesAndPosesMeetAtTheirStamps) {
   const auto listen = [&](int timeout_ms) {
     const auto line = player.readLine(timeout_ms);
     if (line && line->find("own_late_us=") != std::string::npos) {
-      own_late_s = 1e-9 * static_cast<double>(EmulatorProgram::ownLate_ns(*line));
+      own_late_s = 1e-9 * static_cast<double>(EmulatorProcess::ownLate_ns(*line));
     }
     return line.has_value();
   };
@@ -149,6 +149,6 @@ TEST(LiveSession, CubesAndPosesMeetAtTheirStamps) {
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "test_live_session");
+  ros::init(argc, argv, "live_session_test");
   return RUN_ALL_TESTS();
 }

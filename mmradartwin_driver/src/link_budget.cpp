@@ -1,4 +1,4 @@
-#include "mmradartwin_driver/capture_link.h"
+#include "mmradartwin_driver/link_budget.h"
 
 #include <algorithm>
 #include <cmath>
@@ -31,7 +31,7 @@ int ticksFor(double needed_bit_per_s) {
   return possible ? std::min(ticks, 65535) : -1;
 }
 
-std::string whatWouldFit(const RadarConfig& radar, const CaptureLink& link) {
+std::string whatWouldFit(const RadarConfig& radar, const LinkBudget& link) {
   const double carried = link.carried_bit_per_s(), bits = 8.0 * static_cast<double>(radar.bytes_per_frame());
   std::string fits = "frame_period_s of at least " + number("%.6g", std::ceil(bits / carried * 1e6) * 1e-6);
   int samples = static_cast<int>(std::floor(radar.samples_per_chirp / link.share() + 1e-9));
@@ -45,17 +45,17 @@ std::string whatWouldFit(const RadarConfig& radar, const CaptureLink& link) {
             " ticks of the card)";
   } else {
     fits += "; no packet delay carries it: the card's fastest, 5 us, is " +
-            mbit(captureLink(radar, kShortestDelay_us).carried_bit_per_s());
+            mbit(linkBudget(radar, kShortestDelay_us).carried_bit_per_s());
   }
   return fits;
 }
 
 }  // namespace
 
-double CaptureLink::carried_bit_per_s() const { return std::min(card_bit_per_s, ethernet_bit_per_s); }
+double LinkBudget::carried_bit_per_s() const { return std::min(card_bit_per_s, ethernet_bit_per_s); }
 
-CaptureLink captureLink(const RadarConfig& radar, double delay_us, double lane_bit_per_s) {
-  CaptureLink link;
+LinkBudget linkBudget(const RadarConfig& radar, double delay_us, double lane_bit_per_s) {
+  LinkBudget link;
   link.delay_us = packetDelayTicks(delay_us) / 125.0;
   link.needed_bit_per_s = 8.0 * static_cast<double>(radar.bytes_per_frame()) / radar.frame_period_s;
   link.card_bit_per_s = std::min(kPayloadBits / (link.delay_us + kPacketCost_us) * 1e6, kCardFastest_bit_per_s);
@@ -66,8 +66,8 @@ CaptureLink captureLink(const RadarConfig& radar, double delay_us, double lane_b
   return link;
 }
 
-void checkCaptureLink(const RadarConfig& radar, double delay_us, double lane_bit_per_s) {
-  const CaptureLink link = captureLink(radar, delay_us, lane_bit_per_s);
+void checkLinkBudget(const RadarConfig& radar, double delay_us, double lane_bit_per_s) {
+  const LinkBudget link = linkBudget(radar, delay_us, lane_bit_per_s);
   if (link.lvds_per_chirp_s > link.chirp_s) {  // false where the chirp's time is not known
     const double fitting = radar.samples_per_chirp * link.chirp_s / link.lvds_per_chirp_s;
     throw InputError("the LVDS lanes need " + number("%.2f us", link.lvds_per_chirp_s * 1e6) +
@@ -84,7 +84,7 @@ void checkCaptureLink(const RadarConfig& radar, double delay_us, double lane_bit
                    "): this would fit: " + whatWouldFit(radar, link));
 }
 
-std::string describe(const CaptureLink& link) {
+std::string describe(const LinkBudget& link) {
   return number("%.1f of ", link.needed_bit_per_s * 1e-6) + mbit(link.carried_bit_per_s()) + " at a packet delay of " +
          number("%.6g", link.delay_us) + " us";
 }

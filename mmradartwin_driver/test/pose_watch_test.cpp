@@ -1,8 +1,8 @@
+#include "mmradartwin_driver/pose_watch.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
-
-#include "mmradartwin_driver/pose_watch.h"
 
 namespace mmradartwin {
 namespace {

@@ -16,20 +16,20 @@ namespace mmradartwin {
 /// comes while `capacity` values wait is dropped and counted. The taker is a thread of this object, which ends after it
 /// has delivered everything.
 template <typename T>
-class HandOver {
+class DroppingWorkerQueue {
  public:
-  HandOver(std::size_t capacity, std::function<void(T&&)> take) : queue_(capacity), take_(std::move(take)) {
+  DroppingWorkerQueue(std::size_t capacity, std::function<void(T&&)> take) : queue_(capacity), take_(std::move(take)) {
     sem_init(&waiting_, 0, 0);
     thread_ = std::thread([this] { run(); });
   }
-  ~HandOver() {
+  ~DroppingWorkerQueue() {
     stop_ = true;
     sem_post(&waiting_);
     thread_.join();
     sem_destroy(&waiting_);
   }
-  HandOver(const HandOver&) = delete;
-  HandOver& operator=(const HandOver&) = delete;
+  DroppingWorkerQueue(const DroppingWorkerQueue&) = delete;
+  DroppingWorkerQueue& operator=(const DroppingWorkerQueue&) = delete;
 
   /// From one thread only. False where the value was dropped.
   bool give(T&& value) {

@@ -1,4 +1,6 @@
 // The radar's watcher beside the thread that controls it, on the emulated chip; also run under the thread sanitizer.
+#include "mmradartwin_driver/radar_watch.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +11,6 @@
 
 #include "emulated_radar_bus.h"
 #include "emulated_rig.h"
-#include "mmradartwin_driver/radar_watch.h"
 
 namespace mmradartwin {
 namespace {

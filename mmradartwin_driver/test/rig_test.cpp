@@ -1,11 +1,12 @@
 // The rig as a whole against the emulator: configuration, arming, recovery.
+#include "mmradartwin_driver/rig.h"
+
 #include <gtest/gtest.h>
 
 #include <condition_variable>
 #include <mutex>
 
 #include "emulated_rig.h"
-#include "mmradartwin_driver/rig.h"
 #include "mmradartwin_dsp/capture.h"
 
 namespace mmradartwin {
@@ -57,17 +58,17 @@ std::vector<std::string> quickly(const std::string& session, std::vector<std::st
   return arguments;
 }
 
-std::vector<std::int16_t> frameOf(const TemporaryFolder& folder, const RadarConfig& radar, std::size_t i) {
+std::vector<std::int16_t> frameOf(const TestFolder& folder, const RadarConfig& radar, std::size_t i) {
   std::vector<std::int16_t> samples;
   decodeFrame(radar, readBytes(folder.file("captures/a.bin")).data() + i * 2048, samples);
   return samples;
 }
 
 TEST(Rig, ConfiguresArmsAndRecords) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.01, {30});
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
-  EmulatorProgram emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
+  EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
   RunningRig running(radar);
   ASSERT_TRUE(running.waitForCubes(30));
   for (std::size_t i = 0; i < 30; ++i) {
@@ -87,10 +88,10 @@ TEST(Rig, ConfiguresArmsAndRecords) {
 }
 
 TEST(Rig, ArmsAnewWhenTheCardThrewSamplesAway) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.01, {400});
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
-  EmulatorProgram emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file(""), {"--status-at", "40:0x80"}));
+  EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file(""), {"--status-at", "40:0x80"}));
   RunningRig running(radar);
   // The count begins anew, and the frames are whole ones of the radar again.
   const auto second_start = [&running] {
@@ -113,24 +114,25 @@ TEST(Rig, ArmsAnewWhenTheCardThrewSamplesAway) {
 }
 
 TEST(Rig, WaitsForACardAndComesBackToOneThatWasGone) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.01, {400});
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   RunningRig running(radar);
   EXPECT_TRUE(waitUntil([&] { return holds(running.rig.state().problem, "no answer from the DCA1000"); }))
       << running.rig.state().problem;
   {
-    EmulatorProgram emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
+    EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
     ASSERT_TRUE(running.waitForCubes(50));
     EXPECT_EQ("", running.rig.state().problem);
   }  // power lost in the middle
-  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  // What the card had sent is taken once the rig has seen nothing for a while.
+  ASSERT_TRUE(waitUntil([&] { return running.rig.state().silent_s > 0.3; }));
   std::size_t before;
   {
     const std::lock_guard<std::mutex> lock(running.mutex);
     before = running.cubes.size();
   }
-  EmulatorProgram emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
+  EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
   ASSERT_TRUE(running.waitForCubes(before + 50));
   const std::lock_guard<std::mutex> lock(running.mutex);
   // A frame that was cut off comes first.
@@ -143,7 +145,7 @@ TEST(Rig, WaitsForACardAndComesBackToOneThatWasGone) {
 TEST(Rig, NamesAHostAddressThatIsMissing) {
   RigOptions options = RunningRig::options();
   options.host_ip = "203.0.113.7";
-  TemporaryFolder folder;
+  TestFolder folder;
   writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
   const Rig rig(
       loadRadarConfig(folder.file("radar.yaml")), options, [](AdcCube&&) {}, [](Rig::Level, const std::string&) {});
@@ -151,17 +153,17 @@ TEST(Rig, NamesAHostAddressThatIsMissing) {
 }
 
 TEST(Rig, LooksAtTheCardsVersion) {
-  TemporaryFolder folder;
+  TestFolder folder;
   writeSession(folder, 0.01, {30});
   const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
   {
-    EmulatorProgram emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file(""), {"--fpga-version", "0x4402"}));
+    EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file(""), {"--fpga-version", "0x4402"}));
     RunningRig running(radar);
     EXPECT_TRUE(waitUntil([&] { return holds(running.rig.state().problem, "playback image: load TI's record image"); }))
         << running.rig.state().problem;
     EXPECT_EQ(0u, running.rig.state().armings);
   }
-  EmulatorProgram emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file(""), {"--fpga-version", "0x0282"}));
+  EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file(""), {"--fpga-version", "0x0282"}));
   RunningRig running(radar);
   EXPECT_TRUE(running.waitForCubes(30));  // an unknown one is tried
   EXPECT_TRUE(running.saw("FPGA 2.5: the driver is made after FPGA 2.7 to 2.9"));
