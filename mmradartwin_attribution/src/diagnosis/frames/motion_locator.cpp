@@ -8,8 +8,8 @@
 #include <map>
 #include <sstream>
 
-#include "mmradartwin_attribution/ledger.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::frames {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "mmradartwin_attribution/ledger.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::receiver {
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated) {
