@@ -11,7 +11,7 @@
 
 namespace mmradartwin {
 
-/// Where a diagnosis is; `share` of the stage from 0 to 1.
+/// Progress of a diagnosis: its stage, and the share of the stage that is done, 0 to 1.
 struct DiagnosisProgress {
   std::string stage;
   double share = 0;

@@ -25,7 +25,7 @@ struct TriedHypothesis {
   std::string verdict;                 ///< "found", or what speaks against it; "" where none was needed
 };
 
-/// How much likelier the same data are by another twin.
+/// Another twin of the same session: how much likelier the data are under it.
 struct ComparedTwin {
   std::string file;
   double log_likelihood_gain = 0;  ///< nats over the twin as given, actors' and poses' errors fitted with each

@@ -57,8 +57,8 @@ void DiagnosisRun::measureFrameGain() {
   ChannelData recorded = data_;
   const SignalChain chain(data_.radar);
   for (PoseChannels& pose : recorded.poses) {
-    if (pose.plain.x.size() == 0) continue;
-    pose.grid = pose.plain;
+    if (pose.uncorrected_average.x.size() == 0) continue;
+    pose.grid = pose.uncorrected_average;
     transformGrid(chain, pose);
   }
   gains_.ofChange(recorded, mechanisms_, data_, mechanisms_, findings.front());
@@ -94,7 +94,7 @@ void DiagnosisRun::judgeOwnEcho() {
     if (m.mechanism == "tx_rx_leakage" || m.mechanism == "dc_offset") return;  // the twin has it already
   }
   const BodyFixedTone tone = findBodyFixedTone(data_);
-  if (!isPlain(tone)) return;
+  if (!isUnambiguous(tone)) return;
   const ChannelData recorded = data_;
   subtractTone(tone, data_);
   Finding finding = findingOf(tone, data_);

@@ -144,7 +144,7 @@ double ChannelLikelihood::noiseOf(int pose, int cell) const {
 
 const std::complex<double>* ChannelLikelihood::dataOf(int pose, int cell) const {
   if (isBeam(cell)) return data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)].y.data();
-  return data_.poses[pose].y.col(cell).data();
+  return data_.poses[pose].range_spectra.col(cell).data();
 }
 
 void ChannelLikelihood::addApart(int cell, double power, PackedHermitian& to) const {
@@ -641,7 +641,7 @@ SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) c
     }
     double measured = 0;
     for (int bin = firstBin(); bin < samples_; ++bin) {
-      const double power = data_.poses[i].y.col(bin).squaredNorm();
+      const double power = data_.poses[i].range_spectra.col(bin).squaredNorm();
       measured += power;
       low.push_back(std::log(power / channels_ + 1e-300) -
                     std::log(data_.poses[i].clutter.at(bin, size_)[0].real() + 1e-300));
@@ -675,7 +675,7 @@ ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes
   }
   const Eigen::LLT<Eigen::MatrixXcd> llt(full);
   w.inverse = llt.solve(Eigen::MatrixXcd::Identity(channels_, channels_));
-  const Eigen::VectorXcd y = data_.poses[pose].y.col(bin);
+  const Eigen::VectorXcd y = data_.poses[pose].range_spectra.col(bin);
   w.solved = w.inverse * y;
   w.weight = (channels_ + kTailFreedom) / (kTailFreedom + y.dot(w.solved).real());
   return w;

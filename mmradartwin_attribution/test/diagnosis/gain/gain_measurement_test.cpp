@@ -57,7 +57,7 @@ TEST_F(BiasedCabinet, OnePlaceAloneHoldsNothingOut) {
 }
 
 TEST_F(BiasedCabinet, ItsMapMetricsAreTheTwinsBeforeAndAfter) {
-  for (PoseChannels& pose : data_.poses) pose.plain = pose.grid;
+  for (PoseChannels& pose : data_.poses) pose.uncorrected_average = pose.grid;
   recording_.radar = data_.radar;
   DiagnosisContext context(recording_, twin_, data_, options_, 2);
   const GainMeasurement measurement(context);
