@@ -86,9 +86,9 @@ class MadeRoom {
     const auto draw = [&] { return std::complex<double>(normal(random), normal(random)) / std::sqrt(2.0); };
     for (std::size_t i = 0; i < data.poses.size(); ++i) {
       PoseChannels& p = data.poses[i];
-      p.y = spectraOf(truth, i);
-      for (Eigen::Index k = 0; k < p.y.rows(); ++k) p.y.row(k) *= 1.0 + channel_error * draw();
-      for (std::complex<double>& y : p.y.reshaped()) y += noise * draw();
+      p.range_spectra = spectraOf(truth, i);
+      for (Eigen::Index k = 0; k < p.range_spectra.rows(); ++k) p.range_spectra.row(k) *= 1.0 + channel_error * draw();
+      for (std::complex<double>& y : p.range_spectra.reshaped()) y += noise * draw();
       p.noise_power = 0.5 * noise * noise;  // the clutter's floor has the other half
     }
   }
