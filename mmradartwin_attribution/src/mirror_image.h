@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "mmradartwin_sim/ray_caster.h"
 #include "mmradartwin_sim/scene.h"
 
 namespace mmradartwin {

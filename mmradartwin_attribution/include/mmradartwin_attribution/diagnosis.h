@@ -12,7 +12,7 @@ namespace mmradartwin {
 /// that cannot be judged at all, DiagnosisCancelled.
 Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOptions& options);
 
-/// The same without a scene: then only frames and channels can be judged, and the extended twin is none.
+/// Diagnosis without a scene: it judges frames and channels only, and there is no extended twin.
 Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& options);
 
 }  // namespace mmradartwin

@@ -13,6 +13,7 @@
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_sim/cell_records.h"
 #include "mmradartwin_sim/path_record.h"
+#include "mmradartwin_sim/ray_caster.h"
 #include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {

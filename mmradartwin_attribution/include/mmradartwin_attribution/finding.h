@@ -9,6 +9,7 @@
 
 #include "mmradartwin_attribution/residual.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/stated_accuracy.h"
 #include "mmradartwin_sim/mechanism.h"
 #include "mmradartwin_sim/twin.h"
 
@@ -28,11 +29,11 @@ struct CauseParameter {
   std::string name;
   std::string unit;  ///< "" for texts
   ParameterKind kind = ParameterKind::kNumber;
-  /// Of the parameters of a cause that share a number above 0, one is enough.
+  /// Group of parameters of which one is enough, 0 for a parameter that is always required.
   int one_of = 0;
 };
 
-/// What a finding may be called, and what its name implies.
+/// A cause that a finding may name, with the residual class and the parameters that follow from it.
 struct CauseDescription {
   std::string name;
   ResidualClass residual_class = ResidualClass::kMissingMechanism;
@@ -40,11 +41,11 @@ struct CauseDescription {
   const std::string& action() const { return classAction(residual_class); }
 };
 
-/// All binding names of causes.md, in its order, and last `unknown`.
+/// All catalogued causes in the order of causes.md, and last `unknown`.
 const std::vector<CauseDescription>& causeDescriptions();
-/// True for a cause of that list (`unknown` is one).
+/// True for a cause of causeDescriptions(); `unknown` is one.
 bool isCatalogued(const std::string& cause);
-/// Throws InputError naming the known causes.
+/// Description of a cause. Throws InputError for another name; it lists the known ones.
 const CauseDescription& causeDescription(const std::string& cause);
 
 struct CauseProbability {
@@ -59,7 +60,7 @@ struct FindingEvidence {
   std::optional<double> margin;  ///< nats over the runner-up
 };
 
-/// A figure of merit without and with a finding, on held-out locations. NaN where there was nothing to count.
+/// A figure of merit without and with a finding, on held-out locations. NaN where nothing was there to count.
 struct GainMetric {
   double before = std::numeric_limits<double>::quiet_NaN();
   double after = std::numeric_limits<double>::quiet_NaN();
@@ -75,31 +76,31 @@ struct FindingGain {
   std::array<GainMetric, 5> classes;  ///< counts of C1 to C5
 };
 
-/// A place in the room or in the maps that carries a finding. Empty where it does not apply.
+/// A place in the room or in the maps that carries a finding. Parts that do not apply are empty.
 struct FindingPlace {
   std::optional<std::array<double, 2>> range_m, azimuth_deg;  ///< from, to; radar frame
   std::vector<std::string> actors, poses;
   std::optional<double> x_m, y_m;  ///< map
 };
 
-/// What a finding's figure shows of the maps: simulated over measured power, each summed over all poses, with and
-/// without the finding. NaN where neither has an echo to speak of.
+/// Maps of a finding's figure: simulated over measured power by cell, both summed over all poses, without and with the
+/// finding. NaN where neither has an echo to speak of.
 struct FindingMaps {
   RangeAngleAxes axes;
   RealGrid before_db, after_db;  ///< [N][64]
 };
 
-/// Where a path record lies in a pose's maps, and its amplitude (20 log10 of DESIGN section 4's).
+/// Place and level of a path record in a pose's maps; amplitude_db is 20 log10 of PathRecord::amplitude.
 struct RecordState {
   double amplitude_db = 0, range_m = 0, azimuth_deg = 0;
 };
-/// A path record of the simulation that a finding changes, before and after; without the one it adds it, without the
-/// other it takes it away.
+/// A path record of the simulation that a finding changes. Without `before` the finding adds the path, without `after`
+/// it takes the path away.
 struct ChangedRecord {
   std::string pose, event;  ///< event: the mechanism that made it
   std::vector<std::string> actors;
   std::optional<RecordState> before, after;
-  double strongest_db() const;  ///< of both
+  double strongest_db() const;  ///< the larger amplitude of both
 };
 
 /// One entry of findings.json (DESIGN section 5). Class and action follow from the cause.
@@ -117,29 +118,31 @@ struct Finding {
   std::shared_ptr<const FindingMaps> maps;  ///< for the figure; none where maps of averages do not show it
   std::vector<ChangedRecord> records;       ///< that it changes, at the poses that carry it; for the report
 
-  const FindingParameter* parameter(const std::string& name) const;  ///< nullptr where it has none of that name
-  /// Half the 95 % intervals, along map's x and y, of where it is, or of by how much it moved; 0 where it has none.
+  const FindingParameter* parameter(const std::string& name) const;  ///< nullptr where there is none of that name
+  /// Half the 95 % intervals of its place, or of its move, along the map's x and y; 0 where it has no interval.
   std::array<double, 2> placeError_m() const;
 };
 
 /// findings.json.
 struct Findings {
   int poses = 0, locations = 0;
-  std::string held_out;  ///< how, in words
-  /// What the findings make of the session: "none" without any, "unknown" where that is all, else "named".
+  std::string held_out;     ///< how, in words
+  StatedAccuracy accuracy;  ///< by which the session was judged
+  /// Verdict on the session: "none" without findings, "unknown" where the first finding is unknown, else "named".
   std::string verdict() const;
   std::vector<Finding> findings;             ///< by gain
   std::optional<std::string> extended_twin;  ///< file name, relative to findings.json
 };
 
-/// As findings.json holds it. Throws std::logic_error where a finding lacks a parameter of its cause, carries one in
-/// another unit, has a number that is not finite or an `unknown` that does not stand last.
+/// JSON as findings.json holds it. Throws std::logic_error where a finding lacks a parameter of its cause, carries one
+/// in another unit or has a number that is not finite, and where an `unknown` does not stand last.
 std::string toJson(const Finding& finding);
 std::string toJson(const Findings& findings);
 /// Throws std::logic_error as toJson, std::runtime_error where the file cannot be written.
 void writeFindings(const Findings& findings, const std::string& file);
 
-/// Strict: unknown, missing and unfit keys are InputErrors that name file and key, and so is what toJson refuses.
+/// Reads findings.json strictly. Unknown, missing and unfit keys, and all that toJson refuses, are InputErrors that
+/// name file and key.
 Findings readFindings(const std::string& file);
 Findings parseFindings(const std::string& json_text, const std::string& name);
 

@@ -14,7 +14,7 @@
 
 namespace mmradartwin {
 
-/// What the radar was held in front of: a corner reflector at a known place, or a wall of the scene.
+/// A target that the radar was held in front of: a corner reflector at a known place, or a wall of the scene.
 struct CalibrationTarget {
   std::optional<Eigen::Vector3d> reflector_map_m;
   std::vector<Facet> wall;  ///< the actor's facets that reflect; the nearest faced one counts at each pose
@@ -33,7 +33,7 @@ std::vector<LaserDistance> readLaserDistances(const std::string& file);
 
 struct MountCalibrationOptions {
   double search_m = 0.4;            ///< the target's echo is looked for within this of where the pose puts it
-  double search_rad = 0.44;         ///< and the mount's yaw within this
+  double search_rad = 0.44;         ///< greatest yaw of the mount that is looked for, to either side
   double min_level_db = 12;         ///< of the target's echo over the pose's median range bin
   double max_azimuth_rad = 1.05;    ///< poses that hold the target further off boresight are left out
   double most_other_db = -20;       ///< echoes of other things in a wall's range cell, by the scene, against the wall's
@@ -58,7 +58,7 @@ struct CalibratedPose {
   double range_m = 0;                                ///< measured one-way range
   double level_db = 0;                               ///< over the pose's median range bin
   std::array<double, 2> range_error_m = {0, 0};      ///< measured minus expected, before and after
-  std::array<double, 2> azimuth_error_deg = {0, 0};  ///< the same
+  std::array<double, 2> azimuth_error_deg = {0, 0};  ///< measured minus expected, before and after
   std::vector<double> channel_error_deg[2];          ///< [M] phase against the expected, mean taken out
 };
 

@@ -21,7 +21,7 @@ std::vector<std::string> inputFiles(const std::string& recording_path, const Rec
 /// Reads and hashes files, several at a time, in the given order. Throws InputError for one that cannot be read.
 std::vector<InputFile> hashFiles(const std::vector<std::string>& files);
 
-/// What stands beside the results so that a run can be repeated.
+/// Description of a run that stands beside its results, so that the run can be repeated.
 struct RunDescription {
   std::vector<std::string> command;
   std::string recording;                                ///< as given

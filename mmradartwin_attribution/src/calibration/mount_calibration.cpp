@@ -192,7 +192,7 @@ Scatter scatterOf(const Residuals& residuals, const VectorXd& p, bool lasers) {
   scatter.pose_m = std::max(kLeastRange_m, std::sqrt(pose2 / std::max(1.0, poses - geometry)));
   scatter.range_m = with_laser > 1 ? std::max(kLeastRange_m, std::sqrt(range2 / (with_laser - 1))) : kLeastRange_m;
   scatter.heading_rad = std::max(kLeastHeading_rad, std::sqrt(heading2 / std::max(1.0, poses - 1)));
-  // Of 2M numbers a pose's level takes two and its heading one.
+  // A pose has 2M numbers; its complex level takes two of them and its heading one.
   scatter.channel = std::max(kLeastChannel, std::sqrt(channel2 / std::max(1.0, poses * (phases - 1) - phases)));
   return scatter;
 }

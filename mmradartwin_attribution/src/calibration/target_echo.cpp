@@ -100,7 +100,7 @@ void requireClearEcho(const Twin& twin, const CalibrationTarget& target, const P
     throw InputError(here + "'" + twin.scene().actors[static_cast<std::size_t>(hit->actor)].name + "' stands before " +
                      target.name + "; take the pose where nothing does");
   }
-  // What falls into the echo's main lobe disturbs its phases; a strong one beside it would be taken for it.
+  // An echo within the main lobe disturbs the phases; a strong one beside it would be taken for the target's.
   const double lobe_m = 2 * twin.radar().range_bin_m();
   std::map<int, double> power;
   for (const PathRecord& record : simulation.records) {

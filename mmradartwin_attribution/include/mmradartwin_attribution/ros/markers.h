@@ -18,8 +18,8 @@ struct MarkerFrames {
   std::string residual = "radar_link_view_residual";
 };
 
-/// What rviz shows of one pose. Fans keep their topology and all markers their ids from message to message; what a pose
-/// no longer has is deleted by id. The first message clears what an earlier process left.
+/// Markers of one pose for rviz. Fans keep their topology and all markers their ids from message to message; markers
+/// that a pose no longer has are deleted by id. The first message clears what an earlier process left.
 class MarkerBuilder {
  public:
   MarkerBuilder(const EvaluationField& field, const MarkerFrames& frames, int max_paths = 200);
@@ -54,8 +54,8 @@ class MarkerBuilder {
 /// those.
 visualization_msgs::MarkerArray sceneMarkers(const Scene& scene, const std::string& map_frame);
 
-/// Where in the room findings are, in place of all that were shown before: a ring as wide as the place's 95 % interval,
-/// and cause and actor at it. Nothing of findings without a place.
+/// Markers of findings in the room, in place of all that were shown before: a ring as wide as the place's 95 %
+/// interval, with cause and actor. Findings without a place have none.
 visualization_msgs::MarkerArray findingMarkers(const Findings& findings, const std::string& map_frame);
 
 }  // namespace mmradartwin

@@ -19,7 +19,7 @@ ParameterKind kindOf(const Parameters::Value& value);
 /// Way to what findings.json must not hold, and why: "findings/0/parameters/x_m: is missing". "" where nothing is
 /// wrong. Throws InputError for a cause that is not catalogued.
 std::string problemOf(const Findings& findings);
-/// The same of one finding, as "parameters/x_m: is missing".
+/// Way and reason within one finding: "parameters/x_m: is missing".
 std::string problemOf(const Finding& finding);
 
 }  // namespace mmradartwin::diagnosis::catalogue

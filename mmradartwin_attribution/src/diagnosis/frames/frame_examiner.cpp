@@ -15,8 +15,8 @@
 #include "diagnosis/frames/motion_locator.h"
 #include "diagnosis/frames/payload_defects.h"
 #include "diagnosis/frames/shot_examiner.h"
-#include "mmradartwin_attribution/ledger.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::frames {
 namespace {

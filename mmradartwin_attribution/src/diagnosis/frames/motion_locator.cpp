@@ -10,8 +10,8 @@
 #include <sstream>
 
 #include "diagnosis/catalogue/bounds.h"
-#include "mmradartwin_attribution/ledger.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::frames {
 namespace {

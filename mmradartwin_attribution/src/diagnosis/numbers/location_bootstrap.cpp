@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "mmradartwin_attribution/ledger.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::numbers {
 namespace {

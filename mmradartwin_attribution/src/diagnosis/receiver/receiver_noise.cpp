@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "diagnosis/catalogue/bounds.h"
-#include "mmradartwin_attribution/ledger.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::receiver {
 

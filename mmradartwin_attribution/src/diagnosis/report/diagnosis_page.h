@@ -8,7 +8,7 @@
 
 namespace mmradartwin::diagnosis::report {
 
-/// Where a finding's files stand, relative to the page.
+/// Files of a finding, relative to the page.
 struct FindingFiles {
   std::string figure;
   std::string records;  ///< "" where it changes no path records
