@@ -9,7 +9,7 @@ export PATH=/usr/bin:$PATH
 unset PYTHONHOME
 
 packages=(
-  build-essential cmake ros-desktop-full-dev catkin catkin-lint python3-rostest librviz-dev rosbash rospack-tools
+  build-essential cmake clang-format clang-tidy shellcheck ros-desktop-full-dev catkin catkin-lint python3-rostest librviz-dev rosbash rospack-tools
   libactionlib-dev python3-actionlib libdiagnostic-updater-dev libembree-dev libpcl-dev libassimp-dev libyaml-cpp-dev libtinyxml2-dev nlohmann-json3-dev libtbb-dev
   libssl-dev libmatio-dev libpcap-dev libusb-1.0-0-dev zlib1g-dev libumockdev-dev umockdev libcli11-dev libgtest-dev libbenchmark-dev libopencv-dev libnlopt-dev
   ccache xvfb xauth x11-apps x11-utils imagemagick procps iproute2 python3-numpy python3-scipy python3-yaml)
@@ -31,7 +31,8 @@ usage: ./run.sh VERB
                each (60); needs clang; corpus and findings stay in .ws/fuzz
   tsan         the streaming path's tests under the thread sanitizer
   core [...]   build what needs no ROS by cmake alone, without catkin, and run its tests; arguments go to ctest
-  lint         catkin_lint over all packages
+  lint [all]   format, includes, errors and names of C++, Python, shell scripts, packages; clang-tidy takes the newest
+               sources for three minutes, with `all` every one
   exec CMD...  run CMD in the sourced workspace, e.g. ./run.sh exec rosrun mmradartwin_attribution evaluate --help
 U
   exit 2
@@ -100,6 +101,8 @@ run_tests() {
   data_folder
   rm -rf "$ws/build/test_results"
   rm -f "$ws/build/ctest.xml"
+  # Counted among the tests.
+  python3 "$root/test/scripts/lint.py" format includes python shell packages --xml "$ws/build/test_results/lint/lint.xml" >&2 || true
   (cd "$ws/build" && ctest --show-only=json-v1) >"$ws/build/ctest_list.json"
   # Side by side but for those that keep time; seeds and the day are shown. Cases are read from the XML files, and ctest
   # says which modules ended badly or left none.
@@ -172,7 +175,7 @@ run_fuzz() {
 
 run_tsan() {
   local test status=0
-  local tests="test_hand_over test_emulator_loopback test_rig test_radar_watch test_dca1000_control test_pcap_recording"
+  local tests="dropping_worker_queue_test emulator_loopback_test rig_test radar_watch_test dca1000_control_test pcap_recording_test"
   separate_build tsan "$tests" "-DCATKIN_WHITELIST_PACKAGES=mmradartwin_msgs;mmradartwin_dsp;mmradartwin_driver" \
     "-DCMAKE_CXX_FLAGS=-fsanitize=thread"
   data_folder
@@ -194,9 +197,11 @@ core() {
   ctest --test-dir "$ws/core" -j"$(jobs)" --output-on-failure "$@" >&2
 }
 
+# lint [all | PART...]: `all` for clang-tidy over every source, else newest sources for three minutes.
 lint() {
-  # Include folders stand at each target, not at the directory.
-  catkin_lint --offline -W2 --ignore package_path_name --ignore unused_catkin_include_dirs "$root"/mmradartwin_* "$root/launch" "$root/config" "$root/test"
+  local arguments=("$@")
+  [ "${1:-}" = all ] && arguments=(--all)
+  python3 "$root/test/scripts/lint.py" "${arguments[@]}" >&2
 }
 
 verb=${1:-}
@@ -210,7 +215,7 @@ case $verb in
   fuzz) setup; run_fuzz "$@" ;;
   tsan) setup; run_tsan ;;
   core) setup; core "$@" ;;
-  lint) setup; lint ;;
+  lint) setup; lint "$@" ;;
   exec) [ $# -gt 0 ] || usage; source_workspace; data_folder; exec "$@" ;;
   *) usage ;;
 esac

@@ -41,7 +41,7 @@ picture() {
 watch() {
   while kill -0 "$launch" 2>/dev/null; do
     sleep 3
-    picture "$out/.rviz.png" && pgrep -P "$launch" -f "__name:=$1" >/dev/null && mv -f "$out/.rviz.png" "$2" || true
+    if picture "$out/.rviz.png" && pgrep -P "$launch" -f "__name:=$1" >/dev/null; then mv -f "$out/.rviz.png" "$2" || true; fi
   done
   rm -f "$out/.rviz.png"
   wait "$launch" || true
@@ -49,6 +49,7 @@ watch() {
 }
 
 launch=
+# shellcheck disable=SC2317 # called by the trap
 cleanup() {
   [ -n "$launch" ] && kill -INT "$launch" 2>/dev/null && wait "$launch" 2>/dev/null
   [ -n "$xvfb" ] && kill "$xvfb" 2>/dev/null
@@ -62,6 +63,7 @@ port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0));
 export ROS_MASTER_URI=http://127.0.0.1:$port ROS_IP=127.0.0.1
 
 say "2/5 playing it over UDP at the real pace: driver, signal chain, twin, attribution and rviz run live"
+# shellcheck disable=SC2086 # several arguments
 roslaunch -p "$port" mmradartwin_launch demo.launch session:="$out/session" bag:="$out/demo.bag" \
   average_frames:="$frames" ${DEMO_ARGS:-} &
 launch=$!
@@ -80,6 +82,7 @@ rosrun mmradartwin_attribution diagnose "$out/session" --output "$out/diagnosis"
 
 say "5/5 the recording again, with the extended twin: rviz, then the report"
 extended=$out/diagnosis/twin.extended.yaml
+# shellcheck disable=SC2086 # several arguments
 roslaunch -p "$port" mmradartwin_launch replay.launch bag:="$bag" twin:="$extended" average_frames:="$frames" \
   diagnosis:=false ${DEMO_ARGS:-} &
 launch=$!

@@ -19,7 +19,7 @@ using namespace mmradartwin;
 
 struct Arguments {
   RecordingArguments input;
-  std::string output, config;
+  std::string output, config, diagnosis_config;
   std::vector<std::string> compared;
   int jobs = 0, findings = DiagnosisOptions().most_findings;
 };
@@ -41,6 +41,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   options.jobs = arguments.jobs;
   options.most_findings = arguments.findings;
   if (!arguments.config.empty()) options.config = loadAttributionConfig(arguments.config);
+  if (!arguments.diagnosis_config.empty()) options.accuracy = loadStatedAccuracy(arguments.diagnosis_config);
   Diagnosis diagnosis;
   {
     ProgressLine line;
@@ -87,6 +88,9 @@ int main(int argc, char** argv) {
   arguments.input.addChannelsTo(app);
   app.add_option("--output", arguments.output, "folder for findings.json, report and extended twin")->required();
   app.add_option("--config", arguments.config, "attribution.yaml of the paper's metrics (default: as shipped)");
+  app.add_option("--diagnosis-config", arguments.diagnosis_config,
+                 "diagnosis.yaml with the stated accuracy of scene, levels and poses (default: as shipped; what the "
+                 "session states itself comes first)");
   app.add_option("--compare", arguments.compared,
                  "other twin.yaml of the same scene: how much likelier or less likely each makes the same channels")
       ->allow_extra_args(false);

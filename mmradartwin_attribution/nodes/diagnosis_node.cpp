@@ -44,7 +44,7 @@ constexpr std::uint32_t kLongestQueue = 1000;
 
 struct Settings {
   FrameSpoolLimits limits;
-  std::string map_frame, output_folder, config_file;
+  std::string map_frame, output_folder, config_file, diagnosis_config_file;
   std::optional<ChannelCorrection> channels;  ///< errors to take out, as the signal chain does
   int jobs = 0;
 };
@@ -54,6 +54,7 @@ Settings readSettings(const ros::NodeHandle& private_nh) {
   Settings s;
   loadMechanismPlugins(parameters.text("plugins", ""), "parameter plugins");
   s.config_file = parameters.text("config", "");
+  s.diagnosis_config_file = parameters.text("diagnosis_config", "");
   s.map_frame = parameters.text("map_frame", "map");
   s.output_folder = parameters.text("output", "");
   const std::string channels = parameters.text("channels", "");
@@ -107,6 +108,7 @@ class DiagnosisNode {
         server_(
             nh_, "attribution/diagnose", [this](const Goal& goal) { execute(goal); }, false) {
     if (!settings_.config_file.empty()) config_ = loadAttributionConfig(settings_.config_file);
+    if (!settings_.diagnosis_config_file.empty()) accuracy_ = loadStatedAccuracy(settings_.diagnosis_config_file);
     findings_ = nh_.advertise<mmradartwin_msgs::Findings>("attribution/findings", 1, true);
     finding_markers_ = nh_.advertise<visualization_msgs::MarkerArray>("attribution/finding_markers", 1, true);
     forget_ = nh_.advertiseService("attribution/forget_poses", &DiagnosisNode::onForget, this);
@@ -228,6 +230,7 @@ class DiagnosisNode {
     DiagnosisOptions options;
     options.jobs = settings_.jobs;
     options.config = config_;
+    options.accuracy = accuracy_;
     options.cancelled = [this] { return server_.isPreemptRequested() || !ros::ok(); };
     options.on_progress = [this](const DiagnosisProgress& p) { tell(p.stage, p.share); };
     const std::optional<ChosenTwin> chosen = chooseTwin(asked_twin, recording);
@@ -286,6 +289,7 @@ class DiagnosisNode {
 
   const Settings settings_;
   AttributionConfig config_;
+  StatedAccuracy accuracy_;
   ros::NodeHandle nh_;
   FrameSpool spool_;
   ros::CallbackQueue spool_queue_;

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <sstream>
 
+#include "mmradartwin_dsp/statistics.h"
+
 namespace mmradartwin {
 namespace {
 
@@ -20,20 +22,7 @@ std::string fixed(double value, int digits) {
   return s.str();
 }
 
-double quantileOfSorted(const std::vector<double>& values, double probability) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const double position = probability * static_cast<double>(values.size() - 1);
-  const std::size_t below = static_cast<std::size_t>(position);
-  const std::size_t above = std::min(below + 1, values.size() - 1);
-  return values[below] + (position - static_cast<double>(below)) * (values[above] - values[below]);
-}
-
 }  // namespace
-
-double quantile(std::vector<double> values, double probability) {
-  std::sort(values.begin(), values.end());
-  return quantileOfSorted(values, probability);
-}
 
 void Ledger::add(const FieldMetrics& pose) {
   ++poses_;

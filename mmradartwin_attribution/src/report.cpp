@@ -1,6 +1,5 @@
 #include "mmradartwin_attribution/report.h"
 
-#include <openssl/evp.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -13,34 +12,13 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/sha256.h"
 #include "mmradartwin_dsp/strict_yaml.h"
 
 namespace mmradartwin {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string sha256(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw InputError(file + ": cannot be read; check the path and its rights");
-  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), EVP_MD_CTX_free);
-  EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr);
-  std::vector<char> buffer(1 << 16);
-  while (in) {
-    in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
-    EVP_DigestUpdate(context.get(), buffer.data(), static_cast<std::size_t>(in.gcount()));
-  }
-  unsigned char digest[EVP_MAX_MD_SIZE];
-  unsigned int length = 0;
-  EVP_DigestFinal_ex(context.get(), digest, &length);
-  std::string text;
-  const char* hex = "0123456789abcdef";
-  for (unsigned int i = 0; i < length; ++i) {
-    text += hex[digest[i] >> 4];
-    text += hex[digest[i] & 15];
-  }
-  return text;
-}
 
 // Meshes and materials that a scene names. A scene that cannot be read is reported where it is loaded, not here.
 void addSceneFiles(const std::string& scene_file, std::vector<std::string>& files) {
@@ -96,7 +74,9 @@ std::vector<std::string> inputFiles(const std::string& recording_path, const Rec
 
 std::vector<InputFile> hashFiles(const std::vector<std::string>& files) {
   std::vector<InputFile> result(files.size());
-  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { result[i] = {files[i], sha256(files[i])}; });
+  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) {
+    result[i] = {files[i], sha256OfFile(files[i])};
+  });
   return result;
 }
 

@@ -6,11 +6,12 @@
 #include <sstream>
 
 #include "mmradartwin_attribution/report.h"
+#include "mmradartwin_dsp/statistics.h"
+#include "mmradartwin_dsp/text.h"
+#include "mmradartwin_dsp/units.h"
 
 namespace mmradartwin {
 namespace {
-
-constexpr double kDegree = M_PI / 180.0;
 
 // A text file that reports when it could not be written.
 class OutputFile {
@@ -27,42 +28,7 @@ class OutputFile {
   std::ofstream out_;
 };
 
-std::string number(double value, int digits = 3) {
-  if (!std::isfinite(value)) return "";
-  std::ostringstream s;
-  s << std::fixed << std::setprecision(digits) << value;
-  return s.str();
-}
-
-std::string field(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
-
-std::string html(const std::string& text) {
-  std::string out;
-  for (char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
+std::string number(double value, int digits = 3) { return fixedNumber(value, digits); }
 
 nlohmann::json json(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
@@ -109,7 +75,7 @@ void ReportWriter::writePoses(const Evaluation& evaluation, const AttributionCon
     if (!p.used) continue;
     const FieldMetrics &m = p.attribution.central, &o = p.attribution.outer;
     const Eigen::Vector3d t = p.pose.T_map_radar.translation(), x = p.pose.T_map_radar.linear().col(0);
-    out << field(p.pose.name) << ',' << field(p.pose.location) << ',' << formatStamp(p.pose.stamp_ns) << ','
+    out << csvField(p.pose.name) << ',' << csvField(p.pose.location) << ',' << formatStamp(p.pose.stamp_ns) << ','
         << number(t.x(), 4) << ',' << number(t.y(), 4) << ',' << number(t.z(), 4) << ','
         << number(std::atan2(x.y(), x.x()) / kDegree, 2) << ',' << p.frames << ',' << p.attribution.regions.size()
         << ',' << m.active[0] + m.active[1] + m.active[2] << ',' << m.recalled[0] + m.recalled[1] + m.recalled[2];
@@ -136,17 +102,18 @@ void ReportWriter::writeResiduals(const Evaluation& evaluation) const {
   records << "pose,record,event,range_m,azimuth_dep_deg,azimuth_arr_deg,bounces,amplitude_db\n";
   for (const PoseResult& p : evaluation.poses) {
     for (const Residual& r : p.attribution.residuals) {
-      out << field(p.pose.name) << ',' << className(r.residual_class) << ',' << classLabel(r.residual_class) << ','
-          << field(classAction(r.residual_class)) << ',' << (materialChangeAdmissible(r.residual_class) ? "yes" : "no")
-          << ',' << (r.measured_stronger ? "measured" : "simulated") << ',' << number(r.range_m) << ','
+      out << csvField(p.pose.name) << ',' << className(r.residual_class) << ',' << classLabel(r.residual_class) << ','
+          << csvField(classAction(r.residual_class)) << ','
+          << (materialChangeAdmissible(r.residual_class) ? "yes" : "no") << ','
+          << (r.measured_stronger ? "measured" : "simulated") << ',' << number(r.range_m) << ','
           << number(r.azimuth_rad / kDegree, 2) << ',' << number(r.measured_db, 2) << ',' << number(r.simulated_db, 2)
-          << ',' << field(r.actor) << ',' << field(r.material) << ','
+          << ',' << csvField(r.actor) << ',' << csvField(r.material) << ','
           << (r.region >= 0 ? regionKindName(p.attribution.regions[r.region].kind) : "") << ',';
       for (std::size_t i = 0; i < r.records.size(); ++i) out << (i ? ";" : "") << r.records[i];
       out << '\n';
     }
     for (const auto& [index, record] : p.residual_records) {
-      records << field(p.pose.name) << ',' << index << ',' << (record.event ? *record.event : "") << ','
+      records << csvField(p.pose.name) << ',' << index << ',' << (record.event ? *record.event : "") << ','
               << number(record.length_m.front() / 2) << ','
               << number(std::atan2(record.departure.y(), record.departure.x()) / kDegree, 2) << ','
               << number(std::atan2(record.arrival.y(), record.arrival.x()) / kDegree, 2) << ',' << record.bounces << ','
@@ -163,8 +130,8 @@ void ReportWriter::writeRegions(const Evaluation& evaluation) const {
   out << "pose,range_m,azimuth_deg,kind,actor,material,field,measured_strong,simulated_strong,support_db,x_m,y_m,z_m\n";
   for (const PoseResult& p : evaluation.poses) {
     for (const ResponseRegion& r : p.attribution.regions) {
-      out << field(p.pose.name) << ',' << number(r.range_m) << ',' << number(r.azimuth_rad / kDegree, 2) << ','
-          << regionKindName(r.kind) << ',' << field(r.actor) << ',' << field(r.material) << ','
+      out << csvField(p.pose.name) << ',' << number(r.range_m) << ',' << number(r.azimuth_rad / kDegree, 2) << ','
+          << regionKindName(r.kind) << ',' << csvField(r.actor) << ',' << csvField(r.material) << ','
           << (r.field == Field::kCentral ? "central" : "outer") << ',' << (r.measured_strong ? 1 : 0) << ','
           << (r.simulated_strong ? 1 : 0) << ',' << (r.kind == RegionKind::kExtent ? "" : number(r.support_db, 1))
           << ',' << number(r.point.x()) << ',' << number(r.point.y()) << ',' << number(r.point.z()) << '\n';
@@ -213,13 +180,14 @@ void ReportWriter::writeHtml(const Evaluation& evaluation, const AttributionConf
          "5em;font-size:.9em}code,pre{background:#f4f4f4;font-size:.88em}pre{padding:.8em;overflow:auto}\n"
          ".warn{background:#fff3d6;padding:.6em 1em}</style></head><body>\n<h1>Measured and simulated radar, "
          "compared</h1>\n";
-  out << "<p>" << evaluation.central.poses << " poses of <code>" << html(run.recording)
-      << "</code>, simulated side: <code>" << html(run.simulated) << "</code>. Version " << html(run.version)
-      << ".</p>\n";
+  out << "<p>" << evaluation.central.poses << " poses of <code>" << htmlEscape(run.recording)
+      << "</code>, simulated side: <code>" << htmlEscape(run.simulated) << "</code>. Version "
+      << htmlEscape(run.version) << ".</p>\n";
   out << "<h2>Evaluation summary, central field of view &plusmn;" << number(config.max_azimuth_rad / kDegree, 0)
       << "&deg;</h2>\n<table><thead><tr><th>Target</th><th>Metric</th><th>Result</th></tr></thead><tbody>\n";
   for (const auto& row : tableRows(evaluation.central, config.top_k)) {
-    out << "<tr><td>" << html(row[0]) << "</td><td>" << html(row[1]) << "</td><td>" << html(row[2]) << "</td></tr>\n";
+    out << "<tr><td>" << htmlEscape(row[0]) << "</td><td>" << htmlEscape(row[1]) << "</td><td>" << htmlEscape(row[2])
+        << "</td></tr>\n";
   }
   out << "</tbody></table>\n<p>Recall: overall; near (" << number(config.min_range_m, 2) << "&ndash;"
       << number(config.near_limit_m, 1) << " m) / mid (&ndash;" << number(config.far_limit_m, 1)
@@ -232,17 +200,17 @@ void ReportWriter::writeHtml(const Evaluation& evaluation, const AttributionConf
     const double share = evaluation.central.class_share[i];
     out << "<tr><td>" << className(c) << " " << classLabel(c) << "</td><td class=\"n\">"
         << evaluation.central.class_count[i] << "</td><td class=\"n\">"
-        << (std::isnan(share) ? "&ndash;" : number(100 * share, 0) + " %") << "</td><td>" << html(classAction(c))
+        << (std::isnan(share) ? "&ndash;" : number(100 * share, 0) + " %") << "</td><td>" << htmlEscape(classAction(c))
         << "</td></tr>\n";
   }
   out << "</tbody></table>\n<p>Material changes are admissible for C2 alone. The routing follows windows and "
          "thresholds; it "
          "does not name causes.</p>\n";
   std::istringstream text(reportText(evaluation, config));
-  out << "<pre>" << html(text.str()) << "</pre>\n";
+  out << "<pre>" << htmlEscape(text.str()) << "</pre>\n";
   if (!evaluation.problems.empty()) {
     out << "<div class=\"warn\"><b>Poses that could not be used</b><ul>\n";
-    for (const PoseProblem& p : evaluation.problems) out << "<li>" << html(p.message) << "</li>\n";
+    for (const PoseProblem& p : evaluation.problems) out << "<li>" << htmlEscape(p.message) << "</li>\n";
     out << "</ul></div>\n";
   }
   out << "<h2>Coverage</h2>\n<p><img src=\"coverage.png\" alt=\"The scene from above with the radar's places\"></p>\n";
@@ -250,32 +218,32 @@ void ReportWriter::writeHtml(const Evaluation& evaluation, const AttributionConf
          "the "
          "branch that is stronger.</p>\n<nav>";
   for (const PoseResult& p : evaluation.poses) {
-    if (p.used) out << "<a href=\"#pose-" << html(p.pose.name) << "\">" << html(p.pose.name) << "</a><br>";
+    if (p.used) out << "<a href=\"#pose-" << htmlEscape(p.pose.name) << "\">" << htmlEscape(p.pose.name) << "</a><br>";
   }
   out << "</nav>\n";
   for (const PoseResult& p : evaluation.poses) {
     if (!p.used) continue;
     const FieldMetrics& m = p.attribution.central;
-    out << "<figure id=\"pose-" << html(p.pose.name) << "\"><img loading=\"lazy\" src=\""
-        << html(pictureLink(*this, p.pose.name)) << "\" alt=\"measured, simulated and residual map of pose "
-        << html(p.pose.name) << "\"><figcaption>Pose " << html(p.pose.name) << ": "
+    out << "<figure id=\"pose-" << htmlEscape(p.pose.name) << "\"><img loading=\"lazy\" src=\""
+        << htmlEscape(pictureLink(*this, p.pose.name)) << "\" alt=\"measured, simulated and residual map of pose "
+        << htmlEscape(p.pose.name) << "\"><figcaption>Pose " << htmlEscape(p.pose.name) << ": "
         << m.recalled[0] + m.recalled[1] + m.recalled[2] << " of " << m.active[0] + m.active[1] + m.active[2]
         << " measured regions recalled, Q1 " << number(m.q1_energy) << ", Q2 " << number(m.q2_energy)
         << ", C1&ndash;C5 " << m.class_count[0] << "/" << m.class_count[1] << "/" << m.class_count[2] << "/"
         << m.class_count[3] << "/" << m.class_count[4] << "</figcaption></figure>\n";
   }
   out << "<h2>How to repeat this</h2>\n<pre>";
-  for (const std::string& word : run.command) out << html(word) << ' ';
+  for (const std::string& word : run.command) out << htmlEscape(word) << ' ';
   out << "</pre>\n<p>Files: <a href=\"table.txt\">table.txt</a>, <a href=\"summary.json\">summary.json</a>, <a "
          "href=\"poses.csv\">poses.csv</a>, <a href=\"residuals.csv\">residuals.csv</a>, <a "
          "href=\"residual_records.csv\">residual_records.csv</a>, <a href=\"regions.csv\">regions.csv</a></p>\n"
-      << "<details><summary>attribution.yaml</summary><pre>" << html(run.attribution_yaml) << "</pre></details>\n"
-      << "<details><summary>radar.yaml</summary><pre>" << html(run.radar_yaml) << "</pre></details>\n";
+      << "<details><summary>attribution.yaml</summary><pre>" << htmlEscape(run.attribution_yaml) << "</pre></details>\n"
+      << "<details><summary>radar.yaml</summary><pre>" << htmlEscape(run.radar_yaml) << "</pre></details>\n";
   if (!run.twin_yaml.empty()) {
-    out << "<details><summary>twin.yaml</summary><pre>" << html(run.twin_yaml) << "</pre></details>\n";
+    out << "<details><summary>twin.yaml</summary><pre>" << htmlEscape(run.twin_yaml) << "</pre></details>\n";
   }
   out << "<details><summary>" << run.inputs.size() << " input files (SHA-256)</summary><pre>";
-  for (const InputFile& f : run.inputs) out << f.sha256 << "  " << html(f.file) << '\n';
+  for (const InputFile& f : run.inputs) out << f.sha256 << "  " << htmlEscape(f.file) << '\n';
   out << "</pre></details>\n</body></html>\n";
   file.close();
 }

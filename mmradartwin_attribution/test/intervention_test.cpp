@@ -83,7 +83,7 @@ class InterventionTest : public ::testing::Test {
     Count every{}, peak_kept{};
     int groups = 0;
   };
-  static Pooled scaled_values(const std::map<std::string, std::set<int>>& groups, double factor, int expected) {
+  static Pooled scaled(const std::map<std::string, std::set<int>>& groups, double factor, int expected) {
     Pooled pooled;
     for (const auto& group : groups) {
       const std::set<int>& actors = group.second;
@@ -148,7 +148,7 @@ TEST_F(InterventionTest, ASuppressedActorLosesSupport) {
   for (std::size_t a = 0; a < lab_->twin.scene().actors.size(); ++a) {
     actors[lab_->twin.scene().actors[a].name + " suppressed"] = {static_cast<int>(a)};
   }
-  const Pooled pooled = scaled_values(actors, 0, 1);
+  const Pooled pooled = scaled(actors, 0, 1);
   EXPECT_GE(pooled.groups, 8);
   EXPECT_GE(share(pooled.peak_kept, 1), 0.6);
   EXPECT_EQ(largest(pooled.every), 1);
@@ -161,7 +161,7 @@ TEST_F(InterventionTest, AWeakerMaterialIsWeakSupport) {
   for (std::size_t a = 0; a < lab_->twin.scene().actors.size(); ++a) {
     materials[lab_->twin.scene().actors[a].material_tag + " 10 dB weaker"].insert(static_cast<int>(a));
   }
-  const Pooled pooled = scaled_values(materials, std::sqrt(0.1), 2);
+  const Pooled pooled = scaled(materials, std::sqrt(0.1), 2);
   EXPECT_GE(pooled.groups, 4);
   EXPECT_GE(share(pooled.peak_kept, 2), 0.6);
   EXPECT_EQ(largest(pooled.every), 2);

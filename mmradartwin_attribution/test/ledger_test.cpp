@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "mmradartwin_attribution/live_ledger.h"
+#include "mmradartwin_dsp/statistics.h"
 #include "synthetic_map.h"
 
 namespace mmradartwin {

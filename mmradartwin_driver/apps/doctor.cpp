@@ -2,12 +2,12 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
-#include "mmradartwin_driver/rig_check.h"
+#include "mmradartwin_driver/rig_doctor.h"
 #include "mmradartwin_dsp/program.h"
 
 int main(int argc, char** argv) {
   using namespace mmradartwin;
-  RigCheckOptions options;
+  RigDoctorOptions options;
   std::string radar;
   bool no_usb = false;
   double buffer_mb = static_cast<double>(options.buffer_bytes >> 20);

@@ -18,8 +18,8 @@
 #include <thread>
 #include <vector>
 
+#include "mmradartwin_driver/dropping_worker_queue.h"
 #include "mmradartwin_driver/frame_assembler.h"
-#include "mmradartwin_driver/hand_over.h"
 #include "mmradartwin_driver/packet_receiver.h"
 #include "mmradartwin_dsp/paper_radar.h"
 #include "mmradartwin_dsp/program.h"
@@ -218,7 +218,7 @@ Result receiveFrames(const Options& options, const std::function<void()>& ready,
   Result result;
   {
     std::uint64_t taken = 0;
-    HandOver<AdcCube> taker(512, [&](AdcCube&&) {
+    DroppingWorkerQueue<AdcCube> taker(512, [&](AdcCube&&) {
       if (options.stall_ms > 0 && ++taken % 100 == 0) {
         std::this_thread::sleep_for(std::chrono::milliseconds(options.stall_ms));
       }

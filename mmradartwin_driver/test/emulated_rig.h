@@ -14,6 +14,7 @@
 
 #include "../emulator/child_process.h"
 #include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_dsp/temporary_folder.h"
 
 namespace mmradartwin {
 
@@ -23,18 +24,13 @@ inline std::string loopbackIp(int host) {
   return "127." + std::to_string(64 + id % 60) + "." + std::to_string(id / 60 % 250 + 1) + "." + std::to_string(host);
 }
 
-/// A folder that goes with the object.
-class TemporaryFolder {
+/// The files of a test; they go with the object.
+class TestFolder {
  public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "mmradartwin_XXXXXX").string();
-    path_ = mkdtemp(name.data());
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  std::string file(const std::string& name) const { return (std::filesystem::path(path_) / name).string(); }
+  std::string file(const std::string& name) const { return (std::filesystem::path(folder_.path()) / name).string(); }
 
  private:
-  std::string path_;
+  TemporaryFolder folder_;
 };
 
 inline void writeText(const std::string& file, const std::string& text) {
@@ -65,7 +61,7 @@ inline std::string randomBytes(std::size_t size, unsigned seed) {
 }
 
 /// Poses "a", "b", ... one metre apart, with random captures of so many frames each.
-inline void writeSession(const TemporaryFolder& folder, double frame_period_s, const std::vector<int>& frames) {
+inline void writeSession(const TestFolder& folder, double frame_period_s, const std::vector<int>& frames) {
   writeText(folder.file("session.yaml"),
             "format: mmradartwin_session/1\nradar: radar.yaml\nposes: poses.csv\ncaptures: captures/{pose}.bin\n");
   writeText(folder.file("radar.yaml"), paperRadarYaml(frame_period_s));
@@ -89,10 +85,10 @@ inline bool waitUntil(const std::function<bool()>& condition) {
   return true;
 }
 
-/// The emulator as a program of its own.
-class EmulatorProgram {
+/// The emulator as a process of its own.
+class EmulatorProcess {
  public:
-  EmulatorProgram(const std::string& host_ip, const std::string& card_ip, std::vector<std::string> arguments)
+  EmulatorProcess(const std::string& host_ip, const std::string& card_ip, std::vector<std::string> arguments)
       : process_(MMRADARTWIN_EMULATOR, complete(std::move(arguments), host_ip, card_ip)) {
     waitFor("ready");
   }

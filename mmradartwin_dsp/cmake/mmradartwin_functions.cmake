@@ -10,6 +10,7 @@ macro(mmradartwin_defaults)
   endif()
   set(CMAKE_CXX_STANDARD 17)
   set(CMAKE_CXX_STANDARD_REQUIRED ON)
+  set(CMAKE_EXPORT_COMPILE_COMMANDS ON)  # for clang-tidy
   add_compile_options(-Wall -Wextra)
   if(MMRADARTWIN_CORE)
     include(GNUInstallDirs)

@@ -81,7 +81,7 @@ RadarConfig read(YamlMap yaml) {
                                 yamlNumber(adc_end_s) + " (adc_start_s + samples_per_chirp/sample_rate_hz)");
   }
   const double busy_s = radar.chirps_per_frame() *
-                        (std::isnan(radar.idle_s + radar.ramp_end_s) ? adc_end_s : radar.idle_s + radar.ramp_end_s);
+                        (std::isnan(radar.chirp_period_s()) ? adc_end_s : radar.chirp_period_s());
   if (busy_s > radar.frame_period_s + 1e-9) {
     yaml.fail("frame_period_s", yamlNumber(radar.frame_period_s) + " is shorter than the frame's " +
                                     std::to_string(radar.chirps_per_frame()) + " chirps; it must be at least " +
@@ -147,6 +147,8 @@ double RadarConfig::bandwidth_hz() const { return slope_hz_per_s * samples_per_c
 double RadarConfig::range_bin_m() const { return kSpeedOfLight_m_per_s / (2 * bandwidth_hz()); }
 double RadarConfig::max_range_m() const { return samples_per_chirp * range_bin_m(); }
 double RadarConfig::sample_time_s(int n) const { return adc_start_s + n / sample_rate_hz; }
+double RadarConfig::chirp_period_s() const { return idle_s + ramp_end_s; }
+
 double RadarConfig::window_center_s() const { return adc_start_s + samples_per_chirp / (2 * sample_rate_hz); }
 double RadarConfig::center_frequency_hz() const { return carrier_hz + slope_hz_per_s * window_center_s(); }
 double RadarConfig::wavelength_m() const { return kSpeedOfLight_m_per_s / center_frequency_hz(); }

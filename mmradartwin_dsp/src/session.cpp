@@ -11,6 +11,7 @@
 
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/stated_accuracy.h"
 #include "mmradartwin_dsp/strict_yaml.h"
 #include "text_file.h"
 
@@ -223,6 +224,7 @@ Recording openSession(const std::string& path, const SessionOptions& options) {
   const std::string poses_file = resolvePath(yaml.text("poses"), file.string());
   if (yaml.has("scene")) recording.scene_file = resolvePath(yaml.text("scene"), file.string());
   if (yaml.has("twin")) recording.twin_file = resolvePath(yaml.text("twin"), file.string());
+  if (yaml.has("accuracy")) recording.accuracy = readStatedAccuracy(yaml.map("accuracy"));
   if (yaml.has("gain_db")) recording.gain_db = yaml.number("gain_db", -400, 400);
   std::string pattern;
   if (yaml.has("captures") || options.need_captures) {

@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "mmradartwin_sim/ray_caster.h"
 #include "mmradartwin_sim/scene.h"
 
 namespace mmradartwin {

@@ -14,8 +14,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
-from mmradartwin_tests.blind import draws, ledger, recordings, table, trials  # noqa: E402
-from mmradartwin_tests.installed_programs import find_program  # noqa: E402
+from mmradartwin_tests.blind import draws, ledger, recordings, table, trials
+from mmradartwin_tests.installed_programs import find_program
 
 # Of rows with several effects, this many of each; of the other rows, this many in all.
 TRIALS = {"clean": 100, "single": 8, "faint": 6, "pair": 40, "twice": 2, "outside": 3, "decoy": 5, "recording": 3}

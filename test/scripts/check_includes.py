@@ -142,6 +142,13 @@ def check_rooms(sources, folder, table):
             yield f"{file}: includes {target}; {room} may not see {other or 'the files beside the rooms'}"
 
 
+def check(sources):
+    problems = list(check_packages(sources))
+    for folder, table in ROOMS.items():
+        problems += check_rooms(sources, folder, table)
+    return problems
+
+
 def levels(units, arrows):
     """Height of each unit over those that include no other; units in a circle stand at one height."""
     below = defaultdict(set)
@@ -207,9 +214,7 @@ def main():
     if arguments.levels:
         print_levels(sources)
         return 0
-    problems = list(check_packages(sources))
-    for folder, table in ROOMS.items():
-        problems += check_rooms(sources, folder, table)
+    problems = check(sources)
     print("\n".join(problems) if problems else f"includes: {len(sources.includes)} files, nothing forbidden")
     return 1 if problems else 0
 

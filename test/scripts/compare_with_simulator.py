@@ -8,9 +8,9 @@ import tempfile
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
-from mmradartwin_tests.installed_programs import find_program  # noqa: E402
-from mmradartwin_tests.path_comparison import compare  # noqa: E402
-from mmradartwin_tests.session import Measurement, Settings  # noqa: E402
+from mmradartwin_tests.installed_programs import find_program
+from mmradartwin_tests.path_comparison import compare
+from mmradartwin_tests.session import Measurement, Settings
 
 
 def main():
@@ -28,7 +28,7 @@ def main():
     status = 0
     with tempfile.TemporaryDirectory() as directory:
         for tier in ("exact", "default"):
-            at = lambda name: os.path.join(directory, tier + name)
+            at = lambda name, tier=tier: os.path.join(directory, tier + name)
             Measurement(Settings(output=at("_session"), seed=arguments.seed, poses=arguments.poses, frames=1, tier=tier,
                                  paths_csv=at("_true"))).run()
             subprocess.run([program, at("_session"), "--output", at("_sim")], check=True, stdout=subprocess.DEVNULL,

@@ -6,7 +6,7 @@ import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
-from mmradartwin_tests import office  # noqa: E402
+from mmradartwin_tests import office
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)

@@ -9,7 +9,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
-from mmradartwin_tests import campaign, effects, session  # noqa: E402
+from mmradartwin_tests import campaign, effects, session
 
 
 def value_of(text):

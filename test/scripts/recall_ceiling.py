@@ -13,8 +13,8 @@ import tempfile
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
-from mmradartwin_tests.installed_programs import find_program  # noqa: E402
-from mmradartwin_tests.session import Measurement, Settings  # noqa: E402
+from mmradartwin_tests.installed_programs import find_program
+from mmradartwin_tests.session import Measurement, Settings
 
 BANDS = ("near", "mid", "far")
 BRANCHES = ("twin", "ceiling", "ceiling at reported poses")

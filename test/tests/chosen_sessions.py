@@ -1,7 +1,7 @@
 """Which sessions of the diagnosis a run takes: fixed ones always, and in a long run a third of the others, by the day.
 
-Three days in a row take all. MMRADARTWIN_LONG=long takes the day's third, MMRADARTWIN_LONG=all every one; MMRADARTWIN_DAY
-(2026-01-31) repeats a day, which a long run prints.
+Three days in a row take all. MMRADARTWIN_LONG=long takes the day's third, MMRADARTWIN_LONG=all every one;
+MMRADARTWIN_DAY=2026-01-31 repeats a day, which a long run prints.
 """
 import datetime
 import hashlib

@@ -9,6 +9,7 @@
 #include "mmradartwin_attribution/attribution_config.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/stated_accuracy.h"
 #include "mmradartwin_sim/material.h"
 #include "mmradartwin_sim/scene.h"
 #include "mmradartwin_sim/twin.h"
@@ -39,6 +40,10 @@ TEST_P(ShippedConfiguration, Loads) {
     EXPECT_GT(SignalChain(radar).axes().range_m.back(), 1.0);
   } else if (name == "attribution.yaml") {
     EXPECT_NO_THROW(loadAttributionConfig(file.string()));
+  } else if (name == "diagnosis.yaml") {
+    // The file says that it holds what the programs have built in.
+    const StatedAccuracy shipped = loadStatedAccuracy(file.string());
+    for (const AccuracyKey& key : accuracyKeys()) EXPECT_EQ(shipped.*key.member, StatedAccuracy().*key.member);
   } else if (name == "scene.yaml") {
     const RadarConfig radar = loadRadarConfig((kConfig / "radar.yaml").string());
     const Twin twin(loadTwin("", file.string(), radar));

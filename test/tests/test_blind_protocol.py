@@ -6,7 +6,6 @@ import signal
 import stat
 import subprocess
 import sys
-import time
 import unittest
 
 import numpy as np
@@ -16,6 +15,7 @@ from mmradartwin_tests.blind import draws, trials
 from mmradartwin_tests.blind.ledger import Ledger, LedgerError
 from mmradartwin_tests.session import Measurement, Settings
 from in_folder import InFolder
+from wait_for import wait_for
 
 HERE = os.path.dirname(os.path.realpath(__file__))
 PROTOCOL = os.path.join(HERE, "..", "scripts", "blind_protocol.py")
@@ -133,15 +133,15 @@ class MeasuredRuns(InFolder):
         self.assertIsNone(status)
         with open(self.at("pid"), encoding="ascii") as text:
             pid = int(text.read())
-        for _ in range(600):
+
+        def ended():
             try:
                 with open(f"/proc/{pid}/stat", encoding="ascii") as text:
-                    if text.read().rsplit(")", 1)[1].split()[0] == "Z":
-                        return
+                    return text.read().rsplit(")", 1)[1].split()[0] == "Z"
             except FileNotFoundError:
-                return
-            time.sleep(0.1)
-        self.fail("the grandchild still runs")
+                return True
+
+        wait_for(ended, "the grandchild's end", 60)
 
 
 ANSWER = {"format": "mmradartwin_findings/1", "verdict": "named", "findings": [
@@ -254,9 +254,8 @@ class ProtocolProgram(WithProgram):
         command = self.command("--rows", "clean", "--trials", "clean=1")
         with open(self.at("errors"), "w", encoding="utf-8") as errors, \
                 subprocess.Popen(command, stderr=errors, env=self.environment(program)) as run:
-            while not os.path.exists(told):
-                self.assertIsNone(run.poll(), "it ended by itself")
-                time.sleep(0.1)
+            wait_for(lambda: os.path.exists(told) or run.poll() is not None, "the program's start")
+            self.assertIsNone(run.poll(), "it ended by itself")
             run.send_signal(signal.SIGTERM)
             self.assertEqual(run.wait(120), 1)
         with open(told, encoding="utf-8") as text:

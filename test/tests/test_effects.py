@@ -561,7 +561,7 @@ class OutsideTheCatalogue(WithBaseline):
         for name in ("tv", "whiteboard", "window"):
             made = make_effect("tilted_panel", {"actor": name, "tilt_deg": 4.0})
             measurement, _ = self.echoes_of(made)
-            find = lambda actors: next(a for a in actors if a.name == name).parts[0]
+            find = lambda actors, name=name: next(a for a in actors if a.name == name).parts[0]
             plain, tilted = find(measurement.described_actors), find(measurement.room.actors)
             corners = lambda part: np.array([r.origin + a * r.s1 * r.e1 + b * r.s2 * r.e2
                                              for r in part.rectangles() for a in (0, 1) for b in (0, 1)])
@@ -571,7 +571,7 @@ class OutsideTheCatalogue(WithBaseline):
             shift = np.linalg.norm(tilted.center - plain.center)
             reach = math.hypot(plain.size[2], plain.size[:2].min()) / 2     # of the centre about its hinge
             self.assertAlmostEqual(shift, 2 * reach * math.sin(math.radians(2.0)), places=6, msg=name)
-            others = lambda actors: [a.centroid() for a in actors if a.name != name]
+            others = lambda actors, name=name: [a.centroid() for a in actors if a.name != name]
             np.testing.assert_allclose(others(measurement.room.actors), others(measurement.described_actors))
 
     def test_no_strength_is_no_effect(self):

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """live.launch rig:=emulated as a user starts it, and what happens to rigs: cables, power, a restarted roscore."""
 import bisect
+import functools
 import glob
 import os
 import re
@@ -9,16 +10,15 @@ import signal
 import socket
 import subprocess
 import tempfile
-import time
 import unittest
 
 import numpy
 import rosbag
 import rosgraph
 
-from mmradartwin_tests.installed_programs import find_program
 from made_session import make_session
 from test_launch_files import Launched, end, free_port
+from wait_for import wait_for
 
 POSES, FRAMES, PERIOD_S = 2, 60, 0.05
 RECORD = "/usr/lib/rosbag/record"  # itself: the Python front end takes long to start on a busy machine
@@ -54,16 +54,6 @@ class Rig(Launched):
     def text(self):
         return re.sub(r"\x1b\[[0-9;]*m", "", super().text())
 
-    def wait_for_text(self, text, count=1, seconds=240):
-        deadline = time.time() + seconds
-        while time.time() < deadline:
-            if self.text().count(text) >= count:
-                return
-            if self.process.poll() is not None:
-                break
-            time.sleep(0.2)
-        raise AssertionError(f"\"{text}\" was not said {count} times:\n{self.text()[-4000:]}")
-
     def do(self, command):
         """A command to the emulated rig."""
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as s:
@@ -81,13 +71,16 @@ class Rig(Launched):
         return [(int(a), int(b)) for a, b in re.findall(r"frames run first_frame_ns=(\d+) frame=(\d+)", self.text())]
 
 
-def wait_until(true, seconds):
-    deadline = time.time() + seconds
-    while time.time() < deadline:
-        if true():
-            return True
-        time.sleep(0.1)
-    return False
+def wait_for_recorded(words, bag):
+    """Returns once text that matches the words has been written to an open bag, which is not compressed."""
+    before = os.path.getsize(bag)
+
+    def written():
+        with open(bag, "rb") as file:
+            file.seek(before)
+            return re.search(words.encode(), file.read())
+
+    wait_for(written, f"\"{words}\" in {bag}")
 
 
 @unittest.skipUnless(os.geteuid() == 0, "an emulated card's network needs root")
@@ -111,7 +104,7 @@ class EmulatedRig(unittest.TestCase):
         core = subprocess.Popen(["roscore", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                                 env=dict(os.environ, ROS_MASTER_URI=uri, ROS_IP="127.0.0.1"))
         self.addCleanup(end, core)
-        self.assertTrue(wait_until(lambda: rosgraph.is_master_online(uri), 240), "roscore does not start")
+        wait_for(lambda: rosgraph.is_master_online(uri), "roscore's answer")
         return core
 
     def recorder(self, rig, bag, *topics):
@@ -135,27 +128,29 @@ class EmulatedRig(unittest.TestCase):
             recorder = self.recorder(rig, "faults.bag", "/radar/adc", "/radar/config", "/diagnostics", "/tf",
                                      "/tf_static", "/twin/grid", "/attribution/residuals")
             self.addCleanup(lambda: recorder.poll() is None and recorder.kill())
-            rig.wait_for_nodes({"/faults"}, 240)
-            time.sleep(6)
+            rig.wait_for_messages("/faults", {"/radar/adc": 2 * FRAMES, "/diagnostics": 1, "/twin/grid": 1,
+                                              "/attribution/residuals": 1})
+            heard = functools.partial(wait_for_recorded, bag=self.path("faults.bag.active"))
 
             rig.do("usb out")
             rig.wait_for_text("the device is gone")
-            time.sleep(2)
+            heard("device is gone|is not there")
             rig.do("usb in")
             rig.wait_for_text("samples arrive", 2)
 
             rig.do("cable out")
             rig.wait_for_text("no answer from the DCA1000", rig.text().count("no answer from the DCA1000") + 1)
-            time.sleep(2)
+            heard("no answer from the DCA1000")
             rig.do("cable in")
             rig.wait_for_text("samples arrive", 3)
 
             rig.do("card off")
             rig.wait_for_text("no answer from the DCA1000", rig.text().count("no answer from the DCA1000") + 1)
-            time.sleep(2)
+            heard("no answer from the DCA1000")
             rig.do("card on")
             rig.wait_for_text("samples arrive", 4)
 
+            # It is put in at once: frames that pass while it is out are counted by nobody.
             rig.do("ribbon out")
             rig.wait_for_text("no samples come from the card")
             rig.do("ribbon in")
@@ -164,12 +159,13 @@ class EmulatedRig(unittest.TestCase):
             rig.do("event 1003")
             player, = processes("session_player", self.session, "__name:=emulated_rig")
             os.kill(player, signal.SIGSTOP)
-            time.sleep(4)
+            heard(r"[0-9.]+ s old")
             os.kill(player, signal.SIGCONT)
-            time.sleep(4)
-            # Faults may have left too few packets so far to fill the disk; then diagnostics say so within a second.
+            heard("poses were missing for")
+            # Faults may have left too few packets so far to fill the disk.
             rig.wait_for_text("are free on its disk")
-            time.sleep(3)
+            heard("missing from the recording")
+            rig.wait_for_messages("/faults", {"/radar/adc": 8 * FRAMES})
 
             self.stop(core)
             rig.wait_for_text("the ROS master is gone")
@@ -177,15 +173,14 @@ class EmulatedRig(unittest.TestCase):
             rig.wait_for_text("registered anew", 4)
             later = self.recorder(rig, "later.bag", "/radar/adc", "/radar/config")
             self.addCleanup(lambda: later.poll() is None and later.kill())
-            rig.wait_for_nodes({"/later"}, 240)
-            time.sleep(5)
+            rig.wait_for_messages("/later", {"/radar/adc": FRAMES, "/radar/config": 1})
             self.stop(later)
             self.stop(recorder)
             text, runs, played = rig.text(), rig.runs(), rig.played()
         end(core)
-        self.assertTrue(wait_until(lambda: not processes("rosmaster", str(port)), 60), "a rosmaster was left behind")
+        wait_for(lambda: not processes("rosmaster", str(port)), "the end of the rosmaster", 60)
         self.assertNotIn("error: radar:", text)  # no violation of its protocol, as the emulated chip sees it
-        self.assertTrue(wait_until(lambda: not rig.network_is_there(), 60), "the emulated network was left behind")
+        wait_for(lambda: not rig.network_is_there(), "the end of the emulated network", 60)
         self.assertGreaterEqual(len(runs), 5)
         self.check_diagnostics()
         self.check_frames(runs, *played)
@@ -249,7 +244,8 @@ class EmulatedRig(unittest.TestCase):
                 late_s = [(stamp_ns - start) * 1e-9 - message.sequence * PERIOD_S for start, first in runs
                           if (first + message.sequence) % total == frame]
                 # A quarter second: what a busy machine may send a packet late; a frame of another run is seconds off.
-                self.assertTrue(late_s and min(map(abs, late_s)) < 0.25, f"frame {message.sequence}: {late_s}")
+                self.assertTrue(late_s and min(map(abs, late_s)) < 0.25,
+                                f"frame {message.sequence}, the session's {frame}, at {stamp_ns}: {late_s}; runs {runs}")
                 poses.append((stamp_ns, frame // FRAMES))
             transforms = sorted(((t.header.stamp.to_nsec(), t.transform.translation)
                                  for _, message, _ in bag.read_messages("/tf")
@@ -271,11 +267,11 @@ class EmulatedRig(unittest.TestCase):
 
     def test_nothing_is_left_where_it_is_killed(self):
         with Rig(self.folder, self.session, None) as rig:
-            self.assertTrue(wait_until(rig.network_is_there, 240), rig.text()[-2000:])
+            wait_for(rig.network_is_there, lambda: f"the emulated network:\n{rig.text()[-2000:]}")
             # As a machine that runs out of memory would.
             for pid in processes("emulated_rig", self.session):
                 os.kill(pid, signal.SIGKILL)
-            self.assertTrue(wait_until(lambda: not rig.network_is_there(), 60), "the emulated network was left behind")
+            wait_for(lambda: not rig.network_is_there(), "the end of the emulated network", 60)
 
 
 if __name__ == "__main__":

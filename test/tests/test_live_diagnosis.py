@@ -8,7 +8,6 @@ import socket
 import subprocess
 import tempfile
 import threading
-import time
 import unittest
 
 import actionlib
@@ -23,19 +22,7 @@ from mmradartwin_msgs.srv import ApplyTwin
 from mmradartwin_tests import effects
 from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.session import Measurement, Settings
-
-PATIENCE_S = 300  # of a loaded machine
-
-
-def wait_until(condition, what, seconds=PATIENCE_S):
-    """First true value of condition()."""
-    deadline = time.time() + seconds
-    while time.time() < deadline:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.1)
-    raise AssertionError(f"{what}: not within {seconds} s")
+from wait_for import PATIENCE_S, wait_for
 
 
 def next_message(topic, kind):
@@ -43,7 +30,7 @@ def next_message(topic, kind):
     received = []
     subscriber = rospy.Subscriber(topic, kind, received.append)
     try:
-        return wait_until(lambda: received, topic)[0]
+        return wait_for(lambda: received, topic)[0]
     finally:
         subscriber.unregister()
 
@@ -55,7 +42,7 @@ class Request:
         self.client = actionlib.SimpleActionClient("attribution/diagnose", DiagnoseAction)
         ends = self.client.action_client
         ends = (ends.pub_goal, ends.pub_cancel, ends.result_sub, ends.feedback_sub)
-        wait_until(lambda: all(end.get_num_connections() for end in ends), "attribution/diagnose")
+        wait_for(lambda: all(end.get_num_connections() for end in ends), "attribution/diagnose")
         self.feedback, self.done = [], threading.Event()
         self.client.send_goal(DiagnoseGoal(**goal), feedback_cb=self.feedback.append,
                               done_cb=lambda state, result: self.done.set())
@@ -96,12 +83,12 @@ class LiveDiagnosis(unittest.TestCase):
                                           stdin=subprocess.DEVNULL, start_new_session=True)
         cls.addClassCleanup(cls.end_launch)
         master = rosgraph.Master("/live_diagnosis_test")
-        wait_until(master.is_online, "roscore")
+        wait_for(master.is_online, "roscore")
         wanted = {"/signal_chain", "/twin", "/attribution", "/diagnosis"}
-        wait_until(lambda: wanted <= {n for ends in master.getSystemState() for _, nodes in ends for n in nodes},
+        wait_for(lambda: wanted <= {n for ends in master.getSystemState() for _, nodes in ends for n in nodes},
                    "nodes")
         listeners = {"/signal_chain", "/diagnosis"}
-        wait_until(lambda: listeners <= set(dict(master.getSystemState()[1]).get("/radar/adc", [])), "listeners")
+        wait_for(lambda: listeners <= set(dict(master.getSystemState()[1]).get("/radar/adc", [])), "listeners")
         rospy.init_node("live_diagnosis_test", disable_signals=True)
 
         # As a user asks who is too early; then the session comes, and he asks again.
@@ -187,7 +174,7 @@ class LiveDiagnosis(unittest.TestCase):
 
     def test_a_goal_can_be_cancelled_and_leaves_nothing(self):
         request = Request(output=self.at("cancelled"))
-        wait_until(lambda: request.feedback, "feedback")
+        wait_for(lambda: request.feedback, "feedback")
         request.client.cancel_goal()
         state, text, _ = request.wait()
         self.assertEqual(state, GoalStatus.PREEMPTED, text)
@@ -224,17 +211,17 @@ class LiveDiagnosis(unittest.TestCase):
         before, residuals = simulated(), []
         subscriber = rospy.Subscriber("attribution/residuals", Residuals, residuals.append)
         self.addCleanup(subscriber.unregister)
-        wait_until(subscriber.get_num_connections, "attribution/residuals")
+        wait_for(subscriber.get_num_connections, "attribution/residuals")
         answer = self.apply(self.result.extended_twin_file)
         self.assertTrue(answer.success, answer.message)
         self.assertIn(cause, next_message("twin/scene", Scene).twin_yaml)
-        wait_until(lambda: numpy.abs(simulated() - before).max() > 3, "the map of the extended twin")
-        wait_until(lambda: next_message("attribution/ledger", Ledger).poses == 0, "a ledger of the new twin's own")
+        wait_for(lambda: numpy.abs(simulated() - before).max() > 3, "the map of the extended twin")
+        wait_for(lambda: next_message("attribution/ledger", Ledger).poses == 0, "a ledger of the new twin's own")
         # The stream has ended, and its last map is compared with the new twin all the same.
-        wait_until(lambda: residuals, "residuals of the new twin")
+        wait_for(lambda: residuals, "residuals of the new twin")
         answer = self.apply("")
         self.assertTrue(answer.success, answer.message)
-        wait_until(lambda: numpy.abs(simulated() - before).max() < 1e-3, "the map of the twin at the start")
+        wait_for(lambda: numpy.abs(simulated() - before).max() < 1e-3, "the map of the twin at the start")
 
 
 if __name__ == "__main__":

@@ -4,13 +4,12 @@ import os
 import shutil
 import subprocess
 import tempfile
-import time
 import unittest
 
 from mmradartwin_tests.installed_programs import find_program
 from made_session import make_session
-from test_emulated_rig import wait_until
 from test_launch_files import Launched, end
+from wait_for import wait_for
 
 FRAMES = 60
 PLAYER = find_program("mmradartwin_driver", "session_player")
@@ -43,7 +42,7 @@ class Nodelets(unittest.TestCase):
         with Launched(file, package=None) as launched:
             bus = lambda: launched.bus("/manager")
             connected = lambda: bus()[1].get("/radar/adc") and bus()[0].get("/radar/grid")
-            self.assertTrue(wait_until(connected, 240), f"{bus()}\n{launched.text()[-3000:]}")
+            wait_for(connected, lambda: f"connections, {bus()}\n{launched.text()[-3000:]}")
             log = os.path.join(self.folder, "player.log")
             with open(log, "w", encoding="utf-8") as said:
                 player = subprocess.Popen([PLAYER, "_session:=" + self.session, f"_host_ip:={NETWORK}1",
@@ -55,9 +54,9 @@ class Nodelets(unittest.TestCase):
                 with open(log, encoding="utf-8") as file:
                     return file.read()
 
-            self.assertTrue(wait_until(lambda: "has been played" in text() or player.poll() is not None, 240), text())
-            # It was not told to exit, and stays, so that its latched messages do.
-            time.sleep(2)
+            wait_for(lambda: "has been played" in text() or player.poll() is not None, lambda: f"its end: {text()}")
+            # It was not told to exit, and stays, so that its latched messages do: who comes now gets them.
+            launched.record({"/radar/config": 1}, os.path.join(self.folder, "later.bag"))
             self.assertIsNone(player.poll(), text())
             sent, received = bus()
         # Nothing was serialised on the way: the counters of bytes say so, and count what goes to another process.

@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import tempfile
-import time
 import unittest
 
 import numpy
@@ -14,7 +13,7 @@ import rosbag
 
 from mmradartwin_tests.installed_programs import find_program
 from made_session import make_session
-from test_emulated_rig import Rig, wait_until
+from test_emulated_rig import Rig
 from test_launch_files import Launched
 
 FRAMES = 60
@@ -29,10 +28,10 @@ class Recording(Launched):
         os.environ["ROSCONSOLE_STDOUT_LINE_BUFFERED"] = "1"
         super().__init__("record.launch", *arguments, port=rig.port)
 
-    def wait_for_text(self, text, count=1, seconds=240):
-        if not wait_until(lambda: self.text().count(text) >= count or self.process.poll() is not None, seconds) or \
-                self.text().count(text) < count:
-            raise AssertionError(f"\"{text}\" was not said {count} times:\n{self.text()[-4000:]}")
+    def wait_for_frames(self, count=2 * FRAMES):
+        """Returns once the open bag has so many frames, more than rosbag holds in a chunk, and what makes it whole."""
+        self.wait_for_messages("/recorder", {"/radar/adc": count, "/radar/config": 1, "/twin/scene": 1, "/tf": 1,
+                                             "/tf_static": 1})
 
 
 class Disk:
@@ -80,8 +79,8 @@ class FullDisk(unittest.TestCase):
         with Rig(self.folder, self.session, None, "diagnosis:=false") as rig:
             rig.wait_for_text("samples arrive", 1, 240)
             with Recording(rig, "output:=" + os.path.join(self.disk.folder, "run"), "min_free:=8M") as recording:
-                self.assertTrue(wait_until(lambda: self.disk.bags(".active"), 240), recording.text()[-2000:])
-                time.sleep(5)
+                recording.wait_for_frames()
+                self.assertEqual(len(self.disk.bags(".active")), 1, recording.text()[-2000:])
 
                 # Others leave less than min_free: the bag is closed while there is room for its index.
                 self.disk.fill(4 << 20)
@@ -90,8 +89,8 @@ class FullDisk(unittest.TestCase):
                 self.assertEqual(self.disk.bags(".active"), [])
                 self.disk.clear()
                 recording.wait_for_text("recording goes on in a new bag")
-                self.assertTrue(wait_until(lambda: self.disk.bags(".active"), 240))
-                time.sleep(5)
+                recording.wait_for_frames()
+                self.assertEqual(len(self.disk.bags(".active")), 1, recording.text()[-2000:])
 
                 # Nothing is left from one moment to the next: rosbag cannot close its bag any more.
                 self.disk.fill(0)
@@ -99,8 +98,8 @@ class FullDisk(unittest.TestCase):
                 self.disk.clear()
                 recording.wait_for_text("recording goes on in a new bag", 2)
                 whole = len(self.disk.bags(".bag"))
-                self.assertTrue(wait_until(lambda: len(self.disk.bags(".active") + self.disk.bags(".bag")) > 2, 240))
-                time.sleep(4)
+                recording.wait_for_frames()
+                self.assertEqual(len(self.disk.bags(".active") + self.disk.bags(".bag")), 3, recording.text()[-2000:])
                 recording.process.send_signal(signal.SIGINT)
                 self.assertEqual(recording.process.wait(60), 0)
                 text = recording.text()

@@ -5,7 +5,6 @@ import os
 import shutil
 import subprocess
 import tempfile
-import time
 import unittest
 
 import numpy
@@ -13,8 +12,9 @@ import rosbag
 
 from mmradartwin_tests.installed_programs import find_program
 from made_session import make_session
-from test_emulated_rig import Rig, wait_until
+from test_emulated_rig import Rig
 from test_launch_files import end
+from wait_for import wait_for
 
 CAMERA = find_program("mmradartwin_sim", "resting_camera")
 FRAMES = 40
@@ -52,10 +52,10 @@ class RoomPoseLive(unittest.TestCase):
         self.addCleanup(end, camera)
         return camera
 
-    def recorded(self, rig, name, seconds, *topics):
-        """Messages of a while: [(topic, message)]."""
+    def recorded(self, rig, name, counts, more=()):
+        """Messages until so many have come, {topic: count}, and of more topics: [(topic, message)]."""
         file = os.path.join(self.folder, name + ".bag")
-        rig.record(topics, seconds, file)
+        rig.record(counts, file, more)
         with rosbag.Bag(file) as bag:
             return [(topic, message) for topic, message, _ in bag.read_messages()]
 
@@ -66,19 +66,19 @@ class RoomPoseLive(unittest.TestCase):
                  "scene:=" + os.path.join(self.session, "scene.yaml")) as rig:
             rig.wait_for_text("samples arrive", 1, 240)
             # Nobody else says where the rig is, and it has not looked yet.
-            before = self.recorded(rig, "before", 4, "/radar/grid", "/tf", "/diagnostics")
+            before = self.recorded(rig, "before", {"/radar/grid": 2 * FRAMES, "/diagnostics": 3}, ["/tf"])
             self.assertTrue([m for t, m in before if t == "/radar/grid"], "no grids come")
             self.assertFalse([m for t, m in before if t == "/radar/grid" and m.pose_valid])
             self.assertFalse([m for t, m in before if t == "/tf"])
 
             camera = self.camera(rig)
-            self.assertTrue(wait_until(lambda: any(m.pose_valid for t, m in
-                                                   self.recorded(rig, "first", 3, "/radar/grid")), 240),
-                            "no frame gets a pose:\n" + rig.text()[-3000:])
-            seen = self.recorded(rig, "seen", 6, "/radar/grid", "/tf", "/room_pose", "/twin/grid", "/diagnostics")
+            wait_for(lambda: any(m.pose_valid for _, m in self.recorded(rig, "first", {"/radar/grid": FRAMES // 2})),
+                     lambda: "a frame with a pose:\n" + rig.text()[-3000:])
+            seen = self.recorded(rig, "seen", {"/radar/grid": 3 * FRAMES, "/tf": 1, "/room_pose": 1, "/twin/grid": 1,
+                                               "/diagnostics": 3})
             end(camera)
             rig.wait_for_text("goes on without a pose", rig.text().count("goes on without a pose") + 1)
-            blind = self.recorded(rig, "blind", 4, "/radar/grid", "/diagnostics")
+            blind = self.recorded(rig, "blind", {"/radar/grid": 2 * FRAMES, "/diagnostics": 3})
         R = camera_rotation()
         true_m = numpy.array(PLACE_M) + R @ numpy.array(MOUNT_M)
         posed = [m for t, m in seen if t == "/radar/grid" and m.pose_valid]

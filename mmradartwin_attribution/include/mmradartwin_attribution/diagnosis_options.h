@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mmradartwin_attribution/attribution_config.h"
+#include "mmradartwin_dsp/stated_accuracy.h"
 #include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
@@ -22,6 +23,7 @@ struct DiagnosisOptions {
   std::function<void(const DiagnosisProgress&)> on_progress;
   std::function<bool()> cancelled;  ///< asked between steps
   AttributionConfig config;         ///< of the paper's metrics
+  StatedAccuracy accuracy;          ///< of sessions that state none themselves
   /// Other twins of the same scene and radar, whose likelihood is told beside that of the twin as given.
   std::vector<TwinDescription> compared;
 };

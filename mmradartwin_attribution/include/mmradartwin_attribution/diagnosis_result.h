@@ -15,14 +15,14 @@ namespace mmradartwin {
 struct TriedHypothesis {
   std::string label;
   double screened_nats = 0;  ///< nats by the score test
-  double gain = 0;      ///< nats after the fit, NaN where it was not fitted, and so what follows
+  double gain = 0;           ///< nats after the fit, NaN where it was not fitted, and so what follows
   int round = 0;
-  double gain_without_best_place = 0;        ///< nats without the place that gains most
-  double overdispersion = 1;         ///< of chance over places, by which that is divided before it is judged
-  double held_out_gain = 0;     ///< nats on places that the fit did not see
-  double false_alarm_rate = 1;  ///< family-wise
-  std::string fitted;           ///< its numbers, as "forward_m 0.031; left_m -0.002"
-  std::string verdict;          ///< "found", or what speaks against it; "" where none was needed
+  double gain_without_best_place = 0;  ///< nats without the place that gains most
+  double overdispersion = 1;           ///< of chance over places, by which that is divided before it is judged
+  double held_out_gain = 0;            ///< nats on places that the fit did not see
+  double false_alarm_rate = 1;         ///< family-wise
+  std::string fitted;                  ///< its numbers, as "forward_m 0.031; left_m -0.002"
+  std::string verdict;                 ///< "found", or what speaks against it; "" where none was needed
 };
 
 /// Another twin of the same session: how much likelier the data are under it.

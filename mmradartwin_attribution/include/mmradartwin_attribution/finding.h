@@ -9,6 +9,7 @@
 
 #include "mmradartwin_attribution/residual.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/stated_accuracy.h"
 #include "mmradartwin_sim/mechanism.h"
 #include "mmradartwin_sim/twin.h"
 
@@ -125,7 +126,8 @@ struct Finding {
 /// findings.json.
 struct Findings {
   int poses = 0, locations = 0;
-  std::string held_out;  ///< how, in words
+  std::string held_out;     ///< how, in words
+  StatedAccuracy accuracy;  ///< by which the session was judged
   /// Verdict on the session: "none" without findings, "unknown" where the first finding is unknown, else "named".
   std::string verdict() const;
   std::vector<Finding> findings;             ///< by gain

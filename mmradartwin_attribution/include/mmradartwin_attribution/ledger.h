@@ -38,9 +38,6 @@ class Ledger {
   std::array<int, 5> class_count_{};
 };
 
-/// Quantile by linear interpolation between order statistics; NaN for an empty list.
-double quantile(std::vector<double> values, double probability);
-
 /// The paper's table (Target, Metric, Result) as text, in its layout: Placement, Peaks, Matched amp., Under-pred.,
 /// Over-pred., Background, Routing.
 std::vector<std::array<std::string, 3>> tableRows(const LedgerSummary& summary, const std::vector<int>& top_k);

@@ -13,6 +13,8 @@
 
 namespace mmradartwin {
 
+class RayCaster;
+
 enum class RegionKind {
   kFacing,  ///< a facet that faces the radar: foot of the perpendicular inside it
   kCorner,  ///< concave right angle of two facets

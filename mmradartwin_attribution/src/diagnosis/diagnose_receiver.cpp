@@ -28,7 +28,7 @@ Diagnosis diagnoseReceiver(const Recording& recording, const DiagnosisOptions& o
   if (timed.finding) add(findingOf(*timed.finding));
   for (const FrameFinding& frame : session.frames) add(findingOf(frame), frame.nats_by_pose);
   for (const SampleConvention& convention : session.conventions) add(findingOf(convention, data.radar));
-  if (const BodyFixedTone tone = findBodyFixedTone(data); isPlain(tone)) {
+  if (const BodyFixedTone tone = findBodyFixedTone(data); isUnambiguous(tone)) {
     subtractTone(tone, data);
     add(findingOf(tone, data));
   }

@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "mmradartwin_driver/dca1000_control.h"
+#include "mmradartwin_driver/dropping_worker_queue.h"
 #include "mmradartwin_driver/frame_assembler.h"
-#include "mmradartwin_driver/hand_over.h"
 #include "mmradartwin_driver/packet_receiver.h"
 #include "mmradartwin_driver/pcap_writer.h"
 #include "mmradartwin_driver/radar_watch.h"
@@ -100,7 +100,7 @@ class Rig {
   EventSink events_;
   std::unique_ptr<PcapWriter> recording_;  // used by the taps of receiver and control
   bool recording_failed_ = false;
-  HandOver<AdcCube> deliveries_;
+  DroppingWorkerQueue<AdcCube> deliveries_;
   FrameAssembler assembler_;
   std::unique_ptr<PacketReceiver> receiver_;
   std::unique_ptr<Dca1000Control> control_;

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "mmradartwin_driver/awr2243_messages.h"
-#include "mmradartwin_driver/rig_check.h"
+#include "mmradartwin_driver/check_result.h"
 #include "mmradartwin_dsp/radar_config.h"
 
 namespace mmradartwin {

@@ -17,6 +17,7 @@ class DriverNodelet : public nodelet::Nodelet {
       driver_ = std::make_unique<RadarDriver>(getNodeHandle(), getPrivateNodeHandle());
     } catch (const InputError& error) {
       NODELET_FATAL_STREAM(error.what());
+      throw;  // the load fails
     }
   }
   std::unique_ptr<RadarDriver> driver_;

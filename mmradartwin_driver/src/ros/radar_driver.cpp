@@ -4,7 +4,7 @@
 #include <boost/make_shared.hpp>
 #include <cstdio>
 
-#include "mmradartwin_driver/capture_link.h"
+#include "mmradartwin_driver/link_budget.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/strict_parameters.h"
@@ -102,7 +102,7 @@ void RadarDriver::readParameters(const ros::NodeHandle& private_nh) {
   // Another program's packet delay is not known here.
   if (options_.configure_card) {
     try {
-      checkCaptureLink(radar_, options_.packet_delay_us);
+      checkLinkBudget(radar_, options_.packet_delay_us);
     } catch (const InputError& error) {
       throw InputError(radar_file + ": " + error.what());
     }

@@ -51,6 +51,7 @@ struct RadarConfig {
   Eigen::Vector3d virtual_element_m(int k) const;
   /// Receivers that a capture has room for: four lanes always carry four, those not in use as zeros (SWRA581B).
   int capture_receivers() const;
+  double chirp_period_s() const;        ///< from ramp to ramp: idle_s + ramp_end_s; NaN where radar.yaml does not say
   std::size_t bytes_per_chirp() const;  ///< in a capture: samples x capture_receivers x 4
   std::size_t bytes_per_frame() const;  ///< in a capture: chirps x bytes_per_chirp
   /// Start of frame i after that of frame 0, rounded once, so that it does not drift.

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,6 +42,7 @@ struct Recording {
   std::optional<std::string> scene_file;      ///< absolute path of scene.yaml, where the session names one
   std::optional<std::string> twin_file;       ///< absolute path of twin.yaml, where the session names one
   std::optional<double> gain_db;              ///< of a simulated session
+  std::map<std::string, double> accuracy;     ///< what the session states of its ground, by key (StatedAccuracy)
   std::optional<ChannelCorrection> channels;  ///< what averages of its frames are corrected by; set by the user
   std::vector<Pose> poses;                    ///< in file order, duplicates and unusable ones left out
   std::vector<std::string> duplicates;        ///< names of excluded poses (10 cm, 2 cm, 1 deg of an earlier one)

@@ -1,11 +1,11 @@
 #include "mmradartwin_dsp/ros/conversions.h"
 
-#include <openssl/sha.h>
 #include <ros/serialization.h>
 
 #include <cmath>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/sha256.h"
 
 namespace mmradartwin {
 namespace {
@@ -153,8 +153,9 @@ std::uint64_t radarHash(const mmradartwin_msgs::RadarConfig& msg) {
   std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(bare));
   ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
   ros::serialization::serialize(stream, bare);
-  std::uint8_t digest[SHA256_DIGEST_LENGTH];
-  SHA256(bytes.data(), bytes.size(), digest);
+  Sha256 sha256;
+  sha256.add(bytes.data(), bytes.size());
+  const Sha256::Digest digest = sha256.digest();
   std::uint64_t hash = 0;
   for (int i = 7; i >= 0; --i) hash = hash << 8 | digest[i];
   return hash;

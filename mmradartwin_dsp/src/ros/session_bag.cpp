@@ -1,5 +1,4 @@
 #include <mmradartwin_msgs/Session.h>
-#include <openssl/evp.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <tf2_msgs/TFMessage.h>
@@ -14,31 +13,12 @@
 #include "mmradartwin_dsp/ros/bag.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/session_files.h"
+#include "mmradartwin_dsp/sha256.h"
 
 namespace mmradartwin {
 namespace {
 
 namespace fs = std::filesystem;
-
-class Sha256 {
- public:
-  Sha256() : context_(EVP_MD_CTX_new(), EVP_MD_CTX_free) { EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr); }
-  void add(const void* bytes, std::size_t size) { EVP_DigestUpdate(context_.get(), bytes, size); }
-  std::string hex() {
-    unsigned char digest[EVP_MAX_MD_SIZE];
-    unsigned int size = 0;
-    EVP_DigestFinal_ex(context_.get(), digest, &size);
-    std::string text;
-    for (unsigned int i = 0; i < size; ++i) {
-      text += "0123456789abcdef"[digest[i] >> 4];
-      text += "0123456789abcdef"[digest[i] & 15];
-    }
-    return text;
-  }
-
- private:
-  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
-};
 
 std::string captureOf(const std::string& pattern, const std::string& pose) {
   std::string file = pattern;
@@ -50,12 +30,6 @@ std::string readBytes(const std::string& file) {
   std::ostringstream bytes;
   bytes << in.rdbuf();
   return bytes.str();
-}
-
-std::string sha256(const std::string& bytes) {
-  Sha256 hash;
-  hash.add(bytes.data(), bytes.size());
-  return hash.hex();
 }
 
 /// Writes a message that `rosbag play` publishes latched.
@@ -275,7 +249,7 @@ void sessionToBag(const std::string& session, const std::string& bag_file, const
         bytes = readBytes(capture);
       }
     }
-    message.capture_sha256.push_back(exists ? sha256(bytes) : "");
+    message.capture_sha256.push_back(exists ? sha256OfBytes(bytes) : "");
     const auto pose =
         std::find_if(recording.poses.begin(), recording.poses.end(), [&](const Pose& p) { return p.name == name; });
     const bool in_cubes = exists && pose != recording.poses.end() && writer.add(*pose);

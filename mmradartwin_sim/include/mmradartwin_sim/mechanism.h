@@ -28,9 +28,9 @@ class Mechanism {
 
   /// True where a twin may have it several times, each for another thing in the room.
   virtual bool standsSeveralTimes() const { return false; }
-  /// What the user should know about this scene with this mechanism, a line each; asked for after build().
+  /// Notes for the user about this scene with this mechanism, a line each; asked for after build().
   virtual std::vector<std::string> notes() const { return {}; }
-  /// Where the order of two mechanisms in one stage matters, the lower rank acts first; the file's order never matters.
+  /// Order within a stage: the lower rank acts first, equal ranks by name. The order in twin.yaml never matters.
   virtual int rank() const { return 0; }
   /// True where a stage of it asks for PoseContext::strongest_amplitude.
   virtual bool needsStrongestAmplitude() const { return false; }

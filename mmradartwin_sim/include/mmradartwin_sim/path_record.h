@@ -55,7 +55,7 @@ void scaleRecord(std::complex<double> factor, PathRecord& record);
 /// Nearest range bin of length/2, held within the grid.
 int rangeBin(const RadarConfig& radar, double length_m);
 
-/// What the invariants of DESIGN section 4 came out as for one pose.
+/// Deviations of one pose from the invariants of records and grid (DESIGN section 4).
 struct RecordCheck {
   double worst_amplitude_error = 0;  ///< max |sum|c|^2/(M A^2) - 1|
   double grid_error = 0;             ///< |grid - rebuilt| / |grid|

@@ -34,11 +34,12 @@ struct PoseContext {
   /// Zero, and 0 of 1, where no session is known (Twin::setSession).
   double session_s = 0;
   int pose_index = 0, pose_count = 1;
-  /// Where the pose's paths are known but for what a change touches; else null (Mechanism::tracesChanges).
+  /// Change since the pose's paths were found: only paths that it touches are asked for (PathStage::tracesChanges).
+  /// Null where all are.
   const SceneChange* change = nullptr;
-  const CloudCells* cloud = nullptr;  ///< null: every scatter point is a path
-  /// Paths that meet this actor (index in `scene`) are wanted alone; others that are added are thrown away. -1: all
-  /// are.
+  const ScatterCells* cloud = nullptr;  ///< null: every scatter point is a path
+  /// Only paths that meet this actor (index in `scene`) are wanted; others that are added are thrown away. -1: all
+  /// paths are wanted.
   int only_actor = -1;
 };
 

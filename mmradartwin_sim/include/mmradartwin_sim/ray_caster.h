@@ -38,7 +38,7 @@ class RayCaster {
   std::optional<int> insideActor(const Eigen::Vector3d& p) const;
 
  private:
-  bool passesVeils(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const;
+  bool passesThroughActors(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const;
   struct Embree;
   std::unique_ptr<Embree> embree_;
 };

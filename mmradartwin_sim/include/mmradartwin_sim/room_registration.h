@@ -28,7 +28,7 @@ struct RegistrationOptions {
   int min_points = 300;        ///< cells of 1.5 deg of the camera's view
 };
 
-/// What a cloud's fit came out as.
+/// Result of fitting a cloud to the room.
 struct Registration {
   bool trusted = false;
   std::string reason;  ///< why it is not trusted and what to do; "" where it is

@@ -12,7 +12,7 @@ namespace mmradartwin {
 /// Cells, as a radar resolves them, within which scatter points of one facet are one path with their power, at the
 /// place and with the phase of the one that lies nearest to their mean: thousands of points become a hundred where the
 /// phases between them say nothing.
-struct CloudCells {
+struct ScatterCells {
   using Cell = std::array<int, 4>;  ///< facet, range, sine, elevation
   using CellSet = std::unordered_set<Cell, boost::hash<Cell>>;
 

@@ -72,7 +72,7 @@ struct Scene {
   std::vector<Actor> actors;
   std::vector<Facet> facets;
   std::vector<CurvedSurface> curved;
-  std::vector<Actor> screens;  ///< what mechanisms put into the room: they occlude, nothing else
+  std::vector<Actor> occluders_only;  ///< what mechanisms put into the room: they occlude, nothing else
 
   int actorIndex(const std::string& name) const;  ///< -1 where absent
   /// The actor of a path record's index; of -1 one that stands for what mechanisms put into the room.

@@ -63,21 +63,21 @@ class Twin {
   /// True where a mechanism edits the scene or moves the radar, so that every path has to be traced anew; else the
   /// paths of a twin are those of its mechanisms one by one.
   bool altersGeometry() const;
-  /// What another twin of the same scene has otherwise: its actors, and bounds of where they are in both; of what one
-  /// of them put into the room the bounds alone. Nothing where mechanisms have the radar elsewhere.
+  /// Difference to another twin of the same scene: the actors that stand elsewhere and their bounds in both twins. An
+  /// actor that a mechanism put into the room counts by its bounds only. Nothing where the radar is elsewhere.
   std::optional<SceneChange> changesFrom(const Twin& other) const;
-  /// Where all that the edits do is that one actor stands elsewhere, or that they put one there: that one.
+  /// The actor that mechanisms move or add, where that is their only edit of the scene.
   struct PlacedActor {
     int actor;   ///< in scene(); -1 where they put it there
     bool hides;  ///< what is behind it
   };
   std::optional<PlacedActor> placesOneActor() const;
   /// True where an edit lets rays through what occludes in scene().
-  bool opensActors() const;
-  /// True where all that the edits add are screens (things that hide what is behind them): its paths are those of the
-  /// scene without them, less what removeHidden() takes.
-  bool addsScreensAlone() const;
-  /// Takes away the records that a screen stands in the way of. T_map_radar: where they were traced from.
+  bool removesActors() const;
+  /// True where all that the edits add hides what is behind it and does nothing else: its paths are those of the
+  /// scene without that, less what removeHidden() takes.
+  bool addsOccludersOnly() const;
+  /// Removes the records that an added occluder hides. T_map_radar: where they were traced from.
   void removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord>& records,
                     std::int64_t stamp_ns = 0) const;
   /// Tells levels that are relative to the session's strongest echo; without it they refer to the strongest of the
@@ -85,23 +85,25 @@ class Twin {
   void setStrongestAmplitude(double amplitude);
   /// Poses of the session: finds the strongest amplitude where a mechanism needs it. Cheap otherwise.
   void prepare(const std::vector<Eigen::Isometry3d>& poses);
-  /// What a user should know about this scene with these mechanisms (search limits, say), a line each.
+  /// Notes for the user about this scene with these mechanisms (search limits, say), a line each.
   std::vector<std::string> notes() const;
   /// The two halves of simulate(): all that has to be traced, and what weights, leakage and receiver make of it.
   /// Records traced once may be weighed again by a twin that differs in mechanisms of weight and receiver alone.
   /// cloud: cells within which scatter points are summed; not kept.
   std::vector<PathRecord> trace(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0,
-                                const CloudCells* cloud = nullptr) const;
-  /// Of those paths the ones of description().mechanisms[mechanism] alone.
+                                const ScatterCells* cloud = nullptr) const;
+  /// Paths of description().mechanisms[mechanism] alone.
   std::vector<PathRecord> trace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
-                                const CloudCells* cloud) const;
-  /// The same where those of another twin are known, from which this one differs by a change.
-  std::vector<PathRecord> retrace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar, const CloudCells& cloud,
-                                  const SceneChange& change, const std::vector<PathRecord>& known) const;
-  /// The same where those are known of a twin without the actor that the last edit places: all that it does not hide,
-  /// and those that meet it.
+                                const ScatterCells* cloud) const;
+  /// As trace() of one mechanism, from the `known` paths of a twin that differs by `change`: finds only what it
+  /// touches.
+  std::vector<PathRecord> retrace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
+                                  const ScatterCells& cloud, const SceneChange& change,
+                                  const std::vector<PathRecord>& known) const;
+  /// As trace() of one mechanism, from the paths of a twin `without` the placed actor: keeps those that the actor does
+  /// not hide, and finds those that meet it.
   std::vector<PathRecord> traceAround(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
-                                      const CloudCells& cloud, const PlacedActor& placed,
+                                      const ScatterCells& cloud, const PlacedActor& placed,
                                       const std::vector<PathRecord>& without) const;
   Simulation weigh(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,
                    std::int64_t stamp_ns = 0) const;
@@ -110,8 +112,8 @@ class Twin {
                                         std::int64_t stamp_ns = 0) const;
   /// True where the receiver does more to the grid than filter it path by path.
   bool hasReceiveStage() const;
-  /// Where all that the receiver does beyond filters is one complex matrix over the channels, the same at all samples:
-  /// that matrix [M][M]; else nothing.
+  /// The receiver's matrix over the channels [M][M], where beyond filters it is one matrix, the same at all samples;
+  /// else nothing.
   std::optional<Eigen::MatrixXcd> channelMatrix(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
   /// Throws InputError for a pose that is NaN or inside an actor (names it).
   Simulation simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0) const;
@@ -120,8 +122,8 @@ class Twin {
   /// is the first. Between poses that follow each other within 0.2 s the radar is taken to move evenly, elsewhere to
   /// stand. Throws InputError where a mechanism names a pose that is not among them.
   void setSession(const std::vector<Pose>& poses);
-  /// Where the radar is reported to be along time, for what stamps that come late do (pose_time_lag); instead of what
-  /// the session's poses say. Called from any thread.
+  /// Sets the reported poses along time, which pose_time_lag needs, instead of those of the session. The trajectory is
+  /// called from any thread.
   void setTrajectory(Trajectory reported);
   /// True where a mechanism acts on frames, chirps or samples; else all frames are the grid's samples.
   bool hasFrameStage() const;
@@ -132,7 +134,7 @@ class Twin {
   /// The frames of a simulated pose, chirp by chirp, sample/32768 = 10^(gain_db/20) x, rounded and held within full
   /// scale. Depends on pose, stamp and seed alone.
   std::vector<AdcCube> simulateFrames(const Simulation& pose, const FrameOptions& options) const;
-  /// The same before the converter, in path amplitudes: shows every chirp [R][N]. For levels of a whole session.
+  /// Shows every chirp [R][N] as it comes to the converter, in path amplitudes: for the level of a whole session.
   void visitChirps(const Simulation& pose, int frames,
                    const std::function<void(const ChirpContext&, const ComplexGrid&)>& visit) const;
 

@@ -16,8 +16,8 @@ struct NamedParameters {
   Parameters values;
 };
 
-/// What a mechanism's parameters say that it concerns: actors, a material, walls, a pose, of a law its variable; "" for
-/// nothing of the kind.
+/// The actors, material, walls, pose or (of a law) variable that a mechanism's parameters name; "" where they name
+/// none.
 std::string subjectOf(const NamedParameters& mechanism);
 /// True where a twin cannot have both: the same mechanism for the same thing, or twice where it stands once.
 bool excludeEachOther(const NamedParameters& a, const NamedParameters& b);

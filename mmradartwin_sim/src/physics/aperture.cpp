@@ -30,7 +30,7 @@ Complex stretch(double a, double b, double h) {
   return sum * half;
 }
 
-/// The same from a >= 0 to infinity, for h > 0.
+/// The integral from a >= 0 to infinity, for h > 0.
 Complex toInfinity(double a, double h) {
   constexpr double kTurn = 2;  // from here on along l = start + (1-j) t, where the integrand decays without turning
   Complex sum = 0;

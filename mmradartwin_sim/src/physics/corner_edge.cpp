@@ -112,7 +112,7 @@ std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
 }
 
 void addCornerPath(const PoseContext& context, const ElementsInMap& elements, const CornerEdge& edge,
-                   const std::string& event, double level, std::vector<PathRecord>& records, CornerAperture aperture) {
+                   const PathEvent& event, std::vector<PathRecord>& records, CornerAperture aperture) {
   const Eigen::Vector3d to_radar = elements.p - edge.origin;
   // Concave as seen from here: the radar stands between the two faces.
   const double x = to_radar.dot(edge.into_a), y = to_radar.dot(edge.into_b);
@@ -150,11 +150,11 @@ void addCornerPath(const PoseContext& context, const ElementsInMap& elements, co
   field = reflectField(field, between, b.normal, mb, context.frequency_hz);
   const std::complex<double> gamma = (e.cast<std::complex<double>>().transpose() * field)(0);
   const std::complex<double> coefficient =
-      level * wavelength / (4 * M_PI * 2 * R) * specularShare(ma) * specularShare(mb) * gamma * factor;
+      event.level * wavelength / (4 * M_PI * 2 * R) * specularShare(ma) * specularShare(mb) * gamma * factor;
   if (std::abs(coefficient) <= 0) return;
 
   PathRecord record;
-  record.event = &event;
+  record.event = &event.name;
   record.actors = {a.actor, b.actor};
   record.facets = {a.id, b.id};
   record.vertices = {vertex, vertex};

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "physics/elements_in_map.h"
+#include "physics/path_event.h"
 
 namespace mmradartwin {
 
@@ -26,16 +27,15 @@ std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
                                         const std::function<bool(const Facet&)>& takes_part,
                                         const std::function<bool(const Facet&, const Facet&)>& pair);
 
-/// What of two faces across the ray makes up a corner's aperture.
+/// The part of two faces across the ray that makes up a corner's aperture.
 enum class CornerAperture {
   kBothFaces,     ///< from the far end of the one to the far end of the other (DESIGN section 4, `corner`)
   kNarrowerFace,  ///< as far to both sides as the narrower reaches: what meets one face leaves as far on the other
 };
 
-/// The retro path of one edge as seen from one pose, where there is one; `event` lives as long as the record, `level`
-/// is a factor of amplitude.
+/// The retro path of one edge as seen from one pose, where there is one.
 void addCornerPath(const PoseContext& context, const ElementsInMap& elements, const CornerEdge& edge,
-                   const std::string& event, double level, std::vector<PathRecord>& records,
+                   const PathEvent& event, std::vector<PathRecord>& records,
                    CornerAperture aperture = CornerAperture::kBothFaces);
 
 }  // namespace mmradartwin

@@ -236,8 +236,9 @@ std::optional<EdgeReturn> diffract(const PoseContext& context, const Diffracting
   };
   const Fresnel gamma_0 = face(edge.a, phi_in), gamma_n = face(edge.b, edge.n * M_PI - phi);
   const double k = 2 * M_PI / wavelength, L = s1 * s2 / (s1 + s2) * sin_beta * sin_beta;
-  const std::complex<double> soft = wedgeCoefficient(edge.n, phi, phi_in, L, sin_beta, k, gamma_0.te, gamma_n.te);
-  const std::complex<double> hard = wedgeCoefficient(edge.n, phi, phi_in, L, sin_beta, k, gamma_0.tm, gamma_n.tm);
+  const WedgeGeometry wedge{edge.n, phi, phi_in, L, sin_beta};
+  const std::complex<double> soft = wedgeCoefficient(wedge, k, gamma_0.te, gamma_n.te);
+  const std::complex<double> hard = wedgeCoefficient(wedge, k, gamma_0.tm, gamma_n.tm);
   const ComplexVector field = incident(result.point);
   const Eigen::Vector3d receive = verticalField(up, -out);
   const auto dot = [](const ComplexVector& f, const Eigen::Vector3d& v) {

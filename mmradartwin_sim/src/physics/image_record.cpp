@@ -9,14 +9,14 @@
 namespace mmradartwin {
 
 void addImageRecord(const PoseContext& context, const ElementsInMap& elements, const ImagePath& path,
-                    const std::string& event, double level, double cutoff, std::vector<PathRecord>& records) {
+                    const PathEvent& event, double cutoff, std::vector<PathRecord>& records) {
   const double wavelength = context.radar.wavelength_m();
   const int order = static_cast<int>(path.facets.size());
   const double total = (path.image - elements.p).norm();
   Eigen::Vector3d in = (path.vertices.front() - elements.p).normalized();
   const Eigen::Vector3d arrival = (path.vertices.back() - elements.p).normalized();
   ComplexVector field = verticalField(elements.up, in).cast<std::complex<double>>();
-  std::complex<double> weight = level * wavelength / (4 * M_PI * total);
+  std::complex<double> weight = event.level * wavelength / (4 * M_PI * total);
   double before = 0;
   Eigen::Vector3d from = elements.p;
   PathRecord record;
@@ -34,7 +34,7 @@ void addImageRecord(const PoseContext& context, const ElementsInMap& elements, c
   }
   weight *= (verticalField(elements.up, arrival).cast<std::complex<double>>().transpose() * field)(0);
   if (std::abs(weight) < cutoff) return;
-  record.event = &event;
+  record.event = &event.name;
   record.facets = path.facets;
   record.vertices = path.vertices;
   const Eigen::Matrix3d to_radar = context.T_map_radar.linear().transpose();

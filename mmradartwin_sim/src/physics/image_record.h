@@ -1,17 +1,17 @@
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "physics/elements_in_map.h"
+#include "physics/path_event.h"
 #include "rays/image_paths.h"
 
 namespace mmradartwin {
 
 /// The record of a closed specular path of two bounces or more: Fresnel coefficients with polarisation, sqrt(1 - S^2)
 /// and the aperture factor of each facet, spreading of the full length. Nothing is added where 20 log10(A_p) falls
-/// below `cutoff` (an amplitude). `event` lives as long as the record, `level` is a factor of amplitude.
+/// below `cutoff` (an amplitude).
 void addImageRecord(const PoseContext& context, const ElementsInMap& elements, const ImagePath& path,
-                    const std::string& event, double level, double cutoff, std::vector<PathRecord>& records);
+                    const PathEvent& event, double cutoff, std::vector<PathRecord>& records);
 
 }  // namespace mmradartwin

@@ -25,7 +25,7 @@ double signedArea(const Polygon& polygon) {
   return 0.5 * sum;
 }
 
-/// What of a polygon lies where normal . p >= 0 (Sutherland and Hodgman).
+/// The part of a polygon where normal . p >= 0 (Sutherland and Hodgman).
 Polygon clip(const Polygon& polygon, const Eigen::Vector2d& point, const Eigen::Vector2d& normal) {
   Polygon kept;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -107,7 +107,7 @@ std::vector<Trihedral> findTrihedra(const Scene& scene, const std::vector<Corner
 }
 
 void addTrihedralPath(const PoseContext& context, const ElementsInMap& elements, const Trihedral& trihedral,
-                      const std::string& event, double level, std::vector<PathRecord>& records) {
+                      const PathEvent& event, std::vector<PathRecord>& records) {
   const Eigen::Vector3d to_radar = elements.p - trihedral.apex;
   for (const Eigen::Vector3d& e : trihedral.edge) {
     if (to_radar.dot(e) < 1e-6) return;
@@ -158,7 +158,7 @@ void addTrihedralPath(const PoseContext& context, const ElementsInMap& elements,
   gamma /= orders;
 
   PathRecord record;
-  std::complex<double> coefficient = level * wavelength / (4 * M_PI * 2 * R) * gamma * factor;
+  std::complex<double> coefficient = event.level * wavelength / (4 * M_PI * 2 * R) * gamma * factor;
   for (int id : trihedral.facets) {
     const Facet& f = context.scene.facets[id];
     coefficient *= specularShare(context.scene.actors[f.actor].material);
@@ -168,7 +168,7 @@ void addTrihedralPath(const PoseContext& context, const ElementsInMap& elements,
     record.reflection_cosine.push_back(std::abs(out.dot(f.normal)));
   }
   if (!(std::abs(coefficient) > 0)) return;
-  record.event = &event;
+  record.event = &event.name;
   record.departure = record.arrival = direction_radar;
   record.bounces = 3;
   record.length_m =

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "physics/corner_edge.h"
+#include "physics/path_event.h"
 
 namespace mmradartwin {
 
@@ -14,7 +15,7 @@ struct Trihedral {
   std::array<int, 3> facets;  ///< ids, rising
   Eigen::Vector3d apex;
   std::array<Eigen::Vector3d, 3> edge;  ///< unit, along the octant's edges; edge[i] is across facet i
-  /// What of each facet lies in the octant, from the apex; taken as convex, without its holes.
+  /// The part of each facet in the octant, from the apex; taken as convex, without its holes.
   std::array<std::vector<Eigen::Vector3d>, 3> outline;
 };
 
@@ -27,9 +28,8 @@ std::vector<Trihedral> findTrihedra(const Scene& scene, const std::vector<Corner
 /// ray, in so far as it covers its own inversion (a ray that comes in beside the apex leaves on the opposite side): at
 /// boresight a^2/sqrt(3) of a triangular, sqrt(3) a^2 of a square one, and so 4 pi a^4/(3 lambda^2) and
 /// 12 pi a^4/lambda^2 far off. Source: Robertson 1947; Knott, Shaeffer, Tuley, Radar Cross Section. The orders in which
-/// the faces are met differ for dielectrics only; their mean is taken. `event` lives as long as the record, `level` is
-/// a factor of amplitude.
+/// the faces are met differ for dielectrics only; their mean is taken.
 void addTrihedralPath(const PoseContext& context, const ElementsInMap& elements, const Trihedral& trihedral,
-                      const std::string& event, double level, std::vector<PathRecord>& records);
+                      const PathEvent& event, std::vector<PathRecord>& records);
 
 }  // namespace mmradartwin

@@ -37,12 +37,14 @@ std::complex<double> transitionFunction(double X) {
   return Complex(0, 2 * root) * std::polar(1.0, X) * std::sqrt(0.5 * M_PI) * tail;
 }
 
-std::complex<double> wedgeCoefficient(double n, double phi, double phi_in, double distance_parameter_m, double sin_beta,
-                                      double wavenumber, std::complex<double> gamma_0, std::complex<double> gamma_n) {
-  const double kL = wavenumber * distance_parameter_m, minus = phi - phi_in, plus = phi + phi_in;
+std::complex<double> wedgeCoefficient(const WedgeGeometry& wedge, double wavenumber, std::complex<double> gamma_0,
+                                      std::complex<double> gamma_n) {
+  const double n = wedge.n;
+  const double kL = wavenumber * wedge.distance_parameter_m, minus = wedge.phi - wedge.phi_in,
+               plus = wedge.phi + wedge.phi_in;
   const Complex sum =
       term(n, 1, minus, kL) + term(n, -1, minus, kL) + gamma_n * term(n, 1, plus, kL) + gamma_0 * term(n, -1, plus, kL);
-  return -std::polar(1.0, -M_PI / 4) / (2 * n * std::sqrt(2 * M_PI * wavenumber) * sin_beta) * sum;
+  return -std::polar(1.0, -M_PI / 4) / (2 * n * std::sqrt(2 * M_PI * wavenumber) * wedge.sin_beta) * sum;
 }
 
 }  // namespace mmradartwin

@@ -17,7 +17,7 @@ double legGap(const Facet& facet, const Eigen::Vector3d& direction) {
   return std::max(1e-3, 2 * facet.flatness_m / cosine);
 }
 
-/// What a point sees through a rectangle: the pyramid over it, outward normals as rows.
+/// The view of a point through a rectangle: the pyramid over it, outward normals as rows.
 class Beam {
  public:
   Beam(const Eigen::Vector3d& apex, const Eigen::Matrix<double, 3, 4>& window) {
@@ -160,110 +160,155 @@ bool ImageSearch::solve(const Eigen::Vector3d& p, const PerInteraction<int>& seq
   return true;
 }
 
-std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
-                                         int min_order) const {
-  std::vector<ImagePath> found;
-  const int count = static_cast<int>(reflectors_.size());
-  ImagePath path;
-  // Facets that can be first or last: some of them lies in front of the radar.
-  std::vector<char> in_front(static_cast<std::size_t>(count), 1);
-  if (limits.forward.squaredNorm() > 0) {
-    for (int a = 0; a < count; ++a) {
-      in_front[a] = (limits.forward.transpose() * (corners_[a].point.colwise() - p)).maxCoeff() > 0;
+/// One search from one point.
+class ImageSearch::Finder {
+ public:
+  Finder(const ImageSearch& search, const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
+         int min_order)
+      : search_(search),
+        p_(p),
+        rays_(rays),
+        limits_(limits),
+        min_order_(min_order),
+        in_front_(search.reflectors_.size(), 1),
+        wanted_(search.reflectors_.size(), 1),
+        ways_to_(limits.max_order < 3 ? 0 : search.reflectors_.size()) {
+    const int count = static_cast<int>(search.reflectors_.size());
+    for (int i = 0; i < count; ++i) {
+      if (limits.forward.squaredNorm() > 0) {
+        in_front_[i] = (limits.forward.transpose() * (search.corners_[i].point.colwise() - p)).maxCoeff() > 0;
+      }
+      if (limits.only_actor >= 0) wanted_[i] = facet(i).actor == limits.only_actor;
+      if (search.on_side_.empty()) all_.push_back(i);
+    }
+    for (const Mirror& m : search.mirrors_) {
+      own_.push_back({m.normal.dot(p) - m.offset_m, m.e1.dot(p) - m.first1_m, m.e2.dot(p) - m.first2_m});
     }
   }
-  // Of the point itself: distance from each plane, and place in each rectangle's axes.
+
+  std::vector<ImagePath> find() {
+    for (int a = 0; a < static_cast<int>(in_front_.size()); ++a) {
+      if (in_front_[a]) addFrom(a);
+    }
+    for (std::size_t b = 0; b < ways_to_.size(); ++b) addOver(static_cast<int>(b));
+    return distinct();
+  }
+
+ private:
+  // The point's distance from a plane, and its place in the rectangle's axes.
   struct Own {
     double distance_m, along1_m, along2_m;
   };
-  std::vector<Own> own;
-  for (const Mirror& m : mirrors_) {
-    own.push_back({m.normal.dot(p) - m.offset_m, m.e1.dot(p) - m.first1_m, m.e2.dot(p) - m.first2_m});
+  struct Way {
+    int first;
+    Eigen::Vector3d image;  // of p in the first facet
+  };
+
+  const Facet& facet(int reflector) const { return search_.scene_.facets[search_.reflectors_[reflector]]; }
+
+  double beyond_m(int b, const Eigen::Vector3d& image) const {
+    const Mirror& m = search_.mirrors_[static_cast<std::size_t>(b)];
+    return m.normal.dot(image) - m.offset_m;
   }
-  // The last facet is tried by where the straight line from p to the image meets its plane, which is cheap. beyond_m:
-  // distance of the image before from the plane.
-  const auto meetsLast = [&](int b, double beyond_m, const Eigen::Vector3d& image_before) {
-    const Mirror& m = mirrors_[static_cast<std::size_t>(b)];
-    const Own& o = own[static_cast<std::size_t>(b)];
+
+  /// The last facet is tried by where the straight line from p to the image meets its plane, which is cheap. beyond_m:
+  /// distance of the image before from the plane.
+  bool meetsLast(int b, double beyond_m, const Eigen::Vector3d& image_before) const {
+    const Mirror& m = search_.mirrors_[static_cast<std::size_t>(b)];
+    const Own& o = own_[static_cast<std::size_t>(b)];
     if (!(o.distance_m * beyond_m > 0)) return false;
     const double share = o.distance_m / (o.distance_m + beyond_m);
     const double x = o.along1_m + share * (m.e1.dot(image_before) - m.first1_m - o.along1_m);
     if (!(x > -1e-6 && x < m.size1_m + 1e-6)) return false;
     const double y = o.along2_m + share * (m.e2.dot(image_before) - m.first2_m - o.along2_m);
     return y > -1e-6 && y < m.size2_m + 1e-6;
-  };
-  const bool all_wanted = limits.only_actor < 0;
-  std::vector<char> wanted(static_cast<std::size_t>(count), 1);
-  for (int i = 0; !all_wanted && i < count; ++i) {
-    wanted[i] = scene_.facets[static_cast<std::size_t>(reflectors_[i])].actor == limits.only_actor;
   }
-  const auto beyond = [this](int b, const Eigen::Vector3d& image) {
-    const Mirror& m = mirrors_[static_cast<std::size_t>(b)];
-    return m.normal.dot(image) - m.offset_m;
-  };
-  std::vector<int> all;
-  for (int i = 0; on_side_.empty() && i < count; ++i) all.push_back(i);
-  // Ways over one facet towards another, by the side of the other that they come to. A path of three bounces runs both
-  // ways: it is one of these from either end, in the middle.
-  struct Way {
-    int first;
-    Eigen::Vector3d image;  // of p in the first facet
-  };
-  std::vector<std::array<std::vector<Way>, 2>> ways_to(limits.max_order < 3 ? 0 : static_cast<std::size_t>(count));
-  for (int a = 0; a < count; ++a) {
-    if (!in_front[a]) continue;
-    const Facet& fa = scene_.facets[reflectors_[a]];
-    const double da = fa.planeDistance(p);
-    if (std::abs(da) < kOnPlane_m) continue;
-    if (min_order <= 1 && wanted[a] && solve(p, {fa.id}, rays, limits, path)) found.push_back(path);
-    if (limits.max_order < 2) continue;
-    const Eigen::Vector3d image1 = mirror(p, fa);
-    const Beam beam(image1, corners_[a].point);
-    for (int b : on_side_.empty() ? all : on_side_[static_cast<std::size_t>(2 * a + (da > 0))]) {
+
+  void addSolved(const PerInteraction<int>& sequence) {
+    if (search_.solve(p_, sequence, rays_, limits_, path_)) found_.push_back(path_);
+  }
+
+  /// Adds paths of one and two bounces whose first facet is a, and keeps the ways over it for those of three.
+  void addFrom(int a) {
+    const Facet& fa = facet(a);
+    const double da = fa.planeDistance(p_);
+    if (std::abs(da) < kOnPlane_m) return;
+    if (min_order_ <= 1 && wanted_[a]) addSolved({fa.id});
+    if (limits_.max_order < 2) return;
+    const Eigen::Vector3d image1 = mirror(p_, fa);
+    const Beam beam(image1, search_.corners_[a].point);
+    const bool any_side = search_.on_side_.empty();
+    for (int b : any_side ? all_ : search_.on_side_[static_cast<std::size_t>(2 * a + (da > 0))]) {
       // Cheap tests first: few facets pass them where no third bounce follows.
-      const double db = beyond(b, image1);
+      const double db = beyond_m(b, image1);
       if (b == a || std::abs(db) < kOnPlane_m) continue;
-      const bool last = min_order <= 2 && (wanted[a] || wanted[b]) && in_front[b] && meetsLast(b, db, image1);
-      if ((!last && limits.max_order < 3) || (on_side_.empty() && !faces(a, da > 0, b))) continue;
-      if (!beam.meets(corners_[b].point)) continue;
-      const Facet& fb = scene_.facets[reflectors_[b]];
-      if (last && !perpendicular(fa, fb) && solve(p, {fa.id, fb.id}, rays, limits, path)) found.push_back(path);
-      if (limits.max_order >= 3) ways_to[static_cast<std::size_t>(b)][db > 0].push_back({a, image1});
+      const bool last = min_order_ <= 2 && (wanted_[a] || wanted_[b]) && in_front_[b] && meetsLast(b, db, image1);
+      if ((!last && limits_.max_order < 3) || (any_side && !search_.faces(a, da > 0, b))) continue;
+      if (!beam.meets(search_.corners_[b].point)) continue;
+      const Facet& fb = facet(b);
+      if (last && !perpendicular(fa, fb)) addSolved({fa.id, fb.id});
+      if (limits_.max_order >= 3) ways_to_[static_cast<std::size_t>(b)][db > 0].push_back({a, image1});
     }
   }
-  for (std::size_t b = 0; b < ways_to.size(); ++b) {
-    const Facet& fb = scene_.facets[reflectors_[b]];
-    for (const std::vector<Way>& ways : ways_to[b]) {
+
+  /// Adds paths of three bounces whose middle facet is b.
+  void addOver(int b) {
+    const Facet& fb = facet(b);
+    for (const std::vector<Way>& ways : ways_to_[static_cast<std::size_t>(b)]) {
       for (std::size_t i = 0; i < ways.size(); ++i) {
         const int a = ways[i].first;
-        const Facet& fa = scene_.facets[reflectors_[a]];
+        const int fa = search_.reflectors_[a];
         const Eigen::Vector3d image2 = mirror(ways[i].image, fb);
         for (std::size_t j = i; j < ways.size(); ++j) {
           const int c = ways[j].first;
-          if (!(wanted[a] || wanted[b] || wanted[c]) || !meetsLast(c, beyond(c, image2), image2)) continue;
-          const int fc = reflectors_[c];
-          if (solve(p, {fa.id, fb.id, fc}, rays, limits, path)) found.push_back(path);
-          if (c != a && solve(p, {fc, fb.id, fa.id}, rays, limits, path)) found.push_back(path);
+          if (!(wanted_[a] || wanted_[b] || wanted_[c]) || !meetsLast(c, beyond_m(c, image2), image2)) continue;
+          const int fc = search_.reflectors_[c];
+          addSolved({fa, fb.id, fc});
+          if (c != a) addSolved({fc, fb.id, fa});
         }
       }
     }
   }
-  std::sort(found.begin(), found.end(), [](const ImagePath& a, const ImagePath& b) { return a.facets < b.facets; });
-  // Where the line to an image runs through an edge, several orders of the same facets are one path.
-  std::vector<ImagePath> unique;
-  for (const ImagePath& f : found) {
-    PerInteraction<int> set = f.facets;
-    std::sort(set.begin(), set.end());
-    bool known = false;
-    for (const ImagePath& u : unique) {
-      if (u.facets.size() != f.facets.size() || f.facets.size() < 2 || (u.image - f.image).norm() > 1e-6) continue;
-      PerInteraction<int> other = u.facets;
-      std::sort(other.begin(), other.end());
-      known = known || other == set;
+
+  /// The paths found, in the order of facets. Where the line to an image runs through an edge, several orders of the
+  /// same facets are one path.
+  std::vector<ImagePath> distinct() {
+    std::sort(found_.begin(), found_.end(), [](const ImagePath& a, const ImagePath& b) { return a.facets < b.facets; });
+    std::vector<ImagePath> unique;
+    for (const ImagePath& f : found_) {
+      PerInteraction<int> set = f.facets;
+      std::sort(set.begin(), set.end());
+      bool known = false;
+      for (const ImagePath& u : unique) {
+        if (u.facets.size() != f.facets.size() || f.facets.size() < 2 || (u.image - f.image).norm() > 1e-6) continue;
+        PerInteraction<int> other = u.facets;
+        std::sort(other.begin(), other.end());
+        known = known || other == set;
+      }
+      if (!known) unique.push_back(f);
     }
-    if (!known) unique.push_back(f);
+    return unique;
   }
-  return unique;
+
+  const ImageSearch& search_;
+  const Eigen::Vector3d& p_;
+  const RayCaster& rays_;
+  const Limits& limits_;
+  const int min_order_;
+  std::vector<char> in_front_;  // can be first or last: some of the facet lies in front of the radar
+  std::vector<char> wanted_;    // of Limits::only_actor
+  std::vector<Own> own_;
+  std::vector<int> all_;  // reflectors, where sides are not known
+  // Ways over one facet towards another, by the side of the other that they come to. A path of three bounces runs both
+  // ways: it is one of these from either end, in the middle.
+  std::vector<std::array<std::vector<Way>, 2>> ways_to_;
+  std::vector<ImagePath> found_;
+  ImagePath path_;  // one for all: its lists keep their memory
+};
+
+std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
+                                         int min_order) const {
+  return Finder(*this, p, rays, limits, min_order).find();
 }
 
 std::vector<ImageSearch::Seed> ImageSearch::seeds(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,

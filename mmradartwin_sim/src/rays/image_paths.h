@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mmradartwin_sim/path_record.h"
+#include "mmradartwin_sim/ray_caster.h"
 #include "mmradartwin_sim/scene.h"
 
 namespace mmradartwin {
@@ -60,6 +61,7 @@ class ImageSearch {
   const std::vector<int>& reflectors() const { return reflectors_; }
 
  private:
+  class Finder;
   struct Corners {
     Eigen::Matrix<double, 3, 4> point;
   };

@@ -1,3 +1,5 @@
+#include "mmradartwin_sim/ray_caster.h"
+
 #include <embree3/rtcore.h>
 #include <tbb/global_control.h>
 
@@ -8,16 +10,14 @@
 #include <limits>
 #include <stdexcept>
 
-#include "mmradartwin_sim/scene.h"
-
 namespace mmradartwin {
 
 struct RayCaster::Embree {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
   RTCScene still = nullptr;                          // what stands, where other actors may move; else null
-  RTCScene veil = nullptr;                           // actors that rays pass, null where there are none
-  std::vector<std::vector<Facet>> veil_of;           // [actor], empty for the others
+  RTCScene passed_actors = nullptr;                  // actors that rays pass, null where there are none
+  std::vector<std::vector<Facet>> passed_facets;     // [actor], empty for the others
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  // single precision inside, so coordinates stay small
   double radius_m = 0;
   std::vector<std::vector<int>> facet_of_triangle;  // [actor][triangle]
@@ -35,7 +35,7 @@ struct RayCaster::Embree {
     if (scene) rtcReleaseScene(scene);
     if (still) rtcReleaseScene(still);
     for (const Instance& i : instances) rtcReleaseScene(i.scene);
-    if (veil) rtcReleaseScene(veil);
+    if (passed_actors) rtcReleaseScene(passed_actors);
     if (device) rtcReleaseDevice(device);
   }
 };
@@ -52,7 +52,7 @@ bool castable(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, d
          length < 2 * kFarthest_m;
 }
 
-/// The same of a ray of this square length.
+/// castable() of a ray of this square length.
 bool castable(const Eigen::Vector3d& origin, double square_length) {
   return origin.squaredNorm() < kFarthest_m * kFarthest_m && square_length < 4 * kFarthest_m * kFarthest_m;
 }
@@ -141,7 +141,7 @@ RayCaster::RayCaster(const Scene& scene, const std::vector<int>& movable) : embr
     e.center = all.center();
     e.radius_m = 0.5 * all.diagonal().norm();
   }
-  e.veil_of.resize(scene.actors.size());
+  e.passed_facets.resize(scene.actors.size());
   const double volume = all.isEmpty() ? 0 : (all.sizes().array() + 0.01).prod();
   for (std::size_t a = 0; a < scene.actors.size(); ++a) {
     const Actor& actor = scene.actors[a];
@@ -156,16 +156,16 @@ RayCaster::RayCaster(const Scene& scene, const std::vector<int>& movable) : embr
       rtcSetSceneBuildQuality(target, kQuality);
       e.instances.push_back({static_cast<int>(a), target, nullptr, actor.bounds});
     } else if (!actor.occludes) {
-      if (!e.veil) e.veil = rtcNewScene(e.device);
-      target = e.veil;
-      for (int id : actor.facets) e.veil_of[a].push_back(scene.facets[id]);
+      if (!e.passed_actors) e.passed_actors = rtcNewScene(e.device);
+      target = e.passed_actors;
+      for (int id : actor.facets) e.passed_facets[a].push_back(scene.facets[id]);
     }
     attach(e.device, target, actor, e.center, static_cast<unsigned>(a));
   }
-  for (std::size_t i = 0; i < scene.screens.size(); ++i) {
-    attach(e.device, standing, scene.screens[i], e.center, static_cast<unsigned>(scene.actors.size() + i));
+  for (std::size_t i = 0; i < scene.occluders_only.size(); ++i) {
+    attach(e.device, standing, scene.occluders_only[i], e.center, static_cast<unsigned>(scene.actors.size() + i));
   }
-  if (e.veil) commitAlone(e.veil);
+  if (e.passed_actors) commitAlone(e.passed_actors);
   if (e.still) {
     commitAlone(e.still);
     attachInstance(e.device, e.scene, e.still, 0);
@@ -216,7 +216,7 @@ bool RayCaster::visible(const Eigen::Vector3d& a, const Eigen::Vector3d& b, doub
   rtcInitIntersectContext(&context);
   rtcOccluded1(embree_->scene, &context, &ray);
   if (ray.tfar < 0) return false;
-  return !embree_->veil || passesVeils(a, b, gap_m);
+  return !embree_->passed_actors || passesThroughActors(a, b, gap_m);
 }
 
 std::vector<char> RayCaster::visible(const Eigen::Vector3d& a, const std::vector<Eigen::Vector3d>& points,
@@ -259,13 +259,14 @@ std::vector<char> RayCaster::visible(const Eigen::Vector3d& a, const std::vector
     rtcOccluded8(valid, embree_->scene, &context, &rays);
     for (std::size_t i = 0; i < count; ++i) {
       if (!valid[i]) continue;
-      free[first + i] = !(rays.tfar[i] < 0) && (!embree_->veil || passesVeils(a, points[first + i], gap_m[first + i]));
+      free[first + i] = !(rays.tfar[i] < 0) &&
+                        (!embree_->passed_actors || passesThroughActors(a, points[first + i], gap_m[first + i]));
     }
   }
   return free;
 }
 
-bool RayCaster::passesVeils(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const {
+bool RayCaster::passesThroughActors(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double gap_m) const {
   const Eigen::Vector3d unit = (b - a).normalized();
   const auto ends_on = [&](const std::vector<Facet>& facets) {
     for (const Facet& f : facets) {
@@ -287,9 +288,9 @@ bool RayCaster::passesVeils(const Eigen::Vector3d& a, const Eigen::Vector3d& b, 
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    rtcIntersect1(embree_->veil, &context, &query);
+    rtcIntersect1(embree_->passed_actors, &context, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return true;
-    if (ends_on(embree_->veil_of[query.hit.geomID])) return false;
+    if (ends_on(embree_->passed_facets[query.hit.geomID])) return false;
     from += query.ray.tfar + 1e-4;
   }
   return true;

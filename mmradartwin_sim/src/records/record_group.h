@@ -11,7 +11,7 @@ namespace mmradartwin {
 /// least `fewest`, in the order of their first records, each as indices.
 std::vector<std::vector<std::size_t>> groupByFacet(const std::vector<PathRecord>& records, int fewest);
 
-/// What all records of a group have in common: event, actors, facets, bounces, cosines.
+/// A record with what all records of a group have in common: event, actors, facets, bounces, cosines.
 PathRecord standIn(const PathRecord& first);
 
 }  // namespace mmradartwin

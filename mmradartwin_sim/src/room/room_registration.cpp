@@ -9,11 +9,14 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <random>
+#include <utility>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/ray_caster.h"
 
 namespace mmradartwin {
 namespace {
@@ -31,6 +34,10 @@ constexpr double kSameNormal = 0.8;        // cosine
 constexpr double kAlike = 4;               // cells whose noise is that of one: stereo matching works on windows
 constexpr double kPatch_m = 0.5;           // errors of a scene are alike over so much of a surface
 constexpr double kSameFit_m = 0.04, kSameFit_rad = 0.03;
+// Starts around a guess, in shares of the reach of a search.
+constexpr double kTurns[] = {0.0, -0.6, 0.6};
+constexpr std::pair<double, double> kShifts[] = {{0.0, 0.0}, {0.6, 0.0}, {-0.6, 0.0}, {0.0, 0.6}, {0.0, -0.6}};
+constexpr int kStarts = static_cast<int>(std::size(kTurns) * std::size(kShifts));
 constexpr double kRivalMargin = 0.06;  // of agreement; a fit must be better than any rival by this
 constexpr std::uint32_t kSeed = 1;     // of the sampled points: the same scene gives the same points
 
@@ -130,6 +137,9 @@ struct RoomRegistration::Impl {
   bool icp(const std::vector<Surface>& points, const std::vector<Surface>& model, const Measured& measured,
            double reach_m, Eigen::Isometry3d& T) const;
   bool coarseFit(const Measured& measured, Eigen::Isometry3d& T) const;
+  /// Coarse fits from several starts around a guess, best first, each once.
+  std::vector<Eigen::Isometry3d> fitAround(const Measured& measured, const Eigen::Isometry3d& start, double reach_m,
+                                           double reach_rad) const;
   bool fineFit(const Measured& measured, Eigen::Isometry3d& T) const;
   bool estimateErrors(const Measured& measured, const Eigen::Isometry3d& T, Registration& result) const;
   Verdict judge(const std::vector<Eigen::Vector3d>& points, const Eigen::Isometry3d& T, double slack_m = 0) const;
@@ -414,6 +424,30 @@ Registration RoomRegistration::Impl::finish(const Measured& measured, Eigen::Iso
   return result;
 }
 
+std::vector<Eigen::Isometry3d> RoomRegistration::Impl::fitAround(const Measured& measured,
+                                                                 const Eigen::Isometry3d& start, double reach_m,
+                                                                 double reach_rad) const {
+  std::vector<std::pair<double, Eigen::Isometry3d>> ends;
+  for (const double turn : kTurns) {
+    for (const auto& [dx, dy] : kShifts) {
+      Eigen::Isometry3d T = start;
+      T.translation() += reach_m * Eigen::Vector3d(dx, dy, 0);
+      T.linear() = Eigen::AngleAxisd(reach_rad * turn, Eigen::Vector3d::UnitZ()).toRotationMatrix() * T.linear();
+      if (!coarseFit(measured, T)) continue;
+      const Verdict verdict = judge(thinned(measured.all, kCoarsePoints), T, 0.05);
+      ends.emplace_back(verdict.agreement * std::min(1.0, verdict.coverage / options.min_coverage), T);
+    }
+  }
+  std::stable_sort(ends.begin(), ends.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<Eigen::Isometry3d> distinct;
+  for (const auto& [score, T] : ends) {
+    const bool known =
+        std::any_of(distinct.begin(), distinct.end(), [&t = T](const auto& d) { return sameFit(d, t, 2); });
+    if (!known && distinct.size() < 4) distinct.push_back(T);
+  }
+  return distinct;
+}
+
 RoomRegistration::RoomRegistration(const Scene& scene, const RegistrationOptions& options)
     : impl_(std::make_unique<Impl>(scene, options)) {}
 RoomRegistration::~RoomRegistration() = default;
@@ -458,36 +492,16 @@ Registration RoomRegistration::locate(const std::vector<Eigen::Vector3d>& cloud_
     // Another start helps where the cloud does not fit, not where what is seen leaves the pose open.
     if (result.agreement >= options.min_agreement && result.behind <= options.max_behind) return result;
   }
-  // Several starts around the guess, best first.
   const double reach_m = kind == GuessKind::kTracking ? options.max_step_m : options.search_m;
   const double reach_rad = kind == GuessKind::kTracking ? options.max_step_rad : options.search_rad;
-  std::vector<std::pair<double, Eigen::Isometry3d>> ends;
-  int starts = 0;
-  for (const double turn : {0.0, -0.6, 0.6}) {
-    for (const auto& [dx, dy] : {std::pair(0.0, 0.0), {0.6, 0.0}, {-0.6, 0.0}, {0.0, 0.6}, {0.0, -0.6}}) {
-      Eigen::Isometry3d T = start;
-      T.translation() += reach_m * Eigen::Vector3d(dx, dy, 0);
-      T.linear() = Eigen::AngleAxisd(reach_rad * turn, Eigen::Vector3d::UnitZ()).toRotationMatrix() * T.linear();
-      ++starts;
-      if (!impl_->coarseFit(measured, T)) continue;
-      const Impl::Verdict verdict = impl_->judge(thinned(measured.all, kCoarsePoints), T, 0.05);
-      ends.emplace_back(verdict.agreement * std::min(1.0, verdict.coverage / options.min_coverage), T);
-    }
-  }
-  std::stable_sort(ends.begin(), ends.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::vector<Eigen::Isometry3d> distinct;
-  for (const auto& [score, T] : ends) {
-    const bool known =
-        std::any_of(distinct.begin(), distinct.end(), [&t = T](const auto& d) { return sameFit(d, t, 2); });
-    if (!known && distinct.size() < 4) distinct.push_back(T);
-  }
   std::vector<Registration> fits;
-  for (const Eigen::Isometry3d& T : distinct) fits.push_back(impl_->finish(measured, T, up_camera));
+  for (const Eigen::Isometry3d& T : impl_->fitAround(measured, start, reach_m, reach_rad))
+    fits.push_back(impl_->finish(measured, T, up_camera));
   std::stable_sort(fits.begin(), fits.end(), [](const Registration& a, const Registration& b) {
     return std::pair(a.trusted, a.agreement) > std::pair(b.trusted, b.agreement);
   });
   result = fits.empty() ? result : fits.front();
-  result.starts = starts;
+  result.starts = kStarts;
   if (fits.empty()) result.reason = "the cloud meets no surface of the scene near the guess; give a 2D Pose Estimate";
   for (const Registration& rival : fits) {
     if (!result.trusted || sameFit(rival.T_map_camera, result.T_map_camera)) continue;

@@ -136,9 +136,13 @@ ActorMesh prepare(const Actor& actor) {
   return mesh;
 }
 
-/// Makes the facet of some coplanar triangles of a mesh.
-Facet makeFacet(const ActorMesh& mesh, const std::vector<int>& members) {
-  Facet facet;
+/// The plane that triangles of a mesh lie in, by their areas.
+struct MeanPlane {
+  Eigen::Vector3d normal, centroid;
+  double area_m2;
+};
+
+MeanPlane meanPlane(const ActorMesh& mesh, const std::vector<int>& members) {
   const auto& vertices = mesh.actor.vertices;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero(), centroid = Eigen::Vector3d::Zero();
   double area = 0;
@@ -151,6 +155,24 @@ Facet makeFacet(const ActorMesh& mesh, const std::vector<int>& members) {
   }
   normal.normalize();
   centroid /= area;
+  return {normal, centroid, area};
+}
+
+/// Least and largest coordinate of points along a direction.
+std::pair<double, double> extentAlong(const std::vector<Eigen::Vector2d>& points, const Eigen::Vector2d& direction) {
+  double low = 1e300, high = -1e300;
+  for (const auto& p : points) {
+    low = std::min(low, p.dot(direction));
+    high = std::max(high, p.dot(direction));
+  }
+  return {low, high};
+}
+
+/// Makes the facet of some coplanar triangles of a mesh.
+Facet makeFacet(const ActorMesh& mesh, const std::vector<int>& members) {
+  const auto& vertices = mesh.actor.vertices;
+  const auto [normal, centroid, area] = meanPlane(mesh, members);
+  Facet facet;
   facet.area_m2 = area;
 
   // A first frame in the plane, then the axes of the smallest rectangle.
@@ -158,7 +180,7 @@ Facet makeFacet(const ActorMesh& mesh, const std::vector<int>& members) {
   Eigen::Vector3d a = vertices[first[1]] - vertices[first[0]];
   a = (a - a.dot(normal) * normal).normalized();
   const Eigen::Vector3d b = normal.cross(a);
-  const auto project = [&](int v) {
+  const auto project = [&vertices, &a, &b, &centroid = centroid](int v) {
     return Eigen::Vector2d((vertices[v] - centroid).dot(a), (vertices[v] - centroid).dot(b));
   };
   std::vector<Index3> oriented;
@@ -178,14 +200,7 @@ Facet makeFacet(const ActorMesh& mesh, const std::vector<int>& members) {
   }
   const std::vector<Eigen::Vector2d> hull = convexHull(points);
   Eigen::Vector2d axis = rectangleAxis(hull);
-  const auto extent = [&hull](const Eigen::Vector2d& d) {
-    double low = 1e300, high = -1e300;
-    for (const auto& p : hull) {
-      low = std::min(low, p.dot(d));
-      high = std::max(high, p.dot(d));
-    }
-    return std::make_pair(low, high);
-  };
+  const auto extent = [&hull](const Eigen::Vector2d& direction) { return extentAlong(hull, direction); };
   // Axes and origin are told from the facet's own shape (long side first) and, where that is symmetric, from its first
   // triangle: scatter points are hashed in these coordinates and have to move with the actor.
   const auto size = [&extent](const Eigen::Vector2d& d) { return extent(d).second - extent(d).first; };

@@ -7,6 +7,7 @@
 #include <optional>
 #include <sstream>
 
+#include "mmradartwin_sim/ray_caster.h"
 #include "physics/curved_surface.h"
 #include "scene/vertex_weld.h"
 
@@ -33,7 +34,7 @@ std::size_t openEdges(const Actor& actor, const std::vector<int>& weld) {
       std::count_if(count.begin(), count.end(), [](const auto& c) { return c.second == 1; }));
 }
 
-/// Where one of the actor's facets comes through another.
+/// A place where one of the actor's facets comes through another.
 std::optional<Eigen::Vector3d> cut(const Scene& scene, const Actor& actor) {
   Scene alone;
   alone.actors = {actor};

@@ -11,7 +11,7 @@ struct PlyMesh {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<std::vector<int>> faces;  ///< of three corners or more
 
-  /// The same as an OBJ file's text, in single precision: what assimp reads without fault.
+  /// The mesh as an OBJ file's text in single precision, which assimp reads without fault.
   std::string toObj() const;
 };
 

@@ -6,14 +6,17 @@
 
 namespace mmradartwin {
 
+std::string knownActors(const Scene& scene) {
+  std::string known;
+  for (const Actor& a : scene.actors) known += (known.empty() ? "" : ", ") + a.name;
+  return known.size() > 400 ? known.substr(0, 400) + ", ..." : known;
+}
+
 int requireActor(const Scene& scene, const std::string& mechanism, const std::string& actor) {
   const int index = scene.actorIndex(actor);
   if (index >= 0) return index;
-  std::string known;
-  for (const Actor& a : scene.actors) known += (known.empty() ? "" : ", ") + a.name;
-  if (known.size() > 400) known = known.substr(0, 400) + ", ...";
   throw InputError("mechanism " + mechanism + ": key actor: " + scene.file + " has no actor " + actor +
-                   "; known: " + known);
+                   "; known: " + knownActors(scene));
 }
 
 std::vector<bool> requireMaterial(const Scene& scene, const std::string& mechanism, const std::string& material) {

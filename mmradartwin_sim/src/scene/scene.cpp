@@ -8,6 +8,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/strict_yaml.h"
+#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -96,12 +97,7 @@ Scene loadScene(const std::string& scene_yaml, double frequency_hz) {
     YamlMap overrides = yaml.map("actors");
     for (const std::string& name : overrides.keys()) {
       const int index = scene.actorIndex(name);
-      if (index < 0) {
-        std::string known;
-        for (const Actor& a : scene.actors) known += (known.empty() ? "" : ", ") + a.name;
-        if (known.size() > 400) known = known.substr(0, 400) + ", ...";
-        overrides.fail(name, "is no actor of the meshes; known: " + known);
-      }
+      if (index < 0) overrides.fail(name, "is no actor of the meshes; known: " + knownActors(scene));
       YamlMap override_map = overrides.map(name);
       scene.actors[index].material_tag = override_map.text("material");
       override_map.rejectUnknownKeys();

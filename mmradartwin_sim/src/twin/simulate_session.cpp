@@ -94,7 +94,7 @@ class SampleLevels {
   std::atomic<double> strongest_{0};
 };
 
-/// What all steps of a simulation look at.
+/// The inputs that all steps of a simulation share.
 struct Job {
   const SimulateOptions& options;
   const Recording& recording;
@@ -131,8 +131,7 @@ void addLevels(const Job& job, const Simulation& s, SampleLevels& levels) {
     levels.add(s.grid.x);
     return;
   }
-  job.twin.visitChirps(s, job.options.frames,
-                       [&levels](const ChirpContext&, const ComplexGrid& x) { levels.add(x); });
+  job.twin.visitChirps(s, job.options.frames, [&levels](const ChirpContext&, const ComplexGrid& x) { levels.add(x); });
 }
 
 /// Grids of all poses, without records; a pose that cannot be simulated has an empty grid and is among the result's

@@ -147,12 +147,12 @@ std::optional<SceneChange> Twin::changesFrom(const Twin& other) const {
     }
   };
   compare(impl_->model().actors, other.impl_->model().actors, impl_->scene.actors.size());
-  compare(impl_->model().screens, other.impl_->model().screens, 0);
+  compare(impl_->model().occluders_only, other.impl_->model().occluders_only, 0);
   return change;
 }
 
 std::optional<Twin::PlacedActor> Twin::placesOneActor() const {
-  if (!impl_->edited || impl_->movesRadar() || !impl_->edited->screens.empty()) return std::nullopt;
+  if (!impl_->edited || impl_->movesRadar() || !impl_->edited->occluders_only.empty()) return std::nullopt;
   const std::vector<Actor>&before = impl_->scene.actors, &after = impl_->edited->actors;
   std::optional<PlacedActor> placed;
   for (std::size_t i = 0; i < after.size(); ++i) {
@@ -166,20 +166,22 @@ std::optional<Twin::PlacedActor> Twin::placesOneActor() const {
   return placed;
 }
 
-bool Twin::opensActors() const {
+bool Twin::removesActors() const {
   if (!impl_->edited) return false;
   const std::vector<Actor>&before = impl_->scene.actors, &after = impl_->edited->actors;
   return !std::equal(before.begin(), before.end(), after.begin(),
                      [](const Actor& a, const Actor& b) { return !a.occludes || b.occludes || !b.present; });
 }
 
-bool Twin::addsScreensAlone() const { return impl_->screens && impl_->screens_alone && !impl_->movesRadar(); }
+bool Twin::addsOccludersOnly() const {
+  return impl_->occluders_only && impl_->only_occluders_added && !impl_->movesRadar();
+}
 
 void Twin::removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord>& records,
                         std::int64_t stamp_ns) const {
-  if (!impl_->screens) return;
+  if (!impl_->occluders_only) return;
   const Eigen::Vector3d radar = impl_->modelPose(T_map_radar, stamp_ns).translation();
-  const auto hidden = [&](const PathRecord& r) { return hides(*impl_->screens, radar, r); };
+  const auto hidden = [&](const PathRecord& r) { return hides(*impl_->occluders_only, radar, r); };
   records.erase(std::remove_if(records.begin(), records.end(), hidden), records.end());
 }
 
@@ -200,16 +202,16 @@ void Twin::Impl::assemble() {
     for (const SceneStage* stage : m.stages.scene) stage->editScene(*m.edited);
     const bool same = std::equal(m.edited->actors.begin(), m.edited->actors.end(), m.scene.actors.begin(),
                                  m.scene.actors.end(), isSame);
-    if (same && m.edited->screens.empty()) {
+    if (same && m.edited->occluders_only.empty()) {
       m.edited.reset();
     } else {
       m.edited_rays = std::make_unique<RayCaster>(*m.edited);
     }
-    if (m.edited && !m.edited->screens.empty()) {
+    if (m.edited && !m.edited->occluders_only.empty()) {
       Scene alone;
-      alone.screens = m.edited->screens;
-      m.screens = std::make_unique<RayCaster>(alone);
-      m.screens_alone = same;
+      alone.occluders_only = m.edited->occluders_only;
+      m.occluders_only = std::make_unique<RayCaster>(alone);
+      m.only_occluders_added = same;
     }
     for (const auto& mechanism : m.mechanisms) mechanism->build(m.model(), radar);
   } catch (const InputError& e) {
@@ -279,7 +281,7 @@ void Twin::Impl::refuseUnusablePose(const PoseContext& c) const {
 }
 
 std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns,
-                                    const CloudCells* cloud) const {
+                                    const ScatterCells* cloud) const {
   PoseContext c = impl_->context(T_map_radar, stamp_ns);
   c.cloud = cloud;
   impl_->refuseUnusablePose(c);
@@ -291,7 +293,7 @@ std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar, std::i
 }
 
 std::vector<PathRecord> Twin::trace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
-                                    const CloudCells* cloud) const {
+                                    const ScatterCells* cloud) const {
   PoseContext c = impl_->context(T_map_radar);
   c.cloud = cloud;
   impl_->refuseUnusablePose(c);
@@ -310,14 +312,14 @@ std::vector<PathRecord> Twin::trace(std::size_t mechanism, const Eigen::Isometry
 }
 
 std::vector<PathRecord> Twin::retrace(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
-                                      const CloudCells& cloud, const SceneChange& change,
+                                      const ScatterCells& cloud, const SceneChange& change,
                                       const std::vector<PathRecord>& known) const {
   const PathStage* wanted = impl_->pathStage(mechanism);
   if (!wanted || !wanted->tracesChanges()) return trace(mechanism, T_map_radar, &cloud);
   PoseContext c = impl_->context(T_map_radar);
   impl_->refuseUnusablePose(c);
-  CloudCells::CellSet touched;
-  CloudCells cells = cloud;
+  ScatterCells::CellSet touched;
+  ScatterCells cells = cloud;
   cells.touched = &touched;
   c.cloud = &cells;
   c.change = &change;
@@ -333,7 +335,7 @@ std::vector<PathRecord> Twin::retrace(std::size_t mechanism, const Eigen::Isomet
 }
 
 std::vector<PathRecord> Twin::traceAround(std::size_t mechanism, const Eigen::Isometry3d& T_map_radar,
-                                          const CloudCells& cloud, const PlacedActor& placed,
+                                          const ScatterCells& cloud, const PlacedActor& placed,
                                           const std::vector<PathRecord>& without) const {
   const PathStage* wanted = impl_->pathStage(mechanism);
   if (!wanted || !wanted->looksAtPathsOf().empty()) return trace(mechanism, T_map_radar, &cloud);

@@ -93,7 +93,7 @@ void Twin::forEachChirp(const Simulation& pose, int frames,
   const int slots = radar.slots(), receivers = radar.receivers();
   const bool varies = framesNeedRecords();
 
-  // What stays the same from chirp to chirp is propagated once.
+  // Paths that are the same in all chirps are propagated once.
   Impl::DelayedGrid still;
   if (varies) {
     std::vector<PathRecord> paths = m.filtered(c, pose.records);

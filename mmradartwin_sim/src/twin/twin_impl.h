@@ -22,8 +22,8 @@ struct Twin::Impl {
   std::shared_ptr<const RayCaster> rays;
   std::unique_ptr<Scene> edited;  // null where no mechanism edits the scene
   std::unique_ptr<RayCaster> edited_rays;
-  std::unique_ptr<RayCaster> screens;                  // of the screens alone; null where there are none
-  bool screens_alone = false;                          // are all that was added
+  std::unique_ptr<RayCaster> occluders_only;           // of them alone; null where there are none
+  bool only_occluders_added = false;                   // are all that was added
   std::vector<std::unique_ptr<Mechanism>> mechanisms;  // by rank
   std::vector<const Mechanism*> as_described;          // the same by Twin::description()
   StageLists stages;                                   // the same by what they act in
@@ -53,13 +53,13 @@ struct Twin::Impl {
   const RayCaster& alone(int actor) const {
     std::call_once(alone_made, [&] {
       Scene only;
-      only.screens = {model().actors[static_cast<std::size_t>(actor)]};
+      only.occluders_only = {model().actors[static_cast<std::size_t>(actor)]};
       alone_rays = std::make_unique<RayCaster>(only);
     });
     return *alone_rays;
   }
 
-  /// Of a mechanism of Twin::description(); null where it adds no paths.
+  /// The path stage of a mechanism of Twin::description(); null where it adds no paths.
   const PathStage* pathStage(std::size_t described) const {
     return dynamic_cast<const PathStage*>(as_described[described]);
   }
@@ -81,7 +81,7 @@ struct Twin::Impl {
   Eigen::Isometry3d modelPose(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) const {
     Eigen::Isometry3d T = T_map_radar;
     if (const double lag_s = poseLag_s(); lag_s != 0 && reported) {
-      // What is true now is reported later.
+      // The true pose of now is reported later.
       const auto now = reported(stamp_ns), later = reported(stamp_ns + std::llround(lag_s * 1e9));
       if (now && later) T = T * (now->inverse() * *later);
     }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 
 /// Bounds of evidence: how many nats, how small a false-alarm rate or how large an effect a statement needs. Each has
@@ -10,7 +11,115 @@ namespace mmradartwin::diagnosis::bounds {
 
 // ---- frames
 
+/// Chance that frames of a clean session give a finding of one kind; see
+/// docs/calibration_of_bounds.md#kframesfalsealarmrate
+inline constexpr double kFramesFalseAlarmRate = 1e-6;
+/// Nats by which a run of zeros is a lost packet; see docs/calibration_of_bounds.md#kleastnatsofzeroedpacket
+inline const double kLeastNatsOfZeroedPacket = std::log(1e6) + std::log(1e6);
+/// Share of a frame's power, by which frames have to differ where packets slipped; see
+/// docs/calibration_of_bounds.md#kleastslipshare
+inline constexpr double kLeastSlipShare = 0.1;
+/// Multiple of the usual change between frames, from which on a frame jumps; see
+/// docs/calibration_of_bounds.md#kleastslipoverusual
+inline constexpr double kLeastSlipOverUsual = 4.0;
+/// Share of the misfit beyond noise, that a slip may leave unexplained; see
+/// docs/calibration_of_bounds.md#kmostleftofslip
+inline constexpr double kMostLeftOfSlip = 0.2;
+/// Number of codes a signal has to span before its outermost code says anything; see
+/// docs/calibration_of_bounds.md#kleastcodes
+inline constexpr int kLeastCodes = 256;
+/// Odds by which samples that pile up at the last code of 16 bits are likelier clipped; see
+/// docs/calibration_of_bounds.md#koddsoflastcode
+inline constexpr double kOddsOfLastCode = 1e3;
+/// Chance that noise in one window of samples passes for a burst; see
+/// docs/calibration_of_bounds.md#kburstwindowfalsealarmrate
+inline constexpr double kBurstWindowFalseAlarmRate = 1e-12;
+/// Chance of a burst in a clean session; see docs/calibration_of_bounds.md#kburstsfalsealarmrate
+inline constexpr double kBurstsFalseAlarmRate = 1e-5;
+/// Multiple of the noise, from which on a whole chirp differs from the average; see
+/// docs/calibration_of_bounds.md#kleastnoiseofmover
+inline constexpr double kLeastNoiseOfMover = 1.5;
+/// Multiple of a mover's own level, from which on a window is no beat of several movers; see
+/// docs/calibration_of_bounds.md#kleastburstovermover
+inline constexpr double kLeastBurstOverMover = 16.0;
+/// Share of a chirp's power in two groups of range bins, from which on it is echoes; see
+/// docs/calibration_of_bounds.md#kleastshareofmovers
+inline constexpr double kLeastShareOfMovers = 0.8;
+/// Share of a burst's power beyond noise, that one direction holds; see
+/// docs/calibration_of_bounds.md#kleastshareofonewave
+inline constexpr double kLeastShareOfOneWave = 0.7;
+/// Share of a burst's power at one receiver, beyond which it is that receiver's fault; see
+/// docs/calibration_of_bounds.md#kmostshareofonereceiver
+inline constexpr double kMostShareOfOneReceiver = 0.9;
+/// Share of the standing echoes, from which on the radar itself changes; see
+/// docs/calibration_of_bounds.md#kleastunsteadyshare
+inline constexpr double kLeastUnsteadyShare = 0.5;
+/// Number of poses at which the radar has to change before it is said; see
+/// docs/calibration_of_bounds.md#kfewestunsteadyposes
+inline constexpr std::size_t kFewestUnsteadyPoses = 3;
+/// Difference between the lowest and the highest common level of frames, from which on it is told, dB; see
+/// docs/calibration_of_bounds.md#kleastframegain_db
+inline constexpr double kLeastFrameGain_db = 0.1;
+/// Standard deviations of chi-squared by which frames' levels differ beyond their errors; see
+/// docs/calibration_of_bounds.md#kleastframegain_deviations
+inline constexpr double kLeastFrameGain_deviations = 12.0;
+/// Multiple of the noise, from which on a range bin holds a standing echo; see
+/// docs/calibration_of_bounds.md#kleaststandingovernoise
+inline constexpr double kLeastStandingOverNoise = 30.0;
+/// Multiple of the noise, from which on a standing echo varies; see docs/calibration_of_bounds.md#kleastvariedovernoise
+inline constexpr double kLeastVariedOverNoise = 4.0;
+/// Share of a standing echo's power, from which on it varies; see docs/calibration_of_bounds.md#kleastvariedshare
+inline constexpr double kLeastVariedShare = 0.1;
+/// Standard deviations of a range bin's scatter, from which on something moves in it; see
+/// docs/calibration_of_bounds.md#kleastbinscatter_deviations
+inline constexpr double kLeastBinScatter_deviations = 6.0;
+/// Chance that noise in one range bin of a frame passes for a moving echo; see
+/// docs/calibration_of_bounds.md#kmovingbinfalsealarmrate
+inline constexpr double kMovingBinFalseAlarmRate = 1e-6;
+/// Chance that noise in one cell of range and Doppler passes for a moving echo; see
+/// docs/calibration_of_bounds.md#kdopplercellfalsealarmrate
+inline constexpr double kDopplerCellFalseAlarmRate = 1e-9;
+/// Chance of a mover with Doppler in a clean frame; see docs/calibration_of_bounds.md#kdopplerfalsealarmrate
+inline constexpr double kDopplerFalseAlarmRate = 1e-5;
+/// Share of a moving cell's power in one beam, from which on it is one echo; see
+/// docs/calibration_of_bounds.md#kleastshareofonebeam
+inline constexpr double kLeastShareOfOneBeam = 0.5;
+/// Share of a nearer mover's power, below which a mover may be its echo by way of a wall; see
+/// docs/calibration_of_bounds.md#kmostghostshare
+inline constexpr double kMostGhostShare = 0.01;
+/// Share of a frame's strongest moving cell, from which on a cell's channels are told; see
+/// docs/calibration_of_bounds.md#kleastshareofstrongestcell
+inline constexpr double kLeastShareOfStrongestCell = 0.03;
+/// Nats by which a pose carries what moves; see docs/calibration_of_bounds.md#kleastnatsatpose
+inline constexpr float kLeastNatsAtPose = 10.0f;
+/// Nats of one pose beyond which more evidence convinces no more; see
+/// docs/calibration_of_bounds.md#kconvincingnatsatpose
+inline constexpr float kConvincingNatsAtPose = 50.0f;
+/// Share of the evidence of cells that counts; see docs/calibration_of_bounds.md#ktrustinmotion
+inline constexpr double kTrustInMotion = 0.8;
+/// Share of a walker's speed that all poses err by together, a standard deviation; see
+/// docs/calibration_of_bounds.md#kwalkspeederror
+inline constexpr double kWalkSpeedError = 0.07;
+
 // ---- channels
+
+/// Share of a frame's power, by which it differs while the radar still moves; see
+/// docs/calibration_of_bounds.md#kleastchangeofmovingframe
+inline constexpr double kLeastChangeOfMovingFrame = 1e-4;
+/// Multiple of the usual change between frames, from which on the radar still moves; see
+/// docs/calibration_of_bounds.md#kleastmovingoverusual
+inline constexpr double kLeastMovingOverUsual = 4.0;
+/// Number of motions that a lag of poses is read from; see docs/calibration_of_bounds.md#kfewestmotions
+inline constexpr std::size_t kFewestMotions = 3;
+/// Way between two stops from which on a motion counts, metres; see docs/calibration_of_bounds.md#kleastmotion_m
+inline constexpr double kLeastMotion_m = 0.05;
+/// Share of frames' power, by which frames change more on the way than at rest; see
+/// docs/calibration_of_bounds.md#kleastchangeontheway
+inline constexpr double kLeastChangeOnTheWay = 0.1;
+/// Least lag of poses that is told, seconds; see docs/calibration_of_bounds.md#kleastlag_s
+inline constexpr double kLeastLag_s = 0.02;
+/// Chance that a session without a lag is said to have one; see docs/calibration_of_bounds.md#klagfalsealarmrate
+inline constexpr double kLagFalseAlarmRate = 0.01;
 
 // ---- likelihood
 
@@ -49,6 +158,69 @@ inline constexpr double kRankedShareOfNestingLaw = 0.9;
 
 // ---- receiver
 
+/// Chance of a body-fixed tone in a session without one; see docs/calibration_of_bounds.md#ktonefalsealarmrate
+inline constexpr double kToneFalseAlarmRate = 1e-6;
+/// Nats by which a body-fixed tone is beyond doubt; see docs/calibration_of_bounds.md#kleastnatsoftone
+inline constexpr double kLeastNatsOfTone = 30.0;
+/// Standard error that skirts of echoes add to a tone's range, metres; see
+/// docs/calibration_of_bounds.md#ktonerangeerror_m
+inline constexpr double kToneRangeError_m = 0.00025;
+/// Share of an echo's power that errors of channels take out of its array response; see
+/// docs/calibration_of_bounds.md#kechoerrorshare
+inline constexpr double kEchoErrorShare = 0.03;
+/// Share of the first range bins' power that a tone at the only pose holds; see
+/// docs/calibration_of_bounds.md#kleasttoneshare
+inline constexpr double kLeastToneShare = 0.5;
+/// Multiple of the noise that a tone at the only pose exceeds; see docs/calibration_of_bounds.md#kleasttoneovernoise
+inline constexpr double kLeastToneOverNoise = 100.0;
+/// Share of the strongest bin's power that a tone at the only pose exceeds; see
+/// docs/calibration_of_bounds.md#kleasttoneofstrongest
+inline constexpr double kLeastToneOfStrongest = 0.01;
+/// Nats by which a tone behind the radar says that samples are conjugated; see
+/// docs/calibration_of_bounds.md#kleastnatsbehind
+inline constexpr double kLeastNatsBehind = 12.0;
+/// Multiple of the noise, of an echo that tells errors of channels; see
+/// docs/calibration_of_bounds.md#kleastechoovernoise
+inline constexpr double kLeastEchoOverNoise = 100.0;
+/// Number of echoes that tell errors of channels; see docs/calibration_of_bounds.md#kfewestechoes
+inline constexpr std::size_t kFewestEchoes = 6;
+/// Number of groups of echoes that tell errors of channels; see docs/calibration_of_bounds.md#kfewestechogroups
+inline constexpr std::size_t kFewestEchoGroups = 3;
+/// Nats by which channels have errors; see docs/calibration_of_bounds.md#kleastnatsofchannelerrors
+inline constexpr double kLeastNatsOfChannelErrors = 25.0;
+/// Nats by which errors of channels predict echoes that the fit did not see; see
+/// docs/calibration_of_bounds.md#kleastheldoutnatsofchannelerrors
+inline constexpr double kLeastHeldOutNatsOfChannelErrors = 8.0;
+/// Nats by which channels stand in another order; see docs/calibration_of_bounds.md#kleastnatsofchannelorder
+inline constexpr double kLeastNatsOfChannelOrder = 20.0;
+/// Difference of nats within which two orders of channels fit alike; see docs/calibration_of_bounds.md#ksameorder_nats
+inline constexpr double kSameOrder_nats = 1.0;
+/// Nats by which samples were delivered in another way; see docs/calibration_of_bounds.md#kleastconventionnatsperpose
+inline constexpr double kLeastConventionNatsPerPose = 2.0;
+/// Number of conventions tried, which a false alarm counts; see docs/calibration_of_bounds.md#kconventiontries
+inline constexpr double kConventionTries = 50.0;
+/// Widths of a 95 % interval within which a finding says what the twin states; see
+/// docs/calibration_of_bounds.md#ksamevalue_intervals
+inline constexpr double kSameValue_intervals = 1.0;
+/// Distance within which a walker is the one that the twin states, metres; see
+/// docs/calibration_of_bounds.md#ksamewalker_m
+inline constexpr double kSameWalker_m = 0.5;
+/// Range up to which a tone is a constant offset, metres; see docs/calibration_of_bounds.md#kmostconstantrange_m
+inline constexpr double kMostConstantRange_m = 0.01;
+/// Multiple of the power beside its image, of a cell whose image is read; see
+/// docs/calibration_of_bounds.md#kleasthostoverimage
+inline constexpr double kLeastHostOverImage = 10.0;
+/// Least standard error of an image's level, dB; see docs/calibration_of_bounds.md#kimageerror_db
+inline constexpr double kImageError_db = 0.03;
+/// Difference between the noise and what the twin states, from which on it is told, dB; see
+/// docs/calibration_of_bounds.md#kleastnoisechange_db
+inline constexpr double kLeastNoiseChange_db = 0.3;
+/// Standard errors of the noise, from which on it differs from what the twin states; see
+/// docs/calibration_of_bounds.md#kleastnoisechange_errors
+inline constexpr double kLeastNoiseChange_errors = 6.0;
+/// Least standard error of the noise's level, dB; see docs/calibration_of_bounds.md#knoiseerror_db
+inline constexpr double kNoiseError_db = 0.02;
+
 // ---- search
 /// Promise from which on a law without a name, or a replica of echoes, is worth a fit; see
 /// docs/calibration_of_bounds.md#kleastnatsoflaw
@@ -86,6 +258,22 @@ inline constexpr double kBeyondTime = 1.5;
 // ---- gain
 
 // ---- rounds
+/// Share of the measured power that a fit explains more before it counts as gaining in the maps, and less before the
+/// maps count as plainly worse; see docs/calibration_of_bounds.md#kleastexplainedmore
+inline constexpr double kLeastExplainedMore = 0.002;
+/// Share of the measured power that a plain fit may explain less; see docs/calibration_of_bounds.md#kmostexplainedlost
+inline constexpr double kMostExplainedLost = 0.015;
+/// The same of a law of levels, beside which maps do not fit the actors' errors of level; see
+/// docs/calibration_of_bounds.md#kmostexplainedlost
+inline constexpr double kMostExplainedLostByLevels = 0.05;
+/// Correlation over poses of the gains of two fits from which on a name explains some of what a better one was rejected
+/// for by the maps; see docs/calibration_of_bounds.md#kcorrelationofsomeshared
+inline constexpr double kCorrelationOfSomeShared = 0.2;
+/// The same from which on two fits explain the same; see docs/calibration_of_bounds.md#kcorrelationofsomeshared
+inline constexpr double kCorrelationOfSame = 0.5;
+/// Share of an unknown's gain below which a name beside it is a leftover of the unknown's law; see
+/// docs/calibration_of_bounds.md#ksharebesideunknown
+inline constexpr double kShareBesideUnknown = 0.25;
 
 // ---- conductor
 

@@ -108,6 +108,10 @@ std::string toJson(const Findings& findings) {
   Json j;
   j["format"] = kFindingsFormat;
   j["poses"] = {{"count", findings.poses}, {"locations", findings.locations}, {"held_out", findings.held_out}};
+  for (const AccuracyKey& key : accuracyKeys()) {
+    // No estimate is made yet.
+    j["accuracy"][key.name] = {{"stated", findings.accuracy.*key.member}, {"estimated", nullptr}};
+  }
   j["verdict"] = findings.verdict();
   j["findings"] = Json::array();
   for (const Finding& finding : findings.findings) j["findings"].push_back(json(finding));

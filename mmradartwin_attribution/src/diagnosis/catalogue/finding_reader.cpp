@@ -217,6 +217,19 @@ Finding readFinding(Entry e) {
   return finding;
 }
 
+/// Stated accuracies; an older file has none.
+StatedAccuracy readAccuracy(Entry e) {
+  StatedAccuracy accuracy;
+  for (const AccuracyKey& key : accuracyKeys()) {
+    Entry value = e.at(key.name);
+    accuracy.*key.member = value.at("stated").number();
+    value.at("estimated").numberOrNaN();
+    value.finish();
+  }
+  e.finish();
+  return accuracy;
+}
+
 }  // namespace
 
 Findings parseFindings(const std::string& json_text, const std::string& name) {
@@ -235,6 +248,7 @@ Findings parseFindings(const std::string& json_text, const std::string& name) {
   all.locations = poses.at("locations").count();
   all.held_out = poses.at("held_out").text();
   poses.finish();
+  if (e.has("accuracy")) all.accuracy = readAccuracy(e.at("accuracy"));
   for (const Entry& finding : e.at("findings").items()) all.findings.push_back(readFinding(finding));
   all.extended_twin = e.optionalText("extended_twin");
   const Entry verdict = e.at("verdict");

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/frames/payload_defects.h"
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/coherent_average.h"
@@ -16,21 +17,21 @@ namespace {
 
 double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
-constexpr double kMovesMore = 4, kMoves = 1e-4;  ///< change of a frame of a radar that still moves: of the usual, least
-constexpr std::int64_t kStarts_ns = 500'000'000;   ///< from either end of a stop, how long it may still move,
-constexpr std::int64_t kBeside_ns = 1000'000'000;  ///< where tf has it elsewhere so shortly before or after
+constexpr std::int64_t kRolls_ns = 500'000'000;    ///< from either end of a stop, in which a radar may still move
+constexpr std::int64_t kBeside_ns = 1000'000'000;  ///< before or after a stop, in which tf has a moving radar elsewhere
+constexpr double kFullScale = 32768;               ///< of a sample, counts
 
-/// True where tf has the radar elsewhere than at the pose between two times.
+/// True where tf has the radar elsewhere than at the pose, between two times.
 bool standsElsewhere(const std::vector<StampedTransform>& track, const Pose& pose, std::int64_t from_ns,
                      std::int64_t to_ns) {
-  const auto at = [](const StampedTransform& t, std::int64_t stamp_ns) { return t.stamp_ns < stamp_ns; };
-  return std::any_of(std::lower_bound(track.begin(), track.end(), from_ns, at),
-                     std::lower_bound(track.begin(), track.end(), to_ns, at),
+  const auto before = [](const StampedTransform& t, std::int64_t stamp_ns) { return t.stamp_ns < stamp_ns; };
+  return std::any_of(std::lower_bound(track.begin(), track.end(), from_ns, before),
+                     std::lower_bound(track.begin(), track.end(), to_ns, before),
                      [&](const StampedTransform& t) { return !standsStill(t.T_map_radar, pose.T_map_radar); });
 }
 
-/// Without the frames at either end of a stop that differ from those in its middle: a radar is taken to stand while it
-/// is within 2 cm, which is five wavelengths, of where it comes to rest.
+/// Leaves out frames at either end of a stop that differ from those in its middle: a radar is taken to stand while it
+/// is within 2 cm of its place of rest, which is five wavelengths.
 void leaveOutMoving(const SignalChain& chain, const std::vector<StampedTransform>& track, const Pose& pose,
                     std::vector<AdcCube>& frames) {
   if (track.empty()) return;
@@ -52,18 +53,18 @@ void leaveOutMoving(const SignalChain& chain, const std::vector<StampedTransform
   middle /= count;
   std::vector<double> change;
   for (const ComplexGrid& s : spectra) change.push_back(s.size() > 0 ? changeBetween(s, middle) : 0);
-  const double least = std::max(kMoves, kMovesMore * upperMedian(change));
+  const double least = std::max(bounds::kLeastChangeOfMovingFrame, bounds::kLeastMovingOverUsual * upperMedian(change));
   std::size_t first = 0, last = frames.size();
-  while (came && first < quarter && change[first] > least && frames[first].stamp_ns < begin_ns + kStarts_ns) ++first;
+  while (came && first < quarter && change[first] > least && frames[first].stamp_ns < begin_ns + kRolls_ns) ++first;
   while (goes && frames.size() - last < quarter && change[last - 1] > least &&
-         frames[last - 1].stamp_ns > end_ns - kStarts_ns) {
+         frames[last - 1].stamp_ns > end_ns - kRolls_ns) {
     --last;
   }
   frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(last), frames.end());
   frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
-/// True where packets were lost and not filled, which leaves a capture that is too short by them.
+/// True where packets were lost and not filled, which makes a capture too short.
 bool missesPackets(const RadarConfig& radar, const std::vector<AdcCube>& frames) {
   const std::vector<int> order = payloadOrder(radar);
   Payload payload = toPayload(frames, order);
@@ -92,8 +93,72 @@ double upperMedian(std::vector<double> values) {
 
 void transformGrid(const SignalChain& chain, PoseChannels& pose) {
   const double window = sum(hannWindow(chain.radar().samples_per_chirp));
-  pose.y = chain.rangeSpectra(pose.grid.x) / (window * pose.grid.full_scale);
+  pose.range_spectra = chain.rangeSpectra(pose.grid.x) / (window * pose.grid.full_scale);
 }
+
+namespace {
+
+/// Frames of a pose, repaired and without those of a radar that moves. Tells of a capture that misses packets; throws
+/// InputError where no frame can be used.
+std::vector<AdcCube> readFrames(const Recording& recording, const SignalChain& chain, const Pose& pose,
+                                const std::function<void(AdcCube&)>& repair, std::vector<PoseProblem>& problems) {
+  std::vector<AdcCube> frames;
+  try {
+    recording.forEachFrame(pose, [&](const AdcCube& cube) {
+      frames.push_back(cube);
+      if (repair) repair(frames.back());
+    });
+  } catch (const TruncatedCapture& error) {
+    if (frames.empty() || !missesPackets(recording.radar, frames)) throw;
+    problems.push_back({pose.name, std::string(error.what()) + "; packets are missing in it, the rest was used"});
+  }
+  if (frames.empty()) throw InputError("its capture holds no frame; record it again");
+  leaveOutMoving(chain, recording.track, pose, frames);
+  const bool silent = std::all_of(frames.begin(), frames.end(), [](const AdcCube& cube) {
+    return std::all_of(cube.data.begin(), cube.data.end(), [](std::int16_t v) { return v == 0; });
+  });
+  if (silent) throw InputError("all its samples are zero; check the capture");
+  return frames;
+}
+
+/// Noise power in a cell of range_spectra over the noise variance of a sample in counts^2.
+double cellNoiseOverSample(const RadarConfig& radar) {
+  const std::vector<double> window = hannWindow(radar.samples_per_chirp);
+  double window2 = 0;
+  for (double w : window) window2 += w * w;
+  return window2 / (sum(window) * sum(window) * kFullScale * kFullScale);
+}
+
+/// Channels of a pose from its frames and what the examiner made of them.
+PoseChannels channelsOf(const Recording& recording, const SignalChain& chain, const Pose& pose,
+                        const std::vector<AdcCube>& frames, const PoseFrames& examined) {
+  CoherentAverage uncorrected(recording.radar, 0);
+  for (const AdcCube& cube : frames) uncorrected.add(cube);
+  PoseChannels channels;
+  channels.pose = pose;
+  channels.grid = examined.mean;
+  channels.moving = examined.moving;
+  if (uncorrected.complete()) channels.uncorrected_average = uncorrected.grid();
+  std::vector<double> noise = examined.noise_variance;
+  if (recording.channels) {
+    correctChannels(*recording.channels, channels.grid.x);
+    if (uncorrected.complete()) correctChannels(*recording.channels, channels.uncorrected_average.x);
+    for (std::size_t k = 0; k < noise.size(); ++k) {
+      noise[k] /= std::norm(recording.channels->error(k));
+      for (MovingCell& cell : channels.moving) {
+        cell.channels[static_cast<Eigen::Index>(k)] /= recording.channels->error(k);
+      }
+    }
+  }
+  channels.noise_power = cellNoiseOverSample(recording.radar) * sum(noise) / static_cast<double>(noise.size()) /
+                         std::max(1, examined.shots);
+  channels.unsteadiness = examined.unsteadiness;
+  channels.shots = std::max(1, examined.shots);
+  transformGrid(chain, channels);
+  return channels;
+}
+
+}  // namespace
 
 ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, const ReadingProgress& on_progress,
                          const std::function<void(AdcCube&)>& repair) {
@@ -101,55 +166,12 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
   data.radar = recording.radar;
   data.problems = recording.problems;
   const SignalChain chain(recording.radar);
-  const std::vector<double> window = hannWindow(recording.radar.samples_per_chirp);
-  double window2 = 0;
-  for (double w : window) window2 += w * w;
-  const double per_sample = window2 / (sum(window) * sum(window) * 32768.0 * 32768.0);
   std::size_t done = 0;
   for (const Pose& pose : recording.poses) {
     try {
-      std::vector<AdcCube> frames;
-      try {
-        recording.forEachFrame(pose, [&](const AdcCube& cube) {
-          frames.push_back(cube);
-          if (repair) repair(frames.back());
-        });
-      } catch (const TruncatedCapture& error) {
-        if (frames.empty() || !missesPackets(recording.radar, frames)) throw;
-        data.problems.push_back(
-            {pose.name, std::string(error.what()) + "; packets are missing in it, the rest was used"});
-      }
-      if (frames.empty()) throw InputError("its capture holds no frame; record it again");
-      leaveOutMoving(chain, recording.track, pose, frames);
-      const bool silent = std::all_of(frames.begin(), frames.end(), [](const AdcCube& cube) {
-        return std::all_of(cube.data.begin(), cube.data.end(), [](std::int16_t v) { return v == 0; });
-      });
-      if (silent) throw InputError("all its samples are zero; check the capture");
+      const std::vector<AdcCube> frames = readFrames(recording, chain, pose, repair, data.problems);
       examiner.addPose(pose, frames);
-      CoherentAverage plain(recording.radar, 0);
-      for (const AdcCube& cube : frames) plain.add(cube);
-      const PoseFrames& seen = examiner.poses().back();
-      PoseChannels channels;
-      channels.pose = pose;
-      channels.grid = seen.mean;
-      channels.moving = seen.moving;
-      if (plain.complete()) channels.plain = plain.grid();
-      std::vector<double> noise = seen.noise_variance;
-      if (recording.channels) {
-        correctChannels(*recording.channels, channels.grid.x);
-        if (plain.complete()) correctChannels(*recording.channels, channels.plain.x);
-        for (std::size_t k = 0; k < noise.size(); ++k) {
-          noise[k] /= std::norm(recording.channels->error(k));
-          for (MovingCell& cell : channels.moving) {
-            cell.channels[static_cast<Eigen::Index>(k)] /= recording.channels->error(k);
-          }
-        }
-      }
-      channels.noise_power = per_sample * sum(noise) / static_cast<double>(noise.size()) / std::max(1, seen.shots);
-      channels.unsteadiness = seen.unsteadiness;
-      channels.shots = std::max(1, seen.shots);
-      transformGrid(chain, channels);
-      data.poses.push_back(std::move(channels));
+      data.poses.push_back(channelsOf(recording, chain, pose, frames, examiner.poses().back()));
     } catch (const InputError& error) {
       const std::string message = error.what();
       const bool named = message.rfind("pose '" + pose.name, 0) == 0 || message.rfind("pose " + pose.name, 0) == 0;
@@ -168,9 +190,9 @@ ChannelData readChannels(const Recording& recording, FrameExaminer& examiner, co
 void numberLocations(ChannelData& data) {
   data.locations.clear();
   for (PoseChannels& p : data.poses) {
-    const auto at = std::find(data.locations.begin(), data.locations.end(), p.pose.location);
-    p.location = static_cast<int>(at - data.locations.begin());
-    if (at == data.locations.end()) data.locations.push_back(p.pose.location);
+    const auto known = std::find(data.locations.begin(), data.locations.end(), p.pose.location);
+    p.location = static_cast<int>(known - data.locations.begin());
+    if (known == data.locations.end()) data.locations.push_back(p.pose.location);
   }
 }
 

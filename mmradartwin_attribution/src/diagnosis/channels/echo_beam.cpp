@@ -6,18 +6,18 @@
 namespace mmradartwin::diagnosis::channels {
 namespace {
 
-constexpr int kFewestChannels = 4;  // a tone's main lobe has four bins
-constexpr std::size_t kMost = 10;
-constexpr double kWeakest = 1e-3;  // of the strongest path's power
-constexpr double kApart_bins = 1.5;
-constexpr double kAlike = 0.3;  // of a beam's power in another
+constexpr int kFewestChannels = 4;      ///< the main lobe of a tone has four bins, and a beam as many as channels
+constexpr std::size_t kMostBeams = 10;  ///< of a pose
+constexpr double kWeakestShare = 1e-3;  ///< of the strongest path's power
+constexpr double kApart_bins = 1.5;     ///< between beams of one direction
+constexpr double kSameDirection = 0.3;  ///< share of a beam's power that another one holds
 
 }  // namespace
 
-Eigen::VectorXcd formBeam(const EchoBeam& beam, const Eigen::MatrixXcd& y) {
+Eigen::VectorXcd formBeam(const EchoBeam& beam, const Eigen::MatrixXcd& range_spectra) {
   const Eigen::Index bins = beam.weights.size();
-  Eigen::VectorXcd formed = (beam.weights.adjoint() * y.middleCols(beam.first_bin, bins)).transpose();
-  // Hann's middle is sample N/2: from there tones of one echo are real multiples of each other.
+  Eigen::VectorXcd formed = (beam.weights.adjoint() * range_spectra.middleCols(beam.first_bin, bins)).transpose();
+  // The middle of Hann's window is sample N/2: referred to it, tones of one echo are real multiples of each other.
   for (Eigen::Index i = 0; i < bins; ++i) {
     if ((beam.first_bin + i) % 2 != 0) formed[i] = -formed[i];
   }
@@ -39,21 +39,23 @@ std::vector<EchoBeam> chooseBeams(const RadarConfig& radar, const std::vector<Pa
                    [](const PathRecord* a, const PathRecord* b) { return a->amplitude > b->amplitude; });
   std::vector<double> places;
   for (const PathRecord* r : strongest) {
-    if (beams.size() == kMost || r->amplitude * r->amplitude < kWeakest * std::pow(strongest.front()->amplitude, 2))
+    if (beams.size() == kMostBeams ||
+        r->amplitude * r->amplitude < kWeakestShare * std::pow(strongest.front()->amplitude, 2))
       break;
     const double place = 0.5 * meanLength_m(*r) / radar.range_bin_m();
     if (place < first_bin || place > bins - 1) continue;
     EchoBeam beam;
     beam.weights.resize(channels);
     for (int k = 0; k < channels; ++k) {
-      // Hamming's taper over the aperture keeps other directions out.
+      // Hamming's taper over the aperture keeps other directions out of the beam.
       const double across = (radar.virtual_element_m(k).y() - low) / std::max(high - low, 1e-9);
       beam.weights[k] = std::polar(0.54 - 0.46 * std::cos(2 * M_PI * (0.05 + 0.9 * across)), std::arg(r->c[k]));
     }
     beam.weights.normalize();
     bool taken = false;
     for (std::size_t i = 0; i < beams.size() && !taken; ++i) {
-      taken = std::abs(places[i] - place) < kApart_bins && std::norm(beams[i].weights.dot(beam.weights)) > kAlike;
+      taken =
+          std::abs(places[i] - place) < kApart_bins && std::norm(beams[i].weights.dot(beam.weights)) > kSameDirection;
     }
     if (taken) continue;
     beam.first_bin = std::clamp(static_cast<int>(std::lround(place)) - (channels - 1) / 2, first_bin, bins - channels);

@@ -9,24 +9,24 @@
 
 namespace mmradartwin::diagnosis::channels {
 
-/// A direction at which a strong echo is expected: the channels formed into one beam, over as many range bins as there
-/// are channels. Bins one by one show where an echo comes from; a beam's bins together show how far it went, as the
+/// Beam at a strong echo that is expected: the channels summed towards its direction, over as many range bins as there
+/// are channels. Single bins show where an echo comes from. The bins of a beam together show how far it went, as the
 /// tones of one echo hold one phase there.
 struct EchoBeam {
   int first_bin = 0;
-  Eigen::VectorXcd weights;  ///< [M] of unit norm; the beam is weights^H y
-  Eigen::VectorXcd y;        ///< [M] of the bins from first_bin on, at the window's middle
-  double clutter = 0;        ///< power in the beam that PoseChannels::clutter has in its middle bin
+  Eigen::VectorXcd weights;  ///< [M] of unit norm; the beam is weights^H times the channels
+  Eigen::VectorXcd y;        ///< [M] the beam in the bins from first_bin on, with phases at the window's middle
+  double clutter = 0;        ///< power of PoseChannels::clutter in the beam, at its middle bin
 };
 
-/// Its bin in the middle; a beam has as many bins as there are channels.
+/// Range bin in the middle of a beam.
 inline int middleBin(const EchoBeam& beam, int channels) { return beam.first_bin + channels / 2; }
 
-/// A beam of range spectra [M][N], at its bins and at the window's middle.
-Eigen::VectorXcd formBeam(const EchoBeam& beam, const Eigen::MatrixXcd& y);
+/// Forms a beam of range spectra [M][N]: its bins, with phases at the window's middle.
+Eigen::VectorXcd formBeam(const EchoBeam& beam, const Eigen::MatrixXcd& range_spectra);
 
-/// Beams at the strongest of the paths that a pose is expected to receive, none beside another, from `first_bin` on. y
-/// is left empty. None for radars of fewer than four channels.
+/// Chooses beams at the strongest of the paths that a pose is expected to receive, from `first_bin` on, no two of the
+/// same direction beside each other. EchoBeam::y is left empty. A radar with fewer than four channels has no beams.
 std::vector<EchoBeam> chooseBeams(const RadarConfig& radar, const std::vector<PathRecord>& expected, int first_bin);
 
 }  // namespace mmradartwin::diagnosis::channels

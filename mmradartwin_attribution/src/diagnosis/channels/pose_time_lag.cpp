@@ -9,6 +9,7 @@
 #include <sstream>
 #include <utility>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin::diagnosis::channels {
@@ -17,25 +18,22 @@ namespace {
 const std::string kName = "pose_time_lag";
 constexpr double kLongest_s = 1;         ///< lag that is looked for
 constexpr double kStep_s = 0.005;        ///< between lags that are tried
-constexpr double kAround_s = 1.2;        ///< of a motion's ends, what is read
+constexpr double kAround_s = 1.2;        ///< of a motion's ends, within which frames are read
 constexpr double kSpeed_m_per_s = 0.05;  ///< of a radar that moves; tf of visual odometry trembles by less
 constexpr double kSmooth_s = 0.1;        ///< to either side, over which speeds are taken
 constexpr double kRest_s = 0.5;          ///< a shorter stop is a part of the motion
 constexpr double kFarthest_s = 0.3;      ///< between frames that follow each other
-constexpr double kFar_m = 0.05;
-constexpr std::size_t kFewestMotions = 3;
-constexpr double kSlow_m_per_s[] = {0.01, 0.02, 0.05};
-constexpr double kMoved = 0.05, kMovedMore = 4;  ///< of what is changed on the way, and of what is while it stands
-constexpr double kTellingChange = 0.1;           ///< on the way, beyond that of a radar that stands
-constexpr double kLeast_s = 0.02;                ///< what stamps of two computers' clocks differ by at best
-constexpr double kFalseAlarm = 0.01;
-constexpr double kNear_m = 0.3;  ///< what leaks within the radar moves along with it
+constexpr double kSlow_m_per_s[] = {0.01, 0.02, 0.05};  ///< slowest speeds that frames may show
+constexpr double kAtRest = 0.1;                         ///< Way::moves() of a radar that stands, at most
+constexpr double kMoved = 0.05;        ///< share of the change on the way that a radar at rest does not show
+constexpr double kMovedOverStill = 4;  ///< multiple of the change at rest that a radar at rest does not show
+constexpr double kNear_m = 0.3;        ///< range up to which there is leakage, which moves along with the radar
 
 double secondsSince(std::int64_t zero_ns, std::int64_t stamp_ns) {
   return 1e-9 * static_cast<double>(stamp_ns - zero_ns);
 }
 
-/// Where the radar is reported to be at any time: linear between frames, the first and last one's beyond them.
+/// Reported way of the radar: linear between frames; before the first and after the last frame it stands.
 class Way {
  public:
   Way(const std::vector<StampedTransform>& track, std::int64_t zero_ns) {
@@ -47,7 +45,7 @@ class Way {
   double speed_m_per_s(double t_s) const {
     return (at(t_s + kSmooth_s) - at(t_s - kSmooth_s)).norm() / (2 * kSmooth_s);
   }
-  /// 0 where it stands, 1 where it moves much faster than that.
+  /// 0 where the radar stands, 1 where it moves much faster than a slow speed.
   double moves(double t_s, double slow_m_per_s) const {
     const double v = speed_m_per_s(t_s) / slow_m_per_s;
     return 1 - std::exp(-v * v);
@@ -66,14 +64,14 @@ class Way {
   std::vector<Eigen::Vector3d> place_;
 };
 
-/// How long after its stamp a frame's middle is. What the chirps last at least, where radar.yaml does not say how long.
+/// Time from a frame's stamp to its middle. Where radar.yaml does not say how long chirps last, their samples do.
 double halfFrame_s(const RadarConfig& radar) {
   const double sampled_s = radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
   const double said_s = radar.idle_s + radar.ramp_end_s;
   return 0.5 * radar.chirps_per_frame() * (std::isnan(said_s) ? sampled_s : said_s);
 }
 
-/// Of the frames from one time to another, those that follow each other.
+/// Changes between frames that follow each other, from one time to another.
 std::vector<FrameChange> changesBetween(const Recording& recording, std::int64_t zero_ns, double from_s, double to_s) {
   const SignalChain chain(recording.radar);
   const RangeAngleAxes& axes = chain.axes();
@@ -96,6 +94,7 @@ std::vector<FrameChange> changesBetween(const Recording& recording, std::int64_t
   return changes;
 }
 
+/// Names of the first pose after each motion.
 std::vector<std::string> posesAfter(const Recording& recording, std::int64_t zero_ns,
                                     const std::vector<MovingStretch>& motions) {
   std::vector<std::string> poses;
@@ -117,12 +116,12 @@ std::vector<MovingStretch> motionsOf(const std::vector<StampedTransform>& track,
   std::vector<MovingStretch> motions;
   if (track.size() < 2) return motions;
   const Way way(track, zero_ns);
-  bool gap = true;  // frames or tf are missing: nothing is known of how it began
+  bool gap = true;  // frames or tf are missing, so that the beginning of a motion is not known
   for (std::size_t i = 1; i < track.size(); ++i) {
     const double from_s = secondsSince(zero_ns, track[i - 1].stamp_ns);
     const double to_s = secondsSince(zero_ns, track[i].stamp_ns);
     if (to_s - from_s > kFarthest_s) {
-      if (!motions.empty() && motions.back().to_s > from_s - kRest_s) motions.pop_back();  // it did not come to an end
+      if (!motions.empty() && motions.back().to_s > from_s - kRest_s) motions.pop_back();  // its end is not known
       gap = true;
       continue;
     }
@@ -140,16 +139,22 @@ std::vector<MovingStretch> motionsOf(const std::vector<StampedTransform>& track,
     motions.pop_back();
   motions.erase(std::remove_if(motions.begin(), motions.end(),
                                [&](const MovingStretch& m) {
-                                 return (way.at(m.to_s + kSmooth_s) - way.at(m.from_s - kSmooth_s)).norm() < kFar_m;
+                                 return (way.at(m.to_s + kSmooth_s) - way.at(m.from_s - kSmooth_s)).norm() <
+                                        bounds::kLeastMotion_m;
                                }),
                 motions.end());
   return motions;
 }
 
-std::optional<PoseTimeLag> findPoseTimeLag(const std::vector<StampedTransform>& track, std::int64_t zero_ns,
-                                           const std::vector<MovingStretch>& motions,
-                                           const std::vector<std::vector<FrameChange>>& changes, double period_s) {
-  const Way way(track, zero_ns);
+namespace {
+
+/// Changes of frames while the radar stands and while it is on the way: medians.
+struct UsualChanges {
+  double still = 0, more = 0;  ///< at rest, and by how much more on the way
+};
+
+std::optional<UsualChanges> usualChanges(const Way& way, const std::vector<MovingStretch>& motions,
+                                         const std::vector<std::vector<FrameChange>>& changes) {
   std::vector<double> standing, moving;
   for (std::size_t g = 0; g < motions.size(); ++g) {
     const double middle_s = 0.5 * (motions[g].from_s + motions[g].to_s);
@@ -157,58 +162,84 @@ std::optional<PoseTimeLag> findPoseTimeLag(const std::vector<StampedTransform>& 
       const double quarter_s = 0.25 * (motions[g].to_s - motions[g].from_s);
       if (std::abs(c.at_s - middle_s) < quarter_s) {
         moving.push_back(c.change);
-      } else if (way.moves(c.at_s, kSpeed_m_per_s) < 0.1) {
+      } else if (way.moves(c.at_s, kSpeed_m_per_s) < kAtRest) {
         standing.push_back(c.change);
       }
     }
   }
   if (standing.empty() || moving.empty()) return std::nullopt;
-  const double still = upperMedian(standing), more = upperMedian(moving) - still;
-  if (more < kTellingChange) return std::nullopt;
+  const double still = upperMedian(standing);
+  return UsualChanges{still, upperMedian(moving) - still};
+}
 
-  // On the way it is now more and now less: any change that a radar at rest does not show is one.
-  const double least = still + std::max(kMoved * more, kMovedMore * still);
-  const auto misfit = [&](const std::vector<FrameChange>& about, double lag_s, double slow_m_per_s) {
+/// Lag of least misfit, and that misfit.
+std::pair<double, double> leastOverLags(const std::function<double(double)>& misfit) {
+  std::pair<double, double> best{std::numeric_limits<double>::infinity(), 0};
+  for (int i = -static_cast<int>(kLongest_s / kStep_s); i <= static_cast<int>(kLongest_s / kStep_s); ++i) {
+    best = std::min(best, {misfit(i * kStep_s), i * kStep_s});
+  }
+  return best;
+}
+
+/// Misfit of frames' changes to a reported way that lags behind.
+class LagMisfit {
+ public:
+  LagMisfit(const Way& way, const UsualChanges& usual)
+      : way_(way), least_(usual.still + std::max(kMoved * usual.more, kMovedOverStill * usual.still)) {}
+  double operator()(const std::vector<FrameChange>& changes, double lag_s, double slow_m_per_s) const {
     double sum = 0;
-    for (const FrameChange& c : about) {
-      sum += std::abs((c.change > least ? 1 : 0) - way.moves(c.at_s + lag_s, slow_m_per_s));
+    for (const FrameChange& c : changes) {
+      sum += std::abs((c.change > least_ ? 1 : 0) - way_.moves(c.at_s + lag_s, slow_m_per_s));
     }
     return sum;
-  };
-  const auto leastOver = [&](const std::function<double(double)>& value) {
-    std::pair<double, double> best{std::numeric_limits<double>::infinity(), 0};
-    for (int i = -static_cast<int>(kLongest_s / kStep_s); i <= static_cast<int>(kLongest_s / kStep_s); ++i) {
-      best = std::min(best, {value(i * kStep_s), i * kStep_s});
-    }
-    return best;
-  };
-  // How slow a motion frames still show is the radar's matter and tf's.
-  double slow_m_per_s = kSpeed_m_per_s, fits = std::numeric_limits<double>::infinity();
-  for (double slow : kSlow_m_per_s) {
-    const auto ofAll = [&](double lag_s) {
-      double sum = 0;
-      for (const std::vector<FrameChange>& about : changes) sum += misfit(about, lag_s, slow);
-      return sum;
-    };
-    const double value = leastOver(ofAll).first;
-    if (value >= fits) continue;
-    fits = value;
-    slow_m_per_s = slow;
   }
+  /// Slowest speed that frames show, of kSlow_m_per_s: that is a matter of the radar and of tf.
+  double slowestShown_m_per_s(const std::vector<std::vector<FrameChange>>& changes) const {
+    double slow_m_per_s = kSpeed_m_per_s, least = std::numeric_limits<double>::infinity();
+    for (double slow : kSlow_m_per_s) {
+      const auto ofAll = [&](double lag_s) {
+        double sum = 0;
+        for (const std::vector<FrameChange>& about : changes) sum += (*this)(about, lag_s, slow);
+        return sum;
+      };
+      const double value = leastOverLags(ofAll).first;
+      if (value >= least) continue;
+      least = value;
+      slow_m_per_s = slow;
+    }
+    return slow_m_per_s;
+  }
+
+ private:
+  const Way& way_;
+  double least_;  ///< change that a radar at rest does not show: on the way there is now more and now less
+};
+
+}  // namespace
+
+std::optional<PoseTimeLag> findPoseTimeLag(const std::vector<StampedTransform>& track, std::int64_t zero_ns,
+                                           const std::vector<MovingStretch>& motions,
+                                           const std::vector<std::vector<FrameChange>>& changes, double period_s) {
+  const Way way(track, zero_ns);
+  const std::optional<UsualChanges> usual = usualChanges(way, motions, changes);
+  if (!usual || usual->more < bounds::kLeastChangeOnTheWay) return std::nullopt;
+  const LagMisfit misfit(way, *usual);
+  const double slow_m_per_s = misfit.slowestShown_m_per_s(changes);
   PoseTimeLag result;
   std::vector<std::size_t> telling;
   for (std::size_t g = 0; g < motions.size(); ++g) {
-    const double lag_s = leastOver([&](double s) { return misfit(changes[g], s, slow_m_per_s); }).second;
+    const double lag_s = leastOverLags([&](double s) { return misfit(changes[g], s, slow_m_per_s); }).second;
     if (changes[g].empty() || std::abs(lag_s) > kLongest_s - 2 * kStep_s) continue;
     telling.push_back(g);
     result.by_motion_s.push_back(lag_s);
   }
   const double n = static_cast<double>(telling.size());
-  if (telling.size() < kFewestMotions) return std::nullopt;
+  if (telling.size() < bounds::kFewestMotions) return std::nullopt;
   result.lag_s = upperMedian(result.by_motion_s);
   std::vector<double> off;
   for (double lag_s : result.by_motion_s) off.push_back(std::abs(lag_s - result.lag_s));
-  // A median's error is 1.25 of a mean's. Two edges, each within a frame period, know no better than that.
+  // The error of a median is 1.25 times that of a mean. Two edges, each within a frame period, know no better than the
+  // second value.
   const double scatter_s = std::max(1.4826 * upperMedian(off), period_s / std::sqrt(24.0));
   result.standard_error_s = 1.25 * scatter_s / std::sqrt(n);
   for (std::size_t g : telling) {
@@ -221,6 +252,30 @@ std::optional<PoseTimeLag> findPoseTimeLag(const std::vector<StampedTransform>& 
       2 * boost::math::cdf(boost::math::complement(student, std::abs(result.lag_s) / result.standard_error_s));
   return result;
 }
+
+namespace {
+
+/// Finding of a lag of the poses, beyond one that the twin states.
+FrameFinding findingOf(const PoseTimeLag& lag, double stated_s) {
+  FrameFinding f;
+  f.cause = kName;
+  const double value_s = stated_s + lag.lag_s;
+  const boost::math::students_t student(static_cast<double>(lag.by_motion_s.size()) - 1);
+  const double half_s = boost::math::quantile(student, 0.975) * lag.standard_error_s;
+  f.parameters = {{"lag_s", "s", value_s, {{value_s - half_s, value_s + half_s}}}};
+  for (double nats : lag.nats) f.log_likelihood_gain += nats;
+  f.false_alarm_rate = lag.false_alarm_rate;
+  std::ostringstream text;
+  text << std::setprecision(3) << "frames begin and end to change " << std::abs(lag.lag_s) << " s "
+       << (lag.lag_s > 0 ? "before" : "after") << " tf says that the radar moves or stops, at "
+       << lag.by_motion_s.size() << " moves; poses are looked up by that much " << (lag.lag_s > 0 ? "later" : "earlier")
+       << " than frames' stamps here";
+  if (stated_s != 0) text << ", beyond the " << stated_s << " s that the twin states";
+  f.description = text.str();
+  return f;
+}
+
+}  // namespace
 
 TimedRecording inTime(const Recording& recording, const std::vector<NamedParameters>& stated,
                       const ReadingProgress& on_progress) {
@@ -239,7 +294,7 @@ TimedRecording inTime(const Recording& recording, const std::vector<NamedParamet
 
   const std::int64_t zero_ns = read.track.front().stamp_ns;
   const std::vector<MovingStretch> motions = motionsOf(read.track, zero_ns);
-  if (motions.size() < kFewestMotions) return timed;
+  if (motions.size() < bounds::kFewestMotions) return timed;
   std::vector<std::vector<FrameChange>> changes;
   for (const MovingStretch& m : motions) {
     changes.push_back(changesBetween(read, zero_ns, m.from_s - kAround_s, m.to_s + kAround_s));
@@ -247,25 +302,13 @@ TimedRecording inTime(const Recording& recording, const std::vector<NamedParamet
   }
   const std::optional<PoseTimeLag> lag =
       findPoseTimeLag(read.track, zero_ns, motions, changes, read.radar.frame_period_s);
-  if (!lag || lag->false_alarm_rate > kFalseAlarm || std::abs(lag->lag_s) < kLeast_s) return timed;
+  if (!lag || lag->false_alarm_rate > bounds::kLagFalseAlarmRate || std::abs(lag->lag_s) < bounds::kLeastLag_s) {
+    return timed;
+  }
 
-  FrameFinding f;
-  f.cause = kName;
-  const double value_s = stated_s + lag->lag_s;
-  const boost::math::students_t student(static_cast<double>(lag->by_motion_s.size()) - 1);
-  const double half_s = boost::math::quantile(student, 0.975) * lag->standard_error_s;
-  f.parameters = {{"lag_s", "s", value_s, {{value_s - half_s, value_s + half_s}}}};
-  for (double nats : lag->nats) f.log_likelihood_gain += nats;
-  f.false_alarm_rate = lag->false_alarm_rate;
+  FrameFinding f = findingOf(*lag, stated_s);
   f.poses = posesAfter(read, zero_ns, motions);
-  std::ostringstream said_in_words;
-  said_in_words << std::setprecision(3) << "frames begin and end to change " << std::abs(lag->lag_s) << " s "
-                << (lag->lag_s > 0 ? "before" : "after") << " tf says that the radar moves or stops, at "
-                << lag->by_motion_s.size() << " moves; poses are looked up by that much "
-                << (lag->lag_s > 0 ? "later" : "earlier") << " than frames' stamps here";
-  if (stated_s != 0) said_in_words << ", beyond the " << stated_s << " s that the twin states";
-  f.description = said_in_words.str();
-  reread(value_s);
+  reread(stated_s + lag->lag_s);
   timed.finding = std::move(f);
   return timed;
 }

@@ -1,17 +1,13 @@
 #include "diagnosis/fit/hypothesis_fit.h"
 
-#include <nlopt.h>
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
-#include <functional>
-#include <limits>
-#include <memory>
 #include <numeric>
 
 #include "diagnosis/catalogue/bounds.h"
+#include "diagnosis/fit/likelihood_climb.h"
 #include "diagnosis/hypotheses/evidence_bounds.h"
 #include "diagnosis/likelihood/profiled_scores.h"
 #include "mmradartwin_attribution/finding.h"
@@ -21,51 +17,10 @@ namespace {
 
 constexpr int kSteps = 4, kStepsTogether = 3;       ///< Fisher steps of one hypothesis, of several together
 constexpr int kFirstSteps = 14, kFurtherSteps = 3;  ///< Fisher steps of the latents, from scratch and from others
-constexpr int kRisingFactor = 12;                   ///< times as many steps while each still gains kRising_nats
-constexpr double kLeastStep_nats = 0.2;             ///< promised gain below which a climb ends
 constexpr int kMostExpansions = 8;                  ///< of a state's echoes about the ranges that were fitted
 constexpr double kSettled_nats = 1;                 ///< gain of an expansion below which they end
-constexpr double kRising_nats = 5;                  ///< gain of the last step for which a climb goes on
-constexpr double kClimb_steps = 4;                  ///< like the last one, within which a climb has to reach its gain
-constexpr double kWorthASearch_nats = 25;           ///< gain by slopes from which on a rough likelihood is searched
-constexpr double kSearched[] = {0.3, 0.15};         ///< first steps of that search, in the coordinates' scale
-constexpr double kSearchTolerance = 0.02;           ///< in the coordinates' scale
-constexpr int kSearchPlaces = 12;                   ///< per coordinate
-constexpr double kLongestStep = 3;                  ///< in the coordinate's scale
-constexpr double kStepShares[] = {1.0, 0.4, 0.1};   ///< of a promised step, until one gains
-constexpr double kOneSidedFactors[] = {0.4, 2.0};   ///< of a start that rises from nothing
-constexpr Eigen::Index kMostRough = 4;              ///< coordinates that are searched without slopes
 constexpr double kFoldShares[] = {1, 0.4, 0.1, 0};  ///< of a fold's step, until its places are no worse
 constexpr double kLeastShareKept = 0.2;             ///< bound of the share of places that a fold is fitted to
-// Three times what an actor's place is wrong by. A shorter move is no likely cause and explains part of other causes.
-constexpr double kLeastMove_m = 0.06;
-
-// Six times what a scene's actors err by.
-constexpr double kFarAway_m = 0.12;
-
-/// Calls `value` at places that lead to its maximum, without slopes (BOBYQA, Powell 2009).
-void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector<double> scaled_values,
-                         double initial_step, const std::function<double(const std::vector<double>&)>& value) {
-  const unsigned n = static_cast<unsigned>(coordinates.size());
-  const std::unique_ptr<std::remove_pointer_t<nlopt_opt>, void (*)(nlopt_opt)> search(nlopt_create(NLOPT_LN_BOBYQA, n),
-                                                                                      nlopt_destroy);
-  std::vector<double> low, high;
-  for (const Coordinate& c : coordinates) {
-    low.push_back(std::min(c.scaled_values(c.min), c.scaled_values(c.max)));
-    high.push_back(std::max(c.scaled_values(c.min), c.scaled_values(c.max)));
-  }
-  const auto call = [](unsigned size, const double* x, double*, void* function) {
-    return (*static_cast<const std::function<double(const std::vector<double>&)>*>(function))({x, x + size});
-  };
-  nlopt_set_lower_bounds(search.get(), low.data());
-  nlopt_set_upper_bounds(search.get(), high.data());
-  nlopt_set_max_objective(search.get(), call, const_cast<std::function<double(const std::vector<double>&)>*>(&value));
-  nlopt_set_initial_step1(search.get(), initial_step);
-  nlopt_set_xtol_abs1(search.get(), kSearchTolerance);
-  nlopt_set_maxeval(search.get(), kSearchPlaces * static_cast<int>(n));
-  double best = 0;
-  nlopt_optimize(search.get(), scaled_values.data(), &best);
-}
 
 }  // namespace
 
@@ -89,7 +44,7 @@ double HypothesisFit::ranking() const {
                                                     : 1;
   double nats = share * gain - bounds::kPriceOfNumber_nats * static_cast<double>(numbers());
   if (hypothesis.mechanism.mechanism == "actor_unmodelled") nats -= bounds::kPriceOfPlace_nats;
-  if (hypothesis.isMove() && moved_m() < kLeastMove_m) nats -= bounds::kPriceOfNumber_nats;
+  if (hypothesis.isMove() && moved_m() < stated.leastMove_m()) nats -= bounds::kPriceOfNumber_nats;
   return nats;
 }
 
@@ -107,7 +62,8 @@ double HypothesisFit::moved_m() const {
 }
 
 bool HypothesisFit::isFarAway() const {
-  return moved_m() > kFarAway_m && (plain || gain_without_best_place / overdispersion > bounds::kLeastNatsOfFarAway);
+  return moved_m() > stated.farAway_m() &&
+         (plain || gain_without_best_place / overdispersion > bounds::kLeastNatsOfFarAway);
 }
 
 double HypothesisFit::size_m() const {
@@ -115,8 +71,9 @@ double HypothesisFit::size_m() const {
   return hypothesis.at(scaled_values).values.number("size_m");
 }
 
-HypothesisFitter::HypothesisFitter(ExpectedEchoes& source, const ChannelLikelihood& model, int folds)
-    : source_(source), model_(model), folds_(folds) {}
+HypothesisFitter::HypothesisFitter(ExpectedEchoes& source, const ChannelLikelihood& model, int folds,
+                                   StatedBounds stated)
+    : source_(source), model_(model), folds_(folds), stated_(stated) {}
 
 ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanisms, const SessionLatents* start) {
   ModelState s;
@@ -155,193 +112,6 @@ std::optional<ModelState> HypothesisFitter::improved(const ModelState& null, con
   return s;
 }
 
-HypothesisFitter::Optimum HypothesisFitter::maximise(const std::vector<NamedParameters>& base,
-                                                     const SessionLatents& nuisance,
-                                                     const std::vector<Hypothesis>& parts,
-                                                     const std::vector<std::vector<double>>& starts, int steps,
-                                                     const ModelState* null, double least_nats,
-                                                     const HypothesisFit* known) {
-  std::vector<Coordinate> coordinates;
-  for (const Hypothesis& h : parts) coordinates.insert(coordinates.end(), h.coordinates.begin(), h.coordinates.end());
-  const int globals = nuisance.globals();
-  const Eigen::Index n = static_cast<Eigen::Index>(coordinates.size());
-  const auto mechanisms = [&](const std::vector<double>& at) { return mechanismsWith(base, parts, at); };
-  const auto evaluate = [&](const std::vector<double>& scaled_values, const SessionLatents& with_nuisance) {
-    ModelState s;
-    s.mechanisms = mechanisms(scaled_values);
-    s.actor_range_m = with_nuisance.actor_range_m;
-    s.echoes = source_.echoes(s.mechanisms, s.actor_range_m);
-    s.nuisance = with_nuisance;
-    s.log_likelihood = model_.logLikelihood(s.echoes, with_nuisance, &s.by_pose);
-    return s;
-  };
-  // Latents of all poses or actors may stand in for the cause: it starts without them, too.
-  SessionLatents without = nuisance;
-  std::fill(without.yaw_rad.begin(), without.yaw_rad.end(), 0.0);
-  SessionLatents placed = without;
-  std::fill(placed.actor_range_m.begin(), placed.actor_range_m.end(), 0.0);
-  SessionLatents bare = placed;
-  std::fill(bare.actor_gain.begin(), bare.actor_gain.end(), 0.0);
-  std::vector<SessionLatents> candidates = {nuisance};
-  if (known == nullptr) {
-    candidates.insert(candidates.end(), {without, placed, bare});
-    for (const Hypothesis& h : parts) {
-      const int actor = source_.base().scene().actorIndex(h.subject);
-      if (actor >= 0) candidates.push_back(withoutErrors(nuisance, actor));
-    }
-  }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const SessionLatents& a, const SessionLatents& b) { return a.actor_range_m < b.actor_range_m; });
-  Optimum o;
-  const auto take = [&](const ModelState& s, const std::vector<double>& scaled_values) {
-    if (!o.state.echoes.empty() && s.log_likelihood <= o.state.log_likelihood) return;
-    o.state = s;
-    o.scaled_values = scaled_values;
-  };
-  const auto consider = [&](const std::vector<double>& scaled_values) {
-    ModelState s, best;
-    for (const SessionLatents& candidate : candidates) {
-      if (s.echoes.empty() || s.actor_range_m != candidate.actor_range_m) {
-        s = evaluate(scaled_values, candidate);
-      } else {  // equal ranges have the same echoes
-        s.nuisance = candidate;
-        s.log_likelihood = model_.logLikelihood(s.echoes, candidate, &s.by_pose);
-      }
-      if (best.echoes.empty() || s.log_likelihood > best.log_likelihood) best = s;
-    }
-    take(best, scaled_values);
-    return best;
-  };
-  for (const std::vector<double>& start : starts) {
-    const ModelState s = consider(start);
-    if (null == nullptr || known != nullptr || starts.size() < 2 || !parts.front().isGeometry()) continue;
-    // The right start may lose to a smaller one before the latents have settled on it.
-    SessionLatents settled = s.nuisance;
-    model_.fit(s.echoes, settled, kSettling);
-    take(evaluate(start, settled), start);
-  }
-  // The promise of a quadratic is far off where a level rises from nothing.
-  const bool one_sided = parts.size() == 1 && std::any_of(coordinates.begin(), coordinates.end(),
-                                                          [](const Coordinate& c) { return c.oneSided(); });
-  for (double factor : kOneSidedFactors) {
-    if (!one_sided) break;
-    std::vector<double> other = starts.front();
-    for (double& v : other) v *= factor;
-    consider(other);
-  }
-  const bool geometric = std::any_of(parts.begin(), parts.end(), [&](const Hypothesis& h) {
-    return source_.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0)));
-  });
-  // A start that is worse than nothing is an error of the quadratic; only geometry has a valley to cross.
-  if (!one_sided && !geometric && parts.size() == 1) consider(std::vector<double>(coordinates.size(), 0.0));
-  const std::vector<int> everyone = everyPose(o.state);
-  const auto derivatives = [&](const ModelState& s, const std::vector<double>& scaled_values) {
-    std::vector<SessionCovariance> directions;
-    SessionCovariance here;
-    for (Eigen::Index j = 0; j < n; ++j) {
-      const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
-      const double step = c.logarithmic()
-                              ? kSmallStep * std::max(1e-4, std::abs(scaled_values[static_cast<std::size_t>(j)]))
-                              : kSmallStep;
-      const auto covarianceAt = [&](double by) {
-        std::vector<double> moved = scaled_values;
-        moved[static_cast<std::size_t>(j)] += by;
-        return model_.covariance(source_.echoesNear(mechanisms(moved), s.mechanisms, everyone, s.actor_range_m),
-                                 s.nuisance, everyone);
-      };
-      // The likelihood of one strong path is a narrow ridge. A difference to one side would contain the square of a
-      // turn or of a gain, which hides the slope and makes the information many times too large.
-      if (!c.oneSided()) {
-        directions.push_back(difference(covarianceAt(step), covarianceAt(-step), 2 * step));
-        continue;
-      }
-      if (here.empty()) here = model_.covariance(s.echoes, s.nuisance, everyone);
-      directions.push_back(difference(covarianceAt(step), here, everyone, step));
-    }
-    return model_.scores(model_.basis(s.echoes, s.nuisance), directions, everyone);
-  };
-  double risen = 0;
-  for (int i = 0;; ++i) {
-    o.scores = derivatives(o.state, o.scaled_values);
-    const Eigen::VectorXd step = regularised(o.scores.information).ldlt().solve(o.scores.total);
-    const double screened_nats = 0.5 * o.scores.total.dot(step);
-    const bool hopeless =
-        null != nullptr && i >= 2 &&
-        o.state.log_likelihood + kClimb_steps * std::max(risen, screened_nats) < null->log_likelihood + least_nats;
-    // On a ridge between a cause and the latents that stood in for it, every step is longer than the one before.
-    if (i >= (risen > kRising_nats ? kRisingFactor * steps : steps) || screened_nats < kLeastStep_nats || hopeless)
-      break;
-    bool better = false;
-    for (double share : kStepShares) {
-      std::vector<double> next = o.scaled_values;
-      for (Eigen::Index j = 0; j < n; ++j) {
-        const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
-        double& v = next[static_cast<std::size_t>(j)];
-        v += share * std::clamp(step[globals + j], -kLongestStep, kLongestStep);
-        if (c.logarithmic()) v = std::max(v, 0.3 * o.scaled_values[static_cast<std::size_t>(j)]);
-        const double low = std::min(c.scaled_values(c.min), c.scaled_values(c.max)),
-                     high = std::max(c.scaled_values(c.min), c.scaled_values(c.max));
-        v = std::clamp(v, low, high);
-      }
-      ModelState s = evaluate(next, model_.stepped(o.state.nuisance, step.head(globals), o.scores, step, share));
-      if (s.log_likelihood <= o.state.log_likelihood) continue;
-      risen = s.log_likelihood - o.state.log_likelihood;
-      o.state = std::move(s);
-      o.scaled_values = next;
-      better = true;
-      break;
-    }
-    if (!better) break;
-  }
-  if (!geometric || n == 0 || n > kMostRough) return o;
-  if (null != nullptr && broadGain(*null, o.state) < kWorthASearch_nats) return o;
-  if (known != nullptr) {
-    const double higher = o.state.log_likelihood - known->state.log_likelihood;
-    double apart = 0;
-    for (std::size_t j = 0; j < o.scaled_values.size(); ++j) {
-      apart = std::max(apart, std::abs(o.scaled_values[j] - known->scaled_values[j]));
-    }
-    if (higher < -kWorthASearch_nats || (apart < kSearched[1] && higher < kRising_nats)) return o;
-  }
-  // The likelihood is rough where paths come and go with every millimetre: slopes end at the first bump, a quadratic
-  // through values some millimetres apart does not. The latents follow to first order.
-  for (double initial : kSearched) {
-    const Optimum from = o;
-    const Eigen::MatrixXd information = regularised(from.scores.information);
-    const Eigen::LDLT<Eigen::MatrixXd> latents(information.topLeftCorner(globals, globals));
-    searchQuadratically(coordinates, from.scaled_values, initial, [&](const std::vector<double>& next) {
-      Eigen::VectorXd step(globals + n);
-      for (Eigen::Index j = 0; j < n; ++j) step[globals + j] = next[j] - from.scaled_values[j];
-      step.head(globals) =
-          latents.solve(from.scores.total.head(globals) - information.topRightCorner(globals, n) * step.tail(n));
-      ModelState s = evaluate(next, model_.stepped(from.state.nuisance, step.head(globals), from.scores, step, 1));
-      const double value = s.log_likelihood;
-      if (value > o.state.log_likelihood) {
-        o.state = std::move(s);
-        o.scaled_values = next;
-      }
-      return value;
-    });
-    o.scores = derivatives(o.state, o.scaled_values);
-    if (o.state.log_likelihood - from.state.log_likelihood < kRising_nats) break;
-  }
-  return o;
-}
-
-std::vector<double> HypothesisFitter::gainByLocation(const ModelState& null, const ModelState& state) const {
-  std::vector<double> gain(model_.data().locations.size(), 0.0);
-  for (std::size_t i = 0; i < state.by_pose.size(); ++i) {
-    gain[static_cast<std::size_t>(model_.data().poses[i].location)] += state.by_pose[i] - null.by_pose[i];
-  }
-  return gain;
-}
-
-double HypothesisFitter::broadGain(const ModelState& null, const ModelState& state) const {
-  const double gain = state.log_likelihood - null.log_likelihood;
-  const std::vector<double> at = gainByLocation(null, state);
-  return at.size() > 1 ? gain - std::max(0.0, *std::max_element(at.begin(), at.end())) : gain;
-}
-
 Eigen::MatrixXd HypothesisFitter::robustCovariance(const ProfiledScores& e) const {
   const double locations = static_cast<double>(e.by_location.rows());
   const Eigen::MatrixXd covariance = e.information.inverse();
@@ -360,7 +130,8 @@ EvidenceShare HypothesisFitter::worthOfPresence(const std::vector<NamedParameter
                                                 const ProfiledScores& e, Eigen::Index first, Eigen::Index numbers) {
   std::vector<double> scaled_values = o.scaled_values;
   std::fill_n(scaled_values.begin() + first, numbers, 0.0);
-  const double gain = broadGain(state(mechanismsWith(base, parts, scaled_values), &o.state.nuisance), o.state);
+  const double gain =
+      broadGain(model_.data(), state(mechanismsWith(base, parts, scaled_values), &o.state.nuisance), o.state);
   if (e.scatter.size() == 0) return {gain, 1};  // one place: nothing scatters
   return {gain, std::clamp(e.scatter(first, first) / e.information(first, first), 1.0, kMostOverdispersion)};
 }
@@ -376,9 +147,9 @@ EvidenceShare HypothesisFitter::evidenceShareOf(const Hypothesis& hypothesis, co
 
 JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const SessionLatents& nuisance,
                                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start) {
-  std::vector<double> from;
-  for (const std::vector<double>& s : start) from.insert(from.end(), s.begin(), s.end());
-  Optimum o = maximise(base, nuisance, parts, {from}, kStepsTogether, nullptr, 0, nullptr);
+  std::vector<std::vector<double>> starts = {{}};
+  for (const std::vector<double>& s : start) starts[0].insert(starts[0].end(), s.begin(), s.end());
+  Optimum o = LikelihoodClimb(source_, model_, {base, nuisance, parts, starts, kStepsTogether}).run();
   const ProfiledScores e = profiledScores(o.scores, nuisance.globals());
   const Eigen::MatrixXd covariance = e.information.inverse(), robust = robustCovariance(e);
   JointFit fit;
@@ -413,17 +184,22 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
                                     const std::vector<std::vector<double>>& starts, double least_nats,
                                     const HypothesisFit* known) {
   HypothesisFit f;
+  f.stated = stated_;
   f.hypothesis = hypothesis;
   const int globals = null.nuisance.globals();
   const Eigen::Index n = static_cast<Eigen::Index>(hypothesis.coordinates.size());
-  Optimum o = maximise(null.mechanisms, known != nullptr ? known->state.nuisance : null.nuisance, {hypothesis}, starts,
-                       kSteps, &null, std::max(kWorthASearch_nats, least_nats), known);
+  const std::vector<Hypothesis> parts = {hypothesis};
+  const SessionLatents& latents = known != nullptr ? known->state.nuisance : null.nuisance;
+  Optimum o = LikelihoodClimb(source_, model_,
+                              {null.mechanisms, latents, parts, starts, kSteps, &null,
+                               std::max(kWorthASearch_nats, least_nats), known})
+                  .run();
   f.scaled_values = std::move(o.scaled_values);
   f.state = std::move(o.state);
   f.state.echoes = {};  // 80 MB and more a fit, of 154 poses
   const Scores& scores = o.scores;
   gainOver(null, f);
-  const std::vector<double> gain_at = gainByLocation(null, f.state);
+  const std::vector<double> gain_at = gainByLocation(model_.data(), null, f.state);
 
   // Scatter over places is that of the scores at the fit, or of the gain where nothing has a slope.
   const double locations = static_cast<double>(gain_at.size());
@@ -485,7 +261,7 @@ void HypothesisFitter::settleFolds(const ModelState& null, HypothesisFit& f) {
 void HypothesisFitter::gainOver(const ModelState& null, HypothesisFit& f) const {
   const double before = f.gain;
   f.gain = f.state.log_likelihood - null.log_likelihood;
-  f.gain_without_best_place = broadGain(null, f.state);
+  f.gain_without_best_place = broadGain(model_.data(), null, f.state);
   f.held_out_gain += f.gain - before;
 }
 

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "diagnosis/catalogue/stated_bounds.h"
 #include "diagnosis/hypotheses/hypothesis.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/likelihood/expected_echoes.h"
@@ -29,6 +29,7 @@ struct ModelState {
 /// Fit of one hypothesis, with everything else refitted.
 struct HypothesisFit {
   Hypothesis hypothesis;
+  StatedBounds stated;                ///< which moves are larger than the scene's errors
   std::vector<double> scaled_values;  ///< [coordinates] at the fit
   ModelState state;                   ///< echoes left out
   double gain = 0;                    ///< nats over the state without it
@@ -74,10 +75,13 @@ struct Screened {
   std::vector<std::vector<double>> starts;  ///< scaled coordinates to start a fit from
 };
 
+struct Optimum;
+
 /// Fits hypotheses by maximum likelihood, over a state of the model that has none of them (the *null*).
 class HypothesisFitter {
  public:
-  HypothesisFitter(ExpectedEchoes& source, const ChannelLikelihood& model, int folds);
+  HypothesisFitter(ExpectedEchoes& source, const ChannelLikelihood& model, int folds,
+                   StatedBounds stated = StatedBounds());
 
   /// State of these mechanisms with all latents fitted, from `start` where it is given.
   ModelState state(const std::vector<NamedParameters>& mechanisms, const SessionLatents* start);
@@ -110,11 +114,6 @@ class HypothesisFitter {
   double falseAlarmRate(double gain, const Hypothesis& hypothesis, std::size_t numbers, std::size_t family) const;
 
  private:
-  struct Optimum {
-    std::vector<double> scaled_values;
-    ModelState state;
-    Scores scores;  ///< at the last place with derivatives
-  };
   /// Nats that the numbers from `first` on bring beside the others, without the place that gains most. For numbers that
   /// rise from nothing or turn the view the errors at the fit say far too little: the likelihood follows a square law.
   EvidenceShare worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
@@ -123,18 +122,11 @@ class HypothesisFitter {
   /// Nats by which values lie off nothing, by their errors.
   EvidenceShare evidenceShareOf(const Hypothesis& hypothesis, const Eigen::VectorXd& scaled_values,
                                 const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& robust) const;
-  /// Maximum over the coordinates of all parts. null: a geometry is searched without slopes only where it gains over it
-  /// at more than one place; always where it is no pointer. least_nats, known: see fit().
-  Optimum maximise(const std::vector<NamedParameters>& base, const SessionLatents& nuisance,
-                   const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& starts, int steps,
-                   const ModelState* null, double least_nats, const HypothesisFit* known);
-  std::vector<double> gainByLocation(const ModelState& null, const ModelState& state) const;
-  /// Gain over the null without the place that gains most.
-  double broadGain(const ModelState& null, const ModelState& state) const;
 
   ExpectedEchoes& source_;
   const ChannelLikelihood& model_;
   int folds_;
+  StatedBounds stated_;
 };
 
 }  // namespace mmradartwin::diagnosis::fit

@@ -190,7 +190,7 @@ void Profile::consider(const Place& place, const std::vector<double>& scaled_val
 
 std::pair<double, double> Profile::limits(std::size_t j) const {
   const Coordinate& c = coordinates_[j];
-  return std::minmax({c.scaled_values(c.min), c.scaled_values(c.max)});
+  return std::minmax({c.scaled(c.min), c.scaled(c.max)});
 }
 
 Step Profile::stepAlong(std::size_t j, const Fall& wanted) {

@@ -5,48 +5,47 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <set>
 #include <sstream>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/frames/frame_stack.h"
 #include "diagnosis/frames/motion_locator.h"
 #include "diagnosis/frames/payload_defects.h"
 #include "diagnosis/frames/shot_examiner.h"
-#include "mmradartwin_attribution/ledger.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::frames {
 namespace {
 
 using Complex = std::complex<float>;
 
-// Chance of a false finding of one kind in a session; six kinds stay far below the one in a hundred that a diagnosis
-// may afford for all its hypotheses.
-constexpr double kFalseAlarm = 1e-6;
+constexpr int kMostSlips = 3;              ///< of one pose, that are closed
+constexpr double kLeastScatter_db = 1e-4;  ///< of a frame's level over poses: floor of a division
 
-/// Clopper and Pearson's 95 % interval of a share.
-std::array<double, 2> shareInterval(double hits, double of) {
+/// 95 % interval of a share of `trials` by Clopper and Pearson.
+std::array<double, 2> shareInterval(double hits, double trials) {
   const auto quantile = [](double a, double b, double p) {
     return boost::math::quantile(boost::math::beta_distribution<double>(a, b), p);
   };
-  return {hits > 0 ? quantile(hits, of - hits + 1, 0.025) : 0.0,
-          hits < of ? quantile(hits + 1, of - hits, 0.975) : 1.0};
+  return {hits > 0 ? quantile(hits, trials - hits + 1, 0.025) : 0.0,
+          hits < trials ? quantile(hits + 1, trials - hits, 0.975) : 1.0};
 }
 
 FindingParameter number(const char* name, const char* unit, double value, const std::array<double, 2>& ci95) {
   return {name, unit, value, {ci95}};
 }
 
-constexpr double kUnsteady = 0.5;  ///< of the bins with standing echoes, where it is not something in the room
-
-/// Of one pose, what findings() judges.
+/// Statistics of one pose that findings() judges.
 struct PoseJudgement {
   std::string pose;
   ZeroedPackets packets;
   double slip_gain = 0;
   Rails rails;
-  double clipped = 0, counted = 0;  ///< I and Q values per shot: beyond the converter, and all that were looked at
+  ClippedCount values;
   Bursts bursts;
   double turn_rad_per_frame = 0, turn_variance = 0;
   int turn_cells = 0, frames = 0;
@@ -65,7 +64,7 @@ struct FrameExaminer::State {
   std::vector<PoseJudgement> judged;
   std::vector<PoseMotion> motion;
   std::vector<PoseFrames> poses;
-  mutable std::optional<LocatedMotion> located;  ///< of the poses so far, once asked for
+  mutable std::optional<LocatedMotion> located;  ///< motion at the poses so far, once it was asked for
 
   const LocatedMotion& locate() const {
     if (!located) located = locateMotion(radar, motion);
@@ -73,12 +72,16 @@ struct FrameExaminer::State {
   }
   FrameFinding saturation() const;
   FrameFinding packetLoss() const;
-  std::vector<FrameFinding> misalignments() const;  ///< one a pose
+  std::vector<FrameFinding> misalignments() const;  ///< one per pose
   FrameFinding interference() const;
   FrameFinding drift() const;
   FrameFinding frameGain() const;
   FrameFinding unsteadiness() const;
-  /// A frame's level at all poses but those of one location.
+  /// Checks the shape of a pose's frames; throws InputError.
+  void requireShape(const Pose& pose, const std::vector<AdcCube>& frames) const;
+  /// Repairs the stream of a pose's bytes as far as it can be.
+  FrameStack repairBytes(const std::vector<AdcCube>& frames, PoseJudgement& judged) const;
+  /// Levels of a frame at all poses but those of one location, dB.
   std::vector<double> levelsOf_db(std::size_t frame, const std::string& without = "") const;
 };
 
@@ -89,9 +92,7 @@ FrameExaminer& FrameExaminer::operator=(FrameExaminer&&) noexcept = default;
 
 const std::vector<PoseFrames>& FrameExaminer::poses() const { return state_->poses; }
 
-void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames) {
-  State& s = *state_;
-  const RadarConfig& radar = s.radar;
+void FrameExaminer::State::requireShape(const Pose& pose, const std::vector<AdcCube>& frames) const {
   for (const AdcCube& cube : frames) {
     if (cube.chirps == radar.chirps_per_frame() && cube.samples == radar.samples_per_chirp &&
         cube.receivers == radar.receivers() && cube.chirp_valid.size() == static_cast<std::size_t>(cube.chirps) &&
@@ -104,22 +105,28 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
                      std::to_string(radar.chirps_per_frame()) + " x " + std::to_string(radar.samples_per_chirp) +
                      " x " + std::to_string(radar.receivers()));
   }
-  PoseJudgement judged;
-  judged.pose = pose.name;
-  judged.frames = static_cast<int>(frames.size());
+}
 
-  // Bytes first: all that follows takes samples for what they are.
-  Payload payload = toPayload(frames, s.order);
-  judged.packets = markZeroedPackets(payload, s.order);
-  for (int slips = 0; slips < 3; ++slips) {
+FrameStack FrameExaminer::State::repairBytes(const std::vector<AdcCube>& frames, PoseJudgement& judged) const {
+  Payload payload = toPayload(frames, order);
+  judged.packets = markZeroedPackets(payload, order);
+  for (int slips = 0; slips < kMostSlips; ++slips) {
     const std::optional<Slip> slip = findSlip(payload);
     if (!slip) break;
     closeSlip(*slip, payload);
     judged.slip_gain += slip->log_likelihood_gain;
   }
-  FrameStack stack(radar, payload, s.order);
-  payload = Payload();
+  return FrameStack(radar, payload, order);
+}
 
+void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames) {
+  State& s = *state_;
+  s.requireShape(pose, frames);
+  PoseJudgement judged;
+  judged.pose = pose.name;
+  judged.frames = static_cast<int>(frames.size());
+  // All later steps take samples for what they are, so bytes come first.
+  FrameStack stack = s.repairBytes(frames, judged);
   judged.rails = countRails(stack);
   ClippedValues clipped = clippedValues(judged.rails, stack);
   const std::map<std::size_t, Complex> clipped_means = clippedMeans(clipped, stack);
@@ -129,11 +136,11 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   // Where the standing signal itself comes to the converter's limit, clipped values are no bursts.
   dropStandingClipped(clipped, average, stack);
   Bursts bursts = dropBursts(average, differenceVariance(stack), stack);
-  countClipped(clipped, bursts, stack, judged.clipped, judged.counted);
+  judged.values = countClipped(clipped, bursts, stack);
   judged.bursts = bursts;
 
   average = meanShot(stack);
-  // What is clipped in every shot is nearer to the truth than nothing at all.
+  // A value that is clipped in every shot is nearer to the truth than none at all.
   for (const auto& [place, mean] : clipped_means) {
     if (average[place] == Complex(0)) average[place] = mean;
   }
@@ -179,7 +186,7 @@ FrameFinding FrameExaminer::State::packetLoss() const {
     if (p.packets.lost > 0) f.poses.push_back(p.pose);
   }
   if (lost == 0) return f;
-  f.false_alarm_rate = kFalseAlarm;
+  f.false_alarm_rate = bounds::kFramesFalseAlarmRate;
   const double share = static_cast<double>(lost) / static_cast<double>(packets);
   f.parameters = {number("lost_fraction", "1", share, shareInterval(lost, packets))};
   std::ostringstream text;
@@ -197,7 +204,7 @@ std::vector<FrameFinding> FrameExaminer::State::misalignments() const {
     f.poses = {p.pose};
     f.log_likelihood_gain = p.slip_gain;
     f.nats_by_pose = {{p.pose, p.slip_gain}};
-    f.false_alarm_rate = kFalseAlarm;
+    f.false_alarm_rate = bounds::kFramesFalseAlarmRate;
     f.parameters = {{"pose", "", p.pose, {}}};
     f.description = "packets are missing and were not filled: from there on samples belong to other channels and times";
     all.push_back(std::move(f));
@@ -208,7 +215,7 @@ std::vector<FrameFinding> FrameExaminer::State::misalignments() const {
 FrameFinding FrameExaminer::State::saturation() const {
   FrameFinding f;
   f.cause = "adc_saturation";
-  // One converter: its limits are the outermost codes of the whole session.
+  // All poses have one converter: its limits are the outermost codes of the whole session.
   int high = 0, low = 0;
   for (const PoseJudgement& p : judged) {
     high = std::max(high, p.rails.high.code);
@@ -216,25 +223,27 @@ FrameFinding FrameExaminer::State::saturation() const {
   }
   double at_code = 0, next_codes = 0, clipped = 0, counted = 0, spread = 0;
   for (const PoseJudgement& p : judged) {
-    counted += p.counted;
+    counted += p.values.counted;
     const bool top = p.rails.high.code == high, bottom = p.rails.low.code == low;
-    if ((!top && !bottom) || p.clipped <= 0) continue;
-    at_code += p.clipped;
+    if ((!top && !bottom) || p.values.clipped <= 0) continue;
+    at_code += p.values.clipped;
     next_codes += (top ? p.rails.high.next_codes : 0) + (bottom ? p.rails.low.next_codes : 0);
-    clipped += p.clipped;
-    spread += p.clipped;
+    clipped += p.values.clipped;
+    spread += p.values.clipped;
     f.poses.push_back(p.pose);
   }
   f.log_likelihood_gain = pileUp({0, at_code, next_codes});
-  // That the outermost code is the last one of 16 bits happens by chance once in a thousand sessions at most.
-  if (f.log_likelihood_gain > 0 && (high == INT16_MAX || low == INT16_MIN)) f.log_likelihood_gain += std::log(1e3);
+  if (f.log_likelihood_gain > 0 && (high == INT16_MAX || low == INT16_MIN)) {
+    f.log_likelihood_gain += std::log(bounds::kOddsOfLastCode);
+  }
   f.false_alarm_rate = std::exp(-f.log_likelihood_gain);
-  if (f.false_alarm_rate > kFalseAlarm || counted == 0) {
+  if (f.false_alarm_rate > bounds::kFramesFalseAlarmRate || counted == 0) {
     f.log_likelihood_gain = 0;
     return f;
   }
   const double share = clipped / counted;
-  // Samples of one pose clip together or not at all only where noise decides: their number is as good as its root.
+  // Samples of a pose clip in all shots or in none unless noise decides: the error is the root of their number, times
+  // 0.2.
   f.parameters = {number("clipped_fraction", "1", share,
                          {std::max(0.0, share - 1.96 * std::sqrt(spread) / counted * 0.2),
                           share + 1.96 * std::sqrt(spread) / counted * 0.2})};
@@ -257,8 +266,7 @@ FrameFinding FrameExaminer::State::interference() const {
     if (p.bursts.hit_frames > 0) f.poses.push_back(p.pose);
   }
   if (hit == 0) return f;
-  // dropBursts' thresholds: 1e-12 per window, some 1e7 windows in a session at most.
-  f.false_alarm_rate = 1e-5;
+  f.false_alarm_rate = bounds::kBurstsFalseAlarmRate;
   f.parameters = {number("frame_fraction", "1", hit / frames, shareInterval(hit, frames))};
   std::ostringstream text;
   text << "bursts within single chirps, the same wave at all receivers, in " << hit << " of " << frames << " frames";
@@ -295,8 +303,7 @@ FrameFinding FrameExaminer::State::drift() const {
   const double between = room > 0 ? std::max(0.0, (chi2 - (poses - 1)) / room) : 0;
   const double turn = mean(between, weights);
   const double error = std::sqrt(1 / weights);
-  // Common to all cells is what makes it drift of the radar: what one echo of one pose does may be that echo's own
-  // motion.
+  // A drift of the radar turns all cells alike. A turn of one echo at one pose may be that echo's own motion.
   int cells = 0;
   for (const PoseJudgement* p : used) cells += p->turn_cells;
   const double freedom = std::max(poses, static_cast<double>(cells)) - 1;
@@ -304,7 +311,7 @@ FrameFinding FrameExaminer::State::drift() const {
   const double t = std::abs(turn) / error;
   const boost::math::students_t_distribution<double> student(freedom);
   f.false_alarm_rate = 2 * boost::math::cdf(boost::math::complement(student, t));
-  if (!(f.false_alarm_rate < kFalseAlarm)) return f;
+  if (!(f.false_alarm_rate < bounds::kFramesFalseAlarmRate)) return f;
   f.log_likelihood_gain = 0.5 * t * t;
   const double half = boost::math::quantile(student, 0.975) * error;
   f.parameters = {number("rad_per_frame", "rad", turn, {turn - half, turn + half})};
@@ -336,8 +343,8 @@ FrameFinding FrameExaminer::State::frameGain() const {
   f.cause = "unknown";
   std::size_t frames = 0;
   for (const PoseJudgement& p : judged) frames = std::max(frames, p.frame_gain_db.size());
-  // The median over poses of each frame's level against the pose's other frames, which bursts at some poses do not
-  // move; it changes where it differs between frames by far more than its error over poses.
+  // The median over poses of each frame's level is not moved by bursts at some poses. The gain changes where the median
+  // differs between frames by far more than its error over poses.
   double chi2 = 0, lowest = 0, highest = 0;
   std::size_t lowest_at = 0, highest_at = 0, counted = 0;
   std::vector<double> middle_db(frames, 0.0), scatter_db(frames, std::numeric_limits<double>::infinity());
@@ -347,8 +354,9 @@ FrameFinding FrameExaminer::State::frameGain() const {
     const double middle = middle_db[i] = quantile(levels, 0.5);
     std::vector<double> apart;
     for (double level : levels) apart.push_back(std::abs(level - middle));
-    // Of normal errors: the deviation is 1.48 times the median of sizes, the median's own 1.25 times the mean's.
-    scatter_db[i] = std::max(1.48 * quantile(apart, 0.5), 1e-4);
+    // Normal errors have a deviation of 1.48 times their median size, and the median's own error is 1.25 times the
+    // mean's.
+    scatter_db[i] = std::max(1.48 * quantile(apart, 0.5), kLeastScatter_db);
     const double error = 1.25 * scatter_db[i] / std::sqrt(static_cast<double>(levels.size()));
     chi2 += std::pow(middle / error, 2);
     ++counted;
@@ -361,10 +369,9 @@ FrameFinding FrameExaminer::State::frameGain() const {
       highest_at = i;
     }
   }
-  // A tenth of a decibel matters to nobody, whatever its error.
-  if (counted < 3 || highest - lowest < 0.1) return f;
+  if (counted < 3 || highest - lowest < bounds::kLeastFrameGain_db) return f;
   const double excess = (chi2 - static_cast<double>(counted)) / std::sqrt(2.0 * static_cast<double>(counted));
-  if (excess < 12) return f;
+  if (excess < bounds::kLeastFrameGain_deviations) return f;
   f.log_likelihood_gain = 0.5 * (chi2 - static_cast<double>(counted));
   f.false_alarm_rate = std::exp(-0.5 * excess);
   for (const PoseJudgement& p : judged) f.poses.push_back(p.pose);
@@ -390,12 +397,13 @@ FrameFinding FrameExaminer::State::unsteadiness() const {
   FrameFinding f;
   f.cause = "unknown";
   for (const PoseJudgement& p : judged) {
-    if (p.unsteady_share < kUnsteady) continue;
+    if (p.unsteady_share < bounds::kLeastUnsteadyShare) continue;
     f.poses.push_back(p.pose);
     f.log_likelihood_gain += p.unsteady_nats;
   }
-  if (f.poses.size() < 3 || 3 * f.poses.size() < 2 * judged.size()) return {};
-  f.false_alarm_rate = 1e-6;  // nobody who walks is in half of all bins at two thirds of the poses
+  // Nobody who walks is in half of all bins at two thirds of the poses.
+  if (f.poses.size() < bounds::kFewestUnsteadyPoses || 3 * f.poses.size() < 2 * judged.size()) return {};
+  f.false_alarm_rate = bounds::kFramesFalseAlarmRate;
   f.description = "frames of one pose disagree about what stands, in most of its echoes at once, at " +
                   std::to_string(f.poses.size()) + " of " + std::to_string(judged.size()) +
                   " poses: the radar itself changes from frame to frame";
@@ -404,6 +412,7 @@ FrameFinding FrameExaminer::State::unsteadiness() const {
 
 namespace {
 
+/// True where all poses of a finding are among these.
 bool standsWithin(const FrameFinding& f, const std::set<std::string>& poses) {
   return std::all_of(f.poses.begin(), f.poses.end(), [&](const std::string& p) { return poses.count(p) > 0; });
 }
@@ -415,15 +424,14 @@ std::vector<FrameFinding> FrameExaminer::findings() const {
   std::vector<FrameFinding> all = s.misalignments();
   all.push_back(s.saturation());
   all.push_back(s.packetLoss());
-  // What moves, bursts and turns are told from a radar that is the same in all frames.
+  // Movers, bursts and turns can be told only of a radar that is the same in all frames.
   const bool steady = s.unsteadiness().poses.empty();
   if (steady) {
     all.push_back(s.interference());
     all.push_back(s.drift());
   }
-  // A strong walker pulls the gain that a frame's samples share, and what that leaves looks like a burst; what is left
-  // of bursts looks like something that moves. Of two that stand at the same poses the one with more poses is the
-  // cause.
+  // A strong walker pulls the gain that a frame's samples share, which leaves something like a burst; remainders of
+  // bursts look like something that moves. Where one stands at poses of the other alone, the other is the cause.
   const std::vector<FrameFinding> walkers = steady ? s.locate().walkers : std::vector<FrameFinding>();
   std::set<std::string> walked, hit;
   for (const FrameFinding& walker : walkers) walked.insert(walker.poses.begin(), walker.poses.end());
@@ -446,7 +454,7 @@ std::vector<FrameFinding> FrameExaminer::findings() const {
 std::vector<FrameFinding> FrameExaminer::unexplained() const {
   if (FrameFinding f = state_->unsteadiness(); !f.poses.empty()) return {std::move(f)};
   std::vector<FrameFinding> all = state_->locate().unexplained;
-  // A tone of the radar's own is at most poses; one beat at a few of those with bursts is what is left of these.
+  // A tone of the radar's own is at most poses. A beat at a few of the poses with bursts is a remainder of these.
   const FrameFinding bursts = state_->interference();
   const std::set<std::string> hit(bursts.poses.begin(), bursts.poses.end());
   all.erase(

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <map>
 #include <memory>
 #include <optional>
@@ -15,50 +16,51 @@
 
 namespace mmradartwin::diagnosis::frames {
 
-/// What raw samples and frames show that no average shows.
+/// Finding from raw samples and frames, which no average shows.
 struct FrameFinding {
   /// adc_saturation, packet_loss, packet_misalignment, interference, moving_target or phase_drift; "unknown" among
   /// FrameExaminer::unexplained().
   std::string cause;
-  std::vector<FindingParameter> parameters;  ///< with the cause's names and units
+  std::vector<FindingParameter> parameters;  ///< named as the cause has them
   double log_likelihood_gain = 0;            ///< nats of the frame data
   double false_alarm_rate = 1;               ///< upper bound for the whole session
-  std::vector<std::string> poses;            ///< that carry it
+  std::vector<std::string> poses;            ///< names of those that carry it
   std::vector<FindingPlace> where;
   std::string description;  ///< in words and numbers
-  /// Among FrameExaminer::unexplained(): the twin's term for it where there is one (level_db over one ADC count).
+  /// Mechanism of the twin for an unexplained() finding, where there is one (level_db over one ADC count).
   std::optional<NamedParameters> mechanism;
-  /// Where it is told pose by pose, the nats that it explains at each, by its name; of a term of unexplained() as the
-  /// poses of other locations tell it.
+  /// Nats that it explains at each pose, by the pose's name; empty where it is not told pose by pose. Nats of an
+  /// unexplained() finding are those of numbers read at the poses of other locations.
   std::map<std::string, double> nats_by_pose;
 };
 
-/// Channels of an echo that moves, by range and Doppler, of a radar with many loops per frame.
+/// Echo that moves, as one cell of range and Doppler of a frame with many loops.
 struct MovingCell {
-  int bin = 0;                ///< of range
-  double turn_rad = 0;        ///< from one transmitter's slot to the next
-  double power = 0;           ///< over the noise
-  Eigen::VectorXcd channels;  ///< [M] as delivered, of any common level
+  int bin = 0;                ///< range bin
+  double turn_rad = 0;        ///< phase from one transmitter's slot to the next
+  double power = 0;           ///< ratio to the noise
+  Eigen::VectorXcd channels;  ///< [M] as delivered, up to a common factor
 };
 
-/// What the frames of one pose come to once damaged samples are left out.
+/// Average and statistics of the frames of one pose without damaged samples.
 struct PoseFrames {
   std::string pose;
-  /// Average in ADC counts [M][N], as CoherentAverage's, without lost, clipped and disturbed samples, slips closed and
-  /// frames turned back. Zero where a sample was never fit for use; as delivered where it was always clipped.
+  /// Average in ADC counts [M][N], as CoherentAverage makes it, but without lost, clipped and disturbed samples, with
+  /// slips closed and frames turned back. Samples that were never fit for use are zero; samples that always clipped are
+  /// as delivered.
   ReceiveGrid mean;
-  /// Thermal noise [M]: variance of one complex sample of one shot in counts^2, robust against what moves; rounding
-  /// leaves at least 1/6. The mean carries this over `shots`.
+  /// Noise variance [M] of one complex sample of one shot in counts^2, which movers do not raise; at least the 1/6 of
+  /// rounding. The mean carries this over `shots`.
   std::vector<double> noise_variance;
-  int shots = 0;  ///< whole ones, of frames x loops
-  /// [N] of range: variance of the mean over that of noise alone, 1 but where something moves; empty where nothing
-  /// does.
+  int shots = 0;  ///< number of whole shots among frames x loops
+  /// Ratio [N] by range bin of the mean's variance to that of noise alone: 1 where nothing moves. Empty where nothing
+  /// moves in any bin.
   std::vector<double> unsteadiness;
   std::vector<MovingCell> moving;
 };
 
-/// One streaming pass over a session's captures, pose after pose; keeps statistics, no samples. It needs no scene: raw
-/// bytes, then frames against each other.
+/// Examiner of a session's frames, pose after pose, which keeps statistics and no samples. It needs no scene: it looks
+/// at raw bytes, then at frames against each other.
 class FrameExaminer {
  public:
   /// Throws InputError where the virtual array is no uniform line along y.
@@ -67,11 +69,11 @@ class FrameExaminer {
   FrameExaminer(FrameExaminer&&) noexcept;
   FrameExaminer& operator=(FrameExaminer&&) noexcept;
 
-  /// `frames`: all of the pose, in order. Throws InputError where one has not the radar's shape.
+  /// Examines all frames of a pose, in order. Throws InputError where one has not the radar's shape.
   void addPose(const Pose& pose, const std::vector<AdcCube>& frames);
-  /// By falling gain; empty on a clean session.
+  /// Findings with a cause, by falling gain; empty for a clean session.
   std::vector<FrameFinding> findings() const;
-  /// What differs between frames and is none of the six: body-fixed tones, frames whose common gain changes.
+  /// Differences between frames that are none of the six causes: body-fixed tones, frames whose common gain changes.
   std::vector<FrameFinding> unexplained() const;
   const std::vector<PoseFrames>& poses() const;
 

@@ -2,13 +2,13 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <unsupported/Eigen/FFT>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin::diagnosis::frames {
@@ -16,14 +16,9 @@ namespace {
 
 using Complex = std::complex<float>;
 
-// No converter of these radars has fewer than 8 bits: a signal of fewer codes says nothing about its limits.
-constexpr int kLeastCodes = 256;
-// Codes inside of the outermost one that tell how often it should come.
-constexpr int kNeighbours = 16;
-
-// An echo that moves, with all of its limbs, holds a few neighbouring range bins; a burst sweeps over the whole band.
-constexpr int kEchoesOfBand = 8;        // one is an eighth of it at most
-constexpr double kShareOfEchoes = 0.8;  // of the power, by two of them
+constexpr int kNeighbourCodes = 16;            ///< inside of the outermost one, that tell how often it should come
+constexpr int kEchoesInBand = 8;               ///< a mover with its limbs holds an eighth of the range bins at most
+constexpr double kRoundingVariance = 1.0 / 6;  ///< of a complex value, 1/12 each for I and Q
 
 float medianOf(std::vector<float>& values) {
   const auto middle = values.begin() + static_cast<long>(values.size() / 2);
@@ -32,11 +27,11 @@ float medianOf(std::vector<float>& values) {
   return 0.5f * (*middle + *std::max_element(values.begin(), middle));
 }
 
-/// The same sample of all shots counts as one.
+/// Weight of one value where the same sample of all shots counts as one.
 double frameShare(const FrameStack& s) { return s.shots() > 0 ? 1.0 / s.shots() : 0; }
 
+/// Counts at one end of a histogram, whose element i counts code i - 32768; `share` is the weight of one value.
 RailCounts countRail(const std::vector<int>& histogram, bool high, double share) {
-  // histogram[i] counts code i - 32768.
   RailCounts c;
   const int codes = static_cast<int>(histogram.size());
   int edge = high ? codes - 1 : 0, far = high ? 0 : codes - 1;
@@ -45,10 +40,11 @@ RailCounts countRail(const std::vector<int>& histogram, bool high, double share)
   while (far != edge && histogram[static_cast<std::size_t>(far)] == 0) far -= step;
   c.code = edge - 32768;
   c.at_code = histogram[static_cast<std::size_t>(edge)] * share;
-  const int inside = std::min(kNeighbours, std::abs(edge - far));
+  const int inside = std::min(kNeighbourCodes, std::abs(edge - far));
   double sum = 0;
   for (int i = 1; i <= inside; ++i) sum += histogram[static_cast<std::size_t>(edge + i * step)];
-  c.next_codes = std::abs(edge - far) < kLeastCodes ? std::numeric_limits<double>::infinity() : sum * share / inside;
+  c.next_codes =
+      std::abs(edge - far) < bounds::kLeastCodes ? std::numeric_limits<double>::infinity() : sum * share / inside;
   return c;
 }
 
@@ -104,8 +100,8 @@ Rails countRails(const FrameStack& s) {
 }
 
 double pileUp(const RailCounts& counts) {
-  // The density of a sine's values grows to its ends as 1/sqrt(A^2 - v^2): its outermost code holds 1 + sqrt(2) times
-  // what the next one does. Half a sample more, since neighbours that are not there prove nothing.
+  // The density of a sine's values grows to its ends as 1/sqrt(A^2 - v^2): the outermost code holds 1 + sqrt(2) times
+  // what the next one holds. Half a sample is added, since missing neighbours prove nothing.
   const double expected = (1 + std::sqrt(2.0)) * counts.next_codes + 0.5;
   if (!(counts.at_code > expected)) return 0;
   return counts.at_code * std::log(counts.at_code / expected) - (counts.at_code - expected);
@@ -142,20 +138,19 @@ std::map<std::size_t, Complex> clippedMeans(const ClippedValues& clipped, const 
 
 void dropStandingClipped(const ClippedValues& clipped, const std::vector<Complex>& average, FrameStack& s) {
   for (const auto& [at, count] : clipped.at) {
-    // The average of what is clipped now and then stays below the limit.
+    // A value that clips now and then has an average below the limit.
     if (std::abs(average[at % s.values()]) < 0.8 * clipped.limit) continue;
     s.x[at] = 0;
     s.use[at] = 0;
   }
 }
 
-void countClipped(const ClippedValues& clipped, const Bursts& bursts, FrameStack& s, double& values, double& of) {
+ClippedCount countClipped(const ClippedValues& clipped, const Bursts& bursts, FrameStack& s) {
   const auto chirp = [&](std::size_t at) {
     const std::size_t shot = at / s.values(), channel = at % s.values() / static_cast<std::size_t>(s.samples);
     return shot * static_cast<std::size_t>(s.slots) + channel / static_cast<std::size_t>(s.receivers);
   };
-  values = 0;
-  double used = 0;
+  double values = 0, used = 0;
   for (std::size_t i = 0; i < s.use.size(); ++i) used += 2 * s.use[i];
   for (const auto& [at, count] : clipped.at) {
     if (bursts.hit[chirp(at)]) continue;
@@ -164,15 +159,13 @@ void countClipped(const ClippedValues& clipped, const Bursts& bursts, FrameStack
     s.x[at] = 0;
     s.use[at] = 0;
   }
-  values *= frameShare(s);
-  of = used * frameShare(s);
+  return {values * frameShare(s), used * frameShare(s)};
 }
 
 std::vector<Complex> medianShot(const FrameStack& s) {
   std::vector<Complex> average(s.values());
   std::vector<float> re, im;
   const std::size_t values = s.values();
-  // Blocks of places keep the walk over shots within the cache.
   for (std::size_t i = 0; i < values; ++i) {
     re.clear();
     im.clear();
@@ -216,7 +209,7 @@ std::vector<Complex> commonGains(const FrameStack& s, const std::vector<Complex>
       with += std::complex<double>(std::conj(average[i]) * s.x[base + i]);
       power += std::norm(average[i]);
     }
-    // The average itself carries 1/shots of the noise; ten times all noise in it is a signal.
+    // The average itself carries 1/shots of the noise. Ten times all noise in it is a signal.
     if (power > 10 * noise_variance * static_cast<double>(s.values()) / s.shots()) {
       gains[static_cast<std::size_t>(shot)] = Complex(with / power);
     }
@@ -248,8 +241,7 @@ double differenceVariance(const FrameStack& s) {
       variances.push_back(medianOf(power) / static_cast<float>(2 * std::log(2.0) * window_power));
     }
   }
-  // Rounding of I and Q: 1/12 each.
-  return variances.empty() ? 1.0 / 6 : std::max<double>(medianOf(variances), 1.0 / 6);
+  return variances.empty() ? kRoundingVariance : std::max<double>(medianOf(variances), kRoundingVariance);
 }
 
 void turnFrames(double rad_per_frame, FrameStack& s) {
@@ -262,9 +254,9 @@ void turnFrames(double rad_per_frame, FrameStack& s) {
 
 namespace {
 
-/// Whether most of a power by range bin lies in two groups of neighbouring ones.
+/// True where most of a power by range bin lies in two groups of neighbouring bins.
 bool isOfEchoes(std::vector<float> power) {
-  const std::size_t bins = power.size(), wide = std::max<std::size_t>(1, bins / kEchoesOfBand);
+  const std::size_t bins = power.size(), wide = std::max<std::size_t>(1, bins / kEchoesInBand);
   double left = std::accumulate(power.begin(), power.end(), 0.0);
   const double all = left;
   for (int echo = 0; echo < 2; ++echo) {
@@ -280,112 +272,167 @@ bool isOfEchoes(std::vector<float> power) {
     std::fill_n(power.begin() + static_cast<std::ptrdiff_t>(first), wide, 0.0f);
     left -= most;
   }
-  return left < (1 - kShareOfEchoes) * all;
+  return left < (1 - bounds::kLeastShareOfMovers) * all;
+}
+
+/// One chirp's differences from the average times the shot's gain, at all receivers.
+class ChirpResidual {
+ public:
+  ChirpResidual(const FrameStack& stack, const std::vector<Complex>& average, Complex gain, int shot, int slot)
+      : stack_(stack), average_(average), gain_(gain), shot_(shot), slot_(slot) {}
+  bool used(int receiver, int sample) const { return stack_.use[place(receiver, sample)]; }
+  /// 0 where the value is not to be used.
+  Complex at(int receiver, int sample) const {
+    const std::size_t i = place(receiver, sample);
+    return stack_.use[i] ? stack_.x[i] - gain_ * average_[i % stack_.values()] : Complex(0);
+  }
+  /// Power by range bin, summed over receivers.
+  std::vector<float> spectrum() const {
+    thread_local Eigen::FFT<float> fft(Eigen::FFT<float>::impl_type(), Eigen::FFT<float>::Unscaled);
+    std::vector<Complex> chirp(static_cast<std::size_t>(stack_.samples)), bins(chirp);
+    std::vector<float> power(chirp.size(), 0.0f);
+    for (int r = 0; r < stack_.receivers; ++r) {
+      for (int n = 0; n < stack_.samples; ++n) chirp[static_cast<std::size_t>(n)] = at(r, n);
+      fft.fwd(bins.data(), chirp.data(), stack_.samples);
+      for (std::size_t b = 0; b < power.size(); ++b) power[b] += std::norm(bins[b]);
+    }
+    return power;
+  }
+
+ private:
+  std::size_t place(int receiver, int sample) const {
+    return stack_.at(shot_, slot_ * stack_.receivers + receiver, sample);
+  }
+  const FrameStack& stack_;
+  const std::vector<Complex>& average_;
+  Complex gain_;
+  int shot_, slot_;
+};
+
+/// Samples of a chirp in which it differs most from the average.
+struct BurstWindow {
+  int begin = 0, length = 0;  ///< length 0: none
+  double nats = 0;
+};
+
+/// Looks for bursts in one chirp after the other.
+class BurstSearch {
+ public:
+  BurstSearch(const FrameStack& stack, double noise_variance)
+      : receivers_(stack.receivers),
+        samples_(stack.samples),
+        // Where noise is less than rounding, differences from the median are flips by one code, whose variance is at
+        // most 1/4 for each of I and Q.
+        scale_(std::max(noise_variance, 0.5)),
+        energy_(static_cast<std::size_t>(stack.samples)),
+        sum_(static_cast<std::size_t>(stack.samples) + 1, 0) {
+    // Windows of 1, 2, 4, ... samples up to half a chirp.
+    for (int w = 1; 2 * w <= samples_; w *= 2) {
+      lengths_.push_back(w);
+      thresholds_.push_back(
+          boost::math::gamma_q_inv(static_cast<double>(receivers_) * w, bounds::kBurstWindowFalseAlarmRate) /
+          (receivers_ * w));
+    }
+  }
+  /// Reads the energy of a chirp's samples over the noise; false where none of them is to be used.
+  bool read(const ChirpResidual& chirp) {
+    sorted_.clear();
+    for (int n = 0; n < samples_; ++n) {
+      double e = 0;
+      int count = 0;
+      for (int r = 0; r < receivers_; ++r) {
+        if (!chirp.used(r, n)) continue;
+        e += std::norm(chirp.at(r, n));
+        ++count;
+      }
+      const auto i = static_cast<std::size_t>(n);
+      energy_[i] = static_cast<float>(e / scale_ / receivers_);
+      sum_[i + 1] = sum_[i] + energy_[i];
+      if (count) sorted_.push_back(energy_[i]);
+    }
+    if (sorted_.empty()) return false;
+    // An echo that moves, and a gain that flickers, are in all samples of the chirp.
+    level_ = std::max(1.0, static_cast<double>(medianOf(sorted_)));
+    return true;
+  }
+  /// True where the chirp read last differs from the average as a whole.
+  bool moves() const { return level_ > bounds::kLeastNoiseOfMover; }
+  /// Window of the chirp read last that is most unlike noise and movers.
+  BurstWindow window() const {
+    const double least = moves() ? bounds::kLeastBurstOverMover : 1;
+    BurstWindow best;
+    for (std::size_t l = 0; l < lengths_.size(); ++l) {
+      const int w = lengths_[l];
+      const double threshold = level_ * std::max(thresholds_[l], least);
+      for (int n = 0; n + w <= samples_; n += std::max(1, w / 4)) {
+        const double mean = (sum_[static_cast<std::size_t>(n + w)] - sum_[static_cast<std::size_t>(n)]) / w;
+        if (mean < threshold) continue;
+        const double ratio = mean / level_, nats = receivers_ * w * (ratio - 1 - std::log(ratio));
+        if (nats > best.nats) best = {n, w, nats};
+      }
+    }
+    return best;
+  }
+  /// True where one direction holds most of a window's power beyond noise, and not one receiver alone, which would be a
+  /// fault of its converter.
+  bool isOneWave(const ChirpResidual& chirp, const BurstWindow& window) const {
+    Eigen::MatrixXcd covariance = Eigen::MatrixXcd::Zero(receivers_, receivers_);
+    Eigen::VectorXcd sample(receivers_);
+    for (int n = window.begin; n < window.begin + window.length; ++n) {
+      for (int r = 0; r < receivers_; ++r) sample[r] = std::complex<double>(chirp.at(r, n));
+      covariance += sample * sample.adjoint();
+    }
+    const double noise = scale_ * level_ * window.length, power = covariance.trace().real();
+    const double first = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd>(covariance, Eigen::EigenvaluesOnly)
+                             .eigenvalues()[receivers_ - 1];
+    if (first - noise < bounds::kLeastShareOfOneWave * (power - receivers_ * noise)) return false;
+    return receivers_ == 1 || !(covariance.diagonal().real().maxCoeff() > bounds::kMostShareOfOneReceiver * power);
+  }
+
+ private:
+  int receivers_, samples_;
+  double scale_;                    ///< variance of a sample by noise
+  std::vector<int> lengths_;        ///< of windows
+  std::vector<double> thresholds_;  ///< mean energy of each, that noise does not reach
+  std::vector<float> energy_, sorted_;
+  std::vector<double> sum_;  ///< of the energy of all samples before each
+  double level_ = 1;         ///< usual energy of the chirp's samples, 1 by noise
+};
+
+/// Takes a chirp out of use.
+void dropChirp(int shot, int slot, FrameStack& s) {
+  for (int r = 0; r < s.receivers; ++r) {
+    for (int n = 0; n < s.samples; ++n) {
+      const std::size_t place = s.at(shot, slot * s.receivers + r, n);
+      s.x[place] = 0;
+      s.use[place] = 0;
+    }
+  }
 }
 
 }  // namespace
 
 Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, FrameStack& s) {
-  // Where noise is less than rounding, differences from the median are flips by one code, whose variance is at most 1/4
-  // for each of I and Q.
-  const double scale = std::max(noise_variance, 0.5);
   const std::vector<Complex> gains = commonGains(s, average, noise_variance);
-  // Windows of 1, 2, 4, ... samples up to half a chirp; chance beats a threshold once in 1e12 windows, a session has
-  // some 1e7.
-  std::vector<int> lengths;
-  std::vector<double> thresholds;
-  for (int w = 1; 2 * w <= s.samples; w *= 2) {
-    lengths.push_back(w);
-    thresholds.push_back(boost::math::gamma_q_inv(static_cast<double>(s.receivers) * w, 1e-12) / (s.receivers * w));
-  }
+  BurstSearch search(s, noise_variance);
   Bursts found;
   found.hit.assign(static_cast<std::size_t>(s.shots()) * static_cast<std::size_t>(s.slots), 0);
   std::vector<std::uint8_t> seen(static_cast<std::size_t>(s.frames), 0), hit(seen);
-  std::vector<double> sum(static_cast<std::size_t>(s.samples) + 1, 0);
-  std::vector<float> energy(static_cast<std::size_t>(s.samples)), sorted;
-  Eigen::FFT<float> fft(Eigen::FFT<float>::impl_type(), Eigen::FFT<float>::Unscaled);
-  std::vector<Complex> chirp(static_cast<std::size_t>(s.samples)), spectrum(chirp);
   for (int shot = 0; shot < s.shots(); ++shot) {
+    const auto frame = static_cast<std::size_t>(shot / s.loops);
     for (int slot = 0; slot < s.slots; ++slot) {
-      const Complex gain = gains[static_cast<std::size_t>(shot)];
-      const auto residual = [&](std::size_t at) {
-        return s.use[at] ? s.x[at] - gain * average[at % s.values()] : Complex(0);
-      };
-      sorted.clear();
-      for (int n = 0; n < s.samples; ++n) {
-        double e = 0;
-        int count = 0;
-        for (int r = 0; r < s.receivers; ++r) {
-          const std::size_t at = s.at(shot, slot * s.receivers + r, n);
-          if (!s.use[at]) continue;
-          e += std::norm(residual(at));
-          ++count;
-        }
-        energy[static_cast<std::size_t>(n)] = static_cast<float>(e / scale / s.receivers);
-        sum[static_cast<std::size_t>(n) + 1] = sum[static_cast<std::size_t>(n)] + energy[static_cast<std::size_t>(n)];
-        if (count) sorted.push_back(energy[static_cast<std::size_t>(n)]);
-      }
-      if (sorted.empty()) continue;
-      seen[static_cast<std::size_t>(shot / s.loops)] = 1;
-      // An echo that moves, or gain that flickers, is there in all samples of the chirp. Several such beat, and their
-      // sum is distributed at most as noise is, one sample at each receiver alike: 16 times the median has a chance of
-      // 2^-16 per sample, and thereby none in a window of several.
-      const double level = std::max(1.0, static_cast<double>(medianOf(sorted)));
-      const bool moves = level > 1.5;
-      const double least = moves ? 16 : 1;
-      double best_gain = 0;
-      int best_begin = 0, best_length = 0;
-      for (std::size_t l = 0; l < lengths.size(); ++l) {
-        const int w = lengths[l];
-        const double threshold = level * std::max(thresholds[l], least);
-        for (int n = 0; n + w <= s.samples; n += std::max(1, w / 4)) {
-          const double mean = (sum[static_cast<std::size_t>(n + w)] - sum[static_cast<std::size_t>(n)]) / w;
-          if (mean < threshold) continue;
-          const double ratio = mean / level, nats = s.receivers * w * (ratio - 1 - std::log(ratio));
-          if (nats > best_gain) {
-            best_gain = nats;
-            best_begin = n;
-            best_length = w;
-          }
-        }
-      }
-      if (best_length == 0) continue;
-      if (moves) {  // limbs beat, and now and then all at once
-        std::vector<float> power(chirp.size(), 0.0f);
-        for (int r = 0; r < s.receivers; ++r) {
-          for (int n = 0; n < s.samples; ++n) {
-            chirp[static_cast<std::size_t>(n)] = residual(s.at(shot, slot * s.receivers + r, n));
-          }
-          fft.fwd(spectrum.data(), chirp.data(), s.samples);
-          for (std::size_t b = 0; b < power.size(); ++b) power[b] += std::norm(spectrum[b]);
-        }
-        if (isOfEchoes(std::move(power))) continue;
-      }
-      // One wave at all receivers: one direction holds most of what is not noise.
-      Eigen::MatrixXcd c = Eigen::MatrixXcd::Zero(s.receivers, s.receivers);
-      Eigen::VectorXcd e(s.receivers);
-      for (int n = best_begin; n < best_begin + best_length; ++n) {
-        for (int r = 0; r < s.receivers; ++r) {
-          e[r] = std::complex<double>(residual(s.at(shot, slot * s.receivers + r, n)));
-        }
-        c += e * e.adjoint();
-      }
-      const double noise = scale * level * best_length;
-      const double first =
-          Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd>(c, Eigen::EigenvaluesOnly).eigenvalues()[s.receivers - 1];
-      if (first - noise < 0.7 * (c.trace().real() - s.receivers * noise)) continue;
-      // Not one receiver alone: that is a fault of its converter, no wave.
-      if (s.receivers > 1 && c.diagonal().real().maxCoeff() > 0.9 * c.trace().real()) continue;
-      found.log_likelihood_gain += best_gain;
-      hit[static_cast<std::size_t>(shot / s.loops)] = 1;
+      const ChirpResidual chirp(s, average, gains[static_cast<std::size_t>(shot)], shot, slot);
+      if (!search.read(chirp)) continue;
+      seen[frame] = 1;
+      const BurstWindow window = search.window();
+      if (window.length == 0) continue;
+      // Limbs beat, now and then all at once.
+      if (search.moves() && isOfEchoes(chirp.spectrum())) continue;
+      if (!search.isOneWave(chirp, window)) continue;
+      found.log_likelihood_gain += window.nats;
+      hit[frame] = 1;
       found.hit[static_cast<std::size_t>(shot * s.slots + slot)] = 1;
-      for (int r = 0; r < s.receivers; ++r) {
-        for (int n = 0; n < s.samples; ++n) {
-          const std::size_t at = s.at(shot, slot * s.receivers + r, n);
-          s.x[at] = 0;
-          s.use[at] = 0;
-        }
-      }
+      dropChirp(shot, slot, s);
     }
   }
   for (std::size_t f = 0; f < seen.size(); ++f) {

@@ -14,14 +14,15 @@
 
 namespace mmradartwin::diagnosis::frames {
 
-/// All samples of one pose in ADC counts, [shot][channel][sample]; a shot is one loop of one frame. Values that are not
-/// to be used count nowhere.
+/// Samples of one pose in ADC counts, [shot][channel][sample]; a shot is one loop of one frame. Values that are not to
+/// be used are zero and count nowhere.
 struct FrameStack {
+  /// `order`: payloadOrder() of the radar.
   FrameStack(const RadarConfig& radar, const Payload& payload, const std::vector<int>& order);
 
   int frames = 0, loops = 0, slots = 0, receivers = 0, samples = 0;
   std::vector<std::complex<float>> x;
-  std::vector<std::uint8_t> use;
+  std::vector<std::uint8_t> use;  ///< 0 where a value is not to be used
 
   int shots() const { return frames * loops; }
   int channels() const { return slots * receivers; }
@@ -31,59 +32,65 @@ struct FrameStack {
   }
 };
 
-/// How often the outermost codes of a pose's I and Q values come, in frames of samples (the same sample of all frames
-/// counts as one).
+/// Counts of I and Q values at one end of the codes of a pose; the same sample of all shots counts as one.
 struct RailCounts {
-  int code = 0;           ///< outermost that was seen
-  double at_code = 0;     ///< samples with it
-  double next_codes = 0;  ///< samples per code among up to 16 codes inside of it
+  int code = 0;           ///< outermost one that was seen
+  double at_code = 0;     ///< values with that code
+  double next_codes = 0;  ///< values per code among up to 16 codes inside of it; infinite where the codes are too few
 };
+/// Both ends of the codes.
 struct Rails {
   RailCounts high, low;
   double samples = 0;  ///< I and Q values counted
 };
 Rails countRails(const FrameStack& stack);
-/// More often at its outermost code than a sine of that amplitude is (2.4 times the density inside), and by what
-/// log-likelihood: the code clips.
+/// Nats by which values stand more often at the outermost code than a sine of that amplitude does (2.4 times the
+/// density inside): beyond 0 the code clips.
 double pileUp(const RailCounts& counts);
 
-/// Robust average over shots per channel and sample: the median of I and of Q, [M][N] channel-major.
+/// Median over shots of I and of Q per channel and sample, [M][N] channel-major: an average that single shots do not
+/// move.
 std::vector<std::complex<float>> medianShot(const FrameStack& stack);
+/// Mean over shots per channel and sample, [M][N] channel-major.
 std::vector<std::complex<float>> meanShot(const FrameStack& stack);
-/// Fits every shot's common complex gain to the template, as far as the template stands out of the noise (variance of a
-/// complex sample). 1 where it does not.
+/// Complex gain of every shot that fits it to the average best; 1 where the average does not stand out of the noise.
+/// `noise_variance` is that of a complex sample.
 std::vector<std::complex<float>> commonGains(const FrameStack& stack, const std::vector<std::complex<float>>& average,
                                              double noise_variance);
-/// Variance of a complex sample by differences of successive shots: the median over range bins, which what moves does
-/// not reach, shots and slots, never below what rounding leaves.
+/// Noise variance of a complex sample from differences of successive shots: the median over range bins, which movers do
+/// not reach, then over shots and channels; at least what rounding leaves.
 double differenceVariance(const FrameStack& stack);
 
-/// Turns every frame by so much more than the one before.
+/// Turns frame f by f times an angle.
 void turnFrames(double rad_per_frame, FrameStack& stack);
 
+/// Chirps with interference.
 struct Bursts {
-  int frames = 0;      ///< with samples to look at
+  int frames = 0;      ///< with values to look at
   int hit_frames = 0;  ///< with a burst
   double log_likelihood_gain = 0;
-  std::vector<std::uint8_t> hit;  ///< [shot][slot] chirps taken out of use
+  std::vector<std::uint8_t> hit;  ///< [shot][slot] 1 for chirps taken out of use
 };
-/// Finds energy that is confined to a part of one chirp, the same wave at all receivers and no echo's few range bins,
-/// and takes the chirp out of use.
+/// Finds chirps with energy in a part of the chirp that is one wave at all receivers and more than the few range bins
+/// of an echo, and takes them out of use.
 Bursts dropBursts(const std::vector<std::complex<float>>& average, double noise_variance, FrameStack& stack);
 
-/// Values that stand at a code beyond which there is none, where that code comes far more often than its neighbours.
+/// Values at an outermost code that clips.
 struct ClippedValues {
   std::vector<std::pair<std::size_t, std::uint8_t>> at;  ///< place in the stack, and how many of I and Q
-  double limit = 0;                                      ///< the nearer of both codes, as a size
+  double limit = 0;                                      ///< size of the nearer one of both codes
 };
 ClippedValues clippedValues(const Rails& rails, const FrameStack& stack);
-/// By place in a shot: mean over the shots in which it is clipped, as it was delivered.
+/// Mean of the clipped values at each place of a shot, as they were delivered.
 std::map<std::size_t, std::complex<float>> clippedMeans(const ClippedValues& clipped, const FrameStack& stack);
-/// Takes clipped values out of use where the average comes to the limit too.
+/// Takes clipped values out of use where the average comes close to the limit, too.
 void dropStandingClipped(const ClippedValues& clipped, const std::vector<std::complex<float>>& average,
                          FrameStack& stack);
-/// Takes the others out of use and counts those that no burst drove beyond the limit: I and Q values per shot, and how
-/// many were looked at.
-void countClipped(const ClippedValues& clipped, const Bursts& bursts, FrameStack& stack, double& values, double& of);
+/// Number of I and Q values per shot that are clipped, and of all that were looked at.
+struct ClippedCount {
+  double clipped = 0, counted = 0;
+};
+/// Takes the remaining clipped values out of use and counts those that no burst drove beyond the limit.
+ClippedCount countClipped(const ClippedValues& clipped, const Bursts& bursts, FrameStack& stack);
 
 }  // namespace mmradartwin::diagnosis::frames

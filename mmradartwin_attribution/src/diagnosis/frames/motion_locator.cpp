@@ -3,44 +3,47 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
-#include <map>
+#include <set>
 #include <sstream>
 
-#include "mmradartwin_attribution/ledger.h"
+#include "diagnosis/catalogue/bounds.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::frames {
 namespace {
 
-constexpr double kCell_m = 0.15;  // of the map: about a range bin of the paper's radar
-// A walker and the width of a beam at some metres.
-constexpr double kReach_m = 1.0;
-constexpr std::size_t kMostWalkers = 4;
-// A pose carries a finding from here on: chance makes one cell in 2e4.
-constexpr float kPoseEvidence = 10;
-// Evidence of one pose beyond this convinces no more: several poses that agree on a place weigh more than one alone.
-constexpr float kConvincing = 50;
-// Sidelobes of a window, and what a strong echo does to everything else, stay 20 dB below it.
-constexpr float kBeside = 0.01f;
-// Cells' noise is itself an estimate of some hundred values, good to a tenth: evidence counts less by so much.
-constexpr double kTrust = 0.8;
-// What poses share and a jackknife over them does not see: how often a walk turns, and frames in which its echo fades.
-// Eight walks of 0.35 to 1.2 m/s came out between 19 % slow and 3 % fast.
-constexpr double kWalkError = 0.07;  // of the speed, standard deviation
-const double kLogFalseAlarm = std::log(1e-6);
+constexpr double kCell_m = 0.15;             ///< of the map: about a range bin of the paper's radar
+constexpr int kMostCells = 1000;             ///< of the map, along either axis
+constexpr double kReach_m = 1.0;             ///< of a walker, and the width of a beam at some metres
+constexpr double kAround_m = 0.5;            ///< half the place of a finding
+constexpr double kAround_deg = 10;           ///< half the place of a finding by Doppler
+constexpr std::size_t kMostWalkers = 4;      ///< that are told
+constexpr std::size_t kFewestPlaces = 5;     ///< of a track that counts
+constexpr int kPasses = 3;                   ///< of tracks about a centre that moves with them
+constexpr float kBesideShare = 0.01f;        ///< of a peak, to which sidelobes of the window and of the array reach
+constexpr double kPlaceError_m = 0.3;        ///< of a walk without tracks
+constexpr double kRangeError_m = 0.1;        ///< of a place along the view, about a range bin
+constexpr double kAngleError_rad = 0.035;    ///< of a place across the view: 2 degrees, the array's errors
+constexpr double kLimbSpeeds_m_per_s = 0.1;  ///< between parts of a walking body
 
+const double kLogFalseAlarm = std::log(bounds::kFramesFalseAlarmRate);
+
+/// Place in the map with its evidence, nats.
 struct Place {
   double x_m = 0, y_m = 0, evidence = 0;
 };
 
-float bounded(float evidence) { return evidence / (1 + evidence / kConvincing); }
+/// Evidence of one pose as it counts beside others.
+float bounded(float evidence) { return evidence / (1 + evidence / bounds::kConvincingNatsAtPose); }
 
 double degrees(double rad) { return rad * 180 / M_PI; }
 
-/// Logarithm of the chance that `poses` cells of pure noise add up to `evidence`: each holds half the square of the
-/// positive part of a normal number, E exp(t e) = 1/2 + 1/2 (1 - t)^(-1/2); Chernoff's bound over t.
+/// Logarithm of the chance that `poses` cells of pure noise add up to `evidence`, as Chernoff's bound over t. A cell
+/// holds half the square of the positive part of a normal number, for which E exp(t e) = 1/2 + 1/2 (1 - t)^(-1/2).
 double logChance(double evidence, std::size_t poses) {
   double best = 0;
   for (double t = 0.02; t < 1; t += 0.02) {
@@ -49,7 +52,7 @@ double logChance(double evidence, std::size_t poses) {
   return best;
 }
 
-/// Cell of a place at a pose; false where the place is behind the radar or beyond its range.
+/// View from a pose: cells of places in the map, and places of ranges and azimuths.
 class View {
  public:
   View(const RadarConfig& radar, const PoseMotion& pose)
@@ -58,8 +61,9 @@ class View {
         per_bin_(1 / radar.range_bin_m()),
         per_sine_(2 * radar.virtual_pitch_m() / radar.wavelength_m() * (kAngleBins / 2)),
         bins_(static_cast<int>(pose.evidence.rows())) {}
+  /// Cell of a place; false where the place is behind the radar or beyond its range.
   bool cell(double x_m, double y_m, int& bin, int& beam) const {
-    // At the radar's height: an array along y tells no elevation.
+    // An array along y tells no elevation: the place is taken at the radar's height.
     const Eigen::Vector3d d = R_ * Eigen::Vector3d(x_m - p_.x(), y_m - p_.y(), 0);
     const double r = d.norm();
     if (d.x() <= 0 || r < 1e-3) return false;
@@ -80,6 +84,7 @@ class View {
   int bins_;
 };
 
+/// Search for walkers and for tones of the radar in the evidence of all poses.
 class Search {
  public:
   Search(const RadarConfig& radar, std::vector<PoseMotion> poses) : radar_(radar), poses_(std::move(poses)) {
@@ -96,8 +101,8 @@ class Search {
     const double reach_m = radar_.max_range_m();
     low_.array() -= reach_m;
     high_.array() += reach_m;
-    // Poses far apart make a map of fewer, wider cells rather than an endless one.
-    cell_m_ = std::max(kCell_m, (high_ - low_).maxCoeff() / 1000);
+    // Poses far apart make cells wider, not more.
+    cell_m_ = std::max(kCell_m, (high_ - low_).maxCoeff() / kMostCells);
     columns_ = static_cast<int>((high_.x() - low_.x()) / cell_m_) + 1;
     rows_ = static_cast<int>((high_.y() - low_.y()) / cell_m_) + 1;
   }
@@ -114,16 +119,17 @@ class Search {
       int bin = 0, beam = 0;
       const double fixed = several_places_ ? strongestCell(bin, beam) : 0;
       const auto carry = std::count_if(poses_.begin(), poses_.end(), [&](const PoseMotion& p) {
-        return p.evidence.size() > 0 && p.evidence(bin, beam) > kPoseEvidence;
+        return p.evidence.size() > 0 && p.evidence(bin, beam) > bounds::kLeastNatsAtPose;
       });
-      // Every cell of the map was a try, and every cell of the radar.
+      // Every cell of the map was a try; the radar has fewer cells.
       const double tries = std::log(static_cast<double>(columns_) * rows_);
-      if (carry > 2 && fixed >= place.evidence && tries + logChance(kTrust * fixed, poses_.size()) < kLogFalseAlarm) {
+      if (carry > 2 && fixed >= place.evidence &&
+          tries + logChance(bounds::kTrustInMotion * fixed, poses_.size()) < kLogFalseAlarm) {
         motion.unexplained.push_back(bodyFixed(bin, beam, fixed));
         for (PoseMotion& p : poses_) clear(p, bin * radar_.range_bin_m(), 2.5 * radar_.range_bin_m());
         continue;
       }
-      const double log_chance = tries + logChance(kTrust * place.evidence, poses_.size());
+      const double log_chance = tries + logChance(bounds::kTrustInMotion * place.evidence, poses_.size());
       if (log_chance >= kLogFalseAlarm || motion.walkers.size() == kMostWalkers) break;
       motion.walkers.push_back(walker(place, std::exp(log_chance)));
     }
@@ -131,13 +137,14 @@ class Search {
   }
 
  private:
+  /// Place of the map with most evidence over all poses.
   Place strongestPlace() const {
     std::vector<float> sum(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), 0);
     for (std::size_t i = 0; i < poses_.size(); ++i) {
-      const Eigen::Vector2d at = views_[i].position();
+      const Eigen::Vector2d radar = views_[i].position();
       const double reach_m = radar_.max_range_m();
-      const int c0 = std::max(0, column(at.x() - reach_m)), c1 = std::min(columns_ - 1, column(at.x() + reach_m));
-      const int r0 = std::max(0, row(at.y() - reach_m)), r1 = std::min(rows_ - 1, row(at.y() + reach_m));
+      const int c0 = std::max(0, column(radar.x() - reach_m)), c1 = std::min(columns_ - 1, column(radar.x() + reach_m));
+      const int r0 = std::max(0, row(radar.y() - reach_m)), r1 = std::min(rows_ - 1, row(radar.y() + reach_m));
       if (!(poses_[i].evidence.size() > 0 && poses_[i].evidence.maxCoeff() > 0)) continue;
       for (int r = r0; r <= r1; ++r) {
         for (int c = c0; c <= c1; ++c) {
@@ -150,11 +157,11 @@ class Search {
       }
     }
     const auto best = std::max_element(sum.begin(), sum.end());
-    const auto at = static_cast<int>(best - sum.begin());
-    return {x(at % columns_), y(at / columns_), *best};
+    const auto cell = static_cast<int>(best - sum.begin());
+    return {x(cell % columns_), y(cell / columns_), *best};
   }
 
-  /// The cell that varies most over all poses but those of one location.
+  /// Cell of range and angle that varies most, over all poses but those of one location, and its evidence.
   double strongestCell(int& bin, int& beam, const std::string& without = "") const {
     Eigen::ArrayXXf sum;
     for (const PoseMotion& p : poses_) {
@@ -165,17 +172,18 @@ class Search {
     return sum.size() > 0 ? sum.maxCoeff(&bin, &beam) : 0;
   }
 
+  /// Finding of a tone of the radar's own in a cell.
   FrameFinding bodyFixed(int bin, int beam, double evidence) const {
     FrameFinding f;
     f.cause = "unknown";
     f.log_likelihood_gain = evidence;
-    f.false_alarm_rate = std::min(
-        1.0, std::exp(std::log(static_cast<double>(columns_) * rows_) + logChance(kTrust * evidence, poses_.size())));
+    f.false_alarm_rate = std::min(1.0, std::exp(std::log(static_cast<double>(columns_) * rows_) +
+                                                logChance(bounds::kTrustInMotion * evidence, poses_.size())));
     FindingPlace place;
     const double range_m = bin * radar_.range_bin_m();
     place.range_m = {range_m - radar_.range_bin_m(), range_m + radar_.range_bin_m()};
     for (const PoseMotion& p : poses_) {
-      if (p.evidence.size() > 0 && p.evidence(bin, beam) > kPoseEvidence) f.poses.push_back(p.pose.name);
+      if (p.evidence.size() > 0 && p.evidence(bin, beam) > bounds::kLeastNatsAtPose) f.poses.push_back(p.pose.name);
     }
     place.poses = f.poses;
     f.where = {place};
@@ -193,7 +201,7 @@ class Search {
     return f;
   }
 
-  /// The tone that is fixed to the radar, its level over one count, as the median of what frames show near its cell.
+  /// Tone of the radar's own about a range bin: medians of the echoes there; its level is over one ADC count.
   NamedParameters toneIn(int bin) const {
     std::vector<double> range_m, sine, power;
     const std::vector<double> window = hannWindow(radar_.samples_per_chirp);
@@ -204,7 +212,7 @@ class Search {
         if (std::abs(e.range_m - bin * radar_.range_bin_m()) > 1.5 * radar_.range_bin_m()) continue;
         range_m.push_back(e.range_m);
         sine.push_back(std::sin(e.azimuth_rad));
-        // Of a tone of amplitude A: A^2 (sum w)^2 M / (variance sum w^2).
+        // A tone of amplitude A has snr = A^2 (sum w)^2 M / (variance sum w^2).
         power.push_back(e.snr * p.noise_variance * squares / (sum * sum * radar_.channels()));
       }
     }
@@ -216,7 +224,7 @@ class Search {
     return tone;
   }
 
-  /// Takes what lies in a span of ranges out of a pose.
+  /// Takes the evidence and echoes of a span of ranges out of a pose.
   void clear(PoseMotion& p, double range_m, double half_m) const {
     const int low = std::max(0, static_cast<int>(std::floor((range_m - half_m) / radar_.range_bin_m())));
     const int high = std::min(static_cast<int>(p.evidence.rows()) - 1,
@@ -224,20 +232,21 @@ class Search {
     if (high >= low) {
       const float peak = p.evidence.middleRows(low, high - low + 1).maxCoeff();
       p.evidence.middleRows(low, high - low + 1).setZero();
-      p.evidence = (p.evidence < kBeside * peak).select(0.0f, p.evidence);
+      p.evidence = (p.evidence < kBesideShare * peak).select(0.0f, p.evidence);
     }
     p.echoes.erase(std::remove_if(p.echoes.begin(), p.echoes.end(),
                                   [&](const MovingEcho& e) { return std::abs(e.range_m - range_m) <= half_m; }),
                    p.echoes.end());
   }
 
-  /// Bodies whose speed the frames tell themselves: one walker per place, and per sense of motion at a pose.
-  LocatedMotion dopplerWalkers() const {
-    struct Sighting {
-      std::size_t pose;
-      MovingEcho echo;
-      Eigen::Vector2d at;
-    };
+  struct Sighting {
+    std::size_t pose;
+    MovingEcho echo;
+    Eigen::Vector2d place;  ///< in the map
+  };
+
+  /// Sightings of one walker each: near its strongest one, and to one sense of motion at a pose. Strongest first.
+  std::vector<std::vector<Sighting>> sightingsOfWalkers() const {
     std::vector<Sighting> sightings;
     for (std::size_t i = 0; i < poses_.size(); ++i) {
       for (const MovingEcho& e : poses_[i].echoes) sightings.push_back({i, e, views_[i].map(e.range_m, e.azimuth_rad)});
@@ -247,9 +256,9 @@ class Search {
     std::vector<std::vector<Sighting>> walkers;
     for (const Sighting& s : sightings) {
       const auto known = std::find_if(walkers.begin(), walkers.end(), [&](const std::vector<Sighting>& w) {
-        if ((w.front().at - s.at).norm() > kReach_m) return false;
-        return std::none_of(w.begin(), w.end(), [&](const Sighting& o) {
-          return o.pose == s.pose && o.echo.radial_m_per_s * s.echo.radial_m_per_s < 0;
+        if ((w.front().place - s.place).norm() > kReach_m) return false;
+        return std::none_of(w.begin(), w.end(), [&](const Sighting& other) {
+          return other.pose == s.pose && other.echo.radial_m_per_s * s.echo.radial_m_per_s < 0;
         });
       });
       if (known != walkers.end()) {
@@ -258,92 +267,99 @@ class Search {
         walkers.push_back({s});
       }
     }
+    return walkers;
+  }
+
+  /// Walkers whose speed the frames tell by Doppler: one per place, and per sense of motion at a pose.
+  LocatedMotion dopplerWalkers() const {
     LocatedMotion motion;
-    for (const auto& walker : walkers) {
-      FrameFinding f;
-      f.cause = "moving_target";
-      Eigen::Vector2d center = Eigen::Vector2d::Zero(), squares = center;
-      double weights = 0, speed = 0, speed_squares = 0;
-      FindingPlace place;
-      place.range_m =
-          place.azimuth_deg = {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-      std::set<std::string> names;
-      for (const Sighting& s : walker) {
-        // Good to a range bin along the view and some 2 degrees, the array's errors, across it; a sum of equals.
-        const double v = std::abs(s.echo.radial_m_per_s);
-        center += s.at;
-        squares += s.at.cwiseAbs2();
-        speed += v;
-        speed_squares += v * v;
-        ++weights;
-        f.log_likelihood_gain += s.echo.snr - 1 - std::log(s.echo.snr);
-        const double azimuth_deg = degrees(s.echo.azimuth_rad);
-        place.range_m = {std::min((*place.range_m)[0], s.echo.range_m - 0.5),
-                         std::max((*place.range_m)[1], s.echo.range_m + 0.5)};
-        place.azimuth_deg = {std::min((*place.azimuth_deg)[0], azimuth_deg - 10),
-                             std::max((*place.azimuth_deg)[1], azimuth_deg + 10)};
-        if (names.insert(poses_[s.pose].pose.name).second) f.poses.push_back(poses_[s.pose].pose.name);
-      }
-      // The threshold of a cell was 1e-9; a frame has some 1e4 of them.
-      f.false_alarm_rate = 1e-5;
-      center /= weights;
-      speed /= weights;
-      const double range_m = (center - views_[walker.front().pose].position()).norm();
-      const double resolution_m_per_s = 0.1;  // of a walking body's parts
-      const auto half = [&](double mean_square, double mean, double floor) {
-        return 1.96 * std::hypot(std::sqrt(std::max(0.0, mean_square - mean * mean) / weights), floor);
-      };
-      const double half_x = half(squares.x() / weights, center.x(), std::hypot(0.1, 0.035 * range_m));
-      const double half_y = half(squares.y() / weights, center.y(), std::hypot(0.1, 0.035 * range_m));
-      const double half_v = half(speed_squares / weights, speed, resolution_m_per_s);
-      f.parameters = {{"x_m", "m", center.x(), {{center.x() - half_x, center.x() + half_x}}},
-                      {"y_m", "m", center.y(), {{center.y() - half_y, center.y() + half_y}}},
-                      {"speed_m_per_s", "m/s", speed, {{std::max(0.0, speed - half_v), speed + half_v}}}};
-      place.poses = f.poses;
-      place.x_m = center.x();
-      place.y_m = center.y();
-      f.where = {place};
-      std::ostringstream text;
-      text << "something moves at (" << center.x() << ", " << center.y() << ") m in the map, at "
-           << walker.front().echo.range_m << " m and " << degrees(walker.front().echo.azimuth_rad) << " deg of pose "
-           << poses_[walker.front().pose].pose.name << ", "
-           << (walker.front().echo.radial_m_per_s > 0 ? "away from" : "towards") << " the radar at " << speed << " m/s";
-      f.description = text.str();
-      motion.walkers.push_back(std::move(f));
-    }
+    for (const auto& walker : sightingsOfWalkers()) motion.walkers.push_back(dopplerWalker(walker));
     return motion;
   }
 
+  FrameFinding dopplerWalker(const std::vector<Sighting>& walker) const {
+    FrameFinding f;
+    f.cause = "moving_target";
+    f.false_alarm_rate = bounds::kDopplerFalseAlarmRate;
+    Eigen::Vector2d center = Eigen::Vector2d::Zero(), squares = center;
+    double count = 0, speed = 0, speed_squares = 0;
+    FindingPlace place;
+    place.range_m =
+        place.azimuth_deg = {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+    std::set<std::string> names;
+    for (const Sighting& s : walker) {
+      const double v = std::abs(s.echo.radial_m_per_s);
+      center += s.place;
+      squares += s.place.cwiseAbs2();
+      speed += v;
+      speed_squares += v * v;
+      ++count;
+      f.log_likelihood_gain += s.echo.snr - 1 - std::log(s.echo.snr);
+      const double azimuth_deg = degrees(s.echo.azimuth_rad);
+      place.range_m = {std::min((*place.range_m)[0], s.echo.range_m - kAround_m),
+                       std::max((*place.range_m)[1], s.echo.range_m + kAround_m)};
+      place.azimuth_deg = {std::min((*place.azimuth_deg)[0], azimuth_deg - kAround_deg),
+                           std::max((*place.azimuth_deg)[1], azimuth_deg + kAround_deg)};
+      if (names.insert(poses_[s.pose].pose.name).second) f.poses.push_back(poses_[s.pose].pose.name);
+    }
+    center /= count;
+    speed /= count;
+    const double range_m = (center - views_[walker.front().pose].position()).norm();
+    const auto half = [&](double mean_square, double mean, double floor) {
+      return 1.96 * std::hypot(std::sqrt(std::max(0.0, mean_square - mean * mean) / count), floor);
+    };
+    const double floor_m = std::hypot(kRangeError_m, kAngleError_rad * range_m);
+    const double half_x = half(squares.x() / count, center.x(), floor_m);
+    const double half_y = half(squares.y() / count, center.y(), floor_m);
+    const double half_v = half(speed_squares / count, speed, kLimbSpeeds_m_per_s);
+    f.parameters = {{"x_m", "m", center.x(), {{center.x() - half_x, center.x() + half_x}}},
+                    {"y_m", "m", center.y(), {{center.y() - half_y, center.y() + half_y}}},
+                    {"speed_m_per_s", "m/s", speed, {{std::max(0.0, speed - half_v), speed + half_v}}}};
+    place.poses = f.poses;
+    place.x_m = center.x();
+    place.y_m = center.y();
+    f.where = {place};
+    const Sighting& strongest = walker.front();
+    std::ostringstream text;
+    text << "something moves at (" << center.x() << ", " << center.y() << ") m in the map, at "
+         << strongest.echo.range_m << " m and " << degrees(strongest.echo.azimuth_rad) << " deg of pose "
+         << poses_[strongest.pose].pose.name << ", " << (strongest.echo.radial_m_per_s > 0 ? "away from" : "towards")
+         << " the radar at " << speed << " m/s";
+    f.description = text.str();
+    return f;
+  }
+
+  /// Places of a walker, frame by frame, seen from one pose.
   struct Track {
     std::size_t pose = 0;
     std::vector<int> frame;
-    std::vector<Eigen::Vector2d> at;  ///< map
+    std::vector<Eigen::Vector2d> places;  ///< [frames seen] in the map
     Eigen::Vector2d mean = Eigen::Vector2d::Zero();
     Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
   };
 
-  /// The strongest echo of every frame near a place.
+  /// Track of the strongest echo of every frame near a place.
   Track track(std::size_t pose, const Eigen::Vector2d& place) const {
     Track t;
     t.pose = pose;
     double snr = 0;
     for (const MovingEcho& e : poses_[pose].echoes) {
-      const Eigen::Vector2d at = views_[pose].map(e.range_m, e.azimuth_rad);
-      if ((at - place).norm() > kReach_m) continue;
+      const Eigen::Vector2d seen = views_[pose].map(e.range_m, e.azimuth_rad);
+      if ((seen - place).norm() > kReach_m) continue;
       if (!t.frame.empty() && t.frame.back() == e.frame) {
         if (e.snr <= snr) continue;
-        t.at.back() = at;
+        t.places.back() = seen;
       } else {
         t.frame.push_back(e.frame);
-        t.at.push_back(at);
+        t.places.push_back(seen);
       }
       snr = e.snr;
     }
-    for (const auto& at : t.at) t.mean += at / static_cast<double>(t.at.size());
+    for (const auto& seen : t.places) t.mean += seen / static_cast<double>(t.places.size());
     return t;
   }
 
-  /// Where the walk has its middle: each pose's mean, weighed by how well a pose can know it.
+  /// Middle of a walk: the mean of each pose's track, weighed by how well the pose can know it.
   Eigen::Vector2d middle(std::vector<Track>& tracks, Eigen::Matrix2d& covariance) const {
     Eigen::Matrix2d total = Eigen::Matrix2d::Zero();
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
@@ -351,9 +367,9 @@ class Search {
       const Eigen::Vector2d ray = t.mean - views_[t.pose].position();
       const double r = std::max(ray.norm(), 0.1);
       const Eigen::Vector2d along = ray / r, across(-along.y(), along.x());
-      // A few seconds see part of a walk of some decimetres; angles are good to some 2 degrees, the array's errors.
-      const double part_m = 0.2 / std::sqrt(std::max(1.0, t.at.size() / 20.0));
-      const double range_m = std::hypot(part_m, 0.05), cross_m = std::hypot(part_m, 0.035 * r);
+      // A few seconds see a part of a walk of some decimetres.
+      const double part_m = 0.2 / std::sqrt(std::max(1.0, t.places.size() / 20.0));
+      const double range_m = std::hypot(part_m, 0.05), cross_m = std::hypot(part_m, kAngleError_rad * r);
       t.information =
           along * along.transpose() / (range_m * range_m) + across * across.transpose() / (cross_m * cross_m);
       total += t.information;
@@ -374,14 +390,15 @@ class Search {
     return center;
   }
 
+  /// Speed with its 95 % interval, m/s.
   struct Speed {
     double value = 0, low = 0, high = 0;
   };
 
-  /// Speed^2 of bodies that turn back every straight_s: the mean square of the way between two frames is
-  /// v^2 t^2 (1 - 2/3 t / straight_s) for a time t between them, for the share t / straight_s of ways has a turn in it
-  /// and is a third of v^2 t^2 in the mean; the errors of single places add a constant to each track's.
-  /// misfit: of the mean over tracks, by which one straight_s is better than another.
+  /// Squared speed of bodies that turn back every straight_s. The mean square of the way between two frames, a time t
+  /// apart, is v^2 t^2 (1 - 2/3 t / straight_s): a share t / straight_s of the ways has a turn in it, and its mean
+  /// square is a third of v^2 t^2. Errors of single places add a constant to each track. `misfit` is that of the mean
+  /// over tracks, by which values of straight_s compare.
   double speed2(const std::vector<const Track*>& tracks, double straight_s, double& misfit) const {
     constexpr int kLags = 8;
     double counts[kLags] = {}, means[kLags] = {}, grows[kLags];
@@ -396,7 +413,7 @@ class Search {
         for (std::size_t j = i + 1; j < t->frame.size() && t->frame[j] - t->frame[i] <= kLags; ++j) {
           const int lag = t->frame[j] - t->frame[i] - 1;
           ++count[lag];
-          square[lag] += (t->at[j] - t->at[i]).squaredNorm();
+          square[lag] += (t->places[j] - t->places[i]).squaredNorm();
         }
       }
       double w = 0, mx = 0, my = 0, xx = 0, xy = 0;
@@ -429,7 +446,7 @@ class Search {
     return std::max(0.0, all_slope / all_weight);
   }
 
-  /// With the way between two turns that leaves the least misfit.
+  /// Speed for the time between two turns that leaves the least misfit.
   double speedOf(const std::vector<const Track*>& tracks) const {
     double least = std::numeric_limits<double>::infinity(), best = 0;
     for (double straight_s : {100.0, 2.0, 1.4, 1.0, 0.8, 0.7, 0.65, 0.6, 0.55, 0.5, 0.45}) {
@@ -441,51 +458,66 @@ class Search {
     return best;
   }
 
+  /// Speed with its interval by a jackknife over poses.
   Speed speed(const std::vector<Track>& tracks) const {
     std::vector<const Track*> all;
     for (const Track& t : tracks) all.push_back(&t);
     Speed s;
     s.value = speedOf(all);
-    // Jackknife over poses; a lone one is known to a factor of two.
+    // One or two poses know a speed to a factor of two.
     double variance = 0;
     for (std::size_t i = 0; all.size() > 2 && i < all.size(); ++i) {
       std::vector<const Track*> rest = all;
       rest.erase(rest.begin() + static_cast<long>(i));
       variance += std::pow(speedOf(rest) - s.value, 2);
     }
-    const double half =
-        all.size() > 2 ? 1.96 * std::hypot(std::sqrt(variance * (all.size() - 1.0) / all.size()), kWalkError * s.value)
-                       : s.value;
+    const double half = all.size() > 2 ? 1.96 * std::hypot(std::sqrt(variance * (all.size() - 1.0) / all.size()),
+                                                           bounds::kWalkSpeedError * s.value)
+                                       : s.value;
     s.low = std::max(0.0, s.value - half);
     s.high = s.value + half;
     return s;
   }
 
+  /// Centre of a walk that begins about a place, with its covariance, and the tracks that tell it.
+  struct Walk {
+    Eigen::Vector2d center;
+    Eigen::Matrix2d covariance;
+    std::vector<Track> tracks;
+  };
+
+  Walk walkAbout(const Place& found) const {
+    Walk walk{{found.x_m, found.y_m}, Eigen::Matrix2d::Identity() * kPlaceError_m * kPlaceError_m, {}};
+    for (int pass = 0; pass < kPasses; ++pass) {
+      walk.tracks.clear();
+      for (std::size_t i = 0; i < poses_.size(); ++i) {
+        int bin = 0, beam = 0;
+        if (!views_[i].cell(walk.center.x(), walk.center.y(), bin, beam)) continue;
+        Track t = track(i, walk.center);
+        if (t.places.size() >= kFewestPlaces || (poses_.size() == 1 && !t.places.empty())) {
+          walk.tracks.push_back(std::move(t));
+        }
+      }
+      if (walk.tracks.empty()) break;
+      walk.center = middle(walk.tracks, walk.covariance);
+    }
+    return walk;
+  }
+
+  /// Finding of a walker at a place, whose evidence is taken out of all poses.
   FrameFinding walker(const Place& found, double false_alarm_rate) {
     FrameFinding f;
     f.cause = "moving_target";
     f.false_alarm_rate = std::min(1.0, false_alarm_rate);
-    Eigen::Vector2d center(found.x_m, found.y_m);
-    Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity() * 0.3 * 0.3;
-    std::vector<Track> tracks;
-    for (int pass = 0; pass < 3; ++pass) {
-      tracks.clear();
-      for (std::size_t i = 0; i < poses_.size(); ++i) {
-        int bin = 0, beam = 0;
-        if (!views_[i].cell(center.x(), center.y(), bin, beam)) continue;
-        Track t = track(i, center);
-        if (t.at.size() >= 5 || (poses_.size() == 1 && !t.at.empty())) tracks.push_back(std::move(t));
-      }
-      if (tracks.empty()) break;
-      center = middle(tracks, covariance);
-    }
-    const Speed v = speed(tracks);
+    const Walk walk = walkAbout(found);
+    const Eigen::Vector2d& center = walk.center;
+    const Speed v = speed(walk.tracks);
     const auto interval = [](double value, double variance) {
       const double half = 1.96 * std::sqrt(variance);
       return std::vector<std::array<double, 2>>{{value - half, value + half}};
     };
-    f.parameters = {{"x_m", "m", center.x(), interval(center.x(), covariance(0, 0))},
-                    {"y_m", "m", center.y(), interval(center.y(), covariance(1, 1))},
+    f.parameters = {{"x_m", "m", center.x(), interval(center.x(), walk.covariance(0, 0))},
+                    {"y_m", "m", center.y(), interval(center.y(), walk.covariance(1, 1))},
                     {"speed_m_per_s", "m/s", v.value, {{v.low, v.high}}}};
     for (std::size_t i = 0; i < poses_.size(); ++i) {
       PoseMotion& p = poses_[i];
@@ -494,21 +526,16 @@ class Search {
           Eigen::Vector3d(center.x() - views_[i].position().x(), center.y() - views_[i].position().y(), 0);
       // The walk's middle may be behind the radar and one of its ends before it.
       if (p.evidence.size() == 0 || d.x() < -kReach_m || d.norm() > radar_.max_range_m()) continue;
-      const int bin = static_cast<int>(std::lround(d.norm() / radar_.range_bin_m()));
-      const int around = static_cast<int>(std::ceil(kReach_m / radar_.range_bin_m()));
-      const int high = std::min(static_cast<int>(p.evidence.rows()) - 1, bin + around);
-      const int low = std::clamp(bin - around, 0, high);
-      Eigen::Index peak_bin = 0, peak_beam = 0;
-      const float peak = p.evidence.middleRows(low, high - low + 1).maxCoeff(&peak_bin, &peak_beam);
       const double range_m = (views_[i].position() - center).norm();
-      if (peak > kPoseEvidence) {
+      const float peak = peakAbout(p, d.norm());
+      if (peak > bounds::kLeastNatsAtPose) {
         f.log_likelihood_gain += peak;
         f.poses.push_back(p.pose.name);
         const double azimuth_deg = degrees(std::atan2(d.y(), d.x()));
+        const double around_deg = degrees(kAround_m / std::max(range_m, kAround_m));
         FindingPlace place;
-        place.range_m = {range_m - 0.5, range_m + 0.5};
-        place.azimuth_deg = {azimuth_deg - degrees(0.5 / std::max(range_m, 0.5)),
-                             azimuth_deg + degrees(0.5 / std::max(range_m, 0.5))};
+        place.range_m = {range_m - kAround_m, range_m + kAround_m};
+        place.azimuth_deg = {azimuth_deg - around_deg, azimuth_deg + around_deg};
         place.poses = {p.pose.name};
         place.x_m = center.x();
         place.y_m = center.y();
@@ -522,6 +549,15 @@ class Search {
          << " m/s; seen at " << f.poses.size() << " of " << poses_.size() << " poses";
     f.description = text.str();
     return f;
+  }
+
+  /// Most evidence of a pose within reach of a range, over all angles.
+  float peakAbout(const PoseMotion& p, double range_m) const {
+    const int bin = static_cast<int>(std::lround(range_m / radar_.range_bin_m()));
+    const int around = static_cast<int>(std::ceil(kReach_m / radar_.range_bin_m()));
+    const int high = std::min(static_cast<int>(p.evidence.rows()) - 1, bin + around);
+    const int low = std::clamp(bin - around, 0, high);
+    return p.evidence.middleRows(low, high - low + 1).maxCoeff();
   }
 
   double x(int column) const { return low_.x() + (column + 0.5) * cell_m_; }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <string>
+#include <Eigen/Core>
 #include <vector>
 
 #include "diagnosis/frames/frame_examiner.h"
@@ -10,21 +10,23 @@
 
 namespace mmradartwin::diagnosis::frames {
 
-/// What moved at one pose.
+/// Motion at one pose, as its frames show it.
 struct PoseMotion {
   Pose pose;
   int frames = 0;
-  Eigen::ArrayXXf evidence;  ///< [range][azimuth] nats
+  Eigen::ArrayXXf evidence;  ///< [range][azimuth] nats by which a cell varies more than noise does
   std::vector<MovingEcho> echoes;
-  double noise_variance = 1.0 / 6;  ///< of one complex sample of one shot, mean over channels, counts^2
+  double noise_variance =
+      1.0 / 6;  ///< of one complex sample of one shot, mean over channels, counts^2; rounding by default
 };
 
+/// Motion of a session: walkers with their places in the map, and what moves along with the radar.
 struct LocatedMotion {
   std::vector<FrameFinding> walkers;      ///< moving_target
-  std::vector<FrameFinding> unexplained;  ///< the same cell at every pose: nothing in the room
+  std::vector<FrameFinding> unexplained;  ///< one cell of range and angle at every pose: a tone of the radar
 };
 
-/// Puts what moved into the map: a person is seen from many poses at one place, what is fixed to the radar in one cell.
+/// Locates motion in the map: a person is seen from many poses at one place, a tone of the radar in one cell.
 LocatedMotion locateMotion(const RadarConfig& radar, std::vector<PoseMotion> poses);
 
 }  // namespace mmradartwin::diagnosis::frames

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "mmradartwin_dsp/capture.h"
 
 namespace mmradartwin::diagnosis::frames {
@@ -11,17 +12,15 @@ namespace {
 
 constexpr std::size_t kPacketValues = kPacketBytes / 2;
 
-// A run of zeros is a lost packet where chance makes one run in 1e6 sessions of 1e6 packets.
-const double kPacketEvidence = std::log(1e6) + std::log(1e6);
-// Lost packets in a row that a slip is searched for.
-constexpr int kMostPackets = 4;
+constexpr int kMostPackets = 4;                 ///< lost in a row, that a slip is searched for
+constexpr double kRoundingVariance = 1.0 / 12;  ///< of a value, that rounding alone leaves
 
 struct Run {
   std::size_t begin, end;
 };
 
-/// Runs of zeros of a packet's length or more; at the end of the recording, whose last packet is short, of a sixteenth
-/// of one. Values not to be used and missing frames end a run.
+/// Runs of zeros that are at least as long as a packet, or, at the end of the recording, whose last packet is short, as
+/// a sixteenth of one. Values that are not to be used and missing frames end a run.
 std::vector<Run> zeroRuns(const Payload& p, const std::vector<int>& order) {
   std::vector<Run> runs;
   std::size_t begin = 0;
@@ -36,12 +35,12 @@ std::vector<Run> zeroRuns(const Payload& p, const std::vector<int>& order) {
       finish(p.at(f, 0));
     }
     for (std::size_t i = 0; i < p.frame_values; ++i) {
-      const std::size_t at = p.at(f, i);
-      if (p.use[at] && (p.value[at] == 0 || order[i] < 0)) {
-        if (!inside) begin = at;
+      const std::size_t place = p.at(f, i);
+      if (p.use[place] && (p.value[place] == 0 || order[i] < 0)) {
+        if (!inside) begin = place;
         inside = true;
       } else {
-        finish(at);
+        finish(place);
       }
     }
   }
@@ -49,10 +48,11 @@ std::vector<Run> zeroRuns(const Payload& p, const std::vector<int>& order) {
   return runs;
 }
 
-/// Position in the recording, modulo a packet.
-std::size_t packetPhase(const Payload& p, std::size_t at) {
-  const std::size_t frame = at / p.frame_values;
-  return (p.sequence[frame] % kPacketValues * (p.frame_values % kPacketValues) + at % p.frame_values) % kPacketValues;
+/// Position of a value within its packet, where packets are counted from arming.
+std::size_t packetPhase(const Payload& p, std::size_t place) {
+  const std::size_t frame = place / p.frame_values;
+  return (p.sequence[frame] % kPacketValues * (p.frame_values % kPacketValues) + place % p.frame_values) %
+         kPacketValues;
 }
 
 /// First position from `begin` on where a packet of the given phase starts.
@@ -60,12 +60,134 @@ std::size_t firstPacket(const Payload& p, std::size_t begin, std::size_t phase) 
   return begin + (phase + kPacketValues - packetPhase(p, begin)) % kPacketValues;
 }
 
+/// Squared changes of frames against the frame before.
+struct FrameChanges {
+  std::vector<double> square;  ///< [frame], 0 for the first one
+  double power = 0;            ///< of a frame, mean over all but the first
+};
+
+FrameChanges changesOfFrames(const Payload& p) {
+  FrameChanges changes;
+  changes.square.assign(static_cast<std::size_t>(p.frames), 0);
+  for (int f = 1; f < p.frames; ++f) {
+    double sum = 0;
+    for (std::size_t i = 0; i < p.frame_values; ++i) {
+      const std::size_t now = p.at(f, i), before = p.at(f - 1, i);
+      if (!p.use[now] || !p.use[before]) continue;
+      const double d = static_cast<double>(p.value[now]) - p.value[before];
+      sum += d * d;
+      changes.power += static_cast<double>(p.value[now]) * p.value[now];
+    }
+    changes.square[static_cast<std::size_t>(f)] = sum;
+  }
+  changes.power /= p.frames - 1;
+  return changes;
+}
+
+/// Numbers of the frames that differ from the one before by far more than frames usually do. `least` is the smallest
+/// change that a slip makes. Empty where frames change by as much all the time.
+std::vector<int> jumpingFrames(const FrameChanges& changes, double least) {
+  const int frames = static_cast<int>(changes.square.size());
+  std::vector<double> sorted(changes.square.begin() + 1, changes.square.end());
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<long>(sorted.size() / 2), sorted.end());
+  const double usual = sorted[sorted.size() / 2];
+  // A tone that turns from frame to frame changes all frames, and some other order of samples explains any of these
+  // changes.
+  if (frames > 3 && usual > least) return {};
+  std::vector<int> jumps;
+  for (int f = 1; f < frames; ++f) {
+    const double change = changes.square[static_cast<std::size_t>(f)];
+    if (change > least && (frames == 2 || change > bounds::kLeastSlipOverUsual * usual)) jumps.push_back(f);
+  }
+  return jumps;
+}
+
+/// Mean of the frames of one stretch, and the variance of a value about it.
+struct FrameTemplate {
+  std::vector<double> mean;  ///< [position]
+  double variance = 0;
+};
+
+/// Template from the longest stretch of frames without a jump; empty where a position has no value to use in it.
+std::optional<FrameTemplate> longestStretch(const Payload& p, std::vector<int> jumps) {
+  int first = 0, last = 0;
+  jumps.push_back(p.frames);
+  for (std::size_t i = 0, begin = 0; i < jumps.size(); begin = static_cast<std::size_t>(jumps[i++])) {
+    if (jumps[i] - static_cast<int>(begin) > last - first) {
+      first = static_cast<int>(begin);
+      last = jumps[i];
+    }
+  }
+  std::vector<double> sum(p.frame_values, 0), weight(p.frame_values, 0);
+  double squares = 0;
+  for (int f = first; f < last; ++f) {
+    for (std::size_t i = 0; i < p.frame_values; ++i) {
+      const std::size_t place = p.at(f, i);
+      if (!p.use[place]) continue;
+      const double v = p.value[place];
+      sum[i] += v;
+      squares += v * v;
+      ++weight[i];
+    }
+  }
+  double residual = squares, freedom = 0;
+  for (std::size_t i = 0; i < p.frame_values; ++i) {
+    if (weight[i] == 0) return std::nullopt;
+    residual -= sum[i] * sum[i] / weight[i];
+    freedom += weight[i] - 1;
+    sum[i] /= weight[i];
+  }
+  return FrameTemplate{std::move(sum), std::max(freedom > 0 ? residual / freedom : 0.0, kRoundingVariance)};
+}
+
+/// Blocks of the stream between packet boundaries, and how badly each fits a template.
+class PacketBlocks {
+ public:
+  explicit PacketBlocks(const Payload& p)
+      : payload_(p),
+        origin_(firstPacket(p, 0, 0)),
+        count_((p.value.size() - origin_ + kPacketValues - 1) / kPacketValues + 1) {}
+  std::size_t count() const { return count_; }
+  /// First value of a block, counted from 1.
+  std::size_t position(std::size_t block) const { return origin_ + (block - 1) * kPacketValues; }
+  /// Squared misfit to a template that stands `packets` later, summed over all blocks before each: [count + 1].
+  std::vector<double> misfit(const FrameTemplate& frame, long packets) const {
+    std::vector<double> sum(count_ + 1, 0);
+    const long values = static_cast<long>(payload_.frame_values);
+    const auto turn =
+        static_cast<std::size_t>(((packets * static_cast<long>(kPacketValues)) % values + values) % values);
+    for (std::size_t i = 0; i < payload_.value.size(); ++i) {
+      if (!payload_.use[i]) continue;
+      const double d = payload_.value[i] - frame.mean[(i + turn) % payload_.frame_values];
+      sum[blockOf(i) + 1] += d * d;
+    }
+    std::partial_sum(sum.begin(), sum.end(), sum.begin());
+    return sum;
+  }
+  /// Number of values in use in all blocks before each: [count + 1].
+  std::vector<double> used() const {
+    std::vector<double> sum(count_ + 1, 0);
+    for (std::size_t i = 0; i < payload_.value.size(); ++i) {
+      if (payload_.use[i]) ++sum[blockOf(i) + 1];
+    }
+    std::partial_sum(sum.begin(), sum.end(), sum.begin());
+    return sum;
+  }
+
+ private:
+  std::size_t blockOf(std::size_t i) const { return i < origin_ ? 0 : (i - origin_) / kPacketValues + 1; }
+
+  const Payload& payload_;
+  std::size_t origin_;  ///< first packet boundary in the stream
+  std::size_t count_;
+};
+
 }  // namespace
 
 std::vector<int> payloadOrder(const RadarConfig& radar) {
   const std::size_t cube =
       static_cast<std::size_t>(radar.chirps_per_frame()) * radar.samples_per_chirp * radar.receivers() * 2;
-  // Sends every place's number through the encoder, seven bits at a time, with a bit that tells it from filling.
+  // The encoder moves the number of every place, seven bits at a time, with a bit that tells it from filling.
   std::vector<int> order(radar.bytes_per_frame() / 2, 0);
   std::vector<std::int16_t> digits(cube);
   for (int shift = 0; shift < 28; shift += 7) {
@@ -106,7 +228,7 @@ ZeroedPackets markZeroedPackets(Payload& p, const std::vector<int>& order) {
   const std::vector<Run> runs = zeroRuns(p, order);
   if (runs.empty()) return found;
 
-  // How often each place of a frame is zero outside of these runs, and any place.
+  // Share of zeros outside of these runs, at each position of a frame and at all together.
   std::vector<std::uint8_t> in_run(p.value.size(), 0);
   for (const Run& r : runs) std::fill(&in_run[r.begin], &in_run[0] + r.end, std::uint8_t{1});
   std::vector<int> zeros(p.frame_values, 0), counted(p.frame_values, 0);
@@ -130,11 +252,11 @@ ZeroedPackets markZeroedPackets(Payload& p, const std::vector<int>& order) {
       const std::size_t i = at % p.frame_values;
       if (order[i] >= 0) gain -= std::log((zeros[i] + share) / (counted[i] + 1.0));
     }
-    if (gain <= kPacketEvidence) continue;
+    if (gain <= bounds::kLeastNatsOfZeroedPacket) continue;
     lost.push_back(r);
     gains.push_back(gain);
   }
-  // Packets are counted from arming; a bag may have begun later, then the runs themselves say where packets start.
+  // Packets are counted from arming. A bag may have begun later: then the runs themselves say where packets start.
   const auto packetsAt = [&](std::size_t phase) {
     long long packets = 0;
     for (const Run& r : lost) {
@@ -167,112 +289,35 @@ ZeroedPackets markZeroedPackets(Payload& p, const std::vector<int>& order) {
 
 std::optional<Slip> findSlip(const Payload& p) {
   if (p.frames < 2) return std::nullopt;
-  // A slip puts other samples into every place: frames differ from those before by about twice their power, once.
-  std::vector<double> jump(static_cast<std::size_t>(p.frames), 0);
-  double power = 0;
-  for (int f = 1; f < p.frames; ++f) {
-    double sum = 0;
-    for (std::size_t i = 0; i < p.frame_values; ++i) {
-      const std::size_t now = p.at(f, i), before = p.at(f - 1, i);
-      if (!p.use[now] || !p.use[before]) continue;
-      const double d = static_cast<double>(p.value[now]) - p.value[before];
-      sum += d * d;
-      power += static_cast<double>(p.value[now]) * p.value[now];
-    }
-    jump[static_cast<std::size_t>(f)] = sum;
-  }
-  power /= p.frames - 1;
-  std::vector<double> sorted(jump.begin() + 1, jump.end());
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<long>(sorted.size() / 2), sorted.end());
-  const double usual = sorted[sorted.size() / 2];
-  // The last packet before the frame's end may be all that jumps: a tenth of the power is below any slip's.
-  const double least = 0.1 * power;
-  // Where frames change by as much all the time nothing stands that could slip: of a tone that turns from frame to
-  // frame some other order of samples explains any change.
-  if (p.frames > 3 && usual > least) return std::nullopt;
-  std::vector<int> jumps;
-  for (int f = 1; f < p.frames; ++f) {
-    const double j = jump[static_cast<std::size_t>(f)];
-    if (j > least && (p.frames == 2 || j > 4 * usual)) jumps.push_back(f);
-  }
+  const FrameChanges changes = changesOfFrames(p);
+  const double least = bounds::kLeastSlipShare * changes.power;
+  const std::vector<int> jumps = jumpingFrames(changes, least);
   if (jumps.empty()) return std::nullopt;
+  const std::optional<FrameTemplate> frame = longestStretch(p, jumps);
+  if (!frame) return std::nullopt;
 
-  // The longest stretch of frames without a jump is the template.
-  int first = 0, last = 0;
-  jumps.push_back(p.frames);
-  for (std::size_t i = 0, begin = 0; i < jumps.size(); begin = static_cast<std::size_t>(jumps[i++])) {
-    if (jumps[i] - static_cast<int>(begin) > last - first) {
-      first = static_cast<int>(begin);
-      last = jumps[i];
-    }
-  }
-  std::vector<double> sum(p.frame_values, 0), weight(p.frame_values, 0);
-  double squares = 0;
-  for (int f = first; f < last; ++f) {
-    for (std::size_t i = 0; i < p.frame_values; ++i) {
-      const std::size_t at = p.at(f, i);
-      if (!p.use[at]) continue;
-      const double v = p.value[at];
-      sum[i] += v;
-      squares += v * v;
-      ++weight[i];
-    }
-  }
-  double residual = squares, freedom = 0;
-  for (std::size_t i = 0; i < p.frame_values; ++i) {
-    if (weight[i] == 0) return std::nullopt;
-    residual -= sum[i] * sum[i] / weight[i];
-    freedom += weight[i] - 1;
-    sum[i] /= weight[i];
-  }
-  // Rounding alone leaves 1/12.
-  const double variance = std::max(freedom > 0 ? residual / freedom : 0.0, 1.0 / 12);
-
-  // Misfit of every block between packet boundaries to the template shifted by whole packets.
-  const std::size_t origin = firstPacket(p, 0, 0);
-  const std::size_t blocks = (p.value.size() - origin + kPacketValues - 1) / kPacketValues + 1;
-  const auto blockOf = [&](std::size_t at) { return at < origin ? 0 : (at - origin) / kPacketValues + 1; };
+  const PacketBlocks blocks(p);
+  const std::vector<double> still = blocks.misfit(*frame, 0), used = blocks.used();
+  const std::size_t end = blocks.count();
   std::optional<Slip> best;
-  double best_cost = 0;
-  std::vector<double> still(blocks + 1, 0), used(blocks + 1, 0);
-  const auto misfit = [&](long shift, std::vector<double>& to, bool count) {
-    std::fill(to.begin(), to.end(), 0);
-    const long values = static_cast<long>(p.frame_values);
-    const auto turn = static_cast<std::size_t>(((shift * static_cast<long>(kPacketValues)) % values + values) % values);
-    for (std::size_t at = 0; at < p.value.size(); ++at) {
-      if (!p.use[at]) continue;
-      const double d = p.value[at] - sum[(at + turn) % p.frame_values];
-      to[blockOf(at) + 1] += d * d;
-      if (count) ++used[blockOf(at) + 1];
-    }
-    std::partial_sum(to.begin(), to.end(), to.begin());
-  };
-  misfit(0, still, true);
-  std::partial_sum(used.begin(), used.end(), used.begin());
-  std::vector<double> shifted(blocks + 1, 0);
   for (int packets = 1; packets <= kMostPackets; ++packets) {
     for (const bool template_after : {false, true}) {
-      misfit(template_after ? -packets : packets, shifted, false);
-      for (std::size_t b = 1; b < blocks; ++b) {
-        // Blocks before b are original, those from b on have slipped.
-        const double fit = template_after ? shifted[b] : shifted[blocks] - shifted[b];
-        const double was = template_after ? still[b] : still[blocks] - still[b];
-        const double noise = variance * (template_after ? used[b] : used[blocks] - used[b]);
-        // What was so is unexplained beyond noise; a slip explains nearly all of that, in whatever frames it is. Of a
-        // walker close by, some other order of samples explains half.
-        if (was - noise < least || fit - noise > 0.2 * (was - noise)) continue;
-        const double gain = (was - fit) / (2 * variance);
-        if (!best || gain > best_cost) {
-          best_cost = gain;
-          best = Slip{origin + (b - 1) * kPacketValues, packets, 0};
-        }
+      const std::vector<double> shifted = blocks.misfit(*frame, template_after ? -packets : packets);
+      for (std::size_t b = 1; b < end; ++b) {
+        // Blocks before b stand in place, those from b on have slipped.
+        const double fit = template_after ? shifted[b] : shifted[end] - shifted[b];
+        const double was = template_after ? still[b] : still[end] - still[b];
+        const double noise = frame->variance * (template_after ? used[b] : used[end] - used[b]);
+        if (was - noise < least || fit - noise > bounds::kMostLeftOfSlip * (was - noise)) continue;
+        const double gain = (was - fit) / (2 * frame->variance);
+        if (!best || gain > best->log_likelihood_gain) best = Slip{blocks.position(b), packets, gain};
       }
     }
   }
   // Every boundary and number of packets was a try, each with a sign.
-  const double tries = std::log(2.0 * kMostPackets * static_cast<double>(blocks)) + std::log(1e6);
-  if (!best || best_cost <= tries) return std::nullopt;
-  best->log_likelihood_gain = best_cost;
+  const double tries =
+      std::log(2.0 * kMostPackets * static_cast<double>(end)) + std::log(1 / bounds::kFramesFalseAlarmRate);
+  if (!best || best->log_likelihood_gain <= tries) return std::nullopt;
   return best;
 }
 

@@ -6,21 +6,21 @@
 #include <limits>
 #include <numeric>
 #include <unsupported/Eigen/FFT>
+#include <utility>
+
+#include "diagnosis/catalogue/bounds.h"
 
 namespace mmradartwin::diagnosis::frames {
 namespace {
 
 using Complex = std::complex<float>;
 
-// Loops from which on a frame has a Doppler spectrum worth the name: static echoes take three bins of a Hann window.
-constexpr int kLeastLoops = 16;
-// Of a frame's moving echoes the strongest are kept.
-constexpr std::size_t kEchoesPerFrame = 3;
-constexpr double kLimb_m = 0.75;
-constexpr double kUnsteadyRadar = 0.5;      ///< of the standing echoes: more change with the radar itself
-constexpr double kChance = 6;               ///< standard deviations of a bin's scatter
-constexpr double kAlike = 2;                ///< a body's echo is alike for some frames: its average scatters by more
-constexpr double kLeastOfStrongest = 0.03;  ///< power of the moving cells that are told of
+constexpr int kLeastLoops = 16;             ///< that make a Doppler spectrum: standing echoes take three of its bins
+constexpr std::size_t kEchoesPerFrame = 3;  ///< moving ones, the strongest, that are kept
+constexpr double kLimb_m = 0.75;            ///< between parts of a body
+constexpr double kGhostBefore_m = 1;        ///< by which an echo by way of a wall may seem nearer than its body
+constexpr double kAlike = 2;  ///< frames for which a body's echo is alike, by which its average scatters more
+constexpr int kSkirtBins = 8, kPeakBins = 2;  ///< about a cell, beyond and within: its surroundings
 
 template <typename T>
 T medianOf(std::vector<T> values) {
@@ -29,7 +29,7 @@ T medianOf(std::vector<T> values) {
   return *middle;
 }
 
-/// Of values with weights; 0 of none.
+/// Median of values with weights; 0 without values.
 double weightedMedian(std::vector<std::pair<double, double>>& values) {
   std::sort(values.begin(), values.end());
   double total = 0, sum = 0;
@@ -41,7 +41,7 @@ double weightedMedian(std::vector<std::pair<double, double>>& values) {
   return values.empty() ? 0 : values.back().first;
 }
 
-/// Standard deviation of the median of values that scatter so about it, normally but for outliers.
+/// Standard error of a median, from the scatter of the values about it: normal but for outliers.
 template <typename T>
 double errorOfMedian(std::vector<T> values, double median) {
   for (T& v : values) v = std::abs(v - median);
@@ -53,35 +53,144 @@ Eigen::FFT<float>& fft() {
   return fft;
 }
 
-/// From one chirp's start to the next: as radar.yaml says, else as short as its samples allow.
+/// Time from one chirp's start to the next: as radar.yaml says, else as short as its samples allow.
 double chirpPeriod_s(const RadarConfig& radar) {
   const double sampled_s = radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
   return (std::isfinite(radar.ramp_end_s) ? radar.ramp_end_s : sampled_s) +
          (std::isfinite(radar.idle_s) ? radar.idle_s : 0);
 }
 
-/// Offset of a peak from the middle of three levels, by a parabola through their logarithms: +-1/2 at most.
+/// Offset of a peak from the middle one of three levels, by a parabola through their logarithms; at most 1/2 either
+/// way.
 double peakOffset(double left, double middle, double right) {
   if (!(left > 0 && middle > 0 && right > 0)) return 0;
   const double l = std::log(left), m = std::log(middle), r = std::log(right), curve = l - 2 * m + r;
   return curve < 0 ? std::clamp(0.5 * (l - r) / curve, -0.5, 0.5) : 0;
 }
 
+/// Bodies among the echoes of one frame: arms and legs join the body that they are near and move along with, and echoes
+/// by way of a wall are left out.
+std::vector<MovingEcho> bodiesOf(std::vector<MovingEcho> echoes) {
+  struct Body {
+    MovingEcho echo;
+    double weight, sum_range, sum_azimuth, sum_speed;
+  };
+  std::sort(echoes.begin(), echoes.end(), [](const auto& p, const auto& q) { return p.snr > q.snr; });
+  std::vector<Body> bodies;
+  for (const MovingEcho& echo : echoes) {
+    bool part = false, ghost = false;
+    for (Body& body : bodies) {
+      if (std::abs(echo.range_m - body.echo.range_m) < kLimb_m && echo.radial_m_per_s * body.echo.radial_m_per_s > 0) {
+        body.weight += echo.snr;
+        body.sum_range += echo.snr * echo.range_m;
+        body.sum_azimuth += echo.snr * echo.azimuth_rad;
+        body.sum_speed += echo.snr * echo.radial_m_per_s;
+        part = true;
+        break;
+      }
+      ghost |= echo.range_m > body.echo.range_m - kGhostBefore_m && echo.snr < bounds::kMostGhostShare * body.echo.snr;
+    }
+    if (part || ghost) continue;
+    bodies.push_back(
+        {echo, echo.snr, echo.snr * echo.range_m, echo.snr * echo.azimuth_rad, echo.snr * echo.radial_m_per_s});
+  }
+  std::vector<MovingEcho> means;
+  for (Body& body : bodies) {
+    body.echo.range_m = body.sum_range / body.weight;
+    body.echo.azimuth_rad = body.sum_azimuth / body.weight;
+    body.echo.radial_m_per_s = body.sum_speed / body.weight;
+    means.push_back(body.echo);
+  }
+  return means;
+}
+
 }  // namespace
 
-/// Range spectra of the residuals, shot by shot, of those shots that are nearly whole.
+/// Range spectra of the residuals of those shots that are nearly whole.
 struct ShotExaminer::Spectra {
   int channels = 0, bins = 0;
   std::vector<int> shot;                   ///< numbers of the shots
-  std::vector<Complex> residual;           ///< [shot][bin][channel]; whitened once the noise is known
-  std::vector<Complex> average;            ///< [bin][channel], alike
+  std::vector<Complex> residual;           ///< [shot][bin][channel]; over the noise once readNoise() knows it
+  std::vector<Complex> average;            ///< [bin][channel]; over the noise likewise
   std::vector<std::complex<double>> gain;  ///< [shot] common to all cells, taken out of the residuals
-  int per_frame = 1;
+  int per_frame = 1;                       ///< shots
   const Complex* at(std::size_t i, int bin) const {
     return &residual[(i * static_cast<std::size_t>(bins) + static_cast<std::size_t>(bin)) *
                      static_cast<std::size_t>(channels)];
   }
   Complex* at(std::size_t i, int bin) { return const_cast<Complex*>(std::as_const(*this).at(i, bin)); }
+};
+
+/// Cell of range and Doppler; `turns` are those of the phase over a frame, with their sign.
+struct ShotExaminer::DopplerCell {
+  int bin = 0, doppler = 0, turns = 0;
+};
+
+/// Doppler spectra of one frame's loops: by Hann's window, of unit noise.
+class ShotExaminer::DopplerFrame {
+ public:
+  DopplerFrame(int channels, int bins, int loops)
+      : channels_(channels),
+        bins_(bins),
+        loops_(loops),
+        least_(static_cast<float>(
+            boost::math::gamma_q_inv(static_cast<double>(channels), bounds::kDopplerCellFalseAlarmRate))),
+        spectra_(static_cast<std::size_t>(loops) * static_cast<std::size_t>(bins * channels)),
+        power_(bins, loops) {
+    for (double w : hannWindow(loops)) {
+      window_.push_back(static_cast<float>(w));
+      window_power_ += window_.back() * window_.back();
+    }
+  }
+  int loops() const { return loops_; }
+  float power(int bin, int doppler) const { return power_(bin, doppler); }
+  Eigen::Map<const Eigen::VectorXcf> cell(int bin, int doppler) const {
+    return Eigen::Map<const Eigen::VectorXcf>(&spectra_[static_cast<std::size_t>((doppler * bins_ + bin) * channels_)],
+                                              channels_);
+  }
+  /// Takes the shots from begin to end, all of one frame; loops without a shot count as zero.
+  void transform(const Spectra& s, std::size_t begin, std::size_t end) {
+    std::vector<Complex> in(static_cast<std::size_t>(loops_)), out(in);
+    for (int b = 0; b < bins_; ++b) {
+      for (int k = 0; k < channels_; ++k) {
+        std::fill(in.begin(), in.end(), Complex(0));
+        for (std::size_t i = begin; i < end; ++i) {
+          const auto loop = static_cast<std::size_t>(s.shot[i] % loops_);
+          in[loop] = s.at(i, b)[k] * window_[loop] / std::sqrt(window_power_);
+        }
+        fft().fwd(out.data(), in.data(), loops_);
+        for (int d = 0; d < loops_; ++d) {
+          spectra_[static_cast<std::size_t>((d * bins_ + b) * channels_ + k)] = out[static_cast<std::size_t>(d)];
+        }
+      }
+      for (int d = 0; d < loops_; ++d) power_(b, d) = cell(b, d).squaredNorm();
+    }
+  }
+  /// Cells that stand out of the noise and above their neighbours, by range and Doppler.
+  std::vector<DopplerCell> movingPeaks() const {
+    std::vector<DopplerCell> peaks;
+    for (int b = 1; b + 1 < bins_; ++b) {
+      for (int d = 0; d < loops_; ++d) {
+        const int turns = d < (loops_ + 1) / 2 ? d : d - loops_;
+        // Standing echoes leak into two turns per frame by the window, and flicker there.
+        if (std::abs(turns) <= 2 || power_(b, d) < least_) continue;
+        bool highest = true;
+        for (int i = -1; i <= 1; ++i) {
+          for (int j = -1; j <= 1; ++j) highest &= power_(b, d) >= power_(b + i, (d + j + loops_) % loops_);
+        }
+        if (highest) peaks.push_back({b, d, turns});
+      }
+    }
+    return peaks;
+  }
+
+ private:
+  int channels_, bins_, loops_;
+  float least_;  ///< power that noise in all channels does not reach
+  std::vector<float> window_;
+  float window_power_ = 0;
+  std::vector<Complex> spectra_;  ///< [doppler][bin][channel]
+  Eigen::ArrayXXf power_;         ///< [bin][doppler]
 };
 
 ShotExaminer::ShotExaminer(const RadarConfig& radar) : radar_(radar), chain_(radar) {
@@ -91,6 +200,13 @@ ShotExaminer::ShotExaminer(const RadarConfig& radar) : radar_(radar), chain_(rad
     const double azimuth_rad = axes().azimuth_rad[static_cast<std::size_t>(a)];
     beams_.col(a) = std::isnan(azimuth_rad) ? Eigen::VectorXcf::Zero(radar.channels()) : steering(azimuth_rad);
   }
+}
+
+double ShotExaminer::azimuth_rad(const Eigen::VectorXf& beam, int strongest) const {
+  const double offset =
+      peakOffset(beam[(strongest + kAngleBins - 1) % kAngleBins], beam[strongest], beam[(strongest + 1) % kAngleBins]);
+  const double step = radar_.wavelength_m() / (2 * radar_.virtual_pitch_m()) / (kAngleBins / 2);
+  return std::asin(std::clamp((strongest - kAngleBins / 2 + offset) * step, -1.0, 1.0));
 }
 
 Eigen::VectorXcf ShotExaminer::steering(double azimuth_rad) const {
@@ -142,9 +258,9 @@ ShotExaminer::Spectra ShotExaminer::spectra(const FrameStack& stack, const std::
 double ShotExaminer::commonTurn(const FrameStack& stack) const {
   if (stack.frames < 3) return 0;
   const auto bins = static_cast<std::size_t>(stack.samples);
-  std::vector<std::vector<std::complex<double>>> steps(bins);  ///< of size 1
+  std::vector<std::vector<std::complex<double>>> steps(bins);  // unit phasors from frame to frame
   std::vector<Complex> in(bins), before(bins), now(bins);
-  // One receiver of each slot tells enough about what is strong.
+  // One receiver of each slot tells enough of strong echoes.
   for (int k = 0; k < stack.channels(); k += stack.receivers) {
     int last = -2;
     for (int f = 0; f < stack.frames; ++f) {
@@ -163,7 +279,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
       last = f;
     }
   }
-  // The median of angles about their middle: what bursts do to two steps each counts for no more than that.
+  // The median of angles about their middle: a burst spoils two steps, which the median leaves out.
   struct Turn {
     double rad, error_rad;
   };
@@ -177,7 +293,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
   std::vector<Turn> of_bins;
   std::vector<std::complex<double>> each;
   for (const auto& of_bin : steps) {
-    // Half of the steps may be turned anyhow; noise's add up to a sixth of 40.
+    // Half of the steps may turn anyhow. Forty steps of noise add up to a sixth of their number.
     const std::complex<double> sum = std::accumulate(of_bin.begin(), of_bin.end(), std::complex<double>(0));
     if (!(std::abs(sum) > 0.5 * static_cast<double>(of_bin.size()))) continue;
     of_bins.push_back(middle(of_bin));
@@ -185,7 +301,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
   }
   if (of_bins.empty()) return 0;
   const Turn common = middle(each);
-  // Most of these bins are weak. Those that know better tell how much it is, where they do not turn by themselves.
+  // Most of these bins are weak. Bins count by their own errors, but for those that turn by themselves.
   std::vector<std::pair<double, double>> weighed;
   for (const Turn& t : of_bins) {
     const double apart = std::remainder(t.rad - common.rad, 2 * M_PI);
@@ -201,7 +317,7 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotStati
   result.frame_level.assign(static_cast<std::size_t>(stack.frames), 1);
   const double freedom = static_cast<double>(s.shot.size()) - 1;
   if (freedom < 1) return;
-  // What all cells share, by the weighted median over range bins: what moves is in few of them.
+  // The common gain is the weighted median over range bins: movers are in few of them.
   struct Cell {
     int bin;
     double power;
@@ -224,7 +340,7 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotStati
     }
     return beyond;
   };
-  // A cell that varies by more than a tenth of itself, beyond what is taken to be common, does not tell what is common.
+  // Cells that vary by less than a tenth of themselves beside the common gain.
   const auto steady = [&](const std::vector<std::complex<double>>& beyond) {
     std::vector<Cell> cells;
     for (int b = 0; b < s.bins; ++b) {
@@ -238,7 +354,7 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotStati
     return cells;
   };
   std::vector<Cell> cells = steady(std::vector<std::complex<double>>(s.shot.size(), 0.0)), all;
-  // A gain that itself changes by more than that lets no cell be steady but beside it.
+  // A gain that changes by more than a tenth lets cells be steady only beside it.
   for (int b = 0; b < s.bins; ++b) {
     if (still(b).squaredNorm() > 0) all.push_back({b, still(b).squaredNorm()});
   }
@@ -268,15 +384,18 @@ void ShotExaminer::readSteadiness(const Spectra& s, ShotStatistics& result) cons
         Eigen::Map<const Eigen::VectorXcf>(&s.average[bin * static_cast<std::size_t>(s.channels)], s.channels)
             .squaredNorm();
   }
-  // Noise fills all bins alike: the steadiest hold no more than it.
+  // Noise fills all bins alike: the steadiest bins hold nothing else.
   std::vector<double> sorted = varied;
   std::sort(sorted.begin(), sorted.end());
   const double noise = sorted[sorted.size() / 10];
   double all = 0, unsteady = 0;
   for (std::size_t b = 0; b < varied.size(); ++b) {
-    if (!(standing[b] > 30 * noise)) continue;
+    if (!(standing[b] > bounds::kLeastStandingOverNoise * noise)) continue;
     ++all;
-    if (!(varied[b] > 4 * noise && varied[b] - noise > 0.1 * standing[b])) continue;
+    if (!(varied[b] > bounds::kLeastVariedOverNoise * noise &&
+          varied[b] - noise > bounds::kLeastVariedShare * standing[b])) {
+      continue;
+    }
     ++unsteady;
     const double q = varied[b] / std::max(noise, 1e-30);
     result.unsteady_nats += freedom * s.channels * (q - 1 - std::log(q));
@@ -288,8 +407,8 @@ void ShotExaminer::readNoise(Spectra& s, ShotStatistics& result) const {
   double window_power = 0;
   for (float w : window_) window_power += w * w;
   const double freedom = static_cast<double>(s.shot.size()) - 1;
-  // Whatever moves fills few range bins, noise fills all of them alike: the median over bins, of sums that are Gamma
-  // distributed with the number of shots (Wilson and Hilferty: median = mean (1 - 1/(9 n))^3).
+  // Movers fill few range bins, noise fills all of them alike: the median over bins tells the noise. It is of sums that
+  // are Gamma distributed with the number of shots (Wilson and Hilferty: median = mean (1 - 1/(9 n))^3).
   const double median_of_mean = std::pow(1 - 1 / (9 * std::max(freedom, 1.0)), 3);
   result.noise_variance.assign(static_cast<std::size_t>(s.channels), 1.0 / 6);
   if (freedom < 1) return;
@@ -309,15 +428,15 @@ void ShotExaminer::readNoise(Spectra& s, ShotStatistics& result) const {
 
 void ShotExaminer::readUnsteadiness(const Spectra& s, ShotStatistics& result) const {
   const double values = static_cast<double>(s.shot.size()) * s.channels, freedom = values - s.channels;
-  // A radar that changes itself does so in all its echoes, which are what is to be explained.
-  if (freedom < 1 || result.unsteady_share > kUnsteadyRadar) return;
+  // A radar that itself changes does so in all its echoes, which still are to be explained.
+  if (freedom < 1 || result.unsteady_share > bounds::kLeastUnsteadyShare) return;
   for (int b = 0; b < s.bins; ++b) {
     double power = 0;
     for (std::size_t i = 0; i < s.shot.size(); ++i) {
       power += Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm();
     }
     const double beyond = power / freedom - 1;
-    if (beyond < kChance / std::sqrt(freedom)) continue;
+    if (beyond < bounds::kLeastBinScatter_deviations / std::sqrt(freedom)) continue;
     result.unsteadiness.resize(static_cast<std::size_t>(s.bins), 1.0);
     result.unsteadiness[static_cast<std::size_t>(b)] += kAlike * beyond;
   }
@@ -336,8 +455,8 @@ void ShotExaminer::readEvidence(const Spectra& s, ShotStatistics& result) const 
     }
     c /= static_cast<float>(freedom);
     const Eigen::Map<const Eigen::VectorXcf> still(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
-    // Flicker of a standing echo (phase noise, gain) has that echo's channel vector and some permille of its power:
-    // that direction is left out where so little varies. A body that stands and breathes varies by more.
+    // Flicker of a standing echo (phase noise, gain) has the echo's channel vector and some permille of its power. That
+    // direction is left out where so little varies; a body that stands and breathes varies by more.
     const float standing = still.squaredNorm();
     Eigen::MatrixXcf beams = beams_;
     if (c.trace().real() < 0.01f * standing) {
@@ -349,14 +468,14 @@ void ShotExaminer::readEvidence(const Spectra& s, ShotStatistics& result) const 
       ratio(b, a) = size > 0.2f * static_cast<float>(s.channels) ? beams.col(a).dot(varied.col(a)).real() / size : 1.0f;
     }
   }
-  // Skirts of strong echoes reach over many bins; what is somewhere stands out of its surroundings in range too.
+  // Skirts of strong echoes reach over many bins. A mover stands out of its surroundings in range, too.
   std::vector<float> around;
   for (int a = 0; a < kAngleBins; ++a) {
     for (int b = 0; b < s.bins; ++b) {
       if (ratio(b, a) <= 1) continue;
       around.clear();
-      for (int d = -8; d <= 8; ++d) {
-        if (std::abs(d) > 2 && b + d >= 0 && b + d < s.bins) around.push_back(ratio(b + d, a));
+      for (int d = -kSkirtBins; d <= kSkirtBins; ++d) {
+        if (std::abs(d) > kPeakBins && b + d >= 0 && b + d < s.bins) around.push_back(ratio(b + d, a));
       }
       const double q = ratio(b, a) / std::max(1.0f, medianOf(around));
       if (q > 1) result.evidence(b, a) = static_cast<float>(freedom * (q - 1 - std::log(q)));
@@ -365,8 +484,9 @@ void ShotExaminer::readEvidence(const Spectra& s, ShotStatistics& result) const 
 }
 
 void ShotExaminer::readEchoes(const Spectra& s, ShotStatistics& result) const {
-  // Over all channels a bin holds M times the noise; chance exceeds this once in 1e6 bins.
-  const auto least = static_cast<float>(boost::math::gamma_q_inv(static_cast<double>(s.channels), 1e-6));
+  // A bin holds M times the noise over all channels.
+  const auto least =
+      static_cast<float>(boost::math::gamma_q_inv(static_cast<double>(s.channels), bounds::kMovingBinFalseAlarmRate));
   std::vector<float> power(static_cast<std::size_t>(s.bins));
   Eigen::VectorXf beam(kAngleBins);
   for (std::size_t i = 0; i < s.shot.size(); ++i) {
@@ -381,12 +501,10 @@ void ShotExaminer::readEchoes(const Spectra& s, ShotStatistics& result) const {
       beam = (beams_.adjoint() * Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels)).cwiseAbs2();
       int a = 0;
       const float peak = beam.maxCoeff(&a);
-      const double offset = peakOffset(beam[(a + kAngleBins - 1) % kAngleBins], peak, beam[(a + 1) % kAngleBins]);
-      const double step = radar_.wavelength_m() / (2 * radar_.virtual_pitch_m()) / (kAngleBins / 2);
       MovingEcho echo;
       echo.frame = s.shot[i] / s.per_frame;
       echo.range_m = (b + peakOffset(left, here, right)) * radar_.range_bin_m();
-      echo.azimuth_rad = std::asin(std::clamp((a - kAngleBins / 2 + offset) * step, -1.0, 1.0));
+      echo.azimuth_rad = azimuth_rad(beam, a);
       echo.snr = peak / s.channels;
       echo.radial_m_per_s = std::numeric_limits<double>::quiet_NaN();
       echoes.push_back(echo);
@@ -408,13 +526,13 @@ void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& s, ShotStati
   double spread = 0;
   for (double f : frame) spread += (f - mean_frame) * (f - mean_frame);
   if (!(spread > 0)) return;
-  // The slope of each second bin's phase (a Hann window ties neighbours together), weighed by its own scatter: a cell
-  // in which something moves counts for little.
+  // The turn is the mean slope of phases over every second bin (a Hann window ties neighbours together), weighed by
+  // each bin's own scatter: a bin in which something moves counts for little.
   double weights = 0, weighted = 0, squares = 0, moments = 0;
   for (int b = 0; b < s.bins; b += 2) {
     const Eigen::Map<const Eigen::VectorXcf> still(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
     const double power = still.squaredNorm();
-    // The average's own noise is channels/shots.
+    // The average carries noise of channels/shots.
     if (power < 10 * s.channels / shots || power < 10) continue;
     std::vector<double> phase;
     double mean = 0, slope = 0;
@@ -438,7 +556,7 @@ void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& s, ShotStati
   }
   if (result.turn_cells == 0) return;
   result.turn_rad_per_frame = weighted / weights;
-  // Cells that disagree beyond their scatter widen it (Birge).
+  // Cells that disagree beyond their scatter widen the error (Birge).
   const double chi2 = moments - weighted * weighted / weights;
   const double ratio = result.turn_cells > 1 ? std::max(1.0, chi2 / (result.turn_cells - 1)) : 1.0;
   result.turn_variance = ratio / weights;
@@ -464,124 +582,69 @@ ShotStatistics ShotExaminer::examine(const FrameStack& stack, const std::vector<
 }
 
 void ShotExaminer::readDopplerEchoes(const Spectra& s, ShotStatistics& result) const {
-  const int loops = s.per_frame;
-  const auto least = static_cast<float>(boost::math::gamma_q_inv(static_cast<double>(s.channels), 1e-9));
-  std::vector<float> window;
-  float window_power = 0;
-  for (double w : hannWindow(loops)) {
-    window.push_back(static_cast<float>(w));
-    window_power += window.back() * window.back();
-  }
-  const double per_turn_m_per_s = 0.5 * radar_.wavelength_m() / (loops * radar_.slots() * chirpPeriod_s(radar_));
-  std::vector<Complex> in(static_cast<std::size_t>(loops)), out(in);
-  std::vector<Complex> doppler(static_cast<std::size_t>(loops) * static_cast<std::size_t>(s.bins * s.channels));
-  Eigen::ArrayXXf power(s.bins, loops);
-  const auto cell = [&](int bin, int d) {
-    return Eigen::Map<Eigen::VectorXcf>(&doppler[static_cast<std::size_t>((d * s.bins + bin) * s.channels)],
-                                        s.channels);
-  };
+  DopplerFrame frame(s.channels, s.bins, s.per_frame);
   for (std::size_t begin = 0; begin < s.shot.size();) {
-    const int frame = s.shot[begin] / loops;
+    const int number = s.shot[begin] / s.per_frame;
     std::size_t end = begin;
-    while (end < s.shot.size() && s.shot[end] / loops == frame) ++end;
-    for (int b = 0; b < s.bins; ++b) {
-      for (int k = 0; k < s.channels; ++k) {
-        std::fill(in.begin(), in.end(), Complex(0));
-        for (std::size_t i = begin; i < end; ++i) {
-          const auto loop = static_cast<std::size_t>(s.shot[i] % loops);
-          in[loop] = s.at(i, b)[k] * window[loop] / std::sqrt(window_power);
-        }
-        fft().fwd(out.data(), in.data(), loops);
-        for (int d = 0; d < loops; ++d) cell(b, d)[k] = out[static_cast<std::size_t>(d)];
-      }
-      for (int d = 0; d < loops; ++d) power(b, d) = cell(b, d).squaredNorm();
-    }
+    while (end < s.shot.size() && s.shot[end] / s.per_frame == number) ++end;
+    frame.transform(s, begin, end);
     begin = end;
-
-    struct Peak {
-      MovingEcho echo;
-      double weight, sum_range, sum_azimuth, sum_speed;
-    };
-    std::vector<Peak> peaks;
+    std::vector<MovingEcho> echoes;
     std::vector<MovingCell> cells;
-    for (int b = 1; b + 1 < s.bins; ++b) {
-      for (int d = 0; d < loops; ++d) {
-        const int turns = d < (loops + 1) / 2 ? d : d - loops;
-        // What stands leaks into two turns per frame by the window, and flickers there.
-        if (std::abs(turns) <= 2 || power(b, d) < least) continue;
-        bool highest = true;
-        for (int i = -1; i <= 1; ++i) {
-          for (int j = -1; j <= 1; ++j) highest &= power(b, d) >= power(b + i, (d + j + loops) % loops);
-        }
-        if (!highest) continue;
-        Eigen::VectorXcf v = cell(b, d);
-        MovingCell moving;
-        moving.bin = b;
-        moving.turn_rad = 2 * M_PI * turns / (loops * radar_.slots());
-        moving.power = power(b, d) / static_cast<double>(s.channels);
-        moving.channels = v.cast<std::complex<double>>();
-        for (int k = 0; k < s.channels; ++k) {
-          moving.channels[k] *= std::sqrt(result.noise_variance[static_cast<std::size_t>(k)]);
-        }
-        cells.push_back(std::move(moving));
-        // Later slots see a mover further on its way.
-        for (int k = 0; k < s.channels; ++k) {
-          const int slot = k / radar_.receivers();
-          v[k] *= Complex(std::polar(1.0, -2 * M_PI * turns * slot / (loops * radar_.slots())));
-        }
-        const Eigen::VectorXf beam = (beams_.adjoint() * v).cwiseAbs2();
-        int a = 0;
-        const float peak = beam.maxCoeff(&a);
-        // An echo from one direction has most of its power in one beam; a sum of others' sidelobes has not.
-        if (peak < 0.5f * static_cast<float>(s.channels) * power(b, d)) continue;
-        const double step = radar_.wavelength_m() / (2 * radar_.virtual_pitch_m()) / (kAngleBins / 2);
-        const double offset = peakOffset(beam[(a + kAngleBins - 1) % kAngleBins], peak, beam[(a + 1) % kAngleBins]);
-        const double turn_offset =
-            peakOffset(power(b, (d + loops - 1) % loops), power(b, d), power(b, (d + 1) % loops));
-        Peak p{};
-        p.echo.frame = frame;
-        p.echo.range_m = (b + peakOffset(power(b - 1, d), power(b, d), power(b + 1, d))) * radar_.range_bin_m();
-        p.echo.azimuth_rad = std::asin(std::clamp((a - kAngleBins / 2 + offset) * step, -1.0, 1.0));
-        p.echo.snr = peak / static_cast<float>(s.channels);
-        p.echo.radial_m_per_s = (turns + turn_offset) * per_turn_m_per_s;
-        peaks.push_back(p);
+    for (const DopplerCell& peak : frame.movingPeaks()) {
+      cells.push_back(movingCell(frame, peak, result.noise_variance));
+      if (std::optional<MovingEcho> echo = dopplerEcho(frame, peak)) {
+        echo->frame = number;
+        echoes.push_back(*echo);
       }
     }
-    // Samples that were lost in some channels alone give a strong mover sidelobes in those.
     double strongest = 0;
     for (const MovingCell& c : cells) strongest = std::max(strongest, c.power);
     for (MovingCell& c : cells) {
-      if (c.power > kLeastOfStrongest * strongest) result.cells.push_back(std::move(c));
+      if (c.power > bounds::kLeastShareOfStrongestCell * strongest) result.cells.push_back(std::move(c));
     }
-    std::sort(peaks.begin(), peaks.end(), [](const auto& p, const auto& q) { return p.echo.snr > q.echo.snr; });
-    std::vector<Peak> bodies;
-    for (const Peak& p : peaks) {
-      bool part = false, ghost = false;
-      for (Peak& body : bodies) {
-        // Arms and legs move with the body, near it and to the same side.
-        if (std::abs(p.echo.range_m - body.echo.range_m) < kLimb_m &&
-            p.echo.radial_m_per_s * body.echo.radial_m_per_s > 0) {
-          body.weight += p.echo.snr;
-          body.sum_range += p.echo.snr * p.echo.range_m;
-          body.sum_azimuth += p.echo.snr * p.echo.azimuth_rad;
-          body.sum_speed += p.echo.snr * p.echo.radial_m_per_s;
-          part = true;
-          break;
-        }
-        // By way of a wall a body is seen again, further away and weaker; what is 20 dB below a nearer one may be that.
-        ghost |= p.echo.range_m > body.echo.range_m - 1 && p.echo.snr < 0.01 * body.echo.snr;
-      }
-      if (part || ghost) continue;
-      bodies.push_back({p.echo, p.echo.snr, p.echo.snr * p.echo.range_m, p.echo.snr * p.echo.azimuth_rad,
-                        p.echo.snr * p.echo.radial_m_per_s});
-    }
-    for (Peak& body : bodies) {
-      body.echo.range_m = body.sum_range / body.weight;
-      body.echo.azimuth_rad = body.sum_azimuth / body.weight;
-      body.echo.radial_m_per_s = body.sum_speed / body.weight;
-      result.echoes.push_back(body.echo);
-    }
+    const std::vector<MovingEcho> bodies = bodiesOf(std::move(echoes));
+    result.echoes.insert(result.echoes.end(), bodies.begin(), bodies.end());
   }
+}
+
+MovingCell ShotExaminer::movingCell(const DopplerFrame& frame, const DopplerCell& peak,
+                                    const std::vector<double>& noise_variance) const {
+  MovingCell moving;
+  moving.bin = peak.bin;
+  moving.turn_rad = 2 * M_PI * peak.turns / (frame.loops() * radar_.slots());
+  moving.power = frame.power(peak.bin, peak.doppler) / static_cast<double>(radar_.channels());
+  moving.channels = frame.cell(peak.bin, peak.doppler).cast<std::complex<double>>();
+  for (int k = 0; k < radar_.channels(); ++k) {
+    moving.channels[k] *= std::sqrt(noise_variance[static_cast<std::size_t>(k)]);
+  }
+  return moving;
+}
+
+std::optional<MovingEcho> ShotExaminer::dopplerEcho(const DopplerFrame& frame, const DopplerCell& peak) const {
+  const int loops = frame.loops(), channels = radar_.channels(), b = peak.bin, d = peak.doppler;
+  Eigen::VectorXcf v = frame.cell(b, d);
+  // Later slots see a mover further on its way.
+  for (int k = 0; k < channels; ++k) {
+    const int slot = k / radar_.receivers();
+    v[k] *= Complex(std::polar(1.0, -2 * M_PI * peak.turns * slot / (loops * radar_.slots())));
+  }
+  const Eigen::VectorXf beam = (beams_.adjoint() * v).cwiseAbs2();
+  int a = 0;
+  const float strongest = beam.maxCoeff(&a);
+  if (strongest < static_cast<float>(bounds::kLeastShareOfOneBeam) * static_cast<float>(channels) * frame.power(b, d)) {
+    return std::nullopt;
+  }
+  const double turn_offset =
+      peakOffset(frame.power(b, (d + loops - 1) % loops), frame.power(b, d), frame.power(b, (d + 1) % loops));
+  const double per_turn_m_per_s = 0.5 * radar_.wavelength_m() / (loops * radar_.slots() * chirpPeriod_s(radar_));
+  MovingEcho echo;
+  echo.range_m =
+      (b + peakOffset(frame.power(b - 1, d), frame.power(b, d), frame.power(b + 1, d))) * radar_.range_bin_m();
+  echo.azimuth_rad = azimuth_rad(beam, a);
+  echo.snr = strongest / static_cast<float>(channels);
+  echo.radial_m_per_s = (peak.turns + turn_offset) * per_turn_m_per_s;
+  return echo;
 }
 
 }  // namespace mmradartwin::diagnosis::frames

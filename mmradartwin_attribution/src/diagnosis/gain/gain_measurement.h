@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "diagnosis/channels/channel_data.h"
+#include "diagnosis/fit/diagnosis_context.h"
 #include "diagnosis/fit/hypothesis_fit.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/likelihood/expected_echoes.h"
@@ -17,16 +18,8 @@ namespace mmradartwin::diagnosis::gain {
 /// something was fitted.
 class GainMeasurement {
  public:
-  /// Keeps references.
-  GainMeasurement(const Recording& recording, const Twin& twin, const ChannelData& data, ExpectedEchoes& source,
-                  const ChannelLikelihood& model, HypothesisFitter& fitter, const DiagnosisOptions& options)
-      : recording_(recording),
-        twin_(twin),
-        data_(data),
-        source_(source),
-        model_(model),
-        fitter_(fitter),
-        options_(options) {}
+  /// Keeps a reference.
+  explicit GainMeasurement(DiagnosisContext& context) : context_(context) {}
 
   /// Gain of a fit over `before` in explained power and log-likelihood: each fold of locations is expected with the
   /// values that the other folds gave.
@@ -47,13 +40,7 @@ class GainMeasurement {
                                         const std::vector<double>& actor_range_m);
   EvaluationOptions evaluationOptions() const;
 
-  const Recording& recording_;
-  const Twin& twin_;
-  const ChannelData& data_;
-  ExpectedEchoes& source_;
-  const ChannelLikelihood& model_;
-  HypothesisFitter& fitter_;
-  const DiagnosisOptions& options_;
+  DiagnosisContext& context_;
 };
 
 }  // namespace mmradartwin::diagnosis::gain

@@ -59,7 +59,7 @@ std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<Po
       for (int k = 0; k < channels; ++k) {
         for (int l = 0; l < k; ++l) covariance(l, k) = std::conj(covariance(k, l));
       }
-      const Eigen::VectorXcd y = data.poses[i].y.col(bin);
+      const Eigen::VectorXcd y = data.poses[i].range_spectra.col(bin);
       for (Eigen::Index a = 0; a < weights.cols(); ++a) {
         // |w^T y|^2 and its expectation w^T R conj(w).
         result[i].measured.push_back(std::norm((weights.col(a).transpose() * y)(0)));

@@ -47,11 +47,13 @@ void addMapMetrics(const Recording& recording, const Twin& twin, const ChannelDa
   Recording used = recording;
   used.poses.clear();
   for (const PoseChannels& p : data.poses) {
-    if (p.plain.x.size() == 0) continue;
+    if (p.uncorrected_average.x.size() == 0) continue;
     by_name[p.pose.name] = &p;
     used.poses.push_back(p.pose);
   }
-  const MeasuredBranch measured = [&](const Pose& pose) { return chain.map(by_name.at(pose.name)->plain); };
+  const MeasuredBranch measured = [&](const Pose& pose) {
+    return chain.map(by_name.at(pose.name)->uncorrected_average);
+  };
   const auto fieldsOf = [&](const std::vector<std::vector<NamedParameters>>& folds) {
     std::vector<Twin> twins;
     for (const auto& mechanisms : folds) twins.push_back(twin.changed(mechanisms));

@@ -136,7 +136,7 @@ double Coordinate::value(double scaled_values) const {
   return std::clamp(neutral + scaled_values * (typical - neutral), min, max);
 }
 
-double Coordinate::scaled_values(double v) const {
+double Coordinate::scaled(double v) const {
   if (logarithmic()) return std::pow(10.0, (v - typical) / 10);
   if (reciprocal()) return typical / v;
   return (v - neutral) / (typical - neutral);

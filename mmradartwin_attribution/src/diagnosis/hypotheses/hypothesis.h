@@ -25,7 +25,7 @@ struct Coordinate {
   /// True where it has one side: what is there or not, more or less.
   bool oneSided() const { return logarithmic() || min >= neutral || max <= neutral; }
   double value(double scaled_values) const;
-  double scaled_values(double value) const;
+  double scaled(double value) const;
   /// Derivative of value() by the scale.
   double slope(double scaled_values) const;
 };

@@ -38,9 +38,11 @@ enum Global {
 struct Limits {
   double low, high, step;
 };
-Limits limitsOf(int global, int errors) {
+Limits limitsOf(int global, int errors, const LatentSpread& spread) {
   constexpr double kAny = std::numeric_limits<double>::infinity();
-  if (global >= kActors + errors) return {-kMostRangeError_m, kMostRangeError_m, 0.02};
+  if (global >= kActors + errors) {
+    return {-spread.most_range_error_m, spread.most_range_error_m, spread.actor_range_m};
+  }
   if (global >= kActors) return {-2, 2, 0.5};
   if (global >= kShape) return {-8, 8, 1};
   switch (global) {
@@ -142,7 +144,7 @@ double ChannelLikelihood::noiseOf(int pose, int cell) const {
 
 const std::complex<double>* ChannelLikelihood::dataOf(int pose, int cell) const {
   if (isBeam(cell)) return data_.poses[pose].beams[static_cast<std::size_t>(cell - samples_)].y.data();
-  return data_.poses[pose].y.col(cell).data();
+  return data_.poses[pose].range_spectra.col(cell).data();
 }
 
 void ChannelLikelihood::addApart(int cell, double power, PackedHermitian& to) const {
@@ -165,41 +167,44 @@ void ChannelLikelihood::addRelative(const SessionLatents& n, int cell, PackedHer
   }
 }
 
-std::vector<ChannelLikelihood::GroupLevel> ChannelLikelihood::levels(const PoseEchoes& echoes,
-                                                                     const SessionLatents& n) const {
-  std::vector<GroupLevel> levels;
+ChannelLikelihood::PoseModel ChannelLikelihood::modelOf(const PoseEchoes& echoes, const SessionLatents& n,
+                                                        int pose) const {
+  PoseModel model{echoes, n, pose, {}};
   const double gain = std::exp(n.log_gain);
   const double grazing = std::exp(n.log_graze);
   for (std::size_t i = 0; i < echoes.all(); ++i) {
     const EchoGroup& group = echoes.at(i);
-    levels.push_back({gain * groupGain(group, n) * (echoes.grazes(i) ? grazing : 1), groupShift_m(group, n)});
+    model.levels.push_back({gain * groupGain(group, n) * (echoes.grazes(i) ? grazing : 1), groupShift_m(group, n)});
   }
-  return levels;
+  return model;
 }
 
 double ChannelLikelihood::rangeVariance_m2(const SessionLatents& n) const {
   return accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
 }
 
-PackedHermitian ChannelLikelihood::sigma(const PoseEchoes& echoes, const std::vector<GroupLevel>& levels,
-                                         const SessionLatents& n, int pose, int cell) const {
-  const int at = isBeam(cell) ? cell - samples_ : cell;
+PackedHermitian ChannelLikelihood::sigma(const PoseModel& model, int cell) const {
+  const SessionLatents& n = model.nuisance;
   PackedHermitian s(channels_);
   PackedTurn turn;
   const double range_variance = rangeVariance_m2(n);
-  for (std::size_t i = 0; i < echoes.all(); ++i) {
-    const EchoGroup& g = echoes.at(i);
-    const auto f = (isBeam(cell) ? g.beams : g.bins).at(at, size_);
-    if (!f) continue;
-    const auto [u, shift] = levels[i];
-    turn.set(apart_, turnOf(n.yaw_rad[pose], *f));
-    s.addTurned({f->power, f->shift, f->curvature}, {u, u * shift, u * (shift * shift + range_variance)}, turn);
+  for (std::size_t i = 0; i < model.echoes.all(); ++i) {
+    const auto fields = fieldsOf(model.echoes.at(i), cell);
+    if (!fields) continue;
+    const auto [u, shift] = model.levels[i];
+    turn.set(apart_, turnOf(n.yaw_rad[model.pose], *fields));
+    s.addTurned({fields->power, fields->shift, fields->curvature}, {u, u * shift, u * (shift * shift + range_variance)},
+                turn);
   }
   // The channels' independent share keeps the matrix definite where the first-order terms alone would not.
   if (s.trace() > 0) addRelative(n, cell, s);
-  addApart(cell, noiseOf(pose, cell), s);
-  addClutter(n, pose, cell, 1, s);
+  addApart(cell, noiseOf(model.pose, cell), s);
+  addClutter(n, model.pose, cell, 1, s);
   return s;
+}
+
+std::optional<EchoGroup::Cell> ChannelLikelihood::fieldsOf(const EchoGroup& group, int cell) const {
+  return isBeam(cell) ? group.beams.at(cell - samples_, size_) : group.bins.at(cell, size_);
 }
 
 double ChannelLikelihood::prior(const SessionLatents& n) const {
@@ -214,9 +219,9 @@ double ChannelLikelihood::poseLikelihood(const PoseEchoes& echoes, const Session
   double sum = 0;
   InverseFactor factor;
   std::array<std::complex<double>, kMaxChannels> y;
-  const std::vector<GroupLevel> level = levels(echoes, n);
+  const PoseModel model = modelOf(echoes, n, pose);
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
-    if (!factor.compute(sigma(echoes, level, n, pose, cell))) return -1e9;
+    if (!factor.compute(sigma(model, cell))) return -1e9;
     factor.apply(dataOf(pose, cell), y.data());
     double q = 0;
     for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
@@ -273,114 +278,147 @@ SessionCovariance ChannelLikelihood::covariance(const std::vector<PoseEchoes>& e
   return result;
 }
 
-void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents& n, int pose, bool keep,
-                                 PoseBasis& out) const {
-  const int globals = n.globals(), heading = globals;
-  const int numbers = channels_ * channels_;
-  out.score = Eigen::VectorXd::Zero(globals + 1);
-  out.information = Eigen::MatrixXd::Zero(globals + 1, globals + 1);
-  out.log_likelihood = 0;
-  out.bins.clear();
-  const double relative = std::exp(n.log_relative);
-  const double range_variance = rangeVariance_m2(n);
-  // Only directions that act in a cell enter its products.
-  std::vector<int> active;
-  PackedTurn turn;
-  PackedHermitian own(channels_);  // covariance of one group
-  std::vector<char> is_active(static_cast<std::size_t>(globals + 1));
-  std::vector<PackedHermitian> raw(static_cast<std::size_t>(globals + 1), PackedHermitian(channels_));
-  const auto touch = [&](int j) -> PackedHermitian& {
-    if (!is_active[j]) {
-      is_active[j] = 1;
+/// Changes of one cell's covariance by the globals and the heading. Only directions that act in the cell enter its
+/// products. The memory is kept from cell to cell.
+struct ChannelLikelihood::CellDirections {
+  CellDirections(int count, int channels)
+      : acts(static_cast<std::size_t>(count)),
+        raw(static_cast<std::size_t>(count), PackedHermitian(channels)),
+        whitened(channels * channels, count),
+        products(static_cast<std::size_t>(count * count)) {}
+  void clear() {
+    for (int j : active) acts[j] = 0;
+    active.clear();
+  }
+  PackedHermitian& touch(int j) {
+    if (!acts[j]) {
+      acts[j] = 1;
       active.push_back(j);
       raw[j].setZero();
     }
     return raw[j];
-  };
+  }
+
+  std::vector<int> active;
+  std::vector<char> acts;
+  std::vector<PackedHermitian> raw;
+  Eigen::MatrixXd whitened;      ///< [M^2][count] the active directions, in the first columns
+  std::vector<double> products;  ///< of the active directions in pairs
+};
+
+void ChannelLikelihood::addEchoDirections(const PoseModel& model, int cell, const PackedHermitian& inverse,
+                                          CellDirections& to) const {
+  const SessionLatents& n = model.nuisance;
+  const int heading = n.globals();
+  const double range_variance = rangeVariance_m2(n);
+  PackedTurn turn;
+  PackedHermitian own(channels_);  // covariance of one group
+  for (std::size_t i = 0; i < model.echoes.all(); ++i) {
+    const EchoGroup& g = model.echoes.at(i);
+    const auto fields = fieldsOf(g, cell);
+    if (!fields) continue;
+    const std::complex<float>*power = fields->power, *shift = fields->shift, *curvature = fields->curvature;
+    const auto [f, moved] = model.levels[i];
+    const double share = inverse.traceOfProduct(power) + kMoved_m * kMoved_m * inverse.traceOfProduct(curvature);
+    if (f * share < kNegligibleShare) continue;
+    turn.set(apart_, turnOf(n.yaw_rad[model.pose], *fields));
+    own.setZero();
+    own.addTurned({power, shift, curvature}, {f, f * moved, f * (moved * moved + range_variance)}, turn);
+    for (int actor : g.actors) {
+      const int a = static_cast<int>(errorOf(actor, static_cast<std::size_t>(errors_)));
+      to.touch(kActors + a).add(own, 1);
+      to.touch(kActors + errors_ + a).addTurned({nullptr, shift, curvature}, {0, f, 2 * f * moved}, turn);
+    }
+    if (model.echoes.grazes(i)) to.touch(kGraze).add(own, 1);
+    to.touch(kRange).addTurned({curvature, nullptr, nullptr}, {f * range_variance, 0, 0}, turn);
+    const double by_yaw = turnOf(1, *fields);
+    if (by_yaw != 0) to.touch(heading).addTurnDerivative(own, by_yaw, apart_);
+  }
+  for (int j : to.active) {  // a heading's trace is 0
+    if (j != heading) addRelative(n, cell, to.raw[j]);
+  }
+}
+
+void ChannelLikelihood::addLevelDirections(const PoseModel& model, int cell, const PackedHermitian& covariance,
+                                           CellDirections& to) const {
+  const SessionLatents& n = model.nuisance;
+  const double relative = std::exp(n.log_relative);
+  PackedHermitian& floor = to.touch(kFloor);
+  addClutter(n, model.pose, cell, 1, floor);
+  const auto [shape_at, shape_share] = shapeAt(binOf(model.pose, cell));
+  to.touch(kShape + shape_at).add(floor, 1 - shape_share);
+  to.touch(kShape + shape_at + 1).add(floor, shape_share);
+  PackedHermitian& level = to.touch(kGain);
+  level.add(covariance, 1);
+  level.add(floor, -1);
+  addApart(cell, -noiseOf(model.pose, cell), level);
+  const double mean = level.trace() / channels_ / (1 + relative + (isBeam(cell) ? kBeamShare : 0));
+  addApart(cell, relative * mean, to.touch(kRelative));
+}
+
+void ChannelLikelihood::addProducts(CellDirections& directions, BinBasis& basis, PoseBasis& out) const {
+  const int numbers = channels_ * channels_, count = static_cast<int>(directions.active.size());
+  const std::vector<int>& active = directions.active;
+  Eigen::MatrixXd& whitened = directions.whitened;
+  std::vector<double>& products = directions.products;
+  for (int a = 0; a < count; ++a) basis.factor.whiten(directions.raw[active[a]], whitened.col(a).data());
+  const Eigen::VectorXd score = whitened.leftCols(count).transpose() * basis.data;
+  pairProducts(whitened.data(), numbers, count, products.data());
+  basis.traces.resize(count);
+  for (std::size_t a = 0; a < active.size(); ++a) {
+    const Eigen::Index ia = static_cast<Eigen::Index>(a);
+    basis.traces[ia] = traceOfWhitened(whitened.col(ia).data(), channels_);
+    out.score[active[a]] += weight() * score[ia];
+    for (std::size_t b = 0; b <= a; ++b) {
+      const Eigen::Index ib = static_cast<Eigen::Index>(b);
+      const double v = weight() * informationOf(products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
+      out.information(active[a], active[b]) += v;
+      if (a != b) out.information(active[b], active[a]) += v;
+    }
+  }
+}
+
+void ChannelLikelihood::setData(const std::complex<double>* y, double w, BinBasis& basis) const {
+  basis.data.resize(channels_ * channels_);
+  int i = 0;
+  for (int k = 0; k < channels_; ++k) {
+    basis.data[i++] = w * std::norm(y[k]) - 1;
+    for (int l = 0; l < k; ++l) {
+      const std::complex<double> v = w * y[k] * std::conj(y[l]);
+      basis.data[i++] = M_SQRT2 * v.real();
+      basis.data[i++] = M_SQRT2 * v.imag();
+    }
+  }
+}
+
+void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents& n, int pose, bool keep,
+                                 PoseBasis& out) const {
+  const int globals = n.globals();
+  out.score = Eigen::VectorXd::Zero(globals + 1);
+  out.information = Eigen::MatrixXd::Zero(globals + 1, globals + 1);
+  out.log_likelihood = 0;
+  out.bins.clear();
+  const PoseModel model = modelOf(echoes, n, pose);
+  CellDirections directions(globals + 1, channels_);
   std::array<std::complex<double>, kMaxChannels> y;
-  const std::vector<GroupLevel> of_groups = levels(echoes, n);
-  std::vector<double> products(static_cast<std::size_t>((globals + 1) * (globals + 1)));
   BinBasis basis;
-  Eigen::MatrixXd whitened(numbers, globals + 1);  // the active directions, in the first columns
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
-    for (int j : active) is_active[j] = 0;
-    active.clear();
-    const int at = isBeam(cell) ? cell - samples_ : cell;
-    const PackedHermitian s = sigma(echoes, of_groups, n, pose, cell);
+    directions.clear();
+    const PackedHermitian covariance = sigma(model, cell);
     basis.cell = cell;
-    if (!basis.factor.compute(s)) continue;
+    if (!basis.factor.compute(covariance)) continue;
     basis.factor.apply(dataOf(pose, cell), y.data());
     double q = 0;
     for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
     const double w = (channels_ + kTailFreedom) / (kTailFreedom + q);
-    const PackedHermitian inverse = basis.factor.inverse();
     out.log_likelihood += -basis.factor.logDeterminant() - (channels_ + kTailFreedom) * std::log1p(q / kTailFreedom);
-
-    for (std::size_t i = 0; i < echoes.all(); ++i) {
-      const EchoGroup& g = echoes.at(i);
-      const auto fields = (isBeam(cell) ? g.beams : g.bins).at(at, size_);
-      if (!fields) continue;
-      const std::complex<float>*power = fields->power, *shift = fields->shift, *curvature = fields->curvature;
-      const auto [f, moved] = of_groups[i];
-      const double share = inverse.traceOfProduct(power) + kMoved_m * kMoved_m * inverse.traceOfProduct(curvature);
-      if (f * share < kNegligibleShare) continue;
-      turn.set(apart_, turnOf(n.yaw_rad[pose], *fields));
-      own.setZero();
-      own.addTurned({power, shift, curvature}, {f, f * moved, f * (moved * moved + range_variance)}, turn);
-      for (int actor : g.actors) {
-        const int a = static_cast<int>(errorOf(actor, static_cast<std::size_t>(errors_)));
-        touch(kActors + a).add(own, 1);
-        touch(kActors + errors_ + a).addTurned({nullptr, shift, curvature}, {0, f, 2 * f * moved}, turn);
-      }
-      if (echoes.grazes(i)) touch(kGraze).add(own, 1);
-      touch(kRange).addTurned({curvature, nullptr, nullptr}, {f * range_variance, 0, 0}, turn);
-      const double by_yaw = turnOf(1, *fields);
-      if (by_yaw != 0) touch(heading).addTurnDerivative(own, by_yaw, apart_);
-    }
-    for (int j : active) {  // a heading's trace is 0
-      if (j != heading) addRelative(n, cell, raw[j]);
-    }
-    PackedHermitian& floor = touch(kFloor);
-    addClutter(n, pose, cell, 1, floor);
-    const auto [shape_at, shape_share] = shapeAt(binOf(pose, cell));
-    touch(kShape + shape_at).add(floor, 1 - shape_share);
-    touch(kShape + shape_at + 1).add(floor, shape_share);
-    PackedHermitian& level = touch(kGain);
-    level.add(s, 1);
-    level.add(floor, -1);
-    addApart(cell, -noiseOf(pose, cell), level);
-    const double mean = level.trace() / channels_ / (1 + relative + (isBeam(cell) ? kBeamShare : 0));
-    addApart(cell, relative * mean, touch(kRelative));
-    basis.active = active;
-    const int count = static_cast<int>(active.size());
-    for (int a = 0; a < count; ++a) basis.factor.whiten(raw[active[a]], whitened.col(a).data());
-    // The data in the same numbers: w y y^H - I.
-    basis.data.resize(numbers);
-    int i = 0;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(channels_); ++k) {
-      basis.data[i++] = w * std::norm(y[k]) - 1;
-      for (std::size_t l = 0; l < k; ++l) {
-        const std::complex<double> v = w * y[k] * std::conj(y[l]);
-        basis.data[i++] = M_SQRT2 * v.real();
-        basis.data[i++] = M_SQRT2 * v.imag();
-      }
-    }
-    const Eigen::VectorXd score = whitened.leftCols(count).transpose() * basis.data;
-    pairProducts(whitened.data(), numbers, count, products.data());
-    basis.traces.resize(count);
-    for (std::size_t a = 0; a < active.size(); ++a) {
-      const Eigen::Index ia = static_cast<Eigen::Index>(a);
-      basis.traces[ia] = traceOfWhitened(whitened.col(ia).data(), channels_);
-      out.score[active[a]] += weight() * score[ia];
-      for (std::size_t b = 0; b <= a; ++b) {
-        const Eigen::Index ib = static_cast<Eigen::Index>(b);
-        const double v = weight() * informationOf(products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
-        out.information(active[a], active[b]) += v;
-        if (a != b) out.information(active[b], active[a]) += v;
-      }
-    }
+    addEchoDirections(model, cell, basis.factor.inverse(), directions);
+    addLevelDirections(model, cell, covariance, directions);
+    basis.active = directions.active;
+    setData(y.data(), w, basis);
+    addProducts(directions, basis, out);
     if (!keep) continue;
-    basis.whitened = whitened.leftCols(count).cast<float>();
+    basis.whitened = directions.whitened.leftCols(static_cast<Eigen::Index>(basis.active.size())).cast<float>();
     out.bins.push_back(std::move(basis));
   }
   out.log_likelihood *= weight();
@@ -401,83 +439,83 @@ Basis ChannelLikelihood::basis(const std::vector<PoseEchoes>& echoes, const Sess
   return b;
 }
 
-Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
-                                 const std::vector<int>& poses) const {
-  const SessionLatents& n = basis.nuisance;
-  const int globals = n.globals(), more = static_cast<int>(directions.size()), all = globals + more;
-  const int numbers = channels_ * channels_;
-  struct Own {
-    Eigen::VectorXd score;
-    Eigen::MatrixXd information;  // last row and column: heading
-  };
-  std::vector<Own> each(poses.size());
-  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
-    const PoseBasis& p = basis.poses[static_cast<std::size_t>(poses[j])];
-    Own& own = each[j];
-    own.score.resize(all + 1);
-    own.score << p.score.head(globals), Eigen::VectorXd::Zero(more), p.score[globals];
-    own.information = Eigen::MatrixXd::Zero(all + 1, all + 1);
-    own.information.topLeftCorner(globals, globals) = p.information.topLeftCorner(globals, globals);
-    own.information.col(all).head(globals) = p.information.col(globals).head(globals);
-    own.information.row(all).head(globals) = p.information.row(globals).head(globals);
-    own.information(all, all) = p.information(globals, globals);
-    Eigen::MatrixXd v(numbers, more);
-    PackedHermitian m(channels_);
-    for (const BinBasis& bin : p.bins) {
-      std::vector<int> active;
-      Eigen::VectorXd traces(more);
-      for (int h = 0; h < more; ++h) {
-        const PoseCovariance& field = directions[static_cast<std::size_t>(h)][j];
-        if (field.empty()) continue;
-        const auto* from = field.data() + static_cast<std::size_t>(bin.cell) * size_;
-        if (std::all_of(from, from + size_, [](auto x) { return x == 0.0f; })) continue;
-        m.setZero();
-        m.add(from, 1);
-        addRelative(n, bin.cell, m);
-        bin.factor.whiten(m, v.col(h).data());
-        traces[h] = traceOfWhitened(v.col(h).data(), channels_);
-        active.push_back(h);
-      }
-      for (int h : active) {
-        own.score[globals + h] += weight() * v.col(h).dot(bin.data);
-        const Eigen::VectorXf single = v.col(h).cast<float>();
-        const Eigen::VectorXf products = bin.whitened.transpose() * single;
-        for (std::size_t a = 0; a < bin.active.size(); ++a) {
-          const int g = bin.active[a] == globals ? all : bin.active[a];
-          const Eigen::Index ia = static_cast<Eigen::Index>(a);
-          const double x = weight() * informationOf(products[ia], bin.traces[ia], traces[h]);
-          own.information(globals + h, g) += x;
-          own.information(g, globals + h) += x;
-        }
-        for (int k : active) {
-          if (k > h) continue;
-          const double x = weight() * informationOf(v.col(h).dot(v.col(k)), traces[h], traces[k]);
-          own.information(globals + h, globals + k) += x;
-          if (k != h) own.information(globals + k, globals + h) += x;
-        }
-      }
-    }
-  });
-  Scores s;
-  s.by_location = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.locations.size()), all);
-  s.information = Eigen::MatrixXd::Zero(all, all);
-  s.yaw_step.assign(data_.poses.size(), 0.0);
-  s.yaw_coupling = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.poses.size()), all);
-  const double heading_prior = 1 / (accuracy_.heading_rad * accuracy_.heading_rad);
-  for (std::size_t j = 0; j < each.size(); ++j) {
-    const Own& p = each[j];
-    const std::size_t i = static_cast<std::size_t>(poses[j]);
-    s.log_likelihood += basis.poses[i].log_likelihood;
-    const double own = p.information(all, all) + heading_prior;
-    const double yaw = p.score[all] - heading_prior * n.yaw_rad[i];
-    const Eigen::VectorXd coupling = p.information.col(all).head(all) / own;
-    s.by_location.row(data_.poses[i].location) += (p.score.head(all) - coupling * yaw).transpose();
-    s.information += p.information.topLeftCorner(all, all) - own * coupling * coupling.transpose();
-    s.yaw_step[i] = yaw / own;
-    s.yaw_coupling.row(static_cast<Eigen::Index>(i)) = coupling.transpose();
+/// Score and information of one pose by globals, further directions and, last, its heading.
+struct ChannelLikelihood::PoseScores {
+  Eigen::VectorXd score;
+  Eigen::MatrixXd information;
+};
+
+ChannelLikelihood::PoseScores ChannelLikelihood::poseScores(const Basis& basis, std::size_t pose,
+                                                            const std::vector<const PoseCovariance*>& further) const {
+  const int globals = basis.nuisance.globals(), all = globals + static_cast<int>(further.size());
+  const PoseBasis& p = basis.poses[pose];
+  PoseScores own;
+  own.score = Eigen::VectorXd::Zero(all + 1);
+  own.score.head(globals) = p.score.head(globals);
+  own.score[all] = p.score[globals];
+  own.information = Eigen::MatrixXd::Zero(all + 1, all + 1);
+  own.information.topLeftCorner(globals, globals) = p.information.topLeftCorner(globals, globals);
+  own.information.col(all).head(globals) = p.information.col(globals).head(globals);
+  own.information.row(all).head(globals) = p.information.row(globals).head(globals);
+  own.information(all, all) = p.information(globals, globals);
+  for (const BinBasis& bin : p.bins) addFurther(bin, basis.nuisance, further, own);
+  return own;
+}
+
+void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& n,
+                                   const std::vector<const PoseCovariance*>& further, PoseScores& own) const {
+  const int globals = n.globals(), more = static_cast<int>(further.size()), all = globals + more;
+  Eigen::MatrixXd v(channels_ * channels_, more);
+  PackedHermitian m(channels_);
+  std::vector<int> active;
+  Eigen::VectorXd traces(more);
+  for (int h = 0; h < more; ++h) {
+    const PoseCovariance& field = *further[static_cast<std::size_t>(h)];
+    if (field.empty()) continue;
+    const auto* from = field.data() + static_cast<std::size_t>(bin.cell) * size_;
+    if (std::all_of(from, from + size_, [](auto x) { return x == 0.0f; })) continue;
+    m.setZero();
+    m.add(from, 1);
+    addRelative(n, bin.cell, m);
+    bin.factor.whiten(m, v.col(h).data());
+    traces[h] = traceOfWhitened(v.col(h).data(), channels_);
+    active.push_back(h);
   }
-  s.total = s.by_location.colwise().sum().transpose();
-  s.prior = Eigen::VectorXd::Zero(globals);
+  for (int h : active) {
+    own.score[globals + h] += weight() * v.col(h).dot(bin.data);
+    const Eigen::VectorXf single = v.col(h).cast<float>();
+    const Eigen::VectorXf products = bin.whitened.transpose() * single;
+    for (std::size_t a = 0; a < bin.active.size(); ++a) {
+      const int g = bin.active[a] == globals ? all : bin.active[a];
+      const Eigen::Index ia = static_cast<Eigen::Index>(a);
+      const double x = weight() * informationOf(products[ia], bin.traces[ia], traces[h]);
+      own.information(globals + h, g) += x;
+      own.information(g, globals + h) += x;
+    }
+    for (int k : active) {
+      if (k > h) continue;
+      const double x = weight() * informationOf(v.col(h).dot(v.col(k)), traces[h], traces[k]);
+      own.information(globals + h, globals + k) += x;
+      if (k != h) own.information(globals + k, globals + h) += x;
+    }
+  }
+}
+
+void ChannelLikelihood::addWithoutHeading(const PoseScores& p, const SessionLatents& n, std::size_t pose,
+                                          Scores& s) const {
+  const Eigen::Index all = p.score.size() - 1;
+  const double heading_prior = 1 / (accuracy_.heading_rad * accuracy_.heading_rad);
+  const double own = p.information(all, all) + heading_prior;
+  const double yaw = p.score[all] - heading_prior * n.yaw_rad[pose];
+  const Eigen::VectorXd coupling = p.information.col(all).head(all) / own;
+  s.by_location.row(data_.poses[pose].location) += (p.score.head(all) - coupling * yaw).transpose();
+  s.information += p.information.topLeftCorner(all, all) - own * coupling * coupling.transpose();
+  s.yaw_step[pose] = yaw / own;
+  s.yaw_coupling.row(static_cast<Eigen::Index>(pose)) = coupling.transpose();
+}
+
+void ChannelLikelihood::addPriors(const SessionLatents& n, Scores& s) const {
+  s.prior = Eigen::VectorXd::Zero(n.globals());
   for (int a = 0; a < errors_; ++a) {
     const double gain = 1 / (spread_.actor_gain * spread_.actor_gain);
     const double range = 1 / (spread_.actor_range_m * spread_.actor_range_m);
@@ -495,9 +533,12 @@ Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCo
     s.information(j, j) += rough;
     s.total[j] -= rough * (n.global(j) - usual.global(j));
   }
+}
+
+void ChannelLikelihood::holdAtLimits(const SessionLatents& n, Scores& s) const {
   // A number at its limit that would go beyond it stays, and no other number moves as if it did not.
-  for (int j = 0; j < globals; ++j) {
-    const Limits limits = limitsOf(j, errors_);
+  for (int j = 0; j < n.globals(); ++j) {
+    const Limits limits = limitsOf(j, errors_, spread_);
     const double v = n.global(j);
     if (s.total[j] > 0 ? v < limits.high : v > limits.low) continue;
     s.total[j] = 0;
@@ -507,6 +548,31 @@ Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCo
     s.information.col(j).setZero();
     s.information(j, j) = 1;
   }
+}
+
+Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
+                                 const std::vector<int>& poses) const {
+  const SessionLatents& n = basis.nuisance;
+  const Eigen::Index all = n.globals() + static_cast<Eigen::Index>(directions.size());
+  std::vector<PoseScores> each(poses.size());
+  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
+    std::vector<const PoseCovariance*> further;
+    for (const SessionCovariance& d : directions) further.push_back(&d[j]);
+    each[j] = poseScores(basis, static_cast<std::size_t>(poses[j]), further);
+  });
+  Scores s;
+  s.by_location = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.locations.size()), all);
+  s.information = Eigen::MatrixXd::Zero(all, all);
+  s.yaw_step.assign(data_.poses.size(), 0.0);
+  s.yaw_coupling = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.poses.size()), all);
+  for (std::size_t j = 0; j < each.size(); ++j) {
+    const std::size_t pose = static_cast<std::size_t>(poses[j]);
+    s.log_likelihood += basis.poses[pose].log_likelihood;
+    addWithoutHeading(each[j], n, pose, s);
+  }
+  s.total = s.by_location.colwise().sum().transpose();
+  addPriors(n, s);
+  holdAtLimits(n, s);
   s.log_likelihood += prior(n);
   return s;
 }
@@ -516,7 +582,7 @@ SessionLatents ChannelLikelihood::stepped(const SessionLatents& from, const Eige
   SessionLatents n = from;
   const auto held = [share](double step, double limit) { return std::clamp(share * step, -limit, limit); };
   for (int j = 0; j < n.globals(); ++j) {
-    const Limits limits = limitsOf(j, errors_);
+    const Limits limits = limitsOf(j, errors_, spread_);
     double& v = n.global(j);
     v = std::clamp(v + held(g[j], limits.step), limits.low, limits.high);
   }
@@ -575,7 +641,7 @@ SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) c
     }
     double measured = 0;
     for (int bin = firstBin(); bin < samples_; ++bin) {
-      const double power = data_.poses[i].y.col(bin).squaredNorm();
+      const double power = data_.poses[i].range_spectra.col(bin).squaredNorm();
       measured += power;
       low.push_back(std::log(power / channels_ + 1e-300) -
                     std::log(data_.poses[i].clutter.at(bin, size_)[0].real() + 1e-300));
@@ -598,7 +664,7 @@ SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) c
 ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes, const SessionLatents& n, int pose,
                                                         int bin) const {
   Whitened w;
-  const PackedHermitian packed = sigma(echoes, levels(echoes, n), n, pose, bin);
+  const PackedHermitian packed = sigma(modelOf(echoes, n, pose), bin);
   Eigen::MatrixXcd full(channels_, channels_);
   std::size_t i = 0;
   for (int k = 0; k < channels_; ++k) {
@@ -609,7 +675,7 @@ ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes
   }
   const Eigen::LLT<Eigen::MatrixXcd> llt(full);
   w.inverse = llt.solve(Eigen::MatrixXcd::Identity(channels_, channels_));
-  const Eigen::VectorXcd y = data_.poses[pose].y.col(bin);
+  const Eigen::VectorXcd y = data_.poses[pose].range_spectra.col(bin);
   w.solved = w.inverse * y;
   w.weight = (channels_ + kTailFreedom) / (kTailFreedom + y.dot(w.solved).real());
   return w;

@@ -3,8 +3,11 @@
 #include <Eigen/Core>
 #include <array>
 #include <complex>
+#include <optional>
+#include <utility>
 #include <vector>
 
+#include "diagnosis/catalogue/stated_bounds.h"
 #include "diagnosis/channels/channel_data.h"
 #include "diagnosis/likelihood/echo_field.h"
 #include "diagnosis/likelihood/expected_echoes.h"
@@ -34,11 +37,15 @@ struct SessionLatents {
 
 /// Prior standard deviations of the actors' latent errors.
 struct LatentSpread {
-  double actor_gain = 1.5 / 4.343;  ///< 1.5 dB of power
-  double actor_range_m = 0.02;
+  explicit LatentSpread(const StatedAccuracy& stated = {})
+      : actor_gain(stated.level_db / 4.343),
+        actor_range_m(stated.scene_m),
+        most_range_error_m(StatedBounds(stated).mostRangeError_m()) {}
+
+  double actor_gain;          ///< natural logarithm of power, per interaction
+  double actor_range_m;       ///< one-way, per interaction
+  double most_range_error_m;  ///< limit of an actor's range error
 };
-/// Four times what a scene's actors err by: of some twenty none is farther away.
-constexpr double kMostRangeError_m = 0.08;
 
 /// Expected covariance of the channels in all bins of a pose, packed as BinCovariance.
 using PoseCovariance = std::vector<std::complex<float>>;
@@ -90,7 +97,8 @@ struct Basis {
 class ChannelLikelihood {
  public:
   /// Keeps a reference to data. actors: how many Scene::actors has.
-  ChannelLikelihood(const ChannelData& data, int actors, const PoseAccuracy& accuracy, const LatentSpread& spread = {});
+  ChannelLikelihood(const ChannelData& data, int actors, const PoseAccuracy& accuracy,
+                    const LatentSpread& spread = LatentSpread());
 
   /// Latents to start fit() from: levels from the data, errors zero.
   SessionLatents start(const std::vector<PoseEchoes>& echoes) const;
@@ -153,14 +161,45 @@ class ChannelLikelihood {
   struct GroupLevel {
     double gain, shift_m;
   };
-  std::vector<GroupLevel> levels(const PoseEchoes& echoes, const SessionLatents& nuisance) const;
-  PackedHermitian sigma(const PoseEchoes& echoes, const std::vector<GroupLevel>& levels, const SessionLatents& nuisance,
-                        int pose, int cell) const;
+  /// One pose's echoes under latents.
+  struct PoseModel {
+    const PoseEchoes& echoes;
+    const SessionLatents& nuisance;
+    int pose;
+    std::vector<GroupLevel> levels;  ///< [groups, grazing ones last]
+  };
+  PoseModel modelOf(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose) const;
+  /// Covariance of a cell.
+  PackedHermitian sigma(const PoseModel& model, int cell) const;
+  /// A group's fields in a cell; nothing where it has none.
+  std::optional<EchoGroup::Cell> fieldsOf(const EchoGroup& group, int cell) const;
   /// Adds clutter's covariance in a cell, times factor.
   void addClutter(const SessionLatents& nuisance, int pose, int cell, double factor, PackedHermitian& to) const;
   double prior(const SessionLatents& nuisance) const;
   double poseLikelihood(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose) const;
   void addBasis(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose, bool keep, PoseBasis& out) const;
+  struct CellDirections;
+  /// Adds a cell's changes by the actors' errors, the heading, grazing echoes and range errors. inverse: of the cell's
+  /// covariance.
+  void addEchoDirections(const PoseModel& model, int cell, const PackedHermitian& inverse, CellDirections& to) const;
+  /// Adds a cell's changes by the floor, its shape, the gain and the channels' independent share.
+  void addLevelDirections(const PoseModel& model, int cell, const PackedHermitian& covariance,
+                          CellDirections& to) const;
+  /// Fills BinBasis::data: y whitened channels, w their weight under the t distribution.
+  void setData(const std::complex<double>* y, double w, BinBasis& basis) const;
+  /// Whitens a cell's directions and adds their scores and information to the pose's.
+  void addProducts(CellDirections& directions, BinBasis& basis, PoseBasis& out) const;
+  struct PoseScores;
+  /// further: the pose's changes of covariance by each further direction.
+  PoseScores poseScores(const Basis& basis, std::size_t pose, const std::vector<const PoseCovariance*>& further) const;
+  /// Adds the scores of one cell by further directions.
+  void addFurther(const BinBasis& bin, const SessionLatents& nuisance,
+                  const std::vector<const PoseCovariance*>& further, PoseScores& own) const;
+  /// Adds a pose's scores with its heading eliminated.
+  void addWithoutHeading(const PoseScores& pose_scores, const SessionLatents& nuisance, std::size_t pose,
+                         Scores& scores) const;
+  void addPriors(const SessionLatents& nuisance, Scores& scores) const;
+  void holdAtLimits(const SessionLatents& nuisance, Scores& scores) const;
   double informationOf(double product, double trace_a, double trace_b) const;
 
   const ChannelData& data_;

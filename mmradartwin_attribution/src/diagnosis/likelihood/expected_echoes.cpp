@@ -232,7 +232,7 @@ void ExpectedEchoes::pointBeams(ChannelData& data, const std::vector<NamedParame
     const Eigen::Isometry3d& T = p.pose.T_map_radar;
     p.beams = chooseBeams(base_.radar(), twin.receivedPaths(T, twin.trace(T), p.pose.stamp_ns), first_bin);
     for (EchoBeam& beam : p.beams) {
-      beam.y = formBeam(beam, p.y);
+      beam.y = formBeam(beam, p.range_spectra);
       const int channels = base_.radar().channels();
       PackedHermitian clutter(channels);
       clutter.add(p.clutter.at(middleBin(beam, channels), static_cast<std::size_t>(clutter.size())), 1);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <string>
@@ -13,15 +14,22 @@
 #include "diagnosis/likelihood/receiver_mixture.h"
 #include "diagnosis/likelihood/traced_paths.h"
 #include "diagnosis/rooms.h"
+#include "mmradartwin_dsp/stated_accuracy.h"
 #include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin::diagnosis::likelihood {
 
-/// What is known of the accuracy of poses; standard deviations.
+/// Accuracy of poses and of single paths; standard deviations.
 struct PoseAccuracy {
-  double position_m = 0.004, heading_rad = 0.3 * M_PI / 180;
-  double path_angle_rad = 0.2 * M_PI / 180;  ///< of one path on its own: facets are not exactly where the mesh says
-  double path_range_m = 0.005;
+  explicit PoseAccuracy(const StatedAccuracy& stated = {})
+      : position_m(stated.pose_m),
+        heading_rad(stated.heading_deg * M_PI / 180),
+        path_angle_rad(stated.path_angle_deg * M_PI / 180),
+        path_range_m(stated.path_range_m) {}
+
+  double position_m, heading_rad;
+  double path_angle_rad;  ///< direction of one path on its own
+  double path_range_m;    ///< one-way range of one path on its own
 };
 
 /// Expected channels of a session for any list of mechanisms: paths (TracedPaths), received and collected into groups

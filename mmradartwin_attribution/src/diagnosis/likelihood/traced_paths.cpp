@@ -108,7 +108,7 @@ const TracedPaths::Edit& TracedPaths::editOf(const NamedParameters& mechanism) {
   const auto known = edits_.find(key);
   if (known != edits_.end()) return known->second;
   const Twin twin = base_.changed({mechanism});
-  const Geometry geometry = twin.addsScreensAlone() ? Geometry::kMoreScreens
+  const Geometry geometry = twin.addsOccludersOnly() ? Geometry::kMoreScreens
                             : twin.altersGeometry() ? Geometry::kOther
                                                     : Geometry::kSame;
   return edits_[key] = {geometry, twin.placesOneActor()};
@@ -201,7 +201,7 @@ const TracedPaths::ByPose& TracedPaths::of(const std::vector<NamedParameters>& g
       all.begin());
   task.twin = twinOf(all);
   task.before = predecessorOf(geometry, mechanism, mechanisms, missing, *task.twin);
-  task.opens = task.twin->opensActors();
+  task.opens = task.twin->removesActors();
   tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t j) {
     const std::size_t i = static_cast<std::size_t>(missing[j]);
     entry.paths[i] = pathsAt(task, i);
@@ -216,7 +216,7 @@ std::shared_ptr<const TracedPaths::Paths> TracedPaths::pathsAt(const Task& task,
   const std::optional<SceneChange>& change = task.before.change;
   const std::shared_ptr<const Paths> known = task.before.paths != nullptr ? (*task.before.paths)[pose] : nullptr;
   if (known && change && !mayTouch(*change, T, *known)) return known;
-  CloudCells cells{T, kCloud_bins * base_.radar().range_bin_m(), kCloud_lobes * 2 / base_.radar().channels(),
+  ScatterCells cells{T, kCloud_bins * base_.radar().range_bin_m(), kCloud_lobes * 2 / base_.radar().channels(),
                    kCloudElevation};
   // Points that the base scene hides stay apart where an edit lets rays through: they are weighed otherwise.
   if (task.opens) {

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <random>
 
-#include "mmradartwin_attribution/ledger.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::numbers {
 namespace {
 
-constexpr std::size_t kDraws = 1000;
+constexpr std::size_t kDraws = 1000;  ///< of locations; a 2.5 % quantile is then good to some percent of the interval
 
 }  // namespace
 
@@ -26,8 +26,8 @@ std::vector<std::optional<std::array<double, 2>>> intervalsOverLocations(
   std::vector<std::optional<std::array<double, 2>>> intervals(values.front().size());
   for (std::size_t k = 0; k < intervals.size(); ++k) {
     std::vector<double> numbers;
-    for (const std::vector<double>& v : values) {
-      if (!std::isnan(v[k])) numbers.push_back(v[k]);
+    for (const std::vector<double>& draw : values) {
+      if (!std::isnan(draw[k])) numbers.push_back(draw[k]);
     }
     if (2 * numbers.size() < kDraws) continue;
     intervals[k] = {quantile(numbers, 0.025), quantile(numbers, 0.975)};

@@ -9,13 +9,14 @@
 
 namespace mmradartwin::diagnosis::numbers {
 
-/// 95 % intervals of statistics over locations drawn with replacement (percentiles of 1000 draws, the same ones every
-/// time). `statistics` gets how often each location was drawn and gives as many numbers each time; called from several
-/// threads at once. Nothing for a statistic that is NaN in more than half of the draws; others are left out of it.
+/// 95 % intervals of statistics by the bootstrap over locations: percentiles of 1000 draws with replacement, which are
+/// the same in every call. `statistics` takes how often each location was drawn and returns the same number of values
+/// each time; it is called from several threads at once. An interval leaves out draws in which its statistic is NaN,
+/// and is empty where these are more than half.
 std::vector<std::optional<std::array<double, 2>>> intervalsOverLocations(
     std::size_t locations, const std::function<std::vector<double>(const std::vector<int>&)>& statistics);
 
-/// The same of one statistic that is never NaN.
+/// 95 % interval of one statistic that is never NaN.
 std::array<double, 2> intervalOverLocations(std::size_t locations,
                                             const std::function<double(const std::vector<int>&)>& statistic);
 

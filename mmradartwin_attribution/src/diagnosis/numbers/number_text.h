@@ -6,7 +6,7 @@
 
 namespace mmradartwin::diagnosis::numbers {
 
-/// A number with so many significant digits, for texts.
+/// Text of a number with so many significant digits.
 std::string number(double value, int digits = 3);
 
 }  // namespace mmradartwin::diagnosis::numbers

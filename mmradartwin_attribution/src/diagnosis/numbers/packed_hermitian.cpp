@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-// Twice as fast where the processor has AVX2; the same arithmetic otherwise.
+// Function clones for processors with AVX2, where loops run twice as fast; the arithmetic is the same.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define MMRADARTWIN_VECTORISED __attribute__((target_clones("arch=haswell", "default")))
 #else
@@ -14,10 +14,10 @@
 namespace mmradartwin::diagnosis::numbers {
 namespace {
 
-/// The usual array's number of channels, known to the compiler; kAny stands for all others.
+/// Number of channels of the usual array, known to the compiler; kAny stands for all other numbers.
 constexpr int kUsual = 8, kAny = 0;
-constexpr int kWide = 4;                // numbers of a vector
-constexpr double kSmallTurn_rad = 0.7;  // up to there a short series is right to 1e-9
+constexpr int kWide = 4;                ///< numbers of a vector register
+constexpr double kSmallTurn_rad = 0.7;  ///< up to which a short series is right to 1e-9
 
 template <int kChannels>
 constexpr int packedSize(int channels) {
@@ -51,7 +51,7 @@ MMRADARTWIN_INLINE void phasors(const double* apart, double most, double turn, i
   }
 }
 
-/// Cholesky's factor column by column in place, then the inverse of it.
+/// Computes the Cholesky factor column by column in place, then its inverse.
 template <int kChannels>
 MMRADARTWIN_INLINE bool invertFactor(const double* packed_re, const double* packed_im, int channels,
                                      double (*to_re)[kMaxChannels], double (*to_im)[kMaxChannels], double* log_det) {
@@ -82,14 +82,14 @@ MMRADARTWIN_INLINE bool invertFactor(const double* packed_re, const double* pack
     for (int k = 0; k < j; ++k) re[j][k] = im[j][k] = 0;
     for (int l = j + 1; l < n; ++l) {
       const double a = re[j][l], b = im[j][l];
-      for (int k = 0; k < n; ++k) {  // rows above l are of no use
+      for (int k = 0; k < n; ++k) {  // rows above l are not used
         re[l][k] -= re[j][k] * a + im[j][k] * b;
         im[l][k] -= im[j][k] * a - re[j][k] * b;
       }
     }
   }
   *log_det = sum + std::log(product);
-  // L^-1, column by column: of each the rows below follow from those above.
+  // L^-1 column by column: in each, the rows below follow from those above.
   for (int c = 0; c < n; ++c) {
     double x_re[kMaxChannels] = {}, x_im[kMaxChannels] = {};
     x_re[c] = 1;
@@ -119,8 +119,8 @@ MMRADARTWIN_INLINE void whitenBy(const double (*re)[kMaxChannels], const double 
     double *to_re = half_re[c], *to_im = half_im[c];
     for (int k = 0; k < n; ++k) to_re[k] = to_im[k] = 0;
     for (int i = 0; i < n; ++i) {
-      const int at = i >= c ? i * (i + 1) / 2 + c : c * (c + 1) / 2 + i;
-      const double a = packed_re[at], b = i > c ? packed_im[at] : i == c ? 0 : -packed_im[at];
+      const int place = i >= c ? i * (i + 1) / 2 + c : c * (c + 1) / 2 + i;
+      const double a = packed_re[place], b = i > c ? packed_im[place] : i == c ? 0 : -packed_im[place];
       for (int k = i / kWide * kWide; k < n; ++k) {  // rows above are zero
         to_re[k] += re[i][k] * a - im[i][k] * b;
         to_im[k] += re[i][k] * b + im[i][k] * a;
@@ -157,9 +157,10 @@ MMRADARTWIN_VECTORISED void phasorsTo(const double* apart, double most, double t
 }
 
 template <int kChannels>
-MMRADARTWIN_INLINE void addTurned(const float* const* fields, const double* factors, const double* turn_re,
-                                  const double* turn_im, int channels, double* re, double* im) {
+MMRADARTWIN_INLINE void addTurned(const float* const* fields, const double* factors, const PackedTurn& turn,
+                                  int channels, double* re, double* im) {
   const int size = packedSize<kChannels>(channels);
+  const double *turn_re = turn.re.data(), *turn_im = turn.im.data();
   alignas(64) double own_re[kMaxPacked], own_im[kMaxPacked];
   for (int i = 0; i < size; ++i) own_re[i] = own_im[i] = 0;
   for (int f = 0; f < 3; ++f) {
@@ -171,13 +172,13 @@ MMRADARTWIN_INLINE void addTurned(const float* const* fields, const double* fact
   }
 }
 
-MMRADARTWIN_VECTORISED void addTurnedTo(const float* const* fields, const double* factors, const double* turn_re,
-                                        const double* turn_im, int channels, double* re, double* im) {
-  if (channels == kUsual) return addTurned<kUsual>(fields, factors, turn_re, turn_im, channels, re, im);
-  addTurned<kAny>(fields, factors, turn_re, turn_im, channels, re, im);
+MMRADARTWIN_VECTORISED void addTurnedTo(const float* const* fields, const double* factors, const PackedTurn& turn,
+                                        int channels, double* re, double* im) {
+  if (channels == kUsual) return addTurned<kUsual>(fields, factors, turn, channels, re, im);
+  addTurned<kAny>(fields, factors, turn, channels, re, im);
 }
 
-/// Four columns beside each other: each number is read once for four products.
+/// Takes four columns beside each other, so that each number is read once for four products.
 MMRADARTWIN_VECTORISED void pairProductsTo(const double* v, int rows, int columns, double* to) {
   for (int a = 0; a < columns; ++a) {
     const double* x = v + a * rows;
@@ -286,7 +287,7 @@ void PackedHermitian::addTurned(const std::array<const std::complex<float>*, 3>&
     return;
   }
   const float* from[3] = {numbers(fields[0]), numbers(fields[1]), numbers(fields[2])};
-  addTurnedTo(from, factors.data(), turn.re.data(), turn.im.data(), channels, re.data(), im.data());
+  addTurnedTo(from, factors.data(), turn, channels, re.data(), im.data());
 }
 
 void PackedHermitian::addTurnDerivative(const PackedHermitian& turned, double by, const PhasesApart& apart) {

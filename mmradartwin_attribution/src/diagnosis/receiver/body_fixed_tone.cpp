@@ -6,22 +6,23 @@
 #include <limits>
 #include <vector>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/receiver/channel_errors.h"
 #include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-// What skirts of echoes add to a tone's range error: leakages of the blind protocol's seeds 51 to 57 lay 0.2 to 0.5 mm
-// off where their cells alone said 0.15 mm.
-constexpr double kBesideEchoes_m = 0.00025;
-constexpr double kReach_m = 0.15;     ///< where leakage lies at most (causes.md, A1)
-constexpr double kReach_bins = 1.5;   ///< but so many bins at least
-constexpr double kTail = 4;           ///< degrees of freedom of the complex t, as in ChannelLikelihood
-constexpr double kShare = 0.5;        ///< of a bin: neighbours overlap through the window
-constexpr int kRounds = 6;            ///< of re-weighting
-constexpr double kEchoErrors = 0.03;  ///< of an echo's power, by errors of channels
+constexpr double kReach_m = 0.15;      ///< largest range of leakage (causes.md, A1)
+constexpr double kReach_bins = 1.5;    ///< that are looked at in any case
+constexpr double kStep_bins = 0.02;    ///< between ranges that are tried
+constexpr int kNeither = 12;           ///< steps about no range, a quarter of a bin, that are neither before nor behind
+constexpr double kTail = 4;            ///< degrees of freedom of the complex t, as in ChannelLikelihood
+constexpr double kShare = 0.5;         ///< of a bin that counts: neighbours overlap through the window
+constexpr int kRounds = 6;             ///< of re-weighting
+constexpr double kLeastScale = 1e-30;  ///< of a bin: floor of a division
 
+/// Tone of amplitude 1 at a range, [1][N], with phase 0 at the window's centre.
 ComplexGrid unitTone(const RadarConfig& radar, double range_m) {
   ComplexGrid x(1, radar.samples_per_chirp);
   const double rate = 2 * M_PI * radar.slope_hz_per_s * 2 * range_m / kSpeedOfLight_m_per_s;
@@ -31,28 +32,29 @@ ComplexGrid unitTone(const RadarConfig& radar, double range_m) {
   return x;
 }
 
-/// The first bins of all poses, and the last ones before them where a tone may lie behind the radar.
+/// First range bins of all poses, and last ones, where a tone behind the radar appears.
 class FirstBins {
  public:
   FirstBins(const ChannelData& data, bool behind) : data_(data), chain_(data.radar) {
     reach_m_ = std::max(kReach_m, kReach_bins * data.radar.range_bin_m());
-    // The window's lobe reaches two bins further.
+    // The lobe of the window reaches two bins further.
     const int last = std::max(4, static_cast<int>(std::ceil(reach_m_ / data.radar.range_bin_m())) + 2) - 1;
     const int samples = data.radar.samples_per_chirp;
     if (2 * last + 1 >= samples) return;
     for (int r = behind ? -last : 0; r <= last; ++r) bins_.push_back((r + samples) % samples);
     for (int bin : bins_) {
       Bin b{Eigen::MatrixXcd(channels(), static_cast<Eigen::Index>(poses())), {}};
-      for (std::size_t p = 0; p < poses(); ++p) b.y.col(static_cast<Eigen::Index>(p)) = data.poses[p].y.col(bin);
+      for (std::size_t p = 0; p < poses(); ++p)
+        b.y.col(static_cast<Eigen::Index>(p)) = data.poses[p].range_spectra.col(bin);
       b.power = b.y.colwise().squaredNorm().transpose();
-      of_bins_.push_back(std::move(b));
+      values_.push_back(std::move(b));
     }
   }
-  /// One bin of all poses.
+  /// Data of one bin at all poses.
   struct Bin {
     Eigen::MatrixXcd y;     ///< [channels][poses]
     Eigen::VectorXd power;  ///< [poses], of all channels
-    /// Power that a tone's channels, times its kernel there, leave. [poses]
+    /// Power [poses] that is left without a tone of these channels, whose value in this bin is the kernel.
     Eigen::VectorXd left(const std::complex<double>& kernel, const Eigen::VectorXcd& tone) const {
       const Eigen::VectorXcd seen = y.transpose() * (std::conj(kernel) * tone.conjugate());
       return ((power - 2 * seen.real()).array() + std::norm(kernel) * tone.squaredNorm()).max(0.0);
@@ -60,13 +62,13 @@ class FirstBins {
   };
   const std::vector<int>& bins() const { return bins_; }
   double reach_m() const { return reach_m_; }
-  Eigen::Index channels() const { return data_.poses.front().y.rows(); }
+  Eigen::Index channels() const { return data_.poses.front().range_spectra.rows(); }
   std::size_t poses() const { return data_.poses.size(); }
-  const Bin& of(std::size_t bin) const { return of_bins_[bin]; }
+  const Bin& of(std::size_t bin) const { return values_[bin]; }
 
-  /// What a tone of amplitude 1 gives in each bin.
+  /// Values of a tone of amplitude 1 in each bin.
   Eigen::VectorXcd kernel(double range_m) const {
-    // The chain takes all channels; the tone is the same on each.
+    // The chain takes all channels, which are alike here.
     const ComplexGrid x = unitTone(data_.radar, range_m).replicate(data_.radar.channels(), 1);
     const ComplexGrid spectra = chain_.rangeSpectra(x);
     Eigen::VectorXcd kernel(static_cast<Eigen::Index>(bins_.size()));
@@ -79,15 +81,17 @@ class FirstBins {
   SignalChain chain_;
   double reach_m_ = 0;
   std::vector<int> bins_;
-  std::vector<Bin> of_bins_;
+  std::vector<Bin> values_;  ///< in the order of bins_
 };
 
+/// Tone at a range with its likelihood.
 struct ToneFit {
   Eigen::VectorXcd channels;
   double log_likelihood = 0;
 };
 
-/// Vector over channels (zero where `with` is false) and scale of each bin, by expectation-maximisation of the t.
+/// Fits the channels of a tone (none where `with` is false) and the scale of each bin, by expectation-maximisation of
+/// the complex t.
 ToneFit fitTone(const FirstBins& data, const Eigen::VectorXcd& kernel, bool with) {
   const std::size_t bins = data.bins().size();
   const double poses = static_cast<double>(data.poses()), m = static_cast<double>(data.channels());
@@ -96,7 +100,7 @@ ToneFit fitTone(const FirstBins& data, const Eigen::VectorXcd& kernel, bool with
   for (std::size_t r = 0; r < bins; ++r) {
     Eigen::VectorXd power = data.of(r).power / m;
     std::nth_element(power.begin(), power.begin() + power.size() / 2, power.end());
-    scale[static_cast<Eigen::Index>(r)] = std::max(power[power.size() / 2], 1e-30);
+    scale[static_cast<Eigen::Index>(r)] = std::max(power[power.size() / 2], kLeastScale);
   }
   for (int round = 0; round < kRounds; ++round) {
     Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(data.channels());
@@ -107,7 +111,7 @@ ToneFit fitTone(const FirstBins& data, const Eigen::VectorXcd& kernel, bool with
       const Eigen::VectorXd w = ((m + kTail) / (kTail + left.array() / scale[i])).matrix();
       sum += std::conj(kernel[i]) / scale[i] * (data.of(r).y * w);
       total += w.sum() / scale[i] * std::norm(kernel[i]);
-      scale[i] = std::max(w.dot(left) / (m * poses), 1e-30);
+      scale[i] = std::max(w.dot(left) / (m * poses), kLeastScale);
     }
     if (with) fit.channels = sum / total;
   }
@@ -119,7 +123,7 @@ ToneFit fitTone(const FirstBins& data, const Eigen::VectorXcd& kernel, bool with
   return fit;
 }
 
-/// The same of the only pose, where a bin's scale cannot be told from what stands in it: least squares over all bins.
+/// Fits a tone at the only pose by least squares over all bins: the scale of a bin cannot be told from a tone in it.
 ToneFit fitOnlyPose(const FirstBins& data, const Eigen::VectorXcd& kernel) {
   ToneFit fit{Eigen::VectorXcd::Zero(data.channels()), 0};
   double all = 0;
@@ -136,72 +140,106 @@ ToneFit fitOnlyPose(const FirstBins& data, const Eigen::VectorXcd& kernel) {
 
 }  // namespace
 
+namespace {
+
+/// Likelihood of the best tone at each range that is tried.
+struct ToneCurve {
+  double step_m = 0;
+  int steps = 0;  ///< to either side of the radar
+  std::vector<double> log_likelihood;
+  int highest = 0;  ///< index of the most likely range
+  double most = -std::numeric_limits<double>::infinity();
+};
+
+ToneCurve tryRanges(const FirstBins& first, const ChannelData& data, bool behind, BodyFixedTone& best) {
+  ToneCurve curve;
+  curve.step_m = kStep_bins * data.radar.range_bin_m();
+  curve.steps = static_cast<int>(first.reach_m() / curve.step_m);
+  for (int i = behind ? -curve.steps : 0; i <= curve.steps; ++i) {
+    const Eigen::VectorXcd kernel = first.kernel(i * curve.step_m);
+    const ToneFit fit = data.poses.size() == 1 ? fitOnlyPose(first, kernel) : fitTone(first, kernel, true);
+    curve.log_likelihood.push_back(fit.log_likelihood);
+    if (fit.log_likelihood <= curve.most) continue;
+    curve.most = fit.log_likelihood;
+    curve.highest = static_cast<int>(curve.log_likelihood.size()) - 1;
+    best.range_m = i * curve.step_m;
+    best.channels = fit.channels;
+  }
+  return curve;
+}
+
+/// Judges the tone of the only pose by how much of its power no array response explains; false where it is too weak.
+bool judgeOnlyPose(const FirstBins& first, const ChannelData& data, const Eigen::VectorXcd& kernel,
+                   BodyFixedTone& best) {
+  const double beyond = (1 - best.array_share) / bounds::kEchoErrorShare;
+  double all = 0, strongest = 0;
+  for (std::size_t r = 0; r < first.bins().size(); ++r) all += first.of(r).power[0];
+  for (Eigen::Index r = 0; r < data.poses[0].range_spectra.cols(); ++r) {
+    strongest = std::max(strongest, data.poses[0].range_spectra.col(r).squaredNorm());
+  }
+  const double own = best.channels.squaredNorm();
+  const double noise = static_cast<double>(data.radar.channels()) * data.poses[0].noise_power;
+  if (beyond <= 1 || kernel.squaredNorm() * own < bounds::kLeastToneShare * all ||
+      own < bounds::kLeastToneOverNoise * noise || own < bounds::kLeastToneOfStrongest * strongest) {
+    return false;
+  }
+  best.gain = (static_cast<double>(data.radar.channels()) - 2) * (beyond - 1 - std::log(beyond));
+  best.false_alarm_rate = std::exp(-best.gain);
+  return true;
+}
+
+/// Range between the steps and its standard error, by a parabola through the likelihood's peak.
+void refineRange(const ToneCurve& curve, BodyFixedTone& best) {
+  if (curve.highest == 0 || curve.highest + 1 >= static_cast<int>(curve.log_likelihood.size())) return;
+  const double before = curve.log_likelihood[static_cast<std::size_t>(curve.highest) - 1];
+  const double after = curve.log_likelihood[static_cast<std::size_t>(curve.highest) + 1];
+  const double curvature = (before + after - 2 * curve.most) / (curve.step_m * curve.step_m);
+  const double slope = (after - before) / (2 * curve.step_m);
+  if (curvature < 0) {
+    best.range_error_m = std::hypot(1 / std::sqrt(-curvature), bounds::kToneRangeError_m);
+    best.range_m += std::clamp(-slope / curvature, -curve.step_m, curve.step_m);
+  }
+}
+
+/// Chance of so large a gain by the F distribution.
+double falseAlarmRate(const ChannelData& data, double gain) {
+  const double numbers = 2.0 * data.radar.channels() + 1;
+  const double others =
+      std::max(1.0, 2.0 * kShare * data.radar.channels() * static_cast<double>(data.poses.size()) - numbers);
+  const boost::math::fisher_f distribution(numbers, others);
+  return boost::math::cdf(boost::math::complement(distribution, 2 * std::max(0.0, gain) / numbers));
+}
+
+}  // namespace
+
 BodyFixedTone findBodyFixedTone(const ChannelData& data, bool behind) {
   BodyFixedTone best;
   best.channels = Eigen::VectorXcd::Zero(data.radar.channels());
   const FirstBins first(data, behind);
   if (first.bins().empty()) return best;
   const bool only = data.poses.size() == 1;
-  const double step_m = 0.02 * data.radar.range_bin_m();
-  const int steps = static_cast<int>(first.reach_m() / step_m);
-  std::vector<double> curve;
-  double highest = -std::numeric_limits<double>::infinity();
-  int at = 0;
-  for (int i = behind ? -steps : 0; i <= steps; ++i) {
-    const ToneFit fit =
-        only ? fitOnlyPose(first, first.kernel(i * step_m)) : fitTone(first, first.kernel(i * step_m), true);
-    curve.push_back(fit.log_likelihood);
-    if (fit.log_likelihood <= highest) continue;
-    highest = fit.log_likelihood;
-    at = static_cast<int>(curve.size()) - 1;
-    best.range_m = i * step_m;
-    best.channels = fit.channels;
-  }
+  const ToneCurve curve = tryRanges(first, data, behind, best);
   best.array_share = arrayShare(data.radar, best.channels);
   const Eigen::VectorXcd kernel = first.kernel(best.range_m);
   if (only) {
-    // Channels are off by some 10 degrees and 1 dB: so much of an echo's power is no array response, and not more.
-    const double beyond = (1 - best.array_share) / kEchoErrors;
-    double all = 0, strongest = 0;
-    for (std::size_t r = 0; r < first.bins().size(); ++r) all += first.of(r).power[0];
-    for (Eigen::Index r = 0; r < data.poses[0].y.cols(); ++r) {
-      strongest = std::max(strongest, data.poses[0].y.col(r).squaredNorm());
-    }
-    const double own = best.channels.squaredNorm();
-    const double noise = static_cast<double>(data.radar.channels()) * data.poses[0].noise_power;
-    if (beyond <= 1 || kernel.squaredNorm() * own < 0.5 * all || own < 100 * noise || own < 0.01 * strongest) {
-      return best;
-    }
-    best.gain = (static_cast<double>(data.radar.channels()) - 2) * (beyond - 1 - std::log(beyond));
-    best.false_alarm_rate = std::exp(-best.gain);
+    if (!judgeOnlyPose(first, data, kernel, best)) return best;
   } else {
-    best.gain = highest - fitTone(first, Eigen::VectorXcd::Zero(kernel.size()), false).log_likelihood;
+    best.gain = curve.most - fitTone(first, Eigen::VectorXcd::Zero(kernel.size()), false).log_likelihood;
   }
   if (behind) {
-    // A constant lies at no range; within a quarter of a bin of that it is neither before nor behind.
-    const auto split = curve.begin() + std::max(1, steps - 12);
-    best.behind = *std::max_element(curve.begin(), split) - *std::max_element(split, curve.end());
+    // A constant lies at no range; within a quarter of a bin of that a tone is neither before nor behind.
+    const auto& values = curve.log_likelihood;
+    const auto split = values.begin() + std::max(1, curve.steps - kNeither);
+    best.behind = *std::max_element(values.begin(), split) - *std::max_element(split, values.end());
   }
-  if (at > 0 && at + 1 < static_cast<int>(curve.size())) {
-    const double before = curve[static_cast<std::size_t>(at) - 1], after = curve[static_cast<std::size_t>(at) + 1];
-    const double curvature = (before + after - 2 * highest) / (step_m * step_m);
-    const double slope = (after - before) / (2 * step_m);
-    if (curvature < 0) {
-      best.range_error_m = std::hypot(1 / std::sqrt(-curvature), kBesideEchoes_m);
-      best.range_m += std::clamp(-slope / curvature, -step_m, step_m);
-    }
-  }
-  if (only) return best;
-  const double numbers = 2.0 * data.radar.channels() + 1;
-  const double others =
-      std::max(1.0, 2.0 * kShare * data.radar.channels() * static_cast<double>(data.poses.size()) - numbers);
-  const boost::math::fisher_f distribution(numbers, others);
-  best.false_alarm_rate =
-      boost::math::cdf(boost::math::complement(distribution, 2 * std::max(0.0, best.gain) / numbers));
+  refineRange(curve, best);
+  if (!only) best.false_alarm_rate = falseAlarmRate(data, best.gain);
   return best;
 }
 
-bool isPlain(const BodyFixedTone& tone) { return tone.false_alarm_rate <= 1e-6 && tone.gain >= 30; }
+bool isUnambiguous(const BodyFixedTone& tone) {
+  return tone.false_alarm_rate <= bounds::kToneFalseAlarmRate && tone.gain >= bounds::kLeastNatsOfTone;
+}
 
 void subtractTone(const BodyFixedTone& tone, ChannelData& data) {
   const SignalChain chain(data.radar);

@@ -1,36 +1,38 @@
 #include "diagnosis/receiver/channel_errors.h"
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
-#include <map>
 #include <numeric>
 #include <set>
+
+#include "diagnosis/catalogue/bounds.h"
 
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
 constexpr int kDirections = 512;  ///< of sin(azimuth) from -1 to 1: half a step turns the array's ends by 1.2 degrees
-constexpr double kFirst_m = 0.3;  ///< nearer lies what the radar hears of itself
-constexpr double kLeastPower = 100;  ///< over the noise: 1/10 rad in each channel
-constexpr double kFloor = 0.002;     ///< of an echo's power: what an array response leaves of a real one
-constexpr std::size_t kMostEchoes = 200;
-constexpr std::size_t kFewestEchoes = 6;
-constexpr int kRounds = 40;
-constexpr double kGroup_m = 0.6;  ///< echoes of one body stand together, and are held out together
-constexpr std::size_t kMostOrders = 200;
-constexpr double kLeastGain = 25, kLeastHeldOut = 8, kLeastOrderGain = 20;  ///< nats
+constexpr double kFirst_m = 0.3;  ///< range up to which there is leakage
+constexpr double kLeftShare = 0.002;        ///< of a real echo's power that an array response leaves
+constexpr std::size_t kMostEchoes = 200;    ///< that are used, the strongest
+constexpr int kRounds = 40;                 ///< of directions and factors by turns
+constexpr double kGroup_m = 0.6;            ///< of echoes of one body, which are held out together
+constexpr std::size_t kMostOrders = 200;    ///< of channels, that are tried
+constexpr double kLeastNoisePower = 1e-30;  ///< floor of a division
+constexpr std::size_t kFewestPlaces = 3;    ///< from which on echoes are held out by location, not by range
 
+/// Echo whose channels are compared with array responses.
 struct Echo {
   Eigen::VectorXcd y;   ///< [M] as delivered
   double turn_rad = 0;  ///< from one slot to the next
-  double power = 0;     ///< over noise
-  int group = 0;
+  double power = 0;     ///< ratio to the noise
+  int group = 0;        ///< of echoes that are held out together
 };
 
 using Factors = Eigen::VectorXcd;
 
-/// All the array responses in question, [M][directions].
+/// Array responses of all directions that are tried, [M][directions].
 Eigen::MatrixXcd responses(const RadarConfig& radar) {
   Eigen::MatrixXcd v(radar.channels(), kDirections + 1);
   for (int i = 0; i <= kDirections; ++i) {
@@ -42,22 +44,26 @@ Eigen::MatrixXcd responses(const RadarConfig& radar) {
   return v;
 }
 
+/// Fits of factors on the channels to the echoes of a session, each from a direction of its own.
 class EchoFit {
  public:
   explicit EchoFit(const ChannelData& data) : radar_(data.radar), directions_(responses(data.radar)) {
     const int first = static_cast<int>(std::ceil(kFirst_m / radar_.range_bin_m()));
-    const bool by_place = data.locations.size() > 2;
+    const bool by_place = data.locations.size() >= kFewestPlaces;
     for (const PoseChannels& p : data.poses) {
-      const Eigen::VectorXd power = p.y.colwise().squaredNorm().transpose() / static_cast<double>(p.y.rows());
+      const Eigen::VectorXd power =
+          p.range_spectra.colwise().squaredNorm().transpose() / static_cast<double>(p.range_spectra.rows());
       const auto group = [&](int bin) {
         return by_place ? p.location : static_cast<int>(bin * radar_.range_bin_m() / kGroup_m);
       };
       for (int r = std::max(1, first); r + 1 < static_cast<int>(power.size()); ++r) {
-        if (power[r] < power[r - 1] || power[r] < power[r + 1] || power[r] < kLeastPower * p.noise_power) continue;
-        echoes_.push_back({p.y.col(r), 0, power[r] / std::max(p.noise_power, 1e-30), group(r)});
+        if (power[r] < power[r - 1] || power[r] < power[r + 1] ||
+            power[r] < bounds::kLeastEchoOverNoise * p.noise_power)
+          continue;
+        echoes_.push_back({p.range_spectra.col(r), 0, power[r] / std::max(p.noise_power, kLeastNoisePower), group(r)});
       }
       for (const MovingCell& cell : p.moving) {
-        if (cell.bin < first || cell.power < kLeastPower) continue;
+        if (cell.bin < first || cell.power < bounds::kLeastEchoOverNoise) continue;
         echoes_.push_back({cell.channels, cell.turn_rad, cell.power, group(cell.bin)});
       }
     }
@@ -66,11 +72,11 @@ class EchoFit {
     for (const Echo& e : echoes_) groups_.insert(e.group);
   }
 
-  bool enough() const { return echoes_.size() >= kFewestEchoes && groups_.size() >= 3; }
+  bool enough() const { return echoes_.size() >= bounds::kFewestEchoes && groups_.size() >= bounds::kFewestEchoGroups; }
   int echoes() const { return static_cast<int>(echoes_.size()); }
   const std::set<int>& groups() const { return groups_; }
 
-  /// Puts channels where `order` says they belong and takes out what moved on from slot to slot.
+  /// Puts channels where `order` says that they belong, and takes out the turn of movers from slot to slot.
   void arrange(const std::vector<int>& order) {
     const Eigen::Index channels = radar_.channels();
     y_.resize(channels, static_cast<Eigen::Index>(echoes_.size()));
@@ -84,15 +90,15 @@ class EchoFit {
     }
   }
 
-  /// Nats of every echo with these factors on the channels, its direction and amplitude free: its errors in all
-  /// channels alike, of a variance of its own that is at least kFloor's.
+  /// Log-likelihood of every echo with these factors on the channels, its direction and amplitude free. Its errors are
+  /// alike in all channels, and their variance is its own, at least kLeftShare's.
   Eigen::VectorXd logLikelihood(const Factors& factors) const {
     const Directed d = direct(factors);
-    return -static_cast<double>(radar_.channels()) * (1 - d.share.array() + kFloor).log().matrix();
+    return -static_cast<double>(radar_.channels()) * (1 - d.share.array() + kLeftShare).log().matrix();
   }
 
-  /// Factors of most likelihood, without the echoes of one group: directions, amplitudes and weights by turns with the
-  /// least squares of the factors.
+  /// Factors of most likelihood, without the echoes of one group: directions, amplitudes and weights are found by turns
+  /// with least squares of the factors.
   Factors fit(ChannelTie tie, std::optional<int> without = std::nullopt) const {
     const int channels = radar_.channels(), receivers = radar_.receivers();
     Factors factors = Factors::Ones(channels);
@@ -103,8 +109,8 @@ class EchoFit {
       for (std::size_t e = 0; e < echoes_.size(); ++e) {
         if (without && echoes_[e].group == *without) continue;
         const auto i = static_cast<Eigen::Index>(e);
-        const double weight = 1 / (1 - d.share[i] + kFloor);
-        sum += weight * std::conj(d.amplitude[i]) * y_.col(i).cwiseProduct(directions_.col(d.at[i]).conjugate());
+        const double weight = 1 / (1 - d.share[i] + kLeftShare);
+        sum += weight * std::conj(d.amplitude[i]) * y_.col(i).cwiseProduct(directions_.col(d.direction[i]).conjugate());
         total += weight * std::norm(d.amplitude[i]);
       }
       sum /= total;
@@ -125,7 +131,7 @@ class EchoFit {
     return factors;
   }
 
-  /// [M] phases without jumps, relative to channel 0, less the slope that a turn of the radar would be.
+  /// Phases [M] of factors without jumps, relative to channel 0, less the slope that a turn of the radar makes.
   Eigen::VectorXd phases(const Factors& factors, ChannelTie tie) const {
     if (tie == ChannelTie::kTransmitters) return factors.array().arg();
     Eigen::VectorXd phase(factors.size()), place = places();
@@ -138,13 +144,14 @@ class EchoFit {
     return phase.array() - phase[0];
   }
 
-  /// [M] places along the array, m.
+  /// Places [M] along the array, m.
   Eigen::VectorXd places() const {
     Eigen::VectorXd place(radar_.channels());
     for (int k = 0; k < radar_.channels(); ++k) place[k] = radar_.virtual_element_m(k).y();
     return place;
   }
 
+  /// Nats of the echoes of one group, `with` over `base`.
   double heldOut(const Eigen::VectorXd& with, const Eigen::VectorXd& base, int group) const {
     double sum = 0;
     for (std::size_t e = 0; e < echoes_.size(); ++e) {
@@ -155,10 +162,11 @@ class EchoFit {
   }
 
  private:
+  /// Best direction of each echo, [echoes].
   struct Directed {
-    Eigen::VectorXd share;
-    Eigen::VectorXcd amplitude;
-    Eigen::VectorXi at;
+    Eigen::VectorXd share;       ///< of the echo's power
+    Eigen::VectorXcd amplitude;  ///< of the response
+    Eigen::VectorXi direction;   ///< index
   };
 
   Directed direct(const Factors& factors) const {
@@ -166,10 +174,10 @@ class EchoFit {
     const double norm = factors.squaredNorm();
     Directed d{Eigen::VectorXd(y_.cols()), Eigen::VectorXcd(y_.cols()), Eigen::VectorXi(y_.cols())};
     for (Eigen::Index i = 0; i < y_.cols(); ++i) {
-      Eigen::Index at = 0;
-      d.share[i] = std::min(1.0, match.col(i).cwiseAbs2().maxCoeff(&at) / norm);
-      d.amplitude[i] = match(at, i) / norm;
-      d.at[i] = static_cast<int>(at);
+      Eigen::Index best = 0;
+      d.share[i] = std::min(1.0, match.col(i).cwiseAbs2().maxCoeff(&best) / norm);
+      d.amplitude[i] = match(best, i) / norm;
+      d.direction[i] = static_cast<int>(best);
     }
     return d;
   }
@@ -181,13 +189,15 @@ class EchoFit {
   Eigen::MatrixXcd y_;  ///< [M][echoes] of power 1
 };
 
+/// Order of channels as they are.
 std::vector<int> asItIs(const RadarConfig& radar) {
   std::vector<int> order(static_cast<std::size_t>(radar.channels()));
   std::iota(order.begin(), order.end(), 0);
   return order;
 }
 
-/// Receivers in any order, the same under all transmitters, and those in any order.
+/// Orders of channels: receivers in any order, the same under all transmitters, and transmitters in any order. Empty
+/// where there are too many.
 std::vector<std::vector<int>> orders(const RadarConfig& radar) {
   const int receivers = radar.receivers(), slots = radar.slots();
   std::vector<std::vector<int>> all;
@@ -229,49 +239,35 @@ std::optional<ChannelOrder> findChannelOrder(const ChannelData& data) {
   if (tried.size() < 2) return std::nullopt;
   std::stable_sort(tried.begin(), tried.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   const double gain = tried[0].first - as_it_is;
-  if (gain < kLeastOrderGain) return std::nullopt;
-  // Of mirrored orders that nothing tells apart, the one that leaves transmitters where they are.
-  const std::size_t chosen = tried[0].first - tried[1].first < 1 && tried[1].second < tried[0].second ? 1 : 0;
+  if (gain < bounds::kLeastNatsOfChannelOrder) return std::nullopt;
+  // Two mirrored orders fit alike where nothing moves: the one that leaves transmitters in place is told.
+  const std::size_t chosen =
+      tried[0].first - tried[1].first < bounds::kSameOrder_nats && tried[1].second < tried[0].second ? 1 : 0;
   return ChannelOrder{tried[chosen].second, gain, tried[0].first - tried[1].first};
 }
 
-std::optional<ChannelErrors> findChannelErrors(const ChannelData& data) {
-  EchoFit fit(data);
-  if (!fit.enough()) return std::nullopt;
-  fit.arrange(asItIs(data.radar));
-  const Eigen::VectorXd base = fit.logLikelihood(Factors::Ones(data.radar.channels()));
-  struct Tried {
-    ChannelTie tie;
-    Factors factors;
-    std::vector<Factors> without;  ///< one group each
-    double gain = 0, held_out = 0;
-  };
-  const auto attempt = [&](ChannelTie tie) {
-    Tried t{tie, fit.fit(tie), {}, 0, 0};
-    t.gain = fit.logLikelihood(t.factors).sum() - base.sum();
-    for (int group : fit.groups()) {
-      t.without.push_back(fit.fit(tie, group));
-      t.held_out += fit.heldOut(fit.logLikelihood(t.without.back()), base, group);
-    }
-    return t;
-  };
-  // The fewest numbers that predict as well as more do.
-  const Tried tied = attempt(ChannelTie::kReceivers), free = attempt(ChannelTie::kFree);
-  Tried best = attempt(ChannelTie::kTransmitters);
-  const double receivers = data.radar.receivers(), slots = data.radar.slots();
-  if (tied.held_out > best.held_out + receivers - 1) best = tied;
-  if (free.held_out > best.held_out + (receivers - 1) * (slots - 1)) best = free;
-  if (best.gain < kLeastGain || best.held_out < kLeastHeldOut) return std::nullopt;
+namespace {
 
-  ChannelErrors errors;
-  errors.tie = best.tie;
-  errors.gain = best.gain;
-  errors.held_out_gain = best.held_out;
-  errors.echoes = fit.echoes();
-  errors.groups = static_cast<int>(fit.groups().size());
-  errors.phase_rad = fit.phases(best.factors, best.tie);
-  errors.gain_db = 20 * best.factors.cwiseAbs().array().log10();
-  // Jackknife over groups.
+/// Fit of factors that are tied in one way, and of the same without each group.
+struct TiedFit {
+  ChannelTie tie;
+  Factors factors;
+  std::vector<Factors> without;   ///< [groups] fitted without one group each
+  double gain = 0, held_out = 0;  ///< nats over no errors
+};
+
+TiedFit fitTied(const EchoFit& fit, ChannelTie tie, const Eigen::VectorXd& base) {
+  TiedFit t{tie, fit.fit(tie), {}, 0, 0};
+  t.gain = fit.logLikelihood(t.factors).sum() - base.sum();
+  for (int group : fit.groups()) {
+    t.without.push_back(fit.fit(tie, group));
+    t.held_out += fit.heldOut(fit.logLikelihood(t.without.back()), base, group);
+  }
+  return t;
+}
+
+/// Fills the standard errors by the jackknife over groups.
+void setStandardErrors(const EchoFit& fit, const TiedFit& best, ChannelErrors& errors) {
   const auto groups = static_cast<double>(best.without.size());
   Eigen::ArrayXd phase2 = Eigen::ArrayXd::Zero(errors.phase_rad.size()), gain2 = phase2;
   for (const Factors& f : best.without) {
@@ -283,12 +279,40 @@ std::optional<ChannelErrors> findChannelErrors(const ChannelData& data) {
     const Eigen::ArrayXd centred = place.array() - place.mean();
     const double freedom = std::max(1.0, static_cast<double>(place.size()) - 2);
     const double rms = std::sqrt((errors.phase_rad.array() - errors.phase_rad.mean()).square().sum() / freedom);
-    // Of a size known from so few, a slope's error is Student's: as wide as that of the groups' at 95 %.
+    // The slope of errors whose size is known from so few channels has Student's error: it is stated so that the 95 %
+    // interval by the number of groups is as wide.
     const double wide = rms * student95(freedom) / student95(groups - 1);
     phase2 += ((place.array() - place[0]) * wide).square() / centred.square().sum() * groups / (groups - 1);
   }
   errors.phase_error_rad = (phase2 * (groups - 1) / groups).sqrt();
   errors.gain_error_db = (gain2 * (groups - 1) / groups).sqrt();
+}
+
+}  // namespace
+
+std::optional<ChannelErrors> findChannelErrors(const ChannelData& data) {
+  EchoFit fit(data);
+  if (!fit.enough()) return std::nullopt;
+  fit.arrange(asItIs(data.radar));
+  const Eigen::VectorXd base = fit.logLikelihood(Factors::Ones(data.radar.channels()));
+  // The fewest numbers that predict as well as more do.
+  const TiedFit tied = fitTied(fit, ChannelTie::kReceivers, base), free = fitTied(fit, ChannelTie::kFree, base);
+  TiedFit best = fitTied(fit, ChannelTie::kTransmitters, base);
+  const double receivers = data.radar.receivers(), slots = data.radar.slots();
+  if (tied.held_out > best.held_out + receivers - 1) best = tied;
+  if (free.held_out > best.held_out + (receivers - 1) * (slots - 1)) best = free;
+  if (best.gain < bounds::kLeastNatsOfChannelErrors || best.held_out < bounds::kLeastHeldOutNatsOfChannelErrors) {
+    return std::nullopt;
+  }
+  ChannelErrors errors;
+  errors.tie = best.tie;
+  errors.gain = best.gain;
+  errors.held_out_gain = best.held_out;
+  errors.echoes = fit.echoes();
+  errors.groups = static_cast<int>(fit.groups().size());
+  errors.phase_rad = fit.phases(best.factors, best.tie);
+  errors.gain_db = 20 * best.factors.cwiseAbs().array().log10();
+  setStandardErrors(fit, best, errors);
   const Eigen::VectorXd each = fit.phases(free.factors, free.tie), common = fit.phases(tied.factors, tied.tie);
   errors.apart_rad = 2 * (each - common).cwiseAbs().maxCoeff();
   return errors;

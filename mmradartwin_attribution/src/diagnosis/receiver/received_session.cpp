@@ -4,6 +4,7 @@
 #include <utility>
 
 namespace mmradartwin::diagnosis::receiver {
+
 ReadingProgress readingProgress(const DiagnosisOptions& options, const std::string& stage) {
   return [&options, stage](std::size_t done, std::size_t all) {
     if (options.cancelled && options.cancelled()) throw DiagnosisCancelled("the diagnosis was cancelled");
@@ -19,10 +20,10 @@ ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const
   session.unexplained = examiner.unexplained();
   if (by_echoes) session.conventions = findSampleConventionByEchoes(session.data);
   if (session.conventions.empty()) return session;
-  // Bytes are judged as they came, what moves where it is.
+  // Bytes are judged as they came, movers at their true places.
   FrameExaminer repaired(recording.radar);
   session.data = readChannels(recording, repaired, on_progress, [&](AdcCube& frame) {
-    for (const SampleConvention& d : session.conventions) undoSampleConvention(d, recording.radar, frame);
+    for (const SampleConvention& c : session.conventions) undoSampleConvention(c, recording.radar, frame);
   });
   const auto moves = [](const FrameFinding& f) { return f.cause == "moving_target"; };
   std::vector<FrameFinding>& frames = session.frames;

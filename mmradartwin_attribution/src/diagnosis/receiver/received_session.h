@@ -11,16 +11,17 @@
 
 namespace mmradartwin::diagnosis::receiver {
 
-/// Tells options.on_progress of a stage as long as options are there; throws DiagnosisCancelled where they say so.
+/// Progress of a stage for options.on_progress, which throws DiagnosisCancelled where the user has cancelled. Keeps a
+/// reference to the options.
 ReadingProgress readingProgress(const DiagnosisOptions& options, const std::string& stage);
-/// A recording that was read, and how it was delivered as far as leakage and echoes tell that without a scene: then
-/// data are as they ought to have been.
+/// Recording that was read, with the conventions of its samples as far as leakage and echoes tell them without a scene.
+/// The data are as they ought to have been delivered.
 struct ReceivedSession {
   ChannelData data;
   std::vector<FrameFinding> frames, unexplained;
   std::vector<SampleConvention> conventions;
 };
-/// `by_echoes`: looks how it was delivered. Throws InputError where no pose is left.
+/// Reads a recording; `by_echoes`: looks for conventions. Throws InputError where no pose is left.
 ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const ReadingProgress& on_progress);
 
 }  // namespace mmradartwin::diagnosis::receiver

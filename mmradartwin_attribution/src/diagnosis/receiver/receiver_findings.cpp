@@ -7,14 +7,15 @@
 #include <numeric>
 #include <sstream>
 
+#include "diagnosis/catalogue/bounds.h"
+#include "diagnosis/catalogue/default_mechanism.h"
 #include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/receiver/strongest_echo.h"
 
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-constexpr double kSameValue = 1;      ///< widths of an interval of 95 %
-constexpr double kSamePlace_m = 0.5;  ///< of someone who walks
+constexpr double kLeastGain_db = -60;  ///< of a channel of a tone, that is written
 
 }  // namespace
 
@@ -46,12 +47,12 @@ bool differsFromStated(const Finding& f, const std::vector<NamedParameters>& sta
   const Parameters& found = f.mechanism->values;
   const bool placed = found.has("x_m") && found.has("y_m");
   const auto differs = [](double is, const std::array<double, 2>& ci95, double states) {
-    return std::abs(is - states) > kSameValue * (ci95[1] - ci95[0]);
+    return std::abs(is - states) > bounds::kSameValue_intervals * (ci95[1] - ci95[0]);
   };
   return std::none_of(stated.begin(), stated.end(), [&](const NamedParameters& m) {
-    if (placed && m.mechanism == f.mechanism->mechanism) {  // its numbers are of one walk and one session
+    if (placed && m.mechanism == f.mechanism->mechanism) {  // other numbers are of one walk and one session
       return std::hypot(m.values.number("x_m") - found.number("x_m"), m.values.number("y_m") - found.number("y_m")) <
-             kSamePlace_m;
+             bounds::kSameWalker_m;
     }
     if (!excludeEachOther(m, *f.mechanism)) return false;
     return std::none_of(f.parameters.begin(), f.parameters.end(), [&](const FindingParameter& p) {
@@ -68,10 +69,10 @@ bool differsFromStated(const Finding& f, const std::vector<NamedParameters>& sta
   });
 }
 
-Finding findingOf(const SampleConvention& delivery, const RadarConfig& radar) {
+Finding findingOf(const SampleConvention& convention, const RadarConfig& radar) {
   Finding f;
-  f.cause = delivery.mechanism.mechanism;
-  f.mechanism = delivery.mechanism;
+  f.cause = convention.mechanism.mechanism;
+  f.mechanism = convention.mechanism;
   f.candidates = {{f.cause, 1.0}};
   std::vector<double> reversed(static_cast<std::size_t>(radar.channels()));
   std::iota(reversed.rbegin(), reversed.rend(), 0.0);
@@ -88,9 +89,9 @@ Finding findingOf(const SampleConvention& delivery, const RadarConfig& radar) {
         "look into the order of the receivers' lanes (self-test pattern): data alone cannot tell a reversed order of "
         "all channels from conjugated channels";
   }
-  f.evidence.log_likelihood_gain = delivery.gain;
-  f.evidence.false_alarm_rate = std::min(1.0, 50 * std::exp(-delivery.gain));
-  f.evidence.margin = delivery.margin;
+  f.evidence.log_likelihood_gain = convention.gain;
+  f.evidence.false_alarm_rate = std::min(1.0, bounds::kConventionTries * std::exp(-convention.gain));
+  f.evidence.margin = convention.margin;
   return f;
 }
 
@@ -100,7 +101,7 @@ Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest) {
   const double error_db = 8.686 / std::sqrt(2 * std::max(1.0, tone.gain));
   Finding f;
   // A constant has no range at all; leakage travels some centimetres.
-  const bool constant = tone.range_m < std::max(0.01, 3 * tone.range_error_m);
+  const bool constant = tone.range_m < std::max(bounds::kMostConstantRange_m, 3 * tone.range_error_m);
   f.cause = constant ? "dc_offset" : "tx_rx_leakage";
   NamedParameters m = defaultMechanism(f.cause);
   m.values.set("level_db", level_db);
@@ -108,7 +109,7 @@ Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest) {
     std::vector<double> phase_deg, gain_db;
     for (Eigen::Index k = 0; k < tone.channels.size(); ++k) {
       phase_deg.push_back(std::arg(tone.channels[k] / tone.channels[0]) * 180 / M_PI);
-      gain_db.push_back(std::max(-60.0, 20 * std::log10(std::abs(tone.channels[k]) / rms)));
+      gain_db.push_back(std::max(kLeastGain_db, 20 * std::log10(std::abs(tone.channels[k]) / rms)));
     }
     m.values.set("range_m", tone.range_m);
     m.values.set("phase_deg", phase_deg);

@@ -12,14 +12,14 @@
 
 namespace mmradartwin::diagnosis::receiver {
 
-// What is wrong with frames and the receiver, as findings; their gain in maps is left open.
+// Findings about frames and the receiver; their gain in maps is left open.
 
 Finding findingOf(const FrameFinding& frames);
-/// False where a mechanism of the twin says the same: for the same thing, or for a place near by, and no value
-/// farther from the finding's than its interval is wide.
+/// False where a mechanism of the twin states the finding already: it is about the same thing, or a place near by, and
+/// no value is farther from the finding's than the width of its interval.
 bool differsFromStated(const Finding& f, const std::vector<NamedParameters>& stated);
-Finding findingOf(const SampleConvention& delivery, const RadarConfig& radar);
-/// rest: the data without the tone, whose strongest echo levels refer to.
+Finding findingOf(const SampleConvention& convention, const RadarConfig& radar);
+/// `rest` is the data without the tone: levels refer to its strongest echo.
 Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest);
 Finding findingOf(const ChannelErrors& errors);
 

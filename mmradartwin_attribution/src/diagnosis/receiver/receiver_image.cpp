@@ -7,38 +7,37 @@
 #include <numeric>
 #include <vector>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
 constexpr double kDbPerNeper = 8.685889638065035;
+constexpr Eigen::Index kFirst = 2;  ///< bin: leakage and offset stand below, their images at the end
+constexpr int kIterations = 6;      ///< of the image and of what stands beside it
 
 }  // namespace
 
 bool measureImage(const ChannelData& data, Finding& f) {
-  constexpr double kHost = 10;        // times the power beside its image
-  constexpr Eigen::Index kFirst = 2;  // leakage and offset stand below, their images at the end
-  constexpr int kIterations = 6;
-  constexpr double kLeastError_db = 0.03;
   const std::size_t locations = data.locations.size();
   if (locations < 3) return false;
   std::vector<std::complex<double>> shared;
   std::vector<double> host;
   std::complex<double> beta = 0;
   double hosts = 0;
-  // Cells count by what stands there beside the image: by all power there, those that echoes of the room make weaker
-  // would count most.
+  // Cells are weighed by the power beside the image. Weights by all power there would favour cells in which echoes of
+  // the room weaken the image.
   for (int i = 0; i < kIterations; ++i) {
     shared.assign(locations, 0.0);
     host.assign(locations, 0.0);
     for (const PoseChannels& p : data.poses) {
       const std::size_t l = static_cast<std::size_t>(p.location);
-      for (Eigen::Index k = kFirst; k <= p.y.cols() - kFirst; ++k) {
-        const Eigen::VectorXcd there = p.y.col(p.y.cols() - k).conjugate();
-        const double beside = (p.y.col(k) - beta * there).squaredNorm();
-        if (!(beside > 0) || there.squaredNorm() < kHost * beside) continue;
-        shared[l] += there.dot(p.y.col(k)) / beside;
+      for (Eigen::Index k = kFirst; k <= p.range_spectra.cols() - kFirst; ++k) {
+        const Eigen::VectorXcd there = p.range_spectra.col(p.range_spectra.cols() - k).conjugate();
+        const double beside = (p.range_spectra.col(k) - beta * there).squaredNorm();
+        if (!(beside > 0) || there.squaredNorm() < bounds::kLeastHostOverImage * beside) continue;
+        shared[l] += there.dot(p.range_spectra.col(k)) / beside;
         host[l] += there.squaredNorm() / beside;
       }
     }
@@ -52,7 +51,7 @@ bool measureImage(const ChannelData& data, Finding& f) {
   }
   const double n = static_cast<double>(locations);
   const double width = boost::math::quantile(boost::math::students_t(n - 1), 0.975);
-  const double half_db = width * std::max(kLeastError_db, kDbPerNeper * std::sqrt(scatter * n / (n - 1)));
+  const double half_db = width * std::max(bounds::kImageError_db, kDbPerNeper * std::sqrt(scatter * n / (n - 1)));
   const double image_db = kDbPerNeper * std::log(std::abs(beta));
   f.mechanism->values.set("image_db", image_db);
   f.mechanism->values.set("phase_deg", std::arg(beta) * 180 / M_PI);

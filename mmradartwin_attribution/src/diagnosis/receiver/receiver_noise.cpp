@@ -4,11 +4,13 @@
 #include <cmath>
 #include <vector>
 
-#include "mmradartwin_attribution/ledger.h"
+#include "diagnosis/catalogue/bounds.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::receiver {
+
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated) {
-  // A sample's noise from that of a cell of the average: Hann's sums over N samples, N/2 and 3N/8.
+  // The noise of a sample follows from that of a cell of the average by Hann's sums over N samples, N/2 and 3N/8.
   std::vector<double> levels_db;
   for (const PoseChannels& p : data.poses) {
     if (!(p.noise_power > 0)) continue;
@@ -18,8 +20,9 @@ std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedPar
   const double stated_db = stated.values.number("level_dbfs") + stated.values.number("delta_db");
   const double delta_db = quantile(levels_db, 0.5) - stated_db;
   const double scatter = (quantile(levels_db, 0.84) - quantile(levels_db, 0.16)) / 2;
-  const double error = std::max(0.02, scatter / std::sqrt(static_cast<double>(levels_db.size())));
-  if (std::abs(delta_db) < std::max(0.3, 6 * error)) return std::nullopt;
+  const double error = std::max(bounds::kNoiseError_db, scatter / std::sqrt(static_cast<double>(levels_db.size())));
+  if (std::abs(delta_db) < std::max(bounds::kLeastNoiseChange_db, bounds::kLeastNoiseChange_errors * error))
+    return std::nullopt;
   Finding f;
   f.cause = "noise_floor";
   f.mechanism = stated;

@@ -8,7 +8,7 @@
 
 namespace mmradartwin::diagnosis::receiver {
 
-/// Where the noise departs from the level that the twin's noise_floor states.
+/// Finding of noise that departs from the level that the twin's noise_floor states; nothing where it does not.
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated);
 
 }  // namespace mmradartwin::diagnosis::receiver

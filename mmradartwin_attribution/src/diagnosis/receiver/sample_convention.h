@@ -9,20 +9,20 @@
 
 namespace mmradartwin::diagnosis::receiver {
 
-/// How samples may have been delivered other than the convention has it: conjugated or in another order.
+/// Convention other than the twin's in which samples were delivered: conjugated or in another order.
 struct SampleConvention {
   NamedParameters mechanism;     ///< iq_conjugation, channel_conjugation or channel_permutation
-  double gain = 0;               ///< nats over the delivery as it is said to be, on the poses looked at
-  std::optional<double> margin;  ///< nats over the next best
+  double gain = 0;               ///< nats over the stated convention, on the poses that were looked at
+  std::optional<double> margin;  ///< nats over the next best convention
 };
 
-/// Tries all deliveries on a part of the session; nothing where the data fit best as they are.
+/// Tries all conventions on a part of the session; nothing where the data fit best as they are.
 std::optional<SampleConvention> findSampleConvention(const Twin& twin, const ChannelData& data);
-/// What leakage and echoes say without a scene, in the order in which it is to be undone.
+/// Conventions that leakage and echoes tell without a scene, in the order in which they are to be undone.
 std::vector<SampleConvention> findSampleConventionByEchoes(const ChannelData& data);
-/// Undoes it in all poses.
-void undoSampleConvention(const SampleConvention& delivery, ChannelData& data);
-/// Undoes it in a frame; a conjugation of channels as the reversed order.
-void undoSampleConvention(const SampleConvention& delivery, const RadarConfig& radar, AdcCube& frame);
+/// Undoes a convention in all poses.
+void undoSampleConvention(const SampleConvention& convention, ChannelData& data);
+/// Undoes a convention in a frame; conjugated channels count as channels in reversed order.
+void undoSampleConvention(const SampleConvention& convention, const RadarConfig& radar, AdcCube& frame);
 
 }  // namespace mmradartwin::diagnosis::receiver

@@ -10,16 +10,22 @@ namespace mmradartwin::diagnosis::receiver {
 namespace {
 
 constexpr double kDbPerNeper = 8.685889638065035;
-constexpr double kLevelError_db = 0.3, kSharedError_db = 3;  ///< of an echo alone in its cell, and by the others there
+constexpr double kLevelError_db = 0.3;  ///< of an echo alone in its cell
+constexpr double kSharedError_db = 3;   ///< of an echo whose cell belongs to others, how it adds to which is chance
+constexpr double kReach_bins = 2.5;     ///< within which echoes share a cell
+constexpr double kLobeOverTone = 1.5;   ///< power summed over Hann's lobe over a tone's own
 
-/// By bin, mean over the channels.
+/// Mean power over the channels, by range bin.
 Eigen::VectorXd measuredPower(const PoseChannels& pose) {
-  return pose.y.colwise().squaredNorm().transpose() / static_cast<double>(pose.y.rows());
+  return pose.range_spectra.colwise().squaredNorm().transpose() / static_cast<double>(pose.range_spectra.rows());
 }
 
-/// Of a tone about that bin: its power summed over Hann's lobe is 1.5 times its own, wherever it lies between the bins.
-double tonePower(const Eigen::VectorXd& power, Eigen::Index bin) { return power.segment(bin - 2, 5).sum() / 1.5; }
+/// Power of a tone about a bin, wherever it lies between the bins.
+double tonePower(const Eigen::VectorXd& power, Eigen::Index bin) {
+  return power.segment(bin - 2, 5).sum() / kLobeOverTone;
+}
 
+/// Adds to a finding's level, with an error of its own; does nothing to a finding without a level.
 void changeLevel(Finding& f, double by_db, double error_db) {
   const auto level = std::find_if(f.parameters.begin(), f.parameters.end(),
                                   [](const FindingParameter& p) { return p.name == "level_db"; });
@@ -31,14 +37,13 @@ void changeLevel(Finding& f, double by_db, double error_db) {
   f.mechanism->values.set("level_db", level_db);
 }
 
-/// The session's strongest echo: what was measured where the twin has one, and of that the share that the twin gives it
-/// beside the others there. What the twin has and the room has not is weak in the data.
+/// Strongest echo of a session as measured where the twin has an echo, and the share that the twin gives it of the
+/// power there. Echoes that the twin has and the room has not are weak in the data.
 struct MeasuredEcho {
   double amplitude = 0, share = 1;
 };
 
 MeasuredEcho strongestMeasured(const Twin& twin, const ChannelData& data) {
-  constexpr double kReach = 2.5;  // bins
   double strongest = 0;
   MeasuredEcho echo;
   for (const PoseChannels& p : data.poses) {
@@ -56,7 +61,7 @@ MeasuredEcho strongestMeasured(const Twin& twin, const ChannelData& data) {
       const double lobe = tonePower(measured, bin);
       if (lobe <= strongest) continue;
       double all = 0;
-      for (const auto& [other, other_power] : expected) all += std::abs(other - place) < kReach ? other_power : 0;
+      for (const auto& [other, other_power] : expected) all += std::abs(other - place) < kReach_bins ? other_power : 0;
       const double own = lobe * power / all;
       if (own <= strongest) continue;
       strongest = own;
@@ -66,7 +71,7 @@ MeasuredEcho strongestMeasured(const Twin& twin, const ChannelData& data) {
   return echo;
 }
 
-/// Of the strongest echo's level: how it adds to others in its cell is chance.
+/// Error of the strongest echo's level.
 double errorOf_db(const MeasuredEcho& echo) { return kLevelError_db + kSharedError_db * (1 - echo.share); }
 
 }  // namespace

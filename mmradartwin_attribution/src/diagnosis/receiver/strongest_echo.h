@@ -7,14 +7,14 @@
 
 namespace mmradartwin::diagnosis::receiver {
 
-/// Amplitude of the strongest tone of all poses.
+/// Amplitude of the strongest tone at any pose.
 double strongestMeasured(const ChannelData& data);
 
-/// The same where a twin tells where its strongest echoes stand: in the data several may stand in one cell. Does
-/// nothing to a finding without a level.
+/// Refers a finding's level to the strongest echo where the twin has one, as several echoes may share a cell in the
+/// data. Does nothing to a finding without a level.
 void referToStrongestEcho(const Twin& twin, const ChannelData& data, Finding& f);
-/// A level against its host that was fitted beside the twin's strongest amplitude, as one at the strongest echo of the
-/// room. `log_gain`: what the measured power has more than the twin's.
+/// Refers a level that was fitted against the twin's strongest `amplitude` to the strongest echo of the room.
+/// `log_gain` is the logarithm of the measured power over the twin's.
 void referToStrongestHost(const Twin& twin, const ChannelData& data, double log_gain, double amplitude, Finding& f);
 
 }  // namespace mmradartwin::diagnosis::receiver

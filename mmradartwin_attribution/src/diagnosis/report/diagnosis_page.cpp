@@ -53,6 +53,16 @@ std::vector<GainRow> gainRows(const FindingGain& gain) {
           {"C5", &gain.classes[4]}};
 }
 
+void writeAccuracy(const StatedAccuracy& accuracy, std::ostream& html) {
+  html << "<p>Stated accuracy of the ground (1 sigma), by which the session is judged:";
+  const char* separator = " ";
+  for (const AccuracyKey& key : accuracyKeys()) {
+    html << separator << key.name << " " << shownNumber(accuracy.*key.member);
+    separator = ", ";
+  }
+  html << ".</p>";
+}
+
 void writeHead(const Diagnosis& diagnosis, std::ostream& html) {
   html << "<!doctype html><meta charset=\"utf-8\"><title>Diagnosis</title><style>body{font:15px "
           "sans-serif;max-width:60em;"
@@ -67,6 +77,7 @@ void writeHead(const Diagnosis& diagnosis, std::ostream& html) {
          << "<a href=\"twin.extended.yaml\">twin.extended.yaml</a>, ";
   }
   html << "<a href=\"findings.json\">findings.json</a></p>";
+  if (diagnosis.has_twin) writeAccuracy(diagnosis.findings.accuracy, html);
   if (diagnosis.problems.empty()) return;
   html << "<p>Left out:</p><ul>";
   for (const PoseProblem& problem : diagnosis.problems) html << "<li>" << escaped(problem.message) << "</li>";

@@ -43,30 +43,31 @@ void FitRound::fitOne(Screened s) {
       }
     }
   }
-  report_("fitting " + s.hypothesis.label(), std::min(1.0, static_cast<double>(fits_.size()) / kMostFits));
+  context_.report("fitting " + s.hypothesis.label(), std::min(1.0, static_cast<double>(fits_.size()) / kMostFits));
   const bool around = s.hypothesis.isMove() || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
   // A geometry climbs slowly at first.
   const double least_nats = s.hypothesis.isGeometry() ? 0 : kShareOfPlain * plain_name_;
-  fits_.push_back(around ? fitObject(fitter_, state_, s) : fitter_.fit(state_, s.hypothesis, s.starts, least_nats));
-  source_.setBaseline(state_.mechanisms);
-  if (!law && fitter_.isPlain(fits_.back().gain_without_best_place))
+  fits_.push_back(around ? fitObject(context_.fitter, state_, s)
+                         : context_.fitter.fit(state_, s.hypothesis, s.starts, least_nats));
+  context_.echoes.setBaseline(state_.mechanisms);
+  if (!law && context_.fitter.isPlain(fits_.back().gain_without_best_place))
     plain_name_ = std::max(plain_name_, fits_.back().gain);
   if (isObject(s.hypothesis) && !box && fits_.back().gain_without_best_place > std::max(kWorthABox, best_object_)) {
     best_object_ = fits_.back().gain_without_best_place;
     if (isUnmodelledBox(screened_.back().hypothesis)) screened_.pop_back();
-    screened_.push_back(asBox(data_, state_, fits_.back()));  // last: the slowest of all fits
+    screened_.push_back(asBox(context_.data, state_, fits_.back()));  // last: the slowest of all fits
   }
   // What latents bring that the fit has found, and the twin as it is had not, is nobody's gain.
-  if (std::optional<ModelState> better = fitter_.improved(state_, fits_.back().state.nuisance)) {
+  if (std::optional<ModelState> better = context_.fitter.improved(state_, fits_.back().state.nuisance)) {
     const double nats = better->log_likelihood - state_.log_likelihood;
     state_ = std::move(*better);
     // Where that is much, it is one place's, and what the others gain beside it is seen by fits from there alone.
     for (HypothesisFit& earlier : fits_) {
       if (nats > kWorthAFit && &earlier != &fits_.back()) {
-        earlier = fitter_.fit(state_, earlier.hypothesis, {earlier.scaled_values});
-        source_.setBaseline(state_.mechanisms);
+        earlier = context_.fitter.fit(state_, earlier.hypothesis, {earlier.scaled_values});
+        context_.echoes.setBaseline(state_.mechanisms);
       } else {
-        fitter_.gainOver(state_, earlier);
+        context_.fitter.gainOver(state_, earlier);
       }
     }
   }
@@ -119,7 +120,7 @@ std::vector<HypothesisFit> FitRound::fit(std::vector<Screened> screened, std::si
     if (leads && s.hypothesis.isGeometry() && std::none_of(fits_.begin(), fits_.end(), fitted)) fitOne(s);
   }
   for (HypothesisFit& f : fits_) {
-    fitter_.judge(f, family + static_cast<std::size_t>(isPlaced(f.hypothesis) ? kObjectPlaces : 0));
+    context_.fitter.judge(f, family + static_cast<std::size_t>(isPlaced(f.hypothesis) ? kObjectPlaces : 0));
     TriedHypothesis& t = triedAs(f, round, tried);
     t.gain = f.gain;
     t.gain_without_best_place = f.gain_without_best_place;

@@ -1,11 +1,9 @@
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
-#include "diagnosis/channels/channel_data.h"
-#include "diagnosis/fit/hypothesis_fit.h"
+#include "diagnosis/fit/diagnosis_context.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_attribution/diagnosis_result.h"
 
@@ -14,11 +12,8 @@ namespace mmradartwin::diagnosis::rounds {
 /// One round of a diagnosis: of what a ranking promises most of, which are fitted and from where.
 class FitRound {
  public:
-  /// Keeps references. state: what fits are compared with; gets the better latents that they find. report: called with
-  /// a stage and its share done.
-  FitRound(ExpectedEchoes& source, HypothesisFitter& fitter, const ChannelData& data, ModelState& state,
-           std::function<void(const std::string& stage, double share)> report)
-      : source_(source), fitter_(fitter), data_(data), state_(state), report_(std::move(report)) {}
+  /// Keeps references. state: what fits are compared with; gets the better latents that they find.
+  FitRound(DiagnosisContext& context, ModelState& state) : context_(context), state_(state) {}
 
   /// screened: most promising first. Fits, best first, judged as of so large a family; puts behind `tried` what was
   /// looked at.
@@ -28,11 +23,8 @@ class FitRound {
  private:
   void fitOne(Screened screened);
 
-  ExpectedEchoes& source_;
-  HypothesisFitter& fitter_;
-  const ChannelData& data_;
+  DiagnosisContext& context_;
   ModelState& state_;
-  std::function<void(const std::string&, double)> report_;
   std::vector<Screened> screened_;
   std::vector<HypothesisFit> fits_;          ///< best first
   double best_object_ = 0, plain_name_ = 0;  ///< nats of the best fits of these kinds

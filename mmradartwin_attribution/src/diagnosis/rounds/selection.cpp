@@ -13,27 +13,16 @@ namespace mmradartwin::diagnosis::rounds {
 namespace {
 
 constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
-constexpr double kTogether_m = 0.005;  ///< what sixteen of them err by together
 // The most that a geometry has brought with nothing hidden: 269 nats at 26 poses, by 2.6 cm.
-constexpr double kPlainlyAside_m = 0.035, kPlainlyAsidePerPose = 20;
+constexpr double kPlainlyAsidePerPose = 20;
 constexpr double kRival = 0.7;  ///< of a finding's gain, by a simpler name that may be the right one
 constexpr std::size_t kMostRivals = 2;
 
 }  // namespace
 
-Selection::Selection(const Twin& twin, ChannelData& data, ExpectedEchoes& source, const ChannelLikelihood& model,
-                     HypothesisFitter& fitter, GainMeasurement& gains, const PoseAccuracy& accuracy,
-                     std::vector<Finding>& findings, std::vector<TriedHypothesis>& tried, Report report)
-    : twin_(twin),
-      data_(data),
-      source_(source),
-      model_(model),
-      fitter_(fitter),
-      gains_(gains),
-      accuracy_(accuracy),
-      findings_(findings),
-      tried_(tried),
-      report_(std::move(report)) {}
+Selection::Selection(DiagnosisContext& context, GainMeasurement& gains, std::vector<Finding>& findings,
+                     std::vector<TriedHypothesis>& tried)
+    : context_(context), gains_(gains), findings_(findings), tried_(tried) {}
 
 void Selection::begin(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& extended,
                       ModelState state) {
@@ -61,7 +50,7 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
   state_.nuisance = fit.state.nuisance;
   writeBackFindings();
   if (accepted_.size() > 1) refitTogether();
-  source_.setBaseline(mechanisms_);
+  context_.echoes.setBaseline(mechanisms_);
   if (acceptedAs(fit.hypothesis) != accepted_.end()) {
     profileFound();
     withdrawExplainedByUnknown();
@@ -72,7 +61,7 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
     findings_ = findings;
     writeBackFindings();
     state_.nuisance = latents;
-    source_.setBaseline(mechanisms_);
+    context_.echoes.setBaseline(mechanisms_);
     return stands ? "no larger than what errors of actors and poses look like" : "worth nothing beside the rest";
   }
   for (const Accepted& before : accepted) {
@@ -82,23 +71,23 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
   }
   exchangeNames();
   takeOutImage();
-  source_.setBaseline(mechanisms_);
+  context_.echoes.setBaseline(mechanisms_);
   const SessionLatents nuisance = state_.nuisance;
-  state_ = fitter_.state(mechanisms_, &nuisance);
+  state_ = context_.fitter.state(mechanisms_, &nuisance);
   return "";
 }
 
 /// All that rounds have found, fitted at once; what is then worth nothing beside the rest is taken back.
 void Selection::refitTogether() {
   while (true) {
-    report_("fitting all findings together", 0);
+    context_.report("fitting all findings together", 0);
     std::vector<Hypothesis> parts;
     std::vector<std::vector<double>> start;
     for (const Accepted& a : accepted_) {
       parts.push_back(a.hypothesis);
       start.push_back(a.scaled_values);
     }
-    const JointFit fit = fitter_.refit(before_rounds_, state_.nuisance, parts, start);
+    const JointFit fit = context_.fitter.refit(before_rounds_, state_.nuisance, parts, start);
     state_.nuisance = fit.nuisance;
     std::size_t weakest = 0;
     double weakest_rate = -1;
@@ -109,8 +98,8 @@ void Selection::refitTogether() {
       const std::size_t numbers = a.hypothesis.coordinates.size();
       // There or not, or plain whatever its scatter: its own round has judged it. A law may have been what a name had
       // not been fitted to yet (0.9 and -1 deg over azimuth beside half of the carrier's error, then 0.1 and -0.05).
-      if (numbers == 0 || (a.plain && fitter_.isPlain(fit.worth[i].nats))) continue;
-      const double rate = fitter_.falseAlarmRate(fit.worth[i].scattered(), a.hypothesis, numbers, family_);
+      if (numbers == 0 || (a.plain && context_.fitter.isPlain(fit.worth[i].nats))) continue;
+      const double rate = context_.fitter.falseAlarmRate(fit.worth[i].scattered(), a.hypothesis, numbers, family_);
       if (rate > weakest_rate) {
         weakest = i;
         weakest_rate = rate;
@@ -124,7 +113,7 @@ void Selection::refitTogether() {
 
 void Selection::withdraw(std::size_t i) {
   const Accepted gone = accepted_[i];
-  report_("taken back: " + gone.hypothesis.label(), 1);
+  context_.report("taken back: " + gone.hypothesis.label(), 1);
   findings_.erase(findings_.begin() + static_cast<std::ptrdiff_t>(gone.finding));
   accepted_.erase(accepted_.begin() + static_cast<std::ptrdiff_t>(i));
   for (Accepted& a : accepted_) a.finding -= a.finding > gone.finding ? 1 : 0;
@@ -140,7 +129,7 @@ void Selection::withdrawExplainedByUnknown() {
       return false;
     }
     const std::size_t numbers = h.coordinates.size();
-    return fitter_.falseAlarmRate(natsFromNothing(h, a.scaled_values, a.standard_error), h, numbers, family_) >
+    return context_.fitter.falseAlarmRate(natsFromNothing(h, a.scaled_values, a.standard_error), h, numbers, family_) >
            kFalseAlarm;
   };
   bool taken = false;
@@ -155,7 +144,7 @@ void Selection::withdrawExplainedByUnknown() {
 
 void Selection::refitAndProfile() {
   refitTogether();
-  source_.setBaseline(mechanisms_);
+  context_.echoes.setBaseline(mechanisms_);
   profileFound();
 }
 
@@ -167,20 +156,21 @@ void Selection::renameVerdict(const std::string& label, const std::string& verdi
 
 /// Values and intervals of all that rounds have found, on the likelihood that is settled on them.
 void Selection::profileFound() {
-  report_("errors of what was found", 0);
+  context_.report("errors of what was found", 0);
   std::vector<Hypothesis> parts;
   std::vector<ProfiledValues> fits;
   for (const Accepted& a : accepted_) {
     parts.push_back(a.hypothesis);
     fits.push_back({a.scaled_values, a.standard_error});
   }
-  profileParts({source_, model_, accuracy_, before_rounds_, state_.nuisance}, parts, fits);
+  profileParts({context_.echoes, context_.likelihood, context_.pose_accuracy, before_rounds_, state_.nuisance}, parts,
+               fits);
   for (std::size_t i = 0; i < accepted_.size(); ++i) {
     Accepted& a = accepted_[i];
     a.scaled_values = fits[i].scaled_values;
     a.standard_error = fits[i].standard_error;
     if (a.hypothesis.mechanism.mechanism == "channel_phase_error") {
-      widenGains(data_, a.hypothesis, a.standard_error);
+      widenGains(context_.data, a.hypothesis, a.standard_error);
     }
   }
   writeBackFindings();
@@ -196,27 +186,29 @@ bool Selection::isWithinErrors(const HypothesisFit& f) const {
   if (a == accepted_.end() || !(h.isMove() || h.isGeometry())) return false;
   if (h.isMove()) {
     const NamedParameters move = h.at(a->scaled_values);
-    const Actor& actor = twin_.scene().actors[static_cast<std::size_t>(twin_.scene().actorIndex(h.subject))];
+    const Actor& actor =
+        context_.twin.scene().actors[static_cast<std::size_t>(context_.twin.scene().actorIndex(h.subject))];
     const double reach_m = actor.bounds.sizes().head<2>().norm() / 2;
     const double farthest_m = std::hypot(move.values.number("dx_m"), move.values.number("dy_m")) +
                               std::abs(move.values.number("dyaw_deg")) * M_PI / 180 * reach_m;
-    if (farthest_m < kMostRangeError_m) return true;
+    if (farthest_m < f.stated.mostRangeError_m()) return true;
   }
   // An interval may be wide where the likelihood is rough: a radar's that stood 4 cm aside was 17 mm at 1427 nats,
   // since paths came and went at two of 17 places.
-  const double per_pose = f.gain_without_best_place / f.overdispersion / static_cast<double>(data_.poses.size());
-  const bool is_aside = h.isGeometry() && f.moved_m() > kPlainlyAside_m && per_pose > kPlainlyAsidePerPose;
+  const double per_pose =
+      f.gain_without_best_place / f.overdispersion / static_cast<double>(context_.data.poses.size());
+  const bool is_aside = h.isGeometry() && f.moved_m() > f.stated.sureOffset_m() && per_pose > kPlainlyAsidePerPose;
   if (f.isFarAway() || is_aside) return false;
   std::vector<double> errors = a->standard_error;
   bool shifts = false;
   for (std::size_t i = 0; i < errors.size(); ++i) {
     if (h.coordinates[i].unit != "m") continue;
     shifts = true;
-    errors[i] = std::max(errors[i], kTogether_m);
+    errors[i] = std::max(errors[i], f.stated.commonOffset_m());
   }
   if (f.plain && !shifts) return false;
   const double nats = natsFromNothing(h, a->scaled_values, errors);
-  return fitter_.falseAlarmRate(nats, h, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
+  return context_.fitter.falseAlarmRate(nats, h, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
 }
 
 /// An image, once found, is measured against its hosts and taken out: as a power it would be 2 dB high, and what that
@@ -226,8 +218,8 @@ void Selection::takeOutImage() {
                                   [](const Accepted& a) { return a.hypothesis.mechanism.mechanism == "iq_imbalance"; });
   if (image == accepted_.end()) return;
   Finding& f = findings_[image->finding];
-  if (!measureImage(data_, f)) return;
-  subtractImage(*f.mechanism, data_);
+  if (!measureImage(context_.data, f)) return;
+  subtractImage(*f.mechanism, context_.data);
   extended_before_rounds_.push_back(*f.mechanism);
   accepted_.erase(image);
   writeBackFindings();
@@ -240,9 +232,10 @@ void Selection::writeBackFindings() {
   for (const Accepted& a : accepted_) {
     Finding& f = findings_[a.finding];
     f.mechanism = a.hypothesis.at(a.scaled_values);
-    f.parameters = fittedParameters(a.hypothesis, a.scaled_values, a.standard_error, f.cause, data_.locations.size());
+    f.parameters =
+        fittedParameters(a.hypothesis, a.scaled_values, a.standard_error, f.cause, context_.data.locations.size());
     for (FindingPlace& place : f.where) {
-      const std::optional<Eigen::Vector2d> at = placeOf(*f.mechanism, twin_.scene());
+      const std::optional<Eigen::Vector2d> at = placeOf(*f.mechanism, context_.twin.scene());
       if (!place.x_m || !at) continue;
       place.x_m = at->x();
       place.y_m = at->y();
@@ -285,21 +278,21 @@ std::optional<HypothesisFit> Selection::betterName(const Accepted& a) {
     });
     if (!free) continue;
     if (!null) {
-      report_("names beside what was found since", 0);
-      source_.setBaseline(others);
-      null = fitter_.state(others, &state_.nuisance);
-      own = fitter_.fit(*null, a.hypothesis, {a.scaled_values});
+      context_.report("names beside what was found since", 0);
+      context_.echoes.setBaseline(others);
+      null = context_.fitter.state(others, &state_.nuisance);
+      own = context_.fitter.fit(*null, a.hypothesis, {a.scaled_values});
     }
-    HypothesisFit f = fitter_.fit(*null, rival, {scaled_values});
-    fitter_.judge(f, family_);
+    HypothesisFit f = context_.fitter.fit(*null, rival, {scaled_values});
+    context_.fitter.judge(f, family_);
     const bool stands = f.false_alarm_rate <= kFalseAlarm && rejectionReason(f, {}).empty();
     if (!stands || f.ranking() <= (best ? *best : *own).ranking()) continue;
     best = std::move(f);
   }
   if (!best) return best;
   Finding& f = findings_[a.finding];
-  f = findingOf(*best, {*best, *own}, *null, twin_.scene(), data_);
-  if (data_.locations.size() > 1) f.gain.emplace();
+  f = findingOf(*best, {*best, *own}, *null, context_.twin.scene(), context_.data);
+  if (context_.data.locations.size() > 1) f.gain.emplace();
   return best;
 }
 
@@ -313,7 +306,7 @@ void Selection::exchangeNames() {
     const std::optional<HypothesisFit> better = betterName(a);
     if (!better) continue;
     const std::string was = a.hypothesis.label(), is = better->hypothesis.label();
-    report_("found " + is + " instead of " + was, 1);
+    context_.report("found " + is + " instead of " + was, 1);
     renameVerdict(was, "found, later called " + is);
     a = {better->hypothesis, better->scaled_values, better->standard_error, better->plain, a.finding, {}, {}};
     state_.nuisance = better->state.nuisance;
@@ -354,14 +347,14 @@ void Selection::orderByGain() {
 
 /// A finding's gain over mechanisms_, in nats, maps and metrics.
 void Selection::measureAgain(const Accepted& a) {
-  report_("gain of " + a.hypothesis.label() + " beside those before it", 0);
+  context_.report("gain of " + a.hypothesis.label() + " beside those before it", 0);
   Finding& f = findings_[a.finding];
-  source_.setBaseline(mechanisms_);
+  context_.echoes.setBaseline(mechanisms_);
   const SessionLatents nuisance = state_.nuisance;
-  state_ = fitter_.state(mechanisms_, &nuisance);
-  HypothesisFit fit = fitter_.fit(state_, a.hypothesis, {a.scaled_values});
-  fitter_.judge(fit, family_);
-  describeGain(fit, state_, data_, f);
+  state_ = context_.fitter.state(mechanisms_, &nuisance);
+  HypothesisFit fit = context_.fitter.fit(state_, a.hypothesis, {a.scaled_values});
+  context_.fitter.judge(fit, family_);
+  describeGain(fit, state_, context_.data, f);
   if (!f.gain) return;  // one location
   f.where.front().range_m = f.where.front().azimuth_deg = std::nullopt;
   gains_.ofFit(state_, fit, f);

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "diagnosis/channels/channel_data.h"
+#include "diagnosis/fit/diagnosis_context.h"
 #include "diagnosis/fit/hypothesis_fit.h"
 #include "diagnosis/gain/gain_measurement.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
@@ -23,13 +23,12 @@ constexpr double kFalseAlarm = 0.01;  ///< family-wise, per round
 /// state of everything else beside it.
 class Selection {
  public:
-  using Report = std::function<void(const std::string& stage, double share)>;
-  /// Keeps references. `findings`: all of the session; those of rounds are put behind the others. `tried`: of whose
-  /// entries one may be called otherwise later. Mechanisms as the engine simulates them, and `extended` as the
-  /// recording has them, with what was taken out of the data.
-  Selection(const Twin& twin, ChannelData& data, ExpectedEchoes& source, const ChannelLikelihood& model,
-            HypothesisFitter& fitter, GainMeasurement& gains, const PoseAccuracy& accuracy,
-            std::vector<Finding>& findings, std::vector<TriedHypothesis>& tried, Report report);
+  /// Keeps references. findings: all of the session; those of rounds are put behind the others. tried: the hypotheses
+  /// that were looked at; the verdict on one may change later.
+  Selection(DiagnosisContext& context, GainMeasurement& gains, std::vector<Finding>& findings,
+            std::vector<TriedHypothesis>& tried);
+  /// Mechanisms as the engine simulates them, and `extended` as the recording has them, with what was taken out of the
+  /// data.
   void begin(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& extended,
              ModelState state);
 
@@ -75,16 +74,10 @@ class Selection {
   void takeOutImage();
   void measureAgain(const Accepted& a);
 
-  const Twin& twin_;
-  ChannelData& data_;
-  ExpectedEchoes& source_;
-  const ChannelLikelihood& model_;
-  HypothesisFitter& fitter_;
+  DiagnosisContext& context_;
   GainMeasurement& gains_;
-  const PoseAccuracy& accuracy_;
   std::vector<Finding>& findings_;
   std::vector<TriedHypothesis>& tried_;
-  Report report_;
   std::vector<NamedParameters> mechanisms_, extended_;
   /// The same without what rounds have found.
   std::vector<NamedParameters> before_rounds_, extended_before_rounds_;

@@ -193,8 +193,8 @@ void freePlace(const ChannelData& data, Screened& object) {
   const Eigen::Vector2d away = awayFromRadar(data, place);
   for (double radius_m : kWide_m) {
     const Eigen::Vector2d axis = place + radius_m * away;
-    object.starts.push_back({h.coordinates[0].scaled_values(axis.x()), h.coordinates[1].scaled_values(axis.y()),
-                             h.coordinates[2].scaled_values(2 * radius_m)});
+    object.starts.push_back({h.coordinates[0].scaled(axis.x()), h.coordinates[1].scaled(axis.y()),
+                             h.coordinates[2].scaled(2 * radius_m)});
   }
 }
 

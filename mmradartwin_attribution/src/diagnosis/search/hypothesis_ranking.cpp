@@ -27,7 +27,7 @@ constexpr std::size_t kMostElsewhere = 2;  ///< and how many are by that
 }  // namespace
 
 std::vector<int> HypothesisRanking::spread(std::size_t wanted) const {
-  const std::size_t count = data_.poses.size();
+  const std::size_t count = context_.data.poses.size();
   wanted = std::min(count, wanted);
   std::vector<int> poses;
   for (std::size_t i = 0; i < wanted; ++i) poses.push_back(static_cast<int>(i * count / wanted));
@@ -35,7 +35,7 @@ std::vector<int> HypothesisRanking::spread(std::size_t wanted) const {
 }
 
 std::vector<RangeShift> HypothesisRanking::shifted(const ModelState& state) {
-  report_("actors that stand elsewhere", 0);
+  context_.report("actors that stand elsewhere", 0);
   std::vector<RangeShift> shifts = screen_.nearerOrFarther(state, spread(kScreenPoses));
   const auto plain = [](const RangeShift& s) { return s.nats >= kElsewhere; };
   shifts.erase(std::partition_point(shifts.begin(), shifts.end(), plain), shifts.end());
@@ -47,7 +47,7 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   const auto suspects = screen_.suspects(state);
   std::set<std::string> suspicious;
   for (std::size_t i = 0; i < std::min(kSuspects, suspects.size()); ++i) {
-    suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(suspects[i].first)].name);
+    suspicious.insert(context_.twin.scene().actors[static_cast<std::size_t>(suspects[i].first)].name);
   }
   std::set<int> out_of_place;
   for (const auto& [actor, nats] : suspects) {
@@ -59,7 +59,7 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   };
   /// Whom it moves, where that one is looked for elsewhere; -1 of all others.
   const auto outOfPlace = [&](const Hypothesis& h) {
-    const int actor = twin_.scene().actorIndex(h.subject);
+    const int actor = context_.twin.scene().actorIndex(h.subject);
     return h.isMove() && out_of_place.count(actor) > 0 ? actor : -1;
   };
   const auto look = [&](const Hypothesis& h, const std::vector<int>& poses) {
@@ -77,42 +77,45 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
     return best;
   };
   for (std::size_t i = 0; i < std::min(kMostElsewhere, shifted.size()); ++i) {
-    suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(shifted[i].actor)].name);
+    suspicious.insert(context_.twin.scene().actors[static_cast<std::size_t>(shifted[i].actor)].name);
     out_of_place.insert(shifted[i].actor);
   }
-  report_("objects that the twin lacks", 0);
-  std::vector<Screened> placed = bestOf(kMostObjects, projectBack(twin_, model_, state), objectAt);
+  context_.report("objects that the twin lacks", 0);
+  std::vector<Screened> placed = bestOf(kMostObjects, projectBack(context_.twin, context_.likelihood, state), objectAt);
   const std::size_t objects = placed.size();
-  for (Screened& s : bestOf(1, projectLateBack(twin_, model_, state), lateEchoAt)) placed.push_back(std::move(s));
-  source_.setBaseline(state.mechanisms);
+  for (Screened& s : bestOf(1, projectLateBack(context_.twin, context_.likelihood, state), lateEchoAt))
+    placed.push_back(std::move(s));
+  context_.echoes.setBaseline(state.mechanisms);
   for (std::size_t i = 0; i < objects && placed[i].screened_nats > (i == 0 ? kWorthAnObject : kWorthALaw); ++i) {
     // It may be one of the scene's that stands elsewhere.
     const NamedParameters& m = placed[i].hypothesis.mechanism;
-    std::vector<int> near = objectsNear(twin_.scene(), m.values.number("x_m"), m.values.number("y_m"));
+    std::vector<int> near = objectsNear(context_.twin.scene(), m.values.number("x_m"), m.values.number("y_m"));
     near.resize(std::min(near.size(), kNeighbours));
-    for (int actor : near) suspicious.insert(twin_.scene().actors[static_cast<std::size_t>(actor)].name);
+    for (int actor : near) suspicious.insert(context_.twin.scene().actors[static_cast<std::size_t>(actor)].name);
     out_of_place.insert(near.begin(), near.end());
   }
   std::vector<Screened> screened;
   std::map<std::string, std::size_t> looked_at;  // poses
   for (std::size_t i = 0; i < all.size(); ++i) {
-    report_("trying " + all[i].label(), static_cast<double>(i) / static_cast<double>(all.size()));
-    const bool of_actor = twin_.scene().actorIndex(all[i].subject) >= 0;
+    context_.report("trying " + all[i].label(), static_cast<double>(i) / static_cast<double>(all.size()));
+    const bool of_actor = context_.twin.scene().actorIndex(all[i].subject) >= 0;
     const double numbers = static_cast<double>(all[i].coordinates.size());
     const std::vector<double> typical(all[i].coordinates.size(), 1.0);
     // Each of these traces the session anew: of actors without suspicion, what is there or not on a few poses, and
     // nothing else.
-    const bool costly = of_actor && suspicious.count(all[i].subject) == 0 && source_.altersGeometry(all[i].at(typical));
+    const bool costly =
+        of_actor && suspicious.count(all[i].subject) == 0 && context_.echoes.altersGeometry(all[i].at(typical));
     if (costly && (!all[i].isOneSided() || no_use_.count(all[i].label()) > 0)) continue;
     std::vector<int> poses = costly ? spread(kFewestPoses) : some(all[i]);
     Screened s = look(all[i], poses);
-    if (outOfPlace(all[i]) >= 0) poses = spread(data_.poses.size());  // what it promises is of all
+    if (outOfPlace(all[i]) >= 0) poses = spread(context_.data.poses.size());  // what it promises is of all
     if (costly && !(s.screened_nats > 0)) no_use_.insert(all[i].label());
     // What chance promises: half a nat per number on the poses looked at, scaled up like the rest.
-    s.screened_nats -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
+    s.screened_nats -=
+        0.5 * numbers * static_cast<double>(context_.data.poses.size()) / static_cast<double>(poses.size());
     looked_at[s.hypothesis.label()] = poses.size();
     screened.push_back(std::move(s));
-    source_.setBaseline(state.mechanisms);
+    context_.echoes.setBaseline(state.mechanisms);
   }
   std::stable_sort(screened.begin(), screened.end(), better);
   // Geometry before materials: what is wrong with all ranges or directions stands in every latent, and its score is
@@ -122,15 +125,16 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
                                 [&](const Screened& s) { return ++kept > kSecondLook && !s.hypothesis.isGeometry(); }),
                  screened.end());
   for (Screened& s : screened) {
-    report_("looking again at " + s.hypothesis.label(), 0);
+    context_.report("looking again at " + s.hypothesis.label(), 0);
     const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
     const std::vector<int> poses = spread(numbers > 3                 ? kScreenPoses
-                                          : s.hypothesis.isGeometry() ? data_.poses.size()
+                                          : s.hypothesis.isGeometry() ? context_.data.poses.size()
                                                                       : kSecondLookPoses);
     if (looked_at[s.hypothesis.label()] < poses.size()) {
       s = screen_.screen(state, s.hypothesis, poses);
-      s.screened_nats -= 0.5 * numbers * static_cast<double>(data_.poses.size()) / static_cast<double>(poses.size());
-      source_.setBaseline(state.mechanisms);
+      s.screened_nats -=
+          0.5 * numbers * static_cast<double>(context_.data.poses.size()) / static_cast<double>(poses.size());
+      context_.echoes.setBaseline(state.mechanisms);
     }
     s.screened_nats -= numbers;
   }
@@ -146,8 +150,8 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
       same->starts.push_back(s.starts.front());
     }
   };
-  report_("laws without a name", 0);
-  ScreenedLaws laws = screenLaws(twin_, model_, state, spread(kLawPoses));
+  context_.report("laws without a name", 0);
+  ScreenedLaws laws = screenLaws(context_.twin, context_.likelihood, state, spread(kLawPoses));
   const auto isNoName = [&](const Screened& s) {
     return s.hypothesis.mechanism.mechanism == "gain_drift" && !laws.gains_follow_time;
   };
@@ -159,17 +163,19 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
     }
     screened.push_back(std::move(s));
   }
-  report_("replicas of echoes", 0);
-  for (Screened& s : screenReplicas(twin_, model_, state, spread(kLawPoses), kWorthALaw, lookAtSome)) {
+  context_.report("replicas of echoes", 0);
+  for (Screened& s :
+       screenReplicas(context_.twin, context_.likelihood, state, spread(kLawPoses), kWorthALaw, lookAtSome)) {
     screened.push_back(std::move(s));
   }
-  report_("errors that poses and actors share", 0);
-  for (Screened& s : sharedLatents(source_, state, model_.spread(), accuracy_, all, spread(kScreenPoses))) {
+  context_.report("errors that poses and actors share", 0);
+  for (Screened& s : sharedLatents(context_.echoes, state, context_.likelihood.spread(), context_.pose_accuracy, all,
+                                   spread(kScreenPoses))) {
     suggest(std::move(s));
   }
-  source_.setBaseline(state.mechanisms);
+  context_.echoes.setBaseline(state.mechanisms);
   for (Screened& s : placed) {
-    freePlace(data_, s);
+    freePlace(context_.data, s);
     screened.push_back(std::move(s));
   }
   std::stable_sort(screened.begin(), screened.end(), better);

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <functional>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "diagnosis/fit/diagnosis_context.h"
 #include "diagnosis/rooms.h"
 #include "diagnosis/search/hypothesis_screen.h"
 
@@ -18,16 +18,9 @@ constexpr std::size_t kMostObjects = 4;     ///< what is wide or turned promises
 /// What a round of a diagnosis fits, and in which order: everything that could be wrong, looked at without a fit.
 class HypothesisRanking {
  public:
-  /// Keeps references. report: called with a stage and its share done.
-  HypothesisRanking(Twin& twin, ExpectedEchoes& source, const ChannelLikelihood& model, const PoseAccuracy& accuracy,
-                    std::function<void(const std::string& stage, double share)> report)
-      : twin_(twin),
-        source_(source),
-        model_(model),
-        data_(model.data()),
-        accuracy_(accuracy),
-        screen_(source, model),
-        report_(std::move(report)) {}
+  /// Keeps a reference.
+  explicit HypothesisRanking(DiagnosisContext& context)
+      : context_(context), screen_(context.echoes, context.likelihood) {}
 
   /// Names, and what they leave out: objects, late points, laws and replicas. Most nats promised first.
   /// shifted: actors that are looked for elsewhere, most suspicious first.
@@ -41,13 +34,8 @@ class HypothesisRanking {
  private:
   std::vector<int> spread(std::size_t wanted) const;  // of all poses, evenly
 
-  Twin& twin_;
-  ExpectedEchoes& source_;
-  const ChannelLikelihood& model_;
-  const ChannelData& data_;
-  const PoseAccuracy& accuracy_;
+  DiagnosisContext& context_;
   HypothesisScreen screen_;
-  std::function<void(const std::string&, double)> report_;
   std::set<std::string> no_use_;  ///< costly ones that gain nothing whatever is found beside them
 };
 

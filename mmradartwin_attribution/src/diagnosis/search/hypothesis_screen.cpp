@@ -11,14 +11,14 @@ namespace mmradartwin::diagnosis::search {
 namespace {
 
 // Values of a coordinate are in its scale: 0 does nothing, 1 is typical.
-constexpr double kSome = 0.3, kLittle = 0.05;  ///< first values of something that rises from nothing
-constexpr double kMore[] = {4, 16};            ///< further ones, as long as they gain
-constexpr double kEdges[] = {0.8, 1.0, 1.3};   ///< of a steep edge among the tones
-constexpr double kInstead[] = {0.7, 1, 1.5};   ///< values where latents have stood in for a material
-constexpr double kStoodIn_nats = 1;            ///< least nats of those latents
+constexpr double kFirstValue = 0.3, kSmallValue = 0.05;  ///< first values of something that rises from nothing
+constexpr double kFurtherValues[] = {4, 16};             ///< further ones, as long as they gain
+constexpr double kEdges[] = {0.8, 1.0, 1.3};             ///< of a steep edge among the tones
+constexpr double kValuesInstead[] = {0.7, 1, 1.5};       ///< values where latents have stood in for a material
+constexpr double kStoodIn_nats = 1;                      ///< least nats of those latents
 constexpr double kShifts_m[] = {-0.3, -0.14, -0.06, 0.06, 0.14, 0.3};  ///< of all echoes of an actor
 constexpr double kRadii[] = {1, 2, 4, 7};                              ///< about the place where an actor stood before
-constexpr double kFiner[] = {0.35, 0.18};                              ///< shares of the best one's distance
+constexpr double kRefinementFactors[] = {0.35, 0.18};                  ///< shares of the best one's distance
 constexpr int kDirections = 8;                                         ///< at each radius
 constexpr double kTurns_deg[] = {-8, -5, -3, 3, 5, 8};                 ///< of an actor about itself
 constexpr std::size_t kLookedAtFirst = 3;                              ///< every third pose is looked at first
@@ -174,7 +174,7 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
     for (std::size_t j = 2; j < hypothesis.coordinates.size(); ++j) {
       for (double turn_deg : kTurns_deg) {
         std::vector<double> at = middle;
-        at[j] += hypothesis.coordinates[j].scaled_values(share * turn_deg);
+        at[j] += hypothesis.coordinates[j].scaled(share * turn_deg);
         tryAt(at);
       }
     }
@@ -187,7 +187,7 @@ Screened HypothesisScreen::around(const ModelState& null, const Hypothesis& hypo
     for (double radius : kRadii) tryAbout(turned, radius);
   }
   // The likelihood's top is some centimetres wide, and the places so far lie farther apart.
-  for (double share : kFiner) {
+  for (double share : kRefinementFactors) {
     tryAbout(likeliest, share * std::max(kRadii[0], std::hypot(likeliest[0], likeliest[1])));
     tryTurned(likeliest, share);
   }
@@ -231,7 +231,7 @@ double HypothesisScreen::settledAt(const ModelState& null, const Hypothesis& hyp
 
 Screened HypothesisScreen::directly(const ModelState& null, const Hypothesis& hypothesis,
                                     const std::vector<int>& poses) {
-  std::vector<double> start(hypothesis.coordinates.size(), kLittle);
+  std::vector<double> start(hypothesis.coordinates.size(), kSmallValue);
   double best = 0;
   const auto tryAt = [&](double scaled_values) {
     const std::vector<double> at(hypothesis.coordinates.size(), scaled_values);
@@ -249,13 +249,13 @@ Screened HypothesisScreen::directly(const ModelState& null, const Hypothesis& hy
     // A steep edge far above all tones does nothing: values among the tones are tried.
     for (double scaled_values : kEdges) tryAt(scaled_values);
   } else {
-    const double gain = tryAt(kSome);
+    const double gain = tryAt(kFirstValue);
     const bool costly = source_.altersGeometry(hypothesis.at(start));
     if (gain > 0 || !costly) {
-      double last = tryAt(gain > 0 ? 1 : kLittle);
+      double last = tryAt(gain > 0 ? 1 : kSmallValue);
       // A level may be far above its typical one, where that one hardly shows.
       const bool level = hypothesis.coordinates.size() == 1 && hypothesis.coordinates[0].logarithmic();
-      for (double scaled_values : kMore) {
+      for (double scaled_values : kFurtherValues) {
         if (!level || gain <= 0 || last <= gain) break;
         const double next = tryAt(scaled_values);
         if (next <= last) break;
@@ -266,7 +266,7 @@ Screened HypothesisScreen::directly(const ModelState& null, const Hypothesis& hy
   // Gains of a material's actors may stand in for what the material does: values are tried without them.
   const auto [freed, nats] =
       withoutGains(null.nuisance, source_.base().scene(), hypothesis.subject, model_.spread().actor_gain);
-  for (double scaled_values : kInstead) {
+  for (double scaled_values : kValuesInstead) {
     if (nats < kStoodIn_nats) break;
     const std::vector<double> at(hypothesis.coordinates.size(), scaled_values);
     const double screened_nats = nats + valueAt(null, hypothesis, at, poses, freed).second;

@@ -81,7 +81,7 @@ std::vector<Screened> sharedLatents(ExpectedEchoes& source, const ModelState& nu
     if (std::abs(z) < bounds::kSharedLatent_sigmas) continue;
     const double delta_db = 10 / std::log(10.0) * sum / count;
     const Coordinate& c = h.coordinates.front();
-    screened.push_back({h, 0.5 * z * z, {{c.scaled_values(c.neutral + delta_db)}}});
+    screened.push_back({h, 0.5 * z * z, {{c.scaled(c.neutral + delta_db)}}});
   }
   return screened;
 }
@@ -101,7 +101,7 @@ std::optional<Screened> namedSlope(const Screened& law, const Parameters& values
     if (h.coordinates.size() != 1) continue;
     const Coordinate& c = h.coordinates[0];
     if (!(c.neutral + value > c.min && c.neutral + value < c.max)) continue;
-    return Screened{h, law.screened_nats, {{c.scaled_values(c.neutral + value)}}};
+    return Screened{h, law.screened_nats, {{c.scaled(c.neutral + value)}}};
   }
   return std::nullopt;
 }
@@ -137,7 +137,7 @@ std::optional<Screened> namedLike(const Screened& law, const std::vector<Hypothe
   std::vector<double> start;
   for (const Coordinate& c : named->coordinates) {
     const bool first = c.parameter == "forward_m" || c.parameter == "x_m";
-    start.push_back(c.unit == "m" ? c.scaled_values(c.neutral + offset_m[first ? 0 : 1]) : 0.0);
+    start.push_back(c.unit == "m" ? c.scaled(c.neutral + offset_m[first ? 0 : 1]) : 0.0);
   }
   return Screened{*named, law.screened_nats, {start}};
 }

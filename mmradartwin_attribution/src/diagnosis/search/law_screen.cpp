@@ -288,7 +288,7 @@ std::optional<Screened> LawScreen::best(const Sample& s, const Over& over) const
       LawVariable::Values v = of.of(pose.where, p.record);
       if (actor >= 0 && std::count(p.record.actors.begin(), p.record.actors.end(), actor) == 0) v.count = 0;
       for (int i = 0; i < v.count; ++i) {
-        double& x = v.of[static_cast<std::size_t>(i)];
+        double& x = v.value[static_cast<std::size_t>(i)];
         if (over.variable == "amplitude_db") x = std::max(x, kWeakest_db);
         all.push_back(x);
       }
@@ -303,7 +303,7 @@ std::optional<Screened> LawScreen::best(const Sample& s, const Over& over) const
   for (std::size_t p = 0; p < values.size(); ++p) {
     Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(nodes);
     for (int i = 0; i < values[p].count; ++i) {
-      forms.addAt(values[p].of[static_cast<std::size_t>(i)], 1.0 / values[p].count, row);
+      forms.addAt(values[p].value[static_cast<std::size_t>(i)], 1.0 / values[p].count, row);
     }
     basis.row(static_cast<Eigen::Index>(p)) = s.latent(static_cast<Eigen::Index>(p), 0) * row;
   }
@@ -391,7 +391,7 @@ std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const 
     for (const MeasuredPose& pose : poses_) {
       for (const MeasuredPath& p : pose.paths) {
         const LawVariable::Values v = passing.of(pose.where, p.record);
-        direction(at++, 0) = v.count > 0 ? p.share * std::max(0.0, 1 - v.of[0] / radius_m) : 0;
+        direction(at++, 0) = v.count > 0 ? p.share * std::max(0.0, 1 - v.value[0] / radius_m) : 0;
       }
     }
     return Spot{x_m, y_m, radius_m, promise(gain(), direction)};

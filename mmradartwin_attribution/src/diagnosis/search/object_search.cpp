@@ -45,8 +45,8 @@ std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
   const Eigen::Vector2d u(std::cos(yaw_rad), std::sin(yaw_rad)), v(-u.y(), u.x());
   std::vector<std::vector<double>> boxes;
   const auto add = [&](const Eigen::Vector2d& at, double size_m, double turned_deg) {
-    boxes.push_back({c[kX].scaled_values(at.x()), c[kY].scaled_values(at.y()), c[kSide].scaled_values(size_m),
-                     c[kYaw].scaled_values(turned_deg)});
+    boxes.push_back({c[kX].scaled(at.x()), c[kY].scaled(at.y()), c[kSide].scaled(size_m),
+                     c[kYaw].scaled(turned_deg)});
   };
   for (double grown : kGrown) {
     const double half_m = 0.5 * (grown - 1) * side_m;
@@ -68,7 +68,7 @@ std::vector<std::vector<double>> placesAround(const HypothesisFit& fit) {
   const auto add = [&](std::size_t coordinate, double by) {
     const Coordinate& c = fit.hypothesis.coordinates[coordinate];
     places.push_back(fit.scaled_values);
-    places.back()[coordinate] = c.scaled_values(c.value(fit.scaled_values[coordinate]) + by);
+    places.back()[coordinate] = c.scaled(c.value(fit.scaled_values[coordinate]) + by);
   };
   for (std::size_t i = 0; i < fit.scaled_values.size(); ++i) {
     if (fit.hypothesis.coordinates[i].unit == "deg") {
@@ -97,8 +97,8 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
   const auto startBehind = [&](const Eigen::Vector2d& toward_radar, double yaw_deg) {
     for (double side_m : kSides_m) {
       const Eigen::Vector2d center = axis + (radius_m - 0.5 * side_m) * toward_radar;
-      box.starts.push_back({h.coordinates[0].scaled_values(center.x()), h.coordinates[1].scaled_values(center.y()),
-                            h.coordinates[2].scaled_values(side_m), h.coordinates[3].scaled_values(yaw_deg)});
+      box.starts.push_back({h.coordinates[0].scaled(center.x()), h.coordinates[1].scaled(center.y()),
+                            h.coordinates[2].scaled(side_m), h.coordinates[3].scaled(yaw_deg)});
     }
   };
   const Eigen::Vector2d toward_most = -awayFromRadar(data, axis);
@@ -130,8 +130,8 @@ std::optional<Screened> boxThatHides(const Screened& law) {
       for (double dx_m : kAbout_m) {
         for (double dy_m : kAbout_m) {
           box.starts.push_back(
-              {h.coordinates[kX].scaled_values(place.x() + dx_m), h.coordinates[kY].scaled_values(place.y() + dy_m),
-               h.coordinates[kSide].scaled_values(side_m), h.coordinates[kYaw].scaled_values(yaw_deg)});
+              {h.coordinates[kX].scaled(place.x() + dx_m), h.coordinates[kY].scaled(place.y() + dy_m),
+               h.coordinates[kSide].scaled(side_m), h.coordinates[kYaw].scaled(yaw_deg)});
         }
       }
     }

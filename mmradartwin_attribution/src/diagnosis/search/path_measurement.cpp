@@ -99,9 +99,9 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
     if (path.share < kDominant) continue;
     path.alone = own >= kAlone * sigma.trace().real();
     const double gain_db =
-        10 / std::log(10.0) * (std::log(std::norm(a.dot(data.y.col(bin))) / all) + path.share * latent);
+        10 / std::log(10.0) * (std::log(std::norm(a.dot(data.range_spectra.col(bin))) / all) + path.share * latent);
     // The peak's place follows from the ratio of a Hann window's two highest bins.
-    const auto height = [&](int k) { return k < 0 || k >= samples ? 0.0 : std::abs(a.dot(data.y.col(k))); };
+    const auto height = [&](int k) { return k < 0 || k >= samples ? 0.0 : std::abs(a.dot(data.range_spectra.col(k))); };
     int peak = bin;
     for (int k = bin - 2; k <= bin + 2; ++k) peak = height(k) > height(peak) ? k : peak;
     const int side = height(peak + 1) > height(peak - 1) ? 1 : -1;
@@ -112,13 +112,14 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
     double turn = 0, information = 0;
     for (int k = 0; k + 1 < channels; ++k) {
       const double span = wave * (radar.virtual_element_m(k + 1).y() - radar.virtual_element_m(k).y());
-      const std::complex<double> step = data.y(k + 1, peak) * std::conj(a[k + 1]) * std::conj(data.y(k, peak)) * a[k];
+      const std::complex<double> step =
+          data.range_spectra(k + 1, peak) * std::conj(a[k + 1]) * std::conj(data.range_spectra(k, peak)) * a[k];
       turn -= span * std::abs(step) * std::arg(step);
       information += span * span * std::abs(step);
     }
     const double cosine = std::max(0.2, std::hypot(r.departure.x(), r.departure.z()));
     const double angle_deg = information > 0 ? turn / information / cosine * 180 / M_PI : 0;
-    const Eigen::VectorXcd against = data.y.col(peak).cwiseProduct(a.conjugate());  // less expected phases
+    const Eigen::VectorXcd against = data.range_spectra.col(peak).cwiseProduct(a.conjugate());  // less expected phases
     for (const Observable& o : of) {
       const std::complex<double> to_others = o.isOfChannels() ? ratioOf(o.channels, against) : 0;
       switch (o.kind) {

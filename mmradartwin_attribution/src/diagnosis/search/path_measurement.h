@@ -38,7 +38,7 @@ struct MeasuredPath {
 /// Measured paths of one pose.
 struct MeasuredPose {
   int location = 0;
-  LawVariable::Where where;
+  LawVariable::PathPlace where;
   std::vector<MeasuredPath> paths;
 };
 

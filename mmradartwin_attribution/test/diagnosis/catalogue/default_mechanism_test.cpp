@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "mmradartwin_dsp/input_error.h"
-#include "mmradartwin_sim/mechanism.h"
 #include "mmradartwin_sim/mechanism_registry.h"
 
 namespace mmradartwin::diagnosis {

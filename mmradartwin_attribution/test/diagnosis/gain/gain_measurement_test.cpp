@@ -21,10 +21,8 @@ class BiasedCabinet : public ::testing::Test {
   }
   Finding changeOf(ChannelData& data, const std::vector<NamedParameters>& before,
                    const std::vector<NamedParameters>& after) {
-    ExpectedEchoes echoes(twin_, data, PoseAccuracy());
-    const ChannelLikelihood likelihood(data, twin_.scene().actors.size(), PoseAccuracy());
-    HypothesisFitter fitter(echoes, likelihood, 2);
-    GainMeasurement gain(recording_, twin_, data, echoes, likelihood, fitter, options_);
+    DiagnosisContext context(recording_, twin_, data, options_, 2);
+    GainMeasurement gain(context);
     Finding finding;
     finding.where.emplace_back();
     gain.ofChange(data, before, data, after, finding);
@@ -59,12 +57,10 @@ TEST_F(BiasedCabinet, OnePlaceAloneHoldsNothingOut) {
 }
 
 TEST_F(BiasedCabinet, ItsMapMetricsAreTheTwinsBeforeAndAfter) {
-  for (PoseChannels& pose : data_.poses) pose.plain = pose.grid;
+  for (PoseChannels& pose : data_.poses) pose.uncorrected_average = pose.grid;
   recording_.radar = data_.radar;
-  ExpectedEchoes echoes(twin_, data_, PoseAccuracy());
-  const ChannelLikelihood likelihood(data_, twin_.scene().actors.size(), PoseAccuracy());
-  HypothesisFitter fitter(echoes, likelihood, 2);
-  const GainMeasurement measurement(recording_, twin_, data_, echoes, likelihood, fitter, options_);
+  DiagnosisContext context(recording_, twin_, data_, options_, 2);
+  const GainMeasurement measurement(context);
   FindingGain gain;
   measurement.addMetrics({specular_}, std::vector<NamedParameters>{specular_, bias_}, gain);
   EXPECT_GT(gain.q1.before, 0.9);

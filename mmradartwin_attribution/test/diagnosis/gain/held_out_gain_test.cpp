@@ -81,7 +81,7 @@ TEST(CellPowersOfAPose, ExpectedOnesAreThoseOfTheChannelsCovariance) {
       group->bins.packed[j++] = static_cast<std::complex<float>>(y(k, bin) * std::conj(y(l, bin)));
     }
   }
-  data.poses[0].y = y;
+  data.poses[0].range_spectra = y;
   PoseEchoes echoes;
   echoes.groups = {group};
   const CellPowers cells = cellPowers(data, {echoes}).front();

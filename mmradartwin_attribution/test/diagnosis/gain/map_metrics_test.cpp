@@ -16,7 +16,7 @@ class MapMetrics : public ::testing::Test {
   void SetUp() override { options_.jobs = 1; }
   /// Fills the average of a pose.
   void measure(std::size_t pose, const std::vector<NamedParameters>& mechanisms) {
-    data_.poses[pose].plain = cabinet_.with(mechanisms).simulate(data_.poses[pose].pose.T_map_radar).grid;
+    data_.poses[pose].uncorrected_average = cabinet_.with(mechanisms).simulate(data_.poses[pose].pose.T_map_radar).grid;
   }
   FindingGain gain(const std::vector<NamedParameters>& before, const std::vector<std::vector<NamedParameters>>& after,
                    const std::function<int(int)>& fold_of) {

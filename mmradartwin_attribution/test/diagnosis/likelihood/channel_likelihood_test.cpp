@@ -71,18 +71,19 @@ class ThreeActors : public ::testing::Test {
     std::normal_distribution<double> normal(0, 1);
     for (std::size_t i = 0; i < paths_.size(); ++i) {
       PoseChannels& p = data_.poses[i];
-      p.y.resize(data_.radar.channels(), data_.radar.samples_per_chirp);
-      for (std::complex<double>& y : p.y.reshaped()) y = 2e-5 * std::complex<double>(normal(random), normal(random));
+      p.range_spectra.resize(data_.radar.channels(), data_.radar.samples_per_chirp);
+      for (std::complex<double>& y : p.range_spectra.reshaped())
+        y = 2e-5 * std::complex<double>(normal(random), normal(random));
       for (const PathRecord& r : paths_[i]) {
         const int bin = static_cast<int>(std::lround(0.5 * meanLength_m(r) / data_.radar.range_bin_m()));
         for (int k = 0; k < data_.radar.channels(); ++k) {
-          p.y(k, bin) += (1 + channel_error * normal(random)) * r.c[static_cast<std::size_t>(k)];
+          p.range_spectra(k, bin) += (1 + channel_error * normal(random)) * r.c[static_cast<std::size_t>(k)];
         }
       }
       p.beams = chooseBeams(data_.radar, paths_[i], 2);
       ASSERT_FALSE(p.beams.empty());
       for (EchoBeam& beam : p.beams) {
-        beam.y = formBeam(beam, p.y);
+        beam.y = formBeam(beam, p.range_spectra);
         beam.clutter = 1;
       }
     }

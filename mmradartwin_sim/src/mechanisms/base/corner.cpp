@@ -43,9 +43,9 @@ class Corner : public Mechanism, public PathStage {
     const auto wanted = [&](int facet) { return context.scene.facets[facet].actor == context.only_actor; };
     for (const CornerEdge& edge : edges_) {
       if (context.only_actor >= 0 && !wanted(edge.a) && !wanted(edge.b)) continue;
-      addCornerPath(context, elements, edge, kName, 1, records);
+      addCornerPath(context, elements, edge, {kName, 1}, records);
     }
-    for (const Trihedral& t : trihedra_) addTrihedralPath(context, elements, t, kName, 1, records);
+    for (const Trihedral& t : trihedra_) addTrihedralPath(context, elements, t, {kName, 1}, records);
   }
 
  private:

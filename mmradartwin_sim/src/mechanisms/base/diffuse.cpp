@@ -94,7 +94,7 @@ class Diffuse : public Mechanism, public PathStage {
       if (change->moved(context.scene.facets[point.facet].actor)) return true;
       return changed->mayMeet(point.position - elements.p) && change->crosses(elements.p, point.position);
     };
-    CloudCells::CellSet* touched = change && context.cloud ? context.cloud->touched : nullptr;
+    ScatterCells::CellSet* touched = change && context.cloud ? context.cloud->touched : nullptr;
     for (const ScatterPoint& point : points_) {
       if (touched && touches(point)) touched->insert(context.cloud->cellOf(point.facet, point.position));
     }
@@ -151,7 +151,7 @@ class Diffuse : public Mechanism, public PathStage {
 
  private:
   /// Leaves one point of each cell, with the level of all.
-  static void sumCells(const CloudCells& cells, const std::vector<const ScatterPoint*>& points,
+  static void sumCells(const ScatterCells& cells, const std::vector<const ScatterPoint*>& points,
                        std::vector<char>& visible, std::vector<double>& level) {
     std::vector<Eigen::Vector3d> positions;
     std::vector<std::size_t> seen;
@@ -167,7 +167,7 @@ class Diffuse : public Mechanism, public PathStage {
       std::size_t nearest = 0;
       double distance = 1e300;
     };
-    using Key = std::pair<CloudCells::Cell, char>;
+    using Key = std::pair<ScatterCells::Cell, char>;
     std::unordered_map<Key, std::size_t, boost::hash<Key>> number;
     std::vector<Cell> all;
     std::vector<std::size_t> cell_of;

@@ -88,7 +88,7 @@ class Specular : public Mechanism, public PathStage {
     limits.in_view = [&](const Eigen::Vector3d& d) { return context.inFieldOfView(to_radar * d); };
     if (exhaustive_ >= 2) {
       for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2))
-        addImageRecord(context, elements, path, kName, 1, cutoff_, records);
+        addImageRecord(context, elements, path, {kName, 1}, cutoff_, records);
     }
     if (exhaustive_ < max_bounces_ && ray_budget_ > 0) {
       limits.max_order = max_bounces_;
@@ -101,7 +101,7 @@ class Specular : public Mechanism, public PathStage {
           continue;
         if (!search_->solve(elements.p, sequence, context.rays, limits, path)) continue;
         const std::size_t before = records.size();
-        addImageRecord(context, elements, path, kName, 1, cutoff_, records);
+        addImageRecord(context, elements, path, {kName, 1}, cutoff_, records);
         if (records.size() == before) continue;
         ++seeded_paths_;
         late_paths_ += !by_half;
@@ -199,7 +199,7 @@ class Specular : public Mechanism, public PathStage {
   int max_bounces_ = 3, ray_budget_ = 0, exhaustive_ = 0;
   double cutoff_ = 0;
   std::unique_ptr<ImageSearch> search_;
-  // What notes() says of convergence; no result depends on it.
+  // Convergence as notes() states it; no result depends on it.
   mutable std::atomic<int> seeded_poses_{0}, seeded_paths_{0}, late_paths_{0};
 };
 

@@ -78,9 +78,9 @@ class EmpiricalLaw : public Mechanism, public WeightStage {
       affected_.assign(scene.actors.size(), false);
       affected_[requireActor(scene, kName, values.text("actor"))] = true;
     }
-    variable_.emplace(values.text("variable"),
-                      LawVariable::About{values.number("x_m"), values.number("y_m"), values.number("bearing_deg"),
-                                         scene.actorIndex(values.text("actor"))});
+    variable_.emplace(values.text("variable"), LawVariable::ReferencePlace{values.number("x_m"), values.number("y_m"),
+                                                                           values.number("bearing_deg"),
+                                                                           scene.actorIndex(values.text("actor"))});
   }
   int rank() const override { return -1; }  // on geometry's lengths and angles
   void reweight(const PoseContext& context, PathRecord& record) const override {
@@ -125,7 +125,7 @@ class EmpiricalLaw : public Mechanism, public WeightStage {
 
   double look(const std::vector<double>& law, const LawVariable::Values& x) const {
     double sum = 0;
-    for (int i = 0; i < x.count; ++i) sum += look(law, x.of[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < x.count; ++i) sum += look(law, x.value[static_cast<std::size_t>(i)]);
     return sum / x.count;
   }
 

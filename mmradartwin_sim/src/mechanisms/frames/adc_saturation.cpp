@@ -7,7 +7,7 @@ namespace {
 
 const std::string kName = "adc_saturation";
 
-/// So much gain that this share of all I and Q values of the session lies beyond full scale, where it is held. The
+/// A gain at which this share of all I and Q values of the session lies beyond full scale, where it is held. The
 /// session's gain_db is that gain.
 class AdcSaturation : public Mechanism, public DigitiseStage {
  public:

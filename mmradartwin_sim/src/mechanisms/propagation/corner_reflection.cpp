@@ -55,11 +55,11 @@ class CornerReflection : public Mechanism, public PathStage {
     }
     const ElementsInMap elements(context);
     for (const CornerEdge& edge : edges_) {
-      if (known.count({edge.a, edge.b}) == 0) addCornerPath(context, elements, edge, kName, 1, records);
+      if (known.count({edge.a, edge.b}) == 0) addCornerPath(context, elements, edge, {kName, 1}, records);
     }
     for (const Trihedral& t : trihedra_) {
       if (known.count({t.facets.begin(), t.facets.end()}) == 0)
-        addTrihedralPath(context, elements, t, kName, 1, records);
+        addTrihedralPath(context, elements, t, {kName, 1}, records);
     }
   }
 

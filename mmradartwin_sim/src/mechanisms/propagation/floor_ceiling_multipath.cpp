@@ -42,7 +42,7 @@ class FloorCeilingMultipath : public Mechanism, public PathStage {
     const ElementsInMap elements(context);
     // A wall over a picture's upper side is no corner as high as the wall.
     for (const CornerEdge& edge : corners_) {
-      addCornerPath(context, elements, edge, kName, level_, records, CornerAperture::kNarrowerFace);
+      addCornerPath(context, elements, edge, {kName, level_}, records, CornerAperture::kNarrowerFace);
     }
     if (order_ < 2) return;
     ImageSearch::Limits limits;
@@ -54,7 +54,7 @@ class FloorCeilingMultipath : public Mechanism, public PathStage {
     for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2)) {
       const bool ours = std::any_of(path.facets.begin(), path.facets.end(),
                                     [&](int id) { return !context.scene.facets[id].reflects; });
-      if (ours) addImageRecord(context, elements, path, kName, level_, 1e-10, records);
+      if (ours) addImageRecord(context, elements, path, {kName, level_}, 1e-10, records);
     }
   }
 

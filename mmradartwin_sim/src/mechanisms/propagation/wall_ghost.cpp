@@ -79,9 +79,15 @@ class WallGhost : public Mechanism, public PathStage {
 
  private:
   struct Bounce {
+    const Facet* wall;
     Eigen::Vector3d q;        // on the wall
     Eigen::Vector3d out, on;  // unit, radar to wall and wall to scatterer
     double before_m, after_m, cosine;
+  };
+  struct Scatterer {
+    Eigen::Vector3d point;
+    int actor, facet;
+    std::complex<double> coefficient;  // of the path over the wall and the scatterer
   };
 
   /// The bounce of the way from the radar over the wall to x, where geometry and field of view allow it.
@@ -90,6 +96,7 @@ class WallGhost : public Mechanism, public PathStage {
     const double here = wall.planeDistance(p), there = wall.planeDistance(x);
     if (!(here * there > 0) || std::abs(there) < 1e-6) return false;
     const Eigen::Vector3d image = mirror(p, wall);
+    b.wall = &wall;
     b.q = image + here / (here + there) * (x - image);
     if (!wall.contains(b.q)) return false;
     b.before_m = (b.q - p).norm();
@@ -141,8 +148,7 @@ class WallGhost : public Mechanism, public PathStage {
         context.radar.wavelength_m() / (4 * M_PI * r1 * r2) * patch * mirrored(context, elements, wall, b).norm();
     // Both the phase of the wall's reflection and the point's own are unknowable; the point's stands for both.
     addPair(
-        context, elements, wall, b, x, facet.actor, facet.id,
-        std::polar(gain_ * amplitude, point.phase_rad(context.seed)),
+        context, elements, b, {x, facet.actor, facet.id, std::polar(gain_ * amplitude, point.phase_rad(context.seed))},
         [&](const Eigen::Vector3d& t, const Eigen::Vector3d& r) { return (t - x).norm() + (r - x).norm(); }, records);
   }
 
@@ -163,16 +169,17 @@ class WallGhost : public Mechanism, public PathStage {
     if (!free(context, elements.p, wall, b, x + lift * edge.outward, 0)) return;
     const std::complex<double> coefficient = edge_level_ * context.radar.wavelength_m() / (4 * M_PI) * found->factor;
     addPair(
-        context, elements, wall, b, x, a.actor, a.id, std::conj(coefficient),
+        context, elements, b, {x, a.actor, a.id, std::conj(coefficient)},
         [&](const Eigen::Vector3d& t, const Eigen::Vector3d& r) { return lengthOverEdge(edge, t, r); }, records);
   }
 
   /// The path over the wall first and its reverse; length(t, r) is the way from t to r over the scatterer.
   template <typename Length>
-  void addPair(const PoseContext& context, const ElementsInMap& elements, const Facet& wall, const Bounce& b,
-               const Eigen::Vector3d& x, int actor, int facet, std::complex<double> coefficient, Length length,
-               std::vector<PathRecord>& records) const {
-    if (!(std::abs(coefficient) > 0)) return;
+  void addPair(const PoseContext& context, const ElementsInMap& elements, const Bounce& b, const Scatterer& scatterer,
+               Length length, std::vector<PathRecord>& records) const {
+    if (!(std::abs(scatterer.coefficient) > 0)) return;
+    const Facet& wall = *b.wall;
+    const Eigen::Vector3d& x = scatterer.point;
     const Eigen::Matrix3d to_radar = context.T_map_radar.linear().transpose();
     PathRecord first, second;
     for (const auto& t : elements.tx) {
@@ -181,14 +188,14 @@ class WallGhost : public Mechanism, public PathStage {
         second.length_m.push_back(length(t, mirror(r, wall)));
       }
     }
-    first.actors = {wall.actor, actor};
-    first.facets = {wall.id, facet};
+    first.actors = {wall.actor, scatterer.actor};
+    first.facets = {wall.id, scatterer.facet};
     first.vertices = {b.q, x};
     first.reflection_cosine = {b.cosine, -1};
     first.departure = to_radar * b.out;
     first.arrival = to_radar * (x - elements.p).normalized();
-    second.actors = {actor, wall.actor};
-    second.facets = {facet, wall.id};
+    second.actors = {scatterer.actor, wall.actor};
+    second.facets = {scatterer.facet, wall.id};
     second.vertices = {x, b.q};
     second.reflection_cosine = {-1, b.cosine};
     second.departure = first.arrival;
@@ -196,7 +203,7 @@ class WallGhost : public Mechanism, public PathStage {
     for (PathRecord* record : {&first, &second}) {
       record->event = &kName;
       record->bounces = 2;
-      setContribution(context.radar, coefficient, *record);
+      setContribution(context.radar, scatterer.coefficient, *record);
       records.push_back(std::move(*record));
     }
   }

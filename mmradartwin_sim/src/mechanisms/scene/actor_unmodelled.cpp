@@ -55,7 +55,7 @@ class ActorUnmodelled : public Mechanism, public SceneStage, public PathStage {
       }
       addActor(scene, std::move(box));
     } else {
-      scene.screens.push_back(prism(kSides, radius_m_, 0));
+      scene.occluders_only.push_back(prism(kSides, radius_m_, 0));
     }
   }
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {

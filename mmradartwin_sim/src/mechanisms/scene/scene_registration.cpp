@@ -23,7 +23,7 @@ class SceneRegistration : public Mechanism, public SceneStage {
   int rank() const override { return 1; }  // after mechanisms that place actors in the twin's room
   void editScene(Scene& scene) const override {
     for (std::size_t i = 0; i < scene.actors.size(); ++i) moveActor(scene, static_cast<int>(i), T_);
-    for (Actor& screen : scene.screens) {
+    for (Actor& screen : scene.occluders_only) {
       for (auto& v : screen.vertices) v = T_ * v;
     }
   }

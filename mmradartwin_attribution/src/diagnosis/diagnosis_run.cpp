@@ -1,0 +1,224 @@
+#include "diagnosis/diagnosis_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "diagnosis/gain/changed_records.h"
+#include "diagnosis/gain/held_out_gain.h"
+#include "diagnosis/receiver/body_fixed_tone.h"
+#include "diagnosis/receiver/channel_errors.h"
+#include "diagnosis/receiver/receiver_findings.h"
+#include "diagnosis/receiver/receiver_noise.h"
+#include "diagnosis/receiver/sample_convention.h"
+#include "diagnosis/receiver/strongest_echo.h"
+#include "diagnosis/scene_match.h"
+#include "diagnosis/survey_plan.h"
+#include "diagnosis/unexplained_frames.h"
+#include "mmradartwin_dsp/range_angle.h"
+
+namespace mmradartwin::diagnosis {
+namespace {
+
+constexpr int kFolds = 5;
+
+}  // namespace
+
+DiagnosisRun::DiagnosisRun(const TimedRecording& timed, Twin& twin, const DiagnosisOptions& options)
+    : recording_(timed.recording),
+      lag_(timed.finding),
+      twin_(twin),
+      session_(prepareSession(recording_, twin, options)),
+      data_(session_.received.data),
+      context_(recording_, twin, data_, options, kFolds),
+      gains_(context_),
+      rounds_(context_, gains_, session_.received.frames, result_),
+      mechanisms_(twin.description().mechanisms),
+      extended_(mechanisms_) {}
+
+void DiagnosisRun::add(Finding finding, const std::map<std::string, double>& nats_by_pose) {
+  if (!differsFromStated(finding, twin_.description().mechanisms)) return;
+  addGainInNats(data_, nats_by_pose, finding);
+  replaceOrAppend(*finding.mechanism, extended_);
+  result_.findings.findings.push_back(std::move(finding));
+}
+
+void DiagnosisRun::judgeFrames() {
+  if (lag_) add(findingOf(*lag_));
+  for (const FrameFinding& frames : session_.received.frames) add(findingOf(frames), frames.nats_by_pose);
+  measureFrameGain();
+}
+
+/// Measures what leaving damaged samples out gains. Several findings cannot be told apart: one average lacks the
+/// samples of all.
+void DiagnosisRun::measureFrameGain() {
+  std::vector<Finding>& findings = result_.findings.findings;
+  if (session_.few || findings.size() != 1 || session_.received.frames.size() != 1) return;
+  ChannelData recorded = data_;
+  const SignalChain chain(data_.radar);
+  for (PoseChannels& pose : recorded.poses) {
+    if (pose.uncorrected_average.x.size() == 0) continue;
+    pose.grid = pose.uncorrected_average;
+    transformGrid(chain, pose);
+  }
+  gains_.ofChange(recorded, mechanisms_, data_, mechanisms_, findings.front());
+}
+
+void DiagnosisRun::judgeConventions() {
+  for (const SampleConvention& stated : session_.received.conventions) add(findingOf(stated, data_.radar));
+  if (session_.few) return;
+  context_.report("conventions", 0);
+  const std::optional<SampleConvention> convention = findSampleConvention(twin_, data_);
+  if (!convention) return;
+  const ChannelData recorded = data_;
+  undoSampleConvention(*convention, data_);
+  Finding finding = findingOf(*convention, data_.radar);
+  gains_.ofChange(recorded, mechanisms_, data_, mechanisms_, finding);
+  // By chance some convention does best where nothing matches, or beside a transmitter that is late. A true one lets
+  // the twin explain more at all places.
+  if (finding.gain && finding.gain->explained_power.difference_ci95 &&
+      (*finding.gain->explained_power.difference_ci95)[0] <= 0) {
+    data_ = recorded;
+    return;
+  }
+  addGainInNats(data_, {}, finding);
+  extended_.push_back(*finding.mechanism);
+  convention_ = finding.cause;
+  result_.findings.findings.push_back(std::move(finding));
+}
+
+void DiagnosisRun::judgeOwnEcho() {
+  context_.echoes.setBaseline(mechanisms_);
+  context_.report("radar's own echo", 0);
+  for (const NamedParameters& m : mechanisms_) {
+    if (m.mechanism == "tx_rx_leakage" || m.mechanism == "dc_offset") return;  // the twin has it already
+  }
+  const BodyFixedTone tone = findBodyFixedTone(data_);
+  if (!isUnambiguous(tone)) return;
+  const ChannelData recorded = data_;
+  subtractTone(tone, data_);
+  Finding finding = findingOf(tone, data_);
+  std::vector<NamedParameters> with_tone = mechanisms_;
+  with_tone.push_back(*finding.mechanism);
+  gains_.ofChange(recorded, mechanisms_, recorded, with_tone, finding);
+  addGainInNats(data_, {}, finding);
+  extended_.push_back(*finding.mechanism);
+  result_.findings.findings.push_back(std::move(finding));
+}
+
+void DiagnosisRun::judgeNoise() {
+  const auto stated = std::find_if(mechanisms_.begin(), mechanisms_.end(),
+                                   [](const NamedParameters& m) { return m.mechanism == "noise_floor"; });
+  std::optional<Finding> finding;
+  if (stated != mechanisms_.end()) finding = noiseFloorFinding(data_, *stated);
+  if (finding) {
+    addGainInNats(data_, {}, *finding);
+    replaceOrAppend(*finding->mechanism, extended_);
+    result_.findings.findings.push_back(std::move(*finding));
+  }
+  if (!session_.few) return;
+  if (const std::optional<ChannelErrors> errors = findChannelErrors(data_)) add(findingOf(*errors));
+}
+
+void DiagnosisRun::fitTwinAsGiven() {
+  context_.report("fitting the twin as it is", 0);
+  context_.echoes.pointBeams(data_, mechanisms_, context_.likelihood.firstBin());
+  context_.echoes.setBaseline(mechanisms_);
+  state_ = context_.fitter.state(mechanisms_, nullptr);
+  for (Finding& finding : result_.findings.findings) {
+    if (finding.cause != "tx_rx_leakage" && finding.cause != "dc_offset") continue;
+    referToStrongestEcho(twin_.changed(mechanisms_), data_, finding);
+    replaceOrAppend(*finding.mechanism, extended_);
+  }
+}
+
+void DiagnosisRun::compareTwins() {
+  if (context_.options.compared.empty()) return;
+  rounds_.takeRangeErrors(state_);
+  for (const TwinDescription& other : context_.options.compared) {
+    context_.echoes.setBaseline(mechanisms_);  // each from where the twin as given stands
+    ModelState state = context_.fitter.state(other.mechanisms, &state_.nuisance);
+    rounds_.takeRangeErrors(state);
+    const auto [low, high] = *likelihoodGain(data_, state_.by_pose, state.by_pose).difference_ci95;
+    const double poses = static_cast<double>(data_.poses.size());
+    context_.echoes.setBaseline(other.mechanisms);
+    result_.compared.push_back({other.file,
+                                state.log_likelihood - state_.log_likelihood,
+                                {poses * low, poses * high},
+                                explainedPower(cellPowers(data_, context_.echoes.echoes(other.mechanisms)))});
+  }
+}
+
+bool DiagnosisRun::sceneMatches() {
+  context_.echoes.setBaseline(mechanisms_);
+  const std::vector<PoseEchoes> echoes = context_.echoes.echoes(mechanisms_);
+  result_.explained_power = explainedPower(cellPowers(data_, echoes));
+  Findings& findings = result_.findings;
+  findings.accuracy = context_.accuracy;
+  findings.poses = static_cast<int>(data_.poses.size());
+  findings.locations = static_cast<int>(data_.locations.size());
+  findings.held_out = session_.few ? "nothing: of fewer than 3 poses only frames and channels are judged"
+                      : data_.locations.size() > 1 ? std::to_string(kFolds) + "-fold by location"
+                                                   : "nothing: one location";
+  std::optional<Finding> mismatch;
+  if (!session_.few) mismatch = nothingMatches(data_, echoes, result_.explained_power);
+  if (!mismatch) return true;
+  // A convention that was found where nothing matches is none: one of several does best by chance.
+  std::string alone;
+  for (const Finding& other : findings.findings) {
+    if (other.cause != convention_) alone += (alone.empty() ? "" : ", ") + other.cause;
+  }
+  if (!alone.empty()) *mismatch->description += ". What needs no scene, told without one: " + alone;
+  findings.findings = {std::move(*mismatch)};
+  extended_ = twin_.description().mechanisms;
+  return false;
+}
+
+void DiagnosisRun::findCauses() {
+  rounds_.run(mechanisms_, extended_, std::move(state_), session_.few ? 0 : context_.options.most_findings);
+  mechanisms_ = rounds_.mechanisms();
+  extended_ = rounds_.extended();
+  for (Finding& finding : result_.findings.findings) {
+    if (finding.cause != "second_harmonic") continue;
+    referToStrongestHost(twin_.changed(mechanisms_), data_, rounds_.latents().log_gain, session_.strongest_amplitude,
+                         finding);
+    replaceOrAppend(*finding.mechanism, extended_);
+  }
+}
+
+void DiagnosisRun::addUnexplained() {
+  diagnosis::addUnexplained(session_.received.unexplained, data_, twin_.description().mechanisms, result_.findings,
+                            extended_);
+}
+
+/// Each finding changes the paths of the twin with the findings before it. Adds the paper's metrics where its round has
+/// not measured them.
+void DiagnosisRun::recordChangedPaths() {
+  std::vector<NamedParameters> mechanisms = twin_.description().mechanisms;
+  const std::vector<FrameFinding>& frames = session_.received.frames;
+  for (Finding& finding : result_.findings.findings) {
+    if (!finding.mechanism) continue;
+    context_.report("what " + finding.cause + " changes", 0);
+    std::vector<NamedParameters> changed = mechanisms;
+    replaceOrAppend(*finding.mechanism, changed);
+    const bool of_frames = std::any_of(frames.begin(), frames.end(),
+                                       [&](const FrameFinding& frame) { return frame.cause == finding.cause; });
+    if (finding.maps && finding.gain && std::isnan(finding.gain->recall.after) && !of_frames) {
+      gains_.addMetrics(mechanisms, changed, *finding.gain);
+    }
+    std::vector<std::string> poses;
+    for (const FindingPlace& place : finding.where) poses.insert(poses.end(), place.poses.begin(), place.poses.end());
+    finding.records = changedRecords(twin_, data_, poses, mechanisms, changed);
+    mechanisms = std::move(changed);
+  }
+}
+
+Diagnosis DiagnosisRun::result() {
+  result_.extended = twin_.description();
+  result_.extended.mechanisms = extended_;
+  result_.problems = data_.problems;
+  result_.plan = surveyPlan(&twin_.scene(), recording_.poses);
+  return std::move(result_);
+}
+
+}  // namespace mmradartwin::diagnosis

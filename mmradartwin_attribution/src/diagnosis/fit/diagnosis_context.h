@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+
+#include "diagnosis/catalogue/stated_bounds.h"
+#include "diagnosis/channels/channel_data.h"
+#include "diagnosis/fit/hypothesis_fit.h"
+#include "diagnosis/likelihood/channel_likelihood.h"
+#include "diagnosis/likelihood/expected_echoes.h"
+#include "diagnosis/rooms.h"
+#include "mmradartwin_attribution/diagnosis_options.h"
+#include "mmradartwin_dsp/session.h"
+#include "mmradartwin_sim/twin.h"
+
+namespace mmradartwin::diagnosis::fit {
+
+/// Everything that the steps of a diagnosis share; made once for a session.
+struct DiagnosisContext {
+  /// Keeps references. folds: parts of the locations that are held out in turn. Throws InputError where scene and radar
+  /// do not fit together.
+  DiagnosisContext(const Recording& recording, Twin& twin, ChannelData& data, const DiagnosisOptions& options,
+                   int folds);
+
+  /// Tells options.on_progress of a stage and its share done. Throws DiagnosisCancelled where the user asks for it.
+  void report(const std::string& stage, double share) const;
+
+  const Recording& recording;
+  Twin& twin;
+  ChannelData& data;
+  const DiagnosisOptions& options;
+  StatedAccuracy accuracy;  ///< the recording's where it states it, else the options'
+  PoseAccuracy pose_accuracy;
+  ExpectedEchoes echoes;
+  ChannelLikelihood likelihood;
+  HypothesisFitter fitter;
+};
+
+}  // namespace mmradartwin::diagnosis::fit

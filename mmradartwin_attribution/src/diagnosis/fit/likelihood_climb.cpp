@@ -1,0 +1,271 @@
+#include "diagnosis/fit/likelihood_climb.h"
+
+#include <nlopt.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "diagnosis/likelihood/profiled_scores.h"
+
+namespace mmradartwin::diagnosis::fit {
+namespace {
+
+constexpr int kRisingFactor = 12;                  ///< times as many steps while each still gains kRising_nats
+constexpr double kLeastStep_nats = 0.2;            ///< promised gain below which a climb ends
+constexpr double kRising_nats = 5;                 ///< gain of the last step for which a climb goes on
+constexpr double kClimb_steps = 4;                 ///< like the last one, within which a climb has to reach its gain
+constexpr double kSearched[] = {0.3, 0.15};        ///< first steps of that search, in the coordinates' scale
+constexpr double kSearchTolerance = 0.02;          ///< in the coordinates' scale
+constexpr int kSearchPlaces = 12;                  ///< per coordinate
+constexpr double kLongestStep = 3;                 ///< in the coordinate's scale
+constexpr double kStepShares[] = {1.0, 0.4, 0.1};  ///< of a promised step, until one gains
+constexpr double kOneSidedFactors[] = {0.4, 2.0};  ///< of a start that rises from nothing
+constexpr Eigen::Index kMostRough = 4;             ///< coordinates that are searched without slopes
+
+/// Calls `value` at places that lead to its maximum, without slopes (BOBYQA, Powell 2009).
+void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector<double> scaled_values,
+                         double initial_step, const std::function<double(const std::vector<double>&)>& value) {
+  const unsigned n = static_cast<unsigned>(coordinates.size());
+  const std::unique_ptr<std::remove_pointer_t<nlopt_opt>, void (*)(nlopt_opt)> search(nlopt_create(NLOPT_LN_BOBYQA, n),
+                                                                                      nlopt_destroy);
+  std::vector<double> low, high;
+  for (const Coordinate& c : coordinates) {
+    low.push_back(std::min(c.scaled(c.min), c.scaled(c.max)));
+    high.push_back(std::max(c.scaled(c.min), c.scaled(c.max)));
+  }
+  const auto call = [](unsigned size, const double* x, double*, void* function) {
+    return (*static_cast<const std::function<double(const std::vector<double>&)>*>(function))({x, x + size});
+  };
+  nlopt_set_lower_bounds(search.get(), low.data());
+  nlopt_set_upper_bounds(search.get(), high.data());
+  nlopt_set_max_objective(search.get(), call, const_cast<std::function<double(const std::vector<double>&)>*>(&value));
+  nlopt_set_initial_step1(search.get(), initial_step);
+  nlopt_set_xtol_abs1(search.get(), kSearchTolerance);
+  nlopt_set_maxeval(search.get(), kSearchPlaces * static_cast<int>(n));
+  double best = 0;
+  nlopt_optimize(search.get(), scaled_values.data(), &best);
+}
+
+}  // namespace
+
+LikelihoodClimb::LikelihoodClimb(ExpectedEchoes& source, const ChannelLikelihood& model, const ClimbTask& task)
+    : source_(source), model_(model), task_(task), globals_(task.nuisance.globals()) {
+  for (const Hypothesis& h : task.parts) {
+    coordinates_.insert(coordinates_.end(), h.coordinates.begin(), h.coordinates.end());
+  }
+  geometric_ = std::any_of(task.parts.begin(), task.parts.end(), [&](const Hypothesis& h) {
+    return source_.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0)));
+  });
+  latents_ = startingLatents();
+}
+
+std::vector<SessionLatents> LikelihoodClimb::startingLatents() const {
+  std::vector<SessionLatents> candidates = {task_.nuisance};
+  if (task_.known == nullptr) {
+    SessionLatents without_headings = task_.nuisance;
+    std::fill(without_headings.yaw_rad.begin(), without_headings.yaw_rad.end(), 0.0);
+    SessionLatents without_ranges = without_headings;
+    std::fill(without_ranges.actor_range_m.begin(), without_ranges.actor_range_m.end(), 0.0);
+    SessionLatents without_errors = without_ranges;
+    std::fill(without_errors.actor_gain.begin(), without_errors.actor_gain.end(), 0.0);
+    candidates.insert(candidates.end(), {without_headings, without_ranges, without_errors});
+    for (const Hypothesis& h : task_.parts) {
+      const int actor = source_.base().scene().actorIndex(h.subject);
+      if (actor >= 0) candidates.push_back(withoutErrors(task_.nuisance, actor));
+    }
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const SessionLatents& a, const SessionLatents& b) { return a.actor_range_m < b.actor_range_m; });
+  return candidates;
+}
+
+ModelState LikelihoodClimb::stateAt(const std::vector<double>& scaled_values, const SessionLatents& latents) const {
+  ModelState s;
+  s.mechanisms = mechanismsAt(scaled_values);
+  s.actor_range_m = latents.actor_range_m;
+  s.echoes = source_.echoes(s.mechanisms, s.actor_range_m);
+  s.nuisance = latents;
+  s.log_likelihood = model_.logLikelihood(s.echoes, latents, &s.by_pose);
+  return s;
+}
+
+void LikelihoodClimb::take(const ModelState& state, const std::vector<double>& scaled_values) {
+  if (!optimum_.state.echoes.empty() && state.log_likelihood <= optimum_.state.log_likelihood) return;
+  optimum_.state = state;
+  optimum_.scaled_values = scaled_values;
+}
+
+ModelState LikelihoodClimb::consider(const std::vector<double>& scaled_values) {
+  ModelState s, best;
+  for (const SessionLatents& candidate : latents_) {
+    if (s.echoes.empty() || s.actor_range_m != candidate.actor_range_m) {
+      s = stateAt(scaled_values, candidate);
+    } else {  // equal ranges have the same echoes
+      s.nuisance = candidate;
+      s.log_likelihood = model_.logLikelihood(s.echoes, candidate, &s.by_pose);
+    }
+    if (best.echoes.empty() || s.log_likelihood > best.log_likelihood) best = s;
+  }
+  take(best, scaled_values);
+  return best;
+}
+
+void LikelihoodClimb::tryStarts() {
+  const std::vector<Hypothesis>& parts = task_.parts;
+  for (const std::vector<double>& start : task_.starts) {
+    const ModelState s = consider(start);
+    if (task_.null == nullptr || task_.known != nullptr || task_.starts.size() < 2 || !parts.front().isGeometry()) {
+      continue;
+    }
+    // The right start may lose to a smaller one before the latents have settled on it.
+    SessionLatents settled = s.nuisance;
+    model_.fit(s.echoes, settled, kSettling);
+    take(stateAt(start, settled), start);
+  }
+  // The promise of a quadratic is far off where a level rises from nothing.
+  const bool one_sided = parts.size() == 1 && std::any_of(coordinates_.begin(), coordinates_.end(),
+                                                          [](const Coordinate& c) { return c.oneSided(); });
+  for (double factor : kOneSidedFactors) {
+    if (!one_sided) break;
+    std::vector<double> other = task_.starts.front();
+    for (double& v : other) v *= factor;
+    consider(other);
+  }
+  // A start that is worse than nothing is an error of the quadratic; only geometry has a valley to cross.
+  if (!one_sided && !geometric_ && parts.size() == 1) consider(std::vector<double>(coordinates_.size(), 0.0));
+}
+
+Scores LikelihoodClimb::derivatives(const ModelState& state, const std::vector<double>& scaled_values) const {
+  std::vector<SessionCovariance> directions;
+  SessionCovariance here;
+  for (std::size_t j = 0; j < coordinates_.size(); ++j) {
+    const Coordinate& c = coordinates_[j];
+    const double step = c.logarithmic() ? kSmallStep * std::max(1e-4, std::abs(scaled_values[j])) : kSmallStep;
+    const auto covarianceAt = [&](double by) {
+      std::vector<double> moved = scaled_values;
+      moved[j] += by;
+      return model_.covariance(
+          source_.echoesNear(mechanismsAt(moved), state.mechanisms, everyone_, state.actor_range_m), state.nuisance,
+          everyone_);
+    };
+    // The likelihood of one strong path is a narrow ridge. A difference to one side would contain the square of a turn
+    // or of a gain, which hides the slope and makes the information many times too large.
+    if (!c.oneSided()) {
+      directions.push_back(difference(covarianceAt(step), covarianceAt(-step), 2 * step));
+      continue;
+    }
+    if (here.empty()) here = model_.covariance(state.echoes, state.nuisance, everyone_);
+    directions.push_back(difference(covarianceAt(step), here, everyone_, step));
+  }
+  return model_.scores(model_.basis(state.echoes, state.nuisance), directions, everyone_);
+}
+
+void LikelihoodClimb::climb() {
+  double risen = 0;
+  for (int i = 0;; ++i) {
+    optimum_.scores = derivatives(optimum_.state, optimum_.scaled_values);
+    const Eigen::VectorXd step = regularised(optimum_.scores.information).ldlt().solve(optimum_.scores.total);
+    const double screened_nats = 0.5 * optimum_.scores.total.dot(step);
+    const bool hopeless = task_.null != nullptr && i >= 2 &&
+                          optimum_.state.log_likelihood + kClimb_steps * std::max(risen, screened_nats) <
+                              task_.null->log_likelihood + task_.least_nats;
+    // On a ridge between a cause and the latents that stood in for it, every step is longer than the one before.
+    const int most = risen > kRising_nats ? kRisingFactor * task_.steps : task_.steps;
+    if (i >= most || screened_nats < kLeastStep_nats || hopeless) return;
+    const double gained = stepBy(step);
+    if (!(gained > 0)) return;
+    risen = gained;
+  }
+}
+
+double LikelihoodClimb::stepBy(const Eigen::VectorXd& step) {
+  for (double share : kStepShares) {
+    std::vector<double> next = optimum_.scaled_values;
+    for (std::size_t j = 0; j < next.size(); ++j) {
+      const Coordinate& c = coordinates_[j];
+      double& v = next[j];
+      v += share * std::clamp(step[globals_ + static_cast<Eigen::Index>(j)], -kLongestStep, kLongestStep);
+      if (c.logarithmic()) v = std::max(v, 0.3 * optimum_.scaled_values[j]);
+      const double low = std::min(c.scaled(c.min), c.scaled(c.max)), high = std::max(c.scaled(c.min), c.scaled(c.max));
+      v = std::clamp(v, low, high);
+    }
+    ModelState s =
+        stateAt(next, model_.stepped(optimum_.state.nuisance, step.head(globals_), optimum_.scores, step, share));
+    if (s.log_likelihood <= optimum_.state.log_likelihood) continue;
+    const double gained = s.log_likelihood - optimum_.state.log_likelihood;
+    optimum_.state = std::move(s);
+    optimum_.scaled_values = next;
+    return gained;
+  }
+  return 0;
+}
+
+bool LikelihoodClimb::isWorthASearch() const {
+  const Eigen::Index n = static_cast<Eigen::Index>(coordinates_.size());
+  if (!geometric_ || n == 0 || n > kMostRough) return false;
+  if (task_.null != nullptr && broadGain(model_.data(), *task_.null, optimum_.state) < kWorthASearch_nats) return false;
+  if (task_.known == nullptr) return true;
+  const double higher = optimum_.state.log_likelihood - task_.known->state.log_likelihood;
+  double apart = 0;
+  for (std::size_t j = 0; j < optimum_.scaled_values.size(); ++j) {
+    apart = std::max(apart, std::abs(optimum_.scaled_values[j] - task_.known->scaled_values[j]));
+  }
+  return !(higher < -kWorthASearch_nats || (apart < kSearched[1] && higher < kRising_nats));
+}
+
+void LikelihoodClimb::search(double first_step) {
+  const Eigen::Index n = static_cast<Eigen::Index>(coordinates_.size());
+  const Optimum from = optimum_;
+  const Eigen::MatrixXd information = regularised(from.scores.information);
+  const Eigen::LDLT<Eigen::MatrixXd> latents(information.topLeftCorner(globals_, globals_));
+  searchQuadratically(coordinates_, from.scaled_values, first_step, [&](const std::vector<double>& next) {
+    Eigen::VectorXd step(globals_ + n);
+    for (std::size_t j = 0; j < next.size(); ++j) {
+      step[globals_ + static_cast<Eigen::Index>(j)] = next[j] - from.scaled_values[j];
+    }
+    step.head(globals_) =
+        latents.solve(from.scores.total.head(globals_) - information.topRightCorner(globals_, n) * step.tail(n));
+    ModelState s = stateAt(next, model_.stepped(from.state.nuisance, step.head(globals_), from.scores, step, 1));
+    const double value = s.log_likelihood;
+    if (value > optimum_.state.log_likelihood) {
+      optimum_.state = std::move(s);
+      optimum_.scaled_values = next;
+    }
+    return value;
+  });
+  optimum_.scores = derivatives(optimum_.state, optimum_.scaled_values);
+}
+
+Optimum LikelihoodClimb::run() {
+  tryStarts();
+  everyone_ = everyPose(optimum_.state);
+  climb();
+  if (!isWorthASearch()) return std::move(optimum_);
+  // The likelihood is rough where paths come and go with every millimetre: slopes end at the first bump, a quadratic
+  // through values some millimetres apart does not. The latents follow to first order.
+  for (double first_step : kSearched) {
+    const double before = optimum_.state.log_likelihood;
+    search(first_step);
+    if (optimum_.state.log_likelihood - before < kRising_nats) break;
+  }
+  return std::move(optimum_);
+}
+
+std::vector<double> gainByLocation(const ChannelData& data, const ModelState& null, const ModelState& state) {
+  std::vector<double> gain(data.locations.size(), 0.0);
+  for (std::size_t i = 0; i < state.by_pose.size(); ++i) {
+    gain[static_cast<std::size_t>(data.poses[i].location)] += state.by_pose[i] - null.by_pose[i];
+  }
+  return gain;
+}
+
+double broadGain(const ChannelData& data, const ModelState& null, const ModelState& state) {
+  const double gain = state.log_likelihood - null.log_likelihood;
+  const std::vector<double> by_location = gainByLocation(data, null, state);
+  if (by_location.size() < 2) return gain;
+  return gain - std::max(0.0, *std::max_element(by_location.begin(), by_location.end()));
+}
+
+}  // namespace mmradartwin::diagnosis::fit

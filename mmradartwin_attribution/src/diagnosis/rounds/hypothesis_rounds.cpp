@@ -1,0 +1,111 @@
+#include "diagnosis/rounds/hypothesis_rounds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "diagnosis/catalogue/bounds.h"
+#include "diagnosis/likelihood/profiled_scores.h"
+#include "diagnosis/numbers/number_text.h"
+#include "diagnosis/rounds/fit_round.h"
+#include "diagnosis/rounds/hypothesis_finding.h"
+#include "diagnosis/rounds/map_evidence.h"
+#include "diagnosis/search/law_screen.h"
+
+namespace mmradartwin::diagnosis::rounds {
+namespace {
+
+constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is looked for in a round
+
+}  // namespace
+
+HypothesisRounds::HypothesisRounds(DiagnosisContext& context, GainMeasurement& gains,
+                                   const std::vector<FrameFinding>& frames, Diagnosis& result)
+    : context_(context),
+      gains_(gains),
+      frames_(frames),
+      result_(result),
+      ranking_(context),
+      selection_(context, gains, result.findings.findings, result.tried) {}
+
+std::vector<RangeShift> HypothesisRounds::takeRangeErrors(ModelState& state) {
+  const double most_error_m = StatedBounds(context_.accuracy).mostRangeError_m();
+  std::vector<RangeShift> shifted = ranking_.shifted(state);
+  const auto is_error = [&](const RangeShift& shift) {
+    if (std::abs(shift.shift_m) > most_error_m) return false;
+    SessionLatents latents = withoutErrors(state.nuisance, shift.actor);
+    latents.actor_range_m[static_cast<std::size_t>(shift.actor)] = shift.shift_m;
+    std::optional<ModelState> better = context_.fitter.improved(state, latents);
+    if (better) state = std::move(*better);
+    return better.has_value();
+  };
+  shifted.resize(std::min(kMostRangeErrors, shifted.size()));
+  shifted.erase(std::remove_if(shifted.begin(), shifted.end(), is_error), shifted.end());
+  return shifted;
+}
+
+void HypothesisRounds::run(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& extended,
+                           ModelState state, int most_rounds) {
+  selection_.begin(mechanisms, extended, std::move(state));
+  for (int round = 0; round < most_rounds; ++round) {
+    if (!findOne(round)) break;
+  }
+  selection_.orderByGain();
+}
+
+std::vector<HypothesisFit> HypothesisRounds::fitBest(int round) {
+  const std::vector<Hypothesis> all = allHypotheses(context_.twin, selection_.extended());
+  const std::vector<RangeShift> shifted = takeRangeErrors(selection_.state());
+  std::vector<Screened> screened = ranking_.rank(all, selection_.state(), shifted);
+  if (selection_.unknownNats() > 0) {  // one unknown stands for all
+    screened.erase(std::remove_if(screened.begin(), screened.end(),
+                                  [](const Screened& s) { return !isCatalogued(s.hypothesis.mechanism.mechanism); }),
+                   screened.end());
+  }
+  family_ = all.size() + static_cast<std::size_t>(kLawFamily);
+  return FitRound(context_, selection_.state()).fit(std::move(screened), family_, round, result_.tried);
+}
+
+std::string HypothesisRounds::rejectionByLikelihood(const HypothesisFit& fit) const {
+  if (fit.ranking() <= 0) return "gains less than its numbers cost";
+  if (fit.false_alarm_rate > kFalseAlarm) return "chance could do as well";
+  if (!(fit.held_out_gain > 0)) return "loses on places not fitted";
+  if (fit.gain < bounds::kShareBesideUnknown * selection_.unknownNats()) return "little beside what is unknown";
+  return rejectionReason(fit, frames_);
+}
+
+bool HypothesisRounds::findOne(int round) {
+  std::vector<HypothesisFit> fits = fitBest(round);
+  const ModelState& state = selection_.state();
+  preferAbsences(fits);
+  preferMoves(fits, context_.twin.scene());
+  preferBetterNames(fits, state);
+  MapEvidence maps(context_, state);
+  for (HypothesisFit& fit : fits) {
+    std::string& verdict = triedAs(fit, round, result_.tried).verdict;
+    verdict = rejectionByLikelihood(fit);
+    if (!verdict.empty()) continue;
+    Finding finding = findingOf(fit, fits, state, context_.twin.scene(), context_.data);
+    if (context_.data.locations.size() > 1) {
+      context_.report("gain on held-out places", 0);
+      gains_.ofFit(state, fit, finding);
+      verdict = maps.rejection(fit, *finding.gain);
+      if (!verdict.empty()) continue;
+      gains_.addMetrics(selection_.extended(), fit, *finding.gain);
+    }
+    context_.report("found " + fit.hypothesis.label() + ", " + number(fit.gain, 4) + " nats", 1);
+    if (context_.echoes.altersGeometry(*finding.mechanism)) ranking_.tryAllAgain();
+    verdict = selection_.take(fit, fits, std::move(finding), family_);
+    if (verdict.empty()) {
+      verdict = "found";
+      return true;
+    }
+    context_.report("taken back: " + fit.hypothesis.label(), 1);
+    // What looks like an actor's own error may have another cause.
+    if (!fit.hypothesis.isMove()) maps.addRejected(fit);
+  }
+  return false;
+}
+
+}  // namespace mmradartwin::diagnosis::rounds

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "diagnosis/fit/diagnosis_context.h"
+#include "diagnosis/rooms.h"
+#include "mmradartwin_attribution/finding.h"
+
+namespace mmradartwin::diagnosis::rounds {
+
+/// Judges the fits of one round, which their likelihood speaks for, by what the maps gain.
+class MapEvidence {
+ public:
+  /// Keeps references. before: the state that the round's fits are compared with.
+  MapEvidence(DiagnosisContext& context, const ModelState& before) : context_(context), before_(before) {}
+
+  /// Reason why a fit is no finding, "" where it is one. gain: on held-out places. Fits come best first: one that
+  /// explains the same as a better one that was rejected is rejected, too.
+  std::string rejection(const HypothesisFit& fit, const FindingGain& gain);
+  /// Adds a fit that was rejected for another reason than the maps.
+  void addRejected(const HypothesisFit& fit);
+
+ private:
+  /// What a rejected fit would have explained.
+  struct Rejected {
+    Eigen::VectorXd nats_by_pose;
+    bool by_maps;  ///< else by what is known of the session's own errors
+  };
+  bool isWorthIt(const HypothesisFit& fit, double explained_more, bool plainly_worse, bool likelier);
+  bool explainsTheSame(const HypothesisFit& fit, const Eigen::VectorXd& nats_by_pose) const;
+
+  DiagnosisContext& context_;
+  const ModelState& before_;
+  std::vector<Rejected> rejected_;
+};
+
+}  // namespace mmradartwin::diagnosis::rounds

@@ -1,0 +1,173 @@
+// The rig as a whole against the emulator: configuration, arming, recovery.
+#include "mmradartwin_driver/rig.h"
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <mutex>
+
+#include "emulated_rig.h"
+#include "mmradartwin_dsp/capture.h"
+
+namespace mmradartwin {
+namespace {
+
+struct RunningRig {
+  explicit RunningRig(const RadarConfig& radar)
+      : rig(
+            radar, options(), [this](AdcCube&& cube) { take(std::move(cube)); },
+            [this](Rig::Level, const std::string& text) {
+              const std::lock_guard<std::mutex> lock(mutex);
+              events.push_back(text);
+            }) {}
+  static RigOptions options() {
+    RigOptions options;
+    options.host_ip = loopbackIp(1);
+    options.card_ip = loopbackIp(2);
+    return options;
+  }
+  void take(AdcCube&& cube) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    cubes.push_back(std::move(cube));
+    changed.notify_all();
+  }
+  bool waitForCubes(std::size_t count, int seconds = 60) {
+    std::unique_lock<std::mutex> lock(mutex);
+    return changed.wait_for(lock, std::chrono::seconds(seconds), [&] { return cubes.size() >= count; });
+  }
+  bool saw(const std::string& text) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    for (const std::string& event : events) {
+      if (event.find(text) != std::string::npos) return true;
+    }
+    return false;
+  }
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<AdcCube> cubes;
+  std::vector<std::string> events;
+  Rig rig;  // last: its thread uses the rest
+};
+
+bool holds(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+std::vector<std::string> quickly(const std::string& session, std::vector<std::string> more = {}) {
+  std::vector<std::string> arguments = {session, "--start-delay-s", "0.1", "--flush-s", "0.2", "--deaf-s", "0.1"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+std::vector<std::int16_t> frameOf(const TestFolder& folder, const RadarConfig& radar, std::size_t i) {
+  std::vector<std::int16_t> samples;
+  decodeFrame(radar, readBytes(folder.file("captures/a.bin")).data() + i * 2048, samples);
+  return samples;
+}
+
+TEST(Rig, ConfiguresArmsAndRecords) {
+  TestFolder folder;
+  writeSession(folder, 0.01, {30});
+  const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
+  RunningRig running(radar);
+  ASSERT_TRUE(running.waitForCubes(30));
+  for (std::size_t i = 0; i < 30; ++i) {
+    EXPECT_EQ(i, running.cubes[i].sequence);
+    EXPECT_EQ(frameOf(folder, radar, i), running.cubes[i].data);
+  }
+  EXPECT_TRUE(emulator.waitFor("completed"));
+  // Armed anew for the next frames when the recording was completed.
+  EXPECT_TRUE(waitUntil([&] { return running.rig.state().armings == 2; }));
+  const RigState state = running.rig.state();
+  EXPECT_EQ("", state.problem);
+  EXPECT_EQ(30u, state.frames.frames);
+  EXPECT_EQ(0u, state.frames.lost_bytes);
+  ASSERT_TRUE(state.version);
+  EXPECT_EQ(8, state.version->minor);
+  EXPECT_TRUE(running.saw("completed its recording"));
+}
+
+TEST(Rig, ArmsAnewWhenTheCardThrewSamplesAway) {
+  TestFolder folder;
+  writeSession(folder, 0.01, {400});
+  const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file(""), {"--status-at", "40:0x80"}));
+  RunningRig running(radar);
+  // The count begins anew, and the frames are whole ones of the radar again.
+  const auto second_start = [&running] {
+    return std::find_if(
+        running.cubes.begin() + std::min<std::ptrdiff_t>(1, running.cubes.end() - running.cubes.begin()),
+        running.cubes.end(), [](const AdcCube& cube) { return cube.sequence == 0; });
+  };
+  ASSERT_TRUE(waitUntil([&] {
+    const std::lock_guard<std::mutex> lock(running.mutex);
+    return running.cubes.end() - second_start() > 1;
+  }));
+  EXPECT_TRUE(running.saw("DDR_FULL"));
+  const std::lock_guard<std::mutex> lock(running.mutex);
+  const auto again = second_start();
+  std::size_t first = 0;
+  while (first < 400 && frameOf(folder, radar, first) != again->data) ++first;
+  ASSERT_LT(first, 399u) << "frames after arming anew are none of the radar's";
+  EXPECT_GE(first, 40u);
+  EXPECT_EQ(frameOf(folder, radar, first + 1), (again + 1)->data);
+}
+
+TEST(Rig, WaitsForACardAndComesBackToOneThatWasGone) {
+  TestFolder folder;
+  writeSession(folder, 0.01, {400});
+  const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  RunningRig running(radar);
+  EXPECT_TRUE(waitUntil([&] { return holds(running.rig.state().problem, "no answer from the DCA1000"); }))
+      << running.rig.state().problem;
+  {
+    EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
+    ASSERT_TRUE(running.waitForCubes(50));
+    EXPECT_EQ("", running.rig.state().problem);
+  }  // power lost in the middle
+  // What the card had sent is taken once the rig has seen nothing for a while.
+  ASSERT_TRUE(waitUntil([&] { return running.rig.state().silent_s > 0.3; }));
+  std::size_t before;
+  {
+    const std::lock_guard<std::mutex> lock(running.mutex);
+    before = running.cubes.size();
+  }
+  EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
+  ASSERT_TRUE(running.waitForCubes(before + 50));
+  const std::lock_guard<std::mutex> lock(running.mutex);
+  // A frame that was cut off comes first.
+  const std::size_t cut = running.cubes[before].sequence == 0 ? 0 : 1;
+  EXPECT_EQ(cut == 1, running.cubes[before].lost_bytes > 0);
+  EXPECT_EQ(0u, running.cubes[before + cut].sequence);
+  EXPECT_EQ(frameOf(folder, radar, 0), running.cubes[before + cut].data);
+}
+
+TEST(Rig, NamesAHostAddressThatIsMissing) {
+  RigOptions options = RunningRig::options();
+  options.host_ip = "203.0.113.7";
+  TestFolder folder;
+  writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
+  const Rig rig(
+      loadRadarConfig(folder.file("radar.yaml")), options, [](AdcCube&&) {}, [](Rig::Level, const std::string&) {});
+  EXPECT_TRUE(waitUntil([&] { return holds(rig.state().problem, "no address 203.0.113.7"); })) << rig.state().problem;
+}
+
+TEST(Rig, LooksAtTheCardsVersion) {
+  TestFolder folder;
+  writeSession(folder, 0.01, {30});
+  const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  {
+    EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file(""), {"--fpga-version", "0x4402"}));
+    RunningRig running(radar);
+    EXPECT_TRUE(waitUntil([&] { return holds(running.rig.state().problem, "playback image: load TI's record image"); }))
+        << running.rig.state().problem;
+    EXPECT_EQ(0u, running.rig.state().armings);
+  }
+  EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file(""), {"--fpga-version", "0x0282"}));
+  RunningRig running(radar);
+  EXPECT_TRUE(running.waitForCubes(30));  // an unknown one is tried
+  EXPECT_TRUE(running.saw("FPGA 2.5: the driver is made after FPGA 2.7 to 2.9"));
+}
+
+}  // namespace
+}  // namespace mmradartwin

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace mmradartwin {
+
+/// `value` with this many digits after the point; `missing` where it is not finite.
+std::string fixedNumber(double value, int digits, const std::string& missing = "");
+/// `value` with this many significant digits, as "%.3g" writes it.
+std::string significantNumber(double value, int digits);
+/// The words one after the other, `separator` between them.
+std::string join(const std::vector<std::string>& words, const std::string& separator);
+/// One field of a CSV line: in quotes, with quotes doubled, where it holds a comma, a quote or a line break.
+std::string csvField(const std::string& text);
+/// `text` as the content of an HTML element or a quoted attribute.
+std::string htmlEscape(const std::string& text);
+
+}  // namespace mmradartwin
