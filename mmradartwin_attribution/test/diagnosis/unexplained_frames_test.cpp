@@ -15,10 +15,10 @@ namespace {
 ChannelData toneOf(double amplitude) {
   ChannelData data = channelsAt({facingEastAt(0, 0), facingEastAt(1, 0)});
   for (PoseChannels& pose : data.poses) {
-    pose.y = Eigen::MatrixXcd::Zero(data.radar.channels(), data.radar.samples_per_chirp);
-    pose.y.col(20).setConstant(amplitude);
-    pose.y.col(19).setConstant(-0.5 * amplitude);
-    pose.y.col(21).setConstant(-0.5 * amplitude);
+    pose.range_spectra = Eigen::MatrixXcd::Zero(data.radar.channels(), data.radar.samples_per_chirp);
+    pose.range_spectra.col(20).setConstant(amplitude);
+    pose.range_spectra.col(19).setConstant(-0.5 * amplitude);
+    pose.range_spectra.col(21).setConstant(-0.5 * amplitude);
   }
   return data;
 }
