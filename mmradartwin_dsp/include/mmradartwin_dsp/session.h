@@ -61,15 +61,16 @@ struct Recording {
   std::function<Recording(double lag_s)> withPoseLag;
 };
 
-/// Reads a session directory (or its session.yaml). Throws InputError for what makes the whole session unusable
-/// (unknown keys, missing radar.yaml, unreadable poses.csv, poses that overlap in time); what concerns one pose only
-/// goes to `problems`. `check_overlap` needs captures; without captures (simulate) poses are not checked for it.
+/// How openSession reads a session.
 struct SessionOptions {
-  bool need_captures = true;
+  bool need_captures = true;  ///< false to simulate: poses are then not checked for overlap in time
   bool exclude_duplicates = true;
   std::string radar_file;               ///< instead of the one that the session names
   std::optional<CaptureLayout> layout;  ///< instead of the radar's
 };
+/// Reads a session directory (or its session.yaml). Throws InputError for what makes the whole session unusable
+/// (unknown keys, missing radar.yaml, unreadable poses.csv, poses that overlap in time); what concerns one pose only
+/// goes to `problems`.
 Recording openSession(const std::string& path, const SessionOptions& options = {});
 
 /// A bare capture: one pose named after the file, at the origin.
