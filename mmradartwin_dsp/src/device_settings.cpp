@@ -279,7 +279,9 @@ int wholeNumber(double value, const std::string& what) {
   return static_cast<int>(static_cast<long long>(value));
 }
 
-ImportedSettings importSettings(const std::vector<std::string>& files, const std::string& device) {
+namespace {
+
+RawSettings readSettings(const std::vector<std::string>& files, const std::string& device) {
   if (files.empty()) throw InputError("no settings file; give a .lua script, XML or JSON files");
   RawSettings raw;
   if (!device.empty()) raw.setDevice(device, "--device");
@@ -298,6 +300,15 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
   if (raw.device.empty()) {
     throw InputError(files.front() + ": does not say which device it is for; give setup.json too, or --device awr2243");
   }
+  return raw;
+}
+
+struct Device {
+  std::string digits;  ///< those of its name, such as 2243
+  CaptureLayout layout;
+};
+
+Device knownDevice(const RawSettings& raw) {
   const std::size_t digit = raw.device.find_first_of("0123456789");
   const std::string digits = digit == std::string::npos ? "" : raw.device.substr(digit, 4);
   const std::vector<std::string> known = {"1243", "1443", "2243", "1642", "1843", "6443", "6843"};
@@ -306,14 +317,19 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
     throw InputError(raw.device_from + ": device '" + raw.device +
                      "' is not known; known are xWR1243, 1443, 2243, 1642, 1843, 6443 and 6843");
   }
+  return {digits, *layout};
+}
 
-  ImportedSettings imported;
-  RadarConfig& radar = imported.radar;
-  radar.device = raw.device.compare(0, 3, "xwr") == 0 && digits == "2243" ? "awr2243" : raw.device;
+struct FrameChirps {
+  std::vector<int> transmitters;  ///< of each chirp
+  int profile = 0;                ///< that of all of them
+};
+
+FrameChirps frameChirps(const RawSettings& raw) {
   const int first = static_cast<int>(required(raw, "chirp_start", "which chirps a frame has (FrameConfig)"));
   const int last = static_cast<int>(required(raw, "chirp_end", "which chirps a frame has (FrameConfig)"));
   if (first < 0 || last < first || last > kLastChirp) {
-    throw InputError(raw.values["chirp_end"].where + ": chirps " + std::to_string(first) + " to " +
+    throw InputError(raw.values.at("chirp_end").where + ": chirps " + std::to_string(first) + " to " +
                      std::to_string(last) + " of a frame: must be within 0 to " + std::to_string(kLastChirp) +
                      ", in order");
   }
@@ -322,7 +338,7 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
   for (int chirp = first; chirp <= last; ++chirp) {
     const auto found = raw.chirps.find(chirp);
     if (found == raw.chirps.end()) {
-      throw InputError(raw.values["chirp_end"].where + ": the frame uses chirp " + std::to_string(chirp) +
+      throw InputError(raw.values.at("chirp_end").where + ": the frame uses chirp " + std::to_string(chirp) +
                        ", which is not configured" +
                        (raw.only_last_chirps.empty() ? ""
                                                      : " in " + raw.only_last_chirps +
@@ -339,13 +355,19 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
                        ": where several send at once (or none), its position in the virtual array is not known here");
     }
     transmitters.push_back(mask == 4 ? 2 : static_cast<int>(mask) - 1);
-    radar.tx_enable.push_back({transmitters.back()});
   }
-  const auto used = raw.profiles.find(*profile_id);
+  return {transmitters, *profile_id};
+}
+
+const RawSettings::Profile& profileOf(const RawSettings& raw, int id) {
+  const auto used = raw.profiles.find(id);
   if (used == raw.profiles.end()) {
-    throw InputError("the frame's chirps have profile " + std::to_string(*profile_id) + ", which is not configured");
+    throw InputError("the frame's chirps have profile " + std::to_string(id) + ", which is not configured");
   }
-  const RawSettings::Profile& profile = used->second;
+  return used->second;
+}
+
+void setChirp(RadarConfig& radar, const RawSettings::Profile& profile) {
   radar.carrier_hz = std::round(profile.start_ghz * 1e9);
   radar.slope_hz_per_s = std::round(profile.slope_mhz_per_us * 1e9) * 1e3;
   radar.samples_per_chirp = profile.samples;
@@ -353,8 +375,10 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
   radar.adc_start_s = profile.adc_start_us / 1e6;
   radar.idle_s = profile.idle_us / 1e6;
   radar.ramp_end_s = profile.ramp_end_us / 1e6;
-  radar.loops_per_frame = static_cast<int>(required(raw, "loops", "how many loops a frame has (FrameConfig)"));
-  radar.frame_period_s = required(raw, "period_ms", "the frame period (FrameConfig)") / 1e3;
+}
+
+void setGains(ImportedSettings& imported, const RawSettings::Profile& profile, const std::vector<int>& transmitters) {
+  RadarConfig& radar = imported.radar;
   radar.rx_gain_db = profile.rx_gain & 0x3f;
   if (profile.rx_gain & 0xc0) {
     imported.assumed.push_back("rx_gain_db: bits 5:0 of the gain field " + std::to_string(profile.rx_gain) +
@@ -368,13 +392,19 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
   } else {
     imported.assumed.push_back("tx_backoff_db left out: the transmitters' backoffs differ");
   }
+}
+
+void setHighPass(RadarConfig& radar, const RawSettings& raw, const RawSettings::Profile& profile) {
   const double corner1[] = {175e3, 235e3, 350e3, 700e3}, corner2[] = {350e3, 700e3, 1.4e6, 2.8e6};
   if (profile.hpf1 < 0 || profile.hpf1 > 3 || profile.hpf2 < 0 || profile.hpf2 > 3) {
     throw InputError(raw.profile_from + ": high-pass codes " + std::to_string(profile.hpf1) + " and " +
                      std::to_string(profile.hpf2) + ": must be 0 to 3");
   }
   radar.if_highpass_hz = {corner1[profile.hpf1], corner2[profile.hpf2]};
+}
 
+/// How samples leave the device; throws InputError for forms that no capture layout has.
+void setSampleFormat(ImportedSettings& imported, const RawSettings& raw, const Device& device) {
   demand(raw, "adc_bits", {2}, "samples must have 16 bits (code 2; in cf.json dataFormatMode 3)");
   demand(raw, "adc_format", {1, 2}, "samples must be complex (code 1 or 2)");
   demand(raw, "interface", {1}, "samples must leave over LVDS (code 1)");
@@ -383,16 +413,16 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
   demand(raw, "iq_swap", {0, 1}, "must be 0 (I first) or 1 (Q first)");
   const int lanes =
       static_cast<int>(required(raw, "lanes", "how many LVDS lanes there are (LVDSLaneConfig, laneEn or cf.json)"));
-  const bool four_lanes = *layout == CaptureLayout::kFourLane;
+  const bool four_lanes = device.layout == CaptureLayout::kFourLane;
   if (lanes != (four_lanes ? 4 : 2)) {
-    throw InputError(raw.values["lanes"].where + ": " + std::to_string(lanes) + " LVDS lanes of an " + raw.device +
+    throw InputError(raw.values.at("lanes").where + ": " + std::to_string(lanes) + " LVDS lanes of an " + raw.device +
                      ": known are four of xWR1243, 1443 and 2243, and two of the others");
   }
   demand(raw, "interleave", {four_lanes ? 0 : 1},
          std::string("samples of this device must be ") + (four_lanes ? "interleaved (0)" : "non-interleaved (1)"));
-  radar.layout = *layout;
+  imported.radar.layout = device.layout;
   if (raw.values.count("iq_swap")) {
-    radar.iq_order = raw.values["iq_swap"].value != 0 ? IqOrder::kQi : IqOrder::kIq;
+    imported.radar.iq_order = raw.values.at("iq_swap").value != 0 ? IqOrder::kQi : IqOrder::kIq;
   } else {
     imported.assumed.push_back("iq_order: I first, as devices send it unless told otherwise");
   }
@@ -402,14 +432,33 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
       break;
     }
   }
+}
+
+}  // namespace
+
+ImportedSettings importSettings(const std::vector<std::string>& files, const std::string& device_name) {
+  const RawSettings raw = readSettings(files, device_name);
+  const Device device = knownDevice(raw);
+  ImportedSettings imported;
+  RadarConfig& radar = imported.radar;
+  radar.device = raw.device.compare(0, 3, "xwr") == 0 && device.digits == "2243" ? "awr2243" : raw.device;
+  const FrameChirps chirps = frameChirps(raw);
+  for (const int transmitter : chirps.transmitters) radar.tx_enable.push_back({transmitter});
+  const RawSettings::Profile& profile = profileOf(raw, chirps.profile);
+  setChirp(radar, profile);
+  radar.loops_per_frame = static_cast<int>(required(raw, "loops", "how many loops a frame has (FrameConfig)"));
+  radar.frame_period_s = required(raw, "period_ms", "the frame period (FrameConfig)") / 1e3;
+  setGains(imported, profile, chirps.transmitters);
+  setHighPass(radar, raw, profile);
+  setSampleFormat(imported, raw, device);
   const int rx_mask = static_cast<int>(required(raw, "rx_mask", "which receivers are on (ChanNAdcConfig)"));
   for (int rx = 0; rx < 4; ++rx) {
     if (rx_mask >> rx & 1) radar.rx_enable.push_back(rx);
   }
-  placeAntennas(imported, digits, radar.rx_enable, transmitters);
+  placeAntennas(imported, device.digits, radar.rx_enable, chirps.transmitters);
   if (raw.values.count("packet_delay_us")) {
     imported.assumed.push_back("the card's packet delay is no part of radar.yaml: give the driver packet_delay_us:=" +
-                               shortest(raw.values["packet_delay_us"].value));
+                               shortest(raw.values.at("packet_delay_us").value));
   }
   parseRadarConfig(toYaml(radar), files.front());  // its ranges hold for imported values too
   return imported;

@@ -1,5 +1,6 @@
 #include "mmradartwin_dsp/range_angle.h"
 
+#include <array>
 #include <cmath>
 #include <complex>
 #include <limits>

@@ -88,41 +88,6 @@ std::string readRow(const std::vector<std::string>& fields, Pose& pose) {
   return "";
 }
 
-void readPoses(const std::string& file, Recording& recording) {
-  std::istringstream in(readTextFile(file, "put the poses there or correct key poses in session.yaml"));
-  std::string line;
-  std::getline(in, line);
-  if (line.compare(0, 3, "\xEF\xBB\xBF") == 0) line.erase(0, 3);  // spreadsheets put a byte order mark
-  if (splitCsv(trimmed(line)) != splitCsv(kPoseColumns)) {
-    throw InputError(file + ": line 1: header is '" + trimmed(line).substr(0, 80) + "'; it must be '" + kPoseColumns +
-                     "'");
-  }
-  std::set<std::string> names;
-  for (int number = 2; std::getline(in, line); ++number) {
-    if (trimmed(line).empty()) continue;
-    const std::vector<std::string> fields = splitCsv(line);
-    const std::string where = file + ": line " + std::to_string(number) + ": ";
-    if (fields.size() != 10) {
-      throw InputError(where + std::to_string(fields.size()) + " fields; a row has 10, " + kPoseColumns);
-    }
-    Pose pose;
-    pose.name = fields[0];
-    const std::string unusable = unusableName(pose.name);
-    if (!unusable.empty()) throw InputError(where + "pose '" + pose.name + "' " + unusable);
-    if (!names.insert(pose.name).second) {
-      throw InputError(where + "pose '" + pose.name + "' stands twice; every pose needs a name of its own");
-    }
-    recording.pose_names.push_back(pose.name);
-    const std::string problem = readRow(fields, pose);
-    if (problem.empty()) {
-      recording.poses.push_back(pose);
-    } else {
-      recording.problems.push_back({pose.name, where + "pose '" + pose.name + "': " + problem});
-    }
-  }
-  if (names.empty()) throw InputError(file + ": holds no poses; write one row per pose");
-}
-
 std::string captureFile(const std::string& pattern, const std::string& pose) {
   std::string file = pattern;
   return file.replace(file.find("{pose}"), 6, pose);
@@ -238,7 +203,11 @@ Recording openSession(const std::string& path, const SessionOptions& options) {
   recording.radar = loadRadarConfig(recording.radar_file);
   if (options.layout) recording.radar.layout = *options.layout;
   recording.capture_pattern = pattern;
-  readPoses(poses_file, recording);
+  PoseTable table =
+      parsePoses(readTextFile(poses_file, "put the poses there or correct key poses in session.yaml"), poses_file);
+  recording.poses = std::move(table.poses);
+  recording.problems = std::move(table.problems);
+  recording.pose_names = std::move(table.names);
   if (options.need_captures) rejectOverlap(recording, pattern, poses_file);
   if (options.exclude_duplicates) excludeDuplicates(recording);
 
@@ -275,6 +244,43 @@ Recording openCapture(const std::string& file, const RadarConfig& radar) {
     for (int i = 0; i < reader.frames(); ++i) visit(reader.frame(i, pose.stamp_ns));
   };
   return recording;
+}
+
+PoseTable parsePoses(const std::string& csv, const std::string& file) {
+  PoseTable table;
+  std::istringstream in(csv);
+  std::string line;
+  std::getline(in, line);
+  if (line.compare(0, 3, "\xEF\xBB\xBF") == 0) line.erase(0, 3);  // spreadsheets put a byte order mark
+  if (splitCsv(trimmed(line)) != splitCsv(kPoseColumns)) {
+    throw InputError(file + ": line 1: header is '" + trimmed(line).substr(0, 80) + "'; it must be '" + kPoseColumns +
+                     "'");
+  }
+  std::set<std::string> names;
+  for (int number = 2; std::getline(in, line); ++number) {
+    if (trimmed(line).empty()) continue;
+    const std::vector<std::string> fields = splitCsv(line);
+    const std::string where = file + ": line " + std::to_string(number) + ": ";
+    if (fields.size() != 10) {
+      throw InputError(where + std::to_string(fields.size()) + " fields; a row has 10, " + kPoseColumns);
+    }
+    Pose pose;
+    pose.name = fields[0];
+    const std::string unusable = unusableName(pose.name);
+    if (!unusable.empty()) throw InputError(where + "pose '" + pose.name + "' " + unusable);
+    if (!names.insert(pose.name).second) {
+      throw InputError(where + "pose '" + pose.name + "' stands twice; every pose needs a name of its own");
+    }
+    table.names.push_back(pose.name);
+    const std::string problem = readRow(fields, pose);
+    if (problem.empty()) {
+      table.poses.push_back(pose);
+    } else {
+      table.problems.push_back({pose.name, where + "pose '" + pose.name + "': " + problem});
+    }
+  }
+  if (names.empty()) throw InputError(file + ": holds no poses; write one row per pose");
+  return table;
 }
 
 std::int64_t parseStamp_ns(const std::string& text) {

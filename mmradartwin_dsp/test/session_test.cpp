@@ -59,6 +59,26 @@ TEST(Session, PosesThatCannotBeUsedAreProblemsOfTheirOwn) {
   EXPECT_EQ(recording.pose_names.size(), 7u);
 }
 
+TEST(Poses, RowsThatCannotBeUsedAreProblemsOfTheirOwn) {
+  const PoseTable table = parsePoses(
+      "pose,location,stamp,x,y,z,qx,qy,qz,qw\n"
+      "b, door ,12.5,1,2,3,0,0,1,0\r\n"
+      "\n"
+      "a,desk,later,1,2,3,0,0,0,1\n",
+      "list.csv");
+  EXPECT_EQ(table.names, (std::vector<std::string>{"b", "a"}));
+  ASSERT_EQ(table.poses.size(), 1u);
+  EXPECT_EQ(table.poses[0].name, "b");
+  EXPECT_EQ(table.poses[0].location, "door");
+  EXPECT_EQ(table.poses[0].stamp_ns, 12500000000);
+  EXPECT_TRUE(table.poses[0].T_map_radar.translation().isApprox(Eigen::Vector3d(1, 2, 3)));
+  EXPECT_TRUE(table.poses[0].T_map_radar.linear().col(0).isApprox(-Eigen::Vector3d::UnitX()));
+  ASSERT_EQ(table.problems.size(), 1u);
+  EXPECT_EQ(table.problems[0].pose, "a");
+  EXPECT_TRUE(saysInOneLine(table.problems[0].message, "list.csv", "line 4", "'a'", "later"));
+  EXPECT_TRUE(saysInOneLine(inputError([] { parsePoses("pose,place\n", "list.csv"); }), "list.csv", "header"));
+}
+
 TEST(Session, MissingAndTruncatedCapturesAreNamedWhenRead) {
   const TestFolder folder;
   writeSession(folder / "lab");

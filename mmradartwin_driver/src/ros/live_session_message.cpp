@@ -1,17 +1,15 @@
 #include "mmradartwin_driver/ros/live_session_message.h"
 
-#include <openssl/evp.h>
-
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <memory>
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/session_files.h"
+#include "mmradartwin_dsp/sha256.h"
 #include "mmradartwin_dsp/strict_yaml.h"
 
 namespace mmradartwin {
@@ -39,26 +37,6 @@ std::string restamp(const std::string& csv, const std::vector<LivePose>& poses) 
     out += row.substr(0, second + 1) + formatStamp(pose.stamp_ns) + row.substr(third) + "\n";
   }
   return out;
-}
-
-std::string sha256OfFile(const std::string& file) {
-  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), EVP_MD_CTX_free);
-  EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr);
-  std::ifstream in(file, std::ios::binary);
-  std::vector<char> chunk(1 << 16);
-  while (in) {
-    in.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
-    EVP_DigestUpdate(context.get(), chunk.data(), static_cast<std::size_t>(in.gcount()));
-  }
-  unsigned char digest[EVP_MAX_MD_SIZE];
-  unsigned int size = 0;
-  EVP_DigestFinal_ex(context.get(), digest, &size);
-  std::string text;
-  for (unsigned int i = 0; i < size; ++i) {
-    text += "0123456789abcdef"[digest[i] >> 4];
-    text += "0123456789abcdef"[digest[i] & 15];
-  }
-  return text;
 }
 
 }  // namespace

@@ -33,6 +33,13 @@ struct PoseProblem {
   std::string message;  ///< one line for the user
 };
 
+/// What a poses.csv says.
+struct PoseTable {
+  std::vector<std::string> names;     ///< of all rows, in file order
+  std::vector<Pose> poses;            ///< of the rows that can be used
+  std::vector<PoseProblem> problems;  ///< of the others
+};
+
 /// A recorded session, whatever it was read from: a session directory, a bag, a bare capture.
 struct Recording {
   std::string source;  ///< path it was read from
@@ -61,16 +68,21 @@ struct Recording {
   std::function<Recording(double lag_s)> withPoseLag;
 };
 
-/// Reads a session directory (or its session.yaml). Throws InputError for what makes the whole session unusable
-/// (unknown keys, missing radar.yaml, unreadable poses.csv, poses that overlap in time); what concerns one pose only
-/// goes to `problems`. `check_overlap` needs captures; without captures (simulate) poses are not checked for it.
+/// How openSession reads a session.
 struct SessionOptions {
-  bool need_captures = true;
+  bool need_captures = true;  ///< false to simulate: poses are then not checked for overlap in time
   bool exclude_duplicates = true;
   std::string radar_file;               ///< instead of the one that the session names
   std::optional<CaptureLayout> layout;  ///< instead of the radar's
 };
+/// Reads a session directory (or its session.yaml). Throws InputError for what makes the whole session unusable
+/// (unknown keys, missing radar.yaml, unreadable poses.csv, poses that overlap in time); what concerns one pose only
+/// goes to `problems`.
 Recording openSession(const std::string& path, const SessionOptions& options = {});
+
+/// Reads the text of a poses.csv. Throws InputError, which names `file`, for a wrong header, a row without 10 fields, a
+/// name that is unusable or stands twice, and no row at all.
+PoseTable parsePoses(const std::string& csv, const std::string& file);
 
 /// A bare capture: one pose named after the file, at the origin.
 Recording openCapture(const std::string& file, const RadarConfig& radar);

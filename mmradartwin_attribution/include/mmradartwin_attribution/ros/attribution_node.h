@@ -1,0 +1,96 @@
+#pragma once
+
+#include <mmradartwin_msgs/PathRecords.h>
+#include <mmradartwin_msgs/RadarConfig.h>
+#include <mmradartwin_msgs/RangeAngleMap.h>
+#include <mmradartwin_msgs/Scene.h>
+#include <mmradartwin_msgs/Session.h>
+#include <ros/ros.h>
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_attribution/attribution_config.h"
+#include "mmradartwin_attribution/live_ledger.h"
+#include "mmradartwin_attribution/response.h"
+#include "mmradartwin_attribution/response_region.h"
+#include "mmradartwin_attribution/ros/markers.h"
+#include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_sim/path_record.h"
+#include "mmradartwin_sim/scene.h"
+
+namespace mmradartwin {
+
+/// radar/config, session, twin/scene, twin/paths, radar/range_angle, twin/range_angle -> attribution/residuals,
+/// attribution/ledger, attribution/markers, attribution/scene_markers.
+///
+/// Matches measured and simulated maps by stamp and attributes what differs. Poses are named after the session's
+/// poses.csv, else after their stamp. The scene is that of the parameter `scene`, else of twin/scene; where twin/scene
+/// brings another twin the ledger begins anew. Markers and ledger come `markers_hz` times a second at most, with up to
+/// `max_paths` paths. Callbacks must come one at a time.
+class AttributionNode {
+ public:
+  /// Throws InputError for unknown or unusable parameters.
+  AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
+
+ private:
+  using MapMsg = mmradartwin_msgs::RangeAngleMap;
+
+  void readParameters(const ros::NodeHandle& private_nh);
+  void onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg);
+  void onScene(const mmradartwin_msgs::Scene::ConstPtr& msg);
+  void onSession(const mmradartwin_msgs::Session::ConstPtr& msg);
+  void onPaths(const mmradartwin_msgs::PathRecords::ConstPtr& msg);
+  void onMeasured(const MapMsg::ConstPtr& msg);
+  void onSimulated(const MapMsg::ConstPtr& msg);
+  void onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, MapMsg::ConstPtr>& own,
+             std::map<std::int64_t, MapMsg::ConstPtr>& other, bool measured);
+  void setScene(Scene scene);
+  void onSceneViewer();
+  void publishScene();
+  void rebuild();
+  void beginAnew();
+  void publishLedger(const ros::Time& stamp);
+  const std::vector<ResponseRegion>& regionsAt(const Eigen::Isometry3d& T);
+  void compare(const MapMsg& measured_msg, const MapMsg& simulated_msg);
+  std::string nameAt(std::int64_t stamp_ns) const;
+  void watch(const ros::WallTimerEvent&);
+
+  ros::NodeHandle nh_;
+  AttributionConfig config_;
+  MarkerFrames frames_;
+  std::string radar_frame_ = "radar_link", scene_file_, twin_yaml_;
+  double markers_hz_ = 2;
+  int max_paths_ = 200;
+  ros::Publisher residuals_, ledger_, markers_, scene_markers_;
+  std::vector<ros::Subscriber> subscribers_;
+  ros::WallTimer watchdog_;
+  ros::WallTime last_markers_, scene_published_, scene_viewer_since_;  // zero: never, nobody new
+  bool scene_due_ = false;
+  std::uint32_t had_subscribers_ = 0;
+  std::size_t pairs_ = 0, pairs_before_ = 0, received_ = 0, received_before_ = 0;
+
+  std::map<std::int64_t, MapMsg::ConstPtr> measured_, simulated_;  // waiting, by stamp
+  MapMsg::ConstPtr last_measured_;                                 // of the last pair
+  mmradartwin_msgs::PathRecords::ConstPtr paths_, records_of_;
+  std::vector<PathRecord> records_;
+  std::map<std::int64_t, std::string> pose_names_;
+
+  std::unique_ptr<RadarConfig> radar_;
+  std::uint64_t radar_hash_ = 0;
+  std::unique_ptr<Scene> scene_;
+  std::unique_ptr<RayCaster> rays_;
+  std::unique_ptr<EvaluationField> field_;
+  std::unique_ptr<RegionModel> regions_;
+  std::unique_ptr<MarkerBuilder> builder_;
+  std::vector<ResponseRegion> regions_of_pose_;
+  Eigen::Isometry3d regions_T_ = Eigen::Isometry3d::Identity();
+  bool regions_valid_ = false;
+  LiveLedger live_ledger_;
+};
+
+}  // namespace mmradartwin
