@@ -84,10 +84,11 @@ TEST_F(ChannelDataTest, TonesHaveTheirAmplitudeOverFullScale) {
   const Eigen::VectorXcd expected = amplitude_ / 32768.0 * arrayResponse(radar_, 0.2);
   for (const PoseChannels& p : data.poses) {
     // Bin r of exp(2 pi j r (n - N/2)/N) is (-1)^r.
-    EXPECT_LT((p.range_spectra.col(bin_) - expected).norm(), 2e-3 * expected.norm());
+    // Frames are turned by what noise makes of a common turn: some milliradians of the mean.
+    EXPECT_LT((p.range_spectra.col(bin_) - expected).norm(), 0.01 * expected.norm());
     EXPECT_EQ(p.shots, kFrames);
     EXPECT_TRUE(p.unsteadiness.empty());
-    EXPECT_LT((p.uncorrected_average.x - p.grid.x).norm(), 1e-3 * p.grid.x.norm());
+    EXPECT_LT((p.uncorrected_average.x - p.grid.x).norm(), 0.01 * p.grid.x.norm());
   }
 }
 
@@ -134,7 +135,7 @@ TEST_F(ChannelDataTest, RepairsFramesBeforeAnythingLooksAtThem) {
   });
   // A conjugated tone stands at the mirrored bin with the conjugated channels.
   const Eigen::VectorXcd expected = std::conj(amplitude_) / 32768.0 * arrayResponse(radar_, -0.2);
-  EXPECT_LT((data.poses[0].range_spectra.col(64 - bin_) - expected).norm(), 2e-3 * expected.norm());
+  EXPECT_LT((data.poses[0].range_spectra.col(64 - bin_) - expected).norm(), 0.01 * expected.norm());
 }
 
 TEST_F(ChannelDataTest, TakesOutChannelErrorsThatACalibrationFound) {
@@ -148,7 +149,7 @@ TEST_F(ChannelDataTest, TakesOutChannelErrorsThatACalibrationFound) {
   for (int k = 0; k < 8; ++k) {
     const std::complex<double> error = std::polar(k % 2 ? std::pow(10.0, 0.3) : 1.0, 10.0 * k * M_PI / 180);
     const std::complex<double> expected = amplitude_ / 32768.0 * arrayResponse(radar_, 0.2)[k] / error;
-    EXPECT_LT(std::abs(data.poses[0].range_spectra(k, bin_) - expected), 3e-3 * std::abs(expected)) << k;
+    EXPECT_LT(std::abs(data.poses[0].range_spectra(k, bin_) - expected), 0.01 * std::abs(expected)) << k;
   }
 }
 
