@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "mmradartwin_attribution/mechanism_traits.h"
 #include "mmradartwin_attribution/residual.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_dsp/stated_accuracy.h"
@@ -38,11 +39,15 @@ struct CauseDescription {
   std::string name;
   ResidualClass residual_class = ResidualClass::kMissingMechanism;
   std::vector<CauseParameter> parameters;
+  MechanismTraits traits = {};
   const std::string& action() const { return classAction(residual_class); }
 };
 
 /// All catalogued causes in the order of causes.md, and last `unknown`.
 const std::vector<CauseDescription>& causeDescriptions();
+/// Adds a cause that a plug-in brings, behind the others. Its name is the mechanism's. Throws InputError for a name
+/// that the catalogue has already. Not to be called while a diagnosis runs.
+void addCause(CauseDescription cause);
 /// True for a cause of causeDescriptions(); `unknown` is one.
 bool isCatalogued(const std::string& cause);
 /// Description of a cause. Throws InputError for another name; it lists the known ones.

@@ -91,7 +91,7 @@ void DiagnosisRun::judgeOwnEcho() {
   context_.echoes.setBaseline(mechanisms_);
   context_.report("radar's own echo", 0);
   for (const NamedParameters& m : mechanisms_) {
-    if (m.mechanism == "tx_rx_leakage" || m.mechanism == "dc_offset") return;  // the twin has it already
+    if (traitsOf(m.mechanism).form == MechanismForm::kBodyFixedTone) return;  // the twin has it already
   }
   const BodyFixedTone tone = findBodyFixedTone(data_);
   if (!isUnambiguous(tone)) return;
@@ -107,8 +107,9 @@ void DiagnosisRun::judgeOwnEcho() {
 }
 
 void DiagnosisRun::judgeNoise() {
-  const auto stated = std::find_if(mechanisms_.begin(), mechanisms_.end(),
-                                   [](const NamedParameters& m) { return m.mechanism == "noise_floor"; });
+  const auto stated = std::find_if(mechanisms_.begin(), mechanisms_.end(), [](const NamedParameters& m) {
+    return traitsOf(m.mechanism).form == MechanismForm::kNoiseFloor;
+  });
   std::optional<Finding> finding;
   if (stated != mechanisms_.end()) finding = noiseFloorFinding(data_, *stated);
   if (finding) {
@@ -126,7 +127,7 @@ void DiagnosisRun::fitTwinAsGiven() {
   context_.echoes.setBaseline(mechanisms_);
   state_ = context_.fitter.state(mechanisms_, nullptr);
   for (Finding& finding : result_.findings.findings) {
-    if (finding.cause != "tx_rx_leakage" && finding.cause != "dc_offset") continue;
+    if (traitsOf(finding.cause).form != MechanismForm::kBodyFixedTone) continue;
     referToStrongestEcho(twin_.changed(mechanisms_), data_, finding);
     replaceOrAppend(*finding.mechanism, extended_);
   }
@@ -179,7 +180,7 @@ void DiagnosisRun::findCauses() {
   mechanisms_ = rounds_.mechanisms();
   extended_ = rounds_.extended();
   for (Finding& finding : result_.findings.findings) {
-    if (finding.cause != "second_harmonic") continue;
+    if (traitsOf(finding.cause).form != MechanismForm::kHarmonic) continue;
     referToStrongestHost(twin_.changed(mechanisms_), data_, rounds_.latents().log_gain, session_.strongest_amplitude,
                          finding);
     replaceOrAppend(*finding.mechanism, extended_);

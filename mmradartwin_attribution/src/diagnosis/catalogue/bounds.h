@@ -258,6 +258,29 @@ inline constexpr double kBeyondTime = 1.5;
 // ---- gain
 
 // ---- rounds
+/// Scattering coefficient S below which rough scattering is no more than a room's clutter; see
+/// docs/calibration_of_bounds.md#kleastscattering
+inline constexpr double kLeastScattering = 0.15;
+/// Scattering coefficient S above which a fit is clutter beside its actors: no surface mirrors nothing; see
+/// docs/calibration_of_bounds.md#kleastscattering
+inline constexpr double kMostScattering = 0.98;
+/// Scattering coefficient S (an eighth of the reflected power) from which on scattering is no clutter; see
+/// docs/calibration_of_bounds.md#kleastscattering
+inline constexpr double kStrongScattering = 0.35;
+/// Gain of a wall's ghost over its scatterers' law below which the ghost consists of edges alone; see
+/// docs/calibration_of_bounds.md#kleastghost_db
+inline constexpr double kLeastGhost_db = -25;
+/// Level of a replica against its echo from which on it is no clutter; see
+/// docs/calibration_of_bounds.md#kloudreplica_db
+inline constexpr double kLoudReplica_db = -10;
+/// Size of an object below which it is one of the small things that lie about; see
+/// docs/calibration_of_bounds.md#kfurniture_m
+inline constexpr double kFurniture_m = 0.1;
+/// Size of an object that any room is full of; see docs/calibration_of_bounds.md#kfurniture_m
+inline constexpr double kLeastSize_m = 0.05;
+/// Loss of a crossing below which a panel that lets all through is not there; see
+/// docs/calibration_of_bounds.md#kleastloss_db
+inline constexpr double kLeastLoss_db = 0.5;
 /// Share of the measured power that a fit explains more before it counts as gaining in the maps, and less before the
 /// maps count as plainly worse; see docs/calibration_of_bounds.md#kleastexplainedmore
 inline constexpr double kLeastExplainedMore = 0.002;

@@ -36,14 +36,14 @@ std::size_t HypothesisFit::numbers() const {
 
 double HypothesisFit::ranking() const {
   const NamedParameters& m = hypothesis.mechanism;
-  const bool nests = m.mechanism == "empirical_law" &&
+  const bool nests = hypothesis.form() == MechanismForm::kLaw &&
                      !(m.values.numbers("channels").empty() && m.values.numbers("angle_deg").empty());
   const double share = nests                        ? bounds::kRankedShareOfNestingLaw
                        : !isCatalogued(m.mechanism) ? bounds::kRankedShareOfLaw
                        : hypothesis.searched > 1    ? bounds::kRankedShareOfSteps
                                                     : 1;
   double nats = share * gain - bounds::kPriceOfNumber_nats * static_cast<double>(numbers());
-  if (hypothesis.mechanism.mechanism == "actor_unmodelled") nats -= bounds::kPriceOfPlace_nats;
+  if (hypothesis.form() == MechanismForm::kUnmodelledObject) nats -= bounds::kPriceOfPlace_nats;
   if (hypothesis.isMove() && moved_m() < stated.leastMove_m()) nats -= bounds::kPriceOfNumber_nats;
   return nats;
 }
@@ -67,7 +67,7 @@ bool HypothesisFit::isFarAway() const {
 }
 
 double HypothesisFit::size_m() const {
-  if (hypothesis.mechanism.mechanism != "actor_unmodelled") return 0;
+  if (hypothesis.form() != MechanismForm::kUnmodelledObject) return 0;
   return hypothesis.at(scaled_values).values.number("size_m");
 }
 

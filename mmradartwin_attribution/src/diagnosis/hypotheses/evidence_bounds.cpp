@@ -69,13 +69,15 @@ double leastNats(const Hypothesis& hypothesis, const std::vector<double>& scaled
                  std::size_t poses) {
   const double n = static_cast<double>(poses);
   const std::string& name = hypothesis.mechanism.mechanism;
-  if (name == "actor_unmodelled" || name == "empirical_echo") return std::max(kObject, kLawPerPose * n);
+  const MechanismForm form = hypothesis.form();
+  if (form == MechanismForm::kUnmodelledObject || form == MechanismForm::kLateEcho)
+    return std::max(kObject, kLawPerPose * n);
   const bool unnamed = !isCatalogued(name);
   const bool adds = !unnamed && causeDescription(name).residual_class == ResidualClass::kMissingMechanism;
-  if (name == "empirical_law" && hypothesis.mechanism.values.text("actor").empty()) {
+  if (form == MechanismForm::kLaw && hypothesis.mechanism.values.text("actor").empty()) {
     return std::max(kSubject, kLawPerPose * n);
   }
-  if (name == "empirical_law") return std::max(kLawOfActor, kLawOfActorPerPose * n);
+  if (form == MechanismForm::kLaw) return std::max(kLawOfActor, kLawOfActorPerPose * n);
   if (unnamed || !hypothesis.subject.empty()) return std::max(adds ? kSubjectOfMore : kSubject, kSubjectPerPose * n);
   if (adds) {
     return std::max(kLawOfMore, (isTypical(scaled_values) ? kTypicalLawOfMorePerPose : kLawOfMorePerPose) * n);

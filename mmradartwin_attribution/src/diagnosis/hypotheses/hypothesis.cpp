@@ -180,7 +180,9 @@ bool Hypothesis::isGeometry() const {
          causeDescription(mechanism.mechanism).residual_class == ResidualClass::kShiftedResponse;
 }
 
-bool Hypothesis::isMove() const { return mechanism.mechanism == "actor_moved"; }
+bool Hypothesis::isMove() const { return form() == MechanismForm::kActorMoved; }
+
+MechanismForm Hypothesis::form() const { return traitsOf(mechanism.mechanism).form; }
 
 void replaceOrAppend(const NamedParameters& mechanism, std::vector<NamedParameters>& mechanisms) {
   const auto at = std::find_if(mechanisms.begin(), mechanisms.end(),

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "diagnosis/rooms.h"
+#include "mmradartwin_attribution/mechanism_traits.h"
 #include "mmradartwin_sim/mechanism.h"
 #include "mmradartwin_sim/scene.h"
 #include "mmradartwin_sim/twin.h"
@@ -45,6 +46,7 @@ struct Hypothesis {
   bool isOneSided() const;
   /// True for a named error of all ranges or directions in a few numbers.
   bool isGeometry() const;
+  MechanismForm form() const;
   /// True for an actor that stands elsewhere.
   bool isMove() const;
 };

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
-#include <set>
 #include <sstream>
 
 #include "mmradartwin_sim/law_variable.h"
@@ -25,7 +24,7 @@ std::string channelsInWords(const NamedParameters& law) {
 std::string describeLaw(const Hypothesis& hypothesis, const NamedParameters& fitted) {
   std::ostringstream out;
   out << std::setprecision(3);
-  if (fitted.mechanism != "empirical_law") {
+  if (hypothesis.form() != MechanismForm::kLaw) {
     out << "the mechanism " << fitted.mechanism;
     for (const Coordinate& c : hypothesis.coordinates) {
       if (c.element < 0) out << ", " << c.parameter << " = " << fitted.values.number(c.parameter);
@@ -58,25 +57,21 @@ std::string describeLaw(const Hypothesis& hypothesis, const NamedParameters& fit
 }
 
 std::string experimentFor(const std::vector<CauseProbability>& candidates) {
-  std::set<std::string> names;
-  for (const CauseProbability& c : candidates) names.insert(c.cause);
-  const auto any = [&](std::initializer_list<const char*> of) {
-    return std::any_of(of.begin(), of.end(), [&](const char* n) { return names.count(n) > 0; });
-  };
-  if (any({"radar_yaw_offset", "tx_imbalance", "channel_phase_error", "carrier_scale"})) {
-    return "put a corner reflector at a surveyed place, at several azimuths and ranges; use each transmitter alone";
-  }
-  if (any({"if_highpass", "if_lowpass", "excess_attenuation"})) {
-    return "record the same places with another high-pass code, and a corner reflector from 0.5 m to the far wall";
-  }
-  if (any({"radar_position_offset", "scene_registration", "range_bias", "range_scale"})) {
-    return "turn the radar by 90 and 180 degrees at one place, and measure a distance with a laser";
-  }
-  if (any({"radar_pitch_offset", "elevation_pattern", "floor_ceiling_multipath", "gain_drift"})) {
-    return "raise the radar by 0.3 m at five places and record them again";
-  }
-  if (any({"material_reflectivity", "surface_roughness", "diffuse_scattering"})) {
-    return "record the surface from oblique places, and with an absorber in front of it";
+  Experiment first = Experiment::kAbsorber;
+  for (const CauseProbability& candidate : candidates) first = std::min(first, traitsOf(candidate.cause).experiment);
+  switch (first) {
+    case Experiment::kReflector:
+      return "put a corner reflector at a surveyed place, at several azimuths and ranges; use each transmitter alone";
+    case Experiment::kHighPassCode:
+      return "record the same places with another high-pass code, and a corner reflector from 0.5 m to the far wall";
+    case Experiment::kTurnAndMeasure:
+      return "turn the radar by 90 and 180 degrees at one place, and measure a distance with a laser";
+    case Experiment::kRaise:
+      return "raise the radar by 0.3 m at five places and record them again";
+    case Experiment::kSurface:
+      return "record the surface from oblique places, and with an absorber in front of it";
+    case Experiment::kAbsorber:
+      break;
   }
   return "cover the object in question with an absorber, and record from places around it";
 }

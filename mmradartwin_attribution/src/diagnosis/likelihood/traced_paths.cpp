@@ -8,6 +8,7 @@
 #include <memory>
 #include <numeric>
 
+#include "mmradartwin_attribution/mechanism_traits.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/mechanism.h"
 #include "mmradartwin_sim/mechanism_registry.h"
@@ -109,8 +110,8 @@ const TracedPaths::Edit& TracedPaths::editOf(const NamedParameters& mechanism) {
   if (known != edits_.end()) return known->second;
   const Twin twin = base_.changed({mechanism});
   const Geometry geometry = twin.addsOccludersOnly() ? Geometry::kMoreScreens
-                            : twin.altersGeometry() ? Geometry::kOther
-                                                    : Geometry::kSame;
+                            : twin.altersGeometry()  ? Geometry::kOther
+                                                     : Geometry::kSame;
   return edits_[key] = {geometry, twin.placesOneActor()};
 }
 
@@ -164,7 +165,7 @@ TracedPaths::Predecessor TracedPaths::predecessorOf(const std::vector<NamedParam
   if (before.edit.geometry == Geometry::kSame) return before;
   std::vector<NamedParameters> rest(geometry.begin(), geometry.end() - 1);
   if (before.edit.placed && before.edit.placed->actor >= 0) {
-    NamedParameters absent = defaultMechanism("actor_absent");
+    NamedParameters absent = defaultMechanism(mechanismOfForm(MechanismForm::kActorAbsent));
     absent.values.set("actor", base_.scene().actors[static_cast<std::size_t>(before.edit.placed->actor)].name);
     rest.push_back(std::move(absent));
   }
@@ -217,7 +218,7 @@ std::shared_ptr<const TracedPaths::Paths> TracedPaths::pathsAt(const Task& task,
   const std::shared_ptr<const Paths> known = task.before.paths != nullptr ? (*task.before.paths)[pose] : nullptr;
   if (known && change && !mayTouch(*change, T, *known)) return known;
   ScatterCells cells{T, kCloud_bins * base_.radar().range_bin_m(), kCloud_lobes * 2 / base_.radar().channels(),
-                   kCloudElevation};
+                     kCloudElevation};
   // Points that the base scene hides stay apart where an edit lets rays through: they are weighed otherwise.
   if (task.opens) {
     cells.sides = [&](const std::vector<Eigen::Vector3d>& points) {

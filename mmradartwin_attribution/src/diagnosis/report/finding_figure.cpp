@@ -94,7 +94,7 @@ cv::Mat drawPlan(const Finding& f, const SurveyPlan& plan) {
   PlanView view(shown);
   drawGrid(view, shown);
   for (const SurveyPlan::Wall& w : plan.walls) view.line(w.from_m, w.to_m, kWall, 1);
-  const bool moved = f.cause == "actor_moved" && f.mechanism && places.size() == 1;
+  const bool moved = traitsOf(f.cause).form == MechanismForm::kActorMoved && f.mechanism && places.size() == 1;
   for (const SurveyPlan::Wall& w : plan.walls) {
     if (actors.count(w.actor) == 0) continue;
     view.line(w.from_m, w.to_m, moved ? kFaint : kRed, 2);

@@ -26,8 +26,8 @@ constexpr double kNoRival = 1 / 40.0;    ///< of what a plain name brings: who p
 constexpr double kShareOfPlain = 0.25;   ///< of the same: who will not bring as much is not fitted to the end
 constexpr double kObjectPlaces = 500;    ///< places of an 8 by 6 m room that a session resolves, as a family
 
-bool isObject(const Hypothesis& h) { return h.mechanism.mechanism == "actor_unmodelled"; }
-bool isPlaced(const Hypothesis& h) { return isObject(h) || h.mechanism.mechanism == "empirical_echo"; }
+bool isObject(const Hypothesis& h) { return h.form() == MechanismForm::kUnmodelledObject; }
+bool isPlaced(const Hypothesis& h) { return isObject(h) || h.form() == MechanismForm::kLateEcho; }
 
 }  // namespace
 
@@ -44,7 +44,7 @@ void FitRound::fitOne(Screened s) {
     }
   }
   context_.report("fitting " + s.hypothesis.label(), std::min(1.0, static_cast<double>(fits_.size()) / kMostFits));
-  const bool around = s.hypothesis.isMove() || box || s.hypothesis.mechanism.mechanism == "empirical_echo";
+  const bool around = s.hypothesis.isMove() || box || s.hypothesis.form() == MechanismForm::kLateEcho;
   // A geometry climbs slowly at first.
   const double least_nats = s.hypothesis.isGeometry() ? 0 : kShareOfPlain * plain_name_;
   fits_.push_back(around ? fitObject(context_.fitter, state_, s)

@@ -5,6 +5,7 @@
 #include <iomanip>
 #include <sstream>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/hypotheses/fitted_parameters.h"
 #include "diagnosis/hypotheses/law_words.h"
 #include "diagnosis/numbers/number_text.h"
@@ -13,19 +14,9 @@
 namespace mmradartwin::diagnosis::rounds {
 namespace {
 
-constexpr double kAlike = 5;                ///< nats within which two names are not told apart
-constexpr double kLeastSize_m = 0.05;       ///< of an object: any room is full of smaller ones
-constexpr double kLeastScattering = 0.15;   ///< S: less lies under the clutter of any room, whose law is not its own
-constexpr double kMostScattering = 0.98;    ///< no surface mirrors nothing: what wants all is clutter beside its actors
-constexpr double kStrongScattering = 0.35;  ///< an eighth of what is reflected is no clutter
-constexpr double kLeastGhost_db = -25;      ///< over what its scatterers send by their law
-/// Against its echo: a second face returns a tenth of the power; a wall's replica of -26 dB was worth 264 nats of
-/// clutter.
-constexpr double kPlainReplica_db = -10;
-constexpr double kFurniture_m = 0.1;   ///< smaller than this is what lies about
-constexpr double kLeastLoss_db = 0.5;  ///< of a crossing: what lets all through is not there, or not the cause
-constexpr double kSameLaw = 0.7;       ///< correlation over poses of what two names gain that explain the same
-constexpr double kMovesAlike = 0.8;    ///< of what an object gains, by a move of what then stands there
+constexpr double kAlike = 5;         ///< nats within which two names are not told apart
+constexpr double kSameLaw = 0.7;     ///< correlation over poses of what two names gain that explain the same
+constexpr double kMovesAlike = 0.8;  ///< of what an object gains, by a move of what then stands there
 constexpr double kStandsThere_m = 0.1;
 constexpr double kPerson_m = 0.3, kWalk_m = 0.6;  ///< size, and how far from the middle of a walk
 
@@ -104,12 +95,13 @@ void describeGain(const HypothesisFit& fit, const ModelState& before, const Chan
 }
 
 std::optional<Eigen::Vector2d> placeOf(const NamedParameters& m, const Scene& scene) {
-  const bool of_place = m.mechanism == "actor_unmodelled" || m.mechanism == "empirical_echo" ||
-                        (m.mechanism == "empirical_law" && LawVariable::isAboutPlace(m.values.text("variable")));
+  const MechanismForm form = traitsOf(m.mechanism).form;
+  const bool of_place = form == MechanismForm::kUnmodelledObject || form == MechanismForm::kLateEcho ||
+                        (form == MechanismForm::kLaw && LawVariable::isAboutPlace(m.values.text("variable")));
   if (of_place) return Eigen::Vector2d(m.values.number("x_m"), m.values.number("y_m"));
-  const bool moved = m.mechanism == "actor_moved";
+  const bool moved = form == MechanismForm::kActorMoved;
   const bool of_actor =
-      moved || m.mechanism == "actor_absent" || m.mechanism == "echo_replica" || m.mechanism == "empirical_law";
+      moved || form == MechanismForm::kActorAbsent || form == MechanismForm::kReplica || form == MechanismForm::kLaw;
   if (!of_actor) return std::nullopt;
   const int actor = scene.actorIndex(m.values.text("actor"));
   if (actor < 0) return std::nullopt;
@@ -117,28 +109,16 @@ std::optional<Eigen::Vector2d> placeOf(const NamedParameters& m, const Scene& sc
   return moved ? middle + Eigen::Vector2d(m.values.number("dx_m"), m.values.number("dy_m")) : middle;
 }
 
-std::string rejectionReason(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers) {
-  const Parameters values = fit.hypothesis.at(fit.scaled_values).values;
-  const std::string& name = fit.hypothesis.mechanism.mechanism;
-  if (name == "diffuse_scattering" && values.number("scattering_coefficient") < kLeastScattering) {
-    return "no more than clutter is: S = " + number(values.number("scattering_coefficient"));
-  }
-  if (name == "diffuse_scattering" && values.number("scattering_coefficient") > kMostScattering) {
-    return "no surface scatters all that it reflects: S = " + number(values.number("scattering_coefficient"));
-  }
-  if (name == "transmission" && values.number("one_way_db") > -kLeastLoss_db) {
-    return "no panel lets all through: " + number(values.number("one_way_db")) + " dB";
-  }
-  if (name == "wall_ghost" && values.number("gain_db") < kLeastGhost_db) {
-    return "no ghost has edges and nothing else: " + number(values.number("gain_db")) + " dB";
-  }
-  if (name != "actor_unmodelled") return "";
+namespace {
+
+/// Reason why an object is none, "" where it may be one.
+std::string rejectionOfObject(const Parameters& values, const std::vector<FrameFinding>& walkers) {
   const double size_m = values.number("size_m"), x_m = values.number("x_m"), y_m = values.number("y_m");
   const std::string which = ": " + number(size_m) + " m at (" + number(x_m) + ", " + number(y_m) + ")";
-  if (size_m <= kLeastSize_m) return "no larger than clutter is" + which;
-  for (const FrameFinding& f : walkers) {
-    if (f.cause != "moving_target" || size_m > kPerson_m) continue;
-    for (const FindingPlace& place : f.where) {
+  if (size_m <= bounds::kLeastSize_m) return "no larger than clutter is" + which;
+  for (const FrameFinding& walker : walkers) {
+    if (walker.cause != "moving_target" || size_m > kPerson_m) continue;
+    for (const FindingPlace& place : walker.where) {
       if (place.x_m && place.y_m && std::hypot(*place.x_m - x_m, *place.y_m - y_m) < kWalk_m) {
         return "what is left of someone who walks there" + which;
       }
@@ -147,24 +127,44 @@ std::string rejectionReason(const HypothesisFit& fit, const std::vector<FrameFin
   return "";
 }
 
+}  // namespace
+
+std::string rejectionReason(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers) {
+  const Parameters values = fit.hypothesis.at(fit.scaled_values).values;
+  const MechanismTraits& traits = traitsOf(fit.hypothesis.mechanism.mechanism);
+  for (const PlausibleRange& range : traits.plausible) {
+    const double value = values.number(range.parameter);
+    if (value < range.low) return range.too_low + number(value) + range.unit;
+    if (value > range.high) return range.too_high + number(value) + range.unit;
+  }
+  return traits.form == MechanismForm::kUnmodelledObject ? rejectionOfObject(values, walkers) : "";
+}
+
 bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure) {
-  const std::string& name = fit.hypothesis.mechanism.mechanism;
-  if (name == "actor_unmodelled") return !explains_more || (!sure && fit.size_m() < kFurniture_m);
-  if (name == "diffuse_scattering") {
-    return !sure && !fit.plain &&
-           fit.hypothesis.at(fit.scaled_values).values.number("scattering_coefficient") < kStrongScattering;
+  const MechanismTraits& traits = traitsOf(fit.hypothesis.mechanism.mechanism);
+  const auto is_below_bound = [&] {
+    return fit.hypothesis.at(fit.scaled_values).values.number(traits.clutter_parameter) < traits.clutter_bound;
+  };
+  switch (traits.clutter) {
+    case ClutterLikeness::kNone:
+      return false;
+    case ClutterLikeness::kUnlessMapsGain:
+      return !explains_more;
+    case ClutterLikeness::kUnlessMapsGainOrLarge:
+      return !explains_more || (!sure && is_below_bound());
+    case ClutterLikeness::kUnlessMapsGainOrLoud:
+      return !explains_more && !fit.hypothesis.subject.empty() && is_below_bound();
+    case ClutterLikeness::kUnlessSure:
+      return !sure && !fit.plain;
+    case ClutterLikeness::kUnlessSureOrStrong:
+      return !sure && !fit.plain && is_below_bound();
   }
-  if (name == "empirical_echo") return !explains_more;
-  if (name == "echo_replica") {
-    return !explains_more && !fit.hypothesis.subject.empty() &&
-           fit.hypothesis.at(fit.scaled_values).values.number("level_db") < kPlainReplica_db;
-  }
-  return name == "transmission" && !sure && !fit.plain;
+  return false;
 }
 
 void preferAbsences(std::vector<HypothesisFit>& fits) {
   for (HypothesisFit& gone : fits) {
-    if (gone.hypothesis.mechanism.mechanism != "actor_absent") continue;
+    if (traitsOf(gone.hypothesis.mechanism.mechanism).form != MechanismForm::kActorAbsent) continue;
     for (const HypothesisFit& moved : fits) {
       if (moved.hypothesis.isMove() && moved.hypothesis.subject == gone.hypothesis.subject &&
           gone.ranking() >= moved.ranking()) {
@@ -177,7 +177,7 @@ void preferAbsences(std::vector<HypothesisFit>& fits) {
 void preferMoves(std::vector<HypothesisFit>& fits, const Scene& scene) {
   for (std::size_t i = 0; i < fits.size(); ++i) {
     const NamedParameters object = fits[i].hypothesis.at(fits[i].scaled_values);
-    if (object.mechanism != "actor_unmodelled") continue;
+    if (traitsOf(object.mechanism).form != MechanismForm::kUnmodelledObject) continue;
     const Eigen::Vector2d at(object.values.number("x_m"), object.values.number("y_m"));
     for (std::size_t j = i + 1; j < fits.size(); ++j) {
       if (!fits[j].hypothesis.isMove() || fits[j].gain < kMovesAlike * fits[i].gain) continue;

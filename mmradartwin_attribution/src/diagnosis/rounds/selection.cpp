@@ -169,7 +169,7 @@ void Selection::profileFound() {
     Accepted& a = accepted_[i];
     a.scaled_values = fits[i].scaled_values;
     a.standard_error = fits[i].standard_error;
-    if (a.hypothesis.mechanism.mechanism == "channel_phase_error") {
+    if (a.hypothesis.form() == MechanismForm::kChannelErrors) {
       widenGains(context_.data, a.hypothesis, a.standard_error);
     }
   }
@@ -214,8 +214,9 @@ bool Selection::isWithinErrors(const HypothesisFit& f) const {
 /// An image, once found, is measured against its hosts and taken out: as a power it would be 2 dB high, and what that
 /// leaves beside it looks like echoes.
 void Selection::takeOutImage() {
-  const auto image = std::find_if(accepted_.begin(), accepted_.end(),
-                                  [](const Accepted& a) { return a.hypothesis.mechanism.mechanism == "iq_imbalance"; });
+  const auto image = std::find_if(accepted_.begin(), accepted_.end(), [](const Accepted& a) {
+    return a.hypothesis.form() == MechanismForm::kReceiverImage;
+  });
   if (image == accepted_.end()) return;
   Finding& f = findings_[image->finding];
   if (!measureImage(context_.data, f)) return;

@@ -143,7 +143,7 @@ std::vector<ProjectedPlace> apart(const std::vector<ProjectedPlace>& places, con
 std::vector<ProjectedPlace> projectBack(const Twin& twin, const ChannelLikelihood& model, const ModelState& null) {
   std::vector<Source> cylinders;
   for (double size_m : kSizes_m) cylinders.push_back({size_m, 0, 0});
-  return apart(project(twin, model, null, cylinders, kGrid_m), null, "actor_unmodelled");
+  return apart(project(twin, model, null, cylinders, kGrid_m), null, mechanismOfForm(MechanismForm::kUnmodelledObject));
 }
 
 std::vector<ProjectedPlace> projectLateBack(const Twin& twin, const ChannelLikelihood& model, const ModelState& null) {
@@ -152,12 +152,12 @@ std::vector<ProjectedPlace> projectLateBack(const Twin& twin, const ChannelLikel
   for (double behind_m = std::max(kLeastLate_m, 2 * step_m); behind_m < kMostLate_m; behind_m += step_m) {
     for (double rcs_dbsm : kLateRcs_dbsm) points.push_back({0, behind_m, rcs_dbsm});
   }
-  return apart(project(twin, model, null, points, kLateGrid_m), null, "empirical_echo");
+  return apart(project(twin, model, null, points, kLateGrid_m), null, mechanismOfForm(MechanismForm::kLateEcho));
 }
 
 Hypothesis lateEchoAt(const ProjectedPlace& place) {
   Hypothesis h;
-  h.mechanism = defaultMechanism("empirical_echo");
+  h.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kLateEcho));
   h.mechanism.values.set("x_m", place.x_m);
   h.mechanism.values.set("y_m", place.y_m);
   h.mechanism.values.set("behind_m", place.behind_m);
@@ -168,7 +168,7 @@ Hypothesis lateEchoAt(const ProjectedPlace& place) {
 
 Hypothesis objectAt(const ProjectedPlace& place) {
   Hypothesis h;
-  h.mechanism = defaultMechanism("actor_unmodelled");
+  h.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kUnmodelledObject));
   h.mechanism.values.set("x_m", place.x_m);
   h.mechanism.values.set("y_m", place.y_m);
   h.coordinates = {{"size_m", "m", -1, 0, std::max(0.02, place.size_m), 0.002, 5}};
@@ -179,7 +179,7 @@ Hypothesis objectAt(const ProjectedPlace& place) {
 void freePlace(const ChannelData& data, Screened& object) {
   Hypothesis& h = object.hypothesis;
   const Eigen::Vector2d place(h.mechanism.values.number("x_m"), h.mechanism.values.number("y_m"));
-  const bool late = h.mechanism.mechanism == "empirical_echo";
+  const bool late = h.form() == MechanismForm::kLateEcho;
   std::vector<std::pair<const char*, double>> free = {{"y_m", kOffset_m}, {"x_m", kOffset_m}};
   if (late) free.insert(free.begin(), {"behind_m", 0.5 * data.radar.range_bin_m()});
   for (const auto& [key, step_m] : free) {
@@ -193,8 +193,8 @@ void freePlace(const ChannelData& data, Screened& object) {
   const Eigen::Vector2d away = awayFromRadar(data, place);
   for (double radius_m : kWide_m) {
     const Eigen::Vector2d axis = place + radius_m * away;
-    object.starts.push_back({h.coordinates[0].scaled(axis.x()), h.coordinates[1].scaled(axis.y()),
-                             h.coordinates[2].scaled(2 * radius_m)});
+    object.starts.push_back(
+        {h.coordinates[0].scaled(axis.x()), h.coordinates[1].scaled(axis.y()), h.coordinates[2].scaled(2 * radius_m)});
   }
 }
 

@@ -153,7 +153,7 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   context_.report("laws without a name", 0);
   ScreenedLaws laws = screenLaws(context_.twin, context_.likelihood, state, spread(kLawPoses));
   const auto isNoName = [&](const Screened& s) {
-    return s.hypothesis.mechanism.mechanism == "gain_drift" && !laws.gains_follow_time;
+    return s.hypothesis.form() == MechanismForm::kGainOverTime && !laws.gains_follow_time;
   };
   screened.erase(std::remove_if(screened.begin(), screened.end(), isNoName), screened.end());
   for (Screened& s : laws.laws) {

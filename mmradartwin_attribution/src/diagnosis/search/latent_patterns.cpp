@@ -69,7 +69,7 @@ std::vector<Screened> sharedLatents(ExpectedEchoes& source, const ModelState& nu
   }
   // Levels of one material's actors, or of one actor, farther off than such errors are point at the material.
   for (const Hypothesis& h : all) {
-    if (h.mechanism.mechanism != "material_reflectivity" || h.coordinates.size() != 1) continue;
+    if (h.form() != MechanismForm::kMaterialLevel || h.coordinates.size() != 1) continue;
     double sum = 0, count = 0;
     for (std::size_t a = 0; a < scene.actors.size(); ++a) {
       const Actor& actor = scene.actors[a];
@@ -97,7 +97,8 @@ std::optional<Screened> namedSlope(const Screened& law, const Parameters& values
   const double slope = (gain_db.back() - gain_db.front()) / (at.back() - at.front());
   const double value = over_range ? -slope : 3600 * slope;
   for (const Hypothesis& h : all) {
-    if (h.mechanism.mechanism != (over_range ? "excess_attenuation" : "gain_drift") || !h.variant.empty()) continue;
+    if (h.form() != (over_range ? MechanismForm::kLossOverRange : MechanismForm::kGainOverTime) || !h.variant.empty())
+      continue;
     if (h.coordinates.size() != 1) continue;
     const Coordinate& c = h.coordinates[0];
     if (!(c.neutral + value > c.min && c.neutral + value < c.max)) continue;
@@ -109,7 +110,7 @@ std::optional<Screened> namedSlope(const Screened& law, const Parameters& values
 }  // namespace
 
 std::optional<Screened> namedLike(const Screened& law, const std::vector<Hypothesis>& all) {
-  if (law.hypothesis.mechanism.mechanism != "empirical_law" || law.starts.empty()) return std::nullopt;
+  if (law.hypothesis.form() != MechanismForm::kLaw || law.starts.empty()) return std::nullopt;
   const Parameters values = law.hypothesis.at(law.starts.front()).values;
   if (!values.numbers("channels").empty() || !values.text("actor").empty()) return std::nullopt;
   if (std::optional<Screened> slope = namedSlope(law, values, all)) return slope;
@@ -118,7 +119,7 @@ std::optional<Screened> namedLike(const Screened& law, const std::vector<Hypothe
   const bool of_radar = variable == "azimuth_deg", of_scene = variable == "bearing_deg";
   if ((!of_radar && !of_scene) || delay_m.size() < 2 || delay_m.size() != at.size()) return std::nullopt;
   const auto named = std::find_if(all.begin(), all.end(), [&](const Hypothesis& h) {
-    return h.mechanism.mechanism == (of_radar ? "radar_position_offset" : "scene_registration");
+    return h.form() == (of_radar ? MechanismForm::kRadarOffset : MechanismForm::kSceneOffset);
   });
   if (named == all.end()) return std::nullopt;
   Eigen::MatrixXd design(kAlongLaw, 2);

@@ -249,7 +249,7 @@ double LawScreen::places(const Sample& s, const Eigen::VectorXd& direction) cons
 
 Hypothesis LawScreen::law(const Observable& o, const Over& over, const std::vector<double>& at) const {
   Hypothesis h;
-  h.mechanism = defaultMechanism("empirical_law");
+  h.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kLaw));
   h.mechanism.values.set("variable", over.variable);
   h.mechanism.values.set("at", at);
   h.mechanism.values.set(o.parameter, std::vector<double>(at.size(), 0.0));
@@ -530,7 +530,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
     result.emplace();
     const int steps = static_cast<int>(sorted_s.size());
     Hypothesis& h = result->hypothesis;
-    h.mechanism = defaultMechanism("gain_drift");
+    h.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kGainOverTime));
     h = withSteps(std::move(h), steps).value();
     h.mechanism.values.set("steps_s", sorted_s);
     h.variant += steps > 1 ? " where they show" : " where it shows";
@@ -548,7 +548,7 @@ ScreenedLaws screenLaws(const Twin& base, const ChannelLikelihood& model, const 
                         const std::vector<int>& poses) {
   ScreenedLaws result;
   for (const NamedParameters& m : null.mechanisms) {
-    if (m.mechanism == "empirical_law") return result;  // what one leaves over looks like another
+    if (traitsOf(m.mechanism).form == MechanismForm::kLaw) return result;  // what one leaves over looks like another
   }
   if (poses.empty()) return result;
   const LawScreen screen(base, model, null, poses);
@@ -571,7 +571,9 @@ ScreenedLaws screenLaws(const Twin& base, const ChannelLikelihood& model, const 
   for (const std::string& actor : screen.oftenSeen()) {
     for (const char* variable : {"foot_m", "time_s"}) add(screen.best(screen.gain(), {variable, actor}));
   }
-  const auto drifts = [](const NamedParameters& m) { return m.mechanism == "gain_drift"; };
+  const auto drifts = [](const NamedParameters& m) {
+    return traitsOf(m.mechanism).form == MechanismForm::kGainOverTime;
+  };
   if (std::none_of(null.mechanisms.begin(), null.mechanisms.end(), drifts)) {
     std::optional<Screened> steps = screen.bestSteps();
     result.gains_follow_time = screen.gainsFollowTime(steps);

@@ -27,7 +27,7 @@ enum Coordinates { kX, kY, kSide, kYaw };
 /// Hypothesis of a box, its middle at a place to start with.
 Hypothesis boxAt(const Eigen::Vector2d& middle) {
   Hypothesis h;
-  h.mechanism = defaultMechanism("actor_unmodelled");
+  h.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kUnmodelledObject));
   h.mechanism.values.set("shape", std::string("box"));
   h.coordinates = {{"x_m", "m", -1, middle.x(), middle.x() + 0.1, -1000, 1000, {}},
                    {"y_m", "m", -1, middle.y(), middle.y() + 0.1, -1000, 1000, {}},
@@ -45,8 +45,7 @@ std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
   const Eigen::Vector2d u(std::cos(yaw_rad), std::sin(yaw_rad)), v(-u.y(), u.x());
   std::vector<std::vector<double>> boxes;
   const auto add = [&](const Eigen::Vector2d& at, double size_m, double turned_deg) {
-    boxes.push_back({c[kX].scaled(at.x()), c[kY].scaled(at.y()), c[kSide].scaled(size_m),
-                     c[kYaw].scaled(turned_deg)});
+    boxes.push_back({c[kX].scaled(at.x()), c[kY].scaled(at.y()), c[kSide].scaled(size_m), c[kYaw].scaled(turned_deg)});
   };
   for (double grown : kGrown) {
     const double half_m = 0.5 * (grown - 1) * side_m;
@@ -83,7 +82,7 @@ std::vector<std::vector<double>> placesAround(const HypothesisFit& fit) {
 }  // namespace
 
 bool isUnmodelledBox(const Hypothesis& hypothesis) {
-  return hypothesis.mechanism.mechanism == "actor_unmodelled" && hypothesis.mechanism.values.text("shape") == "box";
+  return hypothesis.form() == MechanismForm::kUnmodelledObject && hypothesis.mechanism.values.text("shape") == "box";
 }
 
 Screened asBox(const ChannelData& data, const ModelState& null, const HypothesisFit& cylinder) {
@@ -117,7 +116,7 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
 
 std::optional<Screened> boxThatHides(const Screened& law) {
   const NamedParameters& m = law.hypothesis.mechanism;
-  if (m.mechanism != "empirical_law" || m.values.text("variable") != "passing_m" ||
+  if (traitsOf(m.mechanism).form != MechanismForm::kLaw || m.values.text("variable") != "passing_m" ||
       law.hypothesis.coordinates.front().value(law.starts.front().front()) > bounds::kHides_db) {
     return std::nullopt;
   }
@@ -129,9 +128,8 @@ std::optional<Screened> boxThatHides(const Screened& law) {
     for (double yaw_deg = 0; yaw_deg < kSquare_deg; yaw_deg += 2 * kTurned_deg) {
       for (double dx_m : kAbout_m) {
         for (double dy_m : kAbout_m) {
-          box.starts.push_back(
-              {h.coordinates[kX].scaled(place.x() + dx_m), h.coordinates[kY].scaled(place.y() + dy_m),
-               h.coordinates[kSide].scaled(side_m), h.coordinates[kYaw].scaled(yaw_deg)});
+          box.starts.push_back({h.coordinates[kX].scaled(place.x() + dx_m), h.coordinates[kY].scaled(place.y() + dy_m),
+                                h.coordinates[kSide].scaled(side_m), h.coordinates[kYaw].scaled(yaw_deg)});
         }
       }
     }

@@ -182,7 +182,7 @@ std::vector<Peak> ReplicaScan::secondFaces() const {
 
 Hypothesis ReplicaScan::hypothesisOf(const Peak& peak) const {
   Hypothesis h;
-  h.mechanism = defaultMechanism("echo_replica");
+  h.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kReplica));
   if (peak.target > 0) {
     h.subject = base_.scene().actors[peak.target - 1].name;
     h.mechanism.values.set("actor", h.subject);
@@ -219,7 +219,7 @@ std::vector<Screened> screenReplicas(const Twin& base, const ChannelLikelihood& 
                                      const std::vector<int>& poses, double least_nats,
                                      const std::function<Screened(const Hypothesis&)>& look) {
   for (const NamedParameters& m : null.mechanisms) {
-    if (m.mechanism == "echo_replica") return {};  // what one leaves over looks like another
+    if (traitsOf(m.mechanism).form == MechanismForm::kReplica) return {};  // what one leaves over looks like another
   }
   const ReplicaScan scan(base, model, null, poses);
   std::vector<Screened> result;

@@ -297,7 +297,7 @@ TEST_F(SignalChainNodeTest, TwinGridsGoThroughTheSameChain) {
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "test_signal_chain_node");
+  ros::init(argc, argv, "signal_chain_node_test");
   const ros::NodeHandle nh;
   const int result = RUN_ALL_TESTS();
   // A nodelet manager may abort at shutdown while nodelets are loaded.
