@@ -124,6 +124,29 @@ inline constexpr double kLagFalseAlarmRate = 0.01;
 // ---- likelihood
 
 // ---- hypotheses
+/// Gain over its overdispersion from which on a law of all echoes stands though no map gains by it; see
+/// docs/calibration_of_bounds.md#least-nats-by-kind, and so the bounds that follow
+inline constexpr double kLeastNatsOfGlobal = 18;
+/// The same of a law that moves echoes in the room: the likelihood is rough there.
+inline constexpr double kLeastNatsOfTracing = 40;
+/// The same of a law that adds echoes (edges, ways over floor and ceiling), at all and for each pose.
+inline constexpr double kLeastNatsOfAddition = 25, kLeastNatsOfAdditionPerPose = 4;
+/// The same for each pose where the addition has the size that theory gives it, and the share of that size from which
+/// on it has.
+inline constexpr double kLeastNatsOfTypicalAdditionPerPose = 2, kTypicalShare = 0.75;
+/// The same of something about one actor or material, and of a law without a name.
+inline constexpr double kLeastNatsOfSubject = 24;
+/// The same of something that adds echoes of one actor or material.
+inline constexpr double kLeastNatsOfAdditionOfSubject = 45;
+/// The same of one actor's law without a name, at all and for each pose.
+inline constexpr double kLeastNatsOfActorLaw = 16, kLeastNatsOfActorLawPerPose = 0.6;
+/// The same of an object: it has the whole room to choose from.
+inline constexpr double kLeastNatsOfPlacedObject = 70;
+/// The same for each pose: the errors of a twin add up over poses.
+inline constexpr double kLeastNatsOfGlobalPerPose = 0.4, kLeastNatsOfSubjectPerPose = 1;
+/// Overdispersion of the scores of levels in sessions without a hidden effect, and the number of places whose scatter
+/// that knowledge is worth; see docs/calibration_of_bounds.md#kusualoverdispersionoflevels
+inline constexpr double kUsualOverdispersionOfLevels = 1.4, kPlacesOfUsualOverdispersion = 12;
 
 // ---- fit
 /// Gain by which other latents of a state have to be better to replace its own; see
@@ -258,6 +281,23 @@ inline constexpr double kBeyondTime = 1.5;
 // ---- gain
 
 // ---- rounds
+/// False-alarm rate of the best hypothesis of a round up to which it may be a finding, family-wise.
+inline constexpr double kFalseAlarmRateOfRound = 0.01;
+/// Difference of ranking over the overdispersion within which two names are not told apart.
+inline constexpr double kNotToldApart_nats = 5;
+/// Correlation over poses of the gains of two names from which on they explain the same.
+inline constexpr double kCorrelationOfSameName = 0.7;
+/// Share of an object's gain from which on the move of an actor to its place explains as much, and the distance from
+/// that actor's plan within which the object stands there.
+inline constexpr double kShareOfMoveInstead = 0.8, kStandsThere_m = 0.1;
+/// Size of an object up to which it may be a person, and the distance from the middle of a walk within which it is what
+/// is left of the walker.
+inline constexpr double kMostPersonSize_m = 0.3, kWalkReach_m = 0.6;
+/// Gain over its overdispersion for each pose from which on an offset of radar or scene is no error of the actors; see
+/// docs/calibration_of_bounds.md#sure-offset
+inline constexpr double kLeastNatsOfOffsetPerPose = 20;
+/// Share of a finding's gain from which on a simpler name of its round is kept as its rival.
+inline constexpr double kLeastShareOfRival = 0.7;
 /// Scattering coefficient S below which rough scattering is no more than a room's clutter; see
 /// docs/calibration_of_bounds.md#kleastscattering
 inline constexpr double kLeastScattering = 0.15;

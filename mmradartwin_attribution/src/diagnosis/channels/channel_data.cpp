@@ -11,6 +11,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_dsp/stationary_poses.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::channels {
 namespace {
@@ -83,12 +84,6 @@ ComplexGrid frameSpectra(const SignalChain& chain, const AdcCube& frame) {
 double changeBetween(const ComplexGrid& a, const ComplexGrid& b) {
   const double power = a.squaredNorm() + b.squaredNorm();
   return power > 0 ? (a - b).squaredNorm() / power : 0;
-}
-
-double upperMedian(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 void transformGrid(const SignalChain& chain, PoseChannels& pose) {

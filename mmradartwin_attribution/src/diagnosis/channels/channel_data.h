@@ -59,8 +59,6 @@ ComplexGrid frameSpectra(const SignalChain& chain, const AdcCube& frame);
 /// Difference |a - b|^2 / (|a|^2 + |b|^2) of two spectra of a radar: 0 where they are the same, about 1 where they have
 /// nothing in common.
 double changeBetween(const ComplexGrid& a, const ComplexGrid& b);
-/// Middle one of the values; the greater one of the two in the middle of an even number. Takes at least one value.
-double upperMedian(std::vector<double> values);
 /// Fills the range spectra of a pose from its grid, also after the grid was changed.
 void transformGrid(const SignalChain& chain, PoseChannels& pose);
 

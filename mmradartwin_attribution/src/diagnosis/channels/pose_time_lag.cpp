@@ -11,6 +11,7 @@
 
 #include "diagnosis/catalogue/bounds.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::channels {
 namespace {

@@ -72,16 +72,16 @@ std::vector<double> elementPhases(const RadarConfig& radar) {
   return phases;
 }
 
-double groupGain(const EchoGroup& group, const SessionLatents& nuisance) {
+double groupGain(const EchoGroup& group, const SessionLatents& latents) {
   double sum = 0;
-  for (int a : group.actors) sum += nuisance.actor_gain[errorOf(a, nuisance.actor_gain.size())];
+  for (int a : group.actors) sum += latents.actor_gain[errorOf(a, latents.actor_gain.size())];
   return std::exp(sum);
 }
 
 /// One-way range that a group's actors add beyond what its fields hold already.
-double groupShift_m(const EchoGroup& group, const SessionLatents& nuisance) {
+double groupShift_m(const EchoGroup& group, const SessionLatents& latents) {
   double sum = -group.added_range_m;
-  for (int a : group.actors) sum += nuisance.actor_range_m[errorOf(a, nuisance.actor_range_m.size())];
+  for (int a : group.actors) sum += latents.actor_range_m[errorOf(a, latents.actor_range_m.size())];
   return sum;
 }
 
@@ -108,13 +108,13 @@ ChannelLikelihood::ChannelLikelihood(const ChannelData& data, int actors, const 
       size_(static_cast<std::size_t>(channels_) * (channels_ + 1) / 2),
       apart_(elementPhases(data.radar)) {}
 
-void ChannelLikelihood::addClutter(const SessionLatents& n, int pose, int cell, double factor,
+void ChannelLikelihood::addClutter(const SessionLatents& latents, int pose, int cell, double factor,
                                    PackedHermitian& to) const {
   const PoseChannels& p = data_.poses[pose];
   const int bin = binOf(pose, cell);
   const auto [at, share] = shapeAt(bin);
-  const auto* shape = &n.floor_shape[static_cast<std::size_t>(at)];
-  const double level = factor * std::exp(n.log_floor + (1 - share) * shape[0] + share * shape[1]);
+  const auto* shape = &latents.floor_shape[static_cast<std::size_t>(at)];
+  const double level = factor * std::exp(latents.log_floor + (1 - share) * shape[0] + share * shape[1]);
   if (isBeam(cell)) {
     addApart(cell, level * p.beams[static_cast<std::size_t>(cell - samples_)].clutter, to);
   } else {
@@ -158,48 +158,49 @@ void ChannelLikelihood::addApart(int cell, double power, PackedHermitian& to) co
   }
 }
 
-void ChannelLikelihood::addRelative(const SessionLatents& n, int cell, PackedHermitian& to) const {
+void ChannelLikelihood::addRelative(const SessionLatents& latents, int cell, PackedHermitian& to) const {
   const double mean = to.trace() / channels_;
-  addApart(cell, std::exp(n.log_relative) * mean, to);
+  addApart(cell, std::exp(latents.log_relative) * mean, to);
   if (!isBeam(cell)) return;
   for (int k = 0; k < channels_; ++k) {
     to.re[static_cast<std::size_t>(PackedHermitian::diagonal(k))] += kBeamShare * mean;
   }
 }
 
-ChannelLikelihood::PoseModel ChannelLikelihood::modelOf(const PoseEchoes& echoes, const SessionLatents& n,
+ChannelLikelihood::PoseModel ChannelLikelihood::modelOf(const PoseEchoes& echoes, const SessionLatents& latents,
                                                         int pose) const {
-  PoseModel model{echoes, n, pose, {}};
-  const double gain = std::exp(n.log_gain);
-  const double grazing = std::exp(n.log_graze);
+  PoseModel model{echoes, latents, pose, {}};
+  const double gain = std::exp(latents.log_gain);
+  const double grazing = std::exp(latents.log_graze);
   for (std::size_t i = 0; i < echoes.all(); ++i) {
     const EchoGroup& group = echoes.at(i);
-    model.levels.push_back({gain * groupGain(group, n) * (echoes.grazes(i) ? grazing : 1), groupShift_m(group, n)});
+    model.levels.push_back(
+        {gain * groupGain(group, latents) * (echoes.grazes(i) ? grazing : 1), groupShift_m(group, latents)});
   }
   return model;
 }
 
-double ChannelLikelihood::rangeVariance_m2(const SessionLatents& n) const {
-  return accuracy_.path_range_m * accuracy_.path_range_m * std::exp(n.log_range);
+double ChannelLikelihood::rangeVariance_m2(const SessionLatents& latents) const {
+  return accuracy_.path_range_m * accuracy_.path_range_m * std::exp(latents.log_range);
 }
 
 PackedHermitian ChannelLikelihood::sigma(const PoseModel& model, int cell) const {
-  const SessionLatents& n = model.nuisance;
+  const SessionLatents& latents = model.latents;
   PackedHermitian s(channels_);
   PackedTurn turn;
-  const double range_variance = rangeVariance_m2(n);
+  const double range_variance = rangeVariance_m2(latents);
   for (std::size_t i = 0; i < model.echoes.all(); ++i) {
     const auto fields = fieldsOf(model.echoes.at(i), cell);
     if (!fields) continue;
     const auto [u, shift] = model.levels[i];
-    turn.set(apart_, turnOf(n.yaw_rad[model.pose], *fields));
+    turn.set(apart_, turnOf(latents.yaw_rad[model.pose], *fields));
     s.addTurned({fields->power, fields->shift, fields->curvature}, {u, u * shift, u * (shift * shift + range_variance)},
                 turn);
   }
   // The channels' independent share keeps the matrix definite where the first-order terms alone would not.
-  if (s.trace() > 0) addRelative(n, cell, s);
+  if (s.trace() > 0) addRelative(latents, cell, s);
   addApart(cell, noiseOf(model.pose, cell), s);
-  addClutter(n, model.pose, cell, 1, s);
+  addClutter(latents, model.pose, cell, 1, s);
   return s;
 }
 
@@ -207,19 +208,19 @@ std::optional<EchoGroup::Cell> ChannelLikelihood::fieldsOf(const EchoGroup& grou
   return isBeam(cell) ? group.beams.at(cell - samples_, size_) : group.bins.at(cell, size_);
 }
 
-double ChannelLikelihood::prior(const SessionLatents& n) const {
+double ChannelLikelihood::prior(const SessionLatents& latents) const {
   double sum = 0;
-  for (double v : n.actor_gain) sum -= 0.5 * v * v / (spread_.actor_gain * spread_.actor_gain);
-  for (double v : n.actor_range_m) sum -= 0.5 * v * v / (spread_.actor_range_m * spread_.actor_range_m);
-  for (double v : n.yaw_rad) sum -= 0.5 * v * v / (accuracy_.heading_rad * accuracy_.heading_rad);
+  for (double v : latents.actor_gain) sum -= 0.5 * v * v / (spread_.actor_gain * spread_.actor_gain);
+  for (double v : latents.actor_range_m) sum -= 0.5 * v * v / (spread_.actor_range_m * spread_.actor_range_m);
+  for (double v : latents.yaw_rad) sum -= 0.5 * v * v / (accuracy_.heading_rad * accuracy_.heading_rad);
   return sum;
 }
 
-double ChannelLikelihood::poseLikelihood(const PoseEchoes& echoes, const SessionLatents& n, int pose) const {
+double ChannelLikelihood::poseLikelihood(const PoseEchoes& echoes, const SessionLatents& latents, int pose) const {
   double sum = 0;
   InverseFactor factor;
   std::array<std::complex<double>, kMaxChannels> y;
-  const PoseModel model = modelOf(echoes, n, pose);
+  const PoseModel model = modelOf(echoes, latents, pose);
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
     if (!factor.compute(sigma(model, cell))) return -1e9;
     factor.apply(dataOf(pose, cell), y.data());
@@ -230,40 +231,40 @@ double ChannelLikelihood::poseLikelihood(const PoseEchoes& echoes, const Session
   return weight() * sum;
 }
 
-std::vector<double> ChannelLikelihood::byPose(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance,
+std::vector<double> ChannelLikelihood::byPose(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents,
                                               const std::vector<int>& poses) const {
   std::vector<double> each(poses.size());
   tbb::parallel_for(std::size_t{0}, each.size(),
-                    [&](std::size_t i) { each[i] = poseLikelihood(echoes[i], nuisance, poses[i]); });
+                    [&](std::size_t i) { each[i] = poseLikelihood(echoes[i], latents, poses[i]); });
   return each;
 }
 
-double ChannelLikelihood::logLikelihood(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance,
+double ChannelLikelihood::logLikelihood(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents,
                                         std::vector<double>* by_pose) const {
   std::vector<int> all(data_.poses.size());
   std::iota(all.begin(), all.end(), 0);
-  std::vector<double> each = byPose(echoes, nuisance, all);
+  std::vector<double> each = byPose(echoes, latents, all);
   const double sum = std::accumulate(each.begin(), each.end(), 0.0);
   if (by_pose != nullptr) *by_pose = std::move(each);
-  return sum + prior(nuisance);
+  return sum + prior(latents);
 }
 
-SessionCovariance ChannelLikelihood::covariance(const std::vector<PoseEchoes>& echoes, const SessionLatents& n,
+SessionCovariance ChannelLikelihood::covariance(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents,
                                                 const std::vector<int>& poses) const {
   SessionCovariance result(poses.size());
-  const double gain = std::exp(n.log_gain);
-  const double range_variance = rangeVariance_m2(n);
+  const double gain = std::exp(latents.log_gain);
+  const double range_variance = rangeVariance_m2(latents);
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
     result[i].assign(static_cast<std::size_t>(cells(poses[i])) * size_, {});
     PackedHermitian own(channels_);
     PackedTurn turn;
     for (const auto& group : echoes[i].groups) {
       const EchoGroup& g = *group;
-      const double u = gain * groupGain(g, n), shift = groupShift_m(g, n);
+      const double u = gain * groupGain(g, latents), shift = groupShift_m(g, latents);
       for (const EchoGroup::Fields* fields : {&g.bins, &g.beams}) {
         for (int at = fields->first; at < fields->first + fields->cells; ++at) {
           const EchoGroup::Cell f = *fields->at(at, size_);
-          turn.set(apart_, turnOf(n.yaw_rad[poses[i]], f));
+          turn.set(apart_, turnOf(latents.yaw_rad[poses[i]], f));
           own.setZero();
           own.addTurned({f.power, f.shift, f.curvature}, {u, u * shift, u * (shift * shift + range_variance)}, turn);
           const int cell = fields == &g.beams ? samples_ + at : at;
@@ -308,9 +309,9 @@ struct ChannelLikelihood::CellDirections {
 
 void ChannelLikelihood::addEchoDirections(const PoseModel& model, int cell, const PackedHermitian& inverse,
                                           CellDirections& to) const {
-  const SessionLatents& n = model.nuisance;
-  const int heading = n.globals();
-  const double range_variance = rangeVariance_m2(n);
+  const SessionLatents& latents = model.latents;
+  const int heading = latents.globals();
+  const double range_variance = rangeVariance_m2(latents);
   PackedTurn turn;
   PackedHermitian own(channels_);  // covariance of one group
   for (std::size_t i = 0; i < model.echoes.all(); ++i) {
@@ -321,7 +322,7 @@ void ChannelLikelihood::addEchoDirections(const PoseModel& model, int cell, cons
     const auto [f, moved] = model.levels[i];
     const double share = inverse.traceOfProduct(power) + kMoved_m * kMoved_m * inverse.traceOfProduct(curvature);
     if (f * share < kNegligibleShare) continue;
-    turn.set(apart_, turnOf(n.yaw_rad[model.pose], *fields));
+    turn.set(apart_, turnOf(latents.yaw_rad[model.pose], *fields));
     own.setZero();
     own.addTurned({power, shift, curvature}, {f, f * moved, f * (moved * moved + range_variance)}, turn);
     for (int actor : g.actors) {
@@ -335,16 +336,16 @@ void ChannelLikelihood::addEchoDirections(const PoseModel& model, int cell, cons
     if (by_yaw != 0) to.touch(heading).addTurnDerivative(own, by_yaw, apart_);
   }
   for (int j : to.active) {  // a heading's trace is 0
-    if (j != heading) addRelative(n, cell, to.raw[j]);
+    if (j != heading) addRelative(latents, cell, to.raw[j]);
   }
 }
 
 void ChannelLikelihood::addLevelDirections(const PoseModel& model, int cell, const PackedHermitian& covariance,
                                            CellDirections& to) const {
-  const SessionLatents& n = model.nuisance;
-  const double relative = std::exp(n.log_relative);
+  const SessionLatents& latents = model.latents;
+  const double relative = std::exp(latents.log_relative);
   PackedHermitian& floor = to.touch(kFloor);
-  addClutter(n, model.pose, cell, 1, floor);
+  addClutter(latents, model.pose, cell, 1, floor);
   const auto [shape_at, shape_share] = shapeAt(binOf(model.pose, cell));
   to.touch(kShape + shape_at).add(floor, 1 - shape_share);
   to.touch(kShape + shape_at + 1).add(floor, shape_share);
@@ -391,14 +392,14 @@ void ChannelLikelihood::setData(const std::complex<double>* y, double w, BinBasi
   }
 }
 
-void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents& n, int pose, bool keep,
+void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents& latents, int pose, bool keep,
                                  PoseBasis& out) const {
-  const int globals = n.globals();
+  const int globals = latents.globals();
   out.score = Eigen::VectorXd::Zero(globals + 1);
   out.information = Eigen::MatrixXd::Zero(globals + 1, globals + 1);
   out.log_likelihood = 0;
   out.bins.clear();
-  const PoseModel model = modelOf(echoes, n, pose);
+  const PoseModel model = modelOf(echoes, latents, pose);
   CellDirections directions(globals + 1, channels_);
   std::array<std::complex<double>, kMaxChannels> y;
   BinBasis basis;
@@ -430,12 +431,13 @@ double ChannelLikelihood::informationOf(double product, double trace_a, double t
   return ((channels_ + kTailFreedom) * product - trace_a * trace_b) / (channels_ + kTailFreedom + 1);
 }
 
-Basis ChannelLikelihood::basis(const std::vector<PoseEchoes>& echoes, const SessionLatents& n, bool further) const {
+Basis ChannelLikelihood::basis(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents,
+                               bool further) const {
   Basis b;
-  b.nuisance = n;
+  b.latents = latents;
   b.poses.resize(echoes.size());
   tbb::parallel_for(std::size_t{0}, echoes.size(),
-                    [&](std::size_t i) { addBasis(echoes[i], n, static_cast<int>(i), further, b.poses[i]); });
+                    [&](std::size_t i) { addBasis(echoes[i], latents, static_cast<int>(i), further, b.poses[i]); });
   return b;
 }
 
@@ -447,7 +449,7 @@ struct ChannelLikelihood::PoseScores {
 
 ChannelLikelihood::PoseScores ChannelLikelihood::poseScores(const Basis& basis, std::size_t pose,
                                                             const std::vector<const PoseCovariance*>& further) const {
-  const int globals = basis.nuisance.globals(), all = globals + static_cast<int>(further.size());
+  const int globals = basis.latents.globals(), all = globals + static_cast<int>(further.size());
   const PoseBasis& p = basis.poses[pose];
   PoseScores own;
   own.score = Eigen::VectorXd::Zero(all + 1);
@@ -458,13 +460,13 @@ ChannelLikelihood::PoseScores ChannelLikelihood::poseScores(const Basis& basis, 
   own.information.col(all).head(globals) = p.information.col(globals).head(globals);
   own.information.row(all).head(globals) = p.information.row(globals).head(globals);
   own.information(all, all) = p.information(globals, globals);
-  for (const BinBasis& bin : p.bins) addFurther(bin, basis.nuisance, further, own);
+  for (const BinBasis& bin : p.bins) addFurther(bin, basis.latents, further, own);
   return own;
 }
 
-void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& n,
+void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& latents,
                                    const std::vector<const PoseCovariance*>& further, PoseScores& own) const {
-  const int globals = n.globals(), more = static_cast<int>(further.size()), all = globals + more;
+  const int globals = latents.globals(), more = static_cast<int>(further.size()), all = globals + more;
   Eigen::MatrixXd v(channels_ * channels_, more);
   PackedHermitian m(channels_);
   std::vector<int> active;
@@ -476,7 +478,7 @@ void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& n,
     if (std::all_of(from, from + size_, [](auto x) { return x == 0.0f; })) continue;
     m.setZero();
     m.add(from, 1);
-    addRelative(n, bin.cell, m);
+    addRelative(latents, bin.cell, m);
     bin.factor.whiten(m, v.col(h).data());
     traces[h] = traceOfWhitened(v.col(h).data(), channels_);
     active.push_back(h);
@@ -501,12 +503,12 @@ void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& n,
   }
 }
 
-void ChannelLikelihood::addWithoutHeading(const PoseScores& p, const SessionLatents& n, std::size_t pose,
+void ChannelLikelihood::addWithoutHeading(const PoseScores& p, const SessionLatents& latents, std::size_t pose,
                                           Scores& s) const {
   const Eigen::Index all = p.score.size() - 1;
   const double heading_prior = 1 / (accuracy_.heading_rad * accuracy_.heading_rad);
   const double own = p.information(all, all) + heading_prior;
-  const double yaw = p.score[all] - heading_prior * n.yaw_rad[pose];
+  const double yaw = p.score[all] - heading_prior * latents.yaw_rad[pose];
   const Eigen::VectorXd coupling = p.information.col(all).head(all) / own;
   s.by_location.row(data_.poses[pose].location) += (p.score.head(all) - coupling * yaw).transpose();
   s.information += p.information.topLeftCorner(all, all) - own * coupling * coupling.transpose();
@@ -514,32 +516,32 @@ void ChannelLikelihood::addWithoutHeading(const PoseScores& p, const SessionLate
   s.yaw_coupling.row(static_cast<Eigen::Index>(pose)) = coupling.transpose();
 }
 
-void ChannelLikelihood::addPriors(const SessionLatents& n, Scores& s) const {
-  s.prior = Eigen::VectorXd::Zero(n.globals());
+void ChannelLikelihood::addPriors(const SessionLatents& latents, Scores& s) const {
+  s.prior = Eigen::VectorXd::Zero(latents.globals());
   for (int a = 0; a < errors_; ++a) {
     const double gain = 1 / (spread_.actor_gain * spread_.actor_gain);
     const double range = 1 / (spread_.actor_range_m * spread_.actor_range_m);
     s.prior[kActors + a] = gain;
     s.prior[kActors + errors_ + a] = range;
     s.information(kActors + a, kActors + a) += gain;
-    s.total[kActors + a] -= gain * n.actor_gain[a];
+    s.total[kActors + a] -= gain * latents.actor_gain[a];
     s.information(kActors + errors_ + a, kActors + errors_ + a) += range;
-    s.total[kActors + errors_ + a] -= range * n.actor_range_m[a];
+    s.total[kActors + errors_ + a] -= range * latents.actor_range_m[a];
   }
   // Levels of errors have a wide prior (a factor of 10 in power): none runs away where no data shows it.
   const double rough = 1 / (2.3 * 2.3);
   const SessionLatents usual;
   for (int j = kRelative; j < kActors; ++j) {
     s.information(j, j) += rough;
-    s.total[j] -= rough * (n.global(j) - usual.global(j));
+    s.total[j] -= rough * (latents.global(j) - usual.global(j));
   }
 }
 
-void ChannelLikelihood::holdAtLimits(const SessionLatents& n, Scores& s) const {
+void ChannelLikelihood::holdAtLimits(const SessionLatents& latents, Scores& s) const {
   // A number at its limit that would go beyond it stays, and no other number moves as if it did not.
-  for (int j = 0; j < n.globals(); ++j) {
+  for (int j = 0; j < latents.globals(); ++j) {
     const Limits limits = limitsOf(j, errors_, spread_);
-    const double v = n.global(j);
+    const double v = latents.global(j);
     if (s.total[j] > 0 ? v < limits.high : v > limits.low) continue;
     s.total[j] = 0;
     s.by_location.col(j).setZero();
@@ -552,8 +554,8 @@ void ChannelLikelihood::holdAtLimits(const SessionLatents& n, Scores& s) const {
 
 Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
                                  const std::vector<int>& poses) const {
-  const SessionLatents& n = basis.nuisance;
-  const Eigen::Index all = n.globals() + static_cast<Eigen::Index>(directions.size());
+  const SessionLatents& latents = basis.latents;
+  const Eigen::Index all = latents.globals() + static_cast<Eigen::Index>(directions.size());
   std::vector<PoseScores> each(poses.size());
   tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t j) {
     std::vector<const PoseCovariance*> further;
@@ -568,38 +570,38 @@ Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCo
   for (std::size_t j = 0; j < each.size(); ++j) {
     const std::size_t pose = static_cast<std::size_t>(poses[j]);
     s.log_likelihood += basis.poses[pose].log_likelihood;
-    addWithoutHeading(each[j], n, pose, s);
+    addWithoutHeading(each[j], latents, pose, s);
   }
   s.total = s.by_location.colwise().sum().transpose();
-  addPriors(n, s);
-  holdAtLimits(n, s);
-  s.log_likelihood += prior(n);
+  addPriors(latents, s);
+  holdAtLimits(latents, s);
+  s.log_likelihood += prior(latents);
   return s;
 }
 
 SessionLatents ChannelLikelihood::stepped(const SessionLatents& from, const Eigen::VectorXd& g, const Scores& scores,
                                           const Eigen::VectorXd& whole_step, double share) const {
-  SessionLatents n = from;
+  SessionLatents latents = from;
   const auto held = [share](double step, double limit) { return std::clamp(share * step, -limit, limit); };
-  for (int j = 0; j < n.globals(); ++j) {
+  for (int j = 0; j < latents.globals(); ++j) {
     const Limits limits = limitsOf(j, errors_, spread_);
-    double& v = n.global(j);
+    double& v = latents.global(j);
     v = std::clamp(v + held(g[j], limits.step), limits.low, limits.high);
   }
-  for (std::size_t i = 0; i < n.yaw_rad.size(); ++i) {
+  for (std::size_t i = 0; i < latents.yaw_rad.size(); ++i) {
     const double step =
         scores.yaw_step[i] - scores.yaw_coupling.row(static_cast<Eigen::Index>(i)).dot(whole_step.transpose());
-    n.yaw_rad[i] = std::clamp(n.yaw_rad[i] + held(step, 0.02), -0.06, 0.06);
+    latents.yaw_rad[i] = std::clamp(latents.yaw_rad[i] + held(step, 0.02), -0.06, 0.06);
   }
-  return n;
+  return latents;
 }
 
-double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLatents& nuisance, int iterations) const {
+double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLatents& latents, int iterations) const {
   double best = -1e300;
   std::vector<int> all(echoes.size());
   std::iota(all.begin(), all.end(), 0);
   for (int i = 0; i < iterations; ++i) {
-    const Scores s = scores(basis(echoes, nuisance, false), {}, all);
+    const Scores s = scores(basis(echoes, latents, false), {}, all);
     best = s.log_likelihood;
     const Eigen::VectorXd step = s.information.ldlt().solve(s.total);
     const double screened_nats = 0.5 * s.total.dot(step);
@@ -608,13 +610,13 @@ double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLate
     // All numbers together; where that fails, headings alone, then globals alone.
     for (int attempt = 0; attempt < 6 && !better; ++attempt) {
       constexpr double kShares[] = {1.0, 0.5, 0.2, 0.05};
-      SessionLatents next = attempt < 4    ? stepped(nuisance, step, s, step, kShares[attempt])
-                            : attempt == 4 ? stepped(nuisance, none, s, none, 1)
-                                           : stepped(nuisance, step, s, step, 0.5);
-      if (attempt == 5) next.yaw_rad = nuisance.yaw_rad;
+      SessionLatents next = attempt < 4    ? stepped(latents, step, s, step, kShares[attempt])
+                            : attempt == 4 ? stepped(latents, none, s, none, 1)
+                                           : stepped(latents, step, s, step, 0.5);
+      if (attempt == 5) next.yaw_rad = latents.yaw_rad;
       const double value = logLikelihood(echoes, next);
       if (value <= best) continue;
-      nuisance = std::move(next);
+      latents = std::move(next);
       best = value;
       better = true;
     }
@@ -624,10 +626,10 @@ double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLate
 }
 
 SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) const {
-  SessionLatents n;
-  n.actor_gain.assign(static_cast<std::size_t>(errors_), 0.0);
-  n.actor_range_m.assign(static_cast<std::size_t>(errors_), 0.0);
-  n.yaw_rad.assign(data_.poses.size(), 0.0);
+  SessionLatents latents;
+  latents.actor_gain.assign(static_cast<std::size_t>(errors_), 0.0);
+  latents.actor_range_m.assign(static_cast<std::size_t>(errors_), 0.0);
+  latents.yaw_rad.assign(data_.poses.size(), 0.0);
   // Gain: median over poses of measured over expected power. Floor: lower quartile over cells of power over clutter.
   std::vector<double> ratio, low;
   for (std::size_t i = 0; i < echoes.size(); ++i) {
@@ -654,17 +656,17 @@ SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) c
     std::nth_element(v.begin(), at, v.end());
     return *at;
   };
-  n.log_gain = quantile(ratio, 0.5);
-  n.log_floor = quantile(low, 0.25);
+  latents.log_gain = quantile(ratio, 0.5);
+  latents.log_floor = quantile(low, 0.25);
   // Wide channel errors to start with: far outliers of a narrow t distribution would give headings no slope.
-  n.log_relative = -3;
-  return n;
+  latents.log_relative = -3;
+  return latents;
 }
 
-ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes, const SessionLatents& n, int pose,
-                                                        int bin) const {
+ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes, const SessionLatents& latents,
+                                                        int pose, int bin) const {
   Whitened w;
-  const PackedHermitian packed = sigma(modelOf(echoes, n, pose), bin);
+  const PackedHermitian packed = sigma(modelOf(echoes, latents, pose), bin);
   Eigen::MatrixXcd full(channels_, channels_);
   std::size_t i = 0;
   for (int k = 0; k < channels_; ++k) {
@@ -681,10 +683,10 @@ ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes
   return w;
 }
 
-std::vector<ChannelLikelihood::Whitened> ChannelLikelihood::whitened(const PoseEchoes& echoes, const SessionLatents& n,
-                                                                     int pose) const {
+std::vector<ChannelLikelihood::Whitened> ChannelLikelihood::whitened(const PoseEchoes& echoes,
+                                                                     const SessionLatents& latents, int pose) const {
   std::vector<Whitened> cells;
-  for (int bin = 0; bin < samples_; ++bin) cells.push_back(whitened(echoes, n, pose, std::max(bin, firstBin())));
+  for (int bin = 0; bin < samples_; ++bin) cells.push_back(whitened(echoes, latents, pose, std::max(bin, firstBin())));
   return cells;
 }
 

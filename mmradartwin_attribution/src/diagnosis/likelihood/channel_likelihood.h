@@ -84,7 +84,7 @@ struct PoseBasis {
 
 /// Derivatives of all poses at one set of latents.
 struct Basis {
-  SessionLatents nuisance;
+  SessionLatents latents;
   std::vector<PoseBasis> poses;
 };
 
@@ -103,23 +103,23 @@ class ChannelLikelihood {
   /// Latents to start fit() from: levels from the data, errors zero.
   SessionLatents start(const std::vector<PoseEchoes>& echoes) const;
   /// Log-likelihood of all poses with the priors of the latents; by_pose is without priors.
-  double logLikelihood(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance,
+  double logLikelihood(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents,
                        std::vector<double>* by_pose = nullptr) const;
   /// Log-likelihood of each pose named, without priors; echoes[i] are those of poses[i].
-  std::vector<double> byPose(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance,
+  std::vector<double> byPose(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents,
                              const std::vector<int>& poses) const;
   /// Expected covariance of the echoes alone (no clutter, no noise), with gain, latents and range errors; echoes[i] are
   /// those of poses[i].
-  SessionCovariance covariance(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance,
+  SessionCovariance covariance(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents,
                                const std::vector<int>& poses) const;
   /// Derivatives by the globals and headings. further: keeps what scores() needs for directions beside the globals.
-  Basis basis(const std::vector<PoseEchoes>& echoes, const SessionLatents& nuisance, bool further = true) const;
+  Basis basis(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents, bool further = true) const;
   /// Scores by the globals of SessionLatents and by more directions, each a change of covariance() at the poses named.
   /// Other poses do not count.
   Scores scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
                 const std::vector<int>& poses) const;
   /// Fisher scoring of the latents from where they are; returns the log-likelihood.
-  double fit(const std::vector<PoseEchoes>& echoes, SessionLatents& nuisance, int iterations) const;
+  double fit(const std::vector<PoseEchoes>& echoes, SessionLatents& latents, int iterations) const;
   /// Latents after a share of a step of the globals, with each heading's best answer to whole_step. Numbers and steps
   /// stay within limits.
   SessionLatents stepped(const SessionLatents& from, const Eigen::VectorXd& globals, const Scores& scores,
@@ -131,9 +131,9 @@ class ChannelLikelihood {
     Eigen::VectorXcd solved;   ///< [M] Sigma^-1 y
     double weight;             ///< weight of the bin under the t distribution
   };
-  Whitened whitened(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose, int bin) const;
+  Whitened whitened(const PoseEchoes& echoes, const SessionLatents& latents, int pose, int bin) const;
   /// All bins of a pose; bins before firstBin() stand as firstBin() does.
-  std::vector<Whitened> whitened(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose) const;
+  std::vector<Whitened> whitened(const PoseEchoes& echoes, const SessionLatents& latents, int pose) const;
   /// Nats that a bin gains by a further point of this power and channel vector v. noise: v^H Sigma^-1 v; found:
   /// |v^H Sigma^-1 y|^2.
   double gainOfPoint(const Whitened& cell, double power, double noise, double found) const;
@@ -155,8 +155,8 @@ class ChannelLikelihood {
   /// Adds power that is independent between channels; in a beam, neighbouring bins share it through the window.
   void addApart(int cell, double power, PackedHermitian& to) const;
   /// Adds the channels' independent share (log_relative) of the echoes that `to` holds, or of a change of them.
-  void addRelative(const SessionLatents& nuisance, int cell, PackedHermitian& to) const;
-  double rangeVariance_m2(const SessionLatents& nuisance) const;
+  void addRelative(const SessionLatents& latents, int cell, PackedHermitian& to) const;
+  double rangeVariance_m2(const SessionLatents& latents) const;
   /// Factor of a group's power, and one-way range that its actors add beyond what its fields hold.
   struct GroupLevel {
     double gain, shift_m;
@@ -164,20 +164,20 @@ class ChannelLikelihood {
   /// One pose's echoes under latents.
   struct PoseModel {
     const PoseEchoes& echoes;
-    const SessionLatents& nuisance;
+    const SessionLatents& latents;
     int pose;
     std::vector<GroupLevel> levels;  ///< [groups, grazing ones last]
   };
-  PoseModel modelOf(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose) const;
+  PoseModel modelOf(const PoseEchoes& echoes, const SessionLatents& latents, int pose) const;
   /// Covariance of a cell.
   PackedHermitian sigma(const PoseModel& model, int cell) const;
   /// A group's fields in a cell; nothing where it has none.
   std::optional<EchoGroup::Cell> fieldsOf(const EchoGroup& group, int cell) const;
   /// Adds clutter's covariance in a cell, times factor.
-  void addClutter(const SessionLatents& nuisance, int pose, int cell, double factor, PackedHermitian& to) const;
-  double prior(const SessionLatents& nuisance) const;
-  double poseLikelihood(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose) const;
-  void addBasis(const PoseEchoes& echoes, const SessionLatents& nuisance, int pose, bool keep, PoseBasis& out) const;
+  void addClutter(const SessionLatents& latents, int pose, int cell, double factor, PackedHermitian& to) const;
+  double prior(const SessionLatents& latents) const;
+  double poseLikelihood(const PoseEchoes& echoes, const SessionLatents& latents, int pose) const;
+  void addBasis(const PoseEchoes& echoes, const SessionLatents& latents, int pose, bool keep, PoseBasis& out) const;
   struct CellDirections;
   /// Adds a cell's changes by the actors' errors, the heading, grazing echoes and range errors. inverse: of the cell's
   /// covariance.
@@ -193,13 +193,13 @@ class ChannelLikelihood {
   /// further: the pose's changes of covariance by each further direction.
   PoseScores poseScores(const Basis& basis, std::size_t pose, const std::vector<const PoseCovariance*>& further) const;
   /// Adds the scores of one cell by further directions.
-  void addFurther(const BinBasis& bin, const SessionLatents& nuisance,
-                  const std::vector<const PoseCovariance*>& further, PoseScores& own) const;
+  void addFurther(const BinBasis& bin, const SessionLatents& latents, const std::vector<const PoseCovariance*>& further,
+                  PoseScores& own) const;
   /// Adds a pose's scores with its heading eliminated.
-  void addWithoutHeading(const PoseScores& pose_scores, const SessionLatents& nuisance, std::size_t pose,
+  void addWithoutHeading(const PoseScores& pose_scores, const SessionLatents& latents, std::size_t pose,
                          Scores& scores) const;
-  void addPriors(const SessionLatents& nuisance, Scores& scores) const;
-  void holdAtLimits(const SessionLatents& nuisance, Scores& scores) const;
+  void addPriors(const SessionLatents& latents, Scores& scores) const;
+  void holdAtLimits(const SessionLatents& latents, Scores& scores) const;
   double informationOf(double product, double trace_a, double trace_b) const;
 
   const ChannelData& data_;

@@ -52,7 +52,7 @@ class TracedPaths {
 
  private:
   enum class Geometry { kSame, kMoreScreens, kOther };
-  /// What a mechanism does to the scene.
+  /// Effect of a mechanism on the scene.
   struct Edit {
     Geometry geometry = Geometry::kSame;
     std::optional<Twin::PlacedActor> placed = {};

@@ -4,6 +4,7 @@
 #include <limits>
 #include <optional>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/numbers/number_text.h"
 #include "diagnosis/rounds/hypothesis_finding.h"
 #include "diagnosis/search/hypothesis_ranking.h"
@@ -96,8 +97,8 @@ std::vector<HypothesisFit> FitRound::fit(std::vector<Screened> screened, std::si
     const bool box = isUnmodelledBox(s.hypothesis);
     const double rival = kNoRival * plain_name_;
     const double worth = box                 ? (fits_.empty() ? kWorthABox : kShareWorthABox * fits_.front().gain)
-                         : object            ? kWorthAnObject
-                         : law               ? kWorthALaw
+                         : object            ? bounds::kLeastNatsOfObject
+                         : law               ? bounds::kLeastNatsOfLaw
                          : geometry || moved ? kWorthAFitOfGeometry
                                              : std::max(kWorthAFit, rival);
     // Where an actor went is known by the fit alone: what little the quadratic promises does not rank it.

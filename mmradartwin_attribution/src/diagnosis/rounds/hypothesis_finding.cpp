@@ -12,16 +12,6 @@
 #include "mmradartwin_sim/law_variable.h"
 
 namespace mmradartwin::diagnosis::rounds {
-namespace {
-
-constexpr double kAlike = 5;         ///< nats within which two names are not told apart
-constexpr double kSameLaw = 0.7;     ///< correlation over poses of what two names gain that explain the same
-constexpr double kMovesAlike = 0.8;  ///< of what an object gains, by a move of what then stands there
-constexpr double kStandsThere_m = 0.1;
-constexpr double kPerson_m = 0.3, kWalk_m = 0.6;  ///< size, and how far from the middle of a walk
-
-}  // namespace
-
 Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
                   const Scene& scene, const ChannelData& data) {
   Finding f;
@@ -37,7 +27,7 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   for (const HypothesisFit& other : fits) {
     const double behind = (best.ranking() - other.ranking()) / best.overdispersion;
     // Those ahead were refused, or are the same thing.
-    if (behind > kAlike || behind < 0 || !(other.gain > 0)) continue;
+    if (behind > bounds::kNotToldApart_nats || behind < 0 || !(other.gain > 0)) continue;
     const std::string& name = other.hypothesis.mechanism.mechanism;
     const double weight = std::exp(-behind);
     const std::string cause = isCatalogued(name) ? name : "unknown";
@@ -117,9 +107,9 @@ std::string rejectionOfObject(const Parameters& values, const std::vector<FrameF
   const std::string which = ": " + number(size_m) + " m at (" + number(x_m) + ", " + number(y_m) + ")";
   if (size_m <= bounds::kLeastSize_m) return "no larger than clutter is" + which;
   for (const FrameFinding& walker : walkers) {
-    if (walker.cause != "moving_target" || size_m > kPerson_m) continue;
+    if (walker.cause != "moving_target" || size_m > bounds::kMostPersonSize_m) continue;
     for (const FindingPlace& place : walker.where) {
-      if (place.x_m && place.y_m && std::hypot(*place.x_m - x_m, *place.y_m - y_m) < kWalk_m) {
+      if (place.x_m && place.y_m && std::hypot(*place.x_m - x_m, *place.y_m - y_m) < bounds::kWalkReach_m) {
         return "what is left of someone who walks there" + which;
       }
     }
@@ -180,12 +170,12 @@ void preferMoves(std::vector<HypothesisFit>& fits, const Scene& scene) {
     if (traitsOf(object.mechanism).form != MechanismForm::kUnmodelledObject) continue;
     const Eigen::Vector2d at(object.values.number("x_m"), object.values.number("y_m"));
     for (std::size_t j = i + 1; j < fits.size(); ++j) {
-      if (!fits[j].hypothesis.isMove() || fits[j].gain < kMovesAlike * fits[i].gain) continue;
+      if (!fits[j].hypothesis.isMove() || fits[j].gain < bounds::kShareOfMoveInstead * fits[i].gain) continue;
       const NamedParameters move = fits[j].hypothesis.at(fits[j].scaled_values);
       const Actor& actor = scene.actors[static_cast<std::size_t>(scene.actorIndex(fits[j].hypothesis.subject))];
       const Eigen::Vector2d by(move.values.number("dx_m"), move.values.number("dy_m"));
       const Eigen::AlignedBox2d plan(actor.bounds.min().head<2>(), actor.bounds.max().head<2>());
-      if (plan.exteriorDistance(at - by) > kStandsThere_m) continue;
+      if (plan.exteriorDistance(at - by) > bounds::kStandsThere_m) continue;
       std::rotate(fits.begin() + static_cast<std::ptrdiff_t>(i), fits.begin() + static_cast<std::ptrdiff_t>(j),
                   fits.begin() + static_cast<std::ptrdiff_t>(j) + 1);
       break;
@@ -217,7 +207,7 @@ void preferBetterNames(std::vector<HypothesisFit>& fits, const ModelState& befor
       HypothesisFit& better = fits[i];
       const HypothesisFit& sure = fits[j];
       if (!ofAllEchoes(better) || !ofAllEchoes(sure) || better.ranking() <= sure.ranking()) continue;
-      if (correlation(gained[i], gained[j]) < kSameLaw) continue;
+      if (correlation(gained[i], gained[j]) < bounds::kCorrelationOfSameName) continue;
       better.false_alarm_rate = std::min(better.false_alarm_rate, sure.false_alarm_rate);
     }
   }

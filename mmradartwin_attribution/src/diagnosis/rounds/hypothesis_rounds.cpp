@@ -69,7 +69,7 @@ std::vector<HypothesisFit> HypothesisRounds::fitBest(int round) {
 
 std::string HypothesisRounds::rejectionByLikelihood(const HypothesisFit& fit) const {
   if (fit.ranking() <= 0) return "gains less than its numbers cost";
-  if (fit.false_alarm_rate > kFalseAlarm) return "chance could do as well";
+  if (fit.false_alarm_rate > bounds::kFalseAlarmRateOfRound) return "chance could do as well";
   if (!(fit.held_out_gain > 0)) return "loses on places not fitted";
   if (fit.gain < bounds::kShareBesideUnknown * selection_.unknownNats()) return "little beside what is unknown";
   return rejectionReason(fit, frames_);

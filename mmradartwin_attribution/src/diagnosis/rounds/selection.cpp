@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/fit/profiled_values.h"
 #include "diagnosis/hypotheses/fitted_parameters.h"
 #include "diagnosis/receiver/receiver_findings.h"
@@ -12,11 +13,8 @@
 namespace mmradartwin::diagnosis::rounds {
 namespace {
 
-constexpr std::size_t kWaysToErr = 4;  ///< geometries that alike errors of actors and poses look like
-// The most that a geometry has brought with nothing hidden: 269 nats at 26 poses, by 2.6 cm.
-constexpr double kPlainlyAsidePerPose = 20;
-constexpr double kRival = 0.7;  ///< of a finding's gain, by a simpler name that may be the right one
-constexpr std::size_t kMostRivals = 2;
+constexpr std::size_t kWaysToErr = 4;   ///< geometries that common errors of actors and poses look like
+constexpr std::size_t kMostRivals = 2;  ///< kept of each finding
 
 }  // namespace
 
@@ -77,7 +75,7 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
   return "";
 }
 
-/// All that rounds have found, fitted at once; what is then worth nothing beside the rest is taken back.
+/// Fits all findings of rounds at once, and withdraws findings that are then worth nothing beside the others.
 void Selection::refitTogether() {
   while (true) {
     context_.report("fitting all findings together", 0);
@@ -96,8 +94,8 @@ void Selection::refitTogether() {
       a.scaled_values = fit.scaled_values[i];
       a.standard_error = fit.standard_error[i];
       const std::size_t numbers = a.hypothesis.coordinates.size();
-      // There or not, or plain whatever its scatter: its own round has judged it. A law may have been what a name had
-      // not been fitted to yet (0.9 and -1 deg over azimuth beside half of the carrier's error, then 0.1 and -0.05).
+      // A finding that is there or not, or plain whatever its scatter, was judged by its own round. A law is judged
+      // again: it may have stood for what a name had not been fitted to yet.
       if (numbers == 0 || (a.plain && context_.fitter.isPlain(fit.worth[i].nats))) continue;
       const double rate = context_.fitter.falseAlarmRate(fit.worth[i].scattered(), a.hypothesis, numbers, family_);
       if (rate > weakest_rate) {
@@ -105,7 +103,7 @@ void Selection::refitTogether() {
         weakest_rate = rate;
       }
     }
-    if (weakest_rate <= kFalseAlarm || accepted_.size() < 2) break;
+    if (weakest_rate <= bounds::kFalseAlarmRateOfRound || accepted_.size() < 2) break;
     withdraw(weakest);
   }
   writeBackFindings();
@@ -119,9 +117,8 @@ void Selection::withdraw(std::size_t i) {
   for (Accepted& a : accepted_) a.finding -= a.finding > gone.finding ? 1 : 0;
 }
 
-/// Beside what is unknown a cause of all echoes has to be larger than its own errors: what a law leaves over looks like
-/// a little of one (curtains that the scene lacked were told as 1.06 dB/m, 0.37 to 1.75, and 0.98, -0.39 to 2.35, with
-/// a spot that is dark beside it; 532 and 448 nats, which places scatter by 14 times what they should).
+/// Withdraws causes of all echoes that are no larger than their own errors where something is unknown: the residual of
+/// the unknown's law looks like a little of such a cause. See docs/calibration_of_bounds.md#causes-beside-an-unknown.
 void Selection::withdrawExplainedByUnknown() {
   const auto is_doubtful = [&](const Accepted& a) {
     const Hypothesis& h = a.hypothesis;
@@ -130,7 +127,7 @@ void Selection::withdrawExplainedByUnknown() {
     }
     const std::size_t numbers = h.coordinates.size();
     return context_.fitter.falseAlarmRate(natsFromNothing(h, a.scaled_values, a.standard_error), h, numbers, family_) >
-           kFalseAlarm;
+           bounds::kFalseAlarmRateOfRound;
   };
   bool taken = false;
   while (unknownNats() > 0) {
@@ -154,7 +151,7 @@ void Selection::renameVerdict(const std::string& label, const std::string& verdi
   }
 }
 
-/// Values and intervals of all that rounds have found, on the likelihood that is settled on them.
+/// Profiles the values and intervals of all findings of rounds.
 void Selection::profileFound() {
   context_.report("errors of what was found", 0);
   std::vector<Hypothesis> parts;
@@ -176,10 +173,9 @@ void Selection::profileFound() {
   writeBackFindings();
 }
 
-/// Where paths come and go with every millimetre, the likelihood may gain much by a geometry whose numbers are no
-/// larger than the actors' and poses' own errors make them (1.6 and 2 cm of registration, 255 and 269 nats, in a
-/// corridor of doors and niches); an actor that is no farther away than that has not moved, whatever its likelihood
-/// gains.
+/// True of a geometry whose numbers are no larger than the errors of actors and poses make them, and of a move that is
+/// no farther than an actor's range error: where paths come and go with every millimetre the likelihood may gain much
+/// by either. See docs/calibration_of_bounds.md#sure-offset.
 bool Selection::isWithinErrors(const HypothesisFit& f) const {
   const Hypothesis& h = f.hypothesis;
   const auto a = acceptedAs(h);
@@ -193,11 +189,12 @@ bool Selection::isWithinErrors(const HypothesisFit& f) const {
                               std::abs(move.values.number("dyaw_deg")) * M_PI / 180 * reach_m;
     if (farthest_m < f.stated.mostRangeError_m()) return true;
   }
-  // An interval may be wide where the likelihood is rough: a radar's that stood 4 cm aside was 17 mm at 1427 nats,
-  // since paths came and went at two of 17 places.
+  // An interval may be wide where the likelihood is rough, so that a large offset with much evidence is believed
+  // whatever its interval says.
   const double per_pose =
       f.gain_without_best_place / f.overdispersion / static_cast<double>(context_.data.poses.size());
-  const bool is_aside = h.isGeometry() && f.moved_m() > f.stated.sureOffset_m() && per_pose > kPlainlyAsidePerPose;
+  const bool is_aside =
+      h.isGeometry() && f.moved_m() > f.stated.sureOffset_m() && per_pose > bounds::kLeastNatsOfOffsetPerPose;
   if (f.isFarAway() || is_aside) return false;
   std::vector<double> errors = a->standard_error;
   bool shifts = false;
@@ -208,11 +205,11 @@ bool Selection::isWithinErrors(const HypothesisFit& f) const {
   }
   if (f.plain && !shifts) return false;
   const double nats = natsFromNothing(h, a->scaled_values, errors);
-  return context_.fitter.falseAlarmRate(nats, h, h.coordinates.size(), kWaysToErr) > kFalseAlarm;
+  return context_.fitter.falseAlarmRate(nats, h, h.coordinates.size(), kWaysToErr) > bounds::kFalseAlarmRateOfRound;
 }
 
-/// An image, once found, is measured against its hosts and taken out: as a power it would be 2 dB high, and what that
-/// leaves beside it looks like echoes.
+/// Measures a receiver's image, once found, against its hosts and takes it out of the data. Fitted as a power its level
+/// would be some 2 dB high, and the residual of that would look like echoes.
 void Selection::takeOutImage() {
   const auto image = std::find_if(accepted_.begin(), accepted_.end(), [](const Accepted& a) {
     return a.hypothesis.form() == MechanismForm::kReceiverImage;
@@ -226,7 +223,7 @@ void Selection::takeOutImage() {
   writeBackFindings();
 }
 
-/// The values of what rounds have found, wherever they stand.
+/// Writes the fitted values of all findings of rounds into the findings and the two lists of mechanisms.
 void Selection::writeBackFindings() {
   mechanisms_ = before_rounds_;
   extended_ = extended_before_rounds_;
@@ -246,7 +243,7 @@ void Selection::writeBackFindings() {
   }
 }
 
-/// A finding more; an unknown stays the last one. `fits`: all of its round.
+/// Adds a finding; an unknown stays the last one. fits: all fits of its round.
 void Selection::accept(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding) {
   const std::size_t at = findings_.size() - (unknownNats() > 0 ? 1 : 0);
   for (Accepted& a : accepted_) a.finding += a.finding >= at ? 1 : 0;
@@ -254,9 +251,10 @@ void Selection::accept(const HypothesisFit& fit, const std::vector<HypothesisFit
   for (const Accepted& a : accepted_) beside.push_back(a.hypothesis.label());
   accepted_.push_back({fit.hypothesis, fit.scaled_values, fit.standard_error, fit.plain, at, std::move(beside), {}});
   for (const HypothesisFit& other : fits) {
-    // Those ahead were refused.
+    // Fits ahead of this one were rejected.
     const bool rival = other.ranking() < fit.ranking() && other.numbers() < fit.numbers() &&
-                       other.gain > kRival * fit.gain && isCatalogued(other.hypothesis.mechanism.mechanism);
+                       other.gain > bounds::kLeastShareOfRival * fit.gain &&
+                       isCatalogued(other.hypothesis.mechanism.mechanism);
     if (rival && accepted_.back().rivals.size() < kMostRivals) {
       accepted_.back().rivals.emplace_back(other.hypothesis, other.scaled_values);
     }
@@ -264,8 +262,8 @@ void Selection::accept(const HypothesisFit& fit, const std::vector<HypothesisFit
   findings_.insert(findings_.begin() + static_cast<std::ptrdiff_t>(at), std::move(finding));
 }
 
-/// Of the rivals of its round the one that explains more beside all others than it does itself; nothing where none
-/// does. The finding is then told by it.
+/// Rival of a finding's round that explains more beside all other findings than the finding itself, which then takes
+/// its name; nothing where there is none.
 std::optional<HypothesisFit> Selection::betterName(const Accepted& a) {
   std::vector<NamedParameters> others = before_rounds_;
   for (const Accepted& other : accepted_) {
@@ -286,7 +284,7 @@ std::optional<HypothesisFit> Selection::betterName(const Accepted& a) {
     }
     HypothesisFit f = context_.fitter.fit(*null, rival, {scaled_values});
     context_.fitter.judge(f, family_);
-    const bool stands = f.false_alarm_rate <= kFalseAlarm && rejectionReason(f, {}).empty();
+    const bool stands = f.false_alarm_rate <= bounds::kFalseAlarmRateOfRound && rejectionReason(f, {}).empty();
     if (!stands || f.ranking() <= (best ? *best : *own).ranking()) continue;
     best = std::move(f);
   }
@@ -297,9 +295,8 @@ std::optional<HypothesisFit> Selection::betterName(const Accepted& a) {
   return best;
 }
 
-/// What a cause was taken for while others were not known yet may be explained as well by a simpler name beside them
-/// (a transmitter's error and a turned mount look like an error of every channel): of each finding but the last, the
-/// rivals of its round are fitted anew.
+/// Fits the rivals of each finding but the last anew. A cause that was named before others were known may have a
+/// simpler name beside them: a transmitter's error and a turned mount look like an error of every channel.
 void Selection::exchangeNames() {
   bool exchanged = false;
   for (std::size_t i = 0; i + 1 < accepted_.size(); ++i) {
@@ -346,7 +343,7 @@ void Selection::orderByGain() {
   state_.nuisance = found;
 }
 
-/// A finding's gain over mechanisms_, in nats, maps and metrics.
+/// Measures a finding's gain over mechanisms_ again, in nats, maps and metrics.
 void Selection::measureAgain(const Accepted& a) {
   context_.report("gain of " + a.hypothesis.label() + " beside those before it", 0);
   Finding& f = findings_[a.finding];

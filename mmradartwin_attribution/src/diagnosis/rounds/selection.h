@@ -17,8 +17,6 @@
 
 namespace mmradartwin::diagnosis::rounds {
 
-constexpr double kFalseAlarm = 0.01;  ///< family-wise, per round
-
 /// Forward selection with joint refit and backward deletion: what rounds have found so far, fitted together, and the
 /// state of everything else beside it.
 class Selection {

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/search/back_projection.h"
 #include "diagnosis/search/latent_patterns.h"
 #include "diagnosis/search/law_screen.h"
@@ -13,173 +14,257 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr std::size_t kScreenPoses = 44;  ///< a part of the session ranks hypotheses well enough
-constexpr std::size_t kFewestPoses = 12;
-constexpr std::size_t kLawPoses = 66;   ///< whose paths are scored for laws without a name
-constexpr std::size_t kSecondLook = 9;  ///< hypotheses that are looked at on more poses, geometries on all
-constexpr std::size_t kSecondLookPoses = 66;
-constexpr std::size_t kSuspects = 6;       ///< actors whose geometry is tried
-constexpr std::size_t kNeighbours = 2;     ///< of a place where an object seems to stand, that may be the object
-constexpr double kOutOfPlace = 1.2;        ///< nats of an actor's own errors from which on it is looked for elsewhere
-constexpr double kElsewhere = 5;           ///< the same of its echoes nearer or farther away,
-constexpr std::size_t kMostElsewhere = 2;  ///< and how many are by that
+constexpr std::size_t kScreenPoses = 44;      ///< enough to rank hypotheses
+constexpr std::size_t kFewestPoses = 12;      ///< for costly hypotheses, or those of many numbers
+constexpr std::size_t kLawPoses = 66;         ///< at which paths are measured for laws without a name
+constexpr std::size_t kSecondLook = 9;        ///< hypotheses that are looked at on more poses
+constexpr std::size_t kSecondLookPoses = 66;  ///< then; geometries are looked at on all
+constexpr std::size_t kSuspects = 6;          ///< actors whose geometry is tried
+constexpr std::size_t kNeighbours = 2;        ///< actors near a place where an object seems to stand
+constexpr std::size_t kMostElsewhere = 2;     ///< actors that are looked for elsewhere by a shift of their echoes
+constexpr double kGainPerNumber_nats = 0.5;   ///< by chance
 
-}  // namespace
-
-std::vector<int> HypothesisRanking::spread(std::size_t wanted) const {
-  const std::size_t count = context_.data.poses.size();
+/// Indices of `wanted` of the poses, evenly spread.
+std::vector<int> spread(std::size_t count, std::size_t wanted) {
   wanted = std::min(count, wanted);
   std::vector<int> poses;
   for (std::size_t i = 0; i < wanted; ++i) poses.push_back(static_cast<int>(i * count / wanted));
   return poses;
 }
 
-std::vector<RangeShift> HypothesisRanking::shifted(const ModelState& state) {
-  context_.report("actors that stand elsewhere", 0);
-  std::vector<RangeShift> shifts = screen_.nearerOrFarther(state, spread(kScreenPoses));
-  const auto plain = [](const RangeShift& s) { return s.nats >= kElsewhere; };
-  shifts.erase(std::partition_point(shifts.begin(), shifts.end(), plain), shifts.end());
-  return shifts;
+bool promisesMore(const Screened& a, const Screened& b) { return a.screened_nats > b.screened_nats; }
+
+/// Looks of one round.
+class Looks {
+ public:
+  Looks(DiagnosisContext& context, HypothesisScreen& screen, const std::vector<Hypothesis>& all,
+        const ModelState& state)
+      : context_(context), screen_(screen), all_(all), state_(state) {}
+
+  /// Chooses the actors whose geometry is tried, and those that are looked for elsewhere.
+  void suspect(const std::vector<RangeShift>& shifted);
+  /// Looks for objects and late points that the twin lacks; actors near an object become suspicious.
+  void placeObjects();
+  /// Looks at every hypothesis, then at the best ones on more poses. no_use: see HypothesisRanking.
+  void lookAtAll(std::set<std::string>& no_use);
+  void lookAgain();
+  void addLaws();
+  void addReplicas();
+  void addSharedLatents();
+  void addPlaced();
+  /// All hypotheses that were looked at, most promising first.
+  std::vector<Screened> ranked();
+
+ private:
+  std::vector<int> spread(std::size_t wanted) const { return search::spread(context_.data.poses.size(), wanted); }
+  const std::string& nameOf(int actor) const {
+    return context_.twin.scene().actors[static_cast<std::size_t>(actor)].name;
+  }
+  /// Actor that a hypothesis moves, where the actor is looked for elsewhere; else -1.
+  int outOfPlace(const Hypothesis& hypothesis) const;
+  Screened look(const Hypothesis& hypothesis, const std::vector<int>& poses);
+  Screened lookAtSome(const Hypothesis& hypothesis) { return look(hypothesis, spread(kScreenPoses)); }
+  std::vector<Screened> bestOf(std::size_t most, const std::vector<ProjectedPlace>& places,
+                               Hypothesis (*hypothesisAt)(const ProjectedPlace&));
+  /// Takes off what chance promises: half a nat per number on the poses looked at, scaled up as the promise is.
+  void takeOffChance(std::size_t poses, Screened& screened) const;
+  /// Adds a hypothesis that something else points at, or its start where the hypothesis is known.
+  void suggest(Screened screened);
+
+  DiagnosisContext& context_;
+  HypothesisScreen& screen_;
+  const std::vector<Hypothesis>& all_;
+  const ModelState& state_;
+  std::set<std::string> suspicious_;  ///< actors whose geometry is tried
+  std::set<int> out_of_place_;        ///< actors that are looked for elsewhere
+  std::vector<Screened> placed_;      ///< objects and late points
+  std::vector<Screened> screened_;
+  std::map<std::string, std::size_t> looked_at_;  ///< number of poses, by label
+};
+
+void Looks::suspect(const std::vector<RangeShift>& shifted) {
+  const auto suspects = screen_.suspects(state_);
+  for (std::size_t i = 0; i < std::min(kSuspects, suspects.size()); ++i) {
+    suspicious_.insert(nameOf(suspects[i].first));
+  }
+  for (const auto& [actor, nats] : suspects) {
+    if (nats > bounds::kLeastNatsOutOfPlace && out_of_place_.size() < kMostOutOfPlace) out_of_place_.insert(actor);
+  }
+  for (std::size_t i = 0; i < std::min(kMostElsewhere, shifted.size()); ++i) {
+    suspicious_.insert(nameOf(shifted[i].actor));
+    out_of_place_.insert(shifted[i].actor);
+  }
 }
 
-std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all, const ModelState& state,
-                                              const std::vector<RangeShift>& shifted) {
-  const auto suspects = screen_.suspects(state);
-  std::set<std::string> suspicious;
-  for (std::size_t i = 0; i < std::min(kSuspects, suspects.size()); ++i) {
-    suspicious.insert(context_.twin.scene().actors[static_cast<std::size_t>(suspects[i].first)].name);
-  }
-  std::set<int> out_of_place;
-  for (const auto& [actor, nats] : suspects) {
-    if (nats > kOutOfPlace && out_of_place.size() < kMostOutOfPlace) out_of_place.insert(actor);
-  }
-  // The more numbers a hypothesis has, the more evaluations, and the fewer poses rank it.
-  const auto some = [&](const Hypothesis& h) {
-    return spread(std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
-  };
-  /// Whom it moves, where that one is looked for elsewhere; -1 of all others.
-  const auto outOfPlace = [&](const Hypothesis& h) {
-    const int actor = context_.twin.scene().actorIndex(h.subject);
-    return h.isMove() && out_of_place.count(actor) > 0 ? actor : -1;
-  };
-  const auto look = [&](const Hypothesis& h, const std::vector<int>& poses) {
-    const int actor = outOfPlace(h);
-    return actor >= 0 ? screen_.around(state, h, actor, poses) : screen_.screen(state, h, poses);
-  };
-  const auto lookAtSome = [&](const Hypothesis& h) { return look(h, spread(kScreenPoses)); };
-  const auto better = [](const Screened& a, const Screened& b) { return a.screened_nats > b.screened_nats; };
-  const auto bestOf = [&](std::size_t most, const std::vector<ProjectedPlace>& places,
-                          Hypothesis (*at)(const ProjectedPlace&)) {
-    std::vector<Screened> best;
-    for (const ProjectedPlace& place : places) best.push_back(lookAtSome(at(place)));
-    std::stable_sort(best.begin(), best.end(), better);
-    best.resize(std::min(most, best.size()));
-    return best;
-  };
-  for (std::size_t i = 0; i < std::min(kMostElsewhere, shifted.size()); ++i) {
-    suspicious.insert(context_.twin.scene().actors[static_cast<std::size_t>(shifted[i].actor)].name);
-    out_of_place.insert(shifted[i].actor);
-  }
+int Looks::outOfPlace(const Hypothesis& hypothesis) const {
+  const int actor = context_.twin.scene().actorIndex(hypothesis.subject);
+  return hypothesis.isMove() && out_of_place_.count(actor) > 0 ? actor : -1;
+}
+
+Screened Looks::look(const Hypothesis& hypothesis, const std::vector<int>& poses) {
+  const int actor = outOfPlace(hypothesis);
+  return actor >= 0 ? screen_.around(state_, hypothesis, actor, poses) : screen_.screen(state_, hypothesis, poses);
+}
+
+std::vector<Screened> Looks::bestOf(std::size_t most, const std::vector<ProjectedPlace>& places,
+                                    Hypothesis (*hypothesisAt)(const ProjectedPlace&)) {
+  std::vector<Screened> best;
+  for (const ProjectedPlace& place : places) best.push_back(lookAtSome(hypothesisAt(place)));
+  std::stable_sort(best.begin(), best.end(), promisesMore);
+  best.resize(std::min(most, best.size()));
+  return best;
+}
+
+void Looks::placeObjects() {
   context_.report("objects that the twin lacks", 0);
-  std::vector<Screened> placed = bestOf(kMostObjects, projectBack(context_.twin, context_.likelihood, state), objectAt);
-  const std::size_t objects = placed.size();
-  for (Screened& s : bestOf(1, projectLateBack(context_.twin, context_.likelihood, state), lateEchoAt))
-    placed.push_back(std::move(s));
-  context_.echoes.setBaseline(state.mechanisms);
-  for (std::size_t i = 0; i < objects && placed[i].screened_nats > (i == 0 ? kWorthAnObject : kWorthALaw); ++i) {
-    // It may be one of the scene's that stands elsewhere.
-    const NamedParameters& m = placed[i].hypothesis.mechanism;
+  placed_ = bestOf(kMostObjects, projectBack(context_.twin, context_.likelihood, state_), objectAt);
+  const std::size_t objects = placed_.size();
+  for (Screened& s : bestOf(1, projectLateBack(context_.twin, context_.likelihood, state_), lateEchoAt)) {
+    placed_.push_back(std::move(s));
+  }
+  context_.echoes.setBaseline(state_.mechanisms);
+  for (std::size_t i = 0; i < objects; ++i) {
+    const double least_nats = i == 0 ? bounds::kLeastNatsOfObject : bounds::kLeastNatsOfLaw;
+    if (!(placed_[i].screened_nats > least_nats)) break;
+    // The object may be an actor of the scene that stands elsewhere.
+    const NamedParameters& m = placed_[i].hypothesis.mechanism;
     std::vector<int> near = objectsNear(context_.twin.scene(), m.values.number("x_m"), m.values.number("y_m"));
     near.resize(std::min(near.size(), kNeighbours));
-    for (int actor : near) suspicious.insert(context_.twin.scene().actors[static_cast<std::size_t>(actor)].name);
-    out_of_place.insert(near.begin(), near.end());
+    for (int actor : near) suspicious_.insert(nameOf(actor));
+    out_of_place_.insert(near.begin(), near.end());
   }
-  std::vector<Screened> screened;
-  std::map<std::string, std::size_t> looked_at;  // poses
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    context_.report("trying " + all[i].label(), static_cast<double>(i) / static_cast<double>(all.size()));
-    const bool of_actor = context_.twin.scene().actorIndex(all[i].subject) >= 0;
-    const double numbers = static_cast<double>(all[i].coordinates.size());
-    const std::vector<double> typical(all[i].coordinates.size(), 1.0);
-    // Each of these traces the session anew: of actors without suspicion, what is there or not on a few poses, and
-    // nothing else.
-    const bool costly =
-        of_actor && suspicious.count(all[i].subject) == 0 && context_.echoes.altersGeometry(all[i].at(typical));
-    if (costly && (!all[i].isOneSided() || no_use_.count(all[i].label()) > 0)) continue;
-    std::vector<int> poses = costly ? spread(kFewestPoses) : some(all[i]);
-    Screened s = look(all[i], poses);
-    if (outOfPlace(all[i]) >= 0) poses = spread(context_.data.poses.size());  // what it promises is of all
-    if (costly && !(s.screened_nats > 0)) no_use_.insert(all[i].label());
-    // What chance promises: half a nat per number on the poses looked at, scaled up like the rest.
-    s.screened_nats -=
-        0.5 * numbers * static_cast<double>(context_.data.poses.size()) / static_cast<double>(poses.size());
-    looked_at[s.hypothesis.label()] = poses.size();
-    screened.push_back(std::move(s));
-    context_.echoes.setBaseline(state.mechanisms);
+}
+
+void Looks::takeOffChance(std::size_t poses, Screened& screened) const {
+  const double numbers = static_cast<double>(screened.hypothesis.coordinates.size());
+  screened.screened_nats -=
+      kGainPerNumber_nats * numbers * static_cast<double>(context_.data.poses.size()) / static_cast<double>(poses);
+}
+
+void Looks::lookAtAll(std::set<std::string>& no_use) {
+  for (std::size_t i = 0; i < all_.size(); ++i) {
+    const Hypothesis& h = all_[i];
+    context_.report("trying " + h.label(), static_cast<double>(i) / static_cast<double>(all_.size()));
+    const bool of_actor = context_.twin.scene().actorIndex(h.subject) >= 0;
+    const std::vector<double> typical(h.coordinates.size(), 1.0);
+    // A costly hypothesis traces the session anew. Actors without suspicion are tried only by what is there or not, on
+    // a few poses.
+    const bool costly = of_actor && suspicious_.count(h.subject) == 0 && context_.echoes.altersGeometry(h.at(typical));
+    if (costly && (!h.isOneSided() || no_use.count(h.label()) > 0)) continue;
+    // A hypothesis of more numbers needs more evaluations: fewer poses rank it.
+    std::vector<int> poses =
+        spread(costly ? kFewestPoses : std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
+    Screened s = look(h, poses);
+    if (outOfPlace(h) >= 0) poses = spread(context_.data.poses.size());  // around() promises for all poses
+    if (costly && !(s.screened_nats > 0)) no_use.insert(h.label());
+    takeOffChance(poses.size(), s);
+    looked_at_[s.hypothesis.label()] = poses.size();
+    screened_.push_back(std::move(s));
+    context_.echoes.setBaseline(state_.mechanisms);
   }
-  std::stable_sort(screened.begin(), screened.end(), better);
-  // Geometry before materials: what is wrong with all ranges or directions stands in every latent, and its score is
-  // small for that.
+  std::stable_sort(screened_.begin(), screened_.end(), promisesMore);
+}
+
+void Looks::lookAgain() {
+  // All geometries are kept: every latent holds a part of an error of all ranges or directions, which makes its score
+  // small.
   std::size_t kept = 0;
-  screened.erase(std::remove_if(screened.begin(), screened.end(),
-                                [&](const Screened& s) { return ++kept > kSecondLook && !s.hypothesis.isGeometry(); }),
-                 screened.end());
-  for (Screened& s : screened) {
+  screened_.erase(std::remove_if(screened_.begin(), screened_.end(),
+                                 [&](const Screened& s) { return ++kept > kSecondLook && !s.hypothesis.isGeometry(); }),
+                  screened_.end());
+  for (Screened& s : screened_) {
     context_.report("looking again at " + s.hypothesis.label(), 0);
     const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
     const std::vector<int> poses = spread(numbers > 3                 ? kScreenPoses
                                           : s.hypothesis.isGeometry() ? context_.data.poses.size()
                                                                       : kSecondLookPoses);
-    if (looked_at[s.hypothesis.label()] < poses.size()) {
-      s = screen_.screen(state, s.hypothesis, poses);
-      s.screened_nats -=
-          0.5 * numbers * static_cast<double>(context_.data.poses.size()) / static_cast<double>(poses.size());
-      context_.echoes.setBaseline(state.mechanisms);
+    if (looked_at_[s.hypothesis.label()] < poses.size()) {
+      s = screen_.screen(state_, s.hypothesis, poses);
+      takeOffChance(poses.size(), s);
+      context_.echoes.setBaseline(state_.mechanisms);
     }
     s.screened_nats -= numbers;
   }
-  // A hypothesis that something else points at: with the start that it gives.
-  const auto suggest = [&screened](Screened s) {
-    const auto same = std::find_if(screened.begin(), screened.end(), [&](const Screened& other) {
-      return other.hypothesis.label() == s.hypothesis.label();
-    });
-    if (same == screened.end()) {
-      screened.push_back(std::move(s));
-    } else {
-      same->screened_nats = std::max(same->screened_nats, s.screened_nats);
-      same->starts.push_back(s.starts.front());
-    }
-  };
+}
+
+void Looks::suggest(Screened screened) {
+  const auto same = std::find_if(screened_.begin(), screened_.end(), [&](const Screened& other) {
+    return other.hypothesis.label() == screened.hypothesis.label();
+  });
+  if (same == screened_.end()) {
+    screened_.push_back(std::move(screened));
+  } else {
+    same->screened_nats = std::max(same->screened_nats, screened.screened_nats);
+    same->starts.push_back(screened.starts.front());
+  }
+}
+
+void Looks::addLaws() {
   context_.report("laws without a name", 0);
-  ScreenedLaws laws = screenLaws(context_.twin, context_.likelihood, state, spread(kLawPoses));
+  ScreenedLaws laws = screenLaws(context_.twin, context_.likelihood, state_, spread(kLawPoses));
   const auto isNoName = [&](const Screened& s) {
     return s.hypothesis.form() == MechanismForm::kGainOverTime && !laws.gains_follow_time;
   };
-  screened.erase(std::remove_if(screened.begin(), screened.end(), isNoName), screened.end());
+  screened_.erase(std::remove_if(screened_.begin(), screened_.end(), isNoName), screened_.end());
   for (Screened& s : laws.laws) {
-    if (std::optional<Screened> named = namedLike(s, all); named && !isNoName(*named)) suggest(std::move(*named));
-    if (const std::optional<Screened> box = s.screened_nats > kWorthALaw ? boxThatHides(s) : std::nullopt) {
-      screened.push_back(screen_.amongStarts(state, *box, spread(kScreenPoses)));
-    }
-    screened.push_back(std::move(s));
+    if (std::optional<Screened> named = namedLike(s, all_); named && !isNoName(*named)) suggest(std::move(*named));
+    const std::optional<Screened> box = s.screened_nats > bounds::kLeastNatsOfLaw ? boxThatHides(s) : std::nullopt;
+    if (box) screened_.push_back(screen_.amongStarts(state_, *box, spread(kScreenPoses)));
+    screened_.push_back(std::move(s));
   }
+}
+
+void Looks::addReplicas() {
   context_.report("replicas of echoes", 0);
-  for (Screened& s :
-       screenReplicas(context_.twin, context_.likelihood, state, spread(kLawPoses), kWorthALaw, lookAtSome)) {
-    screened.push_back(std::move(s));
+  for (Screened& s : screenReplicas(context_.twin, context_.likelihood, state_, spread(kLawPoses),
+                                    bounds::kLeastNatsOfLaw, [this](const Hypothesis& h) { return lookAtSome(h); })) {
+    screened_.push_back(std::move(s));
   }
+}
+
+void Looks::addSharedLatents() {
   context_.report("errors that poses and actors share", 0);
-  for (Screened& s : sharedLatents(context_.echoes, state, context_.likelihood.spread(), context_.pose_accuracy, all,
+  for (Screened& s : sharedLatents(context_.echoes, state_, context_.likelihood.spread(), context_.pose_accuracy, all_,
                                    spread(kScreenPoses))) {
     suggest(std::move(s));
   }
-  context_.echoes.setBaseline(state.mechanisms);
-  for (Screened& s : placed) {
+}
+
+void Looks::addPlaced() {
+  context_.echoes.setBaseline(state_.mechanisms);
+  for (Screened& s : placed_) {
     freePlace(context_.data, s);
-    screened.push_back(std::move(s));
+    screened_.push_back(std::move(s));
   }
-  std::stable_sort(screened.begin(), screened.end(), better);
-  return screened;
+}
+
+std::vector<Screened> Looks::ranked() {
+  std::stable_sort(screened_.begin(), screened_.end(), promisesMore);
+  return std::move(screened_);
+}
+
+}  // namespace
+
+std::vector<RangeShift> HypothesisRanking::shifted(const ModelState& state) {
+  context_.report("actors that stand elsewhere", 0);
+  std::vector<RangeShift> shifts = screen_.nearerOrFarther(state, spread(context_.data.poses.size(), kScreenPoses));
+  const auto far = [](const RangeShift& s) { return s.nats >= bounds::kLeastNatsElsewhere; };
+  shifts.erase(std::partition_point(shifts.begin(), shifts.end(), far), shifts.end());
+  return shifts;
+}
+
+std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all, const ModelState& state,
+                                              const std::vector<RangeShift>& shifted) {
+  Looks looks(context_, screen_, all, state);
+  looks.suspect(shifted);
+  looks.placeObjects();
+  looks.lookAtAll(no_use_);
+  looks.lookAgain();
+  looks.addLaws();
+  looks.addReplicas();
+  looks.addSharedLatents();
+  looks.addPlaced();
+  return looks.ranked();
 }
 
 }  // namespace mmradartwin::diagnosis::search

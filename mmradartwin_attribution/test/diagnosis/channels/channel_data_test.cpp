@@ -193,12 +193,6 @@ TEST(ChangeBetween, IsNothingForTheSameAndOneForStrangers) {
   EXPECT_EQ(changeBetween(ComplexGrid::Zero(2, 2), ComplexGrid::Zero(2, 2)), 0);
 }
 
-TEST(UpperMedian, IsTheGreaterOfTheTwoInTheMiddle) {
-  EXPECT_EQ(upperMedian({5}), 5);
-  EXPECT_EQ(upperMedian({9, 1, 5}), 5);
-  EXPECT_EQ(upperMedian({9, 1, 5, 7}), 7);
-}
-
 TEST(FrameSpectra, AreWindowedAndInCounts) {
   const RadarConfig radar = paperRadar();
   const ComplexGrid x = gridOf(radar, {{3.0, 0.1, 1000}});

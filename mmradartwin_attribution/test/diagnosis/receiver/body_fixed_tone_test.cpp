@@ -101,14 +101,14 @@ TEST_F(BodyFixedToneTest, OfOnePoseIsWhatIsNoArrayResponse) {
   const BodyFixedTone echo =
       findBodyFixedTone(draw(1, [&](ComplexGrid& x) { addTone(radar_, 0.08, 0.03 * arrayResponse(radar_, 0.3), x); }));
   EXPECT_FALSE(isUnambiguous(echo));
-  EXPECT_GT(echo.array_share, 0.97);
+  EXPECT_GT(echo.array_share, 0.9);
 }
 
 TEST_F(BodyFixedToneTest, EchoesOfTheSameWallAtAllPosesAreNone) {
-  // The same range at every pose, but another phase: a radar carried along a wall.
-  std::uniform_real_distribution<double> phase(-M_PI, M_PI);
-  const BodyFixedTone tone = findBodyFixedTone(
-      draw(12, [&](ComplexGrid& x) { addTone(radar_, 0.1, std::polar(1.0, phase(random_)) * leakage(), x); }));
+  // The same range at every pose, but another phase, evenly around the circle: a radar carried along a wall.
+  int pose = 0;
+  const BodyFixedTone tone = findBodyFixedTone(draw(
+      12, [&](ComplexGrid& x) { addTone(radar_, 0.1, std::polar(1.0, 2 * M_PI * 5 * pose++ / 12) * leakage(), x); }));
   EXPECT_FALSE(isUnambiguous(tone));
 }
 

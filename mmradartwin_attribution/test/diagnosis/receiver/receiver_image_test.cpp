@@ -19,7 +19,7 @@ class ReceiverImageTest : public ::testing::Test {
       std::vector<DrawnTone> tones;
       for (double range_m : {0.6, 1.3, 2.1, 2.9}) {
         tones.push_back({range_m, sine(random_), std::polar(0.02, phase(random_))});
-        tones.push_back({range_m + 4, sine(random_), std::polar(weak, phase(random_))});
+        tones.push_back({radar_.max_range_m() - range_m, sine(random_), std::polar(weak, phase(random_))});
       }
       const ComplexGrid x = gridOf(radar_, tones);
       grids.emplace_back(x + beta * x.conjugate());
