@@ -1,0 +1,109 @@
+#include "diagnosis/rounds/hypothesis_finding.h"
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/catalogue/default_mechanism.h"
+
+namespace mmradartwin::diagnosis {
+namespace {
+
+HypothesisFit fitOf(const std::string& mechanism, double gain, const std::string& subject = "") {
+  HypothesisFit fit;
+  fit.hypothesis.mechanism = defaultMechanism(mechanism);
+  fit.hypothesis.subject = subject;
+  fit.gain = gain;
+  return fit;
+}
+HypothesisFit with(HypothesisFit fit, const std::string& parameter, double value) {
+  fit.hypothesis.mechanism.values.set(parameter, value);
+  return fit;
+}
+HypothesisFit objectAt(double x_m, double y_m, double size_m) {
+  return with(with(with(fitOf("actor_unmodelled", 100), "x_m", x_m), "y_m", y_m), "size_m", size_m);
+}
+FrameFinding walkerAt(double x_m, double y_m) {
+  FrameFinding walker;
+  walker.cause = "moving_target";
+  walker.where.emplace_back();
+  walker.where.back().x_m = x_m;
+  walker.where.back().y_m = y_m;
+  return walker;
+}
+
+TEST(RejectionReason, NamesValuesThatNoSurfaceHas) {
+  EXPECT_NE(rejectionReason(with(fitOf("diffuse_scattering", 9), "scattering_coefficient", 0.05), {}), "");
+  EXPECT_EQ(rejectionReason(with(fitOf("diffuse_scattering", 9), "scattering_coefficient", 0.5), {}), "");
+  EXPECT_NE(rejectionReason(with(fitOf("diffuse_scattering", 9), "scattering_coefficient", 0.99), {}), "");
+  const std::string reason = rejectionReason(with(fitOf("transmission", 9), "one_way_db", -0.1), {});
+  EXPECT_NE(reason.find("-0.1 dB"), std::string::npos) << reason;
+  EXPECT_EQ(rejectionReason(with(fitOf("transmission", 9), "one_way_db", -6.0), {}), "");
+  EXPECT_EQ(rejectionReason(fitOf("range_bias", 9), {}), "") << "no such range";
+}
+
+TEST(RejectionReason, AnObjectIsNoneWhereItIsTinyOrSomeoneWalks) {
+  EXPECT_NE(rejectionReason(objectAt(2, 1, 0.04), {}), "");
+  EXPECT_EQ(rejectionReason(objectAt(2, 1, 0.25), {}), "");
+  EXPECT_NE(rejectionReason(objectAt(2, 1, 0.25), {walkerAt(2.2, 1.2)}), "");
+  EXPECT_EQ(rejectionReason(objectAt(2, 1, 0.25), {walkerAt(4, 1)}), "") << "far from the walk";
+  EXPECT_EQ(rejectionReason(objectAt(2, 1, 1.2), {walkerAt(2.2, 1.2)}), "") << "larger than a person";
+}
+
+TEST(LikeClutter, IsBelievedByWhatTheMapsExplain) {
+  EXPECT_TRUE(isLikeClutter(objectAt(2, 1, 0.5), false, false));
+  EXPECT_FALSE(isLikeClutter(objectAt(2, 1, 0.5), true, false));
+  EXPECT_TRUE(isLikeClutter(objectAt(2, 1, 0.08), true, false)) << "small things lie about";
+  EXPECT_FALSE(isLikeClutter(objectAt(2, 1, 0.08), true, true));
+  EXPECT_TRUE(isLikeClutter(fitOf("transmission", 9), true, false));
+  HypothesisFit plain = fitOf("transmission", 9);
+  plain.plain = true;
+  EXPECT_FALSE(isLikeClutter(plain, true, false));
+  EXPECT_FALSE(isLikeClutter(fitOf("range_bias", 9), false, false)) << "clutter has no range bias";
+}
+
+TEST(LikeClutter, AReplicaOfOneActorIsUnlessItIsLoud) {
+  const HypothesisFit weak = with(fitOf("echo_replica", 9, "wall"), "level_db", -20.0);
+  const HypothesisFit loud = with(fitOf("echo_replica", 9, "wall"), "level_db", -5.0);
+  EXPECT_TRUE(isLikeClutter(weak, false, false));
+  EXPECT_FALSE(isLikeClutter(loud, false, false));
+  EXPECT_FALSE(isLikeClutter(with(fitOf("echo_replica", 9), "level_db", -20.0), false, false)) << "of all echoes";
+}
+
+TEST(Preference, AnAbsenceIsAsSureAsTheMoveOfTheSameActor) {
+  std::vector<HypothesisFit> fits = {fitOf("actor_absent", 90, "chair"), fitOf("actor_moved", 90, "chair"),
+                                     fitOf("actor_moved", 90, "table")};
+  fits[0].false_alarm_rate = 0.5;
+  fits[1].false_alarm_rate = 1e-6;
+  fits[2].false_alarm_rate = 1e-9;
+  preferAbsences(fits);
+  EXPECT_EQ(fits[0].false_alarm_rate, 1e-6);
+}
+
+TEST(Preference, ABetterNameIsAsSureAsOneThatExplainsTheSamePoses) {
+  ModelState before;
+  before.by_pose = {0, 0, 0, 0};
+  std::vector<HypothesisFit> fits = {fitOf("excess_attenuation", 100), fitOf("if_highpass", 80),
+                                     fitOf("gain_drift", 70)};
+  fits[0].state.by_pose = {1, 2, 3, 4};
+  fits[1].state.by_pose = {2, 4, 6, 8.5};
+  fits[2].state.by_pose = {4, 3, 2, 1};
+  fits[0].false_alarm_rate = 0.3;
+  fits[1].false_alarm_rate = 1e-3;
+  fits[2].false_alarm_rate = 1e-9;
+  preferBetterNames(fits, before);
+  EXPECT_EQ(fits[0].false_alarm_rate, 1e-3) << "not from the one that gains at other poses";
+}
+
+TEST(GainByPose, IsTheDifferenceAndItsCorrelationPearsons) {
+  ModelState before;
+  before.by_pose = {1, 1, 1};
+  HypothesisFit fit;
+  fit.state.by_pose = {2, 1, 4};
+  const Eigen::VectorXd gain = gainByPose(fit, before);
+  EXPECT_EQ(gain, Eigen::Vector3d(1, 0, 3));
+  EXPECT_NEAR(correlation(gain, 2 * gain.array() + 7), 1, 1e-12);
+  EXPECT_NEAR(correlation(gain, -gain), -1, 1e-12);
+  EXPECT_NEAR(correlation(Eigen::Vector3d(1, 0, -1), Eigen::Vector3d(1, -2, 1)), 0, 1e-12);
+}
+
+}  // namespace
+}  // namespace mmradartwin::diagnosis
