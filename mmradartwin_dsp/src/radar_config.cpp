@@ -80,8 +80,8 @@ RadarConfig read(YamlMap yaml) {
     yaml.fail("ramp_end_s", yamlNumber(radar.ramp_end_s) + " ends before the last sample; it must be at least " +
                                 yamlNumber(adc_end_s) + " (adc_start_s + samples_per_chirp/sample_rate_hz)");
   }
-  const double busy_s = radar.chirps_per_frame() *
-                        (std::isnan(radar.chirp_period_s()) ? adc_end_s : radar.chirp_period_s());
+  const double busy_s =
+      radar.chirps_per_frame() * (std::isnan(radar.chirp_period_s()) ? adc_end_s : radar.chirp_period_s());
   if (busy_s > radar.frame_period_s + 1e-9) {
     yaml.fail("frame_period_s", yamlNumber(radar.frame_period_s) + " is shorter than the frame's " +
                                     std::to_string(radar.chirps_per_frame()) + " chirps; it must be at least " +

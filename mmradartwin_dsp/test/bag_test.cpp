@@ -1,3 +1,5 @@
+#include "mmradartwin_dsp/ros/bag.h"
+
 #include <gtest/gtest.h>
 #include <mmradartwin_msgs/Session.h>
 #include <ros/time.h>
@@ -6,7 +8,6 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include "mmradartwin_dsp/average_pose.h"
-#include "mmradartwin_dsp/ros/bag.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "test_session_folder.h"
 

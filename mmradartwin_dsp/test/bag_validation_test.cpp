@@ -1,4 +1,6 @@
 // A clean live recording has no findings; each fault put into it is found, counted and placed.
+#include "mmradartwin_dsp/ros/bag_validation.h"
+
 #include <gtest/gtest.h>
 #include <mmradartwin_msgs/AdcCube.h>
 #include <ros/time.h>
@@ -8,7 +10,6 @@
 
 #include <cstdlib>
 
-#include "mmradartwin_dsp/ros/bag_validation.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "test_session_folder.h"
 

@@ -1,10 +1,11 @@
+#include "mmradartwin_dsp/capture.h"
+
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <fstream>
 #include <random>
 
-#include "mmradartwin_dsp/capture.h"
 #include "test_radar.h"
 
 namespace mmradartwin {

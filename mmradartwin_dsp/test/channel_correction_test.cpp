@@ -1,7 +1,8 @@
+#include "mmradartwin_dsp/channel_correction.h"
+
 #include <gtest/gtest.h>
 
 #include "mmradartwin_dsp/average_pose.h"
-#include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "test_radar.h"
 #include "test_session_folder.h"

@@ -1,9 +1,10 @@
 // Settings of TI's tools, in the forms that people publish.
+#include "mmradartwin_dsp/device_settings.h"
+
 #include <gtest/gtest.h>
 
 #include <fstream>
 
-#include "mmradartwin_dsp/device_settings.h"
 #include "test_radar.h"
 
 namespace mmradartwin {

@@ -1,3 +1,5 @@
+#include "mmradartwin_dsp/ros/frame_spool.h"
+
 #include <gtest/gtest.h>
 #include <ros/time.h>
 #include <rosbag/bag.h>
@@ -7,7 +9,6 @@
 
 #include "mmradartwin_dsp/ros/bag.h"
 #include "mmradartwin_dsp/ros/conversions.h"
-#include "mmradartwin_dsp/ros/frame_spool.h"
 #include "test_session_folder.h"
 
 namespace mmradartwin {

@@ -1,9 +1,10 @@
+#include "mmradartwin_dsp/map_picture.h"
+
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
-#include "mmradartwin_dsp/map_picture.h"
 #include "test_radar.h"
 
 namespace mmradartwin {

@@ -1,8 +1,9 @@
+#include "mmradartwin_dsp/strict_yaml.h"
+
 #include <gtest/gtest.h>
 
 #include <fstream>
 
-#include "mmradartwin_dsp/strict_yaml.h"
 #include "test_radar.h"
 
 namespace mmradartwin {

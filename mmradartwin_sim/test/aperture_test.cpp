@@ -1,7 +1,8 @@
+#include "physics/aperture.h"
+
 #include <gtest/gtest.h>
 
 #include "closed_form.h"
-#include "physics/aperture.h"
 #include "physics/fresnel_integral.h"
 
 namespace mmradartwin {

@@ -1,5 +1,6 @@
-#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/material.h"
+
+#include "mmradartwin_dsp/input_error.h"
 #include "scene_files.h"
 
 namespace mmradartwin {

@@ -1,8 +1,9 @@
+#include "mmradartwin_sim/moving_twin.h"
+
 #include <algorithm>
 #include <random>
 
 #include "mmradartwin_dsp/input_error.h"
-#include "mmradartwin_sim/moving_twin.h"
 #include "scene_files.h"
 
 namespace mmradartwin {

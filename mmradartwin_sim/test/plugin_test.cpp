@@ -1,6 +1,7 @@
+#include "mmradartwin_sim/plugin.h"
+
 #include <cstdlib>
 
-#include "mmradartwin_sim/plugin.h"
 #include "scene_files.h"
 
 namespace mmradartwin {

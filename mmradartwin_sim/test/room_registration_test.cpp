@@ -1,6 +1,8 @@
 // The camera's pose from its cloud, on depth rendered from the shipped office and from a real room's scan, and what
 // must be refused: wrong rooms, far guesses, walls that fix nothing.
 
+#include "mmradartwin_sim/room_registration.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,7 +13,6 @@
 #include <stdexcept>
 
 #include "depth_camera.h"
-#include "mmradartwin_sim/room_registration.h"
 #include "scene_files.h"
 
 namespace mmradartwin {

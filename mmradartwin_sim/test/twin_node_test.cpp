@@ -1,6 +1,8 @@
 // TwinNode in this process, its callbacks called by the test: what a slow simulation leaves of a fast stream, what is
 // simulated again when the radar stands, and actors that move with tf.
 
+#include "mmradartwin_sim/ros/twin_node.h"
+
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <gtest/gtest.h>
@@ -14,7 +16,6 @@
 
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/session_files.h"
-#include "mmradartwin_sim/ros/twin_node.h"
 #include "scene_files.h"
 
 namespace mmradartwin {

@@ -41,8 +41,7 @@ class HeightGain : public mmradartwin::Mechanism, public mmradartwin::WeightStag
 };
 
 const bool kIsCatalogued = [] {
-  mmradartwin::addCause(
-      {"height_gain", mmradartwin::ResidualClass::kUnsupportedAnchor, {{"db_per_m", "dB/m"}}, {}});
+  mmradartwin::addCause({"height_gain", mmradartwin::ResidualClass::kUnsupportedAnchor, {{"db_per_m", "dB/m"}}, {}});
   return true;
 }();
 
