@@ -44,13 +44,13 @@ Rig::Rig(const RadarConfig& radar, const RigOptions& options, CubeSink cubes, Ev
   parseIpv4(options_.card_ip);
   if (!options_.record_pcap.empty()) recording_ = std::make_unique<PcapWriter>(options_.record_pcap);
   if (options_.radar) {
-    watch_ = std::make_unique<RadarWatch>(*options_.radar, options_.radar_firmware,
-                                          [this](RadarWatch::Level level, const std::string& text) {
-                                            events_(level == RadarWatch::Level::kInfo      ? Level::kInfo
-                                                    : level == RadarWatch::Level::kWarning ? Level::kWarning
-                                                                                           : Level::kError,
-                                                    text);
-                                          });
+    radar_control_ = options_.radar->control(radar_, options_.radar_firmware,
+                                             [this](RadarEvent::Level level, const std::string& text) {
+                                               events_(level == RadarEvent::Level::kInfo      ? Level::kInfo
+                                                       : level == RadarEvent::Level::kWarning ? Level::kWarning
+                                                                                              : Level::kError,
+                                                       text);
+                                             });
   }
   silent_since_ = Clock::now();
   thread_ = std::thread([this] { run(); });
@@ -64,7 +64,7 @@ Rig::~Rig() {
 RigState Rig::state() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   RigState state = state_;
-  if (watch_) state.radar = watch_->state();
+  if (radar_control_) state.radar = radar_control_->health();
   state.silent_s = std::chrono::duration<double>(Clock::now() - silent_since_).count();
   return state;
 }
@@ -87,7 +87,7 @@ void Rig::run() {
   assembler_.flush();
   publishState();
   try {
-    if (watch_) watch_->stop();
+    if (radar_control_) radar_control_->stop();
   } catch (const RigError&) {
     // The radar is gone: nothing to stop.
   }
@@ -120,9 +120,9 @@ void Rig::open() {
 }
 
 void Rig::prepareRadar() {
-  if (!watch_ || !watch_->prepare()) return;
+  if (!radar_control_ || !radar_control_->configure()) return;
   configured_ = false;  // the card locks to the LVDS clock when it is configured
-  events_(Level::kInfo, "AWR2243 configured, firmware " + watch_->state().version);
+  events_(Level::kInfo, options_.radar->title + " configured, firmware " + radar_control_->health().version);
 }
 
 void Rig::configure() {
@@ -145,14 +145,14 @@ void Rig::configure() {
 
 void Rig::arm() {
   if (options_.configure_card) {
-    if (watch_) watch_->stop();
+    if (radar_control_) radar_control_->stop();
     // What an earlier recording left in the socket would be taken for the start of this one.
     receiver_->drain();
     while (control_->takeStatus(milliseconds(0))) {
     }
     assembler_.restart();
     control_->startRecord();
-    if (watch_) watch_->start();
+    if (radar_control_) radar_control_->start();
   }
   last_data_ = Clock::now();
   {
@@ -163,7 +163,7 @@ void Rig::arm() {
     ++state_.armings;
   }
   setPhase(RigState::Phase::kArmed);
-  events_(Level::kInfo, watch_                    ? "armed, and the radar's frames started"
+  events_(Level::kInfo, radar_control_            ? "armed, and the radar's frames started"
                         : options_.configure_card ? "armed: waiting for the radar's frames"
                                                   : "listening for a card that another program configures");
 }
@@ -176,7 +176,7 @@ bool Rig::receiveBatch(int timeout_ms) {
 
 void Rig::checkFirstSamples(Clock::duration silent) {
   if (silent < kFirstSamples + std::chrono::duration<double>(2 * radar_.frame_period_s)) return;
-  watch_->forget();
+  radar_control_->forget();
   throw RigError(
       "the radar runs, and no samples come from the card: seat the LVDS ribbon between the boards; radar and "
       "card are set up anew");
@@ -208,8 +208,8 @@ void Rig::stream() {
       }
     }
     if (!options_.configure_card) continue;
-    if (watch_ && !any_data) checkFirstSamples(silent);
-    if (watch_ && watch_->returned()) {
+    if (radar_control_ && !any_data) checkFirstSamples(silent);
+    if (radar_control_ && radar_control_->health().returned) {
       events_(Level::kWarning, "the radar's USB port is there again: radar and card are set up anew");
       return control_->stopRecord();
     }
@@ -238,7 +238,7 @@ bool Rig::handleStatus(std::uint16_t status) {
   }
   if (status & kRecordCompleted) {
     // Frames that this rig started run until it stops them.
-    events_(watch_ ? Level::kWarning : Level::kInfo,
+    events_(radar_control_ ? Level::kWarning : Level::kInfo,
             "the card has completed its recording: the radar's frames have ended");
     // The last packets may be behind the status.
     while (receiveBatch(20) && !stop_) {

@@ -14,12 +14,11 @@
 #include <memory>
 #include <sstream>
 
-#include "mmradartwin_driver/awr2243_control.h"
 #include "mmradartwin_driver/dca1000_control.h"
 #include "mmradartwin_driver/link_budget.h"
 #include "mmradartwin_driver/packet_receiver.h"
+#include "mmradartwin_driver/radar_devices.h"
 #include "mmradartwin_driver/rig_error.h"
-#include "mmradartwin_driver/rig_self_test.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -50,8 +49,6 @@ std::string number(const char* format, double value) {
   std::snprintf(text, sizeof text, format, value);
   return text;
 }
-
-constexpr std::size_t kSelfTestFrames = 20;
 
 struct Interface {
   std::string name;
@@ -237,43 +234,16 @@ class Examination {
 
   /// The radar is brought up before the card is configured: that wants its LVDS clock.
   void selfTest() {
-    const RadarConfig radar = selfTestRadar(*options_.radar);
-    std::string step = "radar";
-    try {
-      const Awr2243Registers registers = quantiseAwr2243(radar, "radar.yaml");
-      const RadarConfig quantised = withQuantisedValues(radar, registers);
-      const std::vector<std::uint8_t> image =
-          options_.radar_firmware.empty() ? std::vector<std::uint8_t>() : loadFirmwareImage(options_.radar_firmware);
-      UsbDevice usb;
-      FtdiRadarPort port(usb);
-      std::string warnings;
-      Awr2243Control control(port, [&](const awr2243::EventText& event, const SubBlock&) {
-        if (event.level != awr2243::EventText::Level::kInfo) warnings += "; " + event.text;
-      });
-      control.bringUp(registers, image, options_.radar_firmware);
-      tell(warnings.empty() ? Level::kFine : Level::kNote, "radar",
-           "the AWR2243 is configured, firmware " + control.version().text() + ", " +
-               std::to_string(control.temperature_deg_c().value_or(0)) + " deg C at calibration" + warnings);
-      step = "lane pattern";
-      awr2243::TestPattern pattern = selfTestPattern();
-      tell(judgeTestPattern(quantised,
-                            recordBytes(16 * selfTestPacketBytes(), [&] { control.setTestPattern(pattern); })));
-      pattern.enable = 0;
-      control.setTestPattern(pattern);
-      step = "test source";
-      control.enableTestSource(selfTestSource(quantised));
-      const auto bytes = recordBytes(kSelfTestFrames * quantised.bytes_per_frame(), [&] { control.start(); });
-      control.stop();
-      control.disableTestSource();
-      tell(judgeTestSource(quantised, bytes));
-    } catch (const RigError& error) {
-      tell(Level::kProblem, step, error.what(), "run this again; power the boards off and on if it stays so");
-    }
+    SelfTestRig rig;
+    rig.record = [this](std::size_t wanted, double expected_s, const std::function<void()>& begin) {
+      return recordBytes(wanted, expected_s, begin);
+    };
+    rig.tell = [this](const CheckResult& result) { tell(result); };
+    radarDevice(*options_.radar, "radar.yaml").self_test(*options_.radar, options_.radar_firmware, rig);
   }
 
-  /// Arms the card, lets the radar begin, and returns the recording's first `wanted` bytes. Throws RigError where they
-  /// do not come, or not whole.
-  std::vector<std::uint8_t> recordBytes(std::size_t wanted, const std::function<void()>& begin) {
+  /// As SelfTestRig's record.
+  std::vector<std::uint8_t> recordBytes(std::size_t wanted, double expected_s, const std::function<void()>& begin) {
     control_->resetFpga();
     control_->configureFpga(4);
     control_->configurePackets(options_.packet_delay_us);
@@ -283,9 +253,8 @@ class Examination {
     std::vector<std::uint8_t> bytes(wanted);
     std::vector<bool> have(wanted);
     std::size_t missing = wanted;
-    const auto until =
-        Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
-                           options_.first_packet_s + 2 * kSelfTestFrames * options_.radar->frame_period_s));
+    const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                          std::chrono::duration<double>(options_.first_packet_s + expected_s));
     while (missing > 0 && Clock::now() < until) {
       receiver_->receive(20, [&](const DataPacket& packet) {
         for (std::size_t i = 0; i < packet.size && packet.byte_count + i < wanted; ++i) {
@@ -417,6 +386,9 @@ bool checkRig(const RigDoctorOptions& options, const std::function<void(const Ch
   packetDelayTicks(options.packet_delay_us);
   if (options.self_test && !(options.radar && options.usb)) {
     throw InputError("the self-test needs a radar.yaml (--radar) and the radar's USB port");
+  }
+  if (options.self_test && !radarDevice(*options.radar, "radar.yaml").self_test) {
+    throw InputError("radar.yaml: key device: '" + options.radar->device + "' has no self-test");
   }
   return Examination(options, report).run();
 }

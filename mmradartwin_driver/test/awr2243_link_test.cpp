@@ -1,4 +1,4 @@
-#include "mmradartwin_driver/awr2243_link.h"
+#include "awr2243/awr2243_link.h"
 
 #include <gtest/gtest.h>
 

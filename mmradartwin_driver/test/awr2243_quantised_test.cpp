@@ -1,4 +1,4 @@
-#include "mmradartwin_driver/awr2243_quantised.h"
+#include "awr2243/awr2243_quantised.h"
 
 #include <gtest/gtest.h>
 

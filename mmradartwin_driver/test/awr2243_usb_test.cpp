@@ -13,8 +13,8 @@
 #include <string>
 
 #include "../emulator/emulated_usb_bus.h"
+#include "awr2243/awr2243_control.h"
 #include "emulated_radar_bus.h"
-#include "mmradartwin_driver/awr2243_control.h"
 
 namespace mmradartwin {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "../emulator/emulated_ftdi.h"
-#include "mmradartwin_driver/awr2243_quantised.h"
+#include "awr2243/awr2243_quantised.h"
 #include "mmradartwin_driver/rig_error.h"
 #include "mmradartwin_driver/usb_device.h"
 

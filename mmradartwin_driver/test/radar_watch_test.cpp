@@ -1,5 +1,5 @@
 // The radar's watcher beside the thread that controls it, on the emulated chip; also run under the thread sanitizer.
-#include "mmradartwin_driver/radar_watch.h"
+#include "awr2243/radar_watch.h"
 
 #include <gtest/gtest.h>
 
@@ -75,7 +75,7 @@ class RadarWatchTest : public testing::Test {
   std::mutex mutex_;
   std::vector<std::string> texts_;
   RadarWatch watch_{deploymentRegisters(), "",
-                    [this](RadarWatch::Level, const std::string& text) {
+                    [this](RadarEvent::Level, const std::string& text) {
                       const std::lock_guard<std::mutex> lock(mutex_);
                       texts_.push_back(text);
                     },
@@ -83,17 +83,17 @@ class RadarWatchTest : public testing::Test {
 };
 
 TEST_F(RadarWatchTest, FetchesEventsWhileFramesRun) {
-  EXPECT_TRUE(watch_.prepare());
-  EXPECT_FALSE(watch_.prepare());  // it is up
+  EXPECT_TRUE(watch_.configure());
+  EXPECT_FALSE(watch_.configure());  // it is up
   watch_.start();
-  const RadarWatch::State before = watch_.state();
+  const RadarHealth before = watch_.health();
   EXPECT_TRUE(before.configured && before.running);
   EXPECT_EQ(before.temperature_deg_c, 45);
   EXPECT_EQ(before.starts, 1u);
   EXPECT_FALSE(before.version.empty());
   cable_.raise(0x1003, {1, 2, 3, 4});
-  EXPECT_TRUE(waitUntil([&] { return watch_.state().events > before.events; }));
-  const RadarWatch::State after = watch_.state();
+  EXPECT_TRUE(waitUntil([&] { return watch_.health().events > before.events; }));
+  const RadarHealth after = watch_.health();
   EXPECT_EQ(after.warnings + after.errors, 1u);
   EXPECT_TRUE(said("radar: " + after.latest.front().text));
   watch_.stop();
@@ -101,18 +101,18 @@ TEST_F(RadarWatchTest, FetchesEventsWhileFramesRun) {
 }
 
 TEST_F(RadarWatchTest, NoticesAPulledCableAndItsReturn) {
-  watch_.prepare();
+  watch_.configure();
   watch_.start();
   cable_.plug(false);
-  EXPECT_TRUE(waitUntil([&] { return watch_.state().problem == "the cable is out"; }));
-  EXPECT_FALSE(watch_.state().running);
-  EXPECT_FALSE(watch_.returned());
-  EXPECT_THROW(watch_.prepare(), RigError);
+  EXPECT_TRUE(waitUntil([&] { return watch_.health().problem == "the cable is out"; }));
+  EXPECT_FALSE(watch_.health().running);
+  EXPECT_FALSE(watch_.health().returned);
+  EXPECT_THROW(watch_.configure(), RigError);
   cable_.plug(true);
-  EXPECT_TRUE(waitUntil([&] { return watch_.returned(); }));
-  EXPECT_TRUE(watch_.prepare());
+  EXPECT_TRUE(waitUntil([&] { return watch_.health().returned; }));
+  EXPECT_TRUE(watch_.configure());
   watch_.start();
-  const RadarWatch::State state = watch_.state();
+  const RadarHealth state = watch_.health();
   EXPECT_EQ(state.problem, "");
   EXPECT_EQ(state.bring_ups, 2u);
   EXPECT_TRUE(cable_.framesRun());
@@ -122,18 +122,18 @@ TEST_F(RadarWatchTest, IsControlledAndAskedAtOnce) {
   std::atomic<bool> stop{false};
   std::thread asking([&] {
     while (!stop) {
-      const RadarWatch::State state = watch_.state();
+      const RadarHealth state = watch_.health();
       EXPECT_LE(state.latest.size(), 10u);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   });
-  watch_.prepare();
+  watch_.configure();
   for (std::uint8_t i = 0; i < 10; ++i) {
     watch_.start();
     cable_.raise(0x1003, {i, 0, 0, 0});
     watch_.stop();
   }
-  EXPECT_TRUE(waitUntil([&] { return watch_.state().warnings + watch_.state().errors == 10; }));
+  EXPECT_TRUE(waitUntil([&] { return watch_.health().warnings + watch_.health().errors == 10; }));
   stop = true;
   asking.join();
 }

@@ -1,6 +1,6 @@
 // The doctor's self-test: its judgement on bytes made here, and the program against an emulated rig with good and with
 // wrong wiring.
-#include "mmradartwin_driver/rig_self_test.h"
+#include "awr2243/rig_self_test.h"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>

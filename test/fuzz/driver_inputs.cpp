@@ -2,8 +2,8 @@
 #include <cstring>
 
 #include "hostile_input.h"
-#include "mmradartwin_driver/awr2243_control.h"
-#include "mmradartwin_driver/awr2243_messages.h"
+#include "awr2243/awr2243_control.h"
+#include "awr2243/awr2243_messages.h"
 #include "mmradartwin_driver/dca1000_protocol.h"
 #include "mmradartwin_driver/frame_assembler.h"
 #include "mmradartwin_driver/mmwavelink_frame.h"

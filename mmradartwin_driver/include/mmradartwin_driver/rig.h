@@ -15,7 +15,8 @@
 #include "mmradartwin_driver/frame_assembler.h"
 #include "mmradartwin_driver/packet_receiver.h"
 #include "mmradartwin_driver/pcap_writer.h"
-#include "mmradartwin_driver/radar_watch.h"
+#include "mmradartwin_driver/radar_control.h"
+#include "mmradartwin_driver/radar_devices.h"
 #include "mmradartwin_dsp/radar_config.h"
 
 namespace mmradartwin {
@@ -26,9 +27,9 @@ struct RigOptions {
   std::uint16_t config_port = kDca1000ConfigPort;
   std::uint16_t data_port = kDca1000DataPort;
   double packet_delay_us = 25;
-  /// An AWR2243 to bring up over USB, and to start whenever the card has been armed, so that frames and recording begin
-  /// together. Without it another program runs the radar.
-  std::optional<Awr2243Registers> radar;
+  /// The radar's kind, see radarDevice(). The rig configures such a radar, and starts it whenever the card has been
+  /// armed, so that frames and recording begin together. Without it another program runs the radar.
+  std::optional<RadarDevice> radar;
   std::string radar_firmware;  ///< image for a radar whose flash is empty
   bool configure_card = true;  ///< false: another program configures and arms it, only the data port is opened
   std::string record_pcap;     ///< records everything between card and host there; "" = nowhere
@@ -43,7 +44,7 @@ struct RigState {
   Phase phase = Phase::kConnecting;
   std::string problem;  ///< one line that says the next thing to do; empty while all is well
   std::optional<FpgaVersion> version;
-  std::optional<RadarWatch::State> radar;    ///< where the rig configures it
+  std::optional<RadarHealth> radar;          ///< where the rig configures it
   std::optional<std::uint16_t> last_status;  ///< of the card, since it was armed
   std::uint64_t armings = 0;
   double silent_s = 0;           ///< since the last packet, or since arming
@@ -104,7 +105,7 @@ class Rig {
   FrameAssembler assembler_;
   std::unique_ptr<PacketReceiver> receiver_;
   std::unique_ptr<Dca1000Control> control_;
-  std::unique_ptr<RadarWatch> watch_;
+  std::unique_ptr<RadarControl> radar_control_;
   PacketReceiver::Counters earlier_;  ///< of receivers that were closed
   bool configured_ = false;
   const Clock::time_point started_ = Clock::now();

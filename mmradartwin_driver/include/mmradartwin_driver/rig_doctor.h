@@ -22,8 +22,8 @@ struct RigDoctorOptions {
   double first_packet_s = 5;             ///< longest wait for samples
   std::size_t buffer_bytes = 32u << 20;  ///< of the data socket
   bool usb = true;                       ///< look for the radar's USB port
-  /// Configure the radar (an AWR2243, `radar` with the keys for that) and let the chip make samples up, see
-  /// rig_self_test.h. Afterwards it must be configured again.
+  /// Configure the radar (`radar` with the keys for that) and let the chip make samples up. Afterwards it must be
+  /// configured again.
   bool self_test = false;
   std::string radar_firmware;  ///< image for a radar whose flash is empty, with self_test
   std::string sysfs = "/sys", devfs = "/dev", procfs = "/proc", etc = "/etc";

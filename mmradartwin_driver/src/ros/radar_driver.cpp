@@ -93,8 +93,8 @@ void RadarDriver::readParameters(const ros::NodeHandle& private_nh) {
       throw InputError(private_nh.resolveName("configure_radar") +
                        ": true needs configure_card: true, since the radar is started when the card has been armed");
     }
-    options_.radar = quantiseAwr2243(radar_, file);
-    radar_ = withQuantisedValues(radar_, *options_.radar);
+    options_.radar = radarDevice(radar_, file);
+    radar_ = options_.radar->quantised(radar_, file);
   } else if (!options_.radar_firmware.empty()) {
     throw InputError(private_nh.resolveName("radar_firmware") + ": " + options_.radar_firmware +
                      ": is used with configure_radar: true only");
@@ -197,15 +197,15 @@ void RadarDriver::diagnoseCard(diagnostic_updater::DiagnosticStatusWrapper& stat
 }
 
 void RadarDriver::diagnoseDevice(diagnostic_updater::DiagnosticStatusWrapper& status) {
-  const RadarWatch::State state = *rig_->state().radar;
+  const RadarHealth state = *rig_->state().radar;
   const auto now = std::chrono::system_clock::now();
-  const auto recent = std::find_if(state.latest.begin(), state.latest.end(), [&](const RadarWatch::Event& event) {
-    return event.level != RadarWatch::Level::kInfo && now - event.at < std::chrono::seconds(10);
+  const auto recent = std::find_if(state.latest.begin(), state.latest.end(), [&](const RadarEvent& event) {
+    return event.level != RadarEvent::Level::kInfo && now - event.at < std::chrono::seconds(10);
   });
   if (!state.problem.empty()) {
     status.summary(DiagnosticStatus::ERROR, state.problem);
   } else if (recent != state.latest.end()) {
-    const bool error = recent->level == RadarWatch::Level::kError;
+    const bool error = recent->level == RadarEvent::Level::kError;
     status.summary(error ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN, "event: " + recent->text);
   } else if (!state.running) {
     status.summary(DiagnosticStatus::WARN,

@@ -17,7 +17,7 @@ namespace mmradartwin {
 /// stream" (rate, loss, drops of this host), "capture card" (status, version), "radar device" (events, temperature)
 /// and "radar pose" (age, gaps and jumps of tf).
 /// Private parameters: radar (path of radar.yaml, required), host_ip, card_ip, config_port, data_port, packet_delay_us,
-/// configure_card, configure_radar (bring an AWR2243 up over USB; radar/config then says the values as the chip rounds
+/// configure_card, configure_radar (bring the radar up over USB; radar/config then says the values as the chip rounds
 /// them), radar_firmware (image for an empty flash), record_pcap (a pcap file to record all packets to), frame_id,
 /// map_frame (empty: poses are not watched), pose_age_limit_s.
 class RadarDriver {

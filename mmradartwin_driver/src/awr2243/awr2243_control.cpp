@@ -1,4 +1,4 @@
-#include "mmradartwin_driver/awr2243_control.h"
+#include "awr2243/awr2243_control.h"
 
 #include <algorithm>
 #include <fstream>

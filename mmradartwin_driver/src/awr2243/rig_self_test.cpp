@@ -1,4 +1,4 @@
-#include "mmradartwin_driver/rig_self_test.h"
+#include "awr2243/rig_self_test.h"
 
 #include <algorithm>
 #include <array>

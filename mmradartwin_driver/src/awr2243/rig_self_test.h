@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "mmradartwin_driver/awr2243_messages.h"
+#include "awr2243/awr2243_messages.h"
 #include "mmradartwin_driver/check_result.h"
 #include "mmradartwin_dsp/radar_config.h"
 

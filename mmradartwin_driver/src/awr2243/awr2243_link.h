@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "mmradartwin_driver/awr2243_control.h"
+#include "awr2243/awr2243_control.h"
 #include "mmradartwin_driver/usb_device.h"
 
 namespace mmradartwin {

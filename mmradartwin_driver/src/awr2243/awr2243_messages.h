@@ -6,8 +6,9 @@
 #include <type_traits>
 #include <vector>
 
-#include "mmradartwin_driver/awr2243_quantised.h"
+#include "awr2243/awr2243_quantised.h"
 #include "mmradartwin_driver/mmwavelink_frame.h"
+#include "mmradartwin_driver/radar_control.h"
 
 namespace mmradartwin {
 
@@ -216,7 +217,7 @@ std::vector<std::uint8_t> withCrc(std::vector<std::uint8_t> image);
 
 /// One line for people, such as "RF calibration failed: TX power, RX gain (61 deg C)".
 struct EventText {
-  enum class Level { kInfo, kWarning, kError };
+  using Level = RadarEvent::Level;
   Level level = Level::kInfo;
   std::string text;
 };

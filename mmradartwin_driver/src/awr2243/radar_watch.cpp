@@ -1,4 +1,4 @@
-#include "mmradartwin_driver/radar_watch.h"
+#include "awr2243/radar_watch.h"
 
 #include <chrono>
 #include <utility>
@@ -39,8 +39,8 @@ void RadarWatch::took(const awr2243::EventText& event) {
   {
     const std::lock_guard<std::mutex> lock(state_mutex_);
     ++state_.events;
-    state_.warnings += event.level == Level::kWarning ? 1 : 0;
-    state_.errors += event.level == Level::kError ? 1 : 0;
+    state_.warnings += event.level == RadarEvent::Level::kWarning ? 1 : 0;
+    state_.errors += event.level == RadarEvent::Level::kError ? 1 : 0;
     state_.latest.push_front({event.level, event.text, std::chrono::system_clock::now()});
     if (state_.latest.size() > kLatestEvents) state_.latest.pop_back();
   }
@@ -68,7 +68,7 @@ void RadarWatch::controlled(Action action) {
   state_.temperature_deg_c = link_.temperature_deg_c();
 }
 
-bool RadarWatch::prepare() {
+bool RadarWatch::configure() {
   bool brought_up = false;
   controlled([&] {
     brought_up = link_.version().empty();
@@ -102,9 +102,11 @@ void RadarWatch::forget() {
   state_.configured = state_.running = false;
 }
 
-RadarWatch::State RadarWatch::state() const {
+RadarHealth RadarWatch::health() const {
   const std::lock_guard<std::mutex> lock(state_mutex_);
-  return state_;
+  RadarHealth health = state_;
+  health.returned = returned_;
+  return health;
 }
 
 void RadarWatch::run() {
@@ -122,7 +124,7 @@ void RadarWatch::run() {
         continue;
       }
       fail(error.what());
-      if (events_) events_(Level::kError, error.what());
+      if (events_) events_(RadarEvent::Level::kError, error.what());
     }
   }
 }

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "mmradartwin_driver/awr2243_messages.h"
-#include "mmradartwin_driver/awr2243_quantised.h"
+#include "awr2243/awr2243_messages.h"
+#include "awr2243/awr2243_quantised.h"
 #include "mmradartwin_driver/mpsse_spi.h"
 
 namespace mmradartwin {
