@@ -151,7 +151,7 @@ TEST_F(ReceiverTest, AReplicaFollowsEveryEchoOrOneActors) {
     EXPECT_NEAR(db(replica.amplitude / echo.amplitude), -9, 1e-9);
     for (std::size_t k = 0; k < echo.length_m.size(); ++k) {
       EXPECT_NEAR(replica.length_m[k] - echo.length_m[k], 1.4, 1e-12);
-      // The way of a wave that is 1.4 m longer, at the window's centre (DESIGN section 3).
+      // The way of a wave that is 1.4 m longer, at the window's centre (docs/contracts.md section 3).
       const double tau = replica.length_m[k] / kSpeedOfLight_m_per_s, was = echo.length_m[k] / kSpeedOfLight_m_per_s;
       const RadarConfig radar = paperRadar();
       const double turns =

@@ -68,7 +68,7 @@ TEST_F(TwinTest, LeavesRecordsThatAddUpToTheGrid) {
   expectForm("4.10 sum of records against the grid", "1", 0, worst(s.grid.x, rebuilt), 1e-12);
 }
 
-// The samples of DESIGN section 3 for one exactly known delay, including the residual video phase.
+// The samples of docs/contracts.md section 3 for one exactly known delay, including the residual video phase.
 TEST_F(TwinTest, MakesTheSamplesOfTheConvention) {
   addWall("wall", "Metal", {3, -10}, {3, 10}, -5, 5);
   const RadarConfig radar = paperRadar();

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cstring>
 
-#include "hostile_input.h"
 #include "awr2243/awr2243_control.h"
 #include "awr2243/awr2243_messages.h"
+#include "hostile_input.h"
 #include "mmradartwin_driver/dca1000_protocol.h"
 #include "mmradartwin_driver/frame_assembler.h"
 #include "mmradartwin_driver/mmwavelink_frame.h"

@@ -108,7 +108,7 @@ struct ChangedRecord {
   double strongest_db() const;  ///< the larger amplitude of both
 };
 
-/// One entry of findings.json (DESIGN section 5). Class and action follow from the cause.
+/// One entry of findings.json (docs/contracts.md section 5). Class and action follow from the cause.
 struct Finding {
   std::string cause;  ///< a binding name or "unknown"
   std::vector<FindingParameter> parameters;

@@ -18,9 +18,9 @@ struct Stretch {
   std::int64_t last_stamp_ns = 0;
 };
 
-/// Finds the stretches of at least 1 s in which T_map_radar stays within 2 cm and 1 deg of its median (DESIGN section
-/// 5). `frames` in order of time; a gap of more than 1 s ends a stretch. Poses are named 001, 002, ...; those within
-/// 10 cm horizontally of a location's first pose share it.
+/// Finds the stretches of at least 1 s in which T_map_radar stays within 2 cm and 1 deg of its median
+/// (docs/contracts.md section 5). `frames` in order of time; a gap of more than 1 s ends a stretch. Poses are named
+/// 001, 002, ...; those within 10 cm horizontally of a location's first pose share it.
 std::vector<Stretch> findStationaryPoses(const std::vector<StampedTransform>& frames, std::int64_t frame_period_ns);
 
 }  // namespace mmradartwin

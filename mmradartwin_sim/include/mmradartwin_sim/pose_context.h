@@ -43,7 +43,7 @@ struct PoseContext {
   int only_actor = -1;
 };
 
-/// One chirp of one frame of a pose, for what differs from chirp to chirp (DESIGN section 3: chirps come as
+/// One chirp of one frame of a pose, for what differs from chirp to chirp (docs/contracts.md section 3: chirps come as
 /// loop * slots + slot).
 struct ChirpContext {
   const PoseContext& pose;

@@ -31,7 +31,7 @@ bool isPresence(const std::vector<ParameterSpec>& specs) {
   });
 }
 
-/// False of what lies: floors, ceilings, table tops reflect and scatter nothing (DESIGN section 4).
+/// False of what lies: floors, ceilings, table tops reflect and scatter nothing (docs/contracts.md section 4).
 bool takesPart(const Scene& scene, const Actor& actor) {
   return std::any_of(actor.facets.begin(), actor.facets.end(), [&](int id) {
     const Facet& f = scene.facets[static_cast<std::size_t>(id)];
