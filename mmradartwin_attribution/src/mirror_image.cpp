@@ -1,5 +1,5 @@
 // Image search in geometry of its own: expected regions come from scene and pose alone and share nothing with
-// the simulator but facets and occlusion, so that an error of the simulator's geometry shows as a residual (DESIGN
+// the simulator but facets and occlusion, so that an error of the simulator's geometry shows as a residual (docs/contracts.md
 // section 6).
 
 #include "mirror_image.h"

@@ -3,19 +3,25 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <condition_variable>
+#include <memory>
 #include <mutex>
+#include <string>
+#include <vector>
 
 #include "emulated_rig.h"
+#include "mmradartwin_driver/radar_devices.h"
 #include "mmradartwin_dsp/capture.h"
+#include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
 namespace {
 
 struct RunningRig {
-  explicit RunningRig(const RadarConfig& radar)
+  explicit RunningRig(const RadarConfig& radar, const RigOptions& rig_options = options())
       : rig(
-            radar, options(), [this](AdcCube&& cube) { take(std::move(cube)); },
+            radar, rig_options, [this](AdcCube&& cube) { take(std::move(cube)); },
             [this](Rig::Level, const std::string& text) {
               const std::lock_guard<std::mutex> lock(mutex);
               events.push_back(text);
@@ -167,6 +173,109 @@ TEST(Rig, LooksAtTheCardsVersion) {
   RunningRig running(radar);
   EXPECT_TRUE(running.waitForCubes(30));  // an unknown one is tried
   EXPECT_TRUE(running.saw("FPGA 2.5: the driver is made after FPGA 2.7 to 2.9"));
+}
+
+/// A radar that no driver knows: it writes down what is asked of it, and fails as often as it is told to.
+class MadeUpRadar : public RadarControl {
+ public:
+  struct Log {
+    std::mutex mutex;
+    std::vector<std::string> calls;
+    int failures = 0;
+    void add(const std::string& call) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      calls.push_back(call);
+    }
+    std::vector<std::string> all() {
+      const std::lock_guard<std::mutex> lock(mutex);
+      return calls;
+    }
+  };
+  explicit MadeUpRadar(std::shared_ptr<Log> log) : log_(std::move(log)) {}
+  ~MadeUpRadar() override { log_->add("gone"); }
+  bool configure() override {
+    log_->add("configure");
+    if (log_->failures-- > 0) throw RigError("the made-up radar is asleep: wake it");
+    const bool anew = !health_.configured;
+    health_.configured = true;
+    health_.version = "7.1";
+    return anew;
+  }
+  void start() override { log_->add("start"); }
+  void stop() override { log_->add("stop"); }
+  void forget() override { health_.configured = false; }
+  RadarHealth health() const override { return health_; }
+
+ private:
+  std::shared_ptr<Log> log_;
+  RadarHealth health_;
+};
+
+/// A session whose radar.yaml names the made-up device, which is known from then on under that name.
+RigOptions optionsFor(const std::string& name, const std::shared_ptr<MadeUpRadar::Log>& log, RadarConfig& radar) {
+  radar.device = name;
+  registerRadarDevice({name,
+                       "Made-up radar",
+                       [](const RadarConfig& config, const std::string&) { return config; },
+                       [log](const RadarConfig&, const std::string&, RadarControl::EventSink) {
+                         return std::make_unique<MadeUpRadar>(log);
+                       },
+                       {}});
+  RigOptions options = RunningRig::options();
+  options.radar = radarDevice(radar, "radar.yaml");
+  return options;
+}
+
+TEST(Rig, DrivesARadarOfAnotherKindInTheSameOrder) {
+  TestFolder folder;
+  writeSession(folder, 0.01, {30});
+  RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  const auto log = std::make_shared<MadeUpRadar::Log>();
+  const RigOptions options = optionsFor("made_up", log, radar);
+  {
+    EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
+    RunningRig running(radar, options);
+    ASSERT_TRUE(running.waitForCubes(10));
+    const RigState state = running.rig.state();
+    ASSERT_TRUE(state.radar);
+    EXPECT_TRUE(state.radar->configured);
+    EXPECT_EQ("7.1", state.radar->version);
+    EXPECT_TRUE(running.saw("Made-up radar configured, firmware 7.1"));
+  }
+  const std::vector<std::string> calls = log->all();
+  const auto configured = std::find(calls.begin(), calls.end(), "configure");
+  const auto started = std::find(calls.begin(), calls.end(), "start");
+  ASSERT_NE(calls.end(), started);
+  EXPECT_LT(configured, started);
+  EXPECT_EQ("gone", calls.back());
+}
+
+TEST(Rig, SaysWhatARadarOfAnotherKindMissesAndTriesAgain) {
+  TestFolder folder;
+  writeSession(folder, 0.01, {30});
+  RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  const auto log = std::make_shared<MadeUpRadar::Log>();
+  log->failures = 1;
+  const RigOptions options = optionsFor("made_up_sleeper", log, radar);
+  EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file("")));
+  RunningRig running(radar, options);
+  ASSERT_TRUE(running.waitForCubes(10));
+  EXPECT_TRUE(running.saw("the made-up radar is asleep: wake it"));
+  EXPECT_EQ("", running.rig.state().problem);
+}
+
+TEST(RadarDevices, AnUnknownDeviceIsRefusedWithTheKnownOnes) {
+  RadarConfig radar;
+  radar.device = "awr9999";
+  try {
+    radarDevice(radar, "my_radar.yaml");
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    for (const char* part : {"my_radar.yaml", "device", "awr9999", "awr2243"}) {
+      EXPECT_TRUE(holds(error.what(), part)) << error.what();
+    }
+  }
+  EXPECT_THROW(registerRadarDevice({"awr2243", "", {}, {}, {}}), InputError) << "a name that is taken";
 }
 
 }  // namespace

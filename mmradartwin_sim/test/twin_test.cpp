@@ -49,7 +49,7 @@ TEST_F(TwinTest, LeavesRecordsThatAddUpToTheGrid) {
   ASSERT_GT(s.records.size(), 1000u);
   EXPECT_TRUE(s.propagation_only);
   EXPECT_TRUE(s.check.ok()) << s.check.worst_amplitude_error << " " << s.check.grid_error;
-  // Rebuilt here, sample by sample, from DESIGN's sum over records.
+  // Rebuilt here, sample by sample, from the sum over records of docs/contracts.md.
   ComplexGrid rebuilt = ComplexGrid::Zero(radar.channels(), radar.samples_per_chirp);
   for (const PathRecord& r : s.records) {
     double power = 0;
