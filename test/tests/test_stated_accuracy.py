@@ -1,0 +1,39 @@
+"""A session is judged by the accuracy that its user states of scene, levels and poses."""
+import shutil
+import unittest
+
+from mmradartwin_tests import effects
+from mmradartwin_tests.session import Measurement, Settings
+from diagnose_program import PROGRAM, diagnose
+from in_folder import InFolder
+
+
+@unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
+class StatedAccuracy(InFolder):
+    def diagnosed(self, stated, output):
+        """Diagnosis of a copy of the session that states this accuracy."""
+        session = self.at(output + "_session")
+        shutil.copytree(self.at("session"), session)
+        with open(self.at(output + "_session", "session.yaml"), "a", encoding="ascii") as file:
+            file.write(stated)
+        return diagnose(session, self.at(output), "--findings", "1")
+
+    def test_a_move_within_the_stated_error_of_the_scene_is_no_finding(self):
+        Measurement(Settings(output=self.at("session"), seed=25, poses=10, locations=8, headings=4, frames=10,
+                             tier="office", duplicates=0,
+                             effects=[effects.make_effect("actor_moved", {}, None)])).run()
+        status, as_shipped, errors = self.diagnosed("", "shipped")
+        self.assertEqual(status, 0, msg=errors)
+        self.assertEqual([f["cause"] for f in as_shipped["findings"]], ["actor_moved"])
+        self.assertEqual(as_shipped["accuracy"]["scene_m"], {"stated": 0.02, "estimated": None})
+
+        status, rough, errors = self.diagnosed("accuracy: {scene_m: 0.1, level_db: 3}\n", "rough")
+        self.assertEqual(status, 0, msg=errors)
+        self.assertNotIn("actor_moved", [f["cause"] for f in rough["findings"]])
+        self.assertEqual(rough["accuracy"]["scene_m"]["stated"], 0.1)
+        self.assertEqual(rough["accuracy"]["pose_m"]["stated"], 0.004, msg="a key that is left out keeps its default")
+
+        status, nothing, errors = self.diagnosed("accuracy: {scene_m: 7}\n", "wrong")
+        self.assertEqual((status, nothing), (2, None))
+        for part in ("session.yaml", "scene_m", "7", "0.5"):
+            self.assertIn(part, errors)
