@@ -12,6 +12,7 @@
 
 #include "emulated_rig.h"
 #include "mmradartwin_driver/radar_devices.h"
+#include "mmradartwin_driver/rig_error.h"
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/input_error.h"
 

@@ -353,7 +353,7 @@ TEST_F(FramesTest, EveryMechanismCanBeSwitchedOn) {
   addWall("left", "Concrete", {4, 2}, {-1, 2}, -1, 1);
   addWall("right", "Metal", {-1, -2}, {4, -2}, -1, 1);
   addRectangle("floor", "Concrete", {-2, -3, -0.9}, {8, 0, 0}, {0, 6, 0});
-  addBox("cabinet", "Metal", {2, 0.6, -0.9}, {2.5, 1.2, 0.6});
+  addBox("cabinet", "Metal", {2, 0.3, -0.9}, {2.5, 0.8, 0.6});  // beside the line to the corner at (4, 2)
   addWall("pane", "Metal", {1.5, -0.5}, {1.5, 0.2}, -1, 1);
   addWall("screen_left", "Metal", {3, -1.98}, {3, -1.2}, -1, 1);
   writeScene("causes");
@@ -371,10 +371,10 @@ TEST_F(FramesTest, EveryMechanismCanBeSwitchedOn) {
       {"dc_offset", "level_db: -10"},
       {"diffuse_scattering", "material: Metal, scattering_coefficient: 0.4"},
       {"echo_replica", "behind_m: 0.5, level_db: -10"},
-      {"edge_diffraction", "level: 1"},
+      {"edge_diffraction", "level: 20"},
       {"element_pattern", "cos_exponent: 2.1"},
       {"elevation_pattern", "cos_exponent: 8"},
-      {"empirical_echo", "x_m: 2, y_m: 0, rcs_dbsm: 0, height_m: 0"},
+      {"empirical_echo", "x_m: 1.2, y_m: -0.8, rcs_dbsm: 0, height_m: 0"},
       {"empirical_frame_gain", "gain_db: [3, 0]"},
       {"empirical_law", "variable: range_m, at: [0, 10], gain_db: [-3, -3]"},
       {"empirical_tone", "beat_hz: 1.0e+6, level_db: -10"},
