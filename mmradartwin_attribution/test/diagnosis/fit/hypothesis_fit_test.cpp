@@ -89,20 +89,6 @@ class FittedEffect : public ::testing::Test {
   const Hypothesis yaw_ = hypothesisOf("radar_yaw_offset", {{"yaw_deg", "deg", -1, 0, 0.5, -180, 180, {}}});
 };
 
-TEST_F(FittedEffect, ADriftIsFittedToItsValue) {
-  measure({mechanismWith("gain_drift", {{"db_per_hour", 80.0}})});
-  const HypothesisFit f = fit(drift_, 8);
-  ASSERT_EQ(f.standard_error.size(), 1U);
-  EXPECT_LT(f.standard_error[0], 30);
-  EXPECT_NEAR(5 * f.scaled_values[0], 80, 3 * f.standard_error[0]);
-  EXPECT_GT(f.gain, 5);
-  EXPECT_NEAR(f.gain, f.state.log_likelihood - fitted_->null.log_likelihood, 1e-9);
-  EXPECT_LT(f.gain_without_best_place, f.gain);
-  // Without a third of the places the value is about the same.
-  ASSERT_EQ(f.fold_scaled.size(), 3U);
-  for (const std::vector<double>& fold : f.fold_scaled) EXPECT_NEAR(5 * fold[0], 80, 4 * f.standard_error[0]);
-}
-
 TEST_F(FittedEffect, ATurnOfTheRadarIsFittedToItsValue) {
   measure({mechanismWith("radar_yaw_offset", {{"yaw_deg", 2.0}})});
   const HypothesisFit f = fit(yaw_, 3);
@@ -125,15 +111,6 @@ TEST_F(FittedEffect, SeveralAreFittedTogether) {
   EXPECT_NEAR(0.5 * joint.scaled_values[1][0], 2, 0.4);
   EXPECT_GT(joint.worth[0].scattered(), 0);
   EXPECT_GT(joint.worth[1].nats, 10);
-}
-
-TEST_F(FittedEffect, FoldsSettleWhereTheirPlacesAreNoWorse) {
-  measure({mechanismWith("gain_drift", {{"db_per_hour", 80.0}})});
-  HypothesisFit f = fit(drift_, 8);
-  const double value = f.scaled_values[0];
-  for (std::vector<double>& fold : f.fold_scaled) fold[0] = value + 40;  // far off: no places want that
-  fitted_->fitter.settleFolds(fitted_->null, f);
-  for (const std::vector<double>& fold : f.fold_scaled) EXPECT_DOUBLE_EQ(fold[0], value);
 }
 
 TEST_F(FittedEffect, FalseAlarmsOfAFamilyFollowChance) {

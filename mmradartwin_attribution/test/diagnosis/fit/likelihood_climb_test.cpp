@@ -22,32 +22,11 @@ class ClimbInARoom : public ::testing::Test {
                            {base_, fitted_->null.nuisance, parts, starts, 4, &fitted_->null, 0, known})
         .run();
   }
-  /// Highest likelihood over values of one coordinate, latents refitted at each.
-  double highest(const Hypothesis& hypothesis, double from, double to, int count) {
-    double best = -INFINITY;
-    for (int i = 0; i < count; ++i) {
-      SessionLatents latents = fitted_->null.nuisance;
-      const auto echoes = fitted_->source.echoes(
-          mechanismsWith(base_, {hypothesis}, {from + (to - from) * i / (count - 1)}), latents.actor_range_m);
-      best = std::max(best, fitted_->model.fit(echoes, latents, 20));
-    }
-    return best;
-  }
-
   MadeRoom room_{10};
   std::optional<FittedRoom> fitted_;
   const std::vector<NamedParameters> base_ = firstOrder();
   const Hypothesis drift_ = hypothesisOf("gain_drift", {{"db_per_hour", "dB/h", -1, 0, 5, -1000, 1000, {}}});
 };
-
-TEST_F(ClimbInARoom, EndsAtTheTopThatAScanFinds) {
-  measure(mechanismWith("gain_drift", {{"db_per_hour", 80.0}}));
-  const double top = highest(drift_, 0, 40, 41);
-  for (double start : {6.0, 25.0}) {
-    const Optimum o = climb(drift_, {{start}});
-    EXPECT_GT(o.state.log_likelihood, top - 0.7) << "from " << start;
-  }
-}
 
 TEST_F(ClimbInARoom, TakesTheBestOfSeveralStarts) {
   measure(mechanismWith("gain_drift", {{"db_per_hour", 80.0}}));
@@ -63,17 +42,6 @@ TEST_F(ClimbInARoom, FindsAPlaceToMillimetresWhereSlopesEndEarlier) {
   const Hypothesis move = hypothesisOf("actor_moved", {{"dx_m", "m", -1, 0, 0.05, -3, 3, {}}}, "actor", "east");
   const Optimum o = climb(move, {{1.5}});
   EXPECT_NEAR(0.05 * o.scaled_values[0], 0.15, 0.02);
-}
-
-TEST_F(ClimbInARoom, HasTheScoresOfItsOptimum) {
-  measure(mechanismWith("gain_drift", {{"db_per_hour", 80.0}}));
-  const Optimum o = climb(drift_, {{16.0}});
-  const int globals = fitted_->null.nuisance.globals();
-  ASSERT_EQ(o.scores.total.size(), globals + 1);
-  // At the top no number promises more than a fraction of a nat.
-  const Eigen::VectorXd step = regularised(o.scores.information).ldlt().solve(o.scores.total);
-  EXPECT_LT(0.5 * o.scores.total.dot(step), 0.7);
-  EXPECT_NEAR(o.state.log_likelihood, fitted_->model.logLikelihood(o.state.echoes, o.state.nuisance), 1e-9);
 }
 
 TEST(Gain, WithoutTheBestPlaceIsThatOfTheOthers) {

@@ -85,7 +85,8 @@ TEST_F(OneEcho, FieldsAreTheOuterProductsOfItsSpectra) {
   const double peak = y.col(middle).squaredNorm();
   for (int bin = middle - 4; bin <= middle + 4; ++bin) {
     const Eigen::MatrixXcd want = y.col(bin) * y.col(bin).adjoint();
-    EXPECT_LT((unpacked(group->bins.at(bin, size_)->power, channels_) - want).norm(), 2e-3 * peak) << "bin " << bin;
+    // The field has one range for all channels; that of the elements differs by some millimetres.
+    EXPECT_LT((unpacked(group->bins.at(bin, size_)->power, channels_) - want).norm(), 5e-3 * peak) << "bin " << bin;
   }
 }
 
