@@ -22,11 +22,14 @@ std::string textOf(const fs::path& file) {
   return text.str();
 }
 
-/// The fields of a line, of which none holds a comma within quotes.
+/// The fields of a line; one in quotes may hold commas.
 std::vector<std::string> split(const std::string& line) {
   std::vector<std::string> fields(1);
+  bool quoted = false;
   for (char c : line) {
-    if (c == ',') {
+    if (c == '"') {
+      quoted = !quoted;
+    } else if (c == ',' && !quoted) {
       fields.emplace_back();
     } else {
       fields.back() += c;
