@@ -349,11 +349,11 @@ TEST_F(FramesTest, AreTheSameBitsOnAnyThread) {
 // Every mechanism of the registry changes what a moving radar records, and its parameters bear their units in their
 // names. Values are those at which its parameters say that it plainly does something, unless they stand here.
 TEST_F(FramesTest, EveryMechanismCanBeSwitchedOn) {
-  addWall("ahead", "RoughConcrete", {4, -2}, {4, 2}, -1, 1);
-  addWall("left", "Concrete", {4, 2}, {-1, 2}, -1, 1);
+  addWall("ahead", "RoughConcrete", {4, -2}, {4, 3.5}, -1, 1);
+  addWall("left", "Concrete", {4, 3.5}, {-1, 3.5}, -1, 1);
   addWall("right", "Metal", {-1, -2}, {4, -2}, -1, 1);
   addRectangle("floor", "Concrete", {-2, -3, -0.9}, {8, 0, 0}, {0, 6, 0});
-  addBox("cabinet", "Metal", {2, 0.3, -0.9}, {2.5, 0.8, 0.6});  // beside the line to the corner at (4, 2)
+  addBox("cabinet", "Metal", {2, 0.6, -0.9}, {2.5, 1.2, 0.6});
   addWall("pane", "Metal", {1.5, -0.5}, {1.5, 0.2}, -1, 1);
   addWall("screen_left", "Metal", {3, -1.98}, {3, -1.2}, -1, 1);
   writeScene("causes");
@@ -395,7 +395,7 @@ TEST_F(FramesTest, EveryMechanismCanBeSwitchedOn) {
       {"phase_noise", "level_dbc_per_hz: -80"},
       {"pose_time_lag", "lag_s: 0.05"},
       {"quantisation", "bits: 4"},
-      {"radar_pitch_offset", "pitch_deg: 4"},
+      {"radar_pitch_offset", "pitch_deg: 12"},
       {"radar_position_offset", "forward_m: 0.03, left_m: 0.02"},
       {"radar_yaw_offset", "yaw_deg: 2"},
       {"range_bias", "range_m: 0.03"},
