@@ -165,6 +165,27 @@ void ReportWriter::writeSummary(const Evaluation& evaluation, const AttributionC
   file.close();
 }
 
+namespace {
+
+/// Writes the command, the configuration and the inputs of the evaluation.
+void writeHowToRepeat(const RunDescription& run, std::ostream& out) {
+  out << "<h2>How to repeat this</h2>\n<pre>";
+  for (const std::string& word : run.command) out << htmlEscape(word) << ' ';
+  out << "</pre>\n<p>Files: <a href=\"table.txt\">table.txt</a>, <a href=\"summary.json\">summary.json</a>, <a "
+         "href=\"poses.csv\">poses.csv</a>, <a href=\"residuals.csv\">residuals.csv</a>, <a "
+         "href=\"residual_records.csv\">residual_records.csv</a>, <a href=\"regions.csv\">regions.csv</a></p>\n"
+      << "<details><summary>attribution.yaml</summary><pre>" << htmlEscape(run.attribution_yaml) << "</pre></details>\n"
+      << "<details><summary>radar.yaml</summary><pre>" << htmlEscape(run.radar_yaml) << "</pre></details>\n";
+  if (!run.twin_yaml.empty()) {
+    out << "<details><summary>twin.yaml</summary><pre>" << htmlEscape(run.twin_yaml) << "</pre></details>\n";
+  }
+  out << "<details><summary>" << run.inputs.size() << " input files (SHA-256)</summary><pre>";
+  for (const InputFile& f : run.inputs) out << f.sha256 << "  " << htmlEscape(f.file) << '\n';
+  out << "</pre></details>\n</body></html>\n";
+}
+
+}  // namespace
+
 void ReportWriter::writeHtml(const Evaluation& evaluation, const AttributionConfig& config,
                              const RunDescription& run) const {
   OutputFile file(directory_ + "/index.html");
@@ -232,19 +253,7 @@ void ReportWriter::writeHtml(const Evaluation& evaluation, const AttributionConf
         << ", C1&ndash;C5 " << m.class_count[0] << "/" << m.class_count[1] << "/" << m.class_count[2] << "/"
         << m.class_count[3] << "/" << m.class_count[4] << "</figcaption></figure>\n";
   }
-  out << "<h2>How to repeat this</h2>\n<pre>";
-  for (const std::string& word : run.command) out << htmlEscape(word) << ' ';
-  out << "</pre>\n<p>Files: <a href=\"table.txt\">table.txt</a>, <a href=\"summary.json\">summary.json</a>, <a "
-         "href=\"poses.csv\">poses.csv</a>, <a href=\"residuals.csv\">residuals.csv</a>, <a "
-         "href=\"residual_records.csv\">residual_records.csv</a>, <a href=\"regions.csv\">regions.csv</a></p>\n"
-      << "<details><summary>attribution.yaml</summary><pre>" << htmlEscape(run.attribution_yaml) << "</pre></details>\n"
-      << "<details><summary>radar.yaml</summary><pre>" << htmlEscape(run.radar_yaml) << "</pre></details>\n";
-  if (!run.twin_yaml.empty()) {
-    out << "<details><summary>twin.yaml</summary><pre>" << htmlEscape(run.twin_yaml) << "</pre></details>\n";
-  }
-  out << "<details><summary>" << run.inputs.size() << " input files (SHA-256)</summary><pre>";
-  for (const InputFile& f : run.inputs) out << f.sha256 << "  " << htmlEscape(f.file) << '\n';
-  out << "</pre></details>\n</body></html>\n";
+  writeHowToRepeat(run, out);
   file.close();
 }
 

@@ -66,6 +66,22 @@ Bytes bytesOf(const std::vector<std::uint16_t>& words) {
   return bytes;
 }
 
+/// True where a message's CRC of this many bytes is that of its content; one of eight bytes is not checked.
+bool isWhole(const Bytes& bytes, const Bytes& covered, std::size_t crc_size) {
+  if (crc_size == 2) return half(bytes, covered.size()) == crc16Of(covered);
+  if (crc_size == 4) return full(bytes, covered.size()) == crc32Of(covered);
+  return true;
+}
+
+/// One block of an answer.
+void append(std::uint16_t sub_block, const Bytes& reply, Bytes& blocks) {
+  for (const std::size_t value : {std::size_t{sub_block}, reply.size() + 4}) {
+    blocks.push_back(static_cast<std::uint8_t>(value & 0xFF));
+    blocks.push_back(static_cast<std::uint8_t>(value >> 8));
+  }
+  blocks.insert(blocks.end(), reply.begin(), reply.end());
+}
+
 }  // namespace
 
 bool EmulatedAwr2243::strikes(int& fault) const {
@@ -177,7 +193,7 @@ void EmulatedAwr2243::handle() {
 
 void EmulatedAwr2243::answer() {
   if (strikes(faults.deaf)) return;
-  const unsigned opcode = words_[0], flags = words_[2], block_count = words_[4];
+  const unsigned opcode = words_[0], flags = words_[2];
   if (strikes(faults.command_data)) words_[6] ^= 0x0010;
   Bytes bytes = bytesOf(words_);
   const bool has_crc = (flags >> 8 & 3) == 0;
@@ -185,9 +201,6 @@ void EmulatedAwr2243::answer() {
   const std::size_t crc_size = !has_crc ? 0 : crc_kind == 0 ? 2 : crc_kind == 1 ? 4 : 8;
   const Bytes covered(bytes.begin(), bytes.end() - static_cast<std::ptrdiff_t>(crc_size));
   if ((covered.size() & 3) != 0) violations.push_back("message is not padded to four bytes");
-  bool crc_good = true;
-  if (crc_size == 2) crc_good = half(bytes, covered.size()) == crc16Of(covered);
-  if (crc_size == 4) crc_good = full(bytes, covered.size()) == crc32Of(covered);
 
   const int sequence = static_cast<int>(flags >> 12);
   const bool retry = (flags & 3) == 3;
@@ -195,7 +208,7 @@ void EmulatedAwr2243::answer() {
   const unsigned back = (opcode & 0xF) == 1 ? 2 : 6;
   const auto answer_opcode = static_cast<std::uint16_t>(back | 1 << 4 | (opcode & 0xFFC0));
   const auto answer_flags = static_cast<std::uint16_t>(flags & 0xFF00);
-  if (!crc_good) {
+  if (!isWhole(bytes, covered, crc_size)) {
     ++crcs_refused;
     send(static_cast<std::uint16_t>((answer_opcode & ~0x30u) | 2 << 4), answer_flags, {0, 0, 8, 0, 9, 0, 0, 0}, 1,
          microseconds(200));
@@ -210,15 +223,25 @@ void EmulatedAwr2243::answer() {
   if (last_sequence_ >= 0 && sequence != (last_sequence_ + 1) % 16) {
     violations.push_back("sequence number " + std::to_string(sequence) + " after " + std::to_string(last_sequence_));
   }
+  const Outcome outcome = carryOutBlocks(covered, sequence, retry);
+  last_sequence_ = sequence;
+  if ((flags >> 2 & 3) != 0) return;  // nobody asked for an answer
+  const bool first_chunk = outcome.offender == 0x4080 && incoming_image_.size() <= 232;
+  send(answer_opcode, answer_flags, outcome.blocks, outcome.count,
+       first_chunk ? microseconds(20000) : microseconds(200));
+  last_answer_ = outgoing_.back().words;
+  spoilAnswer();
+  if (outcome.error == 0) announce(outcome.offender);
+}
 
-  Bytes blocks;
-  int count = 0;
-  int error = 0;
-  unsigned offender = 0;
+/// Carries out the blocks of a message in their order, up to the first that cannot be.
+EmulatedAwr2243::Outcome EmulatedAwr2243::carryOutBlocks(const Bytes& covered, int sequence, bool retry) {
+  const unsigned opcode = words_[0], block_count = words_[4];
+  Outcome outcome;
   std::size_t at = 12;
-  for (unsigned i = 0; i < block_count && error == 0; ++i) {
+  for (unsigned i = 0; i < block_count && outcome.error == 0; ++i) {
     if (at + 4 > covered.size() || half(covered, at + 2) < 4 || at + half(covered, at + 2) > covered.size()) {
-      error = 3;
+      outcome.error = 3;
       break;
     }
     Command command;
@@ -230,49 +253,43 @@ void EmulatedAwr2243::answer() {
     command.retry = retry;
     command.remaining_chunks = words_[3];
     at += length;
-    offender = command.sub_block;
+    outcome.offender = command.sub_block;
     const bool for_main = command.sub_block >= 0x4000;
     if ((opcode >> 4 & 3) != 0 || (opcode & 0xF) != (for_main ? 5u : 1u)) {
-      error = 1;
+      outcome.error = 1;
     } else if (command.sub_block / 32 != opcode >> 6) {
-      error = 2;
+      outcome.error = 2;
     } else {
       Bytes reply;
-      error = carryOut(command, reply);
-      if (error == 0) commands.push_back(command);
-      if (error == 0 && !reply.empty()) {
-        ++count;
-        const std::size_t size = reply.size() + 4;
-        for (const std::size_t value : {std::size_t{command.sub_block}, size}) {
-          blocks.push_back(static_cast<std::uint8_t>(value & 0xFF));
-          blocks.push_back(static_cast<std::uint8_t>(value >> 8));
-        }
-        blocks.insert(blocks.end(), reply.begin(), reply.end());
+      outcome.error = carryOut(command, reply);
+      if (outcome.error == 0) commands.push_back(command);
+      if (outcome.error == 0 && !reply.empty()) {
+        ++outcome.count;
+        append(command.sub_block, reply, outcome.blocks);
       }
     }
   }
   for (; at < covered.size(); ++at) {
-    if (error == 0 && covered[at] != 0xFF) violations.push_back("padding is not 0xFF");
+    if (outcome.error == 0 && covered[at] != 0xFF) violations.push_back("padding is not 0xFF");
   }
-  if (error != 0) {
-    count = 1;
-    blocks = {0,
-              0,
-              8,
-              0,
-              static_cast<std::uint8_t>(error),
-              0,
-              static_cast<std::uint8_t>(offender & 0xFF),
-              static_cast<std::uint8_t>(offender >> 8)};
+  if (outcome.error != 0) {
+    outcome.count = 1;
+    outcome.blocks = {0,
+                      0,
+                      8,
+                      0,
+                      static_cast<std::uint8_t>(outcome.error),
+                      0,
+                      static_cast<std::uint8_t>(outcome.offender & 0xFF),
+                      static_cast<std::uint8_t>(outcome.offender >> 8)};
   }
-  last_sequence_ = sequence;
-  if ((flags >> 2 & 3) != 0) return;  // nobody asked for an answer
-  const bool first_chunk = offender == 0x4080 && incoming_image_.size() <= 232;
-  send(answer_opcode, answer_flags, blocks, count, first_chunk ? microseconds(20000) : microseconds(200));
-  last_answer_ = outgoing_.back().words;
-  spoilAnswer();
-  if (error == 0 && offender == 0x4000) event(0x5001, Bytes(8), milliseconds(5));
-  if (error == 0 && offender == 0x00C0) {
+  return outcome;
+}
+
+/// Sends the events that follow a command: boot, calibration, start and end of frames.
+void EmulatedAwr2243::announce(unsigned sub_block) {
+  if (sub_block == 0x4000) event(0x5001, Bytes(8), milliseconds(5));
+  if (sub_block == 0x00C0) {
     if (faults.front_end_fault) {
       event(0x1002, Bytes(28, 1), milliseconds(5));
     } else {
@@ -281,7 +298,7 @@ void EmulatedAwr2243::answer() {
       event(0x1004, report, milliseconds(10));
     }
   }
-  if (error == 0 && offender == 0x0140) {
+  if (sub_block == 0x0140) {
     if (frames_run && !faults.no_frame_event) event(0x100B, Bytes(4), milliseconds(2));
     if (!frames_run) event(0x100F, Bytes(4), milliseconds(2));
   }

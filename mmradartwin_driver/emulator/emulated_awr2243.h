@@ -75,7 +75,15 @@ class EmulatedAwr2243 {
 
   void received(std::uint16_t word);
   void handle();
+  /// What came of the blocks of a message: those of the answer, how many, and the block that an error is of.
+  struct Outcome {
+    std::vector<std::uint8_t> blocks;
+    int count = 0, error = 0;
+    unsigned offender = 0;
+  };
   void answer();
+  Outcome carryOutBlocks(const std::vector<std::uint8_t>& covered, int sequence, bool retry);
+  void announce(unsigned sub_block);
   void spoilAnswer();
   bool strikes(int& fault) const;
   /// The answer's error code, 0 where all is well; `reply` is the payload of a read command.
