@@ -74,8 +74,8 @@ class RoomPoseLive(unittest.TestCase):
             camera = self.camera(rig)
             wait_for(lambda: any(m.pose_valid for _, m in self.recorded(rig, "first", {"/radar/grid": FRAMES // 2})),
                      lambda: "a frame with a pose:\n" + rig.text()[-3000:])
-            seen = self.recorded(rig, "seen", {"/radar/grid": 3 * FRAMES, "/tf": 1, "/room_pose": 1, "/twin/grid": 1,
-                                               "/diagnostics": 3})
+            seen = self.recorded(rig, "seen", {"/radar/grid": 3 * FRAMES, "/room_pose": 3, "/twin/grid": 1,
+                                               "/diagnostics": 3}, ["/tf"])
             end(camera)
             rig.wait_for_text("goes on without a pose", rig.text().count("goes on without a pose") + 1)
             blind = self.recorded(rig, "blind", {"/radar/grid": 2 * FRAMES, "/diagnostics": 3})
