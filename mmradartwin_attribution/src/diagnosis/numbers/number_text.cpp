@@ -1,14 +1,9 @@
 #include "diagnosis/numbers/number_text.h"
 
-#include <iomanip>
-#include <sstream>
+#include "mmradartwin_dsp/text.h"
 
 namespace mmradartwin::diagnosis::numbers {
 
-std::string number(double value, int digits) {
-  std::ostringstream out;
-  out << std::setprecision(digits) << value;
-  return out.str();
-}
+std::string number(double value, int digits) { return significantNumber(value, digits); }
 
 }  // namespace mmradartwin::diagnosis::numbers
