@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/statistics.h"
+#include "mmradartwin_dsp/text.h"
 
 namespace mmradartwin {
 namespace {
@@ -65,23 +66,62 @@ LedgerSummary Ledger::summary() const {
   return s;
 }
 
+const std::vector<PoseColumn>& poseColumns() {
+  static const std::vector<PoseColumn> columns = {
+      {"q1_energy", [](const FieldMetrics& m) { return fixedNumber(m.q1_energy, 5); }},
+      {"q2_energy", [](const FieldMetrics& m) { return fixedNumber(m.q2_energy, 5); }},
+      {"q1_cells", [](const FieldMetrics& m) { return std::to_string(m.q1_cells); }},
+      {"q2_cells", [](const FieldMetrics& m) { return std::to_string(m.q2_cells); }},
+      {"q3_median_db", [](const FieldMetrics& m) { return fixedNumber(quantile(m.q3_db, 0.5), 3); }},
+      {"q3_cells", [](const FieldMetrics& m) { return std::to_string(m.q3_db.size()); }},
+      {"q4_mae_db", [](const FieldMetrics& m) { return fixedNumber(share(m.q4_sum_db, m.q4_cells), 3); }},
+      {"q4_cells", [](const FieldMetrics& m) { return std::to_string(m.q4_cells); }},
+  };
+  return columns;
+}
+
 std::vector<std::array<std::string, 3>> tableRows(const LedgerSummary& s, const std::vector<int>& top_k) {
-  std::string routing;
-  for (int i = 0; i < 5; ++i) {
-    routing += (i ? "/" : "") + (std::isnan(s.class_share[i]) ? std::string("-") : fixed(100 * s.class_share[i], 0));
-  }
   const auto joined = [](const std::array<double, 3>& v) {
     return fixed(v[0], 3) + "/" + fixed(v[1], 3) + "/" + fixed(v[2], 3);
   };
-  std::string peaks = "Top-";
-  for (std::size_t i = 0; i < top_k.size(); ++i) peaks += (i ? "/" : "") + std::to_string(top_k[i]);
-  return {{"Placement", "Recall", fixed(s.recall, 3) + "; " + joined(s.recall_band)},
-          {"Peaks", peaks, joined(s.top)},
-          {"Matched amp.", "Q3 median/IQR", fixed(s.q3_median_db, 2) + "/" + fixed(s.q3_iqr_db, 2) + " dB"},
-          {"Under-pred.", "Q1 energy", fixed(s.q1_energy, 3)},
-          {"Over-pred.", "Q2 energy", fixed(s.q2_energy, 3)},
-          {"Background", "Q4 MAE", fixed(s.q4_mae_db, 2) + " dB"},
-          {"Routing", "C1/C2/C3/C4/C5", routing + "%"}};
+  std::vector<std::array<std::string, 3>> rows;
+  std::string unit;  // of the last row
+  const auto endRow = [&] {
+    if (!rows.empty() && !unit.empty()) rows.back()[2] += " " + unit;
+    unit.clear();
+  };
+  for (const ResidualMetric& metric : kResidualMetrics) {
+    const std::string value = fixed(s.*metric.member, metric.digits);
+    if (!rows.empty() && rows.back()[0] == metric.target) {
+      rows.back()[1] += std::string("/") + metric.label;
+      rows.back()[2] += "/" + value;
+    } else {
+      endRow();
+      rows.push_back({metric.target, metric.label, value});
+    }
+    unit = metric.unit;
+    if (metric.member == &LedgerSummary::recall) {
+      rows.back()[2] += "; " + joined(s.recall_band);
+      std::string peaks = "Top-";
+      for (std::size_t i = 0; i < top_k.size(); ++i) peaks += (i ? "/" : "") + std::to_string(top_k[i]);
+      rows.push_back({"Peaks", peaks, joined(s.top)});
+    }
+  }
+  endRow();
+  std::string routing;
+  for (int i = 0; i < 5; ++i) routing += (i ? "/" : "") + fixed(100 * s.class_share[i], 0);
+  rows.push_back({"Routing", "C1/C2/C3/C4/C5", routing + "%"});
+  return rows;
+}
+
+std::string metricsLine(const LedgerSummary& summary) {
+  std::string line;
+  for (const ResidualMetric& metric : kResidualMetrics) {
+    if (metric.word[0] == '\0') continue;
+    line += (line.empty() ? "" : ", ") + std::string(metric.word) + " " + fixed(summary.*metric.member, metric.digits);
+    if (metric.unit[0] != '\0') line += std::string(" ") + metric.unit;
+  }
+  return line;
 }
 
 std::string formatTable(const LedgerSummary& summary, const AttributionConfig& config, const std::string& title) {

@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
 #include <set>
 #include <sstream>
 
@@ -101,21 +99,10 @@ std::string reportText(const Evaluation& evaluation, const AttributionConfig& co
   s << formatTable(evaluation.central, config,
                    "Evaluation summary in the central usable field of view, +-" + max + " deg, " +
                        std::to_string(evaluation.central.poses) + " poses");
-  const auto number = [](double value, int digits) {
-    std::ostringstream n;
-    n.setf(std::ios::fixed);
-    n.precision(digits);
-    if (std::isnan(value)) return std::string("-");
-    n << value;
-    return n.str();
-  };
-  const LedgerSummary& o = evaluation.outer;
   s << "Residuals: " << evaluation.central.class_count[0] << " C1, " << evaluation.central.class_count[1] << " C2, "
     << evaluation.central.class_count[2] << " C3, " << evaluation.central.class_count[3] << " C4, "
     << evaluation.central.class_count[4] << " C5\n";
-  s << "Apart, " << max << "-" << outer << " deg (not routed): recall " << number(o.recall, 3) << ", Q3 median "
-    << number(o.q3_median_db, 2) << " dB, Q1 " << number(o.q1_energy, 3) << ", Q2 " << number(o.q2_energy, 3) << ", Q4 "
-    << number(o.q4_mae_db, 2) << " dB\n";
+  s << "Apart, " << max << "-" << outer << " deg (not routed): " << metricsLine(evaluation.outer) << "\n";
   s << "Convention: the conjugated measurement would agree better in " << evaluation.conjugated_better << " of "
     << evaluation.central.poses << " poses\n";
   s << "Duplicates excluded: " << evaluation.duplicates.size();

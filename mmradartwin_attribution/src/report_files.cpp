@@ -35,19 +35,14 @@ nlohmann::json json(double value) { return std::isfinite(value) ? nlohmann::json
 nlohmann::json json(const LedgerSummary& s) {
   nlohmann::json j;
   j["poses"] = s.poses;
-  j["recall"] = json(s.recall);
+  for (const ResidualMetric& metric : kResidualMetrics) j[metric.name] = json(s.*metric.member);
   for (int i = 0; i < 3; ++i) {
     const char* bands[] = {"near", "mid", "far"};
     j["recall_by_band"][bands[i]] = {
         {"recall", json(s.recall_band[i])}, {"active", s.active[i]}, {"recalled", s.recalled[i]}};
     j["top"].push_back(json(s.top[i]));
   }
-  j["q3_median_db"] = json(s.q3_median_db);
-  j["q3_iqr_db"] = json(s.q3_iqr_db);
   j["q3_cells"] = s.q3_cells;
-  j["q1_energy"] = json(s.q1_energy);
-  j["q2_energy"] = json(s.q2_energy);
-  j["q4_mae_db"] = json(s.q4_mae_db);
   for (int i = 0; i < 5; ++i) {
     j["classes"]["C" + std::to_string(i + 1)] = {{"count", s.class_count[i]}, {"share", json(s.class_share[i])}};
   }
@@ -67,8 +62,8 @@ void ReportWriter::writePoses(const Evaluation& evaluation, const AttributionCon
          "mid,"
          "recalled_mid,active_far,recalled_far";
   for (int k : config.top_k) out << ",top" << k << "_hits,top" << k << "_count";
-  out << ",q1_energy,q2_energy,q1_cells,q2_cells,q3_median_db,q3_cells,q4_mae_db,q4_cells,c1,c2,c3,c4,c5,measured_peak_"
-         "dbfs,"
+  for (const PoseColumn& column : poseColumns()) out << ',' << column.name;
+  out << ",c1,c2,c3,c4,c5,measured_peak_dbfs,"
          "outer_active,outer_recalled,outer_peak_db,agreement,agreement_channel_conjugated,agreement_iq_conjugated,"
          "conjugated_better\n";
   for (const PoseResult& p : evaluation.poses) {
@@ -81,9 +76,7 @@ void ReportWriter::writePoses(const Evaluation& evaluation, const AttributionCon
         << ',' << m.active[0] + m.active[1] + m.active[2] << ',' << m.recalled[0] + m.recalled[1] + m.recalled[2];
     for (int i = 0; i < 3; ++i) out << ',' << m.active[i] << ',' << m.recalled[i];
     for (int i = 0; i < 3; ++i) out << ',' << m.top_hits[i] << ',' << m.top_count[i];
-    out << ',' << number(m.q1_energy, 5) << ',' << number(m.q2_energy, 5) << ',' << m.q1_cells << ',' << m.q2_cells
-        << ',' << number(quantile(m.q3_db, 0.5)) << ',' << m.q3_db.size() << ','
-        << (m.q4_cells ? number(m.q4_sum_db / m.q4_cells) : "") << ',' << m.q4_cells;
+    for (const PoseColumn& column : poseColumns()) out << ',' << column.text(m);
     for (int count : m.class_count) out << ',' << count;
     const ConventionCheck& c = p.attribution.convention;
     out << ',' << number(p.attribution.measured.peak_db) << ',' << o.active[0] + o.active[1] + o.active[2] << ','

@@ -1,6 +1,7 @@
 #include "mmradartwin_attribution/ros/conversions.h"
 
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <mutex>
 #include <set>
@@ -110,22 +111,24 @@ mmradartwin_msgs::Residuals toMsg(const EvaluationField& field, const PoseAttrib
   return msg;
 }
 
+// The message's field of each metric, in the order of kResidualMetrics.
+constexpr double mmradartwin_msgs::Ledger::*kLedgerFields[] = {
+    &mmradartwin_msgs::Ledger::recall,    &mmradartwin_msgs::Ledger::q3_median_db,
+    &mmradartwin_msgs::Ledger::q3_iqr_db, &mmradartwin_msgs::Ledger::q1_energy,
+    &mmradartwin_msgs::Ledger::q2_energy, &mmradartwin_msgs::Ledger::q4_mae_db};
+static_assert(std::size(kLedgerFields) == std::size(kResidualMetrics), "Ledger.msg needs a field for each metric");
+
 mmradartwin_msgs::Ledger toMsg(const LedgerSummary& s, const std::vector<std::string>& duplicates) {
   mmradartwin_msgs::Ledger msg;
   msg.poses = static_cast<std::uint32_t>(s.poses);
   msg.excluded_duplicates = duplicates;
-  msg.recall = s.recall;
+  for (std::size_t i = 0; i < std::size(kResidualMetrics); ++i) msg.*kLedgerFields[i] = s.*kResidualMetrics[i].member;
   msg.recall_near = s.recall_band[0];
   msg.recall_mid = s.recall_band[1];
   msg.recall_far = s.recall_band[2];
   msg.top1 = s.top[0];
   msg.top3 = s.top[1];
   msg.top5 = s.top[2];
-  msg.q3_median_db = s.q3_median_db;
-  msg.q3_iqr_db = s.q3_iqr_db;
-  msg.q1_energy = s.q1_energy;
-  msg.q2_energy = s.q2_energy;
-  msg.q4_mae_db = s.q4_mae_db;
   for (int i = 0; i < 5; ++i) msg.class_count[i] = static_cast<std::uint32_t>(s.class_count[i]);
   return msg;
 }
