@@ -22,6 +22,9 @@ constexpr int kSearchPlaces = 12;                  ///< per coordinate
 constexpr double kLongestStep = 3;                 ///< in the coordinate's scale
 constexpr double kStepShares[] = {1.0, 0.4, 0.1};  ///< of a promised step, until one gains
 constexpr double kOneSidedFactors[] = {0.4, 2.0};  ///< of a start that rises from nothing
+constexpr int kScanned = 12;                       ///< values over the range of a number
+constexpr int kMostScanned = 48;                   ///< the same of a range, half a bin apart
+constexpr double kLikelier_nats = 0.5;             ///< by which a scanned value has to beat the optimum
 constexpr Eigen::Index kMostRough = 4;             ///< coordinates that are searched without slopes
 
 /// Calls `value` at places that lead to its maximum, without slopes (BOBYQA, Powell 2009).
@@ -202,6 +205,28 @@ double LikelihoodClimb::stepBy(const Eigen::VectorXd& step) {
   return 0;
 }
 
+void LikelihoodClimb::scan() {
+  if (task_.parts.size() != 1 || coordinates_.size() != 1 || geometric_) return;
+  const Coordinate& c = coordinates_.front();
+  int count = kScanned;
+  if (c.unit == "m") {
+    const double half_bin_m = model_.data().radar.range_bin_m() / 2;
+    count = std::clamp(static_cast<int>(std::ceil((c.max - c.min) / half_bin_m)), kScanned, kMostScanned);
+  }
+  SessionLatents without_errors = optimum_.state.nuisance;
+  std::fill(without_errors.actor_gain.begin(), without_errors.actor_gain.end(), 0.0);
+  const double reached = optimum_.state.log_likelihood;
+  for (int i = 0; i <= count; ++i) {
+    const std::vector<double> there = {c.scaled(c.min + (c.max - c.min) * i / count)};
+    ModelState s = stateAt(there, optimum_.state.nuisance);
+    take(s, there);
+    s.nuisance = without_errors;
+    s.log_likelihood = model_.logLikelihood(s.echoes, without_errors, &s.by_pose);
+    take(s, there);
+  }
+  if (optimum_.state.log_likelihood > reached + kLikelier_nats) climb();
+}
+
 bool LikelihoodClimb::isWorthASearch() const {
   const Eigen::Index n = static_cast<Eigen::Index>(coordinates_.size());
   if (!geometric_ || n == 0 || n > kMostRough) return false;
@@ -242,6 +267,7 @@ Optimum LikelihoodClimb::run() {
   tryStarts();
   everyone_ = everyPose(optimum_.state);
   climb();
+  scan();
   if (!isWorthASearch()) return std::move(optimum_);
   // The likelihood is rough where paths come and go with every millimetre: slopes end at the first bump, a quadratic
   // through values some millimetres apart does not. The latents follow to first order.

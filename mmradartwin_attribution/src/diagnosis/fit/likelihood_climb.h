@@ -58,6 +58,8 @@ class LikelihoodClimb {
   void climb();
   /// Takes the longest share of a step that gains; returns the gain, 0 where none does.
   double stepBy(const Eigen::VectorXd& step);
+  /// Tries values over the whole range of a single number; climbs again from one that is likelier than the optimum.
+  void scan();
   bool isWorthASearch() const;
   /// Searches without slopes around the optimum, from one first step on.
   void search(double first_step);

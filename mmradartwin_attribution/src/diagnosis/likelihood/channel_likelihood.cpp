@@ -11,8 +11,6 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr double kTailFreedom = 4;  ///< degrees of freedom of the complex t distribution
-
 /// Share of a beam's power that keeps its covariance definite in single precision: neighbouring bins of a Hann window
 /// are almost the same.
 constexpr double kBeamShare = 3e-6;
@@ -30,6 +28,7 @@ enum Global {
   kRelative,
   kGraze,
   kRange,
+  kSpread,
   kShape,
   kActors = kShape + std::tuple_size_v<decltype(SessionLatents::floor_shape)>
 };
@@ -52,6 +51,8 @@ Limits limitsOf(int global, int errors, const LatentSpread& spread) {
       return {-6, 6, 2};
     case kRange:
       return {-6, 4, 2};
+    case kSpread:  // 0.05 to 4.3 dB
+      return {-9, 0, 1};
     default:
       return {-kAny, kAny, 2};
   }
@@ -93,7 +94,7 @@ double& SessionLatents::global(int j) {
   if (j >= ranges) return actor_range_m[at(ranges)];
   if (j >= kActors) return actor_gain[at(kActors)];
   if (j >= kShape) return floor_shape[at(kShape)];
-  double* const first[] = {&log_gain, &log_floor, &log_relative, &log_graze, &log_range};
+  double* const first[] = {&log_gain, &log_floor, &log_relative, &log_graze, &log_range, &log_spread};
   return *first[j];
 }
 
@@ -169,7 +170,7 @@ void ChannelLikelihood::addRelative(const SessionLatents& latents, int cell, Pac
 
 ChannelLikelihood::PoseModel ChannelLikelihood::modelOf(const PoseEchoes& echoes, const SessionLatents& latents,
                                                         int pose) const {
-  PoseModel model{echoes, latents, pose, {}};
+  PoseModel model{echoes, latents, pose, {}, {}, {}};
   const double gain = std::exp(latents.log_gain);
   const double grazing = std::exp(latents.log_graze);
   for (std::size_t i = 0; i < echoes.all(); ++i) {
@@ -177,7 +178,80 @@ ChannelLikelihood::PoseModel ChannelLikelihood::modelOf(const PoseEchoes& echoes
     model.levels.push_back(
         {gain * groupGain(group, latents) * (echoes.grazes(i) ? grazing : 1), groupShift_m(group, latents)});
   }
+  findStrongest(model);
   return model;
+}
+
+double ChannelLikelihood::floorOf(const PoseModel& model, int cell) const {
+  const PoseChannels& p = data_.poses[model.pose];
+  const SessionLatents& latents = model.latents;
+  const int bin = binOf(model.pose, cell);
+  const auto [at, share] = shapeAt(bin);
+  const auto* shape = &latents.floor_shape[static_cast<std::size_t>(at)];
+  const double level = std::exp(latents.log_floor + (1 - share) * shape[0] + share * shape[1]);
+  const double clutter = isBeam(cell) ? p.beams[static_cast<std::size_t>(cell - samples_)].clutter
+                                      : p.clutter.at(bin, size_)[0].real();
+  return level * clutter + noiseOf(model.pose, cell);
+}
+
+void ChannelLikelihood::findStrongest(PoseModel& model) const {
+  const std::size_t all = static_cast<std::size_t>(cells(model.pose));
+  std::vector<double> mean(all), squares(all);
+  model.strongest.assign(all, -1);
+  model.cells.assign(model.echoes.all(), 0);
+  for (std::size_t i = 0; i < model.echoes.groups.size(); ++i) {
+    const EchoGroup& group = model.echoes.at(i);
+    const double u = model.levels[i].gain;
+    for (const EchoGroup::Fields* fields : {&group.bins, &group.beams}) {
+      const int first = fields->first + (fields == &group.beams ? samples_ : 0);
+      for (int k = 0; k < fields->cells; ++k) {
+        const auto cell = static_cast<std::size_t>(first + k), at = static_cast<std::size_t>(k);
+        mean[cell] += u * fields->mean[at];
+        const double own = u * u * fields->squares[at];
+        if (own <= squares[cell]) continue;
+        squares[cell] = own;
+        model.strongest[cell] = static_cast<int>(i);
+      }
+    }
+  }
+  for (int cell = firstBin(); cell < static_cast<int>(all); ++cell) {
+    const auto at = static_cast<std::size_t>(cell);
+    if (model.strongest[at] < 0) continue;
+    const double total = mean[at] + floorOf(model, cell);
+    model.cells[static_cast<std::size_t>(model.strongest[at])] += weight() * squares[at] / (total * total);
+  }
+}
+
+CellEcho ChannelLikelihood::strongestEcho(const PoseModel& model, int cell) const {
+  CellEcho echo;
+  const int strongest = model.strongest[static_cast<std::size_t>(cell)];
+  if (strongest < 0) return echo;
+  const auto group = static_cast<std::size_t>(strongest);
+  const auto fields = fieldsOf(model.echoes.at(group), cell);
+  const auto [u, shift] = model.levels[group];
+  PackedTurn turn;
+  turn.set(apart_, turnOf(model.latents.yaw_rad[model.pose], *fields));
+  PackedHermitian own(channels_);
+  own.addTurned({fields->power, fields->shift, fields->curvature}, {u, u * shift, u * shift * shift}, turn);
+  const double mean = own.trace() / channels_;
+  if (!(mean > 0) || !(fields->mean > 0)) return echo;
+  int column = 0;
+  for (int k = 1; k < channels_; ++k) {
+    const auto at = [&](int row) { return own.re[static_cast<std::size_t>(PackedHermitian::diagonal(row))]; };
+    if (at(k) > at(column)) column = k;
+  }
+  double norm = 0;
+  for (int k = 0; k < channels_; ++k) {
+    const int row = std::max(k, column), other = std::min(k, column);
+    const auto at = static_cast<std::size_t>(PackedHermitian::diagonal(row) - row + other);
+    echo.direction[static_cast<std::size_t>(k)] = {own.re[at], k >= column ? own.im[at] : -own.im[at]};
+    norm += std::norm(echo.direction[static_cast<std::size_t>(k)]);
+  }
+  const double to_unit = std::sqrt(channels_ / norm);
+  for (int k = 0; k < channels_; ++k) echo.direction[static_cast<std::size_t>(k)] *= to_unit;
+  echo.power = mean * std::sqrt(fields->squares) / fields->mean;
+  echo.spread = std::exp(model.latents.log_spread) * std::max(1.0, model.cells[group]);
+  return echo;
 }
 
 double ChannelLikelihood::rangeVariance_m2(const SessionLatents& latents) const {
@@ -224,9 +298,7 @@ double ChannelLikelihood::poseLikelihood(const PoseEchoes& echoes, const Session
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
     if (!factor.compute(sigma(model, cell))) return -1e9;
     factor.apply(dataOf(pose, cell), y.data());
-    double q = 0;
-    for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
-    sum += -factor.logDeterminant() - (channels_ + kTailFreedom) * std::log1p(q / kTailFreedom);
+    sum += CellLikelihood(factor, y.data(), strongestEcho(model, cell)).logLikelihood();
   }
   return weight() * sum;
 }
@@ -285,7 +357,7 @@ struct ChannelLikelihood::CellDirections {
   CellDirections(int count, int channels)
       : acts(static_cast<std::size_t>(count)),
         raw(static_cast<std::size_t>(count), PackedHermitian(channels)),
-        whitened(channels * channels, count),
+        whitened(channels * channels + 1, count),
         products(static_cast<std::size_t>(count * count)) {}
   void clear() {
     for (int j : active) acts[j] = 0;
@@ -303,7 +375,7 @@ struct ChannelLikelihood::CellDirections {
   std::vector<int> active;
   std::vector<char> acts;
   std::vector<PackedHermitian> raw;
-  Eigen::MatrixXd whitened;      ///< [M^2][count] the active directions, in the first columns
+  Eigen::MatrixXd whitened;      ///< [M^2 + 1][count] the active directions, in the first columns
   std::vector<double> products;  ///< of the active directions in pairs
 };
 
@@ -358,11 +430,11 @@ void ChannelLikelihood::addLevelDirections(const PoseModel& model, int cell, con
 }
 
 void ChannelLikelihood::addProducts(CellDirections& directions, BinBasis& basis, PoseBasis& out) const {
-  const int numbers = channels_ * channels_, count = static_cast<int>(directions.active.size());
+  const int numbers = channels_ * channels_ + 1, count = static_cast<int>(directions.active.size());
   const std::vector<int>& active = directions.active;
   Eigen::MatrixXd& whitened = directions.whitened;
   std::vector<double>& products = directions.products;
-  for (int a = 0; a < count; ++a) basis.factor.whiten(directions.raw[active[a]], whitened.col(a).data());
+  for (int a = 0; a < count; ++a) whiten(basis, directions.raw[active[a]], whitened.col(a).data());
   const Eigen::VectorXd score = whitened.leftCols(count).transpose() * basis.data;
   pairProducts(whitened.data(), numbers, count, products.data());
   basis.traces.resize(count);
@@ -372,24 +444,17 @@ void ChannelLikelihood::addProducts(CellDirections& directions, BinBasis& basis,
     out.score[active[a]] += weight() * score[ia];
     for (std::size_t b = 0; b <= a; ++b) {
       const Eigen::Index ib = static_cast<Eigen::Index>(b);
-      const double v = weight() * informationOf(products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
+      const double v = weight() * tInformation(channels_, products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
       out.information(active[a], active[b]) += v;
       if (a != b) out.information(active[b], active[a]) += v;
     }
   }
 }
 
-void ChannelLikelihood::setData(const std::complex<double>* y, double w, BinBasis& basis) const {
-  basis.data.resize(channels_ * channels_);
-  int i = 0;
-  for (int k = 0; k < channels_; ++k) {
-    basis.data[i++] = w * std::norm(y[k]) - 1;
-    for (int l = 0; l < k; ++l) {
-      const std::complex<double> v = w * y[k] * std::conj(y[l]);
-      basis.data[i++] = M_SQRT2 * v.real();
-      basis.data[i++] = M_SQRT2 * v.imag();
-    }
-  }
+void ChannelLikelihood::whiten(const BinBasis& basis, const PackedHermitian& change, double* to) const {
+  basis.factor.whiten(change, to);
+  const Eigen::Index numbers = basis.level.size();
+  to[numbers] = basis.level.dot(Eigen::Map<const Eigen::VectorXd>(to, numbers));
 }
 
 void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents& latents, int pose, bool keep,
@@ -409,26 +474,24 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
     basis.cell = cell;
     if (!basis.factor.compute(covariance)) continue;
     basis.factor.apply(dataOf(pose, cell), y.data());
-    double q = 0;
-    for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
-    const double w = (channels_ + kTailFreedom) / (kTailFreedom + q);
-    out.log_likelihood += -basis.factor.logDeterminant() - (channels_ + kTailFreedom) * std::log1p(q / kTailFreedom);
+    const CellLikelihood likelihood(basis.factor, y.data(), strongestEcho(model, cell));
+    out.log_likelihood += likelihood.logLikelihood();
+    out.score[kSpread] += weight() * likelihood.spreadScore();
+    out.information(kSpread, kSpread) += weight() * likelihood.spreadInformation();
     addEchoDirections(model, cell, basis.factor.inverse(), directions);
     addLevelDirections(model, cell, covariance, directions);
     basis.active = directions.active;
-    setData(y.data(), w, basis);
+    const int numbers = channels_ * channels_;
+    basis.data.setZero(numbers + 1);
+    basis.level.resize(numbers);
+    likelihood.score(basis.data.data());
+    likelihood.level(basis.level.data());
     addProducts(directions, basis, out);
     if (!keep) continue;
     basis.whitened = directions.whitened.leftCols(static_cast<Eigen::Index>(basis.active.size())).cast<float>();
     out.bins.push_back(std::move(basis));
   }
   out.log_likelihood *= weight();
-}
-
-/// Fisher information of the complex t distribution about its covariance (Lange, Little and Taylor 1989, in complex
-/// form).
-double ChannelLikelihood::informationOf(double product, double trace_a, double trace_b) const {
-  return ((channels_ + kTailFreedom) * product - trace_a * trace_b) / (channels_ + kTailFreedom + 1);
 }
 
 Basis ChannelLikelihood::basis(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents,
@@ -467,7 +530,7 @@ ChannelLikelihood::PoseScores ChannelLikelihood::poseScores(const Basis& basis, 
 void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& latents,
                                    const std::vector<const PoseCovariance*>& further, PoseScores& own) const {
   const int globals = latents.globals(), more = static_cast<int>(further.size()), all = globals + more;
-  Eigen::MatrixXd v(channels_ * channels_, more);
+  Eigen::MatrixXd v(channels_ * channels_ + 1, more);
   PackedHermitian m(channels_);
   std::vector<int> active;
   Eigen::VectorXd traces(more);
@@ -479,7 +542,7 @@ void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& la
     m.setZero();
     m.add(from, 1);
     addRelative(latents, bin.cell, m);
-    bin.factor.whiten(m, v.col(h).data());
+    whiten(bin, m, v.col(h).data());
     traces[h] = traceOfWhitened(v.col(h).data(), channels_);
     active.push_back(h);
   }
@@ -490,13 +553,13 @@ void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& la
     for (std::size_t a = 0; a < bin.active.size(); ++a) {
       const int g = bin.active[a] == globals ? all : bin.active[a];
       const Eigen::Index ia = static_cast<Eigen::Index>(a);
-      const double x = weight() * informationOf(products[ia], bin.traces[ia], traces[h]);
+      const double x = weight() * tInformation(channels_, products[ia], bin.traces[ia], traces[h]);
       own.information(globals + h, g) += x;
       own.information(g, globals + h) += x;
     }
     for (int k : active) {
       if (k > h) continue;
-      const double x = weight() * informationOf(v.col(h).dot(v.col(k)), traces[h], traces[k]);
+      const double x = weight() * tInformation(channels_, v.col(h).dot(v.col(k)), traces[h], traces[k]);
       own.information(globals + h, globals + k) += x;
       if (k != h) own.information(globals + k, globals + h) += x;
     }

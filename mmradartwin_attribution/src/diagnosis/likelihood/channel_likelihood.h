@@ -10,6 +10,7 @@
 #include "diagnosis/catalogue/stated_bounds.h"
 #include "diagnosis/channels/channel_data.h"
 #include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/likelihood/echo_level.h"
 #include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/numbers/packed_hermitian.h"
 #include "diagnosis/rooms.h"
@@ -25,6 +26,7 @@ struct SessionLatents {
   double log_relative = -8;             ///< share of an echo's power that no two channels have in common
   double log_graze = 0;                 ///< factor of PoseEchoes::grazing
   double log_range = 0;                 ///< factor of the variance of a path's own range
+  double log_spread = -2.94;            ///< relative variance of the power of a path on its own, see CellLikelihood
   std::vector<double> actor_gain;       ///< [errors, see errorOf()] natural logarithm of power, per interaction
   std::vector<double> actor_range_m;    ///< [errors, see errorOf()] added one-way range, per interaction
   std::vector<double> yaw_rad;          ///< [poses] error of the heading
@@ -32,7 +34,7 @@ struct SessionLatents {
   /// Number j of those that all poses share ("globals"), in the order of Scores.
   double& global(int j);
   double global(int j) const { return const_cast<SessionLatents*>(this)->global(j); }
-  int globals() const { return 5 + static_cast<int>(floor_shape.size() + actor_gain.size() + actor_range_m.size()); }
+  int globals() const { return 6 + static_cast<int>(floor_shape.size() + actor_gain.size() + actor_range_m.size()); }
 };
 
 /// Prior standard deviations of the actors' latent errors.
@@ -64,13 +66,15 @@ struct Scores {
 };
 
 /// One cell's whitened directions and its data in the same M^2 real numbers (InverseFactor::whiten()). Derivatives of
-/// the likelihood are then dot products, and a further direction costs only its own products.
+/// the likelihood are then dot products, and a further direction costs only its own products. A last number stands for
+/// the level of the cell's echo (CellLikelihood::level()): it acts in products of directions alone.
 struct BinBasis {
   int cell = 0;
   InverseFactor factor;
   std::vector<int> active;   ///< globals that act in this cell; index `globals` stands for the heading
-  Eigen::MatrixXf whitened;  ///< [M^2][active]; single precision halves a long session's memory
-  Eigen::VectorXd data;      ///< [M^2] w L^-1 y y^H L^-H - I, with the t distribution's weight w
+  Eigen::MatrixXf whitened;  ///< [M^2 + 1][active]; single precision halves a long session's memory
+  Eigen::VectorXd data;      ///< [M^2 + 1] CellLikelihood::score(), then 0
+  Eigen::VectorXd level;     ///< [M^2] CellLikelihood::level()
   Eigen::VectorXd traces;    ///< [active] trace of each whitened direction
 };
 
@@ -88,9 +92,10 @@ struct Basis {
   std::vector<PoseBasis> poses;
 };
 
-/// Likelihood of a session's channels under expected echoes. The channels of a range bin are complex t-distributed (4
-/// complex degrees of freedom) about zero, with the covariance
-///   gain * (echoes + grazing echoes + range errors + relative) + clutter + noise.
+/// Likelihood of a session's channels under expected echoes. The channels of a range bin have the covariance
+///   gain * (echoes + grazing echoes + range errors + relative) + clutter + noise
+/// about zero. They are complex t-distributed (4 complex degrees of freedom), but for the strongest echo, whose level is
+/// known (CellLikelihood).
 /// The bins of a beam (EchoBeam) are distributed in the same way. A *cell* is a range bin or a beam; beams come after
 /// the bins. Neighbouring bins overlap through the window, and beams are formed of bins: each cell counts half
 /// (composite likelihood).
@@ -167,10 +172,17 @@ class ChannelLikelihood {
     const SessionLatents& latents;
     int pose;
     std::vector<GroupLevel> levels;  ///< [groups, grazing ones last]
+    std::vector<int> strongest;      ///< [cells] group with the strongest paths, -1 where there is none
+    std::vector<double> cells;       ///< [groups] how many cells, neighbours counted half, its echo stands out in
   };
   PoseModel modelOf(const PoseEchoes& echoes, const SessionLatents& latents, int pose) const;
+  /// Finds the strongest group of each cell.
+  void findStrongest(PoseModel& model) const;
+  /// Mean power of clutter and noise over the channels of a cell.
+  double floorOf(const PoseModel& model, int cell) const;
   /// Covariance of a cell.
   PackedHermitian sigma(const PoseModel& model, int cell) const;
+  CellEcho strongestEcho(const PoseModel& model, int cell) const;
   /// A group's fields in a cell; nothing where it has none.
   std::optional<EchoGroup::Cell> fieldsOf(const EchoGroup& group, int cell) const;
   /// Adds clutter's covariance in a cell, times factor.
@@ -185,8 +197,8 @@ class ChannelLikelihood {
   /// Adds a cell's changes by the floor, its shape, the gain and the channels' independent share.
   void addLevelDirections(const PoseModel& model, int cell, const PackedHermitian& covariance,
                           CellDirections& to) const;
-  /// Fills BinBasis::data: y whitened channels, w their weight under the t distribution.
-  void setData(const std::complex<double>* y, double w, BinBasis& basis) const;
+  /// Writes a change of a cell's covariance as [M^2 + 1] numbers, see BinBasis.
+  void whiten(const BinBasis& basis, const PackedHermitian& change, double* to) const;
   /// Whitens a cell's directions and adds their scores and information to the pose's.
   void addProducts(CellDirections& directions, BinBasis& basis, PoseBasis& out) const;
   struct PoseScores;
@@ -200,7 +212,6 @@ class ChannelLikelihood {
                          Scores& scores) const;
   void addPriors(const SessionLatents& latents, Scores& scores) const;
   void holdAtLimits(const SessionLatents& latents, Scores& scores) const;
-  double informationOf(double product, double trace_a, double trace_b) const;
 
   const ChannelData& data_;
   int errors_;  ///< number of the actors' errors, see errorOf()

@@ -23,7 +23,9 @@ struct EchoGroup {
     const std::complex<float>* shift;  ///< derivative of power by the one-way range, per metre
     /// W'^2 c c^H per m^2: times a variance of the one-way range it is what a random range adds.
     const std::complex<float>* curvature;
-    double cosine;  ///< sum |W|^2 cos(azimuth) |c_0|^2, on which a turn of the radar acts; 0 for beams
+    double cosine;   ///< sum |W|^2 cos(azimuth) |c_0|^2, on which a turn of the radar acts; 0 for beams
+    double mean;     ///< power, mean over the channels
+    double squares;  ///< sum over paths of the square of each one's mean power
   };
   /// Fields of the cells from `first` on. The fields of one cell are read together and stand one behind the other.
   struct Fields {
@@ -31,12 +33,13 @@ struct EchoGroup {
     int first = 0, cells = 0;
     std::vector<std::complex<float>> packed;  ///< [cell][kOfCell][size]
     std::vector<float> cosine;                ///< [cell]
+    std::vector<float> mean, squares;         ///< [cell]
     /// Fields of a cell; nothing outside. size: of a packed matrix.
     std::optional<Cell> at(int cell, std::size_t size) const {
       if (cell < first || cell >= first + cells) return std::nullopt;
       const auto i = static_cast<std::size_t>(cell - first);
       const std::complex<float>* own = packed.data() + i * kOfCell * size;
-      return Cell{own, own + size, own + 2 * size, cosine[i]};
+      return Cell{own, own + size, own + 2 * size, cosine[i], mean[i], squares[i]};
     }
   };
   PerInteraction<int> actors;  ///< one per interaction, in order; empty where a path meets none
