@@ -1,6 +1,6 @@
 #pragma once
 
-#include "mmradartwin_driver/radar_devices.h"
+#include "mmradartwin_driver/radar_device.h"
 
 namespace mmradartwin {
 

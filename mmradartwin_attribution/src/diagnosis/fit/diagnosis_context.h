@@ -4,7 +4,7 @@
 
 #include "diagnosis/catalogue/stated_bounds.h"
 #include "diagnosis/channels/channel_data.h"
-#include "diagnosis/fit/hypothesis_fit.h"
+#include "diagnosis/fit/hypothesis_fitter.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/rooms.h"

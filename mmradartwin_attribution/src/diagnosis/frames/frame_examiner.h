@@ -1,46 +1,18 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "diagnosis/frames/frame_finding.h"
+#include "diagnosis/frames/moving_cell.h"
 #include "diagnosis/rooms.h"
-#include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_dsp/adc_cube.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
 #include "mmradartwin_dsp/session.h"
 
 namespace mmradartwin::diagnosis::frames {
-
-/// Finding from raw samples and frames, which no average shows.
-struct FrameFinding {
-  /// adc_saturation, packet_loss, packet_misalignment, interference, moving_target or phase_drift; "unknown" among
-  /// FrameExaminer::unexplained().
-  std::string cause;
-  std::vector<FindingParameter> parameters;  ///< named as the cause has them
-  double log_likelihood_gain = 0;            ///< nats of the frame data
-  double false_alarm_rate = 1;               ///< upper bound for the whole session
-  std::vector<std::string> poses;            ///< names of those that carry it
-  std::vector<FindingPlace> where;
-  std::string description;  ///< in words and numbers
-  /// Mechanism of the twin for an unexplained() finding, where there is one (level_db over one ADC count).
-  std::optional<NamedParameters> mechanism;
-  /// Nats that it explains at each pose, by the pose's name; empty where it is not told pose by pose. Nats of an
-  /// unexplained() finding are those of numbers read at the poses of other locations.
-  std::map<std::string, double> nats_by_pose;
-};
-
-/// Echo that moves, as one cell of range and Doppler of a frame with many loops.
-struct MovingCell {
-  int bin = 0;                ///< range bin
-  double turn_rad = 0;        ///< phase from one transmitter's slot to the next
-  double power = 0;           ///< ratio to the noise
-  Eigen::VectorXcd channels;  ///< [M] as delivered, up to a common factor
-};
 
 /// Average and statistics of the frames of one pose without damaged samples.
 struct PoseFrames {

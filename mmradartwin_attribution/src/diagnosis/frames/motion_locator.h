@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "diagnosis/frames/frame_examiner.h"
+#include "diagnosis/frames/frame_finding.h"
 #include "diagnosis/frames/shot_examiner.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_dsp/session.h"

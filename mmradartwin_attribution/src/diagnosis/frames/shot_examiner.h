@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "diagnosis/frames/frame_examiner.h"
 #include "diagnosis/frames/frame_stack.h"
+#include "diagnosis/frames/moving_cell.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_dsp/range_angle.h"
 

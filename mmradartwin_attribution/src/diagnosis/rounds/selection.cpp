@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "diagnosis/catalogue/bounds.h"
+#include "diagnosis/fit/hypothesis_fitter.h"
 #include "diagnosis/fit/profiled_values.h"
 #include "diagnosis/hypotheses/fitted_parameters.h"
 #include "diagnosis/receiver/receiver_findings.h"

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "diagnosis/fit/hypothesis_fit.h"
+#include "diagnosis/fit/hypothesis_fitter.h"
 #include "diagnosis/rooms.h"
 
 namespace mmradartwin::diagnosis::search {
