@@ -2,6 +2,7 @@
 // rig, and publishes the poses in tf on the emulator's schedule.
 #include <ros/ros.h>
 #include <std_msgs/Float32.h>
+#include <tf2_eigen/tf2_eigen.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
@@ -101,14 +102,8 @@ class SessionPlayer {
     const tf2_ros::TransformListener listener(buffer);
     constexpr double kWait_s = 20;
     try {
-      const auto T =
-          buffer.lookupTransform(radar_frame_, camera_frame_, ros::Time(0), ros::Duration(kWait_s)).transform;
-      geometry_msgs::Pose pose;
-      pose.position.x = T.translation.x;
-      pose.position.y = T.translation.y;
-      pose.position.z = T.translation.z;
-      pose.orientation = T.rotation;
-      T_radar_child_ = fromMsg(pose);
+      T_radar_child_ =
+          fromMsg(buffer.lookupTransform(radar_frame_, camera_frame_, ros::Time(0), ros::Duration(kWait_s)).transform);
     } catch (const tf2::TransformException& error) {
       throw InputError("no transform between " + camera_frame_ + " and " + radar_frame_ + " in tf (" + error.what() +
                        "): start a static_transform_publisher for the camera's mount, or leave camera_frame empty");
@@ -274,15 +269,10 @@ class SessionPlayer {
 
   void sendPose(const Eigen::Isometry3d& T_map_radar, const ros::Time& stamp) {
     if (!publish_poses_) return;  // another node finds them
-    geometry_msgs::TransformStamped message;
+    geometry_msgs::TransformStamped message = tf2::eigenToTransform(T_map_radar * T_radar_child_);
     message.header.stamp = stamp;
     message.header.frame_id = map_frame_;
     message.child_frame_id = camera_frame_.empty() ? radar_frame_ : camera_frame_;
-    const geometry_msgs::Pose pose = toMsg(T_map_radar * T_radar_child_);
-    message.transform.translation.x = pose.position.x;
-    message.transform.translation.y = pose.position.y;
-    message.transform.translation.z = pose.position.z;
-    message.transform.rotation = pose.orientation;
     broadcaster_.sendTransform(message);
   }
 

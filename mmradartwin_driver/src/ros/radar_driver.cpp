@@ -233,12 +233,7 @@ void RadarDriver::diagnoseDevice(diagnostic_updater::DiagnosticStatusWrapper& st
 void RadarDriver::observePose() {
   try {
     const geometry_msgs::TransformStamped T = tf_buffer_->lookupTransform(map_frame_, frame_id_, ros::Time(0));
-    geometry_msgs::Pose pose;
-    pose.position.x = T.transform.translation.x;
-    pose.position.y = T.transform.translation.y;
-    pose.position.z = T.transform.translation.z;
-    pose.orientation = T.transform.rotation;
-    pose_watch_.observe(toNanoseconds(T.header.stamp), fromMsg(pose));
+    pose_watch_.observe(toNanoseconds(T.header.stamp), fromMsg(T.transform));
   } catch (const tf2::TransformException&) {
     // Not there yet, or its parts do not meet: the report tells its age.
   }
