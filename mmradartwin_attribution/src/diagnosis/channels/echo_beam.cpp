@@ -38,18 +38,18 @@ std::vector<EchoBeam> chooseBeams(const RadarConfig& radar, const std::vector<Pa
   std::stable_sort(strongest.begin(), strongest.end(),
                    [](const PathRecord* a, const PathRecord* b) { return a->amplitude > b->amplitude; });
   std::vector<double> places;
-  for (const PathRecord* r : strongest) {
+  for (const PathRecord* record : strongest) {
     if (beams.size() == kMostBeams ||
-        r->amplitude * r->amplitude < kWeakestShare * std::pow(strongest.front()->amplitude, 2))
+        record->amplitude * record->amplitude < kWeakestShare * std::pow(strongest.front()->amplitude, 2))
       break;
-    const double place = 0.5 * meanLength_m(*r) / radar.range_bin_m();
+    const double place = 0.5 * meanLength_m(*record) / radar.range_bin_m();
     if (place < first_bin || place > bins - 1) continue;
     EchoBeam beam;
     beam.weights.resize(channels);
     for (int k = 0; k < channels; ++k) {
       // Hamming's taper over the aperture keeps other directions out of the beam.
       const double across = (radar.virtual_element_m(k).y() - low) / std::max(high - low, 1e-9);
-      beam.weights[k] = std::polar(0.54 - 0.46 * std::cos(2 * M_PI * (0.05 + 0.9 * across)), std::arg(r->c[k]));
+      beam.weights[k] = std::polar(0.54 - 0.46 * std::cos(2 * M_PI * (0.05 + 0.9 * across)), std::arg(record->c[k]));
     }
     beam.weights.normalize();
     bool taken = false;

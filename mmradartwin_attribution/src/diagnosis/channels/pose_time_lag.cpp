@@ -258,22 +258,22 @@ namespace {
 
 /// Finding of a lag of the poses, beyond one that the twin states.
 FrameFinding findingOf(const PoseTimeLag& lag, double stated_s) {
-  FrameFinding f;
-  f.cause = kName;
+  FrameFinding finding;
+  finding.cause = kName;
   const double value_s = stated_s + lag.lag_s;
   const boost::math::students_t student(static_cast<double>(lag.by_motion_s.size()) - 1);
   const double half_s = boost::math::quantile(student, 0.975) * lag.standard_error_s;
-  f.parameters = {{"lag_s", "s", value_s, {{value_s - half_s, value_s + half_s}}}};
-  for (double nats : lag.nats) f.log_likelihood_gain += nats;
-  f.false_alarm_rate = lag.false_alarm_rate;
+  finding.parameters = {{"lag_s", "s", value_s, {{value_s - half_s, value_s + half_s}}}};
+  for (double nats : lag.nats) finding.log_likelihood_gain += nats;
+  finding.false_alarm_rate = lag.false_alarm_rate;
   std::ostringstream text;
   text << std::setprecision(3) << "frames begin and end to change " << std::abs(lag.lag_s) << " s "
        << (lag.lag_s > 0 ? "before" : "after") << " tf says that the radar moves or stops, at "
        << lag.by_motion_s.size() << " moves; poses are looked up by that much " << (lag.lag_s > 0 ? "later" : "earlier")
        << " than frames' stamps here";
   if (stated_s != 0) text << ", beyond the " << stated_s << " s that the twin states";
-  f.description = text.str();
-  return f;
+  finding.description = text.str();
+  return finding;
 }
 
 }  // namespace

@@ -18,10 +18,10 @@ struct ModelState {
   std::vector<NamedParameters> mechanisms;
   std::vector<double> actor_range_m;  ///< ranges about which the echoes were collected
   std::vector<PoseEchoes> echoes;
-  SessionLatents nuisance;
+  SessionLatents latents;
   double log_likelihood = 0;
   std::vector<double> by_pose;
-  // Derivatives at nuisance; only HypothesisFitter::state() fills them.
+  // Derivatives at latents; only HypothesisFitter::state() fills them.
   Basis basis;
   SessionCovariance covariance;
 };
@@ -41,7 +41,7 @@ struct HypothesisFit {
   std::vector<double> standard_error;  ///< [coordinates] of the values (not scaled), from the scatter over locations
   std::vector<std::vector<double>> fold_scaled;  ///< [folds][coordinates] values without each fold of locations
   /// True where gain_without_best_place is far beyond what clean sessions bring, whatever the scatter over places.
-  bool plain = false;
+  bool overwhelming = false;
   std::size_t numbers() const;  ///< how many were fitted or searched for, at least one
   double ranking() const;       ///< gain, or the ranked share of it, less a price per number
   double moved_m() const;       ///< how far it moves an actor, or all of them; 0 where it moves none
@@ -59,11 +59,11 @@ struct EvidenceShare {
 struct JointFit {
   std::vector<std::vector<double>> scaled_values;   ///< [hypotheses][coordinates]
   std::vector<std::vector<double>> standard_error;  ///< [hypotheses][coordinates] of the values (not scaled)
-  std::vector<EvidenceShare> worth;                 ///< [hypotheses] beside the others; nothing without coordinates
-  SessionLatents nuisance;
+  std::vector<EvidenceShare> evidence;              ///< [hypotheses] beside the others; nothing without coordinates
+  SessionLatents latents;
 };
 
-constexpr int kSettling = 3;  ///< Fisher steps of the latents before one of several starts or places is judged
+constexpr int kLatentSteps = 3;  ///< Fisher steps of the latents before one of several starts or places is judged
 
 /// Indices of all poses of the session.
 std::vector<int> everyPose(const ModelState& state);
@@ -95,18 +95,18 @@ class HypothesisFitter {
                     const std::vector<std::vector<double>>& starts, double least_nats = 0,
                     const HypothesisFit* known = nullptr);
   /// Maximum likelihood of several hypotheses at once over `base`, which holds none of them.
-  JointFit refit(const std::vector<NamedParameters>& base, const SessionLatents& nuisance,
+  JointFit refit(const std::vector<NamedParameters>& base, const SessionLatents& latents,
                  const std::vector<Hypothesis>& parts, const std::vector<std::vector<double>>& start);
   /// Fold of a location.
   int fold(int location) const { return location % folds_; }
   int folds() const { return folds_; }
   /// Shortens the step to each fold's values until they are no worse than the fit's on the places that the fold is
   /// fitted to. Where the likelihood is rough, scores of one place lead far away.
-  void settleFolds(const ModelState& null, HypothesisFit& fit);
+  void shortenFoldSteps(const ModelState& null, HypothesisFit& fit);
   /// Sets a fit's gains to those over this null, which may have become better since.
   void gainOver(const ModelState& null, HypothesisFit& fit) const;
   /// True for nats far beyond what clean sessions bring, whatever their scatter over places.
-  bool isPlain(double nats) const;
+  bool isOverwhelming(double nats) const;
   /// Sets false_alarm_rate and plain of a fit, one of a family of hypotheses.
   void judge(HypothesisFit& fit, std::size_t family) const;
   /// Probability that one of a family of hypotheses gains so many nats (overdispersion divided out) by chance. numbers:
@@ -116,8 +116,8 @@ class HypothesisFitter {
  private:
   /// Nats that the numbers from `first` on bring beside the others, without the place that gains most. For numbers that
   /// rise from nothing or turn the view the errors at the fit say far too little: the likelihood follows a square law.
-  EvidenceShare worthOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
-                                const Optimum& o, const ProfiledScores& e, Eigen::Index first, Eigen::Index numbers);
+  EvidenceShare evidenceOfPresence(const std::vector<NamedParameters>& base, const std::vector<Hypothesis>& parts,
+                                   const Optimum& o, const ProfiledScores& e, Eigen::Index first, Eigen::Index numbers);
   Eigen::MatrixXd robustCovariance(const ProfiledScores& effective) const;
   /// Nats by which values lie off nothing, by their errors.
   EvidenceShare evidenceShareOf(const Hypothesis& hypothesis, const Eigen::VectorXd& scaled_values,

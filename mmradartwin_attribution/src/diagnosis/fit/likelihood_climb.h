@@ -11,7 +11,7 @@
 
 namespace mmradartwin::diagnosis::fit {
 
-constexpr double kWorthASearch_nats = 25;  ///< gain by slopes from which on a rough likelihood is searched
+constexpr double kLeastForSearch_nats = 25;  ///< gain by slopes from which on a rough likelihood is searched
 
 /// Highest likelihood that a climb has found.
 struct Optimum {
@@ -23,7 +23,7 @@ struct Optimum {
 /// Task of a climb: to maximise the likelihood over the coordinates of several hypotheses.
 struct ClimbTask {
   const std::vector<NamedParameters>& base;  ///< mechanisms without the hypotheses
-  const SessionLatents& nuisance;            ///< latents to start from
+  const SessionLatents& latents;             ///< latents to start from
   const std::vector<Hypothesis>& parts;
   const std::vector<std::vector<double>>& starts;  ///< scaled coordinates of all parts
   int steps;                                       ///< Fisher steps, more while they gain much
@@ -58,7 +58,7 @@ class LikelihoodClimb {
   void climb();
   /// Takes the longest share of a step that gains; returns the gain, 0 where none does.
   double stepBy(const Eigen::VectorXd& step);
-  bool isWorthASearch() const;
+  bool needsSearch() const;
   /// Searches without slopes around the optimum, from one first step on.
   void search(double first_step);
 
@@ -74,7 +74,7 @@ class LikelihoodClimb {
 };
 
 /// Gain of a state over the null, without the location that gains most.
-double broadGain(const ChannelData& data, const ModelState& null, const ModelState& state);
+double gainWithoutBestPlace(const ChannelData& data, const ModelState& null, const ModelState& state);
 /// [locations] gain of a state over the null.
 std::vector<double> gainByLocation(const ChannelData& data, const ModelState& null, const ModelState& state);
 

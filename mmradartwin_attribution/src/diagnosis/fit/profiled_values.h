@@ -21,7 +21,7 @@ struct ProfiledModel {
   const ChannelLikelihood& likelihood;
   const PoseAccuracy& accuracy;
   const std::vector<NamedParameters>& base;  ///< mechanisms without the parts
-  const SessionLatents& nuisance;            ///< from which latents are refitted
+  const SessionLatents& latents;             ///< from which latents are refitted
 };
 
 /// Values and standard errors about a fit, by the profile likelihood: how far the likelihood with all latents refitted

@@ -219,40 +219,40 @@ Eigen::VectorXcf ShotExaminer::steering(double azimuth_rad) const {
 }
 
 ShotExaminer::Spectra ShotExaminer::spectra(const FrameStack& stack, const std::vector<Complex>& average) const {
-  Spectra s;
-  s.channels = stack.channels();
-  s.bins = stack.samples;
-  s.per_frame = stack.loops;
+  Spectra spectra;
+  spectra.channels = stack.channels();
+  spectra.bins = stack.samples;
+  spectra.per_frame = stack.loops;
   const std::size_t values = stack.values();
   for (int shot = 0; shot < stack.shots(); ++shot) {
     const auto first = stack.use.begin() + static_cast<long>(static_cast<std::size_t>(shot) * values);
     const auto used = std::count(first, first + static_cast<long>(values), std::uint8_t{1});
-    if (10 * static_cast<std::size_t>(used) >= 9 * values) s.shot.push_back(shot);
+    if (10 * static_cast<std::size_t>(used) >= 9 * values) spectra.shot.push_back(shot);
   }
-  s.residual.resize(s.shot.size() * values);
-  s.average.resize(values);
-  std::vector<Complex> in(static_cast<std::size_t>(s.bins)), out(in);
+  spectra.residual.resize(spectra.shot.size() * values);
+  spectra.average.resize(values);
+  std::vector<Complex> in(static_cast<std::size_t>(spectra.bins)), out(in);
   const auto transform = [&](Complex* to, int k) {
-    fft().fwd(out.data(), in.data(), s.bins);
-    for (int b = 0; b < s.bins; ++b) to[b * s.channels + k] = out[static_cast<std::size_t>(b)];
+    fft().fwd(out.data(), in.data(), spectra.bins);
+    for (int b = 0; b < spectra.bins; ++b) to[b * spectra.channels + k] = out[static_cast<std::size_t>(b)];
   };
-  for (int k = 0; k < s.channels; ++k) {
-    for (int n = 0; n < s.bins; ++n) {
+  for (int k = 0; k < spectra.channels; ++k) {
+    for (int n = 0; n < spectra.bins; ++n) {
       const auto i = static_cast<std::size_t>(n);
       in[i] = average[stack.at(0, k, n)] * window_[i];
     }
-    transform(s.average.data(), k);
+    transform(spectra.average.data(), k);
   }
-  for (std::size_t i = 0; i < s.shot.size(); ++i) {
-    for (int k = 0; k < s.channels; ++k) {
-      const std::size_t at = stack.at(s.shot[i], k, 0), still = stack.at(0, k, 0);
+  for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+    for (int k = 0; k < spectra.channels; ++k) {
+      const std::size_t at = stack.at(spectra.shot[i], k, 0), still = stack.at(0, k, 0);
       for (std::size_t n = 0; n < in.size(); ++n) {
         in[n] = stack.use[at + n] ? (stack.x[at + n] - average[still + n]) * window_[n] : 0;
       }
-      transform(s.at(i, 0), k);
+      transform(spectra.at(i, 0), k);
     }
   }
-  return s;
+  return spectra;
 }
 
 double ShotExaminer::commonTurn(const FrameStack& stack) const {
@@ -312,10 +312,10 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
   return common.rad + weightedMedian(weighed);
 }
 
-void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotStatistics& result) const {
-  s.gain.assign(s.shot.size(), 1);
+void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& spectra, ShotStatistics& result) const {
+  spectra.gain.assign(spectra.shot.size(), 1);
   result.frame_level.assign(static_cast<std::size_t>(stack.frames), 1);
-  const double freedom = static_cast<double>(s.shot.size()) - 1;
+  const double freedom = static_cast<double>(spectra.shot.size()) - 1;
   if (freedom < 1) return;
   // The common gain is the weighted median over range bins: movers are in few of them.
   struct Cell {
@@ -323,13 +323,16 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotStati
     double power;
   };
   const auto still = [&](int b) {
-    return Eigen::Map<const Eigen::VectorXcf>(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
+    return Eigen::Map<const Eigen::VectorXcf>(&spectra.average[static_cast<std::size_t>(b * spectra.channels)],
+                                              spectra.channels);
   };
-  const auto varied = [&](std::size_t i, int b) { return Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels); };
+  const auto varied = [&](std::size_t i, int b) {
+    return Eigen::Map<const Eigen::VectorXcf>(spectra.at(i, b), spectra.channels);
+  };
   const auto beyondOne = [&](const std::vector<Cell>& cells) {
     std::vector<std::complex<double>> beyond;
     std::vector<std::pair<double, double>> re(cells.size()), im(cells.size());
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
       for (std::size_t c = 0; c < cells.size(); ++c) {
         const std::complex<double> share =
             std::complex<double>(still(cells[c].bin).dot(varied(i, cells[c].bin))) / cells[c].power;
@@ -343,9 +346,9 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotStati
   // Cells that vary by less than a tenth of themselves beside the common gain.
   const auto steady = [&](const std::vector<std::complex<double>>& beyond) {
     std::vector<Cell> cells;
-    for (int b = 0; b < s.bins; ++b) {
+    for (int b = 0; b < spectra.bins; ++b) {
       double scatter = 0;
-      for (std::size_t i = 0; i < s.shot.size(); ++i) {
+      for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
         scatter += (varied(i, b) - Complex(beyond[i]) * still(b)).squaredNorm();
       }
       const double power = still(b).squaredNorm();
@@ -353,36 +356,36 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotStati
     }
     return cells;
   };
-  std::vector<Cell> cells = steady(std::vector<std::complex<double>>(s.shot.size(), 0.0)), all;
+  std::vector<Cell> cells = steady(std::vector<std::complex<double>>(spectra.shot.size(), 0.0)), all;
   // A gain that changes by more than a tenth lets cells be steady only beside it.
-  for (int b = 0; b < s.bins; ++b) {
+  for (int b = 0; b < spectra.bins; ++b) {
     if (still(b).squaredNorm() > 0) all.push_back({b, still(b).squaredNorm()});
   }
   std::vector<Cell> beside = steady(beyondOne(all));
   if (beside.size() > cells.size()) cells = std::move(beside);
   if (cells.empty()) return;
   const std::vector<std::complex<double>> common = beyondOne(cells);
-  for (std::size_t i = 0; i < s.shot.size(); ++i) {
+  for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
     const std::complex<double> beyond = common[i];
-    s.gain[i] = 1.0 + beyond;
-    result.frame_level[static_cast<std::size_t>(s.shot[i] / s.per_frame)] = std::abs(s.gain[i]);
-    Complex* e = s.at(i, 0);
-    for (std::size_t j = 0; j < s.average.size(); ++j) e[j] -= Complex(beyond) * s.average[j];
+    spectra.gain[i] = 1.0 + beyond;
+    result.frame_level[static_cast<std::size_t>(spectra.shot[i] / spectra.per_frame)] = std::abs(spectra.gain[i]);
+    Complex* e = spectra.at(i, 0);
+    for (std::size_t j = 0; j < spectra.average.size(); ++j) e[j] -= Complex(beyond) * spectra.average[j];
   }
 }
 
-void ShotExaminer::readSteadiness(const Spectra& s, ShotStatistics& result) const {
-  const double freedom = static_cast<double>(s.shot.size()) - 1;
+void ShotExaminer::readSteadiness(const Spectra& spectra, ShotStatistics& result) const {
+  const double freedom = static_cast<double>(spectra.shot.size()) - 1;
   if (freedom < 4) return;
-  std::vector<double> varied(static_cast<std::size_t>(s.bins), 0), standing(varied);
-  for (int b = 0; b < s.bins; ++b) {
+  std::vector<double> varied(static_cast<std::size_t>(spectra.bins), 0), standing(varied);
+  for (int b = 0; b < spectra.bins; ++b) {
     const auto bin = static_cast<std::size_t>(b);
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
-      varied[bin] += Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm() / freedom;
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+      varied[bin] += Eigen::Map<const Eigen::VectorXcf>(spectra.at(i, b), spectra.channels).squaredNorm() / freedom;
     }
-    standing[bin] =
-        Eigen::Map<const Eigen::VectorXcf>(&s.average[bin * static_cast<std::size_t>(s.channels)], s.channels)
-            .squaredNorm();
+    standing[bin] = Eigen::Map<const Eigen::VectorXcf>(
+                        &spectra.average[bin * static_cast<std::size_t>(spectra.channels)], spectra.channels)
+                        .squaredNorm();
   }
   // Noise fills all bins alike: the steadiest bins hold nothing else.
   std::vector<double> sorted = varied;
@@ -398,63 +401,65 @@ void ShotExaminer::readSteadiness(const Spectra& s, ShotStatistics& result) cons
     }
     ++unsteady;
     const double q = varied[b] / std::max(noise, 1e-30);
-    result.unsteady_nats += freedom * s.channels * (q - 1 - std::log(q));
+    result.unsteady_nats += freedom * spectra.channels * (q - 1 - std::log(q));
   }
   if (all > 0) result.unsteady_share = unsteady / all;
 }
 
-void ShotExaminer::readNoise(Spectra& s, ShotStatistics& result) const {
+void ShotExaminer::readNoise(Spectra& spectra, ShotStatistics& result) const {
   double window_power = 0;
   for (float w : window_) window_power += w * w;
-  const double freedom = static_cast<double>(s.shot.size()) - 1;
+  const double freedom = static_cast<double>(spectra.shot.size()) - 1;
   // Movers fill few range bins, noise fills all of them alike: the median over bins tells the noise. It is of sums that
   // are Gamma distributed with the number of shots (Wilson and Hilferty: median = mean (1 - 1/(9 n))^3).
   const double median_of_mean = std::pow(1 - 1 / (9 * std::max(freedom, 1.0)), 3);
-  result.noise_variance.assign(static_cast<std::size_t>(s.channels), 1.0 / 6);
+  result.noise_variance.assign(static_cast<std::size_t>(spectra.channels), 1.0 / 6);
   if (freedom < 1) return;
-  for (int k = 0; k < s.channels; ++k) {
-    std::vector<double> power(static_cast<std::size_t>(s.bins), 0);
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
-      for (int b = 0; b < s.bins; ++b) power[static_cast<std::size_t>(b)] += std::norm(s.at(i, b)[k]);
+  for (int k = 0; k < spectra.channels; ++k) {
+    std::vector<double> power(static_cast<std::size_t>(spectra.bins), 0);
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+      for (int b = 0; b < spectra.bins; ++b) power[static_cast<std::size_t>(b)] += std::norm(spectra.at(i, b)[k]);
     }
     const double variance = medianOf(power) / freedom / median_of_mean / window_power;
     result.noise_variance[static_cast<std::size_t>(k)] = std::max(variance, 1.0 / 6);
   }
   std::vector<float> scale;
   for (double v : result.noise_variance) scale.push_back(static_cast<float>(1 / std::sqrt(v * window_power)));
-  for (std::size_t i = 0; i < s.residual.size(); ++i) s.residual[i] *= scale[i % scale.size()];
-  for (std::size_t i = 0; i < s.average.size(); ++i) s.average[i] *= scale[i % scale.size()];
+  for (std::size_t i = 0; i < spectra.residual.size(); ++i) spectra.residual[i] *= scale[i % scale.size()];
+  for (std::size_t i = 0; i < spectra.average.size(); ++i) spectra.average[i] *= scale[i % scale.size()];
 }
 
-void ShotExaminer::readUnsteadiness(const Spectra& s, ShotStatistics& result) const {
-  const double values = static_cast<double>(s.shot.size()) * s.channels, freedom = values - s.channels;
+void ShotExaminer::readUnsteadiness(const Spectra& spectra, ShotStatistics& result) const {
+  const double values = static_cast<double>(spectra.shot.size()) * spectra.channels,
+               freedom = values - spectra.channels;
   // A radar that itself changes does so in all its echoes, which still are to be explained.
   if (freedom < 1 || result.unsteady_share > bounds::kLeastUnsteadyShare) return;
-  for (int b = 0; b < s.bins; ++b) {
+  for (int b = 0; b < spectra.bins; ++b) {
     double power = 0;
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
-      power += Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm();
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+      power += Eigen::Map<const Eigen::VectorXcf>(spectra.at(i, b), spectra.channels).squaredNorm();
     }
     const double beyond = power / freedom - 1;
     if (beyond < bounds::kLeastBinScatter_deviations / std::sqrt(freedom)) continue;
-    result.unsteadiness.resize(static_cast<std::size_t>(s.bins), 1.0);
+    result.unsteadiness.resize(static_cast<std::size_t>(spectra.bins), 1.0);
     result.unsteadiness[static_cast<std::size_t>(b)] += kAlike * beyond;
   }
 }
 
-void ShotExaminer::readEvidence(const Spectra& s, ShotStatistics& result) const {
-  result.evidence = Eigen::ArrayXXf::Zero(s.bins, kAngleBins);
-  const double freedom = static_cast<double>(s.shot.size()) - 1;
+void ShotExaminer::readEvidence(const Spectra& spectra, ShotStatistics& result) const {
+  result.evidence = Eigen::ArrayXXf::Zero(spectra.bins, kAngleBins);
+  const double freedom = static_cast<double>(spectra.shot.size()) - 1;
   if (freedom < 4) return;
-  Eigen::ArrayXXf ratio(s.bins, kAngleBins);
-  for (int b = 0; b < s.bins; ++b) {
-    Eigen::MatrixXcf c = Eigen::MatrixXcf::Zero(s.channels, s.channels);
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
-      const Eigen::Map<const Eigen::VectorXcf> e(s.at(i, b), s.channels);
+  Eigen::ArrayXXf ratio(spectra.bins, kAngleBins);
+  for (int b = 0; b < spectra.bins; ++b) {
+    Eigen::MatrixXcf c = Eigen::MatrixXcf::Zero(spectra.channels, spectra.channels);
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+      const Eigen::Map<const Eigen::VectorXcf> e(spectra.at(i, b), spectra.channels);
       c.noalias() += e * e.adjoint();
     }
     c /= static_cast<float>(freedom);
-    const Eigen::Map<const Eigen::VectorXcf> still(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
+    const Eigen::Map<const Eigen::VectorXcf> still(&spectra.average[static_cast<std::size_t>(b * spectra.channels)],
+                                                   spectra.channels);
     // Flicker of a standing echo (phase noise, gain) has the echo's channel vector and some permille of its power. That
     // direction is left out where so little varies; a body that stands and breathes varies by more.
     const float standing = still.squaredNorm();
@@ -465,17 +470,18 @@ void ShotExaminer::readEvidence(const Spectra& s, ShotStatistics& result) const 
     const Eigen::MatrixXcf varied = c * beams;
     for (int a = 0; a < kAngleBins; ++a) {
       const float size = beams.col(a).squaredNorm();
-      ratio(b, a) = size > 0.2f * static_cast<float>(s.channels) ? beams.col(a).dot(varied.col(a)).real() / size : 1.0f;
+      ratio(b, a) =
+          size > 0.2f * static_cast<float>(spectra.channels) ? beams.col(a).dot(varied.col(a)).real() / size : 1.0f;
     }
   }
   // Skirts of strong echoes reach over many bins. A mover stands out of its surroundings in range, too.
   std::vector<float> around;
   for (int a = 0; a < kAngleBins; ++a) {
-    for (int b = 0; b < s.bins; ++b) {
+    for (int b = 0; b < spectra.bins; ++b) {
       if (ratio(b, a) <= 1) continue;
       around.clear();
       for (int d = -kSkirtBins; d <= kSkirtBins; ++d) {
-        if (std::abs(d) > kPeakBins && b + d >= 0 && b + d < s.bins) around.push_back(ratio(b + d, a));
+        if (std::abs(d) > kPeakBins && b + d >= 0 && b + d < spectra.bins) around.push_back(ratio(b + d, a));
       }
       const double q = ratio(b, a) / std::max(1.0f, medianOf(around));
       if (q > 1) result.evidence(b, a) = static_cast<float>(freedom * (q - 1 - std::log(q)));
@@ -483,29 +489,30 @@ void ShotExaminer::readEvidence(const Spectra& s, ShotStatistics& result) const 
   }
 }
 
-void ShotExaminer::readEchoes(const Spectra& s, ShotStatistics& result) const {
+void ShotExaminer::readEchoes(const Spectra& spectra, ShotStatistics& result) const {
   // A bin holds M times the noise over all channels.
-  const auto least =
-      static_cast<float>(boost::math::gamma_q_inv(static_cast<double>(s.channels), bounds::kMovingBinFalseAlarmRate));
-  std::vector<float> power(static_cast<std::size_t>(s.bins));
+  const auto least = static_cast<float>(
+      boost::math::gamma_q_inv(static_cast<double>(spectra.channels), bounds::kMovingBinFalseAlarmRate));
+  std::vector<float> power(static_cast<std::size_t>(spectra.bins));
   Eigen::VectorXf beam(kAngleBins);
-  for (std::size_t i = 0; i < s.shot.size(); ++i) {
+  for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
     std::vector<MovingEcho> echoes;
-    for (int b = 0; b < s.bins; ++b) {
-      power[static_cast<std::size_t>(b)] = Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm();
+    for (int b = 0; b < spectra.bins; ++b) {
+      power[static_cast<std::size_t>(b)] =
+          Eigen::Map<const Eigen::VectorXcf>(spectra.at(i, b), spectra.channels).squaredNorm();
     }
-    for (int b = 1; b + 1 < s.bins; ++b) {
+    for (int b = 1; b + 1 < spectra.bins; ++b) {
       const float here = power[static_cast<std::size_t>(b)];
       const float left = power[static_cast<std::size_t>(b - 1)], right = power[static_cast<std::size_t>(b + 1)];
       if (here < least || here < left || here <= right) continue;
-      beam = (beams_.adjoint() * Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels)).cwiseAbs2();
+      beam = (beams_.adjoint() * Eigen::Map<const Eigen::VectorXcf>(spectra.at(i, b), spectra.channels)).cwiseAbs2();
       int a = 0;
       const float peak = beam.maxCoeff(&a);
       MovingEcho echo;
-      echo.frame = s.shot[i] / s.per_frame;
+      echo.frame = spectra.shot[i] / spectra.per_frame;
       echo.range_m = (b + peakOffset(left, here, right)) * radar_.range_bin_m();
       echo.azimuth_rad = azimuth_rad(beam, a);
-      echo.snr = peak / s.channels;
+      echo.snr = peak / spectra.channels;
       echo.radial_m_per_s = std::numeric_limits<double>::quiet_NaN();
       echoes.push_back(echo);
     }
@@ -515,13 +522,13 @@ void ShotExaminer::readEchoes(const Spectra& s, ShotStatistics& result) const {
   }
 }
 
-void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& s, ShotStatistics& result) const {
+void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& spectra, ShotStatistics& result) const {
   result.turn_variance = std::numeric_limits<double>::infinity();
-  const double shots = static_cast<double>(s.shot.size());
-  if (stack.frames < 3 || s.shot.size() < 3) return;
+  const double shots = static_cast<double>(spectra.shot.size());
+  if (stack.frames < 3 || spectra.shot.size() < 3) return;
   std::vector<double> frame;
   double mean_frame = 0;
-  for (int shot : s.shot) frame.push_back(shot / stack.loops);
+  for (int shot : spectra.shot) frame.push_back(shot / stack.loops);
   for (double f : frame) mean_frame += f / shots;
   double spread = 0;
   for (double f : frame) spread += (f - mean_frame) * (f - mean_frame);
@@ -529,16 +536,17 @@ void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& s, ShotStati
   // The turn is the mean slope of phases over every second bin (a Hann window ties neighbours together), weighed by
   // each bin's own scatter: a bin in which something moves counts for little.
   double weights = 0, weighted = 0, squares = 0, moments = 0;
-  for (int b = 0; b < s.bins; b += 2) {
-    const Eigen::Map<const Eigen::VectorXcf> still(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
+  for (int b = 0; b < spectra.bins; b += 2) {
+    const Eigen::Map<const Eigen::VectorXcf> still(&spectra.average[static_cast<std::size_t>(b * spectra.channels)],
+                                                   spectra.channels);
     const double power = still.squaredNorm();
     // The average carries noise of channels/shots.
-    if (power < 10 * s.channels / shots || power < 10) continue;
+    if (power < 10 * spectra.channels / shots || power < 10) continue;
     std::vector<double> phase;
     double mean = 0, slope = 0;
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
-      const Eigen::Map<const Eigen::VectorXcf> e(s.at(i, b), s.channels);
-      phase.push_back(std::arg(s.gain[i] + std::complex<double>(still.dot(e)) / power));
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+      const Eigen::Map<const Eigen::VectorXcf> e(spectra.at(i, b), spectra.channels);
+      phase.push_back(std::arg(spectra.gain[i] + std::complex<double>(still.dot(e)) / power));
       mean += phase.back() / shots;
     }
     for (std::size_t i = 0; i < phase.size(); ++i) slope += phase[i] * (frame[i] - mean_frame) / spread;

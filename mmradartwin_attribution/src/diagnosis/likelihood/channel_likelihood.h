@@ -23,7 +23,7 @@ struct SessionLatents {
   double log_floor = 0;                 ///< clutter's power in a cell over PoseChannels::clutter
   std::array<double, 6> floor_shape{};  ///< added to log_floor at ranges that are even in log range; linear between
   double log_relative = -8;             ///< share of an echo's power that no two channels have in common
-  double log_graze = 0;                 ///< factor of PoseEchoes::grazing
+  double log_pose_sensitive = 0;        ///< factor of PoseEchoes::grazing
   double log_range = 0;                 ///< factor of the variance of a path's own range
   std::vector<double> actor_gain;       ///< [errors, see errorOf()] natural logarithm of power, per interaction
   std::vector<double> actor_range_m;    ///< [errors, see errorOf()] added one-way range, per interaction

@@ -19,7 +19,8 @@ constexpr int kFarSkirt_bins = 32;  ///< reach of a strong path: -60 to -100 dB,
 constexpr double kWeakShare = 1e-6, kStrongShare = 0.003;
 constexpr double kLeastResponse = 1e-7;    ///< share of the strongest bin below which a changed response is left out
 constexpr std::size_t kMostBeamBins = 16;  ///< kMaxChannels
-constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;  ///< share of a path's, of a weak path's power that a beam sees
+constexpr double kOffBeam = 1e-7,
+                 kOffBeamWeak = 1e-3;  ///< share of a path's, of a weak path's power that a beam sees
 
 using Fields = EchoGroup::Fields;
 
@@ -213,9 +214,9 @@ std::shared_ptr<const EchoGroup> EchoCollector::addTones(const std::vector<const
   return groups_.back();
 }
 
-void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g) {
+void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& group) {
   const bool weak = share < kWeakShare;
-  const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + g.added_range_m) / bin_m_;
+  const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + group.added_range_m) / bin_m_;
   thread_local std::vector<std::complex<float>> packed;
   outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error drowns in the others
   const bool strong = share >= kStrongShare;
@@ -235,7 +236,7 @@ void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g
                     {static_cast<float>(w * w), static_cast<float>(2 * w * slope), static_cast<float>(slope * slope)},
                     cosine);
   }
-  addToBeams(record.c.data(), place, weak ? kOffBeamWeak : kOffBeam, g.beams);
+  addToBeams(record.c.data(), place, weak ? kOffBeamWeak : kOffBeam, group.beams);
 }
 
 void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, const Eigen::MatrixXcd& slope) {

@@ -49,11 +49,13 @@ struct EchoGroup {
 struct PoseEchoes {
   std::vector<std::shared_ptr<const EchoGroup>> groups;
   /// Paths that appear, vanish or change within the accuracy of the pose, with the uncertain part of their power.
-  std::vector<std::shared_ptr<const EchoGroup>> grazing;
-  std::size_t all() const { return groups.size() + grazing.size(); }
+  std::vector<std::shared_ptr<const EchoGroup>> pose_sensitive;
+  std::size_t all() const { return groups.size() + pose_sensitive.size(); }
   /// Group i of all, grazing ones last.
-  const EchoGroup& at(std::size_t i) const { return i < groups.size() ? *groups[i] : *grazing[i - groups.size()]; }
-  bool grazes(std::size_t i) const { return i >= groups.size(); }
+  const EchoGroup& at(std::size_t i) const {
+    return i < groups.size() ? *groups[i] : *pose_sensitive[i - groups.size()];
+  }
+  bool isPoseSensitive(std::size_t i) const { return i >= groups.size(); }
 };
 
 /// Index of an actor's errors among `errors` of them. Everything that the scene lacks (actor -1, or one that a

@@ -71,8 +71,8 @@ std::vector<PoseEchoes> ExpectedEchoes::echoes(const std::vector<NamedParameters
   const std::vector<NamedParameters> geometry = paths_.geometryOf(mechanisms);
   std::vector<Part> parts;
   for (const NamedParameters& m : mechanisms) parts.push_back({&paths_.of(geometry, m, mechanisms, poses)});
-  const TracedPaths::ByPose* grazing = paths_.hasBaseline() ? &paths_.grazing(mechanisms, poses) : nullptr;
-  return collect(mechanisms, poses, {parts, grazing, actor_range_m});
+  const TracedPaths::ByPose* pose_sensitive = paths_.hasBaseline() ? &paths_.poseSensitive(mechanisms, poses) : nullptr;
+  return collect(mechanisms, poses, {parts, pose_sensitive, actor_range_m});
 }
 
 std::vector<PoseEchoes> ExpectedEchoes::echoesNear(const std::vector<NamedParameters>& mechanisms,
@@ -174,7 +174,7 @@ PoseEchoes ExpectedEchoes::collectAt(const Collection& collection, std::size_t i
       if (part != nullptr) hold(*part);
     }
   }
-  if (collection.grazing != nullptr) hold(*collection.grazing);
+  if (collection.pose_sensitive != nullptr) hold(*collection.pose_sensitive);
   std::array<KeptPose, 2>& kept = kept_poses_[i];
   if (!kept[1].echoes.groups.empty() && kept[1].signature == own.signature) std::swap(kept[0], kept[1]);
   if (!kept[0].echoes.groups.empty() && kept[0].signature == own.signature) return kept[0].echoes;
@@ -206,13 +206,14 @@ PoseEchoes ExpectedEchoes::collectAt(const Collection& collection, std::size_t i
   if (mixture) mixture->addTo(collector);
   PoseEchoes result;
   result.groups = collector.take();
-  if (collection.grazing != nullptr) {
-    Paths uncertain = *(*collection.grazing)[i];
+  if (collection.pose_sensitive != nullptr) {
+    Paths uncertain = *(*collection.pose_sensitive)[i];
     receiver.receive(uncertain);
     const std::vector<double> none;
-    EchoCollector of_grazing(base_.radar(), accuracy_.path_angle_rad, data_.poses[i].beams, none);
-    for (const auto& [actors, members] : byActors(uncertain)) of_grazing.addTones(members, kNoFarSkirt * strongest);
-    result.grazing = of_grazing.take();
+    EchoCollector of_pose_sensitive(base_.radar(), accuracy_.path_angle_rad, data_.poses[i].beams, none);
+    for (const auto& [actors, members] : byActors(uncertain))
+      of_pose_sensitive.addTones(members, kNoFarSkirt * strongest);
+    result.pose_sensitive = of_pose_sensitive.take();
   }
   if (mixture) return result;
   own.echoes = result;

@@ -76,7 +76,7 @@ class ExpectedEchoes {
   /// Everything that echoes follow from: paths, and what is made of them alike at all poses.
   struct Collection {
     const std::vector<Part>& parts;
-    const TracedPaths::ByPose* grazing;  ///< null where they are left out
+    const TracedPaths::ByPose* pose_sensitive;  ///< null where they are left out
     const std::vector<double>& actor_range_m;
     std::shared_ptr<const Twin> twin = {};
     std::shared_ptr<const Twin> without_mixing = {};  ///< without what mixes ranges; null where nothing does

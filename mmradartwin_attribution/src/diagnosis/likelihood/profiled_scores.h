@@ -35,6 +35,6 @@ SessionCovariance difference(SessionCovariance of, const SessionCovariance& from
 /// Change of covariances between two sides, divided by `per`; both are of the same poses.
 SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, double per);
 /// Latents with the errors of one actor set to zero.
-SessionLatents withoutErrors(SessionLatents nuisance, int actor);
+SessionLatents withoutErrors(SessionLatents latents, int actor);
 
 }  // namespace mmradartwin::diagnosis::likelihood

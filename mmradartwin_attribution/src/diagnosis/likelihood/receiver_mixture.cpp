@@ -75,12 +75,12 @@ void ReceiverMixture::scaleTones(std::vector<PathRecord>& paths, const EchoColle
   std::sort(paths.begin(), paths.end(),
             [](const PathRecord& a, const PathRecord& b) { return a.amplitude > b.amplitude; });
   const double least = paths.empty() ? 0 : std::sqrt(kStrongShare) * paths.front().amplitude;
-  for (PathRecord& r : paths) {
-    if (r.amplitude <= least) break;
-    Alone path{r, receiver_};
-    for (double& l : path.path.length_m) l += 2 * collector.addedRange_m(r.actors);
-    boost::hash_combine(path.signature, collector.addedRange_m(r.actors));
-    boost::hash_range(path.signature, r.actors.begin(), r.actors.end());
+  for (PathRecord& record : paths) {
+    if (record.amplitude <= least) break;
+    Alone path{record, receiver_};
+    for (double& l : path.path.length_m) l += 2 * collector.addedRange_m(record.actors);
+    boost::hash_combine(path.signature, collector.addedRange_m(record.actors));
+    boost::hash_range(path.signature, record.actors.begin(), record.actors.end());
     const std::vector<PathRecord> received = linear_.receivedPaths(pose_.T_map_radar, {path.path}, pose_.stamp_ns);
     if (received.empty()) continue;
     for (const PathRecord& part : received) addToSignature(part, path.signature);
@@ -91,7 +91,7 @@ void ReceiverMixture::scaleTones(std::vector<PathRecord>& paths, const EchoColle
       kept.tone = path.tone;
     }
     kept.used = call_;
-    scaleRecord(kept.tone, r);
+    scaleRecord(kept.tone, record);
     alone_.push_back(std::move(path));
   }
 }

@@ -80,15 +80,16 @@ bool mayTouch(const SceneChange& change, const Eigen::Isometry3d& T_map_radar, c
 /// Appends paths of `from` that are weaker in `to`, scaled to the uncertain part of their amplitude.
 void addUncertain(const std::vector<PathRecord>& from, const std::vector<PathRecord>& to, double weight,
                   double strongest_amplitude, std::vector<PathRecord>& uncertain) {
-  for (const PathRecord& r : from) {
-    const auto same = std::find_if(to.begin(), to.end(),
-                                   [&](const PathRecord& o) { return o.event == r.event && o.facets == r.facets; });
+  for (const PathRecord& record : from) {
+    const auto same = std::find_if(to.begin(), to.end(), [&](const PathRecord& o) {
+      return o.event == record.event && o.facets == record.facets;
+    });
     const double other = same == to.end() ? 0 : same->amplitude;
-    if (r.amplitude <= other || r.amplitude == 0) continue;
-    const double lost = (r.amplitude - other) / r.amplitude;
+    if (record.amplitude <= other || record.amplitude == 0) continue;
+    const double lost = (record.amplitude - other) / record.amplitude;
     const double share = std::sqrt(weight) * lost;
-    if (lost <= kSteady || share * r.amplitude < kFaint * strongest_amplitude) continue;
-    uncertain.push_back(r);
+    if (lost <= kSteady || share * record.amplitude < kFaint * strongest_amplitude) continue;
+    uncertain.push_back(record);
     scaleRecord(share, uncertain.back());
   }
 }
@@ -258,17 +259,17 @@ void TracedPaths::beginCall() {
     }
   };
   forget(known_, kMostTraced);
-  forget(grazing_, kMostTraced);
+  forget(pose_sensitive_, kMostTraced);
 }
 
-const TracedPaths::ByPose& TracedPaths::grazing(const std::vector<NamedParameters>& mechanisms,
-                                                const std::vector<int>& poses) {
+const TracedPaths::ByPose& TracedPaths::poseSensitive(const std::vector<NamedParameters>& mechanisms,
+                                                      const std::vector<int>& poses) {
   // Edits that only add something leave the grazing paths of the rest as they are.
   std::vector<NamedParameters> moving, smooth;
   for (const NamedParameters& m : geometryOf(mechanisms)) {
     if (!editOf(m).addsToOthers()) moving.push_back(m);
   }
-  Entry& entry = grazing_[traceKeyOf(moving)];
+  Entry& entry = pose_sensitive_[traceKeyOf(moving)];
   entry.used = std::max(entry.used, call_);
   entry.paths.resize(data_.poses.size());
   std::vector<std::size_t> missing;
@@ -281,11 +282,11 @@ const TracedPaths::ByPose& TracedPaths::grazing(const std::vector<NamedParameter
   }
   const Twin twin = base_.changed(smooth);
   tbb::parallel_for(std::size_t{0}, missing.size(),
-                    [&](std::size_t j) { entry.paths[missing[j]] = grazingAt(twin, missing[j]); });
+                    [&](std::size_t j) { entry.paths[missing[j]] = poseSensitiveAt(twin, missing[j]); });
   return entry.paths;
 }
 
-std::shared_ptr<const TracedPaths::Paths> TracedPaths::grazingAt(const Twin& twin, std::size_t pose) const {
+std::shared_ptr<const TracedPaths::Paths> TracedPaths::poseSensitiveAt(const Twin& twin, std::size_t pose) const {
   const Eigen::Isometry3d& here = data_.poses[pose].pose.T_map_radar;
   Paths at_pose;
   try {
@@ -324,9 +325,9 @@ void TracedPaths::setBaseline(const std::vector<NamedParameters>& mechanisms) {
     wanted.push_back(geometry + traceKeyOf(mechanismsReadBy(m, mechanisms)) + traceKeyOf(m));
   }
   if (wanted != baseline_) {
-    grazing_.clear();
-    grazing(mechanisms, everyPose());
-    grazing_.begin()->second.used = std::numeric_limits<std::size_t>::max();  // never forgotten
+    pose_sensitive_.clear();
+    poseSensitive(mechanisms, everyPose());
+    pose_sensitive_.begin()->second.used = std::numeric_limits<std::size_t>::max();  // never forgotten
   }
   baseline_ = wanted;
   for (auto entry = known_.begin(); entry != known_.end();) {

@@ -37,7 +37,7 @@ class TracedPaths {
   const ByPose& of(const std::vector<NamedParameters>& geometry, const NamedParameters& mechanism,
                    const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
   /// Paths that appear, vanish or change within the accuracy of the poses, with the uncertain part of their amplitude.
-  const ByPose& grazing(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
+  const ByPose& poseSensitive(const std::vector<NamedParameters>& mechanisms, const std::vector<int>& poses);
   /// The base twin with these mechanisms; the last few are kept.
   std::shared_ptr<const Twin> twinOf(const std::vector<NamedParameters>& mechanisms);
   /// Forgets the paths of all other mechanisms, and finds the grazing paths of these.
@@ -84,14 +84,14 @@ class TracedPaths {
                             const std::vector<NamedParameters>& mechanisms, const std::vector<int>& missing,
                             const Twin& twin);
   std::shared_ptr<const Paths> pathsAt(const Task& task, std::size_t pose) const;
-  std::shared_ptr<const Paths> grazingAt(const Twin& twin, std::size_t pose) const;
+  std::shared_ptr<const Paths> poseSensitiveAt(const Twin& twin, std::size_t pose) const;
 
   const Twin& base_;
   const ChannelData& data_;
   double position_error_m_;
   std::size_t call_ = 0;
   std::map<std::string, Entry> known_;                                      // by geometry and mechanism
-  std::map<std::string, Entry> grazing_;                                    // by what moves actors or the radar
+  std::map<std::string, Entry> pose_sensitive_;                             // by what moves actors or the radar
   std::map<std::string, Edit> edits_;                                       // by mechanism
   std::vector<std::pair<std::string, std::shared_ptr<const Twin>>> twins_;  // last used first
   std::vector<std::string> baseline_;                                       // keys into known_

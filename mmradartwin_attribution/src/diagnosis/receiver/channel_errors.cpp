@@ -50,19 +50,20 @@ class EchoFit {
   explicit EchoFit(const ChannelData& data) : radar_(data.radar), directions_(responses(data.radar)) {
     const int first = static_cast<int>(std::ceil(kFirst_m / radar_.range_bin_m()));
     const bool by_place = data.locations.size() >= kFewestPlaces;
-    for (const PoseChannels& p : data.poses) {
-      const Eigen::VectorXd power =
-          p.range_spectra.colwise().squaredNorm().transpose() / static_cast<double>(p.range_spectra.rows());
+    for (const PoseChannels& channels : data.poses) {
+      const Eigen::VectorXd power = channels.range_spectra.colwise().squaredNorm().transpose() /
+                                    static_cast<double>(channels.range_spectra.rows());
       const auto group = [&](int bin) {
-        return by_place ? p.location : static_cast<int>(bin * radar_.range_bin_m() / kGroup_m);
+        return by_place ? channels.location : static_cast<int>(bin * radar_.range_bin_m() / kGroup_m);
       };
       for (int r = std::max(1, first); r + 1 < static_cast<int>(power.size()); ++r) {
         if (power[r] < power[r - 1] || power[r] < power[r + 1] ||
-            power[r] < bounds::kLeastEchoOverNoise * p.noise_power)
+            power[r] < bounds::kLeastEchoOverNoise * channels.noise_power)
           continue;
-        echoes_.push_back({p.range_spectra.col(r), 0, power[r] / std::max(p.noise_power, kLeastNoisePower), group(r)});
+        echoes_.push_back(
+            {channels.range_spectra.col(r), 0, power[r] / std::max(channels.noise_power, kLeastNoisePower), group(r)});
       }
-      for (const MovingCell& cell : p.moving) {
+      for (const MovingCell& cell : channels.moving) {
         if (cell.bin < first || cell.power < bounds::kLeastEchoOverNoise) continue;
         echoes_.push_back({cell.channels, cell.turn_rad, cell.power, group(cell.bin)});
       }

@@ -19,7 +19,7 @@ constexpr int kIterations = 6;      ///< of the image and of what stands beside 
 
 }  // namespace
 
-bool measureImage(const ChannelData& data, Finding& f) {
+bool measureImage(const ChannelData& data, Finding& finding) {
   const std::size_t locations = data.locations.size();
   if (locations < 3) return false;
   std::vector<std::complex<double>> shared;
@@ -53,9 +53,9 @@ bool measureImage(const ChannelData& data, Finding& f) {
   const double width = boost::math::quantile(boost::math::students_t(n - 1), 0.975);
   const double half_db = width * std::max(bounds::kImageError_db, kDbPerNeper * std::sqrt(scatter * n / (n - 1)));
   const double image_db = kDbPerNeper * std::log(std::abs(beta));
-  f.mechanism->values.set("image_db", image_db);
-  f.mechanism->values.set("phase_deg", std::arg(beta) * 180 / M_PI);
-  for (FindingParameter& p : f.parameters) {
+  finding.mechanism->values.set("image_db", image_db);
+  finding.mechanism->values.set("phase_deg", std::arg(beta) * 180 / M_PI);
+  for (FindingParameter& p : finding.parameters) {
     if (p.name != "image_db") continue;
     p.value = image_db;
     p.ci95 = {{image_db - half_db, image_db + half_db}};

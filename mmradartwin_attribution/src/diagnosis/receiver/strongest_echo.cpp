@@ -26,15 +26,15 @@ double tonePower(const Eigen::VectorXd& power, Eigen::Index bin) {
 }
 
 /// Adds to a finding's level, with an error of its own; does nothing to a finding without a level.
-void changeLevel(Finding& f, double by_db, double error_db) {
-  const auto level = std::find_if(f.parameters.begin(), f.parameters.end(),
+void changeLevel(Finding& finding, double by_db, double error_db) {
+  const auto level = std::find_if(finding.parameters.begin(), finding.parameters.end(),
                                   [](const FindingParameter& p) { return p.name == "level_db"; });
-  if (level == f.parameters.end()) return;
+  if (level == finding.parameters.end()) return;
   const double was_db = std::get<double>(level->value), half_db = level->ci95[0][1] - was_db;
   const double level_db = was_db + by_db, both_db = std::hypot(half_db, 1.96 * error_db);
   level->value = level_db;
   level->ci95 = {{level_db - both_db, level_db + both_db}};
-  f.mechanism->values.set("level_db", level_db);
+  finding.mechanism->values.set("level_db", level_db);
 }
 
 /// Strongest echo of a session as measured where the twin has an echo, and the share that the twin gives it of the

@@ -26,8 +26,9 @@ class FitRound {
   DiagnosisContext& context_;
   ModelState& state_;
   std::vector<Screened> screened_;
-  std::vector<HypothesisFit> fits_;          ///< best first
-  double best_object_ = 0, plain_name_ = 0;  ///< nats of the best fits of these kinds
+  std::vector<HypothesisFit> fits_;  ///< best first
+  double best_object_ = 0,
+         best_overwhelming_name_ = 0;  ///< nats of the best fits of these kinds
 };
 
 /// The row of a fit of that round.

@@ -34,7 +34,7 @@ std::vector<RangeShift> HypothesisRounds::takeRangeErrors(ModelState& state) {
   std::vector<RangeShift> shifted = ranking_.shifted(state);
   const auto is_error = [&](const RangeShift& shift) {
     if (std::abs(shift.shift_m) > most_error_m) return false;
-    SessionLatents latents = withoutErrors(state.nuisance, shift.actor);
+    SessionLatents latents = withoutErrors(state.latents, shift.actor);
     latents.actor_range_m[static_cast<std::size_t>(shift.actor)] = shift.shift_m;
     std::optional<ModelState> better = context_.fitter.improved(state, latents);
     if (better) state = std::move(*better);

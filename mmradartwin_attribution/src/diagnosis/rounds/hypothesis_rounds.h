@@ -32,7 +32,7 @@ class HypothesisRounds {
 
   const std::vector<NamedParameters>& mechanisms() const { return selection_.mechanisms(); }
   const std::vector<NamedParameters>& extended() const { return selection_.extended(); }
-  const SessionLatents& latents() { return selection_.state().nuisance; }
+  const SessionLatents& latents() { return selection_.state().latents; }
 
  private:
   /// One round; true where it found something.

@@ -24,9 +24,9 @@ std::string MapEvidence::rejection(const HypothesisFit& fit, const FindingGain& 
     return "clutter is like that, by what the maps gain" + by_how_much;
   }
   if (in_maps) return "";
-  const bool plainly_worse = explained[1] < 0 && explained_more < -bounds::kLeastExplainedMore;
+  const bool clearly_worse = explained[1] < 0 && explained_more < -bounds::kLeastExplainedMore;
   const Eigen::VectorXd nats_by_pose = gainByPose(fit, before_);
-  if (isWorthIt(fit, explained_more, plainly_worse, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
+  if (hasEnoughEvidence(fit, explained_more, clearly_worse, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
   if (likelier) rejected_.push_back({nats_by_pose, true});
   return "the maps gain nothing" + by_how_much;
 }
@@ -36,13 +36,15 @@ void MapEvidence::addRejected(const HypothesisFit& fit) { rejected_.push_back({g
 /// True of a fit whose evidence is large enough though the maps do not gain. The maps of echoes that are many points'
 /// differ from what is expected of them by as much as they hold; and few places see an actor, so that little is left of
 /// a gain without the best of them.
-bool MapEvidence::isWorthIt(const HypothesisFit& fit, double explained_more, bool plainly_worse, bool likelier) {
+bool MapEvidence::hasEnoughEvidence(const HypothesisFit& fit, double explained_more, bool clearly_worse,
+                                    bool likelier) {
   const bool traces = context_.echoes.altersGeometry(fit.hypothesis.at(fit.scaled_values));
   const double least_nats = leastNats(fit.hypothesis, fit.scaled_values, traces, context_.data.poses.size());
-  const bool in_nats = !plainly_worse && fit.gain_without_best_place / fit.overdispersion > least_nats;
+  const bool in_nats = !clearly_worse && fit.gain_without_best_place / fit.overdispersion > least_nats;
   const double most_lost = isOfLevels(fit.hypothesis) ? bounds::kMostExplainedLostByLevels : bounds::kMostExplainedLost;
-  const bool plain = fit.plain && !isFaintAddition(fit.hypothesis, fit.scaled_values);
-  return (likelier || fit.isFarAway()) && ((plain && (explained_more > -most_lost || !plainly_worse)) || in_nats);
+  const bool overwhelming = fit.overwhelming && !isFaintAddition(fit.hypothesis, fit.scaled_values);
+  return (likelier || fit.isFarAway()) &&
+         ((overwhelming && (explained_more > -most_lost || !clearly_worse)) || in_nats);
 }
 
 /// True where a better fit that was rejected explains the same poses. A law without a name may be the cause of

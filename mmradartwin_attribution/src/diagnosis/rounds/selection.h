@@ -50,7 +50,7 @@ class Selection {
   struct Accepted {
     Hypothesis hypothesis;
     std::vector<double> scaled_values, standard_error;
-    bool plain;
+    bool overwhelming;
     std::size_t finding;
     /// Labels of those beside which its gain was measured; none where it was not.
     std::optional<std::vector<std::string>> beside;

@@ -57,14 +57,14 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
   // Covariances of all bins, inverted once.
   std::vector<std::vector<ChannelLikelihood::Whitened>> cells(data.poses.size());
   tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t i) {
-    cells[i] = model.whitened(null.echoes[i], null.nuisance, static_cast<int>(i));
+    cells[i] = model.whitened(null.echoes[i], null.latents, static_cast<int>(i));
   });
   Eigen::AlignedBox3d bounds;
   for (const Actor& a : twin.scene().actors) bounds.extend(a.bounds);
   const int nx = static_cast<int>(bounds.sizes().x() / grid_m), ny = static_cast<int>(bounds.sizes().y() / grid_m);
   if (nx < 1 || ny < 1 || static_cast<double>(nx) * ny > kMostCells) return {};
   std::vector<ProjectedPlace> places(static_cast<std::size_t>(nx) * ny);
-  const double wave = 2 * M_PI / radar.wavelength_m(), gain = std::exp(null.nuisance.log_gain);
+  const double wave = 2 * M_PI / radar.wavelength_m(), gain = std::exp(null.latents.log_gain);
   tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t j) {
     ProjectedPlace& place = places[j];
     place.x_m = bounds.min().x() + grid_m * (static_cast<double>(j % static_cast<std::size_t>(nx)) + 0.5);
@@ -83,8 +83,8 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
       double looked_m = -1;  // radius for which `visible` holds
       bool visible = false;
       for (std::size_t k = 0; k < sources.size(); ++k) {
-        const Source& s = sources[k];
-        const double radius_m = 0.5 * s.size_m, near_m = r - radius_m, at_m = near_m + s.behind_m;
+        const Source& source = sources[k];
+        const double radius_m = 0.5 * source.size_m, near_m = r - radius_m, at_m = near_m + source.behind_m;
         const int bin = static_cast<int>(std::lround(at_m / radar.range_bin_m()));
         if (near_m < kNearest_m || bin < model.firstBin() || bin >= samples) continue;
         if (radius_m != looked_m) {
@@ -96,8 +96,8 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
         const double w = hannResponse(bin - at_m / radar.range_bin_m());
         // Power of a metal cylinder: (lambda/(8 pi r))^2 a/(a + r); of a point: lambda^2 sigma/((4 pi)^3 r^4).
         const double level = radar.wavelength_m() / (8 * M_PI * near_m);
-        const double spread =
-            radius_m > 0 ? radius_m / (radius_m + near_m) : std::pow(10.0, s.rcs_dbsm / 10) / (M_PI * near_m * near_m);
+        const double spread = radius_m > 0 ? radius_m / (radius_m + near_m)
+                                           : std::pow(10.0, source.rcs_dbsm / 10) / (M_PI * near_m * near_m);
         gained(data.poses[i].location, static_cast<Eigen::Index>(k)) += model.gainOfPoint(
             cell, gain * w * w * level * level * spread, v.dot(cell.inverse * v).real(), std::norm(v.dot(cell.solved)));
       }
@@ -105,9 +105,9 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
     for (std::size_t k = 0; k < sources.size(); ++k) {
       // The place that gains most does not count: something that only one place sees is no object.
       const auto nats = gained.col(static_cast<Eigen::Index>(k));
-      const double broad = nats.sum() - std::max(0.0, nats.maxCoeff());
-      if (broad <= place.screened_nats) continue;
-      place.screened_nats = broad;
+      const double without_best = nats.sum() - std::max(0.0, nats.maxCoeff());
+      if (without_best <= place.screened_nats) continue;
+      place.screened_nats = without_best;
       place.size_m = sources[k].size_m;
       place.behind_m = sources[k].behind_m;
       place.rcs_dbsm = sources[k].rcs_dbsm;
@@ -177,15 +177,15 @@ Hypothesis objectAt(const ProjectedPlace& place) {
 }
 
 void freePlace(const ChannelData& data, Screened& object) {
-  Hypothesis& h = object.hypothesis;
-  const Eigen::Vector2d place(h.mechanism.values.number("x_m"), h.mechanism.values.number("y_m"));
-  const bool late = h.form() == MechanismForm::kLateEcho;
+  Hypothesis& hypothesis = object.hypothesis;
+  const Eigen::Vector2d place(hypothesis.mechanism.values.number("x_m"), hypothesis.mechanism.values.number("y_m"));
+  const bool late = hypothesis.form() == MechanismForm::kLateEcho;
   std::vector<std::pair<const char*, double>> free = {{"y_m", kOffset_m}, {"x_m", kOffset_m}};
   if (late) free.insert(free.begin(), {"behind_m", 0.5 * data.radar.range_bin_m()});
   for (const auto& [key, step_m] : free) {
-    const double at_m = h.mechanism.values.number(key);
+    const double at_m = hypothesis.mechanism.values.number(key);
     const double least_m = std::string(key) == "behind_m" ? 0.5 * kLeastLate_m : -1000;
-    h.coordinates.insert(h.coordinates.begin(), {key, "m", -1, at_m, at_m + step_m, least_m, 1000});
+    hypothesis.coordinates.insert(hypothesis.coordinates.begin(), {key, "m", -1, at_m, at_m + step_m, least_m, 1000});
     for (std::vector<double>& start : object.starts) start.insert(start.begin(), 0.0);
   }
   if (late) return;
@@ -193,8 +193,8 @@ void freePlace(const ChannelData& data, Screened& object) {
   const Eigen::Vector2d away = awayFromRadar(data, place);
   for (double radius_m : kWide_m) {
     const Eigen::Vector2d axis = place + radius_m * away;
-    object.starts.push_back(
-        {h.coordinates[0].scaled(axis.x()), h.coordinates[1].scaled(axis.y()), h.coordinates[2].scaled(2 * radius_m)});
+    object.starts.push_back({hypothesis.coordinates[0].scaled(axis.x()), hypothesis.coordinates[1].scaled(axis.y()),
+                             hypothesis.coordinates[2].scaled(2 * radius_m)});
   }
 }
 

@@ -32,7 +32,7 @@ std::vector<int> spread(std::size_t count, std::size_t wanted) {
   return poses;
 }
 
-bool promisesMore(const Screened& a, const Screened& b) { return a.screened_nats > b.screened_nats; }
+bool hasMoreScreenedNats(const Screened& a, const Screened& b) { return a.screened_nats > b.screened_nats; }
 
 /// Looks of one round.
 class Looks {
@@ -46,7 +46,7 @@ class Looks {
   /// Looks for objects and late points that the twin lacks; actors near an object become suspicious.
   void placeObjects();
   /// Looks at every hypothesis, then at the best ones on more poses. no_use: see HypothesisRanking.
-  void lookAtAll(std::set<std::string>& no_use);
+  void lookAtAll(std::set<std::string>& without_gain);
   void lookAgain();
   void addLaws();
   void addReplicas();
@@ -110,7 +110,7 @@ std::vector<Screened> Looks::bestOf(std::size_t most, const std::vector<Projecte
                                     Hypothesis (*hypothesisAt)(const ProjectedPlace&)) {
   std::vector<Screened> best;
   for (const ProjectedPlace& place : places) best.push_back(lookAtSome(hypothesisAt(place)));
-  std::stable_sort(best.begin(), best.end(), promisesMore);
+  std::stable_sort(best.begin(), best.end(), hasMoreScreenedNats);
   best.resize(std::min(most, best.size()));
   return best;
 }
@@ -141,28 +141,29 @@ void Looks::takeOffChance(std::size_t poses, Screened& screened) const {
       kGainPerNumber_nats * numbers * static_cast<double>(context_.data.poses.size()) / static_cast<double>(poses);
 }
 
-void Looks::lookAtAll(std::set<std::string>& no_use) {
+void Looks::lookAtAll(std::set<std::string>& without_gain) {
   for (std::size_t i = 0; i < all_.size(); ++i) {
-    const Hypothesis& h = all_[i];
-    context_.report("trying " + h.label(), static_cast<double>(i) / static_cast<double>(all_.size()));
-    const bool of_actor = context_.twin.scene().actorIndex(h.subject) >= 0;
-    const std::vector<double> typical(h.coordinates.size(), 1.0);
+    const Hypothesis& hypothesis = all_[i];
+    context_.report("trying " + hypothesis.label(), static_cast<double>(i) / static_cast<double>(all_.size()));
+    const bool of_actor = context_.twin.scene().actorIndex(hypothesis.subject) >= 0;
+    const std::vector<double> typical(hypothesis.coordinates.size(), 1.0);
     // A costly hypothesis traces the session anew. Actors without suspicion are tried only by what is there or not, on
     // a few poses.
-    const bool costly = of_actor && suspicious_.count(h.subject) == 0 && context_.echoes.altersGeometry(h.at(typical));
-    if (costly && (!h.isOneSided() || no_use.count(h.label()) > 0)) continue;
+    const bool costly = of_actor && suspicious_.count(hypothesis.subject) == 0 &&
+                        context_.echoes.altersGeometry(hypothesis.at(typical));
+    if (costly && (!hypothesis.isOneSided() || without_gain.count(hypothesis.label()) > 0)) continue;
     // A hypothesis of more numbers needs more evaluations: fewer poses rank it.
     std::vector<int> poses =
-        spread(costly ? kFewestPoses : std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
-    Screened s = look(h, poses);
-    if (outOfPlace(h) >= 0) poses = spread(context_.data.poses.size());  // around() promises for all poses
-    if (costly && !(s.screened_nats > 0)) no_use.insert(h.label());
+        spread(costly ? kFewestPoses : std::max(kFewestPoses, kScreenPoses / (1 + hypothesis.coordinates.size() / 3)));
+    Screened s = look(hypothesis, poses);
+    if (outOfPlace(hypothesis) >= 0) poses = spread(context_.data.poses.size());  // around() promises for all poses
+    if (costly && !(s.screened_nats > 0)) without_gain.insert(hypothesis.label());
     takeOffChance(poses.size(), s);
     looked_at_[s.hypothesis.label()] = poses.size();
     screened_.push_back(std::move(s));
     context_.echoes.setBaseline(state_.mechanisms);
   }
-  std::stable_sort(screened_.begin(), screened_.end(), promisesMore);
+  std::stable_sort(screened_.begin(), screened_.end(), hasMoreScreenedNats);
 }
 
 void Looks::lookAgain() {
@@ -172,18 +173,18 @@ void Looks::lookAgain() {
   screened_.erase(std::remove_if(screened_.begin(), screened_.end(),
                                  [&](const Screened& s) { return ++kept > kSecondLook && !s.hypothesis.isGeometry(); }),
                   screened_.end());
-  for (Screened& s : screened_) {
-    context_.report("looking again at " + s.hypothesis.label(), 0);
-    const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
-    const std::vector<int> poses = spread(numbers > 3                 ? kScreenPoses
-                                          : s.hypothesis.isGeometry() ? context_.data.poses.size()
-                                                                      : kSecondLookPoses);
-    if (looked_at_[s.hypothesis.label()] < poses.size()) {
-      s = screen_.screen(state_, s.hypothesis, poses);
-      takeOffChance(poses.size(), s);
+  for (Screened& screened : screened_) {
+    context_.report("looking again at " + screened.hypothesis.label(), 0);
+    const double numbers = static_cast<double>(screened.hypothesis.coordinates.size());
+    const std::vector<int> poses = spread(numbers > 3                        ? kScreenPoses
+                                          : screened.hypothesis.isGeometry() ? context_.data.poses.size()
+                                                                             : kSecondLookPoses);
+    if (looked_at_[screened.hypothesis.label()] < poses.size()) {
+      screened = screen_.screen(state_, screened.hypothesis, poses);
+      takeOffChance(poses.size(), screened);
       context_.echoes.setBaseline(state_.mechanisms);
     }
-    s.screened_nats -= numbers;
+    screened.screened_nats -= numbers;
   }
 }
 
@@ -239,7 +240,7 @@ void Looks::addPlaced() {
 }
 
 std::vector<Screened> Looks::ranked() {
-  std::stable_sort(screened_.begin(), screened_.end(), promisesMore);
+  std::stable_sort(screened_.begin(), screened_.end(), hasMoreScreenedNats);
   return std::move(screened_);
 }
 
@@ -258,7 +259,7 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   Looks looks(context_, screen_, all, state);
   looks.suspect(shifted);
   looks.placeObjects();
-  looks.lookAtAll(no_use_);
+  looks.lookAtAll(without_gain_);
   looks.lookAgain();
   looks.addLaws();
   looks.addReplicas();

@@ -27,12 +27,12 @@ class HypothesisRanking {
   /// Actors whose echoes are far likelier nearer or farther away than their errors have them; highest gain first.
   std::vector<RangeShift> shifted(const ModelState& state);
   /// Forgets which hypotheses gained nothing: in a changed geometry they may gain.
-  void tryAllAgain() { no_use_.clear(); }
+  void tryAllAgain() { without_gain_.clear(); }
 
  private:
   DiagnosisContext& context_;
   HypothesisScreen screen_;
-  std::set<std::string> no_use_;  ///< labels of costly hypotheses that gain nothing whatever is found beside them
+  std::set<std::string> without_gain_;  ///< labels of costly hypotheses that gain nothing whatever is found beside them
 };
 
 }  // namespace mmradartwin::diagnosis::search

@@ -40,21 +40,21 @@ class HypothesisScreen {
   /// loses far more than `beside` nats, the others are not looked at.
   std::pair<double, double> valueAt(const ModelState& null, const Hypothesis& hypothesis,
                                     const std::vector<double>& scaled_values, const std::vector<int>& poses,
-                                    const SessionLatents& nuisance, double beside = 0);
+                                    const SessionLatents& latents, double beside = 0);
   /// Log-likelihoods of the poses named with the hypothesis at these values.
   std::vector<double> likelihoodsAt(const ModelState& null, const Hypothesis& hypothesis,
                                     const std::vector<double>& scaled_values, const std::vector<int>& poses,
-                                    const SessionLatents& nuisance);
+                                    const SessionLatents& latents);
   /// Log-likelihoods of the poses named with these echoes and latents. known_where_same: a pose whose echoes are the
   /// null's has the null's likelihood, since the latents differ only in what other echoes have.
-  std::vector<double> byPose(const ModelState& null, std::vector<PoseEchoes> echoes, const SessionLatents& nuisance,
+  std::vector<double> byPose(const ModelState& null, std::vector<PoseEchoes> echoes, const SessionLatents& latents,
                              const std::vector<int>& poses, bool known_where_same) const;
   /// Gain and promise of log-likelihoods `there` of the poses named.
-  std::pair<double, double> promiseOf(const ModelState& null, const Hypothesis& hypothesis,
-                                      const std::vector<double>& there, const std::vector<int>& poses) const;
+  std::pair<double, double> screenedGain(const ModelState& null, const Hypothesis& hypothesis,
+                                         const std::vector<double>& there, const std::vector<int>& poses) const;
   /// Promise over all poses once the latents, from those given, have settled.
-  double settledAt(const ModelState& null, const Hypothesis& hypothesis, const std::vector<double>& scaled_values,
-                   SessionLatents nuisance);
+  double screenedWithLatents(const ModelState& null, const Hypothesis& hypothesis,
+                             const std::vector<double>& scaled_values, SessionLatents latents);
   /// Promise by the likelihood at some values.
   Screened directly(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses);
 

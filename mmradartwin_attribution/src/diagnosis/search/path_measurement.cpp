@@ -78,22 +78,22 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
   for (const PathRecord& r : records) most = std::max(most, r.amplitude);
   MeasuredPose result{data.location, {twin.tracedScene(), T, session_s, most}, {}};
   const int channels = radar.channels(), samples = radar.samples_per_chirp;
-  const double gain = std::exp(state.nuisance.log_gain), wave = 2 * M_PI / radar.wavelength_m();
+  const double gain = std::exp(state.latents.log_gain), wave = 2 * M_PI / radar.wavelength_m();
   std::map<int, Eigen::MatrixXcd> expected;  // by bin
-  for (PathRecord& r : records) {
-    if (r.bounces == 0 || r.amplitude * r.amplitude < kLeastPower * most * most) continue;
-    const double place = 0.5 * meanLength_m(r) / radar.range_bin_m();
+  for (PathRecord& record : records) {
+    if (record.bounces == 0 || record.amplitude * record.amplitude < kLeastPower * most * most) continue;
+    const double place = 0.5 * meanLength_m(record) / radar.range_bin_m();
     const int bin = static_cast<int>(std::lround(place));
     if (bin < model.firstBin() || bin >= samples) continue;
-    const Eigen::VectorXcd a = Eigen::Map<const Eigen::VectorXcd>(r.c.data(), channels).normalized();
+    const Eigen::VectorXcd a = Eigen::Map<const Eigen::VectorXcd>(record.c.data(), channels).normalized();
     Eigen::MatrixXcd& sigma = expected[bin];
     if (sigma.size() == 0) {
-      sigma = model.whitened(state.echoes[static_cast<std::size_t>(pose)], state.nuisance, pose, bin).inverse.inverse();
+      sigma = model.whitened(state.echoes[static_cast<std::size_t>(pose)], state.latents, pose, bin).inverse.inverse();
     }
     double latent = 0;  // gains of the path's actors in the state; they are fitted anew beside a law
-    for (int actor : r.actors) latent += state.nuisance.actor_gain[errorOf(actor, state.nuisance.actor_gain.size())];
+    for (int actor : record.actors) latent += state.latents.actor_gain[errorOf(actor, state.latents.actor_gain.size())];
     const double response = hannResponse(bin - place), all = a.dot(sigma * a).real();
-    const double own = gain * std::exp(latent) * channels * r.amplitude * r.amplitude * response * response;
+    const double own = gain * std::exp(latent) * channels * record.amplitude * record.amplitude * response * response;
     MeasuredPath path;
     path.share = std::min(1.0, own / all);
     if (path.share < kDominant) continue;
@@ -117,7 +117,7 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
       turn -= span * std::abs(step) * std::arg(step);
       information += span * span * std::abs(step);
     }
-    const double cosine = std::max(0.2, std::hypot(r.departure.x(), r.departure.z()));
+    const double cosine = std::max(0.2, std::hypot(record.departure.x(), record.departure.z()));
     const double angle_deg = information > 0 ? turn / information / cosine * 180 / M_PI : 0;
     const Eigen::VectorXcd against = data.range_spectra.col(peak).cwiseProduct(a.conjugate());  // less expected phases
     for (const Observable& o : of) {
@@ -133,7 +133,7 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
           path.off.push_back(angle_deg);
           break;
         case Observable::Kind::kAngleOfPose:
-          path.off.push_back(-state.nuisance.yaw_rad[static_cast<std::size_t>(pose)] * 180 / M_PI);
+          path.off.push_back(-state.latents.yaw_rad[static_cast<std::size_t>(pose)] * 180 / M_PI);
           break;
         case Observable::Kind::kChannelGain:
           path.off.push_back(20 * std::log10(std::abs(to_others) + 1e-300));
@@ -143,7 +143,7 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
           break;
       }
     }
-    path.record = std::move(r);
+    path.record = std::move(record);
     result.paths.push_back(std::move(path));
   }
   return result;

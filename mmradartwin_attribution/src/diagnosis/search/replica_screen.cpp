@@ -97,7 +97,7 @@ void ReplicaScan::scan(const Twin& twin, std::size_t j) {
   const PoseChannels& p = model_.data().poses[pose];
   const Eigen::Isometry3d& T = p.pose.T_map_radar;
   const std::vector<PathRecord> records = twin.receivedPaths(T, twin.trace(T, p.pose.stamp_ns), p.pose.stamp_ns);
-  const std::vector<ChannelLikelihood::Whitened> cells = model_.whitened(null_.echoes[pose], null_.nuisance, poses_[j]);
+  const std::vector<ChannelLikelihood::Whitened> cells = model_.whitened(null_.echoes[pose], null_.latents, poses_[j]);
   double strongest = 0;
   for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude);
   for (const PathRecord& r : records) {
@@ -114,7 +114,7 @@ void ReplicaScan::scan(const Twin& twin, std::size_t j) {
 void ReplicaScan::scanEcho(const PathRecord& record, const std::vector<ChannelLikelihood::Whitened>& cells,
                            const std::set<std::size_t>& met, std::vector<Gains>& sums) const {
   const int channels = base_.radar().channels(), samples = base_.radar().samples_per_chirp;
-  const SessionLatents& latents = null_.nuisance;
+  const SessionLatents& latents = null_.latents;
   double own = std::exp(latents.log_gain);
   for (int a : record.actors) own *= std::exp(latents.actor_gain[errorOf(a, latents.actor_gain.size())]);
   const Eigen::Map<const Eigen::VectorXcd> c(record.c.data(), channels);
@@ -181,16 +181,16 @@ std::vector<Peak> ReplicaScan::secondFaces() const {
 }
 
 Hypothesis ReplicaScan::hypothesisOf(const Peak& peak) const {
-  Hypothesis h;
-  h.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kReplica));
+  Hypothesis hypothesis;
+  hypothesis.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kReplica));
   if (peak.target > 0) {
-    h.subject = base_.scene().actors[peak.target - 1].name;
-    h.mechanism.values.set("actor", h.subject);
+    hypothesis.subject = base_.scene().actors[peak.target - 1].name;
+    hypothesis.mechanism.values.set("actor", hypothesis.subject);
   }
-  h.mechanism.values.set("behind_m", peak.behind_m);
-  h.coordinates = {{"level_db", "dB", -1, -200, kTypical_db, -60, 10}};
-  h.searched = peak.target > 0 ? 1 : 0;  // the actor
-  return h;
+  hypothesis.mechanism.values.set("behind_m", peak.behind_m);
+  hypothesis.coordinates = {{"level_db", "dB", -1, -200, kTypical_db, -60, 10}};
+  hypothesis.searched = peak.target > 0 ? 1 : 0;  // the actor
+  return hypothesis;
 }
 
 /// The best of the highest peaks by `look`. The scan has one level and takes echoes one by one: the whole likelihood
