@@ -7,8 +7,8 @@
 namespace mmradartwin::diagnosis::hypotheses {
 namespace {
 
-// What the likelihood's own errors lack: so much wider, 112 of 120 intervals of the blind protocol's seeds 51 to 54 (24
-// poses, office tier) hold the truth; as they are, 102.
+// Factor on standard errors by which 95 % intervals hold the truth as often as they state; see
+// docs/calibration_of_bounds.md#kcalibration.
 constexpr double kCalibration = 1.3;
 
 }  // namespace

@@ -14,16 +14,16 @@
 namespace mmradartwin::diagnosis::hypotheses {
 namespace {
 
-// Pairs of actors are tried as a corner where their bounds come this near.
+// Two actors are tried as a corner where their bounding boxes come this near.
 constexpr double kNear_m = 0.1;
-// A face has to be this large to mirror a room.
+// Least area of a face that mirrors a room.
 constexpr double kMirrorArea_m2 = 0.5;
 
 bool hasFittedNumber(const std::vector<ParameterSpec>& specs) {
   return std::any_of(specs.begin(), specs.end(), [](const ParameterSpec& s) { return !std::isnan(s.neutral); });
 }
 
-/// Mechanisms without a number that are there or not, about something in the scene.
+/// True for mechanisms about something in the scene that are present or absent and have no number.
 bool isPresence(const std::vector<ParameterSpec>& specs) {
   return std::any_of(specs.begin(), specs.end(), [](const ParameterSpec& s) {
     return (s.kind == ParameterKind::kText && s.required && s.name == "actor") ||
@@ -31,7 +31,8 @@ bool isPresence(const std::vector<ParameterSpec>& specs) {
   });
 }
 
-/// False of what lies: floors, ceilings, table tops reflect and scatter nothing (docs/contracts.md section 4).
+/// False for horizontal facets: floors, ceilings and table tops neither reflect nor scatter (docs/contracts.md, section
+/// 4).
 bool takesPart(const Scene& scene, const Actor& actor) {
   return std::any_of(actor.facets.begin(), actor.facets.end(), [&](int id) {
     const Facet& f = scene.facets[static_cast<std::size_t>(id)];
@@ -65,7 +66,7 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
   if (material) {
     std::set<std::string> tags;
     for (const Actor& a : scene.actors) {
-      // Where a material scatters already there is nothing to find missing.
+      // A material that scatters already lacks no scattering.
       const bool scatters = a.material.scattering_coefficient > 0 && spec("scattering_coefficient") != specs.end();
       if (a.present && !scatters) tags.insert(a.material_tag);
     }
@@ -87,7 +88,7 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
     for (std::size_t i = 0; i < scene.actors.size(); ++i) {
       const Actor& a = scene.actors[i];
       if (!a.present || mirrorArea_m2(scene, a) == 0) continue;
-      with("actors", std::vector<std::string>{a.name}, a.name);  // an alcove's own
+      with("actors", std::vector<std::string>{a.name}, a.name);  // an alcove within one actor
       for (std::size_t j = i + 1; j < scene.actors.size(); ++j) {
         const Actor& b = scene.actors[j];
         if (!b.present || a.bounds.exteriorDistance(b.bounds) > kNear_m || mirrorArea_m2(scene, b) == 0) continue;
@@ -98,7 +99,7 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
   if (!material && !actor && spec("walls") == specs.end() && spec("actors") == specs.end()) out.push_back(bare);
 }
 
-/// The same about the values that the twin states; nothing where zero of the scale would not be these.
+/// The hypothesis with the values that the twin states as neutral ones. Nothing where scale 0 would give other values.
 std::optional<Hypothesis> aboutStated(Hypothesis hypothesis, const NamedParameters& stated) {
   hypothesis.stated = true;
   std::map<std::string, std::size_t> lengths;
@@ -110,7 +111,7 @@ std::optional<Hypothesis> aboutStated(Hypothesis hypothesis, const NamedParamete
   hypothesis.mechanism = stated;
   for (const auto& [parameter, length] : lengths) {
     std::vector<double> list = stated.values.numbers(parameter);
-    if (!hypothesis.variant.empty() && list.size() != length) return std::nullopt;  // steps at other times
+    if (!hypothesis.variant.empty() && list.size() != length) return std::nullopt;  // the steps are at other times
     list.resize(length, 0.0);
     hypothesis.mechanism.values.set(parameter, std::move(list));
   }
@@ -235,7 +236,7 @@ std::vector<Hypothesis> allHypotheses(const Twin& twin, const std::vector<NamedP
       if (s.kind == ParameterKind::kNumber) {
         bare.mechanism.values.set(s.name, s.neutral);
         bare.coordinates.push_back(coordinate);
-      } else if (s.kind == ParameterKind::kNumbers) {  // per channel, the first one being the reference
+      } else if (s.kind == ParameterKind::kNumbers) {  // per channel; the first one is the reference
         bare.mechanism.values.set(s.name, std::vector<double>(channels, s.neutral));
         for (std::size_t k = 1; k < channels; ++k) {
           coordinate.element = static_cast<int>(k);
@@ -260,9 +261,9 @@ std::vector<Hypothesis> allHypotheses(const Twin& twin, const std::vector<NamedP
         if (!other) continue;
         hypothesis = std::move(*other);
       }
-      try {  // what the scene or the radar does not allow is no hypothesis
+      try {  // a mechanism that the scene or the radar does not allow is no hypothesis
         const Twin with = twin.changed({hypothesis.at(std::vector<double>(hypothesis.coordinates.size(), 1.0))});
-        // Of what is there or not a note says that it is not.
+        // A mechanism without numbers that notes a problem has no effect.
         if (hypothesis.coordinates.empty() && !with.notes().empty()) continue;
         result.push_back(std::move(hypothesis));
       } catch (const InputError&) {
