@@ -15,13 +15,14 @@
 namespace mmradartwin::diagnosis::fit {
 namespace {
 
-constexpr int kSteps = 4, kStepsTogether = 3;  ///< Fisher steps of one hypothesis, of several together
-constexpr int kFirstSteps = 14,
-              kFurtherSteps = 3;                    ///< Fisher steps of the latents, from scratch and from others
-constexpr int kMostExpansions = 8;                  ///< of a state's echoes about the ranges that were fitted
-constexpr double kSettled_nats = 1;                 ///< gain of an expansion below which they end
-constexpr double kFoldShares[] = {1, 0.4, 0.1, 0};  ///< of a fold's step, until its places are no worse
-constexpr double kLeastShareKept = 0.2;             ///< bound of the share of places that a fold is fitted to
+constexpr int kSteps = 4, kStepsTogether = 3;  ///< Fisher steps of one hypothesis, of several jointly
+/// Fisher steps of the latents, from the data and from other latents.
+constexpr int kFirstSteps = 14, kFurtherSteps = 3;
+constexpr int kMostExpansions = 8;   ///< rounds in which a state's echoes are collected about the fitted ranges
+constexpr double kSettled_nats = 1;  ///< gain of a round below which these rounds end
+/// Shares of a fold's step that are tried until its places lose nothing.
+constexpr double kFoldShares[] = {1, 0.4, 0.1, 0};
+constexpr double kLeastShareKept = 0.2;  ///< lower limit of the share of places that a fold is fitted to
 
 }  // namespace
 
@@ -83,8 +84,8 @@ ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanism
   state.echoes = source_.echoes(mechanisms, state.actor_range_m);
   state.latents = start != nullptr ? *start : model_.start(state.echoes);
   double reached = model_.fit(state.echoes, state.latents, start != nullptr ? kFurtherSteps : kFirstSteps);
-  // Echoes depend on ranges to first order only: they are collected again about the fitted ranges. Nats left below the
-  // top would count as a gain of whatever is tried next.
+  // Echoes depend on ranges to first order only, so that they are collected again about the fitted ranges. A null below
+  // its optimum would lend its missing nats to every hypothesis.
   for (int i = 0; i < kMostExpansions; ++i) {
     const double before = reached;
     state.actor_range_m = state.latents.actor_range_m;
@@ -133,7 +134,7 @@ EvidenceShare HypothesisFitter::evidenceOfPresence(const std::vector<NamedParame
   std::fill_n(scaled_values.begin() + first, numbers, 0.0);
   const double gain =
       gainWithoutBestPlace(model_.data(), state(mechanismsWith(base, parts, scaled_values), &o.state.latents), o.state);
-  if (e.scatter.size() == 0) return {gain, 1};  // one place: nothing scatters
+  if (e.scatter.size() == 0) return {gain, 1};  // one place has no scatter
   return {gain, std::clamp(e.scatter(first, first) / e.information(first, first), 1.0, kMostOverdispersion)};
 }
 
@@ -168,7 +169,7 @@ JointFit HypothesisFitter::refit(const std::vector<NamedParameters>& base, const
     EvidenceShare evidence;
     if (n > 0 && !hypothesis.isOneSided())
       evidence = evidenceShareOf(hypothesis, v, covariance.block(at, at, n, n), robust.block(at, at, n, n));
-    // Paths that a turn of the view lets in and out show in no slope.
+    // A turn of the view lets paths in and out, which no slope shows.
     const bool turns = hypothesis.isGeometry() && n == 1 && source_.altersGeometry(hypothesis.at({1.0}));
     if (n > 0 && (hypothesis.isOneSided() || turns)) {
       const EvidenceShare presence = evidenceOfPresence(base, parts, optimum, profiled, at, n);
@@ -197,12 +198,12 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
                   .run();
   fit.scaled_values = std::move(o.scaled_values);
   fit.state = std::move(o.state);
-  fit.state.echoes = {};  // 80 MB and more a fit, of 154 poses
+  fit.state.echoes = {};  // they need 80 MB and more per fit at 154 poses
   const Scores& scores = o.scores;
   gainOver(null, fit);
   const std::vector<double> gain_at = gainByLocation(model_.data(), null, fit.state);
 
-  // Scatter over places is that of the scores at the fit, or of the gain where nothing has a slope.
+  // Scatter over places is that of the scores at the fit, or that of the gain where there are no coordinates.
   const double locations = static_cast<double>(gain_at.size());
   if (n > 0) {
     const ProfiledScores profiled = profiledScores(scores, globals);
@@ -213,7 +214,7 @@ HypothesisFit HypothesisFitter::fit(const ModelState& null, const Hypothesis& hy
                                    std::abs(hypothesis.coordinates[static_cast<std::size_t>(j)].slope(
                                        fit.scaled_values[static_cast<std::size_t>(j)])));
     }
-    // Values without a fold lie one step away from the fit, by that fold's scores.
+    // Values without a fold lie one step from the fit, by the scores of the other folds.
     for (int k = 0; k < folds_; ++k) {
       Eigen::VectorXd left_out = Eigen::VectorXd::Zero(n);
       double share = 0;
@@ -278,8 +279,8 @@ void HypothesisFitter::judge(HypothesisFit& f, std::size_t family) const {
 
 double HypothesisFitter::falseAlarmRate(double gain, const Hypothesis& hypothesis, std::size_t numbers,
                                         std::size_t family) const {
-  // Twice the gain per number follows a moderated F distribution (Smyth 2004). The overdispersion that the gain was
-  // divided by was estimated from the places, less the fitted coordinates, and from the usual scatter.
+  // Twice the gain per number follows a moderated F distribution (Smyth 2004). The overdispersion, by which the gain
+  // was divided, was estimated from the places, less the fitted coordinates, and from the usual scatter.
   const double n = static_cast<double>(std::max<std::size_t>(1, numbers));
   const double followed = static_cast<double>(hypothesis.coordinates.size());
   const double places = static_cast<double>(model_.data().locations.size()) + usualScatter(hypothesis).places;

@@ -12,19 +12,19 @@
 namespace mmradartwin::diagnosis::fit {
 namespace {
 
-constexpr int kRisingFactor = 12;                  ///< times as many steps while each still gains kRising_nats
-constexpr double kLeastStep_nats = 0.2;            ///< promised gain below which a climb ends
-constexpr double kRising_nats = 5;                 ///< gain of the last step for which a climb goes on
-constexpr double kClimb_steps = 4;                 ///< like the last one, within which a climb has to reach its gain
-constexpr double kSearched[] = {0.3, 0.15};        ///< first steps of that search, in the coordinates' scale
-constexpr double kSearchTolerance = 0.02;          ///< in the coordinates' scale
-constexpr int kSearchPlaces = 12;                  ///< per coordinate
-constexpr double kLongestStep = 3;                 ///< in the coordinate's scale
-constexpr double kStepShares[] = {1.0, 0.4, 0.1};  ///< of a promised step, until one gains
-constexpr double kOneSidedFactors[] = {0.4, 2.0};  ///< of a start that rises from nothing
-constexpr Eigen::Index kMostRough = 4;             ///< coordinates that are searched without slopes
+constexpr int kRisingFactor = 12;        ///< factor on the number of steps while each gains kRising_nats
+constexpr double kLeastStep_nats = 0.2;  ///< expected gain of a step below which a climb ends
+constexpr double kRising_nats = 5;       ///< gain of the last step for which a climb goes on
+constexpr double kClimb_steps = 4;       ///< steps as good as the last one within which a climb has to reach least_nats
+constexpr double kSearched[] = {0.3, 0.15};        ///< first steps of the search without slopes, scaled
+constexpr double kSearchTolerance = 0.02;          ///< tolerance of that search, scaled
+constexpr int kSearchPlaces = 12;                  ///< evaluations of that search per coordinate
+constexpr double kLongestStep = 3;                 ///< longest step, scaled
+constexpr double kStepShares[] = {1.0, 0.4, 0.1};  ///< shares of a step that are tried until one gains
+constexpr double kOneSidedFactors[] = {0.4, 2.0};  ///< factors on a one-sided start
+constexpr Eigen::Index kMostRough = 4;             ///< largest number of coordinates that are searched without slopes
 
-/// Calls `value` at places that lead to its maximum, without slopes (BOBYQA, Powell 2009).
+/// Calls `value` at places that approach its maximum, without slopes (BOBYQA, Powell 2009).
 void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector<double> scaled_values,
                          double initial_step, const std::function<double(const std::vector<double>&)>& value) {
   const unsigned n = static_cast<unsigned>(coordinates.size());
@@ -102,7 +102,7 @@ ModelState LikelihoodClimb::consider(const std::vector<double>& scaled_values) {
   for (const SessionLatents& candidate : latents_) {
     if (state.echoes.empty() || state.actor_range_m != candidate.actor_range_m) {
       state = stateAt(scaled_values, candidate);
-    } else {  // equal ranges have the same echoes
+    } else {  // starts with equal ranges share their echoes
       state.latents = candidate;
       state.log_likelihood = model_.logLikelihood(state.echoes, candidate, &state.by_pose);
     }
@@ -119,12 +119,12 @@ void LikelihoodClimb::tryStarts() {
     if (task_.null == nullptr || task_.known != nullptr || task_.starts.size() < 2 || !parts.front().isGeometry()) {
       continue;
     }
-    // The right start may lose to a smaller one before the latents have settled on it.
+    // The right start may lose to a smaller one until the latents are refitted.
     SessionLatents refitted = s.latents;
     model_.fit(s.echoes, refitted, kLatentSteps);
     take(stateAt(start, refitted), start);
   }
-  // The promise of a quadratic is far off where a level rises from nothing.
+  // A quadratic predicts a one-sided level badly.
   const bool one_sided = parts.size() == 1 && std::any_of(coordinates_.begin(), coordinates_.end(),
                                                           [](const Coordinate& c) { return c.oneSided(); });
   for (double factor : kOneSidedFactors) {
@@ -133,7 +133,7 @@ void LikelihoodClimb::tryStarts() {
     for (double& v : other) v *= factor;
     consider(other);
   }
-  // A start that is worse than nothing is an error of the quadratic; only geometry has a valley to cross.
+  // A start below the null is an error of the quadratic. Only a geometry may have to cross a valley.
   if (!one_sided && !geometric_ && parts.size() == 1) consider(std::vector<double>(coordinates_.size(), 0.0));
 }
 
@@ -150,8 +150,8 @@ Scores LikelihoodClimb::derivatives(const ModelState& state, const std::vector<d
           source_.echoesNear(mechanismsAt(moved), state.mechanisms, everyone_, state.actor_range_m), state.latents,
           everyone_);
     };
-    // The likelihood of one strong path is a narrow ridge. A difference to one side would contain the square of a turn
-    // or of a gain, which hides the slope and makes the information many times too large.
+    // The likelihood of one strong path is a narrow ridge. A one-sided difference would contain the square of a turn or
+    // of a gain, which hides the slope and makes the information many times too large.
     if (!coordinate.oneSided()) {
       directions.push_back(difference(covarianceAt(step), covarianceAt(-step), 2 * step));
       continue;
@@ -171,7 +171,7 @@ void LikelihoodClimb::climb() {
     const bool hopeless = task_.null != nullptr && i >= 2 &&
                           optimum_.state.log_likelihood + kClimb_steps * std::max(risen, screened_nats) <
                               task_.null->log_likelihood + task_.least_nats;
-    // On a ridge between a cause and the latents that stood in for it, every step is longer than the one before.
+    // On a ridge between a cause and the latents that absorbed it, each step is longer than the one before.
     const int most = risen > kRising_nats ? kRisingFactor * task_.steps : task_.steps;
     if (i >= most || screened_nats < kLeastStep_nats || hopeless) return;
     const double gained = stepBy(step);
@@ -244,8 +244,8 @@ Optimum LikelihoodClimb::run() {
   everyone_ = everyPose(optimum_.state);
   climb();
   if (!needsSearch()) return std::move(optimum_);
-  // The likelihood is rough where paths come and go with every millimetre: slopes end at the first bump, a quadratic
-  // through values some millimetres apart does not. The latents follow to first order.
+  // Where paths appear and vanish with each millimetre, slopes end at the first bump. A quadratic through values some
+  // millimetres apart does not. The latents follow to first order.
   for (double first_step : kSearched) {
     const double before = optimum_.state.log_likelihood;
     search(first_step);

@@ -11,40 +11,40 @@
 namespace mmradartwin::diagnosis::fit {
 namespace {
 
-constexpr int kRefits = 3;                ///< Fisher steps of the latents at each place
-constexpr std::size_t kMostProfiled = 6;  ///< numbers profiled together: each pair of them is a place
-constexpr int kWidths = 3;                ///< widths that are tried of a step
-constexpr double kWidest = 1;             ///< first width where geometry is profiled, in the coordinate's scale
+constexpr int kRefits = 3;                ///< Fisher steps of the latents at each point
+constexpr std::size_t kMostProfiled = 6;  ///< numbers profiled jointly: each pair of them costs one point
+constexpr int kWidths = 3;                ///< widths of a step that are tried
+constexpr double kWidest = 1;             ///< largest width of a geometry's step, scaled
 
-/// Fall of the likelihood that a step should bring, in nats, and the narrowest step.
+/// Fall of the likelihood that a step should cause, in nats, and the narrowest step.
 struct Fall {
   double least, wanted, most;
-  double narrowest;  ///< in the coordinate's scale
+  double narrowest;  ///< scaled
 };
 constexpr Fall kSmooth = {1, 3, 15, 1e-6};
-constexpr Fall kRough = {10, 25, 80, 0.1};  ///< well above what paths that come and go within millimetres bring
-constexpr double kMostCorrelated = 0.95;    ///< bound of the correlation of two values, and of more together
+constexpr Fall kRough = {10, 25, 80, 0.1};  ///< well above the jumps of paths that appear and vanish within millimetres
+constexpr double kMostCorrelated = 0.95;    ///< limit of the correlation of two values
 
-/// The likelihood at one place, all latents refitted.
+/// Likelihood at one point, with all latents refitted.
 struct ProfilePoint {
   double log_likelihood = 0;
-  Eigen::VectorXd by_location;  ///< [locations] with the prior of the headings there
-  Eigen::VectorXd latents;      ///< [2 errors] of the actors, in standard deviations
+  Eigen::VectorXd by_location;  ///< [locations] nats, with the prior of the headings there
+  Eigen::VectorXd latents;      ///< [2 errors] errors of the actors, in standard deviations
 };
 
-// Places are known by where paths begin and end, too: ranges and directions do not say everything.
-constexpr double kMostErrorRatio = 10;  ///< bound of the geometric error, times the likelihood's own
-constexpr double kLeastAmplitudeShare =
-    0.1;                                 ///< of the pose's strongest amplitude, for an echo that places are known by
-constexpr double kSmallChange = 0.125;   ///< step of derivatives, in the coordinate's scale
-constexpr double kLeastInformation = 1;  ///< least information about a typical value by which ranges know of it
+// Paths that begin and end within the session locate things, too. Ranges and directions do not say everything.
+constexpr double kMostErrorRatio = 10;  ///< limit of the geometric standard error, over the likelihood's own
+/// Least amplitude of an echo that locates things, over the pose's strongest.
+constexpr double kLeastAmplitudeShare = 0.1;
+constexpr double kSmallChange = 0.125;   ///< step of numerical derivatives, scaled
+constexpr double kLeastInformation = 1;  ///< least information of ranges about a scaled value for which they locate it
 
-/// Variance of the coordinates by the ranges and directions of strong echoes, where actors have range errors and poses
-/// have heading errors. These errors are the same in all echoes of one actor or pose, however many there are. 0 for a
-/// coordinate that moves no echo.
+/// Variance of the scaled coordinates by the ranges and directions of strong echoes, where actors have range errors and
+/// poses have heading errors. All echoes of one actor or pose share these errors. 0 for a coordinate that moves no
+/// echo.
 Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_coordinate, int actors, int poses,
                                   const PoseAccuracy& accuracy, const LatentSpread& spread) {
-  // Unknowns: the coordinates, range errors of the actors and of what the scene lacks, headings of the poses.
+  // Unknowns: the coordinates, the range errors of actors and of everything outside the scene, the headings of poses.
   const Eigen::Index n = static_cast<Eigen::Index>(by_coordinate.size()), all = n + actors + 1 + poses;
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(all, all);
   information.diagonal().segment(n, actors + 1).setOnes();
@@ -59,7 +59,7 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
   for (std::size_t j = 0; j < shifts.size(); ++j) {
     for (const PathShift& p : by_coordinate[j]) shifts[j][{p.place, p.event, p.facets}] = &p;
   }
-  // The error of a pose's own place is the same in all its echoes: together they know a range as well as one does.
+  // The error of a pose's position is common to its echoes: all of them measure a range as well as one does.
   std::vector<double> echoes(strongest.size(), 0.0);
   const auto carries = [&](const PathShift& p) { return p.amplitude >= kLeastAmplitudeShare * strongest[p.place]; };
   for (const auto& [key, path] : shifts.front()) echoes[path->place] += carries(*path);
@@ -87,8 +87,8 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
   return (own > kLeastInformation).select(variance, 0.0);
 }
 
-/// Matrix of curvatures made definite: differences of a rough likelihood need not describe a top. No direction is
-/// flatter than that of two values with correlation kMostAlike.
+/// Positive definite matrix close to these curvatures: numerical differences of a rough likelihood need not describe a
+/// maximum. Correlations are limited to kMostCorrelated.
 Eigen::MatrixXd positiveDefinite(const Eigen::MatrixXd& fall) {
   const Eigen::VectorXd scale = fall.diagonal().cwiseSqrt();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> alike(scale.cwiseInverse().asDiagonal() * fall *
@@ -97,23 +97,23 @@ Eigen::MatrixXd positiveDefinite(const Eigen::MatrixXd& fall) {
   return to * alike.eigenvalues().cwiseMax(1 - kMostCorrelated).asDiagonal() * to.transpose();
 }
 
-/// A step to both sides of the fit along one coordinate.
+/// Steps to both sides of the fit along one coordinate.
 struct Step {
   double width = 0;
   ProfilePoint ahead, behind;
   double curvature = 0;
-  bool flat = false;  ///< the likelihood does not fall: the width is all that is known of an error
+  bool flat = false;  ///< the likelihood does not fall: only the width limits the error
 };
 
-/// The likelihood about a fit, looked at along each coordinate and in the corner of each pair.
+/// Profile of the likelihood about a fit, along each coordinate and at one corner of each pair.
 class Profile {
  public:
   Profile(const ProfiledModel& model, const std::vector<Hypothesis>& parts, const ProfiledValues& fit);
-  /// Values at the best place that was looked at, with the fit's errors still.
+  /// Values at the best point, with the fit's errors.
   const ProfiledValues& best() const { return best_; }
-  /// True where the top lies beyond the steps: they tell no width.
+  /// True where the maximum lies beyond the steps, so that they give no width.
   bool endsBeyondItsSteps() const;
-  /// Values at the best place with their standard errors.
+  /// Values at the best point with their standard errors.
   ProfiledValues withErrors() const;
 
  private:
@@ -121,9 +121,9 @@ class Profile {
     return mechanismsWith(model_.base, parts_, scaled_values);
   }
   ProfilePoint pointAt(const std::vector<double>& scaled_values) const;
-  /// Takes a place for the best one where the likelihood is higher there.
+  /// Makes a point the best one where its likelihood is higher.
   void consider(const ProfilePoint& point, const std::vector<double>& scaled_values);
-  /// Values of the scale that coordinate j may have.
+  /// Limits of the scaled value of coordinate j.
   std::pair<double, double> limits(std::size_t j) const;
   Step stepAlong(std::size_t j, const Fall& wanted);
   void evaluateCorners();
@@ -134,14 +134,14 @@ class Profile {
   const std::vector<Hypothesis>& parts_;
   const ProfiledValues& fit_;
   std::vector<Coordinate> coordinates_;
-  std::vector<char> traces_;  ///< by coordinate: it moves what is traced
+  std::vector<char> traces_;  ///< [coordinates] the coordinate changes traced paths
   ProfilePoint here_;
   double highest_ = 0;
   ProfiledValues best_;
   std::vector<Step> steps_;
   Eigen::VectorXd slope_;
   Eigen::MatrixXd fall_, scores_, latents_;  ///< [n][n], [locations][n], [2 errors][n]
-  Eigen::MatrixXd covariance_;               ///< [n][n] by the fall
+  Eigen::MatrixXd covariance_;               ///< [n][n] inverse of the curvatures
   Eigen::VectorXd to_top_;
   std::vector<double> top_;
   Eigen::VectorXd geometric_;
@@ -293,7 +293,8 @@ bool Profile::endsBeyondItsSteps() const {
 ProfiledValues Profile::withErrors() const {
   const Eigen::MatrixXd centred = scores_.rowwise() - scores_.colwise().mean();
   const double locations = static_cast<double>(scores_.rows());
-  // An actor's error is the same at all places: its prior says how far it reaches, scatter over places does not.
+  // An actor's error is the same at all places, so that its prior bounds it and the scatter over places does not show
+  // it.
   const Eigen::MatrixXd scatter =
       centred.transpose() * centred * (locations / std::max(1.0, locations - 1)) + latents_.transpose() * latents_;
   const Eigen::MatrixXd robust = covariance_ * scatter * covariance_;
