@@ -21,12 +21,12 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   finding.mechanism = mechanism;
   finding.parameters =
       fittedParameters(best.hypothesis, best.scaled_values, best.standard_error, finding.cause, data.locations.size());
-  // Names that explain nearly as much, by their share of probability.
+  // Hypotheses that explain nearly as much share the probability.
   double sum = 0;
   std::vector<std::pair<std::string, double>> alike;
   for (const HypothesisFit& other : fits) {
     const double behind = (best.ranking() - other.ranking()) / best.overdispersion;
-    // Those ahead were refused, or are the same thing.
+    // Fits ahead of this one were rejected, or state the same cause.
     if (behind > bounds::kNotToldApart_nats || behind < 0 || !(other.gain > 0)) continue;
     const std::string& name = other.hypothesis.mechanism.mechanism;
     const double weight = std::exp(-behind);
@@ -40,7 +40,7 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   for (const auto& [cause, weight] : alike) finding.candidates.push_back({cause, weight / sum});
   if (finding.candidates.size() > 1) finding.experiment = experimentFor(finding.candidates);
   for (const HypothesisFit& other : fits) {
-    // Those ahead were refused.
+    // Fits ahead of this one were rejected.
     if (other.hypothesis.mechanism.mechanism == mechanism.mechanism || other.ranking() > best.ranking()) continue;
     const std::string& name = other.hypothesis.mechanism.mechanism;
     finding.evidence.runner_up = isCatalogued(name) ? name : "unknown";
@@ -101,7 +101,7 @@ std::optional<Eigen::Vector2d> placeOf(const NamedParameters& mechanism, const S
 
 namespace {
 
-/// Reason why an object is none, "" where it may be one.
+/// Reason why an object is no finding, "" where it may be one.
 std::string rejectionOfObject(const Parameters& values, const std::vector<FrameFinding>& walkers) {
   const double size_m = values.number("size_m"), x_m = values.number("x_m"), y_m = values.number("y_m");
   const std::string which = ": " + number(size_m) + " m at (" + number(x_m) + ", " + number(y_m) + ")";

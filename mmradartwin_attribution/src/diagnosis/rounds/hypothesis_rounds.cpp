@@ -16,7 +16,7 @@
 namespace mmradartwin::diagnosis::rounds {
 namespace {
 
-constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is looked for in a round
+constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is searched for in a round
 
 }  // namespace
 
@@ -102,7 +102,7 @@ bool HypothesisRounds::findOne(int round) {
       return true;
     }
     context_.report("taken back: " + fit.hypothesis.label(), 1);
-    // What looks like an actor's own error may have another cause.
+    // An effect that looks like an actor's own error may have another cause.
     if (!fit.hypothesis.isMove()) maps.addRejected(fit);
   }
   return false;

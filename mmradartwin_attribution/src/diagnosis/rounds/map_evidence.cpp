@@ -9,9 +9,9 @@
 
 namespace mmradartwin::diagnosis::rounds {
 
-// The likelihood gains a little by its own shortcomings, too: a pose's error looks like a little of many things at
-// edges. Where the maps do not gain, a fit needs more evidence. Real effects need not show in maps (an image at -26
-// dB), so that only maps that get plainly worse speak against much evidence.
+// The likelihood gains a little by its own errors: a pose error resembles small amounts of many effects at edges. Where
+// the maps do not gain, a fit needs more evidence. Real effects need not show in maps (a receiver image at -26 dB), so
+// that only clearly worse maps speak against much evidence.
 std::string MapEvidence::rejection(const HypothesisFit& fit, const FindingGain& gain) {
   const auto explained = *gain.explained_power.difference_ci95;
   const double explained_more = gain.explained_power.after - gain.explained_power.before;
@@ -33,9 +33,9 @@ std::string MapEvidence::rejection(const HypothesisFit& fit, const FindingGain& 
 
 void MapEvidence::addRejected(const HypothesisFit& fit) { rejected_.push_back({gainByPose(fit, before_), false}); }
 
-/// True of a fit whose evidence is large enough though the maps do not gain. The maps of echoes that are many points'
-/// differ from what is expected of them by as much as they hold; and few places see an actor, so that little is left of
-/// a gain without the best of them.
+/// True of a fit that has enough evidence although the maps do not gain. Maps of many scatter points differ from their
+/// expectation by as much as they hold. Few places see one actor, so that little of its gain is left without the best
+/// place.
 bool MapEvidence::hasEnoughEvidence(const HypothesisFit& fit, double explained_more, bool clearly_worse,
                                     bool likelier) {
   const bool traces = context_.echoes.altersGeometry(fit.hypothesis.at(fit.scaled_values));
@@ -47,8 +47,8 @@ bool MapEvidence::hasEnoughEvidence(const HypothesisFit& fit, double explained_m
          ((overwhelming && (explained_more > -most_lost || !clearly_worse)) || in_nats);
 }
 
-/// True where a better fit that was rejected explains the same poses. A law without a name may be the cause of
-/// something else beside such a fit, and so may a name beside errors of the session.
+/// True where a better, rejected fit explains the same poses. Two kinds are exempt: a law without a name, which may be
+/// the cause of something else, and a named cause given errors of the session.
 bool MapEvidence::explainsTheSame(const HypothesisFit& fit, const Eigen::VectorXd& nats_by_pose) const {
   const bool named = isCatalogued(fit.hypothesis.mechanism.mechanism);
   return std::any_of(rejected_.begin(), rejected_.end(), [&](const Rejected& other) {

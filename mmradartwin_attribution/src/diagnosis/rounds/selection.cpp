@@ -13,8 +13,8 @@
 namespace mmradartwin::diagnosis::rounds {
 namespace {
 
-constexpr std::size_t kGeometriesOfCommonErrors = 4;  ///< geometries that common errors of actors and poses look like
-constexpr std::size_t kMostRivals = 2;                ///< kept of each finding
+constexpr std::size_t kGeometriesOfCommonErrors = 4;  ///< geometries that common errors of actors and poses resemble
+constexpr std::size_t kMostRivals = 2;                ///< rivals kept of each finding
 
 }  // namespace
 
@@ -75,7 +75,7 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
   return "";
 }
 
-/// Fits all findings of rounds at once, and withdraws findings that are then worth nothing beside the others.
+/// Fits all findings of rounds jointly, and withdraws findings that then gain nothing given the others.
 void Selection::refitTogether() {
   while (true) {
     context_.report("fitting all findings together", 0);
@@ -94,8 +94,8 @@ void Selection::refitTogether() {
       a.scaled_values = fit.scaled_values[i];
       a.standard_error = fit.standard_error[i];
       const std::size_t numbers = a.hypothesis.coordinates.size();
-      // A finding that is there or not, or plain whatever its scatter, was judged by its own round. A law is judged
-      // again: it may have stood for what a name had not been fitted to yet.
+      // A finding without numbers, or with an overwhelming gain, was judged by its own round. A law is judged again: it
+      // may have stood for a named cause that had not been fitted yet.
       if (numbers == 0 || (a.overwhelming && context_.fitter.isOverwhelming(fit.evidence[i].nats))) continue;
       const double rate = context_.fitter.falseAlarmRate(fit.evidence[i].scattered(), a.hypothesis, numbers, family_);
       if (rate > weakest_rate) {
@@ -118,7 +118,7 @@ void Selection::withdraw(std::size_t i) {
 }
 
 /// Withdraws causes of all echoes that are no larger than their own errors where something is unknown: the residual of
-/// the unknown's law looks like a little of such a cause. See docs/calibration_of_bounds.md#causes-beside-an-unknown.
+/// the unknown's law resembles a little of such a cause. See docs/calibration_of_bounds.md#causes-beside-an-unknown.
 void Selection::withdrawExplainedByUnknown() {
   const auto is_doubtful = [&](const Accepted& a) {
     const Hypothesis& h = a.hypothesis;
@@ -173,9 +173,9 @@ void Selection::profileFound() {
   writeBackFindings();
 }
 
-/// True of a geometry whose numbers are no larger than the errors of actors and poses make them, and of a move that is
-/// no farther than an actor's range error: where paths come and go with every millimetre the likelihood may gain much
-/// by either. See docs/calibration_of_bounds.md#sure-offset.
+/// True of a geometry whose numbers are within the errors of actors and poses, and of a move within an actor's range
+/// error. The likelihood may gain much by either where paths appear and vanish with each millimetre. See
+/// docs/calibration_of_bounds.md#sure-offset.
 bool Selection::isWithinErrors(const HypothesisFit& fit) const {
   const Hypothesis& hypothesis = fit.hypothesis;
   const auto accepted = acceptedAs(hypothesis);
@@ -189,8 +189,8 @@ bool Selection::isWithinErrors(const HypothesisFit& fit) const {
                               std::abs(move.values.number("dyaw_deg")) * M_PI / 180 * reach_m;
     if (farthest_m < fit.stated.mostRangeError_m()) return true;
   }
-  // An interval may be wide where the likelihood is rough, so that a large offset with much evidence is believed
-  // whatever its interval says.
+  // The interval of an offset may be wide where the likelihood is rough. A large offset with much evidence is therefore
+  // accepted whatever its interval.
   const double per_pose =
       fit.gain_without_best_place / fit.overdispersion / static_cast<double>(context_.data.poses.size());
   const bool is_aside = hypothesis.isGeometry() && fit.moved_m() > fit.stated.sureOffset_m() &&
@@ -209,8 +209,8 @@ bool Selection::isWithinErrors(const HypothesisFit& fit) const {
          bounds::kFalseAlarmRateOfRound;
 }
 
-/// Measures a receiver's image, once found, against its hosts and takes it out of the data. Fitted as a power its level
-/// would be some 2 dB high, and the residual of that would look like echoes.
+/// Measures a receiver image that was found against its hosts, and removes it from the data. Fitted as a power, its
+/// level would be some 2 dB high and its residual would look like echoes.
 void Selection::takeOutImage() {
   const auto image = std::find_if(accepted_.begin(), accepted_.end(), [](const Accepted& a) {
     return a.hypothesis.form() == MechanismForm::kReceiverImage;
@@ -244,7 +244,7 @@ void Selection::writeBackFindings() {
   }
 }
 
-/// Adds a finding; an unknown stays the last one. fits: all fits of its round.
+/// Adds a finding; an unknown stays last. fits: all fits of its round.
 void Selection::accept(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding) {
   const std::size_t at = findings_.size() - (unknownNats() > 0 ? 1 : 0);
   for (Accepted& a : accepted_) a.finding += a.finding >= at ? 1 : 0;
@@ -264,8 +264,8 @@ void Selection::accept(const HypothesisFit& fit, const std::vector<HypothesisFit
   findings_.insert(findings_.begin() + static_cast<std::ptrdiff_t>(at), std::move(finding));
 }
 
-/// Rival of a finding's round that explains more beside all other findings than the finding itself, which then takes
-/// its name; nothing where there is none.
+/// Rival of a finding's round that explains more than the finding, given all other findings; it then replaces the
+/// finding. Nothing where there is none.
 std::optional<HypothesisFit> Selection::betterName(const Accepted& accepted) {
   std::vector<NamedParameters> others = before_rounds_;
   for (const Accepted& other : accepted_) {
@@ -297,8 +297,8 @@ std::optional<HypothesisFit> Selection::betterName(const Accepted& accepted) {
   return best;
 }
 
-/// Fits the rivals of each finding but the last anew. A cause that was named before others were known may have a
-/// simpler name beside them: a transmitter's error and a turned mount look like an error of every channel.
+/// Fits the rivals of each finding but the last again. A cause that was named before others were known may have a
+/// simpler name given them: a transmitter's error and a turned mount together look like an error of every channel.
 void Selection::exchangeNames() {
   bool exchanged = false;
   for (std::size_t i = 0; i + 1 < accepted_.size(); ++i) {
@@ -345,7 +345,7 @@ void Selection::orderByGain() {
   state_.latents = found;
 }
 
-/// Measures a finding's gain over mechanisms_ again, in nats, maps and metrics.
+/// Measures a finding's gain over mechanisms_ again, in nats, explained power and metrics.
 void Selection::measureAgain(const Accepted& a) {
   context_.report("gain of " + a.hypothesis.label() + " beside those before it", 0);
   Finding& finding = findings_[a.finding];
@@ -355,7 +355,7 @@ void Selection::measureAgain(const Accepted& a) {
   HypothesisFit fit = context_.fitter.fit(state_, a.hypothesis, {a.scaled_values});
   context_.fitter.judge(fit, family_);
   describeGain(fit, state_, context_.data, finding);
-  if (!finding.gain) return;  // one location
+  if (!finding.gain) return;  // with one location there is no gain
   finding.where.front().range_m = finding.where.front().azimuth_deg = std::nullopt;
   gains_.ofFit(state_, fit, finding);
   gains_.addMetrics(extended_, fit, *finding.gain);
