@@ -14,15 +14,15 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr std::size_t kScreenPoses = 44;      ///< enough to rank hypotheses
+constexpr std::size_t kScreenPoses = 44;      ///< poses that rank hypotheses
 constexpr std::size_t kFewestPoses = 12;      ///< for costly hypotheses, or those of many numbers
-constexpr std::size_t kLawPoses = 66;         ///< at which paths are measured for laws without a name
-constexpr std::size_t kSecondLook = 9;        ///< hypotheses that are looked at on more poses
-constexpr std::size_t kSecondLookPoses = 66;  ///< then; geometries are looked at on all
+constexpr std::size_t kLawPoses = 66;         ///< poses at which paths are measured for laws without a name
+constexpr std::size_t kSecondLook = 9;        ///< hypotheses that are screened again on more poses
+constexpr std::size_t kSecondLookPoses = 66;  ///< number of these poses; geometries are screened on all
 constexpr std::size_t kSuspects = 6;          ///< actors whose geometry is tried
 constexpr std::size_t kNeighbours = 2;        ///< actors near a place where an object seems to stand
-constexpr std::size_t kMostElsewhere = 2;     ///< actors that are looked for elsewhere by a shift of their echoes
-constexpr double kGainPerNumber_nats = 0.5;   ///< by chance
+constexpr std::size_t kMostElsewhere = 2;     ///< actors that are searched for by a shift of their echoes
+constexpr double kGainPerNumber_nats = 0.5;   ///< expected gain per number by chance
 
 /// Indices of `wanted` of the poses, evenly spread.
 std::vector<int> spread(std::size_t count, std::size_t wanted) {
@@ -34,25 +34,25 @@ std::vector<int> spread(std::size_t count, std::size_t wanted) {
 
 bool hasMoreScreenedNats(const Screened& a, const Screened& b) { return a.screened_nats > b.screened_nats; }
 
-/// Looks of one round.
+/// Screens of one round.
 class Looks {
  public:
   Looks(DiagnosisContext& context, HypothesisScreen& screen, const std::vector<Hypothesis>& all,
         const ModelState& state)
       : context_(context), screen_(screen), all_(all), state_(state) {}
 
-  /// Chooses the actors whose geometry is tried, and those that are looked for elsewhere.
+  /// Chooses the actors whose geometry is tried, and those that are searched for at other places.
   void suspect(const std::vector<RangeShift>& shifted);
-  /// Looks for objects and late points that the twin lacks; actors near an object become suspicious.
+  /// Searches for objects and late points that the twin lacks. Actors near an object become suspicious.
   void placeObjects();
-  /// Looks at every hypothesis, then at the best ones on more poses. no_use: see HypothesisRanking.
+  /// Screens every hypothesis, then the best ones on more poses. without_gain: see HypothesisRanking.
   void lookAtAll(std::set<std::string>& without_gain);
   void lookAgain();
   void addLaws();
   void addReplicas();
   void addSharedLatents();
   void addPlaced();
-  /// All hypotheses that were looked at, most promising first.
+  /// All hypotheses that were screened, highest screened gain first.
   std::vector<Screened> ranked();
 
  private:
@@ -60,15 +60,15 @@ class Looks {
   const std::string& nameOf(int actor) const {
     return context_.twin.scene().actors[static_cast<std::size_t>(actor)].name;
   }
-  /// Actor that a hypothesis moves, where the actor is looked for elsewhere; else -1.
+  /// Actor that a hypothesis moves and that is searched for at other places; else -1.
   int outOfPlace(const Hypothesis& hypothesis) const;
   Screened look(const Hypothesis& hypothesis, const std::vector<int>& poses);
   Screened lookAtSome(const Hypothesis& hypothesis) { return look(hypothesis, spread(kScreenPoses)); }
   std::vector<Screened> bestOf(std::size_t most, const std::vector<ProjectedPlace>& places,
                                Hypothesis (*hypothesisAt)(const ProjectedPlace&));
-  /// Takes off what chance promises: half a nat per number on the poses looked at, scaled up as the promise is.
+  /// Subtracts the gain by chance: half a nat per number on the poses of the screen, scaled to all poses.
   void takeOffChance(std::size_t poses, Screened& screened) const;
-  /// Adds a hypothesis that something else points at, or its start where the hypothesis is known.
+  /// Adds a hypothesis that another screen suggests, or adds its start to a known hypothesis.
   void suggest(Screened screened);
 
   DiagnosisContext& context_;
@@ -76,7 +76,7 @@ class Looks {
   const std::vector<Hypothesis>& all_;
   const ModelState& state_;
   std::set<std::string> suspicious_;  ///< actors whose geometry is tried
-  std::set<int> out_of_place_;        ///< actors that are looked for elsewhere
+  std::set<int> out_of_place_;        ///< actors that are searched for at other places
   std::vector<Screened> placed_;      ///< objects and late points
   std::vector<Screened> screened_;
   std::map<std::string, std::size_t> looked_at_;  ///< number of poses, by label
@@ -147,16 +147,17 @@ void Looks::lookAtAll(std::set<std::string>& without_gain) {
     context_.report("trying " + hypothesis.label(), static_cast<double>(i) / static_cast<double>(all_.size()));
     const bool of_actor = context_.twin.scene().actorIndex(hypothesis.subject) >= 0;
     const std::vector<double> typical(hypothesis.coordinates.size(), 1.0);
-    // A costly hypothesis traces the session anew. Actors without suspicion are tried only by what is there or not, on
-    // a few poses.
+    // A costly hypothesis traces the session again. For actors without suspicion only one-sided hypotheses are tried,
+    // on a few poses.
     const bool costly = of_actor && suspicious_.count(hypothesis.subject) == 0 &&
                         context_.echoes.altersGeometry(hypothesis.at(typical));
     if (costly && (!hypothesis.isOneSided() || without_gain.count(hypothesis.label()) > 0)) continue;
-    // A hypothesis of more numbers needs more evaluations: fewer poses rank it.
+    // A hypothesis of more numbers needs more evaluations, so that fewer poses rank it.
     std::vector<int> poses =
         spread(costly ? kFewestPoses : std::max(kFewestPoses, kScreenPoses / (1 + hypothesis.coordinates.size() / 3)));
     Screened s = look(hypothesis, poses);
-    if (outOfPlace(hypothesis) >= 0) poses = spread(context_.data.poses.size());  // around() promises for all poses
+    // around() scales its gain to all poses.
+    if (outOfPlace(hypothesis) >= 0) poses = spread(context_.data.poses.size());
     if (costly && !(s.screened_nats > 0)) without_gain.insert(hypothesis.label());
     takeOffChance(poses.size(), s);
     looked_at_[s.hypothesis.label()] = poses.size();
@@ -167,8 +168,7 @@ void Looks::lookAtAll(std::set<std::string>& without_gain) {
 }
 
 void Looks::lookAgain() {
-  // All geometries are kept: every latent holds a part of an error of all ranges or directions, which makes its score
-  // small.
+  // All geometries are kept: latents absorb most of an error of all ranges or directions, which makes its score small.
   std::size_t kept = 0;
   screened_.erase(std::remove_if(screened_.begin(), screened_.end(),
                                  [&](const Screened& s) { return ++kept > kSecondLook && !s.hypothesis.isGeometry(); }),

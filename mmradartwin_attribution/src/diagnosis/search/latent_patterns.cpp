@@ -9,16 +9,17 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kStep = 0.125;         ///< of derivatives, in the coordinate's scale
-constexpr double kMostStart = 8;        ///< bound of a start, in the coordinate's scale
-constexpr Eigen::Index kAlongLaw = 25;  ///< places of a law at which a name is compared
+constexpr double kStep = 0.125;         ///< step of numerical derivatives, scaled
+constexpr double kMostStart = 8;        ///< limit of a start, scaled
+constexpr Eigen::Index kAlongLaw = 25;  ///< places of a law at which a named hypothesis is compared
 
-/// Least squares of a geometry's coordinates v to the latents z = D v of actors and poses in standard deviations: they
-/// stand in for what the geometry does to ranges and directions.
+/// Geometry that explains the latents: least squares of its coordinates v in z = D v, where z holds the errors of
+/// actors and poses in standard deviations and D how the geometry changes ranges and directions.
 Screened sharedGeometry(ExpectedEchoes& source, const Hypothesis& hypothesis, const ModelState& null,
                         const LatentSpread& spread, const PoseAccuracy& accuracy, const std::vector<int>& poses) {
   const SessionLatents& n = null.latents;
-  const Eigen::Index actors = static_cast<Eigen::Index>(n.actor_range_m.size()) - 1;  // the last is of none
+  const Eigen::Index actors =
+      static_cast<Eigen::Index>(n.actor_range_m.size()) - 1;  // the last one belongs to no actor
   const Eigen::Index rows = actors + static_cast<Eigen::Index>(poses.size());
   const Eigen::Index columns = static_cast<Eigen::Index>(hypothesis.coordinates.size());
   Eigen::VectorXd latents(rows);
@@ -56,7 +57,8 @@ std::vector<Screened> sharedLatents(ExpectedEchoes& source, const ModelState& nu
                                     const std::vector<int>& poses) {
   const Scene& scene = source.base().scene();
   const SessionLatents& n = null.latents;
-  // An error that all poses or all actors share is a cause. The score test does not see it, since the latents hold it.
+  // An error that all poses or all actors share is a cause. The score test does not see it, since the latents have
+  // absorbed it.
   std::vector<Screened> screened;
   for (const Hypothesis& h : all) {
     if (!h.isGeometry()) continue;
@@ -67,7 +69,7 @@ std::vector<Screened> sharedLatents(ExpectedEchoes& source, const ModelState& nu
       s.screened_nats = 0;
     screened.push_back(std::move(s));
   }
-  // Levels of one material's actors, or of one actor, farther off than such errors are point at the material.
+  // Level errors of one material's actors, or of one actor, beyond their prior suggest the material.
   for (const Hypothesis& hypothesis : all) {
     if (hypothesis.form() != MechanismForm::kMaterialLevel || hypothesis.coordinates.size() != 1) continue;
     double sum = 0, count = 0;
@@ -89,7 +91,7 @@ std::vector<Screened> sharedLatents(ExpectedEchoes& source, const ModelState& nu
 
 namespace {
 
-/// Named hypothesis of a level that falls or rises with range or time, with the mean slope as start.
+/// Named hypothesis of a level that changes linearly with range or time; its start is the law's mean slope.
 std::optional<Screened> namedSlope(const Screened& law, const Parameters& values, const std::vector<Hypothesis>& all) {
   const std::vector<double>&at = values.numbers("at"), &gain_db = values.numbers("gain_db");
   const std::string& variable = values.text("variable");

@@ -8,16 +8,16 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr int kFine = 48, kFinest = 128;  ///< nodes of the finest table; most of them where ranges span a hall
-constexpr double kFineRange_m = 0.2;      ///< between these nodes of ranges
-constexpr int kMostNodes = 8;             ///< of a curve
-constexpr double kShortest = 3.5;         ///< fine steps in a ripple's period
-constexpr double kMostPeriods = 10, kShortest_m = 0.85;  ///< of a ripple; ten periods of range in a room are so short
-constexpr double kDecayShares[] = {0.05, 0.1, 0.2,
-                                   0.4};  ///< of the variable's span, in which an exponential falls by e
-constexpr int kSectors = 24;              ///< parts of the variable's span whose edges are tried
-constexpr int kNarrowestBump = 4;         ///< parts between a bump's ends
-constexpr double kLeastShare = 0.02;      ///< of the paths that lie beyond a table's first and last node
+constexpr int kFine = 48, kFinest = 128;  ///< nodes of the finest table; the limit where ranges span a hall
+constexpr double kFineRange_m = 0.2;      ///< spacing of these nodes over range
+constexpr int kMostNodes = 8;             ///< nodes of a curve
+constexpr double kShortest = 3.5;         ///< fine steps in a ripple's shortest period
+constexpr double kMostPeriods = 10, kShortest_m = 0.85;  ///< periods of a ripple; ten of the shortest span a room
+/// Shares of the variable's span in which an exponential falls by e.
+constexpr double kDecayShares[] = {0.05, 0.1, 0.2, 0.4};
+constexpr int kSectors = 24;          ///< parts of the variable's span whose edges are tried
+constexpr int kNarrowestBump = 4;     ///< parts between a bump's ends
+constexpr double kLeastShare = 0.02;  ///< share of the paths beyond a table's first and last node
 
 std::string threeDigits(double value) {
   std::ostringstream out;
@@ -25,7 +25,7 @@ std::string threeDigits(double value) {
   return out.str();
 }
 
-/// Adds the weights of a table's nodes at x; beyond the ends the first or last node has all.
+/// Adds the weights of a table's nodes at x. Beyond the ends the first or last node has weight 1.
 void addHat(const std::vector<double>& at, double x, double weight, Eigen::Ref<Eigen::RowVectorXd> row) {
   const Eigen::Index last = static_cast<Eigen::Index>(at.size()) - 1;
   if (x <= at.front() || last == 0) {
@@ -53,7 +53,7 @@ Eigen::MatrixXd hats(const std::vector<double>& fine, const std::vector<double>&
   return m;
 }
 
-/// Nodes between which the sorted numbers lie evenly.
+/// Nodes between which the sorted numbers are evenly distributed.
 std::vector<double> evenNodes(const std::vector<double>& sorted, int count) {
   std::vector<double> nodes;
   for (int k = 0; k < count; ++k) {
@@ -109,8 +109,8 @@ std::vector<LawForm> LawForms::curves() const {
       form.shapes = form.shapes.leftCols(nodes - 1).eval();
       form.shapes(nodes - 1, 0) = 1;
     }
-    if (!constant_)
-      form.shapes = form.shapes.rightCols(form.shapes.cols() - 1).eval();  // the session's gain is free already
+    // The session's gain is free already.
+    if (!constant_) form.shapes = form.shapes.rightCols(form.shapes.cols() - 1).eval();
     forms.push_back(std::move(form));
   }
   return forms;
@@ -164,7 +164,7 @@ std::vector<LawForm> LawForms::others() const {
   std::vector<LawForm> forms;
   const int count = static_cast<int>(fine_.size());
   if (!turns_) addRipples(false, forms);
-  if (of_azimuth_) addRipples(true, forms);  // as interference at an aperture goes
+  if (of_azimuth_) addRipples(true, forms);  // interference at an aperture has this form
   for (double share : kDecayShares) {
     for (bool grows : {false, true}) {
       if (turns_) break;

@@ -22,26 +22,26 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kHuber_sigmas = 2;                         ///< deviation from which on a path counts less
-constexpr int kReweighings = 3;                             ///< of the paths
+constexpr double kHuber_sigmas = 2;                         ///< deviation from which a path counts less (Huber)
+constexpr int kReweighings = 3;                             ///< iterations of the weights
 constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;  ///< spacing of spots in the floor plan; about the best one
-constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};     ///< of spots
-constexpr std::size_t kMostSpots = 10000;                   ///< a hall has too many to tell apart
+constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};     ///< radii of spots
+constexpr std::size_t kMostSpots = 10000;                   ///< spots of a hall would exceed it
 constexpr int kSpotNumbers = 4;                             ///< place (two), radius and level
-constexpr int kBearings = 24;                               ///< directions of half a turn
-constexpr int kLeastPathsOfActor = 12;                      ///< least paths of an actor with laws of its own
-constexpr double kOwnScatterShare =
-    0.7;                             ///< of the scatter before a law, at which the law is judged by its own scatter
-constexpr double kWeakest_db = -45;  ///< weaker echoes count as so strong in a law over amplitudes
-constexpr double kGainPerNumber_nats = 0.5;  ///< by chance
-constexpr double kMostStart = 8;             ///< bound of a start, in the coordinate's scale
+constexpr int kBearings = 24;                               ///< directions over half a turn
+constexpr int kLeastPathsOfActor = 12;                      ///< measured paths of an actor that has laws of its own
+/// Residual scatter over the previous one, below which a law is judged by its own scatter.
+constexpr double kOwnScatterShare = 0.7;
+constexpr double kWeakest_db = -45;          ///< in a law over amplitudes, weaker echoes count as this strong
+constexpr double kGainPerNumber_nats = 0.5;  ///< expected gain per number by chance
+constexpr double kMostStart = 8;             ///< limit of a start, scaled
 
-/// Deviations of all paths by one observable, robustly weighted. P: paths, G: latents, K: directions of a law.
+/// Deviations of all paths in one observable, robustly weighted. P: paths, G: latents, K: directions of a law.
 struct Sample {
   Observable observable;
-  Eigen::VectorXd off;     ///< [P] measured less expected
+  Eigen::VectorXd off;     ///< [P] measured minus expected
   Eigen::VectorXd weight;  ///< [P] 0 where a path does not show the observable
-  double scatter = 1;      ///< of the residuals
+  double scatter = 1;      ///< standard deviation of the residuals
   Eigen::MatrixXd latent;  ///< [P][G] directions of the latents: a constant and the actors' errors
   Eigen::LDLT<Eigen::MatrixXd> latent_solver;
   Eigen::VectorXd latent_prior;  ///< [G] precision
@@ -57,16 +57,16 @@ struct Sample {
 /// Regression of an observable on the directions of a law.
 struct LawRegression {
   double raw = 0;             ///< nats by which the law explains the paths
-  double overdispersion = 1;  ///< scatter of the scores over places against what chance brings
+  double overdispersion = 1;  ///< scatter of the scores over places, divided by that expected by chance
   Eigen::VectorXd value;      ///< [K] in the observable's unit
-  double constant = 0;        ///< fitted along
+  double constant = 0;        ///< fitted as well
 };
 
-/// Measured paths of a session, and the laws that they promise.
+/// Measured paths of a session, and the laws that they support.
 class LawScreen {
  public:
   LawScreen(const Twin& base, const ChannelLikelihood& model, const ModelState& null, const std::vector<int>& poses);
-  /// Variable of a law, and whose paths it changes.
+  /// Variable of a law, and the actor whose paths it changes.
   struct Over {
     std::string variable, actor = "";  ///< actor empty: all paths
     double bearing_deg = 0;            ///< direction of standing_m
@@ -76,13 +76,13 @@ class LawScreen {
   /// [observables]
   const std::vector<Sample>& samples() const { return samples_; }
   const Sample& gain() const { return samples_.front(); }
-  /// Gain over the radar's place, along the direction that promises most.
+  /// Gain over the radar's position, along the best direction.
   std::optional<Screened> bestBearing() const;
-  /// Gain over the distance to a place at which paths pass or the radar stands, for the place that promises most.
+  /// Gain over the distance to a place that paths pass or where the radar stands, for the best place.
   std::optional<Screened> bestPlace(const std::string& variable) const;
-  /// Steps of the gain, at the times between poses that promise most.
+  /// Steps of the gain, at the best times between poses.
   std::optional<Screened> bestSteps() const;
-  /// False where poses differ in gain by far more than these steps, or a slope over time, explains.
+  /// False where gains differ between poses by far more than these steps, or a slope over time, explain.
   bool gainsFollowTime(const std::optional<Screened>& steps) const;
   /// Actors with enough measured paths for a law of their own.
   std::vector<std::string> actorsOftenSeen() const;
@@ -95,7 +95,7 @@ class LawScreen {
   Eigen::MatrixXd directionsOfPoses(const Eigen::MatrixXd& of_poses) const;
   /// [poses][steps] 1 for a pose after a step.
   Eigen::MatrixXd afterSteps(const std::vector<double>& steps_s) const;
-  /// Effective number of places that tell of a direction, by the shares of their paths.
+  /// Effective number of places that determine a direction, by the shares of their paths.
   double places(const Sample& s, const Eigen::VectorXd& direction) const;
   Hypothesis law(const Observable& o, const Over& over, const std::vector<double>& at) const;
 
@@ -131,7 +131,7 @@ LawScreen::LawScreen(const Twin& base, const ChannelLikelihood& model, const Mod
   for (std::size_t kind = 0; kind < of.size(); ++kind) samples_.push_back(sampleOf(of[kind], kind));
 }
 
-/// Phases in degrees, each within half a turn of their mean direction: a law may lead beyond 180 degrees.
+/// Unwraps phases in degrees to within half a turn of their mean direction: a law may lead beyond 180 degrees.
 void wrapAround(const Eigen::VectorXd& weight, Eigen::VectorXd& phase_deg) {
   std::complex<double> sum = 0;
   for (Eigen::Index i = 0; i < phase_deg.size(); ++i) sum += std::polar(weight[i], phase_deg[i] * M_PI / 180);
@@ -267,7 +267,7 @@ Hypothesis LawScreen::law(const Observable& observable, const Over& over, const 
   return hypothesis;
 }
 
-/// Coordinates of a form's numbers, o.typical being the typical value.
+/// Coordinates of a form's numbers; o.typical is the typical value.
 std::vector<Coordinate> coordinatesOf(const LawForm& form, const Observable& o) {
   std::vector<Coordinate> coordinates;
   for (Eigen::Index k = 0; k < form.shapes.cols(); ++k) {
@@ -338,7 +338,7 @@ std::optional<Screened> LawScreen::best(const Sample& sample, const Over& over) 
   result.hypothesis = law(observable, over, best->at);
   result.hypothesis.variant = best->words;
   result.hypothesis.coordinates = coordinatesOf(*best, observable);
-  result.hypothesis.searched = best->searched + 1;  // and the variable
+  result.hypothesis.searched = best->searched + 1;  // one more for the variable
   result.screened_nats = of_best.raw / of_best.overdispersion - kGainPerNumber_nats * best->priced(observable.constant);
   result.starts = {{}};
   for (Eigen::Index k = 0; k < of_best.value.size(); ++k) {
@@ -508,7 +508,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
     return std::all_of(between.begin(), between.end(),
                        [&](const std::set<int>& of) { return of.size() >= std::min<std::size_t>(2, places.size()); });
   };
-  // One step at the time that promises most beside the others.
+  // Moves one step to the best time, given the others.
   const auto moved = [&](std::vector<double> steps_s, std::size_t which) {
     std::vector<double> best = steps_s;
     double most = -INFINITY;
@@ -529,7 +529,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
   while (steps_s.size() < std::min<std::size_t>(kMostSteps, between_s.size())) {
     steps_s.push_back(-1);
     steps_s = moved(steps_s, steps_s.size() - 1);
-    if (steps_s.back() < 0) break;  // there is no time for one more
+    if (steps_s.back() < 0) break;  // no time is left for one more step
     for (std::size_t which = steps_s.size() - 1; which-- > 0;) steps_s = moved(steps_s, which);
     std::vector<double> sorted_s = steps_s;
     std::sort(sorted_s.begin(), sorted_s.end());
@@ -544,7 +544,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
     h = withSteps(std::move(h), steps).value();
     h.mechanism.values.set("steps_s", sorted_s);
     h.variant += steps > 1 ? " where they show" : " where it shows";
-    h.searched = steps;  // when
+    h.searched = steps;  // the times of the steps
     result->screened_nats = nats - kGainPerNumber_nats * 2 * count;
     result->starts = {{}};
     for (double step_db : regression.value)
@@ -559,14 +559,14 @@ ScreenedLaws screenLaws(const Twin& base, const ChannelLikelihood& model, const 
                         const std::vector<int>& poses) {
   ScreenedLaws result;
   for (const NamedParameters& m : null.mechanisms) {
-    if (traitsOf(m.mechanism).form == MechanismForm::kLaw) return result;  // what one leaves over looks like another
+    if (traitsOf(m.mechanism).form == MechanismForm::kLaw) return result;  // residuals of one law resemble another
   }
   if (poses.empty()) return result;
   const LawScreen screen(base, model, null, poses);
   const auto add = [&](std::optional<Screened> s) {
     if (s) result.laws.push_back(std::move(*s));
   };
-  // An error of directions looks like an error of each channel: the best channel law stands for all.
+  // An error of directions resembles an error of each channel: the best channel law stands for all.
   std::map<std::string, std::optional<Screened>> of_channels;  // by variable
   for (const Sample& s : screen.samples()) {
     for (const std::string& variable : s.observable.over) {

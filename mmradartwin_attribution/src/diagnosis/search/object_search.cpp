@@ -11,20 +11,20 @@ namespace mmradartwin::diagnosis::search {
 namespace {
 
 constexpr double kSides_m[] = {0.25, 0.45};               ///< sides of a box that are tried
-constexpr double kTurned_deg = 15, kSquare_deg = 90;      ///< between its tried turns; a square is itself again
+constexpr double kTurned_deg = 15, kSquare_deg = 90;      ///< step of its turns; a square repeats after a quarter turn
 constexpr std::size_t kFacing = 5;                        ///< poses that a side of a box may face
-constexpr double kSideFactors[] = {0.6, 0.8, 1.25, 1.6};  ///< factors of a side
-constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1};  ///< of a place
-constexpr double kTurns_deg[] = {-8, -3, 3, 8};           ///< about itself
-constexpr double kPlaceOffsets_m[] = {-0.1, 0, 0.1};      ///< from the place that hidden paths pass
-constexpr int kSweeps = 4;                                ///< over the surroundings of a fit
-constexpr double kLeastSweepGain_nats = 5;                ///< gain of a sweep that is worth another
-constexpr double kLeastForSweeps_nats = 15;               ///< gain of a fit that is worth sweeps
+constexpr double kSideFactors[] = {0.6, 0.8, 1.25, 1.6};  ///< factors on a side
+constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1};  ///< shifts of a place
+constexpr double kTurns_deg[] = {-8, -3, 3, 8};           ///< turns about itself
+constexpr double kPlaceOffsets_m[] = {-0.1, 0, 0.1};      ///< offsets from the place that hidden paths pass
+constexpr int kSweeps = 4;                                ///< sweeps over the surroundings of a fit
+constexpr double kLeastSweepGain_nats = 5;                ///< gain of a sweep from which another one follows
+constexpr double kLeastForSweeps_nats = 15;               ///< gain of a fit from which it is swept
 
-/// Places of a box's coordinates.
+/// Indices of a box's coordinates.
 enum Coordinates { kX, kY, kSide, kYaw };
 
-/// Hypothesis of a box, its middle at a place to start with.
+/// Hypothesis of a box whose middle starts at a place.
 Hypothesis boxAt(const Eigen::Vector2d& middle) {
   Hypothesis h;
   h.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kUnmodelledObject));
@@ -36,7 +36,7 @@ Hypothesis boxAt(const Eigen::Vector2d& middle) {
   return h;
 }
 
-/// Boxes that keep a side, a corner or the middle of the fitted one, as scaled coordinates.
+/// Scaled coordinates of boxes that share a side, a corner or the middle with the fitted one.
 std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
   const std::vector<Coordinate>& c = fit.hypothesis.coordinates;
   const Eigen::Vector2d center(c[kX].value(fit.scaled_values[kX]), c[kY].value(fit.scaled_values[kY]));
@@ -61,7 +61,7 @@ std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
   return boxes;
 }
 
-/// Places and turns around a fit (of a late echo: places and distances), as scaled coordinates.
+/// Scaled coordinates of places and turns around a fit; of a late echo, places and delays.
 std::vector<std::vector<double>> placesAround(const HypothesisFit& fit) {
   std::vector<std::vector<double>> places;
   const auto add = [&](std::size_t coordinate, double by) {
