@@ -15,7 +15,7 @@
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-constexpr double kLeastGain_db = -60;  ///< of a channel of a tone, that is written
+constexpr double kLeastGain_db = -60;  ///< least gain of a tone's channel that is written
 
 }  // namespace
 
@@ -50,8 +50,8 @@ bool differsFromStated(const Finding& finding, const std::vector<NamedParameters
     return std::abs(is - states) > bounds::kSameValue_intervals * (ci95[1] - ci95[0]);
   };
   return std::none_of(stated.begin(), stated.end(), [&](const NamedParameters& mechanism) {
-    if (placed &&
-        mechanism.mechanism == finding.mechanism->mechanism) {  // other numbers are of one walk and one session
+    // Other numbers belong to one walk and one session.
+    if (placed && mechanism.mechanism == finding.mechanism->mechanism) {
       return std::hypot(mechanism.values.number("x_m") - found.number("x_m"),
                         mechanism.values.number("y_m") - found.number("y_m")) < bounds::kSameWalker_m;
     }
@@ -84,7 +84,7 @@ Finding findingOf(const SampleConvention& convention, const RadarConfig& radar) 
     finding.parameters.push_back({"order", "1", finding.mechanism->values.numbers("order"), {}});
   }
   if (finding.cause == "channel_conjugation" || is_reversed) {
-    finding.cause = "channel_conjugation";  // the same data; the convention is the likelier mistake
+    finding.cause = "channel_conjugation";  // the data are the same; this convention is the likelier mistake
     finding.mechanism = defaultMechanism(finding.cause);
     finding.parameters.clear();
     finding.candidates = {{"channel_conjugation", 0.5}, {"channel_permutation", 0.5}};
@@ -103,7 +103,7 @@ Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest) {
   const double level_db = 20 * std::log10(rms / strongestMeasured(rest));
   const double error_db = 8.686 / std::sqrt(2 * std::max(1.0, tone.gain));
   Finding finding;
-  // A constant has no range at all; leakage travels some centimetres.
+  // A constant has no range; leakage travels some centimetres.
   const bool constant = tone.range_m < std::max(bounds::kMostConstantRange_m, 3 * tone.range_error_m);
   finding.cause = constant ? "dc_offset" : "tx_rx_leakage";
   NamedParameters mechanism = defaultMechanism(finding.cause);

@@ -14,8 +14,8 @@ namespace mmradartwin::diagnosis::receiver {
 namespace {
 
 constexpr double kDbPerNeper = 8.685889638065035;
-constexpr Eigen::Index kFirst = 2;  ///< bin: leakage and offset stand below, their images at the end
-constexpr int kIterations = 6;      ///< of the image and of what stands beside it
+constexpr Eigen::Index kFirst = 2;  ///< first bin: leakage and offset lie below, and their images at the end
+constexpr int kIterations = 6;      ///< alternations between the image and the power beside it
 
 }  // namespace
 
@@ -26,7 +26,7 @@ bool measureImage(const ChannelData& data, Finding& finding) {
   std::vector<double> host;
   std::complex<double> beta = 0;
   double hosts = 0;
-  // Cells are weighed by the power beside the image. Weights by all power there would favour cells in which echoes of
+  // Cells are weighted by the power beside the image. Weights by the total power would favour cells in which echoes of
   // the room weaken the image.
   for (int i = 0; i < kIterations; ++i) {
     shared.assign(locations, 0.0);

@@ -10,7 +10,8 @@
 namespace mmradartwin::diagnosis::receiver {
 
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated) {
-  // The noise of a sample follows from that of a cell of the average by Hann's sums over N samples, N/2 and 3N/8.
+  // The noise of a sample follows from that of a cell of the average by the sums of Hann's window over N samples, N/2
+  // and 3N/8.
   std::vector<double> levels_db;
   for (const PoseChannels& p : data.poses) {
     if (!(p.noise_power > 0)) continue;
