@@ -13,17 +13,17 @@ namespace {
 
 constexpr double kTailFreedom = 4;  ///< degrees of freedom of the complex t distribution
 
-/// Share of a beam's power that keeps its covariance definite in single precision: neighbouring bins of a Hann window
-/// are almost the same.
+/// Share of a beam's power that keeps its covariance positive definite in single precision: neighbouring bins of a Hann
+/// window are almost equal.
 constexpr double kBeamShare = 3e-6;
 
-/// Change of a cell's covariance, as a share, below which a group of echoes gives the cell no slope, and the range
-/// error that the change is judged at.
+/// Relative change of a cell's covariance below which a group of echoes has no slope in the cell, and the range error
+/// for which the change is evaluated.
 constexpr double kNegligibleShare = 3e-4, kMoved_m = 0.03;
 
-constexpr double kLeastStep_nats = 0.1;  ///< promised gain below which fit() ends
+constexpr double kLeastStep_nats = 0.1;  ///< expected gain below which fit() ends
 
-/// Places of the globals in scores; kShape and kActors are the first of several.
+/// Indices of the globals in scores; kShape and kActors are the first of several.
 enum Global {
   kGain,
   kFloor,
@@ -34,7 +34,7 @@ enum Global {
   kActors = kShape + std::tuple_size_v<decltype(SessionLatents::floor_shape)>
 };
 
-/// Values that a global may have, and how far it may go in one step.
+/// Limits of a global, and the largest change in one step.
 struct Limits {
   double low, high, step;
 };
@@ -78,7 +78,7 @@ double groupGain(const EchoGroup& group, const SessionLatents& latents) {
   return std::exp(sum);
 }
 
-/// One-way range that a group's actors add beyond what its fields hold already.
+/// One-way range that a group's actors add beyond the range of its fields.
 double groupShift_m(const EchoGroup& group, const SessionLatents& latents) {
   double sum = -group.added_range_m;
   for (int a : group.actors) sum += latents.actor_range_m[errorOf(a, latents.actor_range_m.size())];
@@ -197,7 +197,7 @@ PackedHermitian ChannelLikelihood::sigma(const PoseModel& model, int cell) const
     covariance.addTurned({fields->power, fields->shift, fields->curvature},
                          {u, u * shift, u * (shift * shift + range_variance)}, turn);
   }
-  // The channels' independent share keeps the matrix definite where the first-order terms alone would not.
+  // The independent share of channels keeps the matrix definite where the first-order terms alone would not.
   if (covariance.trace() > 0) addRelative(latents, cell, covariance);
   addApart(cell, noiseOf(model.pose, cell), covariance);
   addClutter(latents, model.pose, cell, 1, covariance);
@@ -279,8 +279,8 @@ SessionCovariance ChannelLikelihood::covariance(const std::vector<PoseEchoes>& e
   return result;
 }
 
-/// Changes of one cell's covariance by the globals and the heading. Only directions that act in the cell enter its
-/// products. The memory is kept from cell to cell.
+/// Changes of one cell's covariance along the globals and the heading. Only directions that act in the cell enter its
+/// products. The memory is reused from cell to cell.
 struct ChannelLikelihood::CellDirections {
   CellDirections(int count, int channels)
       : acts(static_cast<std::size_t>(count)),
@@ -304,7 +304,7 @@ struct ChannelLikelihood::CellDirections {
   std::vector<char> acts;
   std::vector<PackedHermitian> raw;
   Eigen::MatrixXd whitened;      ///< [M^2][count] the active directions, in the first columns
-  std::vector<double> products;  ///< of the active directions in pairs
+  std::vector<double> products;  ///< of pairs of the active directions
 };
 
 void ChannelLikelihood::addEchoDirections(const PoseModel& model, int cell, const PackedHermitian& inverse,
@@ -335,7 +335,7 @@ void ChannelLikelihood::addEchoDirections(const PoseModel& model, int cell, cons
     const double by_yaw = turnOf(1, *fields);
     if (by_yaw != 0) to.touch(heading).addTurnDerivative(own, by_yaw, apart_);
   }
-  for (int j : to.active) {  // a heading's trace is 0
+  for (int j : to.active) {  // the trace of a heading is 0
     if (j != heading) addRelative(latents, cell, to.raw[j]);
   }
 }
@@ -441,7 +441,7 @@ Basis ChannelLikelihood::basis(const std::vector<PoseEchoes>& echoes, const Sess
   return b;
 }
 
-/// Score and information of one pose by globals, further directions and, last, its heading.
+/// Score and information of one pose along globals, further directions and, last, its heading.
 struct ChannelLikelihood::PoseScores {
   Eigen::VectorXd score;
   Eigen::MatrixXd information;
@@ -528,7 +528,7 @@ void ChannelLikelihood::addPriors(const SessionLatents& latents, Scores& scores)
     scores.information(kActors + errors_ + a, kActors + errors_ + a) += range;
     scores.total[kActors + errors_ + a] -= range * latents.actor_range_m[a];
   }
-  // Levels of errors have a wide prior (a factor of 10 in power): none runs away where no data shows it.
+  // Levels of errors have a wide prior (a factor of 10 in power), so that none diverges where no data shows it.
   const double rough = 1 / (2.3 * 2.3);
   const SessionLatents usual;
   for (int j = kRelative; j < kActors; ++j) {
@@ -538,7 +538,7 @@ void ChannelLikelihood::addPriors(const SessionLatents& latents, Scores& scores)
 }
 
 void ChannelLikelihood::holdAtLimits(const SessionLatents& latents, Scores& scores) const {
-  // A number at its limit that would go beyond it stays, and no other number moves as if it did not.
+  // A number at its limit whose step leads beyond it is held, and drops out of the steps of all others.
   for (int j = 0; j < latents.globals(); ++j) {
     const Limits limits = limitsOf(j, errors_, spread_);
     const double v = latents.global(j);
@@ -658,7 +658,7 @@ SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) c
   };
   latents.log_gain = quantile(ratio, 0.5);
   latents.log_floor = quantile(low, 0.25);
-  // Wide channel errors to start with: far outliers of a narrow t distribution would give headings no slope.
+  // Large independent errors to start with: outliers of a narrow t distribution would give headings no slope.
   latents.log_relative = -3;
   return latents;
 }

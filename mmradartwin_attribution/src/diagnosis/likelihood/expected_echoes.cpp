@@ -14,7 +14,7 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr double kNoFarSkirt = 1e3;  ///< times the strongest power: no echo is strong beside that
+constexpr double kNoFarSkirt = 1e3;  ///< factor on the strongest power beside which no echo is strong
 
 double strongestPower(const std::vector<PathRecord>& records) {
   double strongest = 0;
@@ -22,13 +22,13 @@ double strongestPower(const std::vector<PathRecord>& records) {
   return strongest;
 }
 
-/// True where a parameter of the mechanism weighs paths.
+/// True where a parameter of the mechanism changes the weights of paths.
 bool weighs(const std::string& mechanism) {
   const std::vector<ParameterSpec> specs = MechanismRegistry::instance().create(mechanism)->parameters();
   return std::any_of(specs.begin(), specs.end(), [](const ParameterSpec& s) { return s.weighs; });
 }
 
-/// Makes a pose's paths into what its channels receive of them, in place.
+/// Converts a pose's paths into what its channels receive of them, in place.
 class PathReceiver {
  public:
   PathReceiver(const Twin& twin, const Pose& pose) : twin_(twin), pose_(pose) {
@@ -178,7 +178,7 @@ PoseEchoes ExpectedEchoes::collectAt(const Collection& collection, std::size_t i
   std::array<KeptPose, 2>& kept = kept_poses_[i];
   if (!kept[1].echoes.groups.empty() && kept[1].signature == own.signature) std::swap(kept[0], kept[1]);
   if (!kept[0].echoes.groups.empty() && kept[0].signature == own.signature) return kept[0].echoes;
-  // The memory of records is kept from pose to pose: making their small vectors anew takes most of the time.
+  // The memory of records is reused from pose to pose: allocating their small vectors takes most of the time.
   thread_local std::vector<PathRecord> all;
   std::size_t count = 0, to = 0;
   for (const Part& part : collection.parts) count += part.here == nullptr ? (*part.there)[i]->size() : 0;
@@ -197,7 +197,7 @@ PoseEchoes ExpectedEchoes::collectAt(const Collection& collection, std::size_t i
   double strongest = 0;
   if (collection.without_mixing) {
     mixture.emplace(*collection.twin, linear, collection.mixing_key, data_.poses[i].pose, mixed_[i], paths_.call());
-    strongest = strongestPower(all);  // before tones lose what the receiver makes of them
+    strongest = strongestPower(all);  // before the receiver's losses are taken off the tones
     mixture->scaleTones(all, collector);
   }
   receiver.receive(all);
@@ -240,7 +240,7 @@ void ExpectedEchoes::pointBeams(ChannelData& data, const std::vector<NamedParame
       beam.clutter = clutter.quadratic(beam.weights.data());
     }
   });
-  paths_.clearBaseline();  // grazing paths are to be collected in the beams, too
+  paths_.clearBaseline();  // pose-sensitive paths are to be collected in the beams, too
   kept_groups_.clear();
   kept_poses_.clear();
   mixed_.clear();

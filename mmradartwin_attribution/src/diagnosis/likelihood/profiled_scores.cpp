@@ -15,8 +15,8 @@ ProfiledScores profiledScores(const Scores& scores, int globals) {
   ProfiledScores profiled;
   const Eigen::Index n = scores.information.rows() - globals;
   const Eigen::MatrixXd latent_information = scores.information.topLeftCorner(globals, globals);
-  const Eigen::MatrixXd projection =
-      latent_information.ldlt().solve(scores.information.topRightCorner(globals, n));  // [g][n]
+  // [g][n].
+  const Eigen::MatrixXd projection = latent_information.ldlt().solve(scores.information.topRightCorner(globals, n));
   profiled.by_location = scores.by_location.rightCols(n) - scores.by_location.leftCols(globals) * projection;
   profiled.information = regularised(scores.information.bottomRightCorner(n, n) -
                                      scores.information.topRightCorner(globals, n).transpose() * projection);
@@ -25,7 +25,7 @@ ProfiledScores profiledScores(const Scores& scores, int globals) {
   if (locations > 1 && n > 0) {
     const Eigen::MatrixXd centred = profiled.by_location.rowwise() - profiled.by_location.colwise().mean();
     profiled.scatter = centred.transpose() * centred * (locations / (locations - 1));
-    // An actor's error is the same at all places: scatter over places does not show it, its prior does.
+    // An actor's error is the same at all places: its prior shows it, the scatter over places does not.
     profiled.scatter += projection.transpose() * scores.prior.asDiagonal() * projection;
     const Eigen::MatrixXd ratio = profiled.information.ldlt().solve(profiled.scatter);
     profiled.overdispersion = std::min(ratio.trace() / static_cast<double>(n), kMostOverdispersion);
