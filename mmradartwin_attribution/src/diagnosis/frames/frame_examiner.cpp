@@ -23,8 +23,8 @@ namespace {
 
 using Complex = std::complex<float>;
 
-constexpr int kMostSlips = 3;              ///< of one pose, that are closed
-constexpr double kLeastScatter_db = 1e-4;  ///< of a frame's level over poses: floor of a division
+constexpr int kMostSlips = 3;              ///< slips of one pose that are closed
+constexpr double kLeastScatter_db = 1e-4;  ///< of a frame's level over poses: floor, against division by zero
 
 /// 95 % interval of a share of `trials` by Clopper and Pearson.
 std::array<double, 2> shareInterval(double hits, double trials) {
@@ -64,7 +64,7 @@ struct FrameExaminer::State {
   std::vector<PoseJudgement> judged;
   std::vector<PoseMotion> motion;
   std::vector<PoseFrames> poses;
-  mutable std::optional<LocatedMotion> located;  ///< motion at the poses so far, once it was asked for
+  mutable std::optional<LocatedMotion> located;  ///< motion at the poses so far, once it was computed
 
   const LocatedMotion& locate() const {
     if (!located) located = locateMotion(radar, motion);
@@ -79,9 +79,9 @@ struct FrameExaminer::State {
   FrameFinding unsteadiness() const;
   /// Checks the shape of a pose's frames; throws InputError.
   void requireShape(const Pose& pose, const std::vector<AdcCube>& frames) const;
-  /// Repairs the stream of a pose's bytes as far as it can be.
+  /// Repairs the byte stream of a pose as far as possible.
   FrameStack repairBytes(const std::vector<AdcCube>& frames, PoseJudgement& judged) const;
-  /// Levels of a frame at all poses but those of one location, dB.
+  /// Levels in dB of a frame at all poses except those of one location.
   std::vector<double> levelsOf_db(std::size_t frame, const std::string& without = "") const;
 };
 
@@ -125,7 +125,7 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   PoseJudgement judged;
   judged.pose = pose.name;
   judged.frames = static_cast<int>(frames.size());
-  // All later steps take samples for what they are, so bytes come first.
+  // All later steps need correctly placed samples, so that bytes come first.
   FrameStack stack = state.repairBytes(frames, judged);
   judged.rails = countRails(stack);
   ClippedValues clipped = clippedValues(judged.rails, stack);
@@ -133,14 +133,14 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   const double turn = state.examiner.commonTurn(stack);
   turnFrames(-turn, stack);
   std::vector<Complex> average = medianShot(stack);
-  // Where the standing signal itself comes to the converter's limit, clipped values are no bursts.
+  // Where the static signal itself reaches the converter's limit, clipped values are no bursts.
   dropStandingClipped(clipped, average, stack);
   Bursts bursts = dropBursts(average, differenceVariance(stack), stack);
   judged.values = countClipped(clipped, bursts, stack);
   judged.bursts = bursts;
 
   average = meanShot(stack);
-  // A value that is clipped in every shot is nearer to the truth than none at all.
+  // A value that is clipped in every shot is closer to the truth than zero.
   for (const auto& [place, mean] : clipped_means) {
     if (average[place] == Complex(0)) average[place] = mean;
   }
@@ -243,8 +243,8 @@ FrameFinding FrameExaminer::State::saturation() const {
     return finding;
   }
   const double share = clipped / counted;
-  // Samples of a pose clip in all shots or in none unless noise decides: the error is the root of their number, times
-  // 0.2.
+  // Samples of a pose clip in all shots or in none unless noise decides. The error is 0.2 times the root of their
+  // number.
   finding.parameters = {number("clipped_fraction", "1", share,
                                {std::max(0.0, share - 1.96 * std::sqrt(spread) / counted * 0.2),
                                 share + 1.96 * std::sqrt(spread) / counted * 0.2})};
@@ -283,7 +283,7 @@ FrameFinding FrameExaminer::State::drift() const {
     if (std::isfinite(p.turn_variance)) used.push_back(&p);
   }
   if (used.empty()) return finding;
-  // Random-effects mean (DerSimonian and Laird): poses may differ by more than each one's own error.
+  // Random-effects mean (DerSimonian and Laird): poses may differ by more than their own errors.
   const auto mean = [&](double between, double& weights) {
     double sum = 0;
     weights = 0;
@@ -304,7 +304,7 @@ FrameFinding FrameExaminer::State::drift() const {
   const double between = room > 0 ? std::max(0.0, (chi2 - (poses - 1)) / room) : 0;
   const double turn = mean(between, weights);
   const double error = std::sqrt(1 / weights);
-  // A drift of the radar turns all cells alike. A turn of one echo at one pose may be that echo's own motion.
+  // A drift of the radar turns the phase of all cells alike. One echo at one pose may turn by its own motion.
   int cells = 0;
   for (const PoseJudgement* p : used) cells += p->turn_cells;
   const double freedom = std::max(poses, static_cast<double>(cells)) - 1;
@@ -344,7 +344,7 @@ FrameFinding FrameExaminer::State::frameGain() const {
   finding.cause = "unknown";
   std::size_t frames = 0;
   for (const PoseJudgement& p : judged) frames = std::max(frames, p.frame_gain_db.size());
-  // The median over poses of each frame's level is not moved by bursts at some poses. The gain changes where the median
+  // Bursts at some poses do not affect the median over poses of each frame's level. The gain changes where the median
   // differs between frames by far more than its error over poses.
   double chi2 = 0, lowest = 0, highest = 0;
   std::size_t lowest_at = 0, highest_at = 0, counted = 0;
@@ -355,7 +355,7 @@ FrameFinding FrameExaminer::State::frameGain() const {
     const double middle = middle_db[i] = quantile(levels, 0.5);
     std::vector<double> apart;
     for (double level : levels) apart.push_back(std::abs(level - middle));
-    // Normal errors have a deviation of 1.48 times their median size, and the median's own error is 1.25 times the
+    // The standard deviation of normal errors is 1.48 times their median size, and a median's error is 1.25 times a
     // mean's.
     scatter_db[i] = std::max(1.48 * quantile(apart, 0.5), kLeastScatter_db);
     const double error = 1.25 * scatter_db[i] / std::sqrt(static_cast<double>(levels.size()));
@@ -402,7 +402,7 @@ FrameFinding FrameExaminer::State::unsteadiness() const {
     finding.poses.push_back(p.pose);
     finding.log_likelihood_gain += p.unsteady_nats;
   }
-  // Nobody who walks is in half of all bins at two thirds of the poses.
+  // No walker is in half of all bins at two thirds of the poses.
   if (finding.poses.size() < bounds::kFewestUnsteadyPoses || 3 * finding.poses.size() < 2 * judged.size()) return {};
   finding.false_alarm_rate = bounds::kFramesFalseAlarmRate;
   finding.description = "frames of one pose disagree about what stands, in most of its echoes at once, at " +
@@ -425,14 +425,14 @@ std::vector<FrameFinding> FrameExaminer::findings() const {
   std::vector<FrameFinding> all = state.misalignments();
   all.push_back(state.saturation());
   all.push_back(state.packetLoss());
-  // Movers, bursts and turns can be told only of a radar that is the same in all frames.
+  // Moving echoes, bursts and phase drift can be found only where the radar is the same in all frames.
   const bool steady = state.unsteadiness().poses.empty();
   if (steady) {
     all.push_back(state.interference());
     all.push_back(state.drift());
   }
-  // A strong walker pulls the gain that a frame's samples share, which leaves something like a burst; remainders of
-  // bursts look like something that moves. Where one stands at poses of the other alone, the other is the cause.
+  // A strong walker changes the common gain of a frame, which leaves something like a burst. Remainders of bursts look
+  // like moving echoes. Where all poses of one have the other as well, the other is the cause.
   const std::vector<FrameFinding> walkers = steady ? state.locate().walkers : std::vector<FrameFinding>();
   std::set<std::string> walked, hit;
   for (const FrameFinding& walker : walkers) walked.insert(walker.poses.begin(), walker.poses.end());
@@ -455,7 +455,7 @@ std::vector<FrameFinding> FrameExaminer::findings() const {
 std::vector<FrameFinding> FrameExaminer::unexplained() const {
   if (FrameFinding f = state_->unsteadiness(); !f.poses.empty()) return {std::move(f)};
   std::vector<FrameFinding> all = state_->locate().unexplained;
-  // A tone of the radar's own is at most poses. A beat at a few of the poses with bursts is a remainder of these.
+  // A tone of the radar is at most poses. A beat at only some poses with bursts is a remainder of the bursts.
   const FrameFinding bursts = state_->interference();
   const std::set<std::string> hit(bursts.poses.begin(), bursts.poses.end());
   all.erase(

@@ -16,8 +16,8 @@ namespace {
 
 using Complex = std::complex<float>;
 
-constexpr int kNeighbourCodes = 16;            ///< inside of the outermost one, that tell how often it should come
-constexpr int kEchoesInBand = 8;               ///< a mover with its limbs holds an eighth of the range bins at most
+constexpr int kNeighbourCodes = 16;  ///< codes next to the outermost one that show how often it should occur
+constexpr int kEchoesInBand = 8;     ///< a moving body with its limbs fills at most an eighth of the range bins
 constexpr double kRoundingVariance = 1.0 / 6;  ///< of a complex value, 1/12 each for I and Q
 
 float medianOf(std::vector<float>& values) {
@@ -30,7 +30,7 @@ float medianOf(std::vector<float>& values) {
 /// Weight of one value where the same sample of all shots counts as one.
 double frameShare(const FrameStack& s) { return s.shots() > 0 ? 1.0 / s.shots() : 0; }
 
-/// Counts at one end of a histogram, whose element i counts code i - 32768; `share` is the weight of one value.
+/// Counts at one end of a histogram, whose element i counts code i - 32768. share: weight of one value.
 RailCounts countRail(const std::vector<int>& histogram, bool high, double share) {
   RailCounts counts;
   const int codes = static_cast<int>(histogram.size());
@@ -100,8 +100,8 @@ Rails countRails(const FrameStack& stack) {
 }
 
 double pileUp(const RailCounts& counts) {
-  // The density of a sine's values grows to its ends as 1/sqrt(A^2 - v^2): the outermost code holds 1 + sqrt(2) times
-  // what the next one holds. Half a sample is added, since missing neighbours prove nothing.
+  // The density of a sine's values rises towards its ends as 1/sqrt(A^2 - v^2): the outermost code holds 1 + sqrt(2)
+  // times what the next one holds. Half a sample is added, since missing neighbours prove nothing.
   const double expected = (1 + std::sqrt(2.0)) * counts.next_codes + 0.5;
   if (!(counts.at_code > expected)) return 0;
   return counts.at_code * std::log(counts.at_code / expected) - (counts.at_code - expected);
@@ -138,7 +138,7 @@ std::map<std::size_t, Complex> clippedMeans(const ClippedValues& clipped, const 
 
 void dropStandingClipped(const ClippedValues& clipped, const std::vector<Complex>& average, FrameStack& s) {
   for (const auto& [at, count] : clipped.at) {
-    // A value that clips now and then has an average below the limit.
+    // A value that clips occasionally has an average below the limit.
     if (std::abs(average[at % s.values()]) < 0.8 * clipped.limit) continue;
     s.x[at] = 0;
     s.use[at] = 0;
@@ -210,7 +210,7 @@ std::vector<Complex> commonGains(const FrameStack& stack, const std::vector<Comp
       with += std::complex<double>(std::conj(average[i]) * stack.x[base + i]);
       power += std::norm(average[i]);
     }
-    // The average itself carries 1/shots of the noise. Ten times all noise in it is a signal.
+    // The average itself has 1/shots of the noise. It is a signal from ten times that on.
     if (power > 10 * noise_variance * static_cast<double>(stack.values()) / stack.shots()) {
       gains[static_cast<std::size_t>(shot)] = Complex(with / power);
     }
@@ -239,7 +239,7 @@ double differenceVariance(const FrameStack& stack) {
       if (2 * count < stack.samples) continue;
       fft.fwd(spectrum.data(), difference.data(), stack.samples);
       std::transform(spectrum.begin(), spectrum.end(), power.begin(), [](const Complex& v) { return std::norm(v); });
-      // The median of an exponential is ln 2 of its mean, and two shots differ by twice the noise of one.
+      // The median of an exponential is ln 2 times its mean, and two shots differ by twice the noise of one.
       variances.push_back(medianOf(power) / static_cast<float>(2 * std::log(2.0) * window_power));
     }
   }
@@ -277,13 +277,13 @@ bool isOfEchoes(std::vector<float> power) {
   return left < (1 - bounds::kLeastShareOfMovers) * all;
 }
 
-/// One chirp's differences from the average times the shot's gain, at all receivers.
+/// Differences of one chirp from the average times the shot's gain, at all receivers.
 class ChirpResidual {
  public:
   ChirpResidual(const FrameStack& stack, const std::vector<Complex>& average, Complex gain, int shot, int slot)
       : stack_(stack), average_(average), gain_(gain), shot_(shot), slot_(slot) {}
   bool used(int receiver, int sample) const { return stack_.use[place(receiver, sample)]; }
-  /// 0 where the value is not to be used.
+  /// 0 for an unusable value.
   Complex at(int receiver, int sample) const {
     const std::size_t i = place(receiver, sample);
     return stack_.use[i] ? stack_.x[i] - gain_ * average_[i % stack_.values()] : Complex(0);
@@ -317,13 +317,13 @@ struct BurstWindow {
   double nats = 0;
 };
 
-/// Looks for bursts in one chirp after the other.
+/// Searches for bursts chirp by chirp.
 class BurstSearch {
  public:
   BurstSearch(const FrameStack& stack, double noise_variance)
       : receivers_(stack.receivers),
         samples_(stack.samples),
-        // Where noise is less than rounding, differences from the median are flips by one code, whose variance is at
+        // Where noise is less than rounding, differences from the median are single-code steps, whose variance is at
         // most 1/4 for each of I and Q.
         scale_(std::max(noise_variance, 0.5)),
         energy_(static_cast<std::size_t>(stack.samples)),
@@ -336,7 +336,7 @@ class BurstSearch {
           (receivers_ * w));
     }
   }
-  /// Reads the energy of a chirp's samples over the noise; false where none of them is to be used.
+  /// Reads the energy of a chirp's samples over the noise; false where no sample is usable.
   bool read(const ChirpResidual& chirp) {
     sorted_.clear();
     for (int n = 0; n < samples_; ++n) {
@@ -353,13 +353,13 @@ class BurstSearch {
       if (count) sorted_.push_back(energy_[i]);
     }
     if (sorted_.empty()) return false;
-    // An echo that moves, and a gain that flickers, are in all samples of the chirp.
+    // A moving echo and a varying gain are in all samples of the chirp.
     level_ = std::max(1.0, static_cast<double>(medianOf(sorted_)));
     return true;
   }
   /// True where the chirp read last differs from the average as a whole.
   bool moves() const { return level_ > bounds::kLeastNoiseOfMover; }
-  /// Window of the chirp read last that is most unlike noise and movers.
+  /// Window of the chirp read last that differs most from noise and moving echoes.
   BurstWindow window() const {
     const double least = moves() ? bounds::kLeastBurstOverMover : 1;
     BurstWindow best;
@@ -375,7 +375,7 @@ class BurstSearch {
     }
     return best;
   }
-  /// True where one direction holds most of a window's power beyond noise, and not one receiver alone, which would be a
+  /// True where one direction holds most of a window's power beyond noise. A single receiver does not count: that is a
   /// fault of its converter.
   bool isOneWave(const ChirpResidual& chirp, const BurstWindow& window) const {
     Eigen::MatrixXcd covariance = Eigen::MatrixXcd::Zero(receivers_, receivers_);
@@ -393,15 +393,15 @@ class BurstSearch {
 
  private:
   int receivers_, samples_;
-  double scale_;                    ///< variance of a sample by noise
+  double scale_;                    ///< noise variance of a sample
   std::vector<int> lengths_;        ///< of windows
-  std::vector<double> thresholds_;  ///< mean energy of each, that noise does not reach
+  std::vector<double> thresholds_;  ///< mean energy of each that noise does not reach
   std::vector<float> energy_, sorted_;
-  std::vector<double> sum_;  ///< of the energy of all samples before each
-  double level_ = 1;         ///< usual energy of the chirp's samples, 1 by noise
+  std::vector<double> sum_;  ///< energy of all samples before each one
+  double level_ = 1;         ///< usual energy of the chirp's samples; 1 for noise
 };
 
-/// Takes a chirp out of use.
+/// Discards a chirp.
 void dropChirp(int shot, int slot, FrameStack& s) {
   for (int r = 0; r < s.receivers; ++r) {
     for (int n = 0; n < s.samples; ++n) {
@@ -428,7 +428,7 @@ Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, Fr
       seen[frame] = 1;
       const BurstWindow window = search.window();
       if (window.length == 0) continue;
-      // Limbs beat, now and then all at once.
+      // Limbs move at several speeds and may add up for a moment.
       if (search.moves() && isOfEchoes(chirp.spectrum())) continue;
       if (!search.isOneWave(chirp, window)) continue;
       found.log_likelihood_gain += window.nats;

@@ -18,32 +18,32 @@ namespace {
 
 constexpr double kCell_m = 0.15;             ///< of the map: about a range bin of the paper's radar
 constexpr int kMostCells = 1000;             ///< of the map, along either axis
-constexpr double kReach_m = 1.0;             ///< of a walker, and the width of a beam at some metres
-constexpr double kAround_m = 0.5;            ///< half the place of a finding
-constexpr double kAround_deg = 10;           ///< half the place of a finding by Doppler
-constexpr std::size_t kMostWalkers = 4;      ///< that are told
-constexpr std::size_t kFewestPlaces = 5;     ///< of a track that counts
-constexpr int kPasses = 3;                   ///< of tracks about a centre that moves with them
-constexpr float kBesideShare = 0.01f;        ///< of a peak, to which sidelobes of the window and of the array reach
-constexpr double kPlaceError_m = 0.3;        ///< of a walk without tracks
-constexpr double kRangeError_m = 0.1;        ///< of a place along the view, about a range bin
-constexpr double kAngleError_rad = 0.035;    ///< of a place across the view: 2 degrees, the array's errors
+constexpr double kReach_m = 1.0;             ///< radius of a walker's motion, and the width of a beam at some metres
+constexpr double kAround_m = 0.5;            ///< half the size of a finding's place
+constexpr double kAround_deg = 10;           ///< half the width of a finding's place by Doppler
+constexpr std::size_t kMostWalkers = 4;      ///< walkers that are stated
+constexpr std::size_t kFewestPlaces = 5;     ///< positions of a track that counts
+constexpr int kPasses = 3;                   ///< iterations of tracks about a moving centre
+constexpr float kBesideShare = 0.01f;        ///< share of a peak down to which sidelobes of window and array reach
+constexpr double kPlaceError_m = 0.3;        ///< standard error of a walk's place without tracks
+constexpr double kRangeError_m = 0.1;        ///< standard error along the view, about a range bin
+constexpr double kAngleError_rad = 0.035;    ///< standard error across the view: 2 degrees, the array's errors
 constexpr double kLimbSpeeds_m_per_s = 0.1;  ///< between parts of a walking body
 
 const double kLogFalseAlarm = std::log(bounds::kFramesFalseAlarmRate);
 
-/// Place in the map with its evidence, nats.
+/// Place in the map with its evidence in nats.
 struct Place {
   double x_m = 0, y_m = 0, evidence = 0;
 };
 
-/// Evidence of one pose as it counts beside others.
+/// Evidence of one pose, limited for the sum over poses.
 float bounded(float evidence) { return evidence / (1 + evidence / bounds::kConvincingNatsAtPose); }
 
 double degrees(double rad) { return rad * 180 / M_PI; }
 
-/// Logarithm of the chance that `poses` cells of pure noise add up to `evidence`, as Chernoff's bound over t. A cell
-/// holds half the square of the positive part of a normal number, for which E exp(t e) = 1/2 + 1/2 (1 - t)^(-1/2).
+/// Logarithm of the probability that `poses` cells of noise sum to `evidence`, by Chernoff's bound over t. A cell holds
+/// half the square of the positive part of a normal number, for which E exp(t e) = 1/2 + 1/2 (1 - t)^(-1/2).
 double logChance(double evidence, std::size_t poses) {
   double best = 0;
   for (double t = 0.02; t < 1; t += 0.02) {
@@ -63,7 +63,7 @@ class View {
         bins_(static_cast<int>(pose.evidence.rows())) {}
   /// Cell of a place; false where the place is behind the radar or beyond its range.
   bool cell(double x_m, double y_m, int& bin, int& beam) const {
-    // An array along y tells no elevation: the place is taken at the radar's height.
+    // An array along y does not measure elevation: the place is taken at the radar's height.
     const Eigen::Vector3d d = R_ * Eigen::Vector3d(x_m - p_.x(), y_m - p_.y(), 0);
     const double r = d.norm();
     if (d.x() <= 0 || r < 1e-3) return false;
@@ -101,7 +101,7 @@ class Search {
     const double reach_m = radar_.max_range_m();
     low_.array() -= reach_m;
     high_.array() += reach_m;
-    // Poses far apart make cells wider, not more.
+    // Poses far apart make cells larger, not more numerous.
     cell_m_ = std::max(kCell_m, (high_ - low_).maxCoeff() / kMostCells);
     columns_ = static_cast<int>((high_.x() - low_.x()) / cell_m_) + 1;
     rows_ = static_cast<int>((high_.y() - low_.y()) / cell_m_) + 1;
@@ -121,7 +121,7 @@ class Search {
       const auto carry = std::count_if(poses_.begin(), poses_.end(), [&](const PoseMotion& p) {
         return p.evidence.size() > 0 && p.evidence(bin, beam) > bounds::kLeastNatsAtPose;
       });
-      // Every cell of the map was a try; the radar has fewer cells.
+      // Every cell of the map was tried; the radar has fewer cells.
       const double tries = std::log(static_cast<double>(columns_) * rows_);
       if (carry > 2 && fixed >= place.evidence &&
           tries + logChance(bounds::kTrustInMotion * fixed, poses_.size()) < kLogFalseAlarm) {
@@ -137,7 +137,7 @@ class Search {
   }
 
  private:
-  /// Place of the map with most evidence over all poses.
+  /// Place in the map of highest evidence over all poses.
   Place strongestPlace() const {
     std::vector<float> sum(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), 0);
     for (std::size_t i = 0; i < poses_.size(); ++i) {
@@ -161,7 +161,7 @@ class Search {
     return {x(cell % columns_), y(cell / columns_), *best};
   }
 
-  /// Cell of range and angle that varies most, over all poses but those of one location, and its evidence.
+  /// Cell of range and angle of highest evidence, over all poses except those of one location, and this evidence.
   double strongestCell(int& bin, int& beam, const std::string& without = "") const {
     Eigen::ArrayXXf sum;
     for (const PoseMotion& p : poses_) {
@@ -172,7 +172,7 @@ class Search {
     return sum.size() > 0 ? sum.maxCoeff(&bin, &beam) : 0;
   }
 
-  /// Finding of a tone of the radar's own in a cell.
+  /// Finding of a tone of the radar in a cell.
   FrameFinding bodyFixed(int bin, int beam, double evidence) const {
     FrameFinding finding;
     finding.cause = "unknown";
@@ -202,7 +202,7 @@ class Search {
     return finding;
   }
 
-  /// Tone of the radar's own about a range bin: medians of the echoes there; its level is over one ADC count.
+  /// Tone of the radar about a range bin, from medians of the echoes there. Its level is relative to one ADC count.
   NamedParameters toneIn(int bin) const {
     std::vector<double> range_m, sine, power;
     const std::vector<double> window = hannWindow(radar_.samples_per_chirp);
@@ -225,7 +225,7 @@ class Search {
     return tone;
   }
 
-  /// Takes the evidence and echoes of a span of ranges out of a pose.
+  /// Removes the evidence and echoes of an interval of ranges from a pose.
   void clear(PoseMotion& pose, double range_m, double half_m) const {
     const int low = std::max(0, static_cast<int>(std::floor((range_m - half_m) / radar_.range_bin_m())));
     const int high = std::min(static_cast<int>(pose.evidence.rows()) - 1,
@@ -246,7 +246,7 @@ class Search {
     Eigen::Vector2d place;  ///< in the map
   };
 
-  /// Sightings of one walker each: near its strongest one, and to one sense of motion at a pose. Strongest first.
+  /// Sightings by walker: near its strongest sighting, and with one sense of motion at a pose. Strongest first.
   std::vector<std::vector<Sighting>> sightingsOfWalkers() const {
     std::vector<Sighting> sightings;
     for (std::size_t i = 0; i < poses_.size(); ++i) {
@@ -271,7 +271,7 @@ class Search {
     return walkers;
   }
 
-  /// Walkers whose speed the frames tell by Doppler: one per place, and per sense of motion at a pose.
+  /// Walkers whose speed the frames show by Doppler: one per place and, at one pose, per sense of motion.
   LocatedMotion dopplerWalkers() const {
     LocatedMotion motion;
     for (const auto& walker : sightingsOfWalkers()) motion.walkers.push_back(dopplerWalker(walker));
@@ -331,7 +331,7 @@ class Search {
     return finding;
   }
 
-  /// Places of a walker, frame by frame, seen from one pose.
+  /// Positions of a walker, frame by frame, seen from one pose.
   struct Track {
     std::size_t pose = 0;
     std::vector<int> frame;
@@ -361,7 +361,7 @@ class Search {
     return track;
   }
 
-  /// Middle of a walk: the mean of each pose's track, weighed by how well the pose can know it.
+  /// Centre of a walk: the mean of each pose's track, weighted by the accuracy of the pose's view.
   Eigen::Vector2d middle(std::vector<Track>& tracks, Eigen::Matrix2d& covariance) const {
     Eigen::Matrix2d total = Eigen::Matrix2d::Zero();
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
@@ -369,7 +369,7 @@ class Search {
       const Eigen::Vector2d ray = track.mean - views_[track.pose].position();
       const double r = std::max(ray.norm(), 0.1);
       const Eigen::Vector2d along = ray / r, across(-along.y(), along.x());
-      // A few seconds see a part of a walk of some decimetres.
+      // A few seconds show only a part of a walk, of some decimetres.
       const double part_m = 0.2 / std::sqrt(std::max(1.0, track.places.size() / 20.0));
       const double range_m = std::hypot(part_m, 0.05), cross_m = std::hypot(part_m, kAngleError_rad * r);
       track.information =
@@ -397,10 +397,10 @@ class Search {
     double value = 0, low = 0, high = 0;
   };
 
-  /// Squared speed of bodies that turn back every straight_s. The mean square of the way between two frames, a time t
-  /// apart, is v^2 t^2 (1 - 2/3 t / straight_s): a share t / straight_s of the ways has a turn in it, and its mean
-  /// square is a third of v^2 t^2. Errors of single places add a constant to each track. `misfit` is that of the mean
-  /// over tracks, by which values of straight_s compare.
+  /// Squared speed of bodies that turn back every straight_s. The mean square displacement between two frames, a time t
+  /// apart, is v^2 t^2 (1 - 2/3 t / straight_s): a share t / straight_s of the displacements contains a turn, and their
+  /// mean square is a third of v^2 t^2. Errors of single positions add a constant to each track. misfit: that of the
+  /// mean over tracks, by which values of straight_s are compared.
   double speed2(const std::vector<const Track*>& tracks, double straight_s, double& misfit) const {
     constexpr int kLags = 8;
     double counts[kLags] = {}, means[kLags] = {}, grows[kLags];
@@ -448,7 +448,7 @@ class Search {
     return std::max(0.0, all_slope / all_weight);
   }
 
-  /// Speed for the time between two turns that leaves the least misfit.
+  /// Speed for the time between two turns of least misfit.
   double speedOf(const std::vector<const Track*>& tracks) const {
     double least = std::numeric_limits<double>::infinity(), best = 0;
     for (double straight_s : {100.0, 2.0, 1.4, 1.0, 0.8, 0.7, 0.65, 0.6, 0.55, 0.5, 0.45}) {
@@ -466,7 +466,7 @@ class Search {
     for (const Track& t : tracks) all.push_back(&t);
     Speed speed;
     speed.value = speedOf(all);
-    // One or two poses know a speed to a factor of two.
+    // One or two poses determine a speed to a factor of two.
     double variance = 0;
     for (std::size_t i = 0; all.size() > 2 && i < all.size(); ++i) {
       std::vector<const Track*> rest = all;
@@ -481,7 +481,7 @@ class Search {
     return speed;
   }
 
-  /// Centre of a walk that begins about a place, with its covariance, and the tracks that tell it.
+  /// Centre of a walk that begins about a place, with its covariance, and the tracks that determine it.
   struct Walk {
     Eigen::Vector2d center;
     Eigen::Matrix2d covariance;
@@ -506,7 +506,7 @@ class Search {
     return walk;
   }
 
-  /// Finding of a walker at a place, whose evidence is taken out of all poses.
+  /// Finding of a walker at a place, whose evidence is removed from all poses.
   FrameFinding walker(const Place& found, double false_alarm_rate) {
     FrameFinding finding;
     finding.cause = "moving_target";
@@ -526,7 +526,7 @@ class Search {
       const Eigen::Vector3d d =
           pose.pose.T_map_radar.linear().transpose() *
           Eigen::Vector3d(center.x() - views_[i].position().x(), center.y() - views_[i].position().y(), 0);
-      // The walk's middle may be behind the radar and one of its ends before it.
+      // The walk's centre may be behind the radar and one of its ends before it.
       if (pose.evidence.size() == 0 || d.x() < -kReach_m || d.norm() > radar_.max_range_m()) continue;
       const double range_m = (views_[i].position() - center).norm();
       const float peak = peakAbout(pose, d.norm());
@@ -553,7 +553,7 @@ class Search {
     return finding;
   }
 
-  /// Most evidence of a pose within reach of a range, over all angles.
+  /// Highest evidence of a pose near a range, over all angles.
   float peakAbout(const PoseMotion& p, double range_m) const {
     const int bin = static_cast<int>(std::lround(range_m / radar_.range_bin_m()));
     const int around = static_cast<int>(std::ceil(kReach_m / radar_.range_bin_m()));

@@ -12,15 +12,15 @@ namespace {
 
 constexpr std::size_t kPacketValues = kPacketBytes / 2;
 
-constexpr int kMostPackets = 4;                 ///< lost in a row, that a slip is searched for
-constexpr double kRoundingVariance = 1.0 / 12;  ///< of a value, that rounding alone leaves
+constexpr int kMostPackets = 4;                 ///< packets lost in a row of a slip that is searched for
+constexpr double kRoundingVariance = 1.0 / 12;  ///< of a value, by rounding alone
 
 struct Run {
   std::size_t begin, end;
 };
 
-/// Runs of zeros that are at least as long as a packet, or, at the end of the recording, whose last packet is short, as
-/// a sixteenth of one. Values that are not to be used and missing frames end a run.
+/// Runs of zeros that are at least as long as a packet. At the end of the recording, whose last packet is short, a
+/// sixteenth of one is enough. Unusable values and missing frames end a run.
 std::vector<Run> zeroRuns(const Payload& payload, const std::vector<int>& order) {
   std::vector<Run> runs;
   std::size_t begin = 0;
@@ -49,7 +49,7 @@ std::vector<Run> zeroRuns(const Payload& payload, const std::vector<int>& order)
   return runs;
 }
 
-/// Position of a value within its packet, where packets are counted from arming.
+/// Position of a value within its packet; packets are counted from arming.
 std::size_t packetPhase(const Payload& p, std::size_t place) {
   const std::size_t frame = place / p.frame_values;
   return (p.sequence[frame] % kPacketValues * (p.frame_values % kPacketValues) + place % p.frame_values) %
@@ -61,7 +61,7 @@ std::size_t firstPacket(const Payload& p, std::size_t begin, std::size_t phase) 
   return begin + (phase + kPacketValues - packetPhase(p, begin)) % kPacketValues;
 }
 
-/// Squared changes of frames against the frame before.
+/// Squared changes of frames relative to the previous frame.
 struct FrameChanges {
   std::vector<double> square;  ///< [frame], 0 for the first one
   double power = 0;            ///< of a frame, mean over all but the first
@@ -85,15 +85,14 @@ FrameChanges changesOfFrames(const Payload& payload) {
   return changes;
 }
 
-/// Numbers of the frames that differ from the one before by far more than frames usually do. `least` is the smallest
-/// change that a slip makes. Empty where frames change by as much all the time.
+/// Numbers of the frames that differ from the previous one by far more than frames usually do. least: smallest change
+/// that a slip causes. Empty where frames always change as much.
 std::vector<int> jumpingFrames(const FrameChanges& changes, double least) {
   const int frames = static_cast<int>(changes.square.size());
   std::vector<double> sorted(changes.square.begin() + 1, changes.square.end());
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<long>(sorted.size() / 2), sorted.end());
   const double usual = sorted[sorted.size() / 2];
-  // A tone that turns from frame to frame changes all frames, and some other order of samples explains any of these
-  // changes.
+  // A tone that turns from frame to frame changes all frames, and some shift of samples explains any of these changes.
   if (frames > 3 && usual > least) return {};
   std::vector<int> jumps;
   for (int f = 1; f < frames; ++f) {
@@ -103,13 +102,13 @@ std::vector<int> jumpingFrames(const FrameChanges& changes, double least) {
   return jumps;
 }
 
-/// Mean of the frames of one stretch, and the variance of a value about it.
+/// Mean of the frames of one interval, and the variance of a value about it.
 struct FrameTemplate {
   std::vector<double> mean;  ///< [position]
   double variance = 0;
 };
 
-/// Template from the longest stretch of frames without a jump; empty where a position has no value to use in it.
+/// Template from the longest sequence of frames without a jump; empty where a position has no usable value in it.
 std::optional<FrameTemplate> longestStretch(const Payload& payload, std::vector<int> jumps) {
   int first = 0, last = 0;
   jumps.push_back(payload.frames);
@@ -141,7 +140,7 @@ std::optional<FrameTemplate> longestStretch(const Payload& payload, std::vector<
   return FrameTemplate{std::move(sum), std::max(freedom > 0 ? residual / freedom : 0.0, kRoundingVariance)};
 }
 
-/// Blocks of the stream between packet boundaries, and how badly each fits a template.
+/// Blocks of the stream between packet boundaries, and the misfit of each to a template.
 class PacketBlocks {
  public:
   explicit PacketBlocks(const Payload& p)
@@ -151,7 +150,7 @@ class PacketBlocks {
   std::size_t count() const { return count_; }
   /// First value of a block, counted from 1.
   std::size_t position(std::size_t block) const { return origin_ + (block - 1) * kPacketValues; }
-  /// Squared misfit to a template that stands `packets` later, summed over all blocks before each: [count + 1].
+  /// Squared misfit to a template shifted `packets` later, summed over all blocks before each: [count + 1].
   std::vector<double> misfit(const FrameTemplate& frame, long packets) const {
     std::vector<double> sum(count_ + 1, 0);
     const long values = static_cast<long>(payload_.frame_values);
@@ -165,7 +164,7 @@ class PacketBlocks {
     std::partial_sum(sum.begin(), sum.end(), sum.begin());
     return sum;
   }
-  /// Number of values in use in all blocks before each: [count + 1].
+  /// Number of usable values in all blocks before each: [count + 1].
   std::vector<double> used() const {
     std::vector<double> sum(count_ + 1, 0);
     for (std::size_t i = 0; i < payload_.value.size(); ++i) {
@@ -188,7 +187,7 @@ class PacketBlocks {
 std::vector<int> payloadOrder(const RadarConfig& radar) {
   const std::size_t cube =
       static_cast<std::size_t>(radar.chirps_per_frame()) * radar.samples_per_chirp * radar.receivers() * 2;
-  // The encoder moves the number of every place, seven bits at a time, with a bit that tells it from filling.
+  // The encoder maps the index of every value, seven bits at a time, with one bit that marks it as a value.
   std::vector<int> order(radar.bytes_per_frame() / 2, 0);
   std::vector<std::int16_t> digits(cube);
   for (int shift = 0; shift < 28; shift += 7) {
@@ -229,7 +228,7 @@ ZeroedPackets markZeroedPackets(Payload& payload, const std::vector<int>& order)
   const std::vector<Run> runs = zeroRuns(payload, order);
   if (runs.empty()) return found;
 
-  // Share of zeros outside of these runs, at each position of a frame and at all together.
+  // Share of zeros outside these runs, at each position of a frame and overall.
   std::vector<std::uint8_t> in_run(payload.value.size(), 0);
   for (const Run& r : runs) std::fill(&in_run[r.begin], &in_run[0] + r.end, std::uint8_t{1});
   std::vector<int> zeros(payload.frame_values, 0), counted(payload.frame_values, 0);
@@ -257,7 +256,7 @@ ZeroedPackets markZeroedPackets(Payload& payload, const std::vector<int>& order)
     lost.push_back(r);
     gains.push_back(gain);
   }
-  // Packets are counted from arming. A bag may have begun later: then the runs themselves say where packets start.
+  // Packets are counted from arming. A bag may have begun later: the runs themselves then show where packets start.
   const auto packetsAt = [&](std::size_t phase) {
     long long packets = 0;
     for (const Run& r : lost) {
@@ -305,7 +304,7 @@ std::optional<Slip> findSlip(const Payload& payload) {
     for (const bool template_after : {false, true}) {
       const std::vector<double> shifted = blocks.misfit(*frame, template_after ? -packets : packets);
       for (std::size_t b = 1; b < end; ++b) {
-        // Blocks before b stand in place, those from b on have slipped.
+        // Blocks before b are in place, those from b on are shifted.
         const double fit = template_after ? shifted[b] : shifted[end] - shifted[b];
         const double was = template_after ? still[b] : still[end] - still[b];
         const double noise = frame->variance * (template_after ? used[b] : used[end] - used[b]);
@@ -315,7 +314,7 @@ std::optional<Slip> findSlip(const Payload& payload) {
       }
     }
   }
-  // Every boundary and number of packets was a try, each with a sign.
+  // Every boundary and number of packets was tried, with either sign.
   const double tries =
       std::log(2.0 * kMostPackets * static_cast<double>(end)) + std::log(1 / bounds::kFramesFalseAlarmRate);
   if (!best || best->log_likelihood_gain <= tries) return std::nullopt;

@@ -15,12 +15,12 @@ namespace {
 
 using Complex = std::complex<float>;
 
-constexpr int kLeastLoops = 16;             ///< that make a Doppler spectrum: standing echoes take three of its bins
-constexpr std::size_t kEchoesPerFrame = 3;  ///< moving ones, the strongest, that are kept
+constexpr int kLeastLoops = 16;             ///< loops of a Doppler spectrum: static echoes fill three of its bins
+constexpr std::size_t kEchoesPerFrame = 3;  ///< moving echoes that are kept, the strongest
 constexpr double kLimb_m = 0.75;            ///< between parts of a body
-constexpr double kGhostBefore_m = 1;        ///< by which an echo by way of a wall may seem nearer than its body
-constexpr double kAlike = 2;  ///< frames for which a body's echo is alike, by which its average scatters more
-constexpr int kSkirtBins = 8, kPeakBins = 2;  ///< about a cell, beyond and within: its surroundings
+constexpr double kGhostBefore_m = 1;        ///< distance by which an echo over a wall may seem nearer than its body
+constexpr double kAlike = 2;  ///< frames over which a body's echo is correlated, by which its average scatters more
+constexpr int kSkirtBins = 8, kPeakBins = 2;  ///< distance from a cell that bounds its surroundings outside and inside
 
 template <typename T>
 T medianOf(std::vector<T> values) {
@@ -41,7 +41,7 @@ double weightedMedian(std::vector<std::pair<double, double>>& values) {
   return values.empty() ? 0 : values.back().first;
 }
 
-/// Standard error of a median, from the scatter of the values about it: normal but for outliers.
+/// Standard error of a median, from the scatter of the values about it: normal except for outliers.
 template <typename T>
 double errorOfMedian(std::vector<T> values, double median) {
   for (T& v : values) v = std::abs(v - median);
@@ -53,23 +53,22 @@ Eigen::FFT<float>& fft() {
   return fft;
 }
 
-/// Time from one chirp's start to the next: as radar.yaml says, else as short as its samples allow.
+/// Time from one chirp's start to the next: as radar.yaml states, else the shortest that its samples allow.
 double chirpPeriod_s(const RadarConfig& radar) {
   const double sampled_s = radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
   return (std::isfinite(radar.ramp_end_s) ? radar.ramp_end_s : sampled_s) +
          (std::isfinite(radar.idle_s) ? radar.idle_s : 0);
 }
 
-/// Offset of a peak from the middle one of three levels, by a parabola through their logarithms; at most 1/2 either
-/// way.
+/// Offset of a peak from the middle of three levels, by a parabola through their logarithms; at most 1/2 in magnitude.
 double peakOffset(double left, double middle, double right) {
   if (!(left > 0 && middle > 0 && right > 0)) return 0;
   const double l = std::log(left), m = std::log(middle), r = std::log(right), curve = l - 2 * m + r;
   return curve < 0 ? std::clamp(0.5 * (l - r) / curve, -0.5, 0.5) : 0;
 }
 
-/// Bodies among the echoes of one frame: arms and legs join the body that they are near and move along with, and echoes
-/// by way of a wall are left out.
+/// Bodies among the echoes of one frame. Arms and legs join the body that they are near and move with. Echoes over a
+/// wall are left out.
 std::vector<MovingEcho> bodiesOf(std::vector<MovingEcho> echoes) {
   struct Body {
     MovingEcho echo;
@@ -106,13 +105,13 @@ std::vector<MovingEcho> bodiesOf(std::vector<MovingEcho> echoes) {
 
 }  // namespace
 
-/// Range spectra of the residuals of those shots that are nearly whole.
+/// Range spectra of the residuals of shots that are nearly complete.
 struct ShotExaminer::Spectra {
   int channels = 0, bins = 0;
-  std::vector<int> shot;                   ///< numbers of the shots
-  std::vector<Complex> residual;           ///< [shot][bin][channel]; over the noise once readNoise() knows it
-  std::vector<Complex> average;            ///< [bin][channel]; over the noise likewise
-  std::vector<std::complex<double>> gain;  ///< [shot] common to all cells, taken out of the residuals
+  std::vector<int> shot;                   ///< indices of the shots
+  std::vector<Complex> residual;           ///< [shot][bin][channel]; in units of the noise after readNoise()
+  std::vector<Complex> average;            ///< [bin][channel]; likewise in units of the noise
+  std::vector<std::complex<double>> gain;  ///< [shot] common to all cells, removed from the residuals
   int per_frame = 1;                       ///< shots
   const Complex* at(std::size_t i, int bin) const {
     return &residual[(i * static_cast<std::size_t>(bins) + static_cast<std::size_t>(bin)) *
@@ -121,12 +120,12 @@ struct ShotExaminer::Spectra {
   Complex* at(std::size_t i, int bin) { return const_cast<Complex*>(std::as_const(*this).at(i, bin)); }
 };
 
-/// Cell of range and Doppler; `turns` are those of the phase over a frame, with their sign.
+/// Cell of range and Doppler; `turns` are those of the phase over a frame, signed.
 struct ShotExaminer::DopplerCell {
   int bin = 0, doppler = 0, turns = 0;
 };
 
-/// Doppler spectra of one frame's loops: by Hann's window, of unit noise.
+/// Doppler spectra of one frame's loops, with Hann's window and unit noise.
 class ShotExaminer::DopplerFrame {
  public:
   DopplerFrame(int channels, int bins, int loops)
@@ -148,7 +147,7 @@ class ShotExaminer::DopplerFrame {
     return Eigen::Map<const Eigen::VectorXcf>(&spectra_[static_cast<std::size_t>((doppler * bins_ + bin) * channels_)],
                                               channels_);
   }
-  /// Takes the shots from begin to end, all of one frame; loops without a shot count as zero.
+  /// Transforms the shots from begin to end, all of one frame. Loops without a shot count as zero.
   void transform(const Spectra& s, std::size_t begin, std::size_t end) {
     std::vector<Complex> in(static_cast<std::size_t>(loops_)), out(in);
     for (int b = 0; b < bins_; ++b) {
@@ -166,13 +165,13 @@ class ShotExaminer::DopplerFrame {
       for (int d = 0; d < loops_; ++d) power_(b, d) = cell(b, d).squaredNorm();
     }
   }
-  /// Cells that stand out of the noise and above their neighbours, by range and Doppler.
+  /// Cells of range and Doppler that exceed the noise and their neighbours.
   std::vector<DopplerCell> movingPeaks() const {
     std::vector<DopplerCell> peaks;
     for (int b = 1; b + 1 < bins_; ++b) {
       for (int d = 0; d < loops_; ++d) {
         const int turns = d < (loops_ + 1) / 2 ? d : d - loops_;
-        // Standing echoes leak into two turns per frame by the window, and flicker there.
+        // Static echoes leak into two turns per frame through the window, and flicker there.
         if (std::abs(turns) <= 2 || power_(b, d) < least_) continue;
         bool highest = true;
         for (int i = -1; i <= 1; ++i) {
@@ -260,7 +259,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
   const auto bins = static_cast<std::size_t>(stack.samples);
   std::vector<std::vector<std::complex<double>>> steps(bins);  // unit phasors from frame to frame
   std::vector<Complex> in(bins), before(bins), now(bins);
-  // One receiver of each slot tells enough of strong echoes.
+  // One receiver of each slot is enough for strong echoes.
   for (int k = 0; k < stack.channels(); k += stack.receivers) {
     int last = -2;
     for (int f = 0; f < stack.frames; ++f) {
@@ -279,7 +278,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
       last = f;
     }
   }
-  // The median of angles about their middle: a burst spoils two steps, which the median leaves out.
+  // The median of angles about their mean direction leaves out the two steps that a burst spoils.
   struct Turn {
     double rad, error_rad;
   };
@@ -293,7 +292,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
   std::vector<Turn> of_bins;
   std::vector<std::complex<double>> each;
   for (const auto& of_bin : steps) {
-    // Half of the steps may turn anyhow. Forty steps of noise add up to a sixth of their number.
+    // Half of the steps may have any phase. Forty steps of noise sum to a sixth of their number.
     const std::complex<double> sum = std::accumulate(of_bin.begin(), of_bin.end(), std::complex<double>(0));
     if (!(std::abs(sum) > 0.5 * static_cast<double>(of_bin.size()))) continue;
     of_bins.push_back(middle(of_bin));
@@ -301,7 +300,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
   }
   if (of_bins.empty()) return 0;
   const Turn common = middle(each);
-  // Most of these bins are weak. Bins count by their own errors, but for those that turn by themselves.
+  // Most of these bins are weak. Bins are weighted by their errors, except for those that turn by themselves.
   std::vector<std::pair<double, double>> weighed;
   for (const Turn& t : of_bins) {
     const double apart = std::remainder(t.rad - common.rad, 2 * M_PI);
@@ -317,7 +316,7 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& spectra, Sho
   result.frame_level.assign(static_cast<std::size_t>(stack.frames), 1);
   const double freedom = static_cast<double>(spectra.shot.size()) - 1;
   if (freedom < 1) return;
-  // The common gain is the weighted median over range bins: movers are in few of them.
+  // The common gain is the weighted median over range bins: moving echoes fill few of them.
   struct Cell {
     int bin;
     double power;
@@ -343,7 +342,7 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& spectra, Sho
     }
     return beyond;
   };
-  // Cells that vary by less than a tenth of themselves beside the common gain.
+  // Cells that vary by less than a tenth apart from the common gain.
   const auto steady = [&](const std::vector<std::complex<double>>& beyond) {
     std::vector<Cell> cells;
     for (int b = 0; b < spectra.bins; ++b) {
@@ -357,7 +356,7 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& spectra, Sho
     return cells;
   };
   std::vector<Cell> cells = steady(std::vector<std::complex<double>>(spectra.shot.size(), 0.0)), all;
-  // A gain that changes by more than a tenth lets cells be steady only beside it.
+  // Where the gain changes by more than a tenth, cells are steady only relative to it.
   for (int b = 0; b < spectra.bins; ++b) {
     if (still(b).squaredNorm() > 0) all.push_back({b, still(b).squaredNorm()});
   }
@@ -387,7 +386,7 @@ void ShotExaminer::readSteadiness(const Spectra& spectra, ShotStatistics& result
                         &spectra.average[bin * static_cast<std::size_t>(spectra.channels)], spectra.channels)
                         .squaredNorm();
   }
-  // Noise fills all bins alike: the steadiest bins hold nothing else.
+  // Noise fills all bins alike: the steadiest bins hold only noise.
   std::vector<double> sorted = varied;
   std::sort(sorted.begin(), sorted.end());
   const double noise = sorted[sorted.size() / 10];
@@ -410,8 +409,9 @@ void ShotExaminer::readNoise(Spectra& spectra, ShotStatistics& result) const {
   double window_power = 0;
   for (float w : window_) window_power += w * w;
   const double freedom = static_cast<double>(spectra.shot.size()) - 1;
-  // Movers fill few range bins, noise fills all of them alike: the median over bins tells the noise. It is of sums that
-  // are Gamma distributed with the number of shots (Wilson and Hilferty: median = mean (1 - 1/(9 n))^3).
+  // Moving echoes fill few range bins, noise fills all of them alike: the median over bins gives the noise. It is a
+  // median of sums that follow a Gamma distribution with the number of shots (Wilson and Hilferty: median = mean (1 -
+  // 1/(9 n))^3).
   const double median_of_mean = std::pow(1 - 1 / (9 * std::max(freedom, 1.0)), 3);
   result.noise_variance.assign(static_cast<std::size_t>(spectra.channels), 1.0 / 6);
   if (freedom < 1) return;
@@ -432,7 +432,7 @@ void ShotExaminer::readNoise(Spectra& spectra, ShotStatistics& result) const {
 void ShotExaminer::readUnsteadiness(const Spectra& spectra, ShotStatistics& result) const {
   const double values = static_cast<double>(spectra.shot.size()) * spectra.channels,
                freedom = values - spectra.channels;
-  // A radar that itself changes does so in all its echoes, which still are to be explained.
+  // A changing radar changes all its echoes, which remain to be explained.
   if (freedom < 1 || result.unsteady_share > bounds::kLeastUnsteadyShare) return;
   for (int b = 0; b < spectra.bins; ++b) {
     double power = 0;
@@ -460,8 +460,8 @@ void ShotExaminer::readEvidence(const Spectra& spectra, ShotStatistics& result) 
     c /= static_cast<float>(freedom);
     const Eigen::Map<const Eigen::VectorXcf> still(&spectra.average[static_cast<std::size_t>(b * spectra.channels)],
                                                    spectra.channels);
-    // Flicker of a standing echo (phase noise, gain) has the echo's channel vector and some permille of its power. That
-    // direction is left out where so little varies; a body that stands and breathes varies by more.
+    // Flicker of a static echo (phase noise, gain) has the echo's channel vector and some permille of its power. That
+    // direction is left out where it varies by so little; a body that stands and breathes varies by more.
     const float standing = still.squaredNorm();
     Eigen::MatrixXcf beams = beams_;
     if (c.trace().real() < 0.01f * standing) {
@@ -474,7 +474,7 @@ void ShotExaminer::readEvidence(const Spectra& spectra, ShotStatistics& result) 
           size > 0.2f * static_cast<float>(spectra.channels) ? beams.col(a).dot(varied.col(a)).real() / size : 1.0f;
     }
   }
-  // Skirts of strong echoes reach over many bins. A mover stands out of its surroundings in range, too.
+  // Skirts of strong echoes reach over many bins. A moving echo also exceeds its surroundings in range.
   std::vector<float> around;
   for (int a = 0; a < kAngleBins; ++a) {
     for (int b = 0; b < spectra.bins; ++b) {
@@ -490,7 +490,7 @@ void ShotExaminer::readEvidence(const Spectra& spectra, ShotStatistics& result) 
 }
 
 void ShotExaminer::readEchoes(const Spectra& spectra, ShotStatistics& result) const {
-  // A bin holds M times the noise over all channels.
+  // A bin holds M times the noise, over all channels.
   const auto least = static_cast<float>(
       boost::math::gamma_q_inv(static_cast<double>(spectra.channels), bounds::kMovingBinFalseAlarmRate));
   std::vector<float> power(static_cast<std::size_t>(spectra.bins));
@@ -533,14 +533,14 @@ void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& spectra, Sho
   double spread = 0;
   for (double f : frame) spread += (f - mean_frame) * (f - mean_frame);
   if (!(spread > 0)) return;
-  // The turn is the mean slope of phases over every second bin (a Hann window ties neighbours together), weighed by
-  // each bin's own scatter: a bin in which something moves counts for little.
+  // The phase drift is the mean slope of phases over every second bin (a Hann window correlates neighbours), weighted
+  // by each bin's own scatter: a bin with motion has little weight.
   double weights = 0, weighted = 0, squares = 0, moments = 0;
   for (int b = 0; b < spectra.bins; b += 2) {
     const Eigen::Map<const Eigen::VectorXcf> still(&spectra.average[static_cast<std::size_t>(b * spectra.channels)],
                                                    spectra.channels);
     const double power = still.squaredNorm();
-    // The average carries noise of channels/shots.
+    // The average has noise of channels/shots.
     if (power < 10 * spectra.channels / shots || power < 10) continue;
     std::vector<double> phase;
     double mean = 0, slope = 0;
@@ -564,7 +564,7 @@ void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& spectra, Sho
   }
   if (result.turn_cells == 0) return;
   result.turn_rad_per_frame = weighted / weights;
-  // Cells that disagree beyond their scatter widen the error (Birge).
+  // Cells that disagree beyond their scatter increase the error (Birge).
   const double chi2 = moments - weighted * weighted / weights;
   const double ratio = result.turn_cells > 1 ? std::max(1.0, chi2 / (result.turn_cells - 1)) : 1.0;
   result.turn_variance = ratio / weights;
@@ -632,7 +632,7 @@ MovingCell ShotExaminer::movingCell(const DopplerFrame& frame, const DopplerCell
 std::optional<MovingEcho> ShotExaminer::dopplerEcho(const DopplerFrame& frame, const DopplerCell& peak) const {
   const int loops = frame.loops(), channels = radar_.channels(), b = peak.bin, d = peak.doppler;
   Eigen::VectorXcf v = frame.cell(b, d);
-  // Later slots see a mover further on its way.
+  // Later slots see a moving echo further on its way.
   for (int k = 0; k < channels; ++k) {
     const int slot = k / radar_.receivers();
     v[k] *= Complex(std::polar(1.0, -2 * M_PI * peak.turns * slot / (loops * radar_.slots())));
