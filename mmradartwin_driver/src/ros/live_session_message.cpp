@@ -22,7 +22,7 @@ std::string trimmed(const std::string& text) {
   return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
 }
 
-/// The rows of the poses played, in the order of `poses`, with their new stamps; other columns stay as they are.
+/// Rows of the played poses, in the order of `poses`, with their new stamps; other columns are unchanged.
 std::string restamp(const std::string& csv, const std::vector<LivePose>& poses) {
   std::istringstream in(csv);
   std::string header;
