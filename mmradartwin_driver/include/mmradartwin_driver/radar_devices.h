@@ -7,10 +7,10 @@
 
 namespace mmradartwin {
 
-/// Makes a device known, for the rest of the process. Throws InputError where its name is taken.
+/// Registers a device for the rest of the process. Throws InputError where its name is taken.
 void registerRadarDevice(const RadarDevice& device);
 
-/// The device that `radar` names. Throws InputError naming `file`, the key, its value and the known devices.
+/// Device that `radar` names. Throws InputError naming `file`, the key, its value and the known devices.
 RadarDevice radarDevice(const RadarConfig& radar, const std::string& file);
 
 }  // namespace mmradartwin

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The rows of the poses played, in the order of `poses`, with their new stamps; other columns stay as they are.
+/// Rows of the played poses, in the order of `poses`, with their new stamps; other columns are unchanged.
 std::string restamp(const StoredFile& csv, const std::vector<LivePose>& poses) {
   CsvReader reader(csv.bytes, csv.name);
   const std::vector<std::string>& columns = reader.columns();

@@ -48,7 +48,7 @@ double HypothesisFit::moved_m() const {
 
 bool HypothesisFit::isFarAway() const {
   return moved_m() > stated.farAway_m() &&
-         (plain || gain_without_best_place / overdispersion > bounds::kLeastNatsOfFarAway);
+         (overwhelming || gain_without_best_place / overdispersion > bounds::kLeastNatsOfFarAway);
 }
 
 double HypothesisFit::size_m() const {

@@ -6,7 +6,7 @@
 
 namespace mmradartwin::diagnosis::frames {
 
-/// Echo that moves, as one cell of range and Doppler of a frame with many loops.
+/// Moving echo: one cell of range and Doppler of a frame with many loops.
 struct MovingCell {
   int bin = 0;                ///< range bin
   double turn_rad = 0;        ///< phase from one transmitter's slot to the next
