@@ -13,7 +13,7 @@
 namespace mmradartwin {
 namespace {
 
-/// A hole that is longer is not filled with zeros: a damaged count must not fill the disk.
+/// Longest hole that is filled with zeros: a damaged count must not fill the disk.
 constexpr std::uint64_t kLongestHole_bytes = 64u << 20;
 
 class CaptureOutput {
@@ -24,12 +24,12 @@ class CaptureOutput {
       throw InputError(file + ": cannot be written (" + std::strerror(errno) + "); give a file in another folder");
     }
   }
-  /// The frame before is written now that it is known not to be the last one.
+  /// The previous frame is written once it is known not to be the last one.
   void take(AdcCube&& cube) {
     settle(false);
     if (new_recording_) {
       result.recordings.push_back(result.frames);
-      // Without its start in the file, nothing says that the frames before the first packet were lost.
+      // Without the recording's start in the file, the frames before the first packet are not known to be lost.
       const bool under_way = result.recordings.size() == 1 && !start_seen_;
       if (under_way) result.before_file = cube.sequence;
       expected_ = under_way ? cube.sequence : 0;
@@ -45,7 +45,7 @@ class CaptureOutput {
     held_ = std::move(cube);
   }
   void seeStart() { start_seen_ = true; }
-  /// What came so far belongs to a recording that has ended.
+  /// Ends the recording to which everything so far belongs.
   void endRecording() {
     settle(true);
     new_recording_ = true;
@@ -63,7 +63,7 @@ class CaptureOutput {
     if (!held_) return;
     const AdcCube cube = std::move(*held_);
     held_.reset();
-    // A recording ends within a frame wherever it was stopped: that frame has no more to come.
+    // A recording may be stopped within a frame, whose rest then never arrives.
     if (last && !cube.chirp_valid.back()) {
       result.cut_off.push_back(radar_.bytes_per_frame() - cube.lost_bytes);
       return;
@@ -78,7 +78,7 @@ class CaptureOutput {
     }
     write(encodeFrame(radar_, cube.data));
   }
-  /// A frame of zeros, which the file system need not store.
+  /// Appends a frame of zeros, which the file system need not store.
   void leaveOut() {
     CaptureFlaw flaw{result.frames, radar_.bytes_per_frame(), {}};
     for (int chirp = 0; chirp < radar_.chirps_per_frame(); ++chirp) flaw.chirps.push_back(chirp);
@@ -107,7 +107,7 @@ PcapCapture pcapToCapture(const std::string& pcap, const RadarConfig& radar, con
   std::uint64_t epochs = 1;
   FrameAssembler* counted = nullptr;
   FrameAssembler assembler(radar, [&](AdcCube&& cube) {
-    // The count began anew without a command in the file.
+    // The count restarted without a command in the file.
     if (counted->counters().epochs != epochs) {
       epochs = counted->counters().epochs;
       out.endRecording();

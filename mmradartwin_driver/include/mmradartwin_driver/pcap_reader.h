@@ -8,7 +8,7 @@
 
 namespace mmradartwin {
 
-/// A packet capture (pcap or pcapng; Ethernet, Linux "any" or raw IP) of a DCA1000's traffic.
+/// Ports of a DCA1000's traffic in a packet capture (pcap or pcapng; Ethernet, Linux "any" or raw IP).
 struct PcapPorts {
   std::uint16_t config = kDca1000ConfigPort;
   std::uint16_t data = kDca1000DataPort;
@@ -23,8 +23,8 @@ struct PcapCounters {
   std::uint64_t replies = 0;
   std::uint64_t other = 0;  ///< not UDP over IPv4 to one of the two ports, fragments, malformed
 };
-/// Reads the whole file in its order. Throws InputError: no such file, no capture, cut short (after visiting what is
-/// whole).
+/// Reads the whole file in order. Throws InputError: no such file, no packet capture, truncated file (after visiting
+/// all complete packets).
 PcapCounters readPcap(const std::string& file, const PcapVisitor& visitor, const PcapPorts& ports = {});
 
 }  // namespace mmradartwin
