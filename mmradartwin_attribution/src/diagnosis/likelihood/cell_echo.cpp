@@ -12,8 +12,8 @@ double ChannelLikelihood::floorOf(const PoseModel& model, int cell) const {
   const auto [at, share] = shapeAt(bin);
   const auto* shape = &latents.floor_shape[static_cast<std::size_t>(at)];
   const double level = std::exp(latents.log_floor + (1 - share) * shape[0] + share * shape[1]);
-  const double clutter = isBeam(cell) ? p.beams[static_cast<std::size_t>(cell - samples_)].clutter
-                                      : p.clutter.at(bin, size_)[0].real();
+  const double clutter =
+      isBeam(cell) ? p.beams[static_cast<std::size_t>(cell - samples_)].clutter : p.clutter.at(bin, size_)[0].real();
   return level * clutter + noiseOf(model.pose, cell);
 }
 

@@ -366,7 +366,8 @@ void ChannelLikelihood::addProducts(CellDirections& directions, BinBasis& basis,
     out.score[active[a]] += weight() * score[ia];
     for (std::size_t b = 0; b <= a; ++b) {
       const Eigen::Index ib = static_cast<Eigen::Index>(b);
-      const double v = weight() * tInformation(channels_, products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
+      const double v =
+          weight() * tInformation(channels_, products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
       out.information(active[a], active[b]) += v;
       if (a != b) out.information(active[b], active[a]) += v;
     }

@@ -23,7 +23,7 @@ struct EchoGroup {
     const std::complex<float>* shift;  ///< derivative of power by the one-way range, per metre
     /// W'^2 c c^H per m^2. Times the variance of a random one-way range it is the added covariance.
     const std::complex<float>* curvature;
-    double cosine;  ///< sum |W|^2 cos(azimuth) |c_0|^2, which a turn of the radar changes; 0 for beams
+    double cosine;   ///< sum |W|^2 cos(azimuth) |c_0|^2, which a turn of the radar changes; 0 for beams
     double mean;     ///< power, mean over the channels
     double squares;  ///< sum over paths of the square of each one's mean power
   };

@@ -7,10 +7,33 @@ namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
 constexpr double kUnknownShare = 0.05;  ///< of the echoes: their level is not the twin's
-constexpr double kMostShape = 1e5;      ///< a level known to 0.014 dB
+constexpr double kLeastSpread = 1e-5;   ///< a level known to 0.014 dB
 
-/// k log k - log Gamma(k), by Stirling's series; error below 1e-3 for k >= 1.
-double logShapeFactor(double k) { return k + 0.5 * std::log(k / (2 * M_PI)) - 1 / (12 * k) + 1 / (360 * k * k * k); }
+/// Square of the echo's share of a cell from which on the level of a path is log-normal, and up to which it is that of
+/// a sum of phasors; between them the law is a mixture.
+constexpr double kPhasors = 0.6, kLogNormal = 0.9;
+
+/// Law of x = |b|^2 / V: its log density, the slopes of that by the logarithms of V and of the spread, and the Fisher
+/// information about both.
+struct LevelLaw {
+  double log_density, by_level, by_spread, level_information, spread_information;
+};
+
+/// Gamma law of mean 1. k log k - log Gamma(k) is Stirling's series, with an error below 1e-3 for k >= 1.
+LevelLaw sumOfPhasors(double x, double squares, double spread) {
+  const double k = std::max(1.0, 1 / (1 - (1 - std::min(1.0, spread)) * squares)), log_x = std::log(x);
+  const double factor = k + 0.5 * std::log(k / (2 * M_PI)) - 1 / (12 * k) + 1 / (360 * k * k * k);
+  const double by_shape = 1 + 0.5 / k + 1 / (12 * k * k) + log_x - x;
+  const double shape = spread < 1 ? -k * k * squares * spread : 0;  // slope of k by the log spread
+  return {factor + (k - 1) * log_x - k * x, k * (x - 1), by_shape * shape, k, 0.5 * shape * shape / (k * k)};
+}
+
+/// Log-normal law about the echo's share; the rest of the cell widens it as it widens the modulus of a long phasor.
+LevelLaw logNormal(double x, double share, double spread) {
+  const double variance = spread + 2 * (1 - share) / share, off = std::log(x / share), part = spread / variance;
+  return {-std::log(x) - 0.5 * std::log(2 * M_PI * variance) - 0.5 * off * off / variance, off / variance,
+          0.5 * part * (off * off / variance - 1), 1 / variance, 0.5 * part * part};
+}
 
 /// Writes the Hermitian a b^H + b a^H (or a a^H where both are the same) times f, added to `to`.
 void addOuter(const std::complex<double>* a, const std::complex<double>* b, int channels, double f, double* to) {
@@ -33,7 +56,8 @@ CellLikelihood::CellLikelihood(const InverseFactor& factor, const std::complex<d
   const double freedom = channels_ + kTailFreedom;
   t_weight_ = freedom / (kTailFreedom + q);
   log_likelihood_ = -factor.logDeterminant() - freedom * std::log1p(q / kTailFreedom);
-  known_ = shape_ = x_ = echo_share_ = across_weight_ = 0;
+  known_ = by_level_ = level_information_ = echo_share_ = across_weight_ = 0;
+  along_.fill(0);
   std::copy(z, z + channels_, across_.begin());
   if (!(echo.power > 0)) return;
   factor.apply(echo.direction.data(), unit_.data());
@@ -48,24 +72,27 @@ CellLikelihood::CellLikelihood(const InverseFactor& factor, const std::complex<d
     along_[k] = unit_[k] * amplitude;
     across_[k] -= along_[k];
   }
-  x_ = std::norm(amplitude);
-  const double across = std::max(0.0, q - x_);
+  const double x = std::max(1e-30, std::norm(amplitude)), across = std::max(0.0, q - x);
   echo_share_ = std::min(1.0, echo.power * g);
   across_weight_ = (freedom - 1) / (kTailFreedom + across);
-  const double squares = echo_share_ * echo_share_, spread = std::min(1.0, echo.spread);
-  shape_ = std::clamp(1 / (1 - (1 - spread) * squares), 1.0, kMostShape);
-  const double usual = (1 - kUnknownShare) * squares;  // share of the known level
-  const double faded = std::log((freedom - 1) / (kTailFreedom + across)) -
-                       freedom * std::log1p(x_ / (kTailFreedom + across));
-  const double log_x = std::log(std::max(1e-300, x_));
-  const double ratio = usual * std::exp(logShapeFactor(shape_) + (shape_ - 1) * log_x - shape_ * x_ - faded);
-  const double both = 1 - usual + ratio;
+  const double squares = echo_share_ * echo_share_, spread = std::max(kLeastSpread, echo.spread);
+  const double usual = (1 - kUnknownShare) * squares;  // share of echoes with a known level
+  const double faded =
+      std::log((freedom - 1) / (kTailFreedom + across)) - freedom * std::log1p(x / (kTailFreedom + across));
+  const double normal = std::clamp((squares - kPhasors) / (kLogNormal - kPhasors), 0.0, 1.0);
+  const auto add = [&](double part, const LevelLaw& law) {
+    const double ratio = usual * part * std::exp(law.log_density - faded);
+    known_ += ratio;
+    by_level_ += ratio * law.by_level;
+    spread_score_ += ratio * law.by_spread;
+    level_information_ += ratio * law.level_information;
+    spread_information_ += ratio * law.spread_information;
+  };
+  if (normal < 1) add(1 - normal, sumOfPhasors(x, squares, spread));
+  if (normal > 0) add(normal, logNormal(x, echo_share_, spread));
+  const double both = 1 - usual + known_;
   log_likelihood_ += std::log(both);
-  known_ = ratio / both;
-  const double by_shape = 1 + 0.5 / shape_ + 1 / (12 * shape_ * shape_) + log_x - x_;
-  const double shape_by_spread = spread < 1 ? -shape_ * shape_ * squares * spread : 0;
-  spread_score_ = known_ * by_shape * shape_by_spread;
-  spread_information_ = known_ * 0.5 / (shape_ * shape_) * shape_by_spread * shape_by_spread;
+  for (double* v : {&known_, &by_level_, &spread_score_, &level_information_, &spread_information_}) *v /= both;
 }
 
 void CellLikelihood::score(double* to) const {
@@ -76,13 +103,11 @@ void CellLikelihood::score(double* to) const {
     const auto* along = along_.data();
     addOuter(across, across, channels_, 0.5 * known_ * across_weight_, to);
     addOuter(across, along, channels_, known_ * across_weight_ * echo_share_, to);
-    addOuter(unit_.data(), unit_.data(), channels_, 0.5 * known_ * (1 + shape_ * (x_ - 1)), to);
+    addOuter(unit_.data(), unit_.data(), channels_, 0.5 * (known_ + by_level_), to);
   }
   if (known_ < 1) {
     std::array<std::complex<double>, kMaxChannels> z = across_;
-    if (shape_ > 0) {
-      for (int k = 0; k < channels_; ++k) z[k] += along_[k];
-    }
+    for (int k = 0; k < channels_; ++k) z[k] += along_[k];
     addOuter(z.data(), z.data(), channels_, 0.5 * (1 - known_) * t_weight_, to);
   }
   int at = 0;
@@ -92,7 +117,7 @@ void CellLikelihood::score(double* to) const {
 void CellLikelihood::level(double* to) const {
   std::fill(to, to + channels_ * channels_, 0.0);
   if (!(known_ > 0)) return;
-  const double more = known_ * (shape_ - 1) * (channels_ + kTailFreedom + 1) / (channels_ + kTailFreedom);
+  const double more = (level_information_ - known_) * (channels_ + kTailFreedom + 1) / (channels_ + kTailFreedom);
   addOuter(unit_.data(), unit_.data(), channels_, 0.5 * std::sqrt(std::max(0.0, more)), to);
 }
 

@@ -12,22 +12,22 @@ constexpr double kTailFreedom = 4;  ///< degrees of freedom of a cell's complex 
 
 /// The strongest echo of a cell.
 struct CellEcho {
-  double power = 0;                                           ///< root of the sum of its paths' squared powers
-  double spread = 0;                                          ///< variance of its power over the square of its mean
+  double power = 0;                                          ///< root of the sum of its paths' squared powers
+  double spread = 0;                                         ///< variance of its power over the square of its mean
   std::array<std::complex<double>, kMaxChannels> direction;  ///< response of the channels, squared norm [channels]
 };
 
-/// Log-likelihood of one cell's channels y under the covariance Sigma = P s s^H + S, where the level of the echo P s s^H
-/// is known and its phase is not.
+/// Log-likelihood of one cell's channels y under the covariance Sigma = P s s^H + S, where the level of the echo P s
+/// s^H is known and its phase is not.
 ///
 /// Under the complex t distribution alone an echo fades: |b|^2, with b = s^H Sigma^-1 y / s^H Sigma^-1 s, is
 /// distributed about its mean V = 1 / s^H Sigma^-1 s as an exponential is, however well P is known. Here b has the
 /// distribution of a sum of phasors of known lengths, matched by two moments: |b|^2 is Gamma-distributed with shape
 /// k = V^2 / variance, where the variance is V^2 less the squares of the paths' powers, plus the spread of the level.
-/// One strong echo gives the information k = 1 / spread about the logarithm of its power; many weak ones give 1, as
-/// fading does. What of y is uncorrelated with b keeps the t distribution, of one dimension less, so that clutter
-/// of another level than expected does not move the level of an echo. A share of echoes follows no known level and
-/// fades. See docs/diagnosis.md.
+/// Where one path stands alone, its level is normal in dB. Then it gives the information 1 / spread about the logarithm
+/// of its power; many paths give 1, as fading does. What of y is uncorrelated with b keeps the t distribution, of one
+/// dimension less, so that clutter of another level than expected does not move the level of an echo. A share of echoes
+/// follows no known level and fades. See docs/diagnosis.md.
 class CellLikelihood {
  public:
   /// z: [channels] L^-1 y, with Sigma = L L^H as factor has it.
@@ -48,7 +48,8 @@ class CellLikelihood {
  private:
   int channels_;
   std::array<std::complex<double>, kMaxChannels> along_, across_, unit_;  ///< parts of z along u and across; u
-  double log_likelihood_, known_, t_weight_, across_weight_, shape_, x_, echo_share_;
+  double log_likelihood_, t_weight_, across_weight_, echo_share_;
+  double known_, by_level_, level_information_;  ///< share of the known level; its slope and information
   double spread_score_ = 0, spread_information_ = 0;
 };
 
