@@ -386,6 +386,7 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
   out.score = Eigen::VectorXd::Zero(globals + 1);
   out.information = Eigen::MatrixXd::Zero(globals + 1, globals + 1);
   out.log_likelihood = 0;
+  out.astray = Eigen::VectorXd::Zero(errors_);
   out.bins.clear();
   const PoseModel model = modelOf(echoes, latents, pose);
   CellDirections directions(globals + 1, channels_);
@@ -399,6 +400,12 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
     basis.factor.apply(dataOf(pose, cell), y.data());
     const CellLikelihood likelihood(basis.factor, y.data(), strongestEcho(model, cell));
     out.log_likelihood += likelihood.logLikelihood();
+    if (const int group = model.strongest[static_cast<std::size_t>(cell)]; group >= 0) {
+      for (int actor : model.echoes.at(static_cast<std::size_t>(group)).actors) {
+        out.astray[static_cast<Eigen::Index>(errorOf(actor, static_cast<std::size_t>(errors_)))] +=
+            weight() * likelihood.astray();
+      }
+    }
     out.score[kSpread] += weight() * likelihood.spreadScore();
     out.information(kSpread, kSpread) += weight() * likelihood.spreadInformation();
     addEchoDirections(model, cell, basis.factor.inverse(), directions);

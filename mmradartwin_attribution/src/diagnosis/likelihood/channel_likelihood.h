@@ -84,6 +84,8 @@ struct PoseBasis {
   Eigen::VectorXd score;        ///< [globals + 1]
   Eigen::MatrixXd information;  ///< [globals + 1][globals + 1], the heading last
   std::vector<BinBasis> bins;   ///< empty where no further directions are needed
+  /// [errors, see errorOf()] number of cells, times their weight, in which the actor's echo has not its level.
+  Eigen::VectorXd astray;
 };
 
 /// Derivatives of all poses at one set of latents.

@@ -56,7 +56,7 @@ CellLikelihood::CellLikelihood(const InverseFactor& factor, const std::complex<d
   const double freedom = channels_ + kTailFreedom;
   t_weight_ = freedom / (kTailFreedom + q);
   log_likelihood_ = -factor.logDeterminant() - freedom * std::log1p(q / kTailFreedom);
-  known_ = by_level_ = level_information_ = echo_share_ = across_weight_ = 0;
+  usual_ = known_ = by_level_ = level_information_ = echo_share_ = across_weight_ = 0;
   along_.fill(0);
   std::copy(z, z + channels_, across_.begin());
   if (!(echo.power > 0)) return;
@@ -76,12 +76,12 @@ CellLikelihood::CellLikelihood(const InverseFactor& factor, const std::complex<d
   echo_share_ = std::min(1.0, echo.power * g);
   across_weight_ = (freedom - 1) / (kTailFreedom + across);
   const double squares = echo_share_ * echo_share_, spread = std::max(kLeastSpread, echo.spread);
-  const double usual = (1 - kUnknownShare) * squares;  // share of echoes with a known level
+  usual_ = (1 - kUnknownShare) * squares;
   const double faded =
       std::log((freedom - 1) / (kTailFreedom + across)) - freedom * std::log1p(x / (kTailFreedom + across));
   const double normal = std::clamp((squares - kPhasors) / (kLogNormal - kPhasors), 0.0, 1.0);
   const auto add = [&](double part, const LevelLaw& law) {
-    const double ratio = usual * part * std::exp(law.log_density - faded);
+    const double ratio = usual_ * part * std::exp(law.log_density - faded);
     known_ += ratio;
     by_level_ += ratio * law.by_level;
     spread_score_ += ratio * law.by_spread;
@@ -90,7 +90,7 @@ CellLikelihood::CellLikelihood(const InverseFactor& factor, const std::complex<d
   };
   if (normal < 1) add(1 - normal, sumOfPhasors(x, squares, spread));
   if (normal > 0) add(normal, logNormal(x, echo_share_, spread));
-  const double both = 1 - usual + known_;
+  const double both = 1 - usual_ + known_;
   log_likelihood_ += std::log(both);
   for (double* v : {&known_, &by_level_, &spread_score_, &level_information_, &spread_information_}) *v /= both;
 }

@@ -34,6 +34,8 @@ class CellLikelihood {
   CellLikelihood(const InverseFactor& factor, const std::complex<double>* z, const CellEcho& echo);
 
   double logLikelihood() const { return log_likelihood_; }
+  /// Probability that the level is expected to be known by, less that with which the measured level is it.
+  double astray() const { return usual_ - known_; }
   /// Score by the echo's log spread, and its information.
   double spreadScore() const { return spread_score_; }
   double spreadInformation() const { return spread_information_; }
@@ -49,7 +51,8 @@ class CellLikelihood {
   int channels_;
   std::array<std::complex<double>, kMaxChannels> along_, across_, unit_;  ///< parts of z along u and across; u
   double log_likelihood_, t_weight_, across_weight_, echo_share_;
-  double known_, by_level_, level_information_;  ///< share of the known level; its slope and information
+  double usual_, known_;                 ///< probability that the level is known, before and after it is measured
+  double by_level_, level_information_;  ///< slope and information of the known level
   double spread_score_ = 0, spread_information_ = 0;
 };
 
