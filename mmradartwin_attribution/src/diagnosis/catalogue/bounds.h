@@ -325,12 +325,6 @@ inline constexpr double kLeastLoss_db = 0.5;
 /// Share of the measured power that a fit explains more before it counts as gaining in the maps, and less before the
 /// maps count as clearly worse; see docs/calibration_of_bounds.md#kleastexplainedmore
 inline constexpr double kLeastExplainedMore = 0.002;
-/// Share of the measured power that an overwhelming fit may explain less; see
-/// docs/calibration_of_bounds.md#kmostexplainedlost
-inline constexpr double kMostExplainedLost = 0.015;
-/// The same of a law of levels, beside which maps do not fit the actors' errors of level; see
-/// docs/calibration_of_bounds.md#kmostexplainedlost
-inline constexpr double kMostExplainedLostByLevels = 0.05;
 /// Correlation over poses of the gains of two fits from which on a name explains some of what a better one was rejected
 /// for by the maps; see docs/calibration_of_bounds.md#kcorrelationofsomeshared
 inline constexpr double kCorrelationOfSomeShared = 0.2;

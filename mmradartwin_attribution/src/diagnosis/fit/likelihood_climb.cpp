@@ -22,7 +22,12 @@ constexpr int kSearchPlaces = 12;                  ///< evaluations of that sear
 constexpr double kLongestStep = 3;                 ///< longest step, scaled
 constexpr double kStepShares[] = {1.0, 0.4, 0.1};  ///< shares of a step that are tried until one gains
 constexpr double kOneSidedFactors[] = {0.4, 2.0};  ///< factors on a one-sided start
-constexpr Eigen::Index kMostRough = 4;             ///< largest number of coordinates that are searched without slopes
+constexpr int kScanned = 12;                       ///< values over the range of a number
+constexpr int kMostScanned = 48;                   ///< the same of a range, half a bin apart
+constexpr int kScanSteps = 2;                      ///< Fisher steps of the latents at a scanned value
+constexpr double kLeastForScan_nats = 3;           ///< gain over the null below which no other value is looked for
+constexpr double kLikelier_nats = 0.5;  ///< gain over the optimum for which a climb starts from a scanned value
+constexpr Eigen::Index kMostRough = 4;  ///< largest number of coordinates that are searched without slopes
 
 /// Calls `value` at places that approach its maximum, without slopes (BOBYQA, Powell 2009).
 void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector<double> scaled_values,
@@ -202,6 +207,30 @@ double LikelihoodClimb::stepBy(const Eigen::VectorXd& step) {
   return 0;
 }
 
+void LikelihoodClimb::scan() {
+  if (task_.parts.size() != 1 || coordinates_.size() != 1 || geometric_) return;
+  if (task_.null != nullptr && optimum_.state.log_likelihood < task_.null->log_likelihood + kLeastForScan_nats) {
+    return;
+  }
+  const Coordinate& c = coordinates_.front();
+  int count = kScanned;
+  if (c.unit == "m") {
+    const double half_bin_m = model_.data().radar.range_bin_m() / 2;
+    count = std::clamp(static_cast<int>(std::ceil((c.max - c.min) / half_bin_m)), kScanned, kMostScanned);
+  }
+  const double reached = optimum_.state.log_likelihood;
+  const SessionLatents from = optimum_.state.latents;
+  for (int i = 0; i <= count; ++i) {
+    const std::vector<double> there = {c.scaled(c.min + (c.max - c.min) * i / count)};
+    ModelState state = stateAt(there, from);
+    // Latents stand in for a part of the cause: they follow before values are compared.
+    model_.fit(state.echoes, state.latents, kScanSteps);
+    state.log_likelihood = model_.logLikelihood(state.echoes, state.latents, &state.by_pose);
+    take(state, there);
+  }
+  if (optimum_.state.log_likelihood > reached + kLikelier_nats) climb();
+}
+
 bool LikelihoodClimb::needsSearch() const {
   const Eigen::Index n = static_cast<Eigen::Index>(coordinates_.size());
   if (!geometric_ || n == 0 || n > kMostRough) return false;
@@ -243,6 +272,7 @@ Optimum LikelihoodClimb::run() {
   tryStarts();
   everyone_ = everyPose(optimum_.state);
   climb();
+  scan();
   if (!needsSearch()) return std::move(optimum_);
   // Where paths appear and vanish with each millimetre, slopes end at the first bump. A quadratic through values some
   // millimetres apart does not. The latents follow to first order.

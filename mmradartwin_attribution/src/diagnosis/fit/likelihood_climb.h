@@ -59,6 +59,8 @@ class LikelihoodClimb {
   void climb();
   /// Takes the longest share of a step that gains. Returns the gain, 0 where no share gains.
   double stepBy(const Eigen::VectorXd& step);
+  /// Tries values over the whole range of a single number, and climbs from one that is likelier than the optimum.
+  void scan();
   bool needsSearch() const;
   /// Searches without slopes around the optimum; first_step is scaled.
   void search(double first_step);

@@ -11,8 +11,6 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr double kTailFreedom = 4;  ///< degrees of freedom of the complex t distribution
-
 /// Share of a beam's power that keeps its covariance positive definite in single precision: neighbouring bins of a Hann
 /// window are almost equal.
 constexpr double kBeamShare = 3e-6;
@@ -30,6 +28,7 @@ enum Global {
   kRelative,
   kPoseSensitive,
   kRange,
+  kSpread,
   kShape,
   kActors = kShape + std::tuple_size_v<decltype(SessionLatents::floor_shape)>
 };
@@ -52,15 +51,11 @@ Limits limitsOf(int global, int errors, const LatentSpread& spread) {
       return {-6, 6, 2};
     case kRange:
       return {-6, 4, 2};
+    case kSpread:  // 0.05 to 4.3 dB
+      return {-9, 0, 1};
     default:
       return {-kAny, kAny, 2};
   }
-}
-
-/// Change of the sine of a group's mean direction in a bin by an error of the heading.
-double turnOf(double yaw_rad, const EchoGroup::Cell& cell) {
-  if (yaw_rad == 0 || cell.cosine == 0 || !(cell.power[0].real() > 0)) return 0;
-  return yaw_rad * cell.cosine / cell.power[0].real();
 }
 
 /// Phases 2 pi y_k / lambda of the virtual elements.
@@ -93,7 +88,7 @@ double& SessionLatents::global(int j) {
   if (j >= ranges) return actor_range_m[at(ranges)];
   if (j >= kActors) return actor_gain[at(kActors)];
   if (j >= kShape) return floor_shape[at(kShape)];
-  double* const first[] = {&log_gain, &log_floor, &log_relative, &log_pose_sensitive, &log_range};
+  double* const first[] = {&log_gain, &log_floor, &log_relative, &log_pose_sensitive, &log_range, &log_spread};
   return *first[j];
 }
 
@@ -169,7 +164,7 @@ void ChannelLikelihood::addRelative(const SessionLatents& latents, int cell, Pac
 
 ChannelLikelihood::PoseModel ChannelLikelihood::modelOf(const PoseEchoes& echoes, const SessionLatents& latents,
                                                         int pose) const {
-  PoseModel model{echoes, latents, pose, {}};
+  PoseModel model{echoes, latents, pose, {}, {}, {}};
   const double gain = std::exp(latents.log_gain);
   const double pose_sensitive = std::exp(latents.log_pose_sensitive);
   for (std::size_t i = 0; i < echoes.all(); ++i) {
@@ -177,6 +172,7 @@ ChannelLikelihood::PoseModel ChannelLikelihood::modelOf(const PoseEchoes& echoes
     model.levels.push_back({gain * groupGain(group, latents) * (echoes.isPoseSensitive(i) ? pose_sensitive : 1),
                             groupShift_m(group, latents)});
   }
+  findStrongest(model);
   return model;
 }
 
@@ -224,9 +220,7 @@ double ChannelLikelihood::poseLikelihood(const PoseEchoes& echoes, const Session
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
     if (!factor.compute(sigma(model, cell))) return -1e9;
     factor.apply(dataOf(pose, cell), y.data());
-    double q = 0;
-    for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
-    sum += -factor.logDeterminant() - (channels_ + kTailFreedom) * std::log1p(q / kTailFreedom);
+    sum += CellLikelihood(factor, y.data(), strongestEcho(model, cell)).logLikelihood();
   }
   return weight() * sum;
 }
@@ -285,7 +279,7 @@ struct ChannelLikelihood::CellDirections {
   CellDirections(int count, int channels)
       : acts(static_cast<std::size_t>(count)),
         raw(static_cast<std::size_t>(count), PackedHermitian(channels)),
-        whitened(channels * channels, count),
+        whitened(channels * channels + 1, count),
         products(static_cast<std::size_t>(count * count)) {}
   void clear() {
     for (int j : active) acts[j] = 0;
@@ -303,7 +297,7 @@ struct ChannelLikelihood::CellDirections {
   std::vector<int> active;
   std::vector<char> acts;
   std::vector<PackedHermitian> raw;
-  Eigen::MatrixXd whitened;      ///< [M^2][count] the active directions, in the first columns
+  Eigen::MatrixXd whitened;      ///< [M^2 + 1][count] the active directions, in the first columns
   std::vector<double> products;  ///< of pairs of the active directions
 };
 
@@ -358,11 +352,11 @@ void ChannelLikelihood::addLevelDirections(const PoseModel& model, int cell, con
 }
 
 void ChannelLikelihood::addProducts(CellDirections& directions, BinBasis& basis, PoseBasis& out) const {
-  const int numbers = channels_ * channels_, count = static_cast<int>(directions.active.size());
+  const int numbers = channels_ * channels_ + 1, count = static_cast<int>(directions.active.size());
   const std::vector<int>& active = directions.active;
   Eigen::MatrixXd& whitened = directions.whitened;
   std::vector<double>& products = directions.products;
-  for (int a = 0; a < count; ++a) basis.factor.whiten(directions.raw[active[a]], whitened.col(a).data());
+  for (int a = 0; a < count; ++a) whiten(basis, directions.raw[active[a]], whitened.col(a).data());
   const Eigen::VectorXd score = whitened.leftCols(count).transpose() * basis.data;
   pairProducts(whitened.data(), numbers, count, products.data());
   basis.traces.resize(count);
@@ -372,24 +366,18 @@ void ChannelLikelihood::addProducts(CellDirections& directions, BinBasis& basis,
     out.score[active[a]] += weight() * score[ia];
     for (std::size_t b = 0; b <= a; ++b) {
       const Eigen::Index ib = static_cast<Eigen::Index>(b);
-      const double v = weight() * informationOf(products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
+      const double v =
+          weight() * tInformation(channels_, products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
       out.information(active[a], active[b]) += v;
       if (a != b) out.information(active[b], active[a]) += v;
     }
   }
 }
 
-void ChannelLikelihood::setData(const std::complex<double>* y, double w, BinBasis& basis) const {
-  basis.data.resize(channels_ * channels_);
-  int i = 0;
-  for (int k = 0; k < channels_; ++k) {
-    basis.data[i++] = w * std::norm(y[k]) - 1;
-    for (int l = 0; l < k; ++l) {
-      const std::complex<double> v = w * y[k] * std::conj(y[l]);
-      basis.data[i++] = M_SQRT2 * v.real();
-      basis.data[i++] = M_SQRT2 * v.imag();
-    }
-  }
+void ChannelLikelihood::whiten(const BinBasis& basis, const PackedHermitian& change, double* to) const {
+  basis.factor.whiten(change, to);
+  const Eigen::Index numbers = basis.level.size();
+  to[numbers] = basis.level.dot(Eigen::Map<const Eigen::VectorXd>(to, numbers));
 }
 
 void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents& latents, int pose, bool keep,
@@ -398,6 +386,7 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
   out.score = Eigen::VectorXd::Zero(globals + 1);
   out.information = Eigen::MatrixXd::Zero(globals + 1, globals + 1);
   out.log_likelihood = 0;
+  out.astray = Eigen::VectorXd::Zero(errors_);
   out.bins.clear();
   const PoseModel model = modelOf(echoes, latents, pose);
   CellDirections directions(globals + 1, channels_);
@@ -409,26 +398,30 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
     basis.cell = cell;
     if (!basis.factor.compute(covariance)) continue;
     basis.factor.apply(dataOf(pose, cell), y.data());
-    double q = 0;
-    for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
-    const double w = (channels_ + kTailFreedom) / (kTailFreedom + q);
-    out.log_likelihood += -basis.factor.logDeterminant() - (channels_ + kTailFreedom) * std::log1p(q / kTailFreedom);
+    const CellLikelihood likelihood(basis.factor, y.data(), strongestEcho(model, cell));
+    out.log_likelihood += likelihood.logLikelihood();
+    if (const int group = model.strongest[static_cast<std::size_t>(cell)]; group >= 0) {
+      for (int actor : model.echoes.at(static_cast<std::size_t>(group)).actors) {
+        out.astray[static_cast<Eigen::Index>(errorOf(actor, static_cast<std::size_t>(errors_)))] +=
+            weight() * likelihood.astray();
+      }
+    }
+    out.score[kSpread] += weight() * likelihood.spreadScore();
+    out.information(kSpread, kSpread) += weight() * likelihood.spreadInformation();
     addEchoDirections(model, cell, basis.factor.inverse(), directions);
     addLevelDirections(model, cell, covariance, directions);
     basis.active = directions.active;
-    setData(y.data(), w, basis);
+    const int numbers = channels_ * channels_;
+    basis.data.setZero(numbers + 1);
+    basis.level.resize(numbers);
+    likelihood.score(basis.data.data());
+    likelihood.level(basis.level.data());
     addProducts(directions, basis, out);
     if (!keep) continue;
     basis.whitened = directions.whitened.leftCols(static_cast<Eigen::Index>(basis.active.size())).cast<float>();
     out.bins.push_back(std::move(basis));
   }
   out.log_likelihood *= weight();
-}
-
-/// Fisher information of the complex t distribution about its covariance (Lange, Little and Taylor 1989, in complex
-/// form).
-double ChannelLikelihood::informationOf(double product, double trace_a, double trace_b) const {
-  return ((channels_ + kTailFreedom) * product - trace_a * trace_b) / (channels_ + kTailFreedom + 1);
 }
 
 Basis ChannelLikelihood::basis(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents,
@@ -467,7 +460,7 @@ ChannelLikelihood::PoseScores ChannelLikelihood::poseScores(const Basis& basis, 
 void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& latents,
                                    const std::vector<const PoseCovariance*>& further, PoseScores& own) const {
   const int globals = latents.globals(), more = static_cast<int>(further.size()), all = globals + more;
-  Eigen::MatrixXd v(channels_ * channels_, more);
+  Eigen::MatrixXd v(channels_ * channels_ + 1, more);
   PackedHermitian change(channels_);
   std::vector<int> active;
   Eigen::VectorXd traces(more);
@@ -479,7 +472,7 @@ void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& la
     change.setZero();
     change.add(from, 1);
     addRelative(latents, bin.cell, change);
-    bin.factor.whiten(change, v.col(h).data());
+    whiten(bin, change, v.col(h).data());
     traces[h] = traceOfWhitened(v.col(h).data(), channels_);
     active.push_back(h);
   }
@@ -490,13 +483,13 @@ void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& la
     for (std::size_t a = 0; a < bin.active.size(); ++a) {
       const int g = bin.active[a] == globals ? all : bin.active[a];
       const Eigen::Index ia = static_cast<Eigen::Index>(a);
-      const double x = weight() * informationOf(products[ia], bin.traces[ia], traces[h]);
+      const double x = weight() * tInformation(channels_, products[ia], bin.traces[ia], traces[h]);
       own.information(globals + h, g) += x;
       own.information(g, globals + h) += x;
     }
     for (int k : active) {
       if (k > h) continue;
-      const double x = weight() * informationOf(v.col(h).dot(v.col(k)), traces[h], traces[k]);
+      const double x = weight() * tInformation(channels_, v.col(h).dot(v.col(k)), traces[h], traces[k]);
       own.information(globals + h, globals + k) += x;
       if (k != h) own.information(globals + k, globals + h) += x;
     }

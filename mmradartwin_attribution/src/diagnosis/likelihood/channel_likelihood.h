@@ -10,6 +10,7 @@
 #include "diagnosis/catalogue/stated_bounds.h"
 #include "diagnosis/channels/channel_data.h"
 #include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/likelihood/echo_level.h"
 #include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/numbers/packed_hermitian.h"
 #include "diagnosis/rooms.h"
@@ -25,6 +26,7 @@ struct SessionLatents {
   double log_relative = -8;             ///< share of an echo's power that is independent between channels
   double log_pose_sensitive = 0;        ///< factor on the power of PoseEchoes::pose_sensitive
   double log_range = 0;                 ///< factor on the variance of a path's own range
+  double log_spread = -2.94;            ///< relative variance of the power of a path on its own, see CellLikelihood
   std::vector<double> actor_gain;       ///< [errors, see errorOf()] natural logarithm of power, per interaction
   std::vector<double> actor_range_m;    ///< [errors, see errorOf()] added one-way range, per interaction
   std::vector<double> yaw_rad;          ///< [poses] error of the heading
@@ -32,7 +34,7 @@ struct SessionLatents {
   /// Number j of those that all poses share ("globals"), in the order of Scores.
   double& global(int j);
   double global(int j) const { return const_cast<SessionLatents*>(this)->global(j); }
-  int globals() const { return 5 + static_cast<int>(floor_shape.size() + actor_gain.size() + actor_range_m.size()); }
+  int globals() const { return 6 + static_cast<int>(floor_shape.size() + actor_gain.size() + actor_range_m.size()); }
 };
 
 /// Prior standard deviations of the actors' latent errors.
@@ -64,13 +66,15 @@ struct Scores {
 };
 
 /// Whitened directions of one cell and its data as M^2 real numbers each (InverseFactor::whiten()). Derivatives of the
-/// likelihood are then dot products, and a further direction costs only its own products.
+/// likelihood are then dot products, and a further direction costs only its own products. A last number stands for the
+/// level of the cell's echo (CellLikelihood::level()): it acts in products of directions alone.
 struct BinBasis {
   int cell = 0;
   InverseFactor factor;
   std::vector<int> active;   ///< globals that act in this cell; index `globals` stands for the heading
-  Eigen::MatrixXf whitened;  ///< [M^2][active]; single precision halves a long session's memory
-  Eigen::VectorXd data;      ///< [M^2] w L^-1 y y^H L^-H - I, with the t distribution's weight w
+  Eigen::MatrixXf whitened;  ///< [M^2 + 1][active]; single precision halves a long session's memory
+  Eigen::VectorXd data;      ///< [M^2 + 1] CellLikelihood::score(), then 0
+  Eigen::VectorXd level;     ///< [M^2] CellLikelihood::level()
   Eigen::VectorXd traces;    ///< [active] trace of each whitened direction
 };
 
@@ -80,6 +84,8 @@ struct PoseBasis {
   Eigen::VectorXd score;        ///< [globals + 1]
   Eigen::MatrixXd information;  ///< [globals + 1][globals + 1], the heading last
   std::vector<BinBasis> bins;   ///< empty where no further directions are needed
+  /// [errors, see errorOf()] number of cells, times their weight, in which the actor's echo has not its level.
+  Eigen::VectorXd astray;
 };
 
 /// Derivatives of all poses at one set of latents.
@@ -88,9 +94,10 @@ struct Basis {
   std::vector<PoseBasis> poses;
 };
 
-/// Likelihood of a session's channels under expected echoes. The channels of a range bin are complex t-distributed (4
-/// complex degrees of freedom) about zero, with the covariance
-///   gain * (echoes + pose-sensitive echoes + range errors + relative) + clutter + noise.
+/// Likelihood of a session's channels under expected echoes. The channels of a range bin have the covariance
+///   gain * (echoes + pose-sensitive echoes + range errors + relative) + clutter + noise
+/// about zero. They are complex t-distributed (4 complex degrees of freedom), but for the cell's strongest echo, whose
+/// level is known (CellLikelihood).
 /// The bins of a beam (EchoBeam) are distributed in the same way. A *cell* is a range bin or a beam; beams come after
 /// the bins. Neighbouring bins overlap through the window, and beams are formed of bins: each cell has the weight 1/2
 /// (composite likelihood).
@@ -167,8 +174,16 @@ class ChannelLikelihood {
     const SessionLatents& latents;
     int pose;
     std::vector<GroupLevel> levels;  ///< [groups, pose-sensitive ones last]
+    std::vector<int> strongest;      ///< [cells] group with the strongest paths, -1 where there is none
+    std::vector<double> cells;       ///< [groups] number of cells, times their weight, in which its echo stands out
   };
   PoseModel modelOf(const PoseEchoes& echoes, const SessionLatents& latents, int pose) const;
+  /// Finds the strongest group of each cell.
+  void findStrongest(PoseModel& model) const;
+  /// Mean power of clutter and noise over the channels of a cell.
+  double floorOf(const PoseModel& model, int cell) const;
+  /// Echo of a cell's strongest group; its power is 0 where there is none.
+  CellEcho strongestEcho(const PoseModel& model, int cell) const;
   /// Covariance of a cell.
   PackedHermitian sigma(const PoseModel& model, int cell) const;
   /// A group's fields in a cell; nothing where it has none.
@@ -185,8 +200,8 @@ class ChannelLikelihood {
   /// Adds a cell's changes by the floor, its shape, the gain and the independent share of channels.
   void addLevelDirections(const PoseModel& model, int cell, const PackedHermitian& covariance,
                           CellDirections& to) const;
-  /// Fills BinBasis::data. y: channels; w: their weight under the t distribution.
-  void setData(const std::complex<double>* y, double w, BinBasis& basis) const;
+  /// Writes a change of a cell's covariance as [M^2 + 1] numbers, see BinBasis.
+  void whiten(const BinBasis& basis, const PackedHermitian& change, double* to) const;
   /// Whitens a cell's directions and adds their scores and information to the pose's.
   void addProducts(CellDirections& directions, BinBasis& basis, PoseBasis& out) const;
   struct PoseScores;
@@ -200,7 +215,6 @@ class ChannelLikelihood {
                          Scores& scores) const;
   void addPriors(const SessionLatents& latents, Scores& scores) const;
   void holdAtLimits(const SessionLatents& latents, Scores& scores) const;
-  double informationOf(double product, double trace_a, double trace_b) const;
 
   const ChannelData& data_;
   int errors_;  ///< number of the actors' errors, see errorOf()

@@ -33,13 +33,13 @@ std::complex<float>* cover(Fields& fields, int cell, std::size_t size) {
   if (cell < fields.first) {
     const auto before = static_cast<std::size_t>(fields.first - cell);
     fields.packed.insert(fields.packed.begin(), before * of_cell, {});
-    fields.cosine.insert(fields.cosine.begin(), before, 0.0f);
+    for (std::vector<float>* v : {&fields.cosine, &fields.mean, &fields.squares}) v->insert(v->begin(), before, 0.0f);
     fields.first = cell;
   }
   const auto at = static_cast<std::size_t>(cell - fields.first);
   if (at >= fields.cosine.size()) {
     fields.packed.resize((at + 1) * of_cell);
-    fields.cosine.resize(at + 1);
+    for (std::vector<float>* v : {&fields.cosine, &fields.mean, &fields.squares}) v->resize(at + 1);
   }
   fields.cells = static_cast<int>(fields.cosine.size());
   return fields.packed.data() + at * of_cell;
@@ -169,7 +169,7 @@ namespace {
 /// between groups.
 struct OpenFields {
   std::vector<std::complex<float>> sums;
-  std::vector<float> cosine;
+  std::vector<float> cosine, mean, squares;
   std::size_t size = 0, of_bin = 0;
   int first = 0, last = -1;
 
@@ -177,17 +177,21 @@ struct OpenFields {
     size = packed_size;
     of_bin = Fields::kOfCell * size;
     if (sums.size() != of_bin * static_cast<std::size_t>(bins)) sums.assign(of_bin * static_cast<std::size_t>(bins), 0);
-    cosine.resize(static_cast<std::size_t>(bins));
+    for (std::vector<float>* v : {&cosine, &mean, &squares}) v->resize(static_cast<std::size_t>(bins));
     first = bins;
     last = -1;
   }
+  /// power: of the path, mean over the channels.
   void add(int bin, const std::complex<float>* packed, const std::array<float, Fields::kOfCell>& factors,
-           double mean_cosine) {
+           double mean_cosine, float power) {
     first = std::min(first, bin);
     last = std::max(last, bin);
     const auto at = static_cast<std::size_t>(bin);
     addMultiples(packed, size, factors.data(), factors.size(), sums.data() + at * of_bin);
     cosine[at] += factors[0] * static_cast<float>(mean_cosine) * packed[0].real();
+    const float own = factors[0] * power;
+    mean[at] += own;
+    squares[at] += own * own;
   }
   void close(Fields& to) {
     if (last < first) return;
@@ -196,9 +200,14 @@ struct OpenFields {
     to.first = first;
     to.cells = last + 1 - first;
     to.packed.assign(from, end);
-    to.cosine.assign(cosine.begin() + first, cosine.begin() + last + 1);
+    const auto hand = [&](std::vector<float>& own, std::vector<float>& other) {
+      other.assign(own.begin() + first, own.begin() + last + 1);
+      std::fill(own.begin() + first, own.begin() + last + 1, 0.0f);
+    };
+    hand(cosine, to.cosine);
+    hand(mean, to.mean);
+    hand(squares, to.squares);
     std::fill(from, end, 0.0f);
-    std::fill(cosine.begin() + first, cosine.begin() + last + 1, 0.0f);
   }
 };
 
@@ -227,6 +236,8 @@ void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g
   const int middle = static_cast<int>(std::lround(place));
   if (middle + reach < 0 || middle - reach > samples_ - 1) return;
   // Spectra are periodic: the skirt of an echo near the first bin continues in the last ones.
+  double power = 0;
+  for (const std::complex<double>& c : record.c) power += std::norm(c) / channels_;
   const bool around = strong && (middle - reach < 0 || middle + reach > samples_ - 1);
   const int low = around ? 0 : std::max(0, middle - reach),
             high = around ? samples_ - 1 : std::min(samples_ - 1, middle + reach);
@@ -237,7 +248,7 @@ void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g
     const double slope = -per_bin / bin_m_;
     open_fields.add(bin, packed.data(),
                     {static_cast<float>(w * w), static_cast<float>(2 * w * slope), static_cast<float>(slope * slope)},
-                    cosine);
+                    cosine, static_cast<float>(power));
   }
   addToBeams(record.c.data(), place, weak ? kOffBeamWeak : kOffBeam, group.beams);
 }
@@ -257,7 +268,11 @@ void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, con
     std::complex<float>*power = cover(f, at, size_), *shift = power + size_, *curvature = shift + size_;
     outer(c.data(), turns, packed);
     accumulate(1, packed, power);
-    f.cosine[static_cast<std::size_t>(at - f.first)] += static_cast<float>(turns) * packed[0].real();
+    const auto i = static_cast<std::size_t>(at - f.first);
+    f.cosine[i] += static_cast<float>(turns) * packed[0].real();
+    const auto own = static_cast<float>(c.squaredNorm() / channels_);
+    f.mean[i] += own;
+    f.squares[i] += own * own;
     accumulate(-1, packed, shift);
     outer(d.data(), turns, packed);
     accumulate(-1, packed, shift);
@@ -303,6 +318,11 @@ void EchoCollector::addToBeams(const std::complex<double>* c, double place, doub
     add([&](int i, int j) { return w[i] * w[j]; });
     add([&](int i, int j) { return w[i] * slope[j] + slope[i] * w[j]; });
     add([&](int i, int j) { return slope[i] * slope[j]; });
+    double own = 0;
+    for (int i = 0; i < channels_; ++i) own += level * w[i] * w[i] / channels_;
+    const std::size_t at = static_cast<std::size_t>(static_cast<int>(b) - beams.first);
+    beams.mean[at] += static_cast<float>(own);
+    beams.squares[at] += static_cast<float>(own * own);
   }
 }
 

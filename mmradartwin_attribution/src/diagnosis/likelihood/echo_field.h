@@ -23,7 +23,9 @@ struct EchoGroup {
     const std::complex<float>* shift;  ///< derivative of power by the one-way range, per metre
     /// W'^2 c c^H per m^2. Times the variance of a random one-way range it is the added covariance.
     const std::complex<float>* curvature;
-    double cosine;  ///< sum |W|^2 cos(azimuth) |c_0|^2, which a turn of the radar changes; 0 for beams
+    double cosine;   ///< sum |W|^2 cos(azimuth) |c_0|^2, which a turn of the radar changes; 0 for beams
+    double mean;     ///< power, mean over the channels
+    double squares;  ///< sum over paths of the square of each one's mean power
   };
   /// Fields of the cells from `first` on. Fields of one cell are read together and are contiguous.
   struct Fields {
@@ -31,12 +33,13 @@ struct EchoGroup {
     int first = 0, cells = 0;
     std::vector<std::complex<float>> packed;  ///< [cell][kOfCell][size]
     std::vector<float> cosine;                ///< [cell]
+    std::vector<float> mean, squares;         ///< [cell] see Cell
     /// Fields of a cell; nothing outside. size: of a packed matrix.
     std::optional<Cell> at(int cell, std::size_t size) const {
       if (cell < first || cell >= first + cells) return std::nullopt;
       const auto i = static_cast<std::size_t>(cell - first);
       const std::complex<float>* own = packed.data() + i * kOfCell * size;
-      return Cell{own, own + size, own + 2 * size, cosine[i]};
+      return Cell{own, own + size, own + 2 * size, cosine[i], mean[i], squares[i]};
     }
   };
   PerInteraction<int> actors;  ///< one per interaction, in order; empty where a path meets none
@@ -44,6 +47,12 @@ struct EchoGroup {
   Fields bins;                 ///< covariance of the channels, by range bin
   Fields beams;                ///< covariance of a beam's bins, by beam: |b^H c|^2 W W^T with W over these bins
 };
+
+/// Change of the sine of a group's mean direction in a cell by an error of the heading.
+inline double turnOf(double yaw_rad, const EchoGroup::Cell& cell) {
+  if (yaw_rad == 0 || cell.cosine == 0 || !(cell.power[0].real() > 0)) return 0;
+  return yaw_rad * cell.cosine / cell.power[0].real();
+}
 
 /// Expected channels of one pose. Groups do not change once collected: states of a fit share them.
 struct PoseEchoes {

@@ -24,11 +24,13 @@ std::string MapEvidence::rejection(const HypothesisFit& fit, const FindingGain& 
     return "clutter is like that, by what the maps gain" + by_how_much;
   }
   if (in_maps) return "";
+  // The likelihood knows the errors that it was given and trusts the twin in all else; what makes maps worse has no
+  // second witness.
   const bool clearly_worse = explained[1] < 0 && explained_more < -bounds::kLeastExplainedMore;
   const Eigen::VectorXd nats_by_pose = gainByPose(fit, before_);
-  if (hasEnoughEvidence(fit, explained_more, clearly_worse, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
+  if (!clearly_worse && hasEnoughEvidence(fit, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
   if (likelier) rejected_.push_back({nats_by_pose, true});
-  return "the maps gain nothing" + by_how_much;
+  return (clearly_worse ? "the maps get worse" : "the maps gain nothing") + by_how_much;
 }
 
 void MapEvidence::addRejected(const HypothesisFit& fit) { rejected_.push_back({gainByPose(fit, before_), false}); }
@@ -36,15 +38,12 @@ void MapEvidence::addRejected(const HypothesisFit& fit) { rejected_.push_back({g
 /// True of a fit that has enough evidence although the maps do not gain. Maps of many scatter points differ from their
 /// expectation by as much as they hold. Few places see one actor, so that little of its gain is left without the best
 /// place.
-bool MapEvidence::hasEnoughEvidence(const HypothesisFit& fit, double explained_more, bool clearly_worse,
-                                    bool likelier) {
+bool MapEvidence::hasEnoughEvidence(const HypothesisFit& fit, bool likelier) {
   const bool traces = context_.echoes.altersGeometry(fit.hypothesis.at(fit.scaled_values));
   const double least_nats = leastNats(fit.hypothesis, fit.scaled_values, traces, context_.data.poses.size());
-  const bool in_nats = !clearly_worse && fit.gain_without_best_place / fit.overdispersion > least_nats;
-  const double most_lost = isOfLevels(fit.hypothesis) ? bounds::kMostExplainedLostByLevels : bounds::kMostExplainedLost;
   const bool overwhelming = fit.overwhelming && !isFaintAddition(fit.hypothesis, fit.scaled_values);
   return (likelier || fit.isFarAway()) &&
-         ((overwhelming && (explained_more > -most_lost || !clearly_worse)) || in_nats);
+         (overwhelming || fit.gain_without_best_place / fit.overdispersion > least_nats);
 }
 
 /// True where a better, rejected fit explains the same poses. Two kinds are exempt: a law without a name, which may be

@@ -1,6 +1,7 @@
 #include "diagnosis/rounds/selection.h"
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
 #include "diagnosis/catalogue/bounds.h"
@@ -55,12 +56,14 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
     withdrawExplainedByUnknown();
   }
   const bool stands = acceptedAs(fit.hypothesis) != accepted_.end();
-  if (!stands || isWithinErrors(fit)) {
+  const bool is_nothing = stands && mayBeNothing(fit.hypothesis);
+  if (!stands || is_nothing || isWithinErrors(fit)) {
     accepted_ = accepted;
     findings_ = findings;
     writeBackFindings();
     state_.latents = latents_before;
     context_.echoes.setBaseline(mechanisms_);
+    if (is_nothing) return "its interval holds the value that does nothing";
     return stands ? "no larger than what errors of actors and poses look like" : "worth nothing beside the rest";
   }
   for (const Accepted& before : accepted) {
@@ -174,6 +177,16 @@ void Selection::profileFound() {
   writeBackFindings();
 }
 
+/// True where the 95 % interval of what was found holds the values that do nothing. One-sided numbers have no such
+/// interval: they are there or not.
+bool Selection::mayBeNothing(const Hypothesis& hypothesis) const {
+  const auto found = acceptedAs(hypothesis);
+  if (hypothesis.coordinates.empty() || hypothesis.isOneSided()) return false;
+  const boost::math::chi_squared distribution(static_cast<double>(hypothesis.coordinates.size()));
+  return 2 * natsFromNothing(hypothesis, found->scaled_values, found->standard_error) <
+         boost::math::quantile(distribution, 0.95);
+}
+
 /// True of a geometry whose numbers are within the errors of actors and poses, and of a move within an actor's range
 /// error. The likelihood may gain much by either where paths appear and vanish with each millimetre. See
 /// docs/calibration_of_bounds.md#sure-offset.
@@ -181,6 +194,8 @@ bool Selection::isWithinErrors(const HypothesisFit& fit) const {
   const Hypothesis& hypothesis = fit.hypothesis;
   const auto accepted = acceptedAs(hypothesis);
   if (accepted == accepted_.end() || !(hypothesis.isMove() || hypothesis.isGeometry())) return false;
+  const double per_pose =
+      fit.gain_without_best_place / fit.overdispersion / static_cast<double>(context_.data.poses.size());
   if (hypothesis.isMove()) {
     const NamedParameters move = hypothesis.at(accepted->scaled_values);
     const Actor& actor =
@@ -188,12 +203,11 @@ bool Selection::isWithinErrors(const HypothesisFit& fit) const {
     const double reach_m = actor.bounds.sizes().head<2>().norm() / 2;
     const double farthest_m = std::hypot(move.values.number("dx_m"), move.values.number("dy_m")) +
                               std::abs(move.values.number("dyaw_deg")) * M_PI / 180 * reach_m;
-    if (farthest_m < fit.stated.mostRangeError_m()) return true;
+    const bool is_sure = farthest_m > fit.stated.leastMove_m() && per_pose > bounds::kLeastNatsOfOffsetPerPose;
+    if (farthest_m < fit.stated.mostRangeError_m() && !is_sure) return true;
   }
   // The interval of an offset may be wide where the likelihood is rough. A large offset with much evidence is therefore
   // accepted whatever its interval.
-  const double per_pose =
-      fit.gain_without_best_place / fit.overdispersion / static_cast<double>(context_.data.poses.size());
   const bool is_aside = hypothesis.isGeometry() && fit.moved_m() > fit.stated.sureOffset_m() &&
                         per_pose > bounds::kLeastNatsOfOffsetPerPose;
   if (fit.isFarAway() || is_aside) return false;

@@ -66,6 +66,7 @@ class Selection {
   void refitAndProfile();
   void renameVerdict(const std::string& label, const std::string& verdict);
   void profileFound();
+  bool mayBeNothing(const Hypothesis& hypothesis) const;
   bool isWithinErrors(const HypothesisFit& fit) const;
   std::optional<HypothesisFit> betterName(const Accepted& a);
   void exchangeNames();

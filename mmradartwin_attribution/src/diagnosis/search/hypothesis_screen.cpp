@@ -11,6 +11,7 @@ namespace mmradartwin::diagnosis::search {
 namespace {
 
 // Values are scaled: 0 does nothing, 1 is typical.
+constexpr double kNatsAstray = 3;                        ///< nats of an echo whose level is not the expected one
 constexpr double kFirstValue = 0.3, kSmallValue = 0.05;  ///< first values of a one-sided hypothesis
 constexpr double kFurtherValues[] = {4, 16};             ///< further values, tried as long as they gain
 constexpr double kEdges[] = {0.8, 1.0, 1.3};             ///< values that put a steep edge among the tones
@@ -46,10 +47,13 @@ std::pair<SessionLatents, double> withoutGains(SessionLatents latents, const Sce
 std::vector<std::pair<int, double>> HypothesisScreen::suspects(const ModelState& null) const {
   std::vector<std::pair<int, double>> result;
   const LatentSpread spread = model_.spread();
+  Eigen::VectorXd astray = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(null.latents.actor_gain.size()));
+  for (const PoseBasis& pose : null.basis.poses) astray += pose.astray;
   for (std::size_t a = 0; a + 1 < null.latents.actor_gain.size(); ++a) {  // the last one belongs to no actor
     const double gain = null.latents.actor_gain[a] / spread.actor_gain;
     const double range = null.latents.actor_range_m[a] / spread.actor_range_m;
-    result.emplace_back(static_cast<int>(a), 0.5 * (gain * gain + range * range));
+    result.emplace_back(static_cast<int>(a), 0.5 * (gain * gain + range * range) +
+                                                 kNatsAstray * std::max(0.0, astray[static_cast<Eigen::Index>(a)]));
   }
   std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
   return result;
