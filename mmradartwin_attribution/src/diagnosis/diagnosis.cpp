@@ -29,6 +29,7 @@ Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOption
   run.compareTwins();
   if (run.sceneMatches()) {
     run.findCauses();
+    run.judgeRest();
     run.addUnexplained();
   }
   run.recordChangedPaths();

@@ -15,6 +15,7 @@
 #include "diagnosis/scene_match.h"
 #include "diagnosis/survey_plan.h"
 #include "diagnosis/unexplained_frames.h"
+#include "diagnosis/unexplained_power.h"
 #include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin::diagnosis {
@@ -190,6 +191,41 @@ void DiagnosisRun::findCauses() {
 void DiagnosisRun::addUnexplained() {
   diagnosis::addUnexplained(session_.received.unexplained, data_, twin_.description().mechanisms, result_.findings,
                             extended_);
+}
+
+void DiagnosisRun::judgeRest() {
+  if (session_.few) return;
+  ModelState state = rounds_.state();
+  context_.echoes.setBaseline(state.mechanisms);
+  std::optional<Finding> rest = unexplainedPower(context_, state);
+  if (!rest) return;
+  if (std::optional<MissingBounces> missing = missingBounces(context_, state)) {
+    Finding finding = findingOf(*missing, state);
+    gains_.ofChange(data_, state.mechanisms, data_, missing->state.mechanisms, finding);
+    const bool explains_more = finding.gain && finding.gain->explained_power.difference_ci95 &&
+                               (*finding.gain->explained_power.difference_ci95)[0] > 0;
+    if (explains_more) {
+      addGainInNats(data_, {}, finding);
+      extended_[missing->specular] = *finding.mechanism;
+      insertBeforeUnknown(std::move(finding));
+      state = std::move(missing->state);
+    }
+    context_.echoes.setBaseline(state.mechanisms);
+    rest = unexplainedPower(context_, state);
+  }
+  if (!rest) return;
+  std::vector<Finding>& findings = result_.findings.findings;
+  if (findings.empty() || findings.back().cause != "unknown") {
+    findings.push_back(std::move(*rest));
+  } else {
+    findings.back().description = findings.back().description.value_or("") + "; besides, " + *rest->description;
+  }
+}
+
+void DiagnosisRun::insertBeforeUnknown(Finding finding) {
+  std::vector<Finding>& findings = result_.findings.findings;
+  const bool unknown = !findings.empty() && findings.back().cause == "unknown";
+  findings.insert(findings.end() - (unknown ? 1 : 0), std::move(finding));
 }
 
 /// Each finding changes the paths of the twin with the findings before it. Adds the paper's metrics where its round has

@@ -38,6 +38,8 @@ class DiagnosisRun {
   bool sceneMatches();
   /// Rounds of hypotheses.
   void findCauses();
+  /// What the twin with all that was found leaves unexplained, beside what a right one would.
+  void judgeRest();
   /// What frames show and no cause explains.
   void addUnexplained();
   /// The paths that each finding changes.
@@ -48,6 +50,7 @@ class DiagnosisRun {
   /// Adds a finding unless the twin states the same already.
   void add(Finding finding, const std::map<std::string, double>& nats_by_pose = {});
   void measureFrameGain();
+  void insertBeforeUnknown(Finding finding);
 
   const Recording& recording_;
   const std::optional<FrameFinding>& lag_;

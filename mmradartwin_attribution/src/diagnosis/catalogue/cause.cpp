@@ -79,6 +79,7 @@ std::vector<CauseDescription> builtInCauses() {
               "no more than clutter is: S = ", "no surface scatters all that it reflects: S = "}}}},
           {"edge_diffraction", kC5, {{"level", "1"}}},
           {"floor_ceiling_multipath", kC5, {{"level", "1"}}, {Form::kOrdinary, Experiment::kRaise}},
+          {"trace_coverage", kC1, {{"max_bounces", "1"}}},
           {"corner_reflection", kC1, {{"actors", "", kTexts}}},
           {"wall_ghost",
            kC5,

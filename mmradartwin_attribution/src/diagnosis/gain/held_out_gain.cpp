@@ -121,6 +121,11 @@ double explained(const std::vector<PowerSums>& sums, const std::vector<int>* tim
 
 }  // namespace
 
+double powerGain(const std::vector<CellPowers>& poses) {
+  const double amplitude = amplitudeGain(poses);
+  return amplitude * amplitude;
+}
+
 double explainedPower(const std::vector<CellPowers>& poses) {
   const double gain = amplitudeGain(poses);
   std::vector<PowerSums> sums;

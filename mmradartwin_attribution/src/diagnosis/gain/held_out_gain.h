@@ -24,6 +24,8 @@ std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<Po
 /// 1 - sum (sqrt(P_meas) - sqrt(g P_twin))^2 / sum P_meas over the cells of all poses, with one gain for the session,
 /// sqrt(g) = sum sqrt(P_meas P_twin)/sum P_twin.
 double explainedPower(const std::vector<CellPowers>& poses);
+/// The session's power gain g of explainedPower().
+double powerGain(const std::vector<CellPowers>& poses);
 /// Explained power before and after, and the 95 % interval of its difference by bootstrap over locations.
 GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPowers>& before,
                               const std::vector<CellPowers>& after);

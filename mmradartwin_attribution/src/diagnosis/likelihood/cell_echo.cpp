@@ -77,4 +77,16 @@ CellEcho ChannelLikelihood::strongestEcho(const PoseModel& model, int cell) cons
   return echo;
 }
 
+std::vector<ChannelLikelihood::ExpectedBin> ChannelLikelihood::expectedBins(const PoseEchoes& echoes,
+                                                                            const SessionLatents& latents,
+                                                                            int pose) const {
+  std::vector<ExpectedBin> bins;
+  const PoseModel model = modelOf(echoes, latents, pose);
+  for (int bin = firstBin(); bin < samples_; ++bin) {
+    bins.push_back(
+        {bin, model.strongest[static_cast<std::size_t>(bin)], sigma(model, bin).full(), strongestEcho(model, bin)});
+  }
+  return bins;
+}
+
 }  // namespace mmradartwin::diagnosis::likelihood

@@ -656,30 +656,26 @@ SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) c
   return latents;
 }
 
-ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes, const SessionLatents& latents,
-                                                        int pose, int bin) const {
+ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseModel& model, int bin) const {
   Whitened cell;
-  const PackedHermitian packed = sigma(modelOf(echoes, latents, pose), bin);
-  Eigen::MatrixXcd full(channels_, channels_);
-  std::size_t i = 0;
-  for (int k = 0; k < channels_; ++k) {
-    for (int l = 0; l <= k; ++l, ++i) {
-      full(k, l) = {packed.re[i], packed.im[i]};
-      full(l, k) = std::conj(full(k, l));
-    }
-  }
-  const Eigen::LLT<Eigen::MatrixXcd> llt(full);
-  cell.inverse = llt.solve(Eigen::MatrixXcd::Identity(channels_, channels_));
-  const Eigen::VectorXcd y = data_.poses[pose].range_spectra.col(bin);
+  const Eigen::LLT<Eigen::MatrixXcd> factor(sigma(model, bin).full());
+  cell.inverse = factor.solve(Eigen::MatrixXcd::Identity(channels_, channels_));
+  const Eigen::VectorXcd y = data_.poses[model.pose].range_spectra.col(bin);
   cell.solved = cell.inverse * y;
   cell.weight = (channels_ + kTailFreedom) / (kTailFreedom + y.dot(cell.solved).real());
   return cell;
 }
 
+ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes, const SessionLatents& latents,
+                                                        int pose, int bin) const {
+  return whitened(modelOf(echoes, latents, pose), bin);
+}
+
 std::vector<ChannelLikelihood::Whitened> ChannelLikelihood::whitened(const PoseEchoes& echoes,
                                                                      const SessionLatents& latents, int pose) const {
+  const PoseModel model = modelOf(echoes, latents, pose);
   std::vector<Whitened> cells;
-  for (int bin = 0; bin < samples_; ++bin) cells.push_back(whitened(echoes, latents, pose, std::max(bin, firstBin())));
+  for (int bin = 0; bin < samples_; ++bin) cells.push_back(whitened(model, std::max(bin, firstBin())));
   return cells;
 }
 

@@ -145,6 +145,15 @@ class ChannelLikelihood {
   /// found: |v^H Sigma^-1 y|^2.
   double gainOfPoint(const Whitened& cell, double power, double noise, double found) const;
 
+  /// What is expected in a bin.
+  struct ExpectedBin {
+    int bin = 0, group = -1;      ///< group: of the strongest echo, -1 where there is none
+    Eigen::MatrixXcd covariance;  ///< [M][M]
+    CellEcho echo;
+  };
+  /// All bins of a pose from firstBin() on.
+  std::vector<ExpectedBin> expectedBins(const PoseEchoes& echoes, const SessionLatents& latents, int pose) const;
+
   const ChannelData& data() const { return data_; }
   const LatentSpread& spread() const { return spread_; }
   int firstBin() const { return 2; }     ///< nearer bins hold the radar's own leakage and are judged separately
@@ -184,6 +193,7 @@ class ChannelLikelihood {
   double floorOf(const PoseModel& model, int cell) const;
   /// Echo of a cell's strongest group; its power is 0 where there is none.
   CellEcho strongestEcho(const PoseModel& model, int cell) const;
+  Whitened whitened(const PoseModel& model, int bin) const;
   /// Covariance of a cell.
   PackedHermitian sigma(const PoseModel& model, int cell) const;
   /// A group's fields in a cell; nothing where it has none.

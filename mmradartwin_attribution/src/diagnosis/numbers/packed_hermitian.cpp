@@ -243,6 +243,18 @@ const float* numbers(const std::complex<float>* field) { return reinterpret_cast
 
 PackedHermitian::PackedHermitian(int count) : channels(count) { setZero(); }
 
+Eigen::MatrixXcd PackedHermitian::full() const {
+  Eigen::MatrixXcd full(channels, channels);
+  std::size_t i = 0;
+  for (int k = 0; k < channels; ++k) {
+    for (int l = 0; l <= k; ++l, ++i) {
+      full(k, l) = {re[i], im[i]};
+      full(l, k) = std::conj(full(k, l));
+    }
+  }
+  return full;
+}
+
 void PackedHermitian::setZero() {
   std::fill_n(re.begin(), size(), 0.0);
   std::fill_n(im.begin(), size(), 0.0);

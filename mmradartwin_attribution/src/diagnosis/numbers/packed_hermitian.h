@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <complex>
 #include <vector>
@@ -54,6 +55,7 @@ struct PackedHermitian {
   double traceOfProduct(const std::complex<float>* field) const;
   /// Quadratic form w^H S w of this matrix S.
   double quadratic(const std::complex<double>* w) const;
+  Eigen::MatrixXcd full() const;
 };
 
 /// Inverse L^-1 of the Cholesky factor of a PackedHermitian S = L L^H.

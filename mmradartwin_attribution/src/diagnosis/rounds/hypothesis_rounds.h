@@ -33,6 +33,7 @@ class HypothesisRounds {
   const std::vector<NamedParameters>& mechanisms() const { return selection_.mechanisms(); }
   const std::vector<NamedParameters>& extended() const { return selection_.extended(); }
   const SessionLatents& latents() { return selection_.state().latents; }
+  const ModelState& state() { return selection_.state(); }
 
  private:
   /// Runs one round; true where it found something.
