@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mmradartwin_driver/frame_assembler.h"
+#include "mmradartwin_driver/pcap_reader.h"
 #include "mmradartwin_dsp/radar_config.h"
 
 namespace mmradartwin {
@@ -21,6 +22,7 @@ struct PcapCapture {
   std::int64_t first_stamp_ns = 0;        ///< start of the first one
   std::uint64_t before_file = 0;          ///< frames of the recording that was under way when the file begins; left out
   std::vector<CaptureFlaw> flaws;         ///< in order
+  std::uint64_t lost_packets = 0;         ///< by the gaps in their numbers
   std::vector<std::uint64_t> recordings;  ///< index of each recording's first frame
   std::vector<std::uint64_t> cut_off;     ///< bytes of last frames that ended within, one for each; left out
   FrameAssembler::Counters counters;
@@ -30,8 +32,8 @@ struct PcapCapture {
 /// capture: frames back to back, at their place even where packets are missing (zeros). The card's answer to
 /// RECORD_START, where the file has it, begins a recording, and so does what follows a hole of more than 64 MB. A file
 /// that was begun within a recording gives the frames from its first packet on. Throws InputError: unreadable file, no
-/// packet of samples, output that cannot be written.
+/// packet of samples, packets of several cards of which `source` chooses none, output that cannot be written.
 PcapCapture pcapToCapture(const std::string& pcap, const RadarConfig& radar, const std::string& output,
-                          std::uint16_t data_port = 4098, std::uint16_t config_port = 4096);
+                          const PcapSource& source = {});
 
 }  // namespace mmradartwin
