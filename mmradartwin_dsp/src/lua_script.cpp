@@ -42,7 +42,7 @@ struct Sandbox {
   std::string part;
   double part_number = 0;  ///< 0: the script compares with no such number
   std::string part_text;   ///< empty: the script compares with no such text
-  std::string part_name;
+  std::string part_name;   ///< where it compares with neither
   Answers answers;
 
   ScriptRecord record;
@@ -199,7 +199,7 @@ int iterateNothing(lua_State* L) {
   return 1;
 }
 
-/// Whether a name asks which part this is: partId, ar1.GetPartNumber, DEVICE.
+/// Whether a name asks which part this is: partId, ar1.GetPartNumber, DEVICE, radarType.
 bool asksForPart(const char* name) {
   std::string plain;
   for (const char* c = name; *c && plain.size() < 40; ++c) {
@@ -208,14 +208,16 @@ bool asksForPart(const char* name) {
   for (const char* verb : {"get", "read", "query"}) {
     if (plain.compare(0, std::strlen(verb), verb) == 0) plain.erase(0, std::strlen(verb));
   }
-  for (const char* kind : {"id", "number", "num", "no", "name", "type", "variant"}) {
+  const std::size_t whole = plain.size();
+  for (const char* kind : {"id", "number", "num", "no", "name", "type", "variant", "model"}) {
     const std::size_t size = std::strlen(kind);
     if (plain.size() > size && plain.compare(plain.size() - size, size, kind) == 0) plain.erase(plain.size() - size);
   }
-  for (const char* thing : {"part", "device", "chip", "devicepart", "platform", "ar1part", "ar1device", "radarpart"}) {
-    if (plain == thing) return true;
-  }
-  return false;
+  const auto isOneOf = [&plain](std::initializer_list<const char*> things) {
+    return std::any_of(things.begin(), things.end(), [&plain](const char* thing) { return plain == thing; });
+  };
+  if (isOneOf({"part", "device", "chip", "chipversion", "platform", "devicepart", "radarpart"})) return true;
+  return plain.size() < whole && isOneOf({"radar", "sensor", "board", "evm", "soc"});
 }
 
 /// Notes that the part was asked for. Whether it is known.
@@ -225,15 +227,18 @@ bool knowsPart(lua_State* L) {
   return !sandbox.part.empty();
 }
 
-/// As the script spells it where it compares: a name is sooner text, all else a number.
+/// As the script spells it where it compares: names and types are sooner text, all else a number.
 int answerPart(lua_State* L, const char* question) {
   if (!knowsPart(L)) return answerNil(L);
   const Sandbox& sandbox = sandboxOf(L);
-  const bool name = std::strstr(question, "ame") || std::strstr(question, "NAME") || std::strstr(question, "ariant");
-  if (sandbox.part_number != 0 && (!name || sandbox.part_text.empty())) {
-    lua_pushinteger(L, static_cast<lua_Integer>(sandbox.part_number));
-  } else {
+  bool is_text = sandbox.part_number == 0;
+  for (const char* part : {"ame", "ype", "ariant", "NAME", "TYPE", "VARIANT"}) {
+    if (std::strstr(question, part) && !sandbox.part_text.empty()) is_text = true;
+  }
+  if (is_text) {
     lua_pushstring(L, sandbox.part_text.empty() ? sandbox.part_name.c_str() : sandbox.part_text.c_str());
+  } else {
+    lua_pushinteger(L, static_cast<lua_Integer>(sandbox.part_number));
   }
   return 1;
 }
@@ -296,7 +301,9 @@ int callAr1(lua_State* L) {
   luaL_checkstack(L, 8, nullptr);
   if (sandboxOf(L).record.calls.size() >= kMostCalls) return luaL_error(L, "too many calls of ar1");
   recordCall(L, name);
-  return answerZero(L);
+  if (!std::strstr(name, "IsConnected")) return answerZero(L);
+  lua_pushinteger(L, 1);
+  return 1;
 }
 
 int indexAr1(lua_State* L) {
@@ -623,20 +630,29 @@ void runScript(Sandbox& sandbox, const std::string& text) {
   throw describeError(L, status, sandbox);
 }
 
+/// Whether a word of the script means the part: "AWR1843", "xwr18xx".
+bool spells(std::string word, const std::string& part) {
+  std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::tolower(c); });
+  const bool one_word =
+      std::all_of(word.begin(), word.end(), [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
+  return one_word && (word.find(part) != std::string::npos || word.find(part.substr(0, 2) + "xx") != std::string::npos);
+}
+
 /// How the script spells its part where it compares with it.
 void spellPart(Sandbox& sandbox, const LuaSource& source) {
   if (sandbox.part.empty()) return;
   const double part = std::strtod(sandbox.part.c_str(), nullptr);
-  sandbox.part_name = "XWR" + sandbox.part;
   for (const std::string& number : source.compared_numbers) {
     if (std::strtod(number.c_str(), nullptr) == part) sandbox.part_number = part;
   }
-  for (const std::string& text : source.compared_texts) {
-    const bool word = std::all_of(text.begin(), text.end(), [](char c) {
-      return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-';
-    });
-    if (sandbox.part_text.empty() && word && text.find(sandbox.part) != std::string::npos) sandbox.part_text = text;
-  }
+  const auto firstOf = [&](const std::vector<std::string>& words) {
+    const auto found =
+        std::find_if(words.begin(), words.end(), [&](const std::string& word) { return spells(word, sandbox.part); });
+    return found == words.end() ? std::string() : *found;
+  };
+  sandbox.part_text = firstOf(source.compared_texts);
+  if (sandbox.part_text.empty()) sandbox.part_text = firstOf(source.assigned_names);
+  sandbox.part_name = "XWR" + sandbox.part;
 }
 
 /// Whether both runs configure the same, apart from what is unknown in the first.

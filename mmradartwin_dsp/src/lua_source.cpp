@@ -80,8 +80,12 @@ class Scanner {
     std::string content;
     while (at_ < in_.size() && isWord(in_[at_])) content += in_[at_++];
     out_.text += content;
-    if (!std::isdigit(static_cast<unsigned char>(content[0]))) return;
-    if (compared || precedesComparison()) out_.compared_numbers.push_back(content);
+    if (!std::isdigit(static_cast<unsigned char>(content[0]))) {
+      const std::size_t next = in_.find_first_not_of(" \t\r\n", at_);
+      if (next < in_.size() && in_[next] == '=' && !precedesComparison()) out_.assigned_names.push_back(content);
+    } else if (compared || precedesComparison()) {
+      out_.compared_numbers.push_back(content);
+    }
   }
   bool followsComparison() const {
     std::size_t end = out_.text.size();

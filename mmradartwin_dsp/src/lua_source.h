@@ -10,6 +10,7 @@ struct LuaSource {
   std::string text;  ///< lines keep their numbers
   /// Strings and numbers that the script compares something with, or that are keys of its tables, in their order.
   std::vector<std::string> compared_texts, compared_numbers;
+  std::vector<std::string> assigned_names;  ///< of variables, or keys of tables that stand as names
 };
 
 /// Takes off a byte order mark and a first line with '#', and the backslash of escapes that Lua 5.1 does not know: it

@@ -154,6 +154,11 @@ void refuseSubframes(const Command& command, RawSettings&) {
 void refuseAdvancedChirp(const Command& command, RawSettings&) {
   command.refuse("sends chirps that differ from their profile (advanced chirps)");
 }
+void refuseLowPower(const Command& command, RawSettings&) {
+  throw InputError(command.where() + ": " + command.name() +
+                   " belongs to the low-power devices (xWRL6432 and its like), which are not known here; known are "
+                   "xWR1243, 1443, 2243, 1642, 1843, 6443 and 6843");
+}
 void refusePhases(const Command& command, RawSettings&) { command.refuse("shifts transmitters' phases by chirp"); }
 
 /// What this file configured before is no longer valid, but for channels and samples.
@@ -187,6 +192,8 @@ const std::map<std::string, Reader>& readers() {
                                                     {"bpmCfg", refuseBpm},
                                                     {"advFrameCfg", refuseSubframes},
                                                     {"subFrameCfg", refuseSubframes},
+                                                    {"chirpComnCfg", refuseLowPower},
+                                                    {"chirpTimingCfg", refuseLowPower},
                                                     {"advChirpCfg", refuseAdvancedChirp},
                                                     {"LUTDataCfg", refuseAdvancedChirp},
                                                     {"perChirpPhaseShiftCfg", refusePhases},

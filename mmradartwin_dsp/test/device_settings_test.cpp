@@ -289,7 +289,13 @@ const char kFuses[] =
 TEST(ImportLua, PartDecidesTheBranch) {
   const TestFolder folder;
   const std::vector<std::string> questions = {
-      kFuses, "part = ar1.partNumber\n", "part = ar1.GetPartNumber()\n", "part = tonumber(partId)\n",
+      kFuses,
+      "part = ar1.partNumber\n",
+      "part = ar1.GetPartNumber()\n",
+      "part = tonumber(partId)\n",
+      "local lanes = {awr2243 = 4, iwr6843 = 2}\n"
+      "part = chip == nil and 0 or lanes[DEVICE_TYPE] == 4 and 2243 - 0 or 6840 + 3\n",
+      "part = radarType == \"xWR22xx\" and 2200 + 43 or radarType == \"xWR68xx\" and 6800 + 43 or 0\n",
       "local name = ar1.getDeviceName()\npart = name == \"AWR2243\" and 2243 or name == \"IWR6843\" and 6843 or "
       "name == \"AWR1843\" and 1843 or 0\n"};
   for (const std::string& question : questions) {
@@ -525,6 +531,7 @@ TEST(ImportSdk, RefusesWhatIsNotTdm) {
   EXPECT_TRUE(saysInOneLine(refusal("lvdsStreamCfg -1 0 1 0", "lvdsStreamCfg -1 0 1 1"), "lvdsStreamCfg"));
   EXPECT_TRUE(saysInOneLine(refusal("channelCfg 15 5 0", "channelCfg 15 5 1"), "cascade"));
   EXPECT_TRUE(saysInOneLine(refusal("frameCfg 0 1 16", "frameCfg 0 1 many"), "'many'"));
+  EXPECT_TRUE(saysInOneLine(refusal("adcCfg 2 1", "chirpComnCfg 8 0 0 256 4 28 0"), "chirpComnCfg", "xWRL6432"));
   EXPECT_EQ(refusal("lvdsStreamCfg -1 0 1 0", "lvdsStreamCfg -1 0 0 0"), "");
   EXPECT_TRUE(contains(importSettings({folder / "profile.cfg"}).assumed.back(), "no ADC samples"));
 }
