@@ -41,10 +41,10 @@ class SettingsCall {
     return wholeNumber(number(i), where() + ": argument " + std::to_string(i + 1) + " of ar1." + call_.name);
   }
   std::string text(std::size_t i) const { return i < size() ? call_.arguments[i].text : ""; }
-  /// Whether all arguments from the i-th on are 0.
+  /// Whether all arguments from the i-th on are 0 or not given (nil).
   bool zeroFrom(std::size_t i) const {
     for (; i < size(); ++i) {
-      if (number(i) != 0) return false;
+      if (call_.arguments[i].text != "nil" && number(i) != 0) return false;
     }
     return true;
   }

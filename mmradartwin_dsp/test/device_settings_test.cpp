@@ -290,6 +290,8 @@ TEST(ImportLua, PartDecidesTheBranch) {
   const TestFolder folder;
   const std::vector<std::string> questions = {
       kFuses,
+      "local _, fuses = ar1.ReadRegister(0xFFFFE214, 18, 25)\n"
+      "part = fuses == 0x30 and 2243 or (fuses == 0xE2 or fuses == 0xE4) and 6843 or 0\n",
       "part = ar1.partNumber\n",
       "part = ar1.GetPartNumber()\n",
       "part = tonumber(partId)\n",
@@ -368,6 +370,9 @@ TEST(ImportLua, RefusesWhatOnlyStudioCanAnswer) {
   // Names that are not there are asked for as Lua's own defaults; what is left after os.exit() is not run.
   EXPECT_EQ(refusal("LOOPS = LOOPS or 32\nar1.FrameConfig(0, 1, 8, LOOPS, 40, 0, 1)\n"), "");
   EXPECT_EQ(refusal("os.exit()\nar1.FrameConfig(0, 1, 8, 64, 40, 0, 1)\n"), "");
+  EXPECT_EQ(refusal("local now = require\"socket\".gettime()\nos.execute(\"mkdir \" .. os.date(\"%Y\", now))\n"
+                    "local f = assert(io.open(path .. now))\nf:write(now)\n"),
+            "");
   EXPECT_EQ(refusal("local f = io.open(path, \"w\")\nfor line in f:lines() do print(#line) end\nf:close()\n"), "");
   write(folder / "a.lua", scriptOfParts("part = 2243\n", "dofile(\"C:\\\\more\\nlines.lua\")\n"));
   const ImportedSettings noted = importSettings({folder / "a.lua"}, "awr2243");
@@ -444,7 +449,7 @@ TEST(ImportSettings, WaveformsBeyondTdmAreNamed) {
     write(folder / "a.lua", script() + call + "\n");
     return inputError([&] { importSettings({folder / "a.lua"}); });
   };
-  EXPECT_EQ(lua("ar1.BpmChirpConfig(0, 1, 0, 0, 0, 0, 0, 0)\nar1.SetPerChirpPhaseShifterConfig(0, 1, 0, 0, 0)"), "");
+  EXPECT_EQ(lua("ar1.BpmChirpConfig(0, 1, 0, 0, 0, 0, 0, 0)\nar1.SetPerChirpPhaseShifterConfig(0, 1, 0, 0, nil)"), "");
   EXPECT_TRUE(saysInOneLine(lua("ar1.BpmChirpConfig(1, 1, 0, 0, 1, 1, 0, 0)"), "a.lua:21", "BpmChirpConfig", "BPM"));
   EXPECT_TRUE(saysInOneLine(lua("ar1.SetPerChirpPhaseShifterConfig(0, 0, 0, 32, 0)"), "SetPerChirpPhaseShifterConfig"));
   EXPECT_TRUE(saysInOneLine(lua("ar1.AdvChirpConfig(0, 0, 0, 0, 0, 0, 0, 0, 4, 1, 0, 4, 0, 0, 0, 0, 0)"), "AdvChirp"));
