@@ -10,7 +10,7 @@ unset PYTHONHOME
 
 packages=(
   build-essential cmake clang-format clang-tidy shellcheck ros-desktop-full-dev catkin catkin-lint python3-rostest librviz-dev rosbash rospack-tools
-  libactionlib-dev python3-actionlib libdiagnostic-updater-dev libembree-dev libpcl-dev libassimp-dev libyaml-cpp-dev libtinyxml2-dev nlohmann-json3-dev libtbb-dev
+  libactionlib-dev python3-actionlib libdiagnostic-updater-dev libtf2-eigen-dev libembree-dev libpcl-dev libassimp-dev libyaml-cpp-dev libtinyxml2-dev nlohmann-json3-dev libtbb-dev
   libssl-dev liblua5.4-dev libmatio-dev libpcap-dev libusb-1.0-0-dev zlib1g-dev libumockdev-dev umockdev libcli11-dev libgtest-dev libbenchmark-dev libopencv-dev libnlopt-dev
   ccache xvfb xauth x11-apps x11-utils imagemagick procps iproute2 python3-numpy python3-scipy python3-yaml)
 
@@ -30,7 +30,8 @@ usage: ./run.sh VERB
   fuzz [S]     every reader of foreign bytes under libFuzzer with address and undefined-behaviour sanitizer, S seconds
                each (60); needs clang; corpus and findings stay in .ws/fuzz
   tsan         the streaming path's tests under the thread sanitizer
-  core [...]   build what needs no ROS by cmake alone, without catkin, and run its tests; arguments go to ctest
+  core [...]   build what needs no ROS by cmake alone, without catkin, and run its tests; arguments go to ctest.
+               `test` takes the libraries and one small test of each package
   lint [all]   format, includes, errors and names of C++, Python, shell scripts, packages; clang-tidy takes the newest
                sources for three minutes, with `all` every one
   exec CMD...  run CMD in the sourced workspace, e.g. ./run.sh exec rosrun mmradartwin_attribution evaluate --help
@@ -87,7 +88,7 @@ data_folder() {
 
 # run_tests [long|all]: which diagnosis sessions run beside the fixed ones
 run_tests() {
-  local limit_s=1800
+  local limit_s=1800 core_status=0
   case ${1:-} in
     '') ;;
     long | all) export MMRADARTWIN_LONG=$1 ;;
@@ -97,6 +98,7 @@ run_tests() {
   build
   # Configured again: ctest's environment has only the folders that were there, and the first build made the messages' one.
   build tests --force-cmake
+  core_sample || core_status=$?
   source_workspace
   data_folder
   rm -rf "$ws/build/test_results"
@@ -111,7 +113,7 @@ run_tests() {
   (cd "$ws/build" && ctest -V -j"$(jobs)" --timeout "$limit_s" --output-junit ctest.xml) |
     awk '/^ *[0-9]+\/[0-9]+ Test|^ +Start|^[0-9]+: MMRADARTWIN_[A-Z_]*(SEED|DAY)=/ {print; fflush()}' >&2 || status=$?
   python3 "$root/test/summarise_results.py" "$ws/build/test_results" --list "$ws/build/ctest_list.json" \
-    --ran "$ws/build/ctest.xml" --status "$status"
+    --ran "$ws/build/ctest.xml" --status "$status" --step "core=$core_status"
 }
 
 run_bench() {
@@ -186,15 +188,29 @@ run_tsan() {
   return $status
 }
 
-# core [ctest arguments]: no part of catkin's workspace is seen, but the same paths, so that ccache knows the files.
-core() {
+# core TARGETS [ctest arguments]: no part of catkin's workspace is seen, but its paths to the sources, from a folder of
+# the same depth, so that ccache knows what catkin's build has compiled.
+core() (
+  targets=$1 folder=$ws/core/mmradartwin
+  shift
   workspace
   [ -d /usr/lib/ccache ] && export PATH=/usr/lib/ccache:$PATH
   unset CMAKE_PREFIX_PATH ROS_PACKAGE_PATH LD_LIBRARY_PATH PYTHONPATH
-  cmake -S "$ws/src/mmradartwin" -B "$ws/core" -DCMAKE_BUILD_TYPE=Release >&2
-  cmake --build "$ws/core" -j"$(jobs)" >&2
   data_folder
-  ctest --test-dir "$ws/core" -j"$(jobs)" --output-on-failure "$@" >&2
+  # shellcheck disable=SC2086
+  cmake -S "$ws/src/mmradartwin" -B "$folder" -DCMAKE_BUILD_TYPE=Release >&2 &&
+    cmake --build "$folder" -j"$(jobs)" --target $targets >&2 &&
+    ctest --test-dir "$folder" -j"$(jobs)" --output-on-failure --no-tests=error "$@" >&2
+)
+
+# The libraries without ROS, and one small test of each package.
+core_sample() {
+  local libraries="mmradartwin_dsp mmradartwin_driver mmradartwin_sim mmradartwin_sim_room mmradartwin_attribution"
+  local tests="mmradartwin_dsp_units_test frame_clock_test mmradartwin_sim_plugin_test
+    mmradartwin_attribution_packed_hermitian_test"
+  say "building and trying what needs no ROS by cmake alone"
+  # shellcheck disable=SC2086
+  core "$libraries $tests" -R "^($(printf '%s|' $tests)none)$"
 }
 
 # lint [all | PART...]: `all` for clang-tidy over every source, else newest sources for three minutes.
@@ -214,7 +230,7 @@ case $verb in
   bench) setup; run_bench "$@" ;;
   fuzz) setup; run_fuzz "$@" ;;
   tsan) setup; run_tsan ;;
-  core) setup; core "$@" ;;
+  core) setup; core all "$@" ;;
   lint) setup; lint "$@" ;;
   exec) [ $# -gt 0 ] || usage; source_workspace; data_folder; exec "$@" ;;
   *) usage ;;

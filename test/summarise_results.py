@@ -82,6 +82,8 @@ def main():
     parser.add_argument("--list", help="what `ctest --show-only=json-v1` says")
     parser.add_argument("--ran", help="file of `ctest --output-junit`")
     parser.add_argument("--status", type=int, default=0, help="exit status of ctest")
+    parser.add_argument("--step", action="append", default=[], metavar="NAME=STATUS",
+                        help="a step beside ctest with its exit status, counted as one case; may be repeated")
     arguments = parser.parse_args()
     if (arguments.list is None) != (arguments.ran is None):
         parser.error("--list and --ran go together")
@@ -101,6 +103,9 @@ def main():
             outcomes["failed"].append(("ctest", name, message))
     if arguments.status != 0 and not outcomes["failed"]:
         outcomes["failed"].append(("ctest", "itself", f"it ended with status {arguments.status}"))
+    for step in arguments.step:
+        name, status = step.rsplit("=", 1)
+        outcomes["passed" if status == "0" else "failed"].append(("step", name, f"it ended with status {status}"))
     for outcome in ("skipped", "failed"):
         for package, name, message in outcomes[outcome]:
             print(f"{outcome}: {package} {name}: {' '.join(message.split())[:600]}")

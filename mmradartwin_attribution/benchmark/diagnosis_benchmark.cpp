@@ -46,8 +46,8 @@ struct Bench {
     source->pointBeams(data, mechanisms, model->firstBin());
     source->setBaseline(mechanisms);
     echoes = source->echoes(mechanisms);
-    nuisance = model->start(echoes);
-    model->fit(echoes, nuisance, 3);
+    latents = model->start(echoes);
+    model->fit(echoes, latents, 3);
     moved = defaultMechanism("actor_moved");
     moved.values.set("actor", std::string("pillar"));
   }
@@ -66,7 +66,7 @@ struct Bench {
   std::unique_ptr<ExpectedEchoes> source;
   std::unique_ptr<ChannelLikelihood> model;
   std::vector<PoseEchoes> echoes;
-  SessionLatents nuisance;
+  SessionLatents latents;
 };
 
 Bench& bench() {
@@ -77,7 +77,7 @@ Bench& bench() {
 // Beside it: as many Cholesky factors of 8 by 8 matrices by Eigen.
 void BM_LikelihoodOfAPose(benchmark::State& state) {
   Bench& b = bench();
-  for (auto _ : state) benchmark::DoNotOptimize(b.model->byPose({b.echoes[0]}, b.nuisance, {0}));
+  for (auto _ : state) benchmark::DoNotOptimize(b.model->byPose({b.echoes[0]}, b.latents, {0}));
 }
 BENCHMARK(BM_LikelihoodOfAPose)->Unit(benchmark::kMicrosecond);
 
@@ -91,7 +91,7 @@ BENCHMARK(BM_LimitCholeskyOfItsCells)->Unit(benchmark::kMicrosecond);
 
 void BM_DerivativesOfAPose(benchmark::State& state) {
   Bench& b = bench();
-  for (auto _ : state) benchmark::DoNotOptimize(b.model->basis(b.echoes, b.nuisance, false));
+  for (auto _ : state) benchmark::DoNotOptimize(b.model->basis(b.echoes, b.latents, false));
   state.SetItemsProcessed(state.iterations() * 8);
 }
 BENCHMARK(BM_DerivativesOfAPose)->Unit(benchmark::kMicrosecond);

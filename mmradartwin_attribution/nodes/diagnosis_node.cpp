@@ -146,10 +146,9 @@ class DiagnosisNode {
 
   void onPosedCube(const Cube::ConstPtr& cube) {
     try {
-      const geometry_msgs::Transform T =
-          tf_buffer_.lookupTransform(settings_.map_frame, cube->header.frame_id, cube->header.stamp).transform;
-      spool_.add(cube, Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
-                           Eigen::Quaterniond(T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z).normalized());
+      const geometry_msgs::TransformStamped T =
+          tf_buffer_.lookupTransform(settings_.map_frame, cube->header.frame_id, cube->header.stamp);
+      spool_.add(cube, fromMsg(T.transform));
     } catch (const tf2::TransformException& error) {  // forgotten by tf in between
       ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f left out: %s", cube->header.stamp.toSec(), error.what());
     }

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mmradartwin_attribution/response_region.h"
+#include "fresnel_aperture.h"
 
 namespace mmradartwin {
 namespace {

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "fresnel_aperture.h"
 #include "synthetic_map.h"
 
 namespace mmradartwin {

@@ -1,4 +1,4 @@
-// An AWR2243BOOST without hardware: runs a command for which the capture card's RADAR_FTDI port is plugged in, with an
+// AWR2243BOOST without hardware: runs a command for which the capture card's RADAR_FTDI port is plugged in, with an
 // emulated radar behind it. As a roslaunch prefix it gives the driver node its radar.
 #include <spawn.h>
 #include <sys/wait.h>

@@ -1,5 +1,5 @@
 // Brings a radar up from radar.yaml over USB and runs its frames until it is interrupted: for recording without ROS,
-// and to see what the radar says.
+// and to read the radar's events.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <csignal>

@@ -1,4 +1,4 @@
-// A DCA1000EVM without hardware: answers the command port and plays a session's captures, or one capture, as the card
+// DCA1000EVM without hardware: answers the command port and plays a session's captures, or one capture, as the card
 // would send them.
 
 #include <CLI/CLI.hpp>

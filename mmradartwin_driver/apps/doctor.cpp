@@ -1,4 +1,4 @@
-// doctor: looks at link, card, USB port and first samples, and says for each failure the next thing to do.
+// doctor: checks link, card, USB port and first samples, and says for each failure the next thing to do.
 #include <CLI/CLI.hpp>
 #include <iostream>
 

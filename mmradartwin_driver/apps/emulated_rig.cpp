@@ -1,5 +1,5 @@
-// A whole rig without hardware: an emulated AWR2243 on an emulated USB bus and an emulated DCA1000 on a network of its
-// own. Programs see the radar when they are started by with_emulated_usb.
+// Whole rig without hardware: an emulated AWR2243 on an emulated USB bus and an emulated DCA1000 on its own network.
+// Programs started by with_emulated_usb see the radar.
 #include "../emulator/emulated_rig.h"
 
 #include <signal.h>
@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The folder in which a running rig is found: `usb` (the bus), `pid`, and `control`, a socket that takes commands.
+/// Folder of a running rig: `usb` (the bus), `pid`, and `control`, a socket that takes commands.
 class RunFolder {
  public:
   RunFolder(const fs::path& path, const std::string& usb_root) : path_(path) {
@@ -38,13 +38,13 @@ class RunFolder {
       throw std::runtime_error(control + ": " + std::strerror(errno));
     }
     fs::create_directory_symlink(usb_root, path_ / "usb");
-    std::ofstream(path_ / "pid") << getpid() << "\n";  // last: now it can be used
+    std::ofstream(path_ / "pid") << getpid() << "\n";  // last: the rig can be used from now on
   }
   ~RunFolder() {
     close(fd_);
     clear();
   }
-  /// Empty where no command waits.
+  /// Next command; empty where none waits.
   std::string command() const {
     char text[256];
     const ssize_t size = recv(fd_, text, sizeof text, 0);

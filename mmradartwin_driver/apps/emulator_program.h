@@ -13,8 +13,8 @@ class App;
 
 namespace mmradartwin {
 
-/// What dca1000_emulator and emulated_rig have in common: options of session and card, lines on stdout, and the end, by
-/// a signal or with the program that started them. One per process.
+/// Common part of dca1000_emulator and emulated_rig: options of session and card, lines on stdout, and the end, by a
+/// signal or with the program that started them. One per process.
 class EmulatorProgram {
  public:
   /// Adds the options, which set `card`; both must outlive this.
@@ -22,11 +22,11 @@ class EmulatorProgram {
 
   /// Parses the command line and plays; returns the exit status (0 done, 2 bad input or use, 1 failed).
   int run(int argc, char** argv, const std::function<int()>& play);
-  /// The selected poses; says on stderr which are left out. Throws InputError.
+  /// The selected poses; reports on stderr which poses are left out. Throws InputError.
   PlayedSession open(const std::string& input, const std::string& radar_file) const;
-  /// A line on stdout, from any thread.
+  /// Writes a line to stdout, from any thread.
   void log(const std::string& line);
-  /// True once SIGINT or SIGTERM came.
+  /// True after SIGINT or SIGTERM.
   static bool interrupted();
 
  private:

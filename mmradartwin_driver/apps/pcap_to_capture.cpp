@@ -1,4 +1,4 @@
-// pcap_to_capture: recorded packets of a DCA1000 -> a capture file, through the driver's own assembler.
+// pcap_to_capture: converts recorded packets of a DCA1000 into a capture file, with the driver's own assembler.
 #include <CLI/CLI.hpp>
 #include <iostream>
 

@@ -1,4 +1,4 @@
-// replay_packets: sends recorded packets of a DCA1000 again, as they came, to a driver on this host.
+// replay_packets: sends recorded packets of a DCA1000 again, as recorded, to a driver on this host.
 #include <CLI/CLI.hpp>
 #include <iostream>
 

@@ -6,7 +6,7 @@
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "radar_driver");
-  const ros::NodeHandle nh;  // outlives the node: with the last handle gone, roscpp prints nothing any more
+  const ros::NodeHandle nh;  // outlives the node: roscpp stops printing with the last handle
   try {
     const mmradartwin::RadarDriver driver(nh, ros::NodeHandle("~"));
     const mmradartwin::MasterWatch master_watch;

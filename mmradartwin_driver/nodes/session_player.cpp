@@ -1,7 +1,8 @@
-// Plays a session as if it were measured now: starts the DCA1000 emulator on its captures, or the emulator of a whole
+// Plays a session as if it were being measured: starts the DCA1000 emulator on its captures, or the emulator of a whole
 // rig, and publishes the poses in tf on the emulator's schedule.
 #include <ros/ros.h>
 #include <std_msgs/Float32.h>
+#include <tf2_eigen/tf2_eigen.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
@@ -54,7 +55,7 @@ class SessionPlayer {
     progress_publisher_ = ros::NodeHandle("~").advertise<std_msgs::Float32>("progress", 1, true);
   }
 
-  /// Exit status of the program.
+  /// Plays the session; returns the exit status of the program.
   int play() {
     findMount();
     if (!viewer_topic_.empty()) waitForViewer(nh_.resolveName(viewer_topic_));
@@ -66,12 +67,12 @@ class SessionPlayer {
     if (!followSchedule(*start_ns) || !waitForEnd()) return ros::ok() ? 1 : 0;
     publishProgress(1.0);
     ROS_INFO("the session has been played");
-    if (!exit_when_done_) ros::waitForShutdown();  // the spinner of main() goes on
+    if (!exit_when_done_) ros::waitForShutdown();  // the spinner of main() continues
     return session_.problems.empty() ? 0 : 2;
   }
 
  private:
-  /// Until somebody listens to the topic: a window that opens late would miss what is played once.
+  /// Waits for a subscriber of the topic: a window that opens late would miss what is played once.
   void waitForViewer(const std::string& topic) {
     constexpr double kWait_s = 60;
     const auto listenedTo = [&topic] {
@@ -94,21 +95,15 @@ class SessionPlayer {
     }
   }
 
-  /// T_radar_camera, from the static transform of the mount.
+  /// Sets T_radar_camera from the static transform of the mount.
   void findMount() {
     if (camera_frame_.empty() || !publish_poses_) return;
     tf2_ros::Buffer buffer;
     const tf2_ros::TransformListener listener(buffer);
     constexpr double kWait_s = 20;
     try {
-      const auto T =
-          buffer.lookupTransform(radar_frame_, camera_frame_, ros::Time(0), ros::Duration(kWait_s)).transform;
-      geometry_msgs::Pose pose;
-      pose.position.x = T.translation.x;
-      pose.position.y = T.translation.y;
-      pose.position.z = T.translation.z;
-      pose.orientation = T.rotation;
-      T_radar_child_ = fromMsg(pose);
+      T_radar_child_ =
+          fromMsg(buffer.lookupTransform(radar_frame_, camera_frame_, ros::Time(0), ros::Duration(kWait_s)).transform);
     } catch (const tf2::TransformException& error) {
       throw InputError("no transform between " + camera_frame_ + " and " + radar_frame_ + " in tf (" + error.what() +
                        "): start a static_transform_publisher for the camera's mount, or leave camera_frame empty");
@@ -137,9 +132,9 @@ class SessionPlayer {
     emulator_ = std::make_unique<ChildProcess>(program, arguments);
   }
 
-  /// Poses for an emulated rig whose radar is started and stopped by others: those of the frames that run, and between
-  /// runs the pose that comes next. A frame's pose stands still from a quarter of a period before its start to a
-  /// quarter after. Returns the exit status.
+  /// Publishes poses for an emulated rig whose radar others start and stop: those of the running frames, and between
+  /// runs the next pose. A frame's pose is constant from a quarter of a period before its start to a quarter after.
+  /// Returns the exit status.
   int followRig() {
     constexpr std::int64_t kHold_ns = 50'000'000;
     const auto lead_ns = static_cast<std::int64_t>(tf_lead_s_ * 1e9);
@@ -176,7 +171,7 @@ class SessionPlayer {
         if (now_ns >= last_stamp_ns + kHold_ns) send(first, now_ns);
         continue;
       }
-      // After a pause of this program only what is still news.
+      // After a pause of this program only recent poses are sent.
       sent = std::max(sent, (now_ns - start_ns) / period_ns - 5);
       for (; start_ns + sent * period_ns - period_ns / 4 < now_ns + lead_ns; ++sent) {
         send(first + sent, start_ns + sent * period_ns - period_ns / 4);
@@ -273,20 +268,15 @@ class SessionPlayer {
   }
 
   void sendPose(const Eigen::Isometry3d& T_map_radar, const ros::Time& stamp) {
-    if (!publish_poses_) return;  // another node finds them
-    geometry_msgs::TransformStamped message;
+    if (!publish_poses_) return;  // another node publishes them
+    geometry_msgs::TransformStamped message = tf2::eigenToTransform(T_map_radar * T_radar_child_);
     message.header.stamp = stamp;
     message.header.frame_id = map_frame_;
     message.child_frame_id = camera_frame_.empty() ? radar_frame_ : camera_frame_;
-    const geometry_msgs::Pose pose = toMsg(T_map_radar * T_radar_child_);
-    message.transform.translation.x = pose.position.x;
-    message.transform.translation.y = pose.position.y;
-    message.transform.translation.z = pose.position.z;
-    message.transform.rotation = pose.orientation;
     broadcaster_.sendTransform(message);
   }
 
-  /// The last samples follow some 2 s after the last frame.
+  /// Waits for the last samples, which follow some 2 s after the last frame.
   bool waitForEnd() {
     const ros::WallTime until = ros::WallTime::now() + ros::WallDuration(20);
     while (ros::ok() && ros::WallTime::now() < until) {
@@ -316,8 +306,8 @@ class SessionPlayer {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "session_player");
-  const ros::NodeHandle keep_alive;  // outlives the player: with the last handle gone, roscpp prints nothing any more
-  // tf listener and broadcaster are served while this thread keeps the schedule.
+  const ros::NodeHandle keep_alive;  // outlives the player: roscpp stops printing with the last handle
+  // The spinner serves tf while this thread keeps the schedule.
   ros::AsyncSpinner spinner(1);
   spinner.start();
   try {

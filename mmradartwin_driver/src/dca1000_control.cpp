@@ -41,7 +41,7 @@ void Dca1000Control::send(Dca1000Command command, const std::vector<std::uint8_t
   const auto sent =
       sendto(socket_.fd(), bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&card_), sizeof card_);
   if (sent == static_cast<ssize_t>(bytes.size())) return;
-  // A port that nobody listens on reports so with the next datagram: that is silence, not a failure of this host.
+  // A closed port is reported with the next datagram: that is silence of the card, not a failure of this host.
   if (errno == ECONNREFUSED) return;
   throw RigError("cannot send to the card at " + card_ip_ + " (" + std::strerror(errno) +
                  "): check that the cable is plugged in and that this host's address is in the card's network");
@@ -56,7 +56,8 @@ std::optional<Dca1000Reply> Dca1000Control::receive(Clock::time_point deadline) 
     socklen_t from_size = sizeof from;
     const auto size =
         recvfrom(socket_.fd(), bytes, sizeof bytes, MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &from_size);
-    if (size < 0 || from.sin_addr.s_addr != card_.sin_addr.s_addr) continue;  // the port is 1024, not the one asked
+    if (size < 0 || from.sin_addr.s_addr != card_.sin_addr.s_addr)
+      continue;  // the reply comes from port 1024, not from the command port
     if (tap_) tap_({from, local_, bytes, static_cast<std::size_t>(size), now_ns()});
     if (const auto reply = decodeReply(bytes, static_cast<std::size_t>(size))) return reply;
   }
@@ -69,7 +70,7 @@ Dca1000Reply Dca1000Control::command(Dca1000Command command, const std::vector<s
     while (const auto reply = receive(deadline)) {
       if (reply->code == static_cast<std::uint16_t>(command)) return *reply;
       if (reply->code == static_cast<std::uint16_t>(Dca1000Command::kSystemStatus)) statuses_.push_back(reply->status);
-      // Anything else is the late answer to an earlier attempt.
+      // Any other reply is a late answer to an earlier attempt.
     }
   }
   throw RigError(

@@ -27,7 +27,7 @@ FrameAssembler::FrameAssembler(const RadarConfig& radar, Output output, const Op
       window_bytes_(std::max<std::uint64_t>(options.window_frames * frame_bytes_, options.window_bytes)),
       clock_(radar),
       recent_(kRememberedPackets) {
-  // A frame is open while no byte beyond its end + window has been seen: at most this many at a time.
+  // A frame is open until a byte beyond its end plus the window arrives, which bounds the number of open frames.
   slots_.resize(window_bytes_ / frame_bytes_ + 3);
   for (Slot& slot : slots_) slot.bytes.resize(frame_bytes_);
 }
@@ -39,7 +39,8 @@ void FrameAssembler::add(const DataPacket& packet) {
     suspect(packet, false);
     return acceptSuspects();
   }
-  // With a restart in the air, what continues it belongs to it, even where it would fit the old count as well.
+  // While a restart is suspected, a packet that continues it belongs to it, even where it would fit the old count as
+  // well.
   if (!suspects_.empty() && !suspects_.front().ahead && continuesSuspects(packet)) return suspect(packet, false);
   const std::uint64_t offset = absoluteOffset(packet.byte_count);
   switch (fit(packet, offset)) {
@@ -51,7 +52,7 @@ void FrameAssembler::add(const DataPacket& packet) {
       ++counters_.duplicate_packets;
       break;
     case Fit::kBehind:
-      // A reordered packet comes soon after the one that it should have preceded, a restart does not.
+      // A reordered packet arrives soon after the one that it should precede, a restart does not.
       if (after_quiet) {
         suspect(packet, false);
       } else {
@@ -64,7 +65,7 @@ void FrameAssembler::add(const DataPacket& packet) {
   }
 }
 
-/// The 48-bit count continued to 64 bits next to the newest byte.
+/// The 48-bit count extended to 64 bits near the newest byte.
 std::uint64_t FrameAssembler::absoluteOffset(std::uint64_t byte_count) const {
   const std::uint64_t ahead = (byte_count - next_byte_) % kCountModulus;
   if (ahead <= options_.plausible_gap_bytes) return next_byte_ + ahead;
@@ -75,13 +76,13 @@ std::uint64_t FrameAssembler::absoluteOffset(std::uint64_t byte_count) const {
 FrameAssembler::Fit FrameAssembler::fit(const DataPacket& packet, std::uint64_t offset) const {
   if (offset >= next_byte_) {
     if (offset - next_byte_ > options_.plausible_gap_bytes) return Fit::kAhead;
-    // The sequence number must rise with the count, or the two are not of one recording.
+    // The sequence number must rise with the count, else the two belong to different recordings.
     if (begun_ && !sequenceAfter(packet.sequence, newest_sequence_)) return Fit::kBehind;
     return Fit::kPlace;
   }
   if (packet.stamp_ns - newest_stamp_ns_ > options_.reorder_ns) return Fit::kBehind;
   if (const Fingerprint* copy = findCopy(packet)) {
-    return packet.size <= copy->size ? Fit::kDuplicate : Fit::kPlace;  // longer: the first one was cut short
+    return packet.size <= copy->size ? Fit::kDuplicate : Fit::kPlace;  // longer: the first copy was truncated
   }
   if (offset + packet.size <= base_frame_ * frame_bytes_) return Fit::kBehind;
   if (overlapsReceived(offset, packet.size)) return Fit::kBehind;
@@ -120,8 +121,8 @@ void FrameAssembler::remember(const DataPacket& packet) {
   std::memcpy(entry.head.data(), packet.payload, std::min(packet.size, entry.head.size()));
 }
 
-/// Near the held packets, in count and sequence alike, and not going back after a pause: that would be the next
-/// restart.
+/// True where a packet is near the held packets in count and sequence. A packet that goes back after a pause does not
+/// continue them, but is the next restart.
 bool FrameAssembler::continuesSuspects(const DataPacket& packet) const {
   constexpr std::uint64_t kNear = 64 * 1472;
   const Suspect& last = suspects_.back();
@@ -169,7 +170,7 @@ void FrameAssembler::acceptSuspects() {
   for (const Suspect& packet : accepted) {
     const DataPacket view{packet.sequence, packet.byte_count, packet.payload.data(), packet.payload.size(),
                           packet.stamp_ns};
-    // Counts that go back among them are late or overlap: they do not lie a whole 48-bit count further on.
+    // Counts that go back among them are late or overlap; they are not a whole 48-bit count ahead.
     const std::uint64_t apart = (packet.byte_count - first_count) % kCountModulus;
     const bool behind = apart > kCountModulus / 2 && kCountModulus - apart <= first_offset;
     place(view, behind ? first_offset - (kCountModulus - apart) : first_offset + apart);
@@ -180,7 +181,7 @@ void FrameAssembler::place(const DataPacket& packet, std::uint64_t offset) {
   remember(packet);
   const std::uint64_t packet_end = offset + packet.size;
   if (begun_ && offset < next_byte_) ++counters_.reordered_packets;
-  // The card sends a packet the moment it is full; a shorter one is the rest of a recording, sent seconds later.
+  // The card sends a packet as soon as it is full. A shorter one is the rest of a recording, sent seconds later.
   longest_payload_ = std::max(longest_payload_, packet.size);
   const bool full = packet.size == longest_payload_;
   if (!begun_ || packet_end > next_byte_) {
@@ -222,11 +223,11 @@ void FrameAssembler::place(const DataPacket& packet, std::uint64_t offset) {
   if (late) ++counters_.late_packets;
 }
 
-/// Copies what of [begin, begin + size) is not there yet, and returns how many bytes that was.
+/// Copies the bytes of [begin, begin + size) that are missing yet. Returns their number.
 std::size_t FrameAssembler::copyMissing(Slot& slot, std::size_t begin, const std::uint8_t* from, std::size_t size) {
   std::vector<Interval>& have = slot.received;
   const std::size_t end = begin + size;
-  if (have.empty() || begin >= have.back().end) {  // in order, nearly always
+  if (have.empty() || begin >= have.back().end) {  // in order, which is almost always the case
     std::memcpy(slot.bytes.data() + begin, from, size);
     if (!have.empty() && have.back().end == begin) {
       have.back().end = end;
@@ -312,7 +313,7 @@ void FrameAssembler::handOut(std::uint64_t frame) {
     std::size_t position = 0;
     const auto loseUntil = [&](std::size_t end) {
       if (position >= end) return;
-      // Half a word is no sample: the hole is widened to whole words.
+      // Half a word is no sample: the hole is extended to whole words.
       const std::size_t from = position & ~std::size_t{1},
                         to = std::min<std::size_t>((end + 1) & ~std::size_t{1}, frame_bytes_);
       std::memset(done.bytes.data() + from, 0, to - from);

@@ -7,7 +7,7 @@
 namespace mmradartwin {
 namespace {
 
-constexpr double kLongest_ns = 1e18;  // 30 years: a frame so far away comes of a damaged count
+constexpr double kLongest_ns = 1e18;  // 30 years: a frame so far away results from a damaged count
 
 }  // namespace
 
@@ -68,7 +68,7 @@ std::optional<double> FrameClock::fittedLate_ns(std::uint64_t frame) const {
     mean += x(next);
     while (hull.size() >= 2) {
       const Observation &a = *hull[hull.size() - 2], &b = *hull.back();
-      // b goes where it lies on or above the chord from a to next.
+      // b is removed where it lies on or above the chord from a to next.
       const double above = (b.late_ns - a.late_ns) * (x(next) - x(a)) - (next.late_ns - a.late_ns) * (x(b) - x(a));
       if (above < 0) break;
       hull.pop_back();
@@ -79,7 +79,7 @@ std::optional<double> FrameClock::fittedLate_ns(std::uint64_t frame) const {
   std::size_t right = 1;
   while (right + 1 < hull.size() && x(*hull[right]) < mean) ++right;
   const Observation &a = *hull[right - 1], &b = *hull[right];
-  const double limit = drift_ * period_ns_;  // no crystal is further off
+  const double limit = drift_ * period_ns_;  // limit of a crystal's error
   const double slope = std::clamp((b.late_ns - a.late_ns) / (x(b) - x(a)), -limit, limit);
   const Observation& rests_on = mean - x(a) < x(b) - mean ? a : b;
   return rests_on.late_ns + slope * (static_cast<double>(frame - first) - x(rests_on));

@@ -23,7 +23,8 @@ std::string number(const char* format, double value) {
 
 std::string mbit(double bit_per_s) { return number("%.1f Mbit/s", bit_per_s * 1e-6); }
 
-/// Largest delay, in the card's ticks, at which it still sends so much; negative where no delay of TI's range does.
+/// Largest delay, in the card's ticks, at which the card still sends this rate; negative where no delay of TI's range
+/// does.
 int ticksFor(double needed_bit_per_s) {
   const double delay_us = kPayloadBits / needed_bit_per_s * 1e6 - kPacketCost_us;
   const int ticks = static_cast<int>(std::floor(delay_us * 125 + 1e-6));
@@ -68,7 +69,7 @@ LinkBudget linkBudget(const RadarConfig& radar, double delay_us, double lane_bit
 
 void checkLinkBudget(const RadarConfig& radar, double delay_us, double lane_bit_per_s) {
   const LinkBudget link = linkBudget(radar, delay_us, lane_bit_per_s);
-  if (link.lvds_per_chirp_s > link.chirp_s) {  // false where the chirp's time is not known
+  if (link.lvds_per_chirp_s > link.chirp_s) {  // false where the chirp's duration is unknown
     const double fitting = radar.samples_per_chirp * link.chirp_s / link.lvds_per_chirp_s;
     throw InputError("the LVDS lanes need " + number("%.2f us", link.lvds_per_chirp_s * 1e6) +
                      " for a chirp's samples, and a chirp lasts " + number("%.2f us", link.chirp_s * 1e6) +

@@ -16,12 +16,12 @@ constexpr std::uint8_t kRequestLatencyTimer = 0x09;
 constexpr std::uint8_t kRequestBitMode = 0x0B;
 constexpr std::uint16_t kResetPort = 0, kPurgeReceive = 1, kPurgeTransmit = 2;
 constexpr std::uint16_t kLatency_ms = 1;
-constexpr std::size_t kStatusBytes = 2;  // lead every packet
+constexpr std::size_t kStatusBytes = 2;  // at the start of every packet
 
 // Commands of the serial engine.
 constexpr std::uint8_t kSetLowPins = 0x80, kGetLowPins = 0x81, kSendImmediate = 0x87;
 constexpr std::uint8_t kClockOut = 0x11;  // bytes, most significant bit first, on the falling edge
-constexpr std::uint8_t kClockIn = 0x20;   // the same, on the rising edge
+constexpr std::uint8_t kClockIn = 0x20;   // bytes, most significant bit first, on the rising edge
 constexpr std::uint8_t kUnknownCommand = 0xAA, kUnknownReply = 0xFA;
 
 // Port A: b0 CLK, b1 MOSI, b2 MISO, b3 CS (active low), b6 PMIC_NRST (kept high), b7 NERROR_OUT.

@@ -11,11 +11,11 @@
 namespace mmradartwin {
 namespace {
 
-constexpr std::size_t kLongestDatagram = 2048;  // the card's stay below 1472, Ethernet's limit
+constexpr std::size_t kLongestDatagram = 2048;  // the card's have at most 1472 bytes, Ethernet's limit
 
 std::size_t forceReceiveBuffer(int fd, std::size_t bytes) {
   const int wanted = static_cast<int>(bytes);
-  // FORCE passes net.core.rmem_max but needs CAP_NET_ADMIN.
+  // SO_RCVBUFFORCE exceeds net.core.rmem_max but needs CAP_NET_ADMIN.
   if (setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &wanted, sizeof wanted) != 0) {
     setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &wanted, sizeof wanted);
   }
@@ -109,7 +109,7 @@ int PacketReceiver::receive(int timeout_ms, const std::function<void(const DataP
   timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
   const std::int64_t batch_ns = now.tv_sec * 1'000'000'000LL + now.tv_nsec;
-  dense_ = gather_us_ > 0 && got < size && batch_ns - last_batch_ns_ < kDense_ns;  // a full batch: more may wait
+  dense_ = gather_us_ > 0 && got < size && batch_ns - last_batch_ns_ < kDense_ns;  // after a full batch more may wait
   last_batch_ns_ = batch_ns;
   int visited = 0;
   for (int i = 0; i < got; ++i) {

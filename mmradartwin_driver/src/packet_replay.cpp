@@ -33,10 +33,10 @@ std::uint64_t replayPackets(const std::string& file, const PacketReplayOptions& 
     if (!first_ns) first_ns = packet.stamp_ns;
     const double due_ns = static_cast<double>(packet.stamp_ns - *first_ns) / options.rate;
     std::this_thread::sleep_until(begin + std::chrono::nanoseconds(std::llround(due_ns)));
-    // The packet is a view of the datagram: its head stands before the samples.
+    // The packet is a view of the datagram: the header precedes the samples.
     const auto sent = sendto(socket.fd(), packet.payload - kDataHeaderBytes, packet.size + kDataHeaderBytes, 0,
                              reinterpret_cast<const sockaddr*>(&host), sizeof host);
-    // Where nobody listens, that is reported with a later datagram.
+    // A closed port is reported with a later datagram.
     if (sent < 0 && errno != ECONNREFUSED) {
       throw RigError("cannot send to " + options.host_ip + ": " + std::strerror(errno));
     }

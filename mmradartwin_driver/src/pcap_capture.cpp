@@ -8,13 +8,14 @@
 #include <optional>
 #include <set>
 
+#include "mmradartwin_driver/udp_socket.h"
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
 namespace {
 
-/// A hole that is longer is not filled with zeros: a damaged count must not fill the disk.
+/// Longest hole that is filled with zeros: a damaged count must not fill the disk.
 constexpr std::uint64_t kLongestHole_bytes = 64u << 20;
 
 class CaptureOutput {
@@ -25,12 +26,12 @@ class CaptureOutput {
       throw InputError(file + ": cannot be written (" + std::strerror(errno) + "); give a file in another folder");
     }
   }
-  /// The frame before is written now that it is known not to be the last one.
+  /// The previous frame is written once it is known not to be the last one.
   void take(AdcCube&& cube) {
     settle(false);
     if (new_recording_) {
       result.recordings.push_back(result.frames);
-      // Without its start in the file, nothing says that the frames before the first packet were lost.
+      // Without the recording's start in the file, the frames before the first packet are not known to be lost.
       const bool under_way = result.recordings.size() == 1 && !start_seen_;
       if (under_way) result.before_file = cube.sequence;
       expected_ = under_way ? cube.sequence : 0;
@@ -46,7 +47,7 @@ class CaptureOutput {
     held_ = std::move(cube);
   }
   void seeStart() { start_seen_ = true; }
-  /// What came so far belongs to a recording that has ended.
+  /// Ends the recording to which everything so far belongs.
   void endRecording() {
     settle(true);
     new_recording_ = true;
@@ -64,7 +65,7 @@ class CaptureOutput {
     if (!held_) return;
     const AdcCube cube = std::move(*held_);
     held_.reset();
-    // A recording ends within a frame wherever it was stopped: that frame has no more to come.
+    // A recording may be stopped within a frame, whose rest then never arrives.
     if (last && !cube.chirp_valid.back()) {
       result.cut_off.push_back(radar_.bytes_per_frame() - cube.lost_bytes);
       return;
@@ -79,7 +80,7 @@ class CaptureOutput {
     }
     write(encodeFrame(radar_, cube.data));
   }
-  /// A frame of zeros, which the file system need not store.
+  /// Appends a frame of zeros, which the file system need not store.
   void leaveOut() {
     CaptureFlaw flaw{result.frames, radar_.bytes_per_frame(), {}};
     for (int chirp = 0; chirp < radar_.chirps_per_frame(); ++chirp) flaw.chirps.push_back(chirp);
@@ -106,6 +107,7 @@ class LostPackets {
   void add(std::uint32_t sequence) {
     const std::int64_t ahead = next_ ? static_cast<std::int64_t>(sequence) - *next_ : 0;
     if (ahead >= 0 && ahead <= kMost) {
+      if (static_cast<std::int64_t>(missing_.size()) + ahead > kMost) endRecording();  // these come no more
       for (std::int64_t i = 0; i < ahead; ++i) missing_.insert(missing_.end(), static_cast<std::uint32_t>(*next_ + i));
     } else if (-kMost <= ahead && ahead < 0 && sequence != 1) {
       missing_.erase(sequence);  // late, or a copy
@@ -139,11 +141,12 @@ class LostPackets {
 
 PcapCapture pcapToCapture(const std::string& pcap, const RadarConfig& radar, const std::string& output,
                           const PcapSource& source) {
+  if (!source.card_ip.empty()) parseIpv4(source.card_ip);
   CaptureOutput out(radar, output);
   std::uint64_t epochs = 1;
   FrameAssembler* counted = nullptr;
   FrameAssembler assembler(radar, [&](AdcCube&& cube) {
-    // The count began anew without a command in the file.
+    // The count restarted without a command in the file.
     if (counted->counters().epochs != epochs) {
       epochs = counted->counters().epochs;
       out.endRecording();

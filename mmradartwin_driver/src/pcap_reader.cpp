@@ -24,10 +24,10 @@ struct CapturedDatagram {
   std::uint32_t source, destination;  ///< IPv4 addresses
   std::uint16_t destination_port;
   const std::uint8_t* payload;
-  std::size_t size;  ///< as captured: less than was sent where the capture cut packets
+  std::size_t size;  ///< as captured: less than was sent where the capture truncated packets
 };
 
-constexpr std::int64_t kLatest_s = 4294967295;  // of a ROS time; a pcapng may say more than 64 bit of ns hold
+constexpr std::int64_t kLatest_s = 4294967295;  // limit of a ROS time; a pcapng may hold later times
 
 /// Bytes of link layer before the IPv4 header, or -1.
 int linkHeaderBytes(int link_type, const std::uint8_t* p, std::size_t size) {
@@ -68,7 +68,7 @@ bool decodeUdp(int link_type, const std::uint8_t* p, std::size_t size, CapturedD
   size -= ip_header;
   const std::size_t udp_bytes = networkOrder16(p + 4);
   if (udp_bytes < 8) return false;
-  // Short frames are padded to Ethernet's minimum: the UDP length counts, not the frame's.
+  // Short frames are padded to Ethernet's minimum: the UDP length decides, not the frame's.
   out.destination_port = networkOrder16(p + 2);
   out.payload = p + 8;
   out.size = std::min(size, udp_bytes) - 8;

@@ -34,7 +34,7 @@ std::uint16_t headerChecksum(const std::uint8_t* p) {
 void writeHeaders(const Datagram& datagram, std::uint8_t* p) {
   constexpr std::uint8_t kCard[6] = {0x12, 0x34, 0x56, 0x78, 0x90, 0x12}, kHost[6] = {2, 0, 0, 0, 0, 1};
   constexpr std::uint8_t kUdp = 17;
-  // The card's factory address is 192.168.33.180; which side is the card shows in what it sends from: port 1024.
+  // The card's factory address is 192.168.33.180. Datagrams from port 1024 are the card's.
   const bool from_card = ntohs(datagram.source.sin_port) == 1024;
   std::memcpy(p, from_card ? kHost : kCard, 6);
   std::memcpy(p + 6, from_card ? kCard : kHost, 6);
@@ -73,7 +73,7 @@ std::string stamped(std::string file) {
 struct PcapWriter::Output {
   std::unique_ptr<pcap_t, decltype(&pcap_close)> format{nullptr, pcap_close};
   pcap_dumper_t* dumper = nullptr;
-  long whole = 0;  ///< bytes up to the end of the last packet that is surely on the disk
+  long whole = 0;  ///< bytes up to the end of the last packet that is certainly on the disk
   ~Output() {
     if (dumper) pcap_dump_close(dumper);
   }
@@ -154,7 +154,7 @@ void PcapWriter::run() {
 }
 
 void PcapWriter::write(const std::vector<std::uint8_t>& records) {
-  if (!output_->dumper) {  // these waited while it ended
+  if (!output_->dumper) {  // these waited while the recording ended
     for (std::size_t at = 0; at < records.size(); ++left_out_) {
       std::uint32_t size;
       std::memcpy(&size, &records[at + sizeof(std::int64_t)], sizeof size);
@@ -188,7 +188,7 @@ void PcapWriter::write(const std::vector<std::uint8_t>& records) {
   end(errno ? std::strerror(errno) : "write error");
 }
 
-/// Of a disk; what is no file (a pipe into another program, say) has no space to run out of.
+/// True where the disk has enough space. A file that is no regular one (a pipe, say) has no limit.
 bool PcapWriter::spaceLeft() {
   struct statvfs disk = {};
   if (!std::filesystem::is_regular_file(file_) || ::statvfs(file_.c_str(), &disk) != 0) return true;

@@ -17,7 +17,7 @@ std::string text(const char* format, Values... values) {
 void PoseWatch::observe(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_radar) {
   if (stamp_ns_ && stamp_ns <= *stamp_ns_) {
     if (stamp_ns == *stamp_ns_ || *stamp_ns_ - stamp_ns < 1'000'000'000) return;
-    stamp_ns_.reset();  // the clock went back: another time begins
+    stamp_ns_.reset();  // the clock went back: stamps begin again
   }
   if (stamp_ns_) {
     const double apart_s = static_cast<double>(stamp_ns - *stamp_ns_) * 1e-9;
@@ -61,7 +61,7 @@ PoseWatch::Report PoseWatch::report(std::int64_t now_ns) const {
         text("the latest pose is %.1f s old: see to the node that publishes the camera's pose", *report.age_s);
     return report;
   }
-  // A jump at a gap's end must not hide the gap, nor the gap the jump.
+  // A jump at the end of a gap must not hide the gap, and vice versa.
   for (const Event* event : {&gap_, &jump_}) {
     if (event->text.empty() || static_cast<double>(now_ns - event->stamp_ns) * 1e-9 >= options_.remember_s) continue;
     report.level = Level::kWarning;

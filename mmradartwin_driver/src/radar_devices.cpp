@@ -3,7 +3,7 @@
 #include <map>
 #include <mutex>
 
-#include "awr2243/awr2243_device.h"
+#include "built_in_devices.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -11,9 +11,10 @@ namespace {
 
 struct Registry {
   std::mutex mutex;
-  std::map<std::string, RadarDevice> devices{
-      {"awr2243", awr2243Device()},
-  };
+  std::map<std::string, RadarDevice> devices;
+  Registry() {
+    for (const RadarDevice& device : builtInDevices()) devices.emplace(device.name, device);
+  }
 };
 
 Registry& registry() {

@@ -15,10 +15,10 @@ constexpr milliseconds kRetryAfter{2000};
 constexpr seconds kRepeatProblemAfter{10};
 constexpr seconds kGrace{3};
 constexpr milliseconds kAskWhileSilent{2000};
-/// The card sends the rest of a recording about 2 s after its last sample; what is silent for longer has ended.
+/// Silence after which a recording has ended: the card sends the rest of a recording about 2 s after its last sample.
 constexpr milliseconds kStreamEnded{3500};
 constexpr int kReceiveTimeout_ms = 50;
-/// From the radar's start to its first samples, beyond two frames.
+/// Longest time from the radar's start to its first samples, beyond two frames.
 constexpr seconds kFirstSamples{5};
 
 PacketReceiver::Counters sum(const PacketReceiver::Counters& a, const PacketReceiver::Counters& b) {
@@ -121,7 +121,7 @@ void Rig::open() {
 
 void Rig::prepareRadar() {
   if (!radar_control_ || !radar_control_->configure()) return;
-  configured_ = false;  // the card locks to the LVDS clock when it is configured
+  configured_ = false;  // the card synchronises with the LVDS clock when it is configured
   events_(Level::kInfo, options_.radar->title + " configured, firmware " + radar_control_->health().version);
 }
 
@@ -146,7 +146,7 @@ void Rig::configure() {
 void Rig::arm() {
   if (options_.configure_card) {
     if (radar_control_) radar_control_->stop();
-    // What an earlier recording left in the socket would be taken for the start of this one.
+    // Datagrams of an earlier recording in the socket would be taken for the start of this one.
     receiver_->drain();
     while (control_->takeStatus(milliseconds(0))) {
     }
@@ -203,7 +203,7 @@ void Rig::stream() {
       setPhase(RigState::Phase::kArmed);
       events_(Level::kWarning, "samples have stopped");
       if (options_.configure_card) {
-        configured_ = false;  // it may have lost its power for a moment, and its configuration with it
+        configured_ = false;  // after a short loss of power it has no configuration
         return control_->stopRecord();
       }
     }
@@ -218,7 +218,7 @@ void Rig::stream() {
     }
     if (silent > kAskWhileSilent && Clock::now() - asked > kAskWhileSilent) {
       asked = Clock::now();
-      control_->connect();  // throws where the card is gone; it is configured anew when it is back
+      control_->connect();  // throws where the card is gone; it is configured again when it is back
     }
   }
 }
@@ -240,7 +240,7 @@ bool Rig::handleStatus(std::uint16_t status) {
     // Frames that this rig started run until it stops them.
     events_(radar_control_ ? Level::kWarning : Level::kInfo,
             "the card has completed its recording: the radar's frames have ended");
-    // The last packets may be behind the status.
+    // The last packets may follow the status.
     while (receiveBatch(20) && !stop_) {
     }
     assembler_.flush();
@@ -287,7 +287,7 @@ void Rig::publishState() {
   silent_since_ = last_data_;
 }
 
-/// Frames go on where the recording of packets cannot.
+/// Reports that the recording of packets failed; frames continue.
 void Rig::watchRecording() {
   if (!recording_ || recording_failed_ || recording_->left_out() == 0) return;
   recording_failed_ = true;
@@ -297,7 +297,7 @@ void Rig::watchRecording() {
                                          : problem);
 }
 
-/// Closes the sockets, so that the next try finds addresses and ports as they are then.
+/// Closes the sockets before a wait, so that the next attempt uses the addresses and ports of that time.
 void Rig::waitToRetry() {
   if (receiver_) earlier_ = sum(earlier_, receiver_->counters());
   receiver_.reset();

@@ -31,7 +31,7 @@ using Level = CheckResult::Level;
 std::string readText(const fs::path& file) {
   std::ifstream in(file);
   std::string text;
-  std::getline(in, text, '\0');  // some files of the kernel open and cannot be read: that is no text either
+  std::getline(in, text, '\0');  // some kernel files open but cannot be read: they count as empty
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
   return text;
 }
@@ -55,7 +55,7 @@ struct Interface {
   unsigned flags = 0;
 };
 
-/// The interface that has the address; for loopback, the one whose network holds it.
+/// Interface that has the address; for loopback, the one whose network contains it.
 std::optional<Interface> interfaceOf(const in_addr& address) {
   ifaddrs* list = nullptr;
   if (getifaddrs(&list) != 0) return std::nullopt;
@@ -142,7 +142,7 @@ class Examination {
     }
   }
 
-  /// Interface A of the card's port J1: the radar is configured through it.
+  /// Checks interface A of the card's port J1, through which the radar is configured.
   void usb() {
     if (!options_.usb) return;
     std::error_code none;
@@ -217,7 +217,7 @@ class Examination {
     return true;
   }
 
-  /// Whether anything with the card's address is on the wire at all.
+  /// State of the card's address in the neighbour table: whether anything answers to it.
   std::string neighbourState() const {
     std::istringstream arp(readText(fs::path(options_.procfs) / "net/arp"));
     for (std::string line; std::getline(arp, line);) {
@@ -232,7 +232,7 @@ class Examination {
     return "";
   }
 
-  /// The radar is brought up before the card is configured: that wants its LVDS clock.
+  /// Runs the radar's self-test. The radar is brought up before the card is configured, which needs its LVDS clock.
   void selfTest() {
     SelfTestRig rig;
     rig.record = [this](std::size_t wanted, double expected_s, const std::function<void()>& begin) {
@@ -242,7 +242,7 @@ class Examination {
     radarDevice(*options_.radar, "radar.yaml").self_test(*options_.radar, options_.radar_firmware, rig);
   }
 
-  /// As SelfTestRig's record.
+  /// Implements SelfTestRig::record.
   std::vector<std::uint8_t> recordBytes(std::size_t wanted, double expected_s, const std::function<void()>& begin) {
     control_->resetFpga();
     control_->configureFpga(4);
@@ -358,7 +358,7 @@ class Examination {
     } else {
       tell(Level::kFine, "losses", "none in " + std::to_string(span) + " bytes");
     }
-    // The card's packets of a frame come together: a span of some frames is needed to tell a rate.
+    // The card's packets of a frame arrive together: a rate needs an interval of several frames.
     if (span >= 3 * wanted && last_ns > first_ns) {
       tell(checkRate(radar, static_cast<double>(span), static_cast<double>(last_ns - first_ns) * 1e-9));
     }
@@ -410,7 +410,7 @@ std::string firewallHint(const std::string& nft, const std::string& iptables, co
 
 CheckResult checkLanes(const RadarConfig& radar, const std::vector<std::uint8_t>& frame) {
   const bool two_lanes = radar.layout == CaptureLayout::kTwoLane;
-  // Four lanes: words I rx0..rx3, Q rx0..rx3. Two: I I Q Q, the receivers one after the other within a chirp.
+  // Four lanes: words I rx0..rx3, Q rx0..rx3. Two lanes: I I Q Q, one receiver after the other within a chirp.
   const std::size_t words = two_lanes ? 4 : 2 * static_cast<std::size_t>(radar.capture_receivers());
   const auto word = [&frame](std::size_t i) { return static_cast<std::int16_t>(frame[2 * i] | frame[2 * i + 1] << 8); };
   std::vector<bool> silent(words, true);

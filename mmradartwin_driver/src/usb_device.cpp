@@ -113,7 +113,7 @@ void UsbDevice::write(int interface, const std::vector<std::uint8_t>& bytes) {
 std::vector<std::uint8_t> UsbDevice::read(int interface, std::chrono::milliseconds timeout) {
   std::vector<std::uint8_t> bytes(kTransferBytes);
   int received = 0;
-  // libusb takes 0 for "wait for ever".
+  // libusb waits without limit for a time-out of 0.
   const auto limit = static_cast<unsigned>(timeout.count() > 0 ? timeout.count() : 1);
   const int result =
       libusb_bulk_transfer(handles_->device, endpointIn(interface), bytes.data(), kTransferBytes, &received, limit);

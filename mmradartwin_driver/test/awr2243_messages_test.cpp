@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "deployment_registers.h"
+#include "interface_bytes.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
@@ -12,36 +14,13 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-Bytes fromHex(const std::string& text) {
-  Bytes bytes;
-  std::string digits;
-  for (const char c : text) {
-    if (c != ' ') digits += c;
-  }
-  for (std::size_t i = 0; i < digits.size(); i += 2) {
-    bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(i, 2), nullptr, 16)));
-  }
-  return bytes;
-}
-
-/// The paper's deployment in the device's units, with TX0 and TX2.
+/// The deployment with every field of a message set.
 Awr2243Registers deployment() {
-  Awr2243Registers registers;
-  registers.start_frequency = 1435384036;
-  registers.slope = 1553;
-  registers.idle = 700;
-  registers.adc_start = 600;
-  registers.ramp_end = 2000;
-  registers.samples = 64;
-  registers.sample_rate_ksps = 5000;
+  Awr2243Registers registers = deploymentRegisters();
   registers.highpass1 = 1;
   registers.highpass2 = 2;
-  registers.rx_gain_db = 40;
   registers.tx_backoff_db = 6;
-  registers.rx_mask = 0xF;
-  registers.chirp_tx_mask = {1, 4};
   registers.loops = 3;
-  registers.frame_period = 10000000;
   return registers;
 }
 
@@ -148,7 +127,7 @@ TEST(Awr2243Messages, CommandsGoToTheProcessorThatOwnsTheSubBlock) {
   start.start = 1;
   MmwaveLinkMessage message = command(subBlock(start));
   message.sequence = 1;
-  EXPECT_EQ(encodeMessage(message), fromHex("3412 2143 8102 1800 0014 0000 0100 65e9 4001 0800 0100 0000 9476 e063"));
+  EXPECT_EQ(encodeMessage(message), sensorStartBytes());
   // 0x4000 / 32 = 0x200: opcode 5 | 0x200 << 6 = 0x8005
   const Bytes power_up = encodeMessage(command({kRfPowerUp, {}}));
   EXPECT_EQ(power_up[4], 0x05);

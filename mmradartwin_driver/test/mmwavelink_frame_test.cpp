@@ -6,22 +6,12 @@
 #include <stdexcept>
 #include <string>
 
+#include "interface_bytes.h"
+
 namespace mmradartwin {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
-
-Bytes fromHex(const std::string& text) {
-  Bytes bytes;
-  std::string digits;
-  for (const char c : text) {
-    if (c != ' ') digits += c;
-  }
-  for (std::size_t i = 0; i < digits.size(); i += 2) {
-    bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(i, 2), nullptr, 16)));
-  }
-  return bytes;
-}
 
 MmwaveLinkMessage sensorStart() {
   MmwaveLinkMessage message;
@@ -43,10 +33,7 @@ TEST(MmwaveLinkFrame, PublishedCheckValuesOfTheCrcs) {
   EXPECT_EQ(crc16(bytes, 9), 0x29B1);
 }
 
-TEST(MmwaveLinkFrame, SensorStart) {
-  EXPECT_EQ(encodeMessage(sensorStart()), fromHex("3412 2143 8102 1800 0014 0000 0100 65e9 4001 0800 0100 0000 9476 "
-                                                  "e063"));
-}
+TEST(MmwaveLinkFrame, SensorStart) { EXPECT_EQ(encodeMessage(sensorStart()), sensorStartBytes()); }
 
 TEST(MmwaveLinkFrame, FlagsOfRetryAndOfNoAcknowledgement) {
   MmwaveLinkMessage message = sensorStart();

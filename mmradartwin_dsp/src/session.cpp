@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/capture.h"
+#include "mmradartwin_dsp/csv_reader.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/stated_accuracy.h"
 #include "mmradartwin_dsp/strict_yaml.h"
@@ -28,29 +29,6 @@ constexpr double kQuaternionTolerance = 1e-3;
 /// Stamps typed with microseconds are rounded; poses recorded back to back must not fail for it.
 constexpr std::int64_t kOverlapTolerance_ns = 1000;
 
-std::string trimmed(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(" \t\r");
-  if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
-}
-
-std::vector<std::string> splitCsv(const std::string& line) {
-  std::vector<std::string> fields;
-  std::istringstream in(line);
-  for (std::string field; std::getline(in, field, ',');) fields.push_back(trimmed(field));
-  if (!line.empty() && line.back() == ',') fields.emplace_back();
-  return fields;
-}
-
-std::optional<double> parseDouble(const std::string& text) {
-  double value = 0;
-  const char* begin = text.data() + (!text.empty() && text.front() == '+' ? 1 : 0);
-  const char* end = text.data() + text.size();
-  const auto result = std::from_chars(begin, end, value);
-  if (result.ec != std::errc() || result.ptr != end) return std::nullopt;
-  return value;
-}
-
 /// Empty where `name` may name a file, else why not.
 std::string unusableName(const std::string& name) {
   if (name.empty()) return "has no name";
@@ -61,31 +39,27 @@ std::string unusableName(const std::string& name) {
   return "";
 }
 
-/// Reads the numeric part of a row. Returns what is wrong with it, or "".
-std::string readRow(const std::vector<std::string>& fields, Pose& pose) {
-  static const char* const kNames[] = {"x", "y", "z", "qx", "qy", "qz", "qw"};
-  pose.location = fields[1];
-  if (pose.location.empty()) return "location is empty; name the spot, poses of one spot share it";
+/// The pose of a row; throws InputError for what is wrong with it alone.
+Pose readRow(const CsvReader& row) {
+  Pose pose;
+  pose.name = row.fields()[0];
+  pose.location = row.fields()[1];
+  if (pose.location.empty()) throw row.error("location is empty; name the spot, poses of one spot share it");
   try {
-    pose.stamp_ns = parseStamp_ns(fields[2]);
+    pose.stamp_ns = parseStamp_ns(row.fields()[2]);
   } catch (const InputError& error) {
-    return error.what();
+    throw row.error(error.what());
   }
   double values[7];
-  for (std::size_t i = 0; i < 7; ++i) {
-    const std::optional<double> value = parseDouble(fields[3 + i]);
-    if (!value) return std::string(kNames[i]) + " '" + fields[3 + i] + "' is no number; correct or remove the row";
-    if (!std::isfinite(*value)) return std::string(kNames[i]) + " is " + fields[3 + i] + "; correct or remove the row";
-    values[i] = *value;
-  }
+  for (std::size_t i = 0; i < 7; ++i) values[i] = row.number(3 + i);
   const Eigen::Quaterniond q(values[6], values[3], values[4], values[5]);
   if (std::abs(q.norm() - 1) > kQuaternionTolerance) {
     std::ostringstream message;
     message << "quaternion qx,qy,qz,qw has norm " << q.norm() << "; allowed: 0.999 to 1.001; correct or remove the row";
-    return message.str();
+    throw row.error(message.str());
   }
   pose.T_map_radar = Eigen::Translation3d(values[0], values[1], values[2]) * q.normalized();
-  return "";
+  return pose;
 }
 
 std::string captureFile(const std::string& pattern, const std::string& pose) {
@@ -248,35 +222,20 @@ Recording openCapture(const std::string& file, const RadarConfig& radar) {
 
 PoseTable parsePoses(const std::string& csv, const std::string& file) {
   PoseTable table;
-  std::istringstream in(csv);
-  std::string line;
-  std::getline(in, line);
-  if (line.compare(0, 3, "\xEF\xBB\xBF") == 0) line.erase(0, 3);  // spreadsheets put a byte order mark
-  if (splitCsv(trimmed(line)) != splitCsv(kPoseColumns)) {
-    throw InputError(file + ": line 1: header is '" + trimmed(line).substr(0, 80) + "'; it must be '" + kPoseColumns +
-                     "'");
-  }
+  CsvReader reader(csv, file);
+  reader.requireColumns(kPoseColumns);
   std::set<std::string> names;
-  for (int number = 2; std::getline(in, line); ++number) {
-    if (trimmed(line).empty()) continue;
-    const std::vector<std::string> fields = splitCsv(line);
-    const std::string where = file + ": line " + std::to_string(number) + ": ";
-    if (fields.size() != 10) {
-      throw InputError(where + std::to_string(fields.size()) + " fields; a row has 10, " + kPoseColumns);
-    }
-    Pose pose;
-    pose.name = fields[0];
-    const std::string unusable = unusableName(pose.name);
-    if (!unusable.empty()) throw InputError(where + "pose '" + pose.name + "' " + unusable);
-    if (!names.insert(pose.name).second) {
-      throw InputError(where + "pose '" + pose.name + "' stands twice; every pose needs a name of its own");
-    }
-    table.names.push_back(pose.name);
-    const std::string problem = readRow(fields, pose);
-    if (problem.empty()) {
-      table.poses.push_back(pose);
-    } else {
-      table.problems.push_back({pose.name, where + "pose '" + pose.name + "': " + problem});
+  while (reader.next()) {
+    const std::string name = reader.fields()[0], pose = "pose '" + name + "'";
+    const std::string unusable = unusableName(name);
+    if (!unusable.empty()) throw reader.error(pose + " " + unusable);
+    if (!names.insert(name).second) throw reader.error(pose + " stands twice; every pose needs a name of its own");
+    table.names.push_back(name);
+    reader.callRow(pose);
+    try {
+      table.poses.push_back(readRow(reader));
+    } catch (const InputError& error) {
+      table.problems.push_back({name, error.what()});
     }
   }
   if (names.empty()) throw InputError(file + ": holds no poses; write one row per pose");

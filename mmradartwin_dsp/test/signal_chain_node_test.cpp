@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 #include <nodelet/NodeletUnload.h>
 #include <ros/ros.h>
+#include <rosgraph_msgs/Log.h>
 #include <tf2_msgs/TFMessage.h>
 #include <tf2_ros/transform_broadcaster.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 
 #include "mmradartwin_dsp/coherent_average.h"
@@ -16,7 +19,18 @@
 namespace mmradartwin {
 namespace {
 
-constexpr double kPatience_s = 60;
+constexpr double kPatience_s = 60;  // a loaded machine is slow, not wrong
+
+/// Calls callbacks until `condition` holds; false where it does not within `patience_s`.
+bool waitFor(const std::function<bool()>& condition, double patience_s = kPatience_s) {
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(patience_s);
+  while (!condition()) {
+    if (!ros::ok() || ros::WallTime::now() > end) return false;
+    ros::WallDuration(0.005).sleep();
+    ros::spinOnce();
+  }
+  return true;
+}
 
 template <typename Message>
 class Inbox {
@@ -24,16 +38,11 @@ class Inbox {
   Inbox(ros::NodeHandle& nh, const std::string& topic)
       : subscriber_(nh.subscribe<Message>(topic, 100,
                                           [this](const typename Message::ConstPtr& m) { messages.push_back(m); })) {}
-  /// Waits until `count` messages are there, a minute at most: a loaded machine is slow, not wrong.
-  bool wait(std::size_t count, double patience_s = kPatience_s) {
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(patience_s);
-    while (messages.size() < count && ros::WallTime::now() < end) {
-      ros::spinOnce();
-      ros::WallDuration(0.005).sleep();
-    }
-    return messages.size() >= count;
+  bool wait(std::size_t count) {
+    return waitFor([&] { return messages.size() >= count; });
   }
   bool connected() const { return subscriber_.getNumPublishers() > 0; }
+  bool endsWith(const ros::Time& stamp) const { return !messages.empty() && messages.back()->header.stamp == stamp; }
   std::vector<typename Message::ConstPtr> messages;
 
  private:
@@ -48,6 +57,7 @@ class SignalChainNodeTest : public ::testing::Test {
         grids_(nh_, "radar/grid"),
         maps_(nh_, "radar/range_angle"),
         twin_maps_(nh_, "twin/range_angle"),
+        log_(nh_, "/rosout"),
         config_(nh_.advertise<mmradartwin_msgs::RadarConfig>("radar/config", 1, true)),
         cubes_(nh_.advertise<mmradartwin_msgs::AdcCube>("radar/adc", 100)),
         twin_(nh_.advertise<mmradartwin_msgs::ReceiveGrid>("twin/grid", 10)),
@@ -57,34 +67,71 @@ class SignalChainNodeTest : public ::testing::Test {
     start_ = ros::Time(1700000000 + 3600 * tests++);
     config_.publish(toMsg(radar_));
     // Both nodes of the launch files, so that each has the configuration and tf.
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kPatience_s);
-    while (ros::WallTime::now() < end &&
-           !(grids_.connected() && maps_.connected() && twin_maps_.connected() && cubes_.getNumSubscribers() > 1 &&
-             config_.getNumSubscribers() > 1 && tf_.getNumSubscribers() > 1 && twin_.getNumSubscribers())) {
-      ros::spinOnce();
-      ros::WallDuration(0.01).sleep();
-    }
-    ros::WallDuration(0.3).sleep();  // the latched configuration is on its way
-    for (int probe = 0; grids_.messages.empty() || maps_.messages.empty(); ++probe) {
-      if (ros::WallTime::now() > end) throw std::runtime_error("the signal chain does not answer");
-      sendProbe(probe);
-      grids_.wait(1, 1.0) && maps_.wait(1, 1.0);
-      if (probe > 0) ros::WallDuration(4).sleep();  // longer than a frame waits for its pose
-    }
-    ros::spinOnce();
-    grids_.messages.clear();
-    maps_.messages.clear();
+    const bool connected = waitFor([this] {
+      return grids_.connected() && maps_.connected() && twin_maps_.connected() && cubes_.getNumSubscribers() > 1 &&
+             config_.getNumSubscribers() > 1 && tf_.getNumSubscribers() > 1 && twin_.getNumSubscribers() > 0;
+    });
+    if (!connected) throw std::runtime_error("the signal chain does not start");
+    if (!answers(grids_, maps_, twin_maps_)) throw std::runtime_error("the signal chain does not answer");
   }
 
-  /// A frame of half an hour before and elsewhere, whose grid says that frames and answers find their way: a subscriber
-  /// knows of its publisher before that one has begun to send to it.
-  void sendProbe(int probe) {
-    const ros::Time at = start_ - ros::Duration(1800) + ros::Duration(probe);
+  /// Sends probes until each of the inboxes has one, and waits for the newest, with which nothing of them is on its way
+  /// any more. A subscriber knows of its publisher before that one has begun to send to it, and a configuration comes
+  /// another way than the frames.
+  template <typename... Inboxes>
+  bool answers(Inboxes&... inboxes) {
+    ros::Time newest;
+    const auto probe = [&] {
+      newest = sendProbe();
+      return waitFor([&] { return (!inboxes.messages.empty() && ...); }, 0.2);
+    };
+    if (!waitFor(probe) || !waitFor([&] { return (inboxes.endsWith(newest) && ...); })) return false;
+    (inboxes.messages.clear(), ...);
+    return true;
+  }
+
+  /// A frame and a grid of the twin of half an hour before and elsewhere; their stamp.
+  ros::Time sendProbe() {
+    const ros::Time at = start_ - ros::Duration(1800) + ros::Duration(probes_++);
     sendPose(at - ros::Duration(0.02), -50);
     sendPose(at + ros::Duration(0.02), -50);
     AdcCube cube = frame(0);
     cube.stamp_ns = toNanoseconds(at);
     cubes_.publish(toMsg(cube, hash_));
+    twin_.publish(toMsg(twinGrid(at), hash_));
+    return at;
+  }
+
+  ReceiveGrid twinGrid(const ros::Time& stamp) const {
+    ReceiveGrid grid;
+    grid.stamp_ns = toNanoseconds(stamp);
+    grid.source = Branch::kSimulated;
+    grid.full_scale = 1;
+    grid.frames = 1;
+    grid.x = pointTarget(radar_, 4.0, -0.4, 1e-4);
+    return grid;
+  }
+
+  void sendNonsense() {
+    mmradartwin_msgs::RadarConfig nonsense = toMsg(radar_);
+    nonsense.slope_hz_per_s = -1;
+    config_.publish(nonsense);
+  }
+
+  /// Whether the node under test has said so in its log, which alone tells what it refuses.
+  bool hasSaid(const std::string& words) const {
+    return std::any_of(log_.messages.begin(), log_.messages.end(), [&](const rosgraph_msgs::Log::ConstPtr& log) {
+      return log->name.rfind("/corrected", 0) != 0 && log->msg.find(words) != std::string::npos;
+    });
+  }
+
+  /// Waits until the log comes here: a configuration is refused aloud each time.
+  bool hearsTheLog() {
+    const auto refused = [this] { return hasSaid("radar/config refused"); };
+    return waitFor([&] {
+      sendNonsense();
+      return waitFor(refused, 0.2);
+    });
   }
 
   void sendPose(const ros::Time& stamp, double x, double yaw_deg = 0) {
@@ -124,8 +171,10 @@ class SignalChainNodeTest : public ::testing::Test {
   RadarConfig radar_;
   std::uint64_t hash_;
   ros::Time start_;
+  int probes_ = 0;
   Inbox<mmradartwin_msgs::ReceiveGrid> grids_;
   Inbox<mmradartwin_msgs::RangeAngleMap> maps_, twin_maps_;
+  Inbox<rosgraph_msgs::Log> log_;
   ros::Publisher config_, cubes_, twin_, tf_;  ///< tf_ is the broadcaster's topic, to see who listens
   tf2_ros::TransformBroadcaster broadcaster_;
 };
@@ -163,13 +212,7 @@ TEST_F(SignalChainNodeTest, AveragesFramesAndPutsTheirPoseIn) {
 // The second node of the launch files has a channels.yaml.
 TEST_F(SignalChainNodeTest, CorrectsTheMeasuredChannels) {
   Inbox<mmradartwin_msgs::ReceiveGrid> corrected(nh_, "corrected/radar/grid");
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kPatience_s);
-  while (ros::WallTime::now() < end && !corrected.connected()) {
-    ros::spinOnce();
-    ros::WallDuration(0.01).sleep();
-  }
-  ASSERT_TRUE(corrected.connected());
-  ros::WallDuration(0.5).sleep();  // the latched configuration
+  ASSERT_TRUE(answers(grids_, maps_, twin_maps_, corrected));
   sendPose(stamp(-0.5), 1.0);
   sendPose(stamp(10), 1.0);
   send(0);
@@ -196,14 +239,15 @@ TEST_F(SignalChainNodeTest, BeginsAnewWhenTheRadarMovesOrTurns) {
 }
 
 TEST_F(SignalChainNodeTest, WaitsForThePoseAtTheStampAndGoesOnWithoutOne) {
+  ASSERT_TRUE(hearsTheLog());
   sendPose(stamp(-0.5), 5);
   send(0);
-  ros::WallDuration(0.1).sleep();
-  ros::spinOnce();
-  EXPECT_TRUE(grids_.messages.empty()) << "did not wait for tf";
+  send(0);
+  ASSERT_TRUE(waitFor([this] { return hasSaid("frame 0 refused: it has the stamp of the one before"); }));
+  // Frame 0 has come, and its pose is only sent now.
   sendPose(stamp(0.5), 5.08);
   ASSERT_TRUE(grids_.wait(1));
-  EXPECT_TRUE(grids_.messages[0]->pose_valid);
+  EXPECT_TRUE(grids_.messages[0]->pose_valid) << "did not wait for tf";
   EXPECT_NEAR(grids_.messages[0]->T_map_radar.position.x, 5.04, 1e-9);  // between the two, at the frame's stamp
   send(1);
   ASSERT_TRUE(grids_.wait(2));
@@ -212,12 +256,14 @@ TEST_F(SignalChainNodeTest, WaitsForThePoseAtTheStampAndGoesOnWithoutOne) {
 }
 
 TEST_F(SignalChainNodeTest, LosesNoneOfTheFramesThatALatePoseLetsGo) {
+  ASSERT_TRUE(hearsTheLog());
   sendPose(stamp(-0.5), 1.0);
   constexpr int kFrames = 80;
   for (int i = 0; i < kFrames; ++i) send(i);
-  ros::WallDuration(0.5).sleep();
+  cubes_.publish(toMsg(frame(kFrames), hash_ ^ 1));
+  ASSERT_TRUE(waitFor([this] { return hasSaid("it was taken with another radar configuration"); }));
+  // All frames have come and wait.
   sendPose(stamp(kFrames), 1.0);
-  ros::WallDuration(0.5).sleep();  // nobody reads while all of them are published
   ASSERT_TRUE(grids_.wait(kFrames) && maps_.wait(kFrames)) << grids_.messages.size() << " grids";
   for (int i = 0; i < kFrames; ++i) {
     EXPECT_EQ(grids_.messages[static_cast<std::size_t>(i)]->header.stamp, stamp(i));
@@ -249,13 +295,13 @@ TEST_F(SignalChainNodeTest, SurvivesBadMessagesAndForeignRadars) {
   mmradartwin_msgs::AdcCube broken = toMsg(frame(1), hash_);
   broken.samples.resize(7);
   cubes_.publish(broken);
-  mmradartwin_msgs::RadarConfig nonsense = toMsg(radar_);
-  nonsense.slope_hz_per_s = -1;
-  config_.publish(nonsense);
+  ASSERT_TRUE(hearsTheLog());
   mmradartwin_msgs::ReceiveGrid grid;
   grid.channels = 3;
   twin_.publish(grid);
-  ros::WallDuration(0.2).sleep();
+  twin_.publish(toMsg(twinGrid(stamp(0)), hash_));
+  ASSERT_TRUE(twin_maps_.wait(1));
+  EXPECT_EQ(twin_maps_.messages[0]->header.stamp, stamp(0));
   send(2);
   ASSERT_TRUE(grids_.wait(1));
   EXPECT_EQ(grids_.messages[0]->header.stamp, stamp(2));
@@ -277,12 +323,7 @@ TEST_F(SignalChainNodeTest, BeginsAnewWhenStampsGoBack) {
 }
 
 TEST_F(SignalChainNodeTest, TwinGridsGoThroughTheSameChain) {
-  ReceiveGrid grid;
-  grid.stamp_ns = toNanoseconds(stamp(0));
-  grid.source = Branch::kSimulated;
-  grid.full_scale = 1;
-  grid.frames = 1;
-  grid.x = pointTarget(radar_, 4.0, -0.4, 1e-4);
+  const ReceiveGrid grid = twinGrid(stamp(0));
   twin_.publish(toMsg(grid, hash_));
   ASSERT_TRUE(twin_maps_.wait(1));
   const RangeAngleMap map = fromMsg(*twin_maps_.messages[0]);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks who includes whom: packages, libraries without ROS, and the rooms of a package (its folders of sources).
+"""Checks who includes whom: packages, libraries without ROS, the rooms of a package (its folders of sources), and circles.
 
 Prints every forbidden include and exits with 1 where there is one. --levels prints the height of the include graph."""
 import argparse
@@ -25,6 +25,27 @@ ROS_HEADERS = re.compile(
 # Rooms of a folder and the rooms that each may include, with all that those may include; a room sees no other. Files
 # beside the rooms see all and are seen by none, rooms.h apart, which tells the compiler the same of the namespaces.
 ROOMS = {
+    "mmradartwin_sim/src": {
+        "scene": set(),
+        "records": {"scene"},
+        "rays": {"records"},
+        "physics": {"rays"},
+        "stages": {"physics"},
+        "mechanisms": {"stages"},
+        "twin": {"stages"},
+        "room": {"rays"},
+        "ros": {"twin", "room"},
+    },
+    "mmradartwin_sim/src/mechanisms": {
+        "base": set(),
+        "scene": {"base"},
+        "mounting": {"base"},
+        "propagation": {"base"},
+        "array": {"base"},
+        "receiver": {"base"},
+        "frames": {"base"},
+        "empirical": {"base"},
+    },
     "mmradartwin_attribution/src/diagnosis": {
         "catalogue": set(),
         "numbers": {"catalogue"},
@@ -39,6 +60,13 @@ ROOMS = {
         "rounds": {"receiver", "search", "gain"},
         "report": {"catalogue"},
     },
+}
+
+# Folders of public headers that have no source there.
+HEADERS_WITHOUT_SOURCE = {
+    "mmradartwin_sim/include/mmradartwin_sim/mechanism.h": "mmradartwin_sim/src/stages",
+    "mmradartwin_sim/include/mmradartwin_sim/mechanism_stages.h": "mmradartwin_sim/src/stages",
+    "mmradartwin_sim/include/mmradartwin_sim/register_mechanism.h": "mmradartwin_sim/src/stages",
 }
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]', re.MULTILINE)
@@ -99,12 +127,21 @@ class Sources:
     def unit(self, file):
         """Header and source of one name are one unit, that of the source where it has one."""
         package, stem = file.split("/")[0], Path(file).stem
+        if file in HEADERS_WITHOUT_SOURCE:
+            return f"{HEADERS_WITHOUT_SOURCE[file]}/{stem}"
         if file.startswith(f"{package}/include/"):
             ros = "/ros/" in file
             for source in self.includes:
                 if source.startswith(f"{package}/src/") and Path(source).stem == stem and ("/ros/" in source) == ros:
                     return source.rsplit(".", 1)[0]
         return file.rsplit(".", 1)[0]
+
+
+    def library_arrows(self):
+        """(unit, included unit) of all includes among the packages' libraries."""
+        library = {file for file in self.includes if file.split("/")[1] in ("include", "src")}
+        arrows = {(self.unit(a), self.unit(b)) for a, b in self.arrows() if a in library and b in library}
+        return {(a, b) for a, b in arrows if a != b}
 
 
 def check_packages(sources):
@@ -134,19 +171,16 @@ def check_rooms(sources, folder, table):
         yield f"{folder}/{room}: is a room that the table does not have"
     for room in sorted(set(table) - found):
         yield f"{folder}/{room}: is in the table and has no files"
+    if folder.endswith("/src"):
+        for file in sorted(sources.includes):
+            if file.startswith(folder[:-len("src")] + "include/") and room_of(file) is None:
+                yield f"{file}: is a public header of no room; name its folder in HEADERS_WITHOUT_SOURCE"
     for file, target in sources.arrows():
         room, other = room_of(file), room_of(target)
         if not room or other is None or other == room or target == f"{folder}/rooms.h":
             continue
         if other == TOP or other not in table.get(room, ()):
             yield f"{file}: includes {target}; {room} may not see {other or 'the files beside the rooms'}"
-
-
-def check(sources):
-    problems = list(check_packages(sources))
-    for folder, table in ROOMS.items():
-        problems += check_rooms(sources, folder, table)
-    return problems
 
 
 def levels(units, arrows):
@@ -183,16 +217,30 @@ def levels(units, arrows):
     return height, [members for members in order if len(members) > 1]
 
 
+def check_circles(sources):
+    arrows = sources.library_arrows()
+    _, circles = levels(sorted({unit for arrow in arrows for unit in arrow}), arrows)
+    for circle in circles:
+        yield f"{min(circle)}: includes itself in a circle of {', '.join(sorted(circle))}"
+
+
+def check(sources):
+    problems = list(check_packages(sources))
+    for folder, table in ROOMS.items():
+        problems += check_rooms(sources, folder, table)
+    return problems + list(check_circles(sources))
+
+
 def print_levels(sources):
     parts = [f"{package}/{part}/" for package in PACKAGES for part in ("include", "src")]
     code = [file for file in sources.includes if file.startswith(tuple(parts))]
     folders = [*PACKAGES, *ROOMS]
+    all_arrows = sources.library_arrows()
     print("folder  units  levels  arrows  circles")
     for folder in folders:
         units = sorted({sources.unit(file) for file in code if sources.unit(file).startswith(folder + "/")})
         inside = set(units)
-        arrows = {(sources.unit(a), sources.unit(b)) for a, b in sources.arrows() if a in code and b in code}
-        arrows = {(a, b) for a, b in arrows if a in inside and b in inside and a != b}
+        arrows = {(a, b) for a, b in all_arrows if a in inside and b in inside}
         height, circles = levels(units, arrows)
         print(f"{folder}  {len(units)}  {max(height.values(), default=0)}  {len(arrows)}  {len(circles)}")
         for circle in circles:

@@ -11,6 +11,9 @@ PROGRAM = HERE.parent / "scripts" / "check_includes.py"
 DIAGNOSIS = "mmradartwin_attribution/src/diagnosis"
 ROOM_NAMES = ("catalogue", "numbers", "frames", "channels", "likelihood", "hypotheses", "fit", "receiver", "search", "gain",
               "rounds", "report")
+SIM = "mmradartwin_sim/src"
+SIM_ROOM_NAMES = ("scene", "records", "rays", "physics", "stages", "twin", "room", "ros")
+MECHANISM_ROOM_NAMES = ("base", "scene", "mounting", "propagation", "array", "receiver", "frames", "empirical")
 
 
 class CheckIncludes(unittest.TestCase):
@@ -21,6 +24,10 @@ class CheckIncludes(unittest.TestCase):
         for room in ROOM_NAMES:
             self.write(f"{DIAGNOSIS}/{room}/{room}_unit.h", "<vector>")
         self.write(f"{DIAGNOSIS}/rooms.h")
+        for room in SIM_ROOM_NAMES:
+            self.write(f"{SIM}/{room}/{room}_unit.h", "<vector>")
+        for room in MECHANISM_ROOM_NAMES:
+            self.write(f"{SIM}/mechanisms/{room}/{room}_mechanism.h", "<vector>")
         self.write("mmradartwin_dsp/include/mmradartwin_dsp/session.h", "<string>")
         self.write("mmradartwin_dsp/include/mmradartwin_dsp/ros/bag.h", "<rosbag/bag.h>", '"mmradartwin_dsp/session.h"')
 
@@ -75,12 +82,62 @@ class CheckIncludes(unittest.TestCase):
         self.write(file, '"mmradartwin_attribution/plan.h"')
         self.assert_forbidden(file, "channels may not see rounds")
 
+    def test_twin_and_mechanisms_meet_in_the_stages_alone(self):
+        twin, mechanism = f"{SIM}/twin/twin.cpp", f"{SIM}/mechanisms/array/coupling.cpp"
+        self.write(twin, '"stages/stages_unit.h"', '"rays/rays_unit.h"')
+        self.write(mechanism, '"stages/stages_unit.h"', '"physics/physics_unit.h"', '"mechanisms/base/base_mechanism.h"')
+        self.assert_allowed()
+        self.write(twin, '"mechanisms/base/base_mechanism.h"')
+        self.assert_forbidden(twin, "twin may not see mechanisms")
+        self.write(twin)
+        self.write(mechanism, '"twin/twin_unit.h"')
+        self.assert_forbidden(mechanism, "mechanisms may not see twin")
+
+    def test_scene_may_not_include_what_is_computed_in_it(self):
+        file = f"{SIM}/scene/facet_builder.cpp"
+        for room in ("records", "rays", "physics"):
+            with self.subTest(room):
+                self.write(file, f'"{room}/{room}_unit.h"')
+                self.assert_forbidden(file, f"scene may not see {room}")
+
+    def test_mechanism_may_not_include_one_of_another_kind(self):
+        file = f"{SIM}/mechanisms/frames/noise.cpp"
+        self.write(file, '"mechanisms/array/array_mechanism.h"')
+        self.assert_forbidden(file, "frames may not see array")
+
+    def test_public_header_without_source_has_the_room_that_the_table_says(self):
+        self.write("mmradartwin_sim/include/mmradartwin_sim/mechanism_stages.h", "<vector>")
+        self.write(f"{SIM}/twin/twin.cpp", '"mmradartwin_sim/mechanism_stages.h"')
+        self.assert_allowed()
+        file = f"{SIM}/physics/aperture.cpp"
+        self.write(file, '"mmradartwin_sim/mechanism_stages.h"')
+        self.assert_forbidden(file, "physics may not see stages")
+
+    def test_public_header_of_no_room_is_told(self):
+        file = "mmradartwin_sim/include/mmradartwin_sim/attic.h"
+        self.write(file, "<vector>")
+        self.assert_forbidden(file, "of no room")
+        self.write(f"{SIM}/twin/attic.cpp", '"mmradartwin_sim/attic.h"')
+        self.assert_allowed()
+
+    def test_circle_of_units_is_told(self):
+        src = "mmradartwin_driver/src"
+        self.write(f"{src}/rig.h")
+        self.write(f"{src}/rig.cpp", '"rig.h"', '"watch.h"')
+        self.write(f"{src}/watch.h", '"clock.h"')
+        self.write(f"{src}/clock.h")
+        self.assert_allowed()
+        # No file includes itself: the circle is of headers with their sources.
+        self.write(f"{src}/clock.cpp", '"clock.h"', '"rig.h"')
+        self.assert_forbidden(f"{src}/clock", "in a circle", f"{src}/clock, {src}/rig, {src}/watch")
+
     def test_unknown_room_is_told(self):
         self.write(f"{DIAGNOSIS}/attic/old.cpp", "<vector>")
         self.assert_forbidden(f"{DIAGNOSIS}/attic", "the table does not have")
 
     def test_package_may_not_include_one_that_depends_on_it(self):
         self.write("mmradartwin_sim/include/mmradartwin_sim/twin.h", "<vector>")
+        self.write(f"{SIM}/twin/twin.cpp", '"mmradartwin_sim/twin.h"')
         file = "mmradartwin_dsp/apps/process.cpp"
         self.write(file, '"mmradartwin_sim/twin.h"')
         self.assert_forbidden(file, "mmradartwin_dsp does not depend on mmradartwin_sim")

@@ -73,6 +73,12 @@ class MadeFolders(Summary):
         self.assertEqual(self.summarise("--status", "8"),
                          (1, ["failed: ctest itself: it ended with status 8", "1 passed, 1 failed, 0 skipped"]))
 
+    def test_a_step_beside_ctest_is_a_case(self):
+        self.write_suite("good", "")
+        self.assertEqual(self.summarise("--step", "core=0"), (0, ["2 passed, 0 failed, 0 skipped"]))
+        self.assertEqual(self.summarise("--step", "core=2", "--step", "other=0"),
+                         (1, ["failed: step core: it ended with status 2", "2 passed, 1 failed, 0 skipped"]))
+
 
 @unittest.skipIf(shutil.which("ctest") is None, "ctest is not here")
 class RealRun(Summary):

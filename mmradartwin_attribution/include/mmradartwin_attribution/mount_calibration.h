@@ -4,24 +4,15 @@
 #include <array>
 #include <functional>
 #include <opencv2/core.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "mmradartwin_attribution/calibration_target.h"
+#include "mmradartwin_attribution/mount_calibration_options.h"
 #include "mmradartwin_dsp/session.h"
-#include "mmradartwin_sim/scene.h"
 #include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
-
-/// A target that the radar was held in front of: a corner reflector at a known place, or a wall of the scene.
-struct CalibrationTarget {
-  std::optional<Eigen::Vector3d> reflector_map_m;
-  std::vector<Facet> wall;  ///< the actor's facets that reflect; the nearest faced one counts at each pose
-  std::string name;
-};
-/// The facets of an actor of the scene. Throws InputError for an unknown actor or one without upright surfaces.
-CalibrationTarget wallTarget(const Scene& scene, const std::string& actor);
 
 /// Distance from the radar's origin to the target, as a laser meter gave it (to a wall: perpendicular).
 struct LaserDistance {
@@ -30,16 +21,6 @@ struct LaserDistance {
 };
 /// Reads CSV `pose,distance_m`. Throws InputError (unknown header, no number, pose given twice).
 std::vector<LaserDistance> readLaserDistances(const std::string& file);
-
-struct MountCalibrationOptions {
-  double search_m = 0.4;            ///< the target's echo is looked for within this of where the pose puts it
-  double search_rad = 0.44;         ///< greatest yaw of the mount that is looked for, to either side
-  double min_level_db = 12;         ///< of the target's echo over the pose's median range bin
-  double max_azimuth_rad = 1.05;    ///< poses that hold the target further off boresight are left out
-  double most_other_db = -20;       ///< echoes of other things in a wall's range cell, by the scene, against the wall's
-  double most_beside_db = -6;       ///< those beside it, within search_m
-  double max_laser_error_m = 0.02;  ///< between a laser's distance and the pose's, a common mount offset apart
-};
 
 /// A value with its 95 % interval. Values that the poses do not fix are 0 and say so.
 struct CalibratedValue {

@@ -13,6 +13,7 @@
 #include <unsupported/Eigen/NumericalDiff>
 
 #include "mmradartwin_dsp/average_pose.h"
+#include "mmradartwin_dsp/csv_reader.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "target_echo.h"
 
@@ -411,52 +412,23 @@ void fillErrors(const Residuals& residuals, const VectorXd& p, int after, const 
 
 }  // namespace
 
-CalibrationTarget wallTarget(const Scene& scene, const std::string& actor) {
-  const int index = scene.actorIndex(actor);
-  if (index < 0) {
-    std::string known;
-    for (const Actor& a : scene.actors) known += (known.empty() ? "" : ", ") + a.name;
-    throw InputError(scene.file + ": has no actor '" + actor + "'; it has " + known);
-  }
-  CalibrationTarget target;
-  target.name = actor;
-  for (int id : scene.actors[static_cast<std::size_t>(index)].facets) {
-    if (scene.facets[static_cast<std::size_t>(id)].reflects)
-      target.wall.push_back(scene.facets[static_cast<std::size_t>(id)]);
-  }
-  if (target.wall.empty())
-    throw InputError(scene.file + ": actor '" + actor + "' has no upright surface to calibrate on");
-  return target;
-}
-
 std::vector<LaserDistance> readLaserDistances(const std::string& file) {
   std::ifstream in(file);
   if (!in) throw InputError(file + ": cannot be read; give a CSV file pose,distance_m");
+  std::ostringstream text;
+  text << in.rdbuf();
+  CsvReader reader(text.str(), file);
+  reader.requireColumns("pose,distance_m");
   std::vector<LaserDistance> distances;
   std::set<std::string> seen;
-  std::string line;
-  for (int number = 1; std::getline(in, line); ++number) {
-    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
-    const std::string where = file + ": line " + std::to_string(number) + ": ";
-    if (number == 1) {
-      if (line != "pose,distance_m") throw InputError(where + "'" + line + "' must be pose,distance_m");
-      continue;
+  while (reader.next()) {
+    const std::string& pose = reader.fields()[0];
+    const double distance_m = reader.number(1);
+    if (!(distance_m > 0 && distance_m < 1000)) {
+      throw reader.error("distance_m " + reader.fields()[1] + " is no distance of 0 to 1000 m");
     }
-    if (line.empty()) continue;
-    const std::size_t comma = line.find(',');
-    std::size_t end = 0;
-    double value = 0;
-    try {
-      value = std::stod(line.substr(comma == std::string::npos ? line.size() : comma + 1), &end);
-    } catch (const std::exception&) {
-      end = 0;
-    }
-    if (comma == std::string::npos || end == 0 || comma + 1 + end != line.size() || !(value > 0 && value < 1000)) {
-      throw InputError(where + "'" + line + "' is no pose and distance in metres (0 to 1000)");
-    }
-    const std::string pose = line.substr(0, comma);
-    if (!seen.insert(pose).second) throw InputError(where + "pose '" + pose + "' stands twice");
-    distances.push_back({pose, value});
+    if (!seen.insert(pose).second) throw reader.error("pose '" + pose + "' stands twice");
+    distances.push_back({pose, distance_m});
   }
   return distances;
 }

@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "mmradartwin_attribution/mount_calibration.h"
+#include "mmradartwin_attribution/calibration_target.h"
+#include "mmradartwin_attribution/mount_calibration_options.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
 #include "mmradartwin_sim/twin.h"

@@ -138,7 +138,7 @@ void DiagnosisRun::compareTwins() {
   rounds_.takeRangeErrors(state_);
   for (const TwinDescription& other : context_.options.compared) {
     context_.echoes.setBaseline(mechanisms_);  // each from where the twin as given stands
-    ModelState state = context_.fitter.state(other.mechanisms, &state_.nuisance);
+    ModelState state = context_.fitter.state(other.mechanisms, &state_.latents);
     rounds_.takeRangeErrors(state);
     const auto [low, high] = *likelihoodGain(data_, state_.by_pose, state.by_pose).difference_ci95;
     const double poses = static_cast<double>(data_.poses.size());

@@ -1,11 +1,12 @@
 #include "mmradartwin_attribution/ros/conversions.h"
 
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <mutex>
 #include <set>
+#include <string_view>
 
+#include "ledger_fields.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 
@@ -111,18 +112,26 @@ mmradartwin_msgs::Residuals toMsg(const EvaluationField& field, const PoseAttrib
   return msg;
 }
 
-// The message's field of each metric, in the order of kResidualMetrics.
-constexpr double mmradartwin_msgs::Ledger::*kLedgerFields[] = {
-    &mmradartwin_msgs::Ledger::recall,    &mmradartwin_msgs::Ledger::q3_median_db,
-    &mmradartwin_msgs::Ledger::q3_iqr_db, &mmradartwin_msgs::Ledger::q1_energy,
-    &mmradartwin_msgs::Ledger::q2_energy, &mmradartwin_msgs::Ledger::q4_mae_db};
-static_assert(std::size(kLedgerFields) == std::size(kResidualMetrics), "Ledger.msg needs a field for each metric");
+constexpr double mmradartwin_msgs::Ledger::*fieldOf(std::string_view metric) {
+  for (const LedgerField& field : kLedgerFields) {
+    if (field.name == metric) return field.member;
+  }
+  return nullptr;
+}
+
+constexpr bool everyMetricHasAField() {
+  for (const ResidualMetric& metric : kResidualMetrics) {
+    if (fieldOf(metric.name) == nullptr) return false;
+  }
+  return true;
+}
+static_assert(everyMetricHasAField(), "Ledger.msg needs a float64 of the name of each residual metric");
 
 mmradartwin_msgs::Ledger toMsg(const LedgerSummary& s, const std::vector<std::string>& duplicates) {
   mmradartwin_msgs::Ledger msg;
   msg.poses = static_cast<std::uint32_t>(s.poses);
   msg.excluded_duplicates = duplicates;
-  for (std::size_t i = 0; i < std::size(kResidualMetrics); ++i) msg.*kLedgerFields[i] = s.*kResidualMetrics[i].member;
+  for (const ResidualMetric& metric : kResidualMetrics) msg.*fieldOf(metric.name) = s.*metric.member;
   msg.recall_near = s.recall_band[0];
   msg.recall_mid = s.recall_band[1];
   msg.recall_far = s.recall_band[2];

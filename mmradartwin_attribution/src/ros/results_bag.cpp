@@ -1,6 +1,7 @@
 #include "mmradartwin_attribution/ros/results_bag.h"
 
 #include <rosbag/bag.h>
+#include <tf2_eigen/tf2_eigen.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <mutex>
@@ -60,14 +61,9 @@ void ResultsBag::add(const PoseResult& pose) {
   auto residuals = toMsg(impl_->field, pose.attribution, pose.pose.name, pose.pose.T_map_radar);
   residuals.header.frame_id = "radar_link";
   residuals.header.stamp = impl_->time(pose.index);
-  geometry_msgs::TransformStamped transform;
+  geometry_msgs::TransformStamped transform = tf2::eigenToTransform(pose.pose.T_map_radar);
   transform.header.frame_id = "map";
   transform.child_frame_id = "radar_link";
-  const geometry_msgs::Pose place = toMsg(pose.pose.T_map_radar);
-  transform.transform.translation.x = place.position.x;
-  transform.transform.translation.y = place.position.y;
-  transform.transform.translation.z = place.position.z;
-  transform.transform.rotation = place.orientation;
 
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   for (double after_s = 0; after_s < kSecondsPerPose; after_s += 0.5) {

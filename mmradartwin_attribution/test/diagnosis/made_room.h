@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/fit/hypothesis_fit.h"
+#include "diagnosis/fit/hypothesis_fitter.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/likelihood/clutter_field.h"
 #include "diagnosis/likelihood/expected_echoes.h"

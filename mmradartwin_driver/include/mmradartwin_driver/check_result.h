@@ -4,7 +4,7 @@
 
 namespace mmradartwin {
 
-/// What one look at the rig found.
+/// Result of one check of the rig.
 struct CheckResult {
   enum class Level { kFine, kNote, kProblem };
   Level level = Level::kFine;

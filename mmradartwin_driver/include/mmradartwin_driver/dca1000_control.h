@@ -14,36 +14,36 @@
 
 namespace mmradartwin {
 
-/// The command port. Replies are matched by command code; status datagrams that come in between are kept and handed out
-/// by takeStatus(). One thread at a time.
+/// Command port of the card. Replies are matched by command code. Status datagrams that arrive between them are kept
+/// for takeStatus(). One thread at a time.
 class Dca1000Control {
  public:
   struct Options {
     std::chrono::milliseconds reply_timeout{300};
     int attempts = 3;
-    std::chrono::milliseconds deaf_limit{5000};  ///< after CONFIG_FPGA_GEN the card does not listen for a while
+    std::chrono::milliseconds deaf_limit{5000};  ///< after CONFIG_FPGA_GEN the card does not answer for a while
   };
 
   /// Binds host_ip:port, talks to card_ip:port. Throws RigError, InputError.
   Dca1000Control(const std::string& host_ip, const std::string& card_ip, std::uint16_t port);
   Dca1000Control(const std::string& host_ip, const std::string& card_ip, std::uint16_t port, const Options& options);
 
-  // Each throws RigError where the card does not answer after all attempts or answers that it failed.
-  void connect();  ///< SYSTEM_CONNECT: is it there?
+  // Each command throws RigError where the card does not answer after all attempts, or answers that it failed.
+  void connect();  ///< SYSTEM_CONNECT: checks that the card answers
   bool answers();  ///< connect() once, without an exception
   void resetFpga();
   void resetRadar();
   FpgaVersion readVersion();
-  /// Sets lanes and format, then asks until the card listens again.
+  /// Sets lanes and format, then waits until the card answers again.
   void configureFpga(int lanes);
   void configurePackets(double delay_us, std::uint16_t packet_bytes = 1470);
   void startRecord();
   void stopRecord();
 
-  /// From now on `tap` sees every command and every datagram that the card answers with.
+  /// `tap` receives every later command and every datagram that the card answers with.
   void setTap(DatagramTap tap) { tap_ = std::move(tap); }
 
-  /// Next status datagram, waiting up to the given time for one.
+  /// Next status datagram; waits for one up to the given time.
   std::optional<std::uint16_t> takeStatus(std::chrono::milliseconds wait);
 
  private:

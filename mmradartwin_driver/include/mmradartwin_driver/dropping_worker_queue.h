@@ -12,9 +12,9 @@
 
 namespace mmradartwin {
 
-/// Hands values from one thread to another that may stall, in order and without a lock: the giver never waits. What
-/// comes while `capacity` values wait is dropped and counted. The taker is a thread of this object, which ends after it
-/// has delivered everything.
+/// Queue from one thread to another that may stall: in order, without a lock, and without waiting for the giver. Values
+/// are dropped and counted while `capacity` values wait. The taker is a thread of this object, which ends after it has
+/// delivered everything.
 template <typename T>
 class DroppingWorkerQueue {
  public:
@@ -31,13 +31,13 @@ class DroppingWorkerQueue {
   DroppingWorkerQueue(const DroppingWorkerQueue&) = delete;
   DroppingWorkerQueue& operator=(const DroppingWorkerQueue&) = delete;
 
-  /// From one thread only. False where the value was dropped.
+  /// Adds a value; from one thread only. False where the value was dropped.
   bool give(T&& value) {
     if (!queue_.push(std::move(value))) {
       dropped_.fetch_add(1, std::memory_order_relaxed);
       return false;
     }
-    sem_post(&waiting_);  // takes no lock either
+    sem_post(&waiting_);  // takes no lock
     return true;
   }
   std::uint64_t dropped() const { return dropped_.load(std::memory_order_relaxed); }

@@ -38,15 +38,15 @@ class FrameAssembler {
   };
   struct Counters {
     std::uint64_t packets = 0;
-    std::uint64_t bytes = 0;       ///< that found their place
-    std::uint64_t lost_bytes = 0;  ///< in frames that are over, those never received included
+    std::uint64_t bytes = 0;       ///< placed in frames
+    std::uint64_t lost_bytes = 0;  ///< in finished frames, those never received included
     std::uint64_t duplicate_packets = 0;
-    std::uint64_t late_packets = 0;       ///< wholly or in part for frames already handed out
+    std::uint64_t late_packets = 0;       ///< entirely or partly for frames already handed out
     std::uint64_t reordered_packets = 0;  ///< behind the newest byte, but in time
-    std::uint64_t rejected_packets = 0;   ///< fitted no count, and nothing continued them
+    std::uint64_t rejected_packets = 0;   ///< did not fit the count, and no later packet continued them
     std::uint64_t frames = 0;             ///< handed out
     std::uint64_t incomplete_frames = 0;  ///< of these
-    std::uint64_t missing_frames = 0;     ///< of which nothing came before later data
+    std::uint64_t missing_frames = 0;     ///< without any byte before later data
     std::uint64_t epochs = 1;             ///< restarts + 1
   };
   using Output = std::function<void(AdcCube&&)>;
@@ -55,13 +55,14 @@ class FrameAssembler {
   FrameAssembler(const RadarConfig& radar, Output output, const Options& options);
 
   void add(const DataPacket& packet);
-  /// Hands out whatever has begun. Packets may follow; those for frames handed out here are late.
+  /// Hands out all frames that have begun. Packets may follow; those for frames handed out here are late.
   void flush();
-  /// A recording has been armed: what is open ends, the next packet counts from byte 0 and frame 0.
+  /// Begins a new recording, after the card was armed: open frames end, and the next packet counts from byte 0 and
+  /// frame 0.
   void restart();
 
   const Counters& counters() const { return counters_; }
-  /// Data of a frame arrived that has not been handed out.
+  /// True where data of a frame have arrived that has not been handed out.
   bool open() const { return next_byte_ > base_frame_ * frame_bytes_ || !suspects_.empty(); }
 
  private:
@@ -73,8 +74,8 @@ class FrameAssembler {
     std::vector<std::uint8_t> bytes;
     std::vector<Interval> received;  ///< sorted, disjoint, not touching
     std::size_t received_bytes = 0;
-    std::optional<std::int64_t> observed_start_ns;  ///< by the packet with the frame's first byte
-    std::int64_t rough_start_ns = 0;                ///< by the first packet that brought anything
+    std::optional<std::int64_t> observed_start_ns;  ///< from the packet with the frame's first byte
+    std::int64_t rough_start_ns = 0;                ///< from the first packet with any byte of the frame
   };
   struct Suspect {
     std::uint32_t sequence;
@@ -83,7 +84,7 @@ class FrameAssembler {
     bool ahead;
     std::vector<std::uint8_t> payload;
   };
-  /// What is kept of a packet to recognise a copy of it.
+  /// Properties of a packet by which a copy of it is recognised.
   struct Fingerprint {
     std::uint32_t sequence = 0;
     std::uint64_t byte_count = 0;

@@ -30,8 +30,8 @@ class FrameClock {
  public:
   explicit FrameClock(const RadarConfig& radar, double drift = 1e-4);
 
-  /// Start of frame `frame` as a packet tells it that ended with byte `last_byte` (both counted from the recording's
-  /// first) and arrived at `stamp_ns`.
+  /// Start of frame `frame` by a packet that ended with byte `last_byte` (both counted from the recording's start) and
+  /// arrived at `stamp_ns`.
   std::int64_t startFromPacket(std::uint64_t frame, std::uint64_t last_byte, std::int64_t stamp_ns) const;
 
   /// Takes an observed start and returns the stamp for this frame. Frames come in ascending order.
@@ -45,9 +45,9 @@ class FrameClock {
  private:
   struct Observation {
     std::uint64_t frame;
-    double late_ns;  ///< against frames at the nominal period from the first observation on
+    double late_ns;  ///< relative to frames at the nominal period from the first observation on
   };
-  /// The line's value at a frame, in the same terms; nothing while it rests on too little.
+  /// The line's value at a frame, in the same terms; nothing while it rests on too few observations.
   std::optional<double> fittedLate_ns(std::uint64_t frame) const;
   std::uint64_t frame_bytes_, chirp_bytes_;
   double period_ns_, chirp_ns_, sampled_ns_, drift_;

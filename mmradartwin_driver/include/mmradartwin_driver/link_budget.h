@@ -7,13 +7,13 @@
 
 namespace mmradartwin {
 
-/// Payload of a full packet, as every card seen sends it.
+/// Payload of a full packet, as cards send it.
 constexpr double kFullPayloadBytes = 1456;
 /// Shortest packet delay that TI gives a throughput for (SPRUIJ4A, table 19).
 constexpr double kShortestDelay_us = 5;
 
-/// What a radar's samples ask of the way from its LVDS lanes to this host, and what that way carries. Rates are of
-/// sample bytes only, averaged over a frame: the card's memory evens out what lies within one.
+/// Rates that a radar's samples need from its LVDS lanes to this host, and that this link carries. Rates count sample
+/// bytes only, averaged over a frame: the card's memory smooths variations within a frame.
 struct LinkBudget {
   double delay_us = 0;               ///< between packets
   double needed_bit_per_s = 0;       ///< bytes_per_frame / frame_period
@@ -25,14 +25,14 @@ struct LinkBudget {
   double share() const { return needed_bit_per_s / carried_bit_per_s(); }
 };
 
-/// `lane_bit_per_s`: of one LVDS lane, 600 Mbit/s as the AWR2243 is configured.
+/// lane_bit_per_s: rate of one LVDS lane, 600 Mbit/s as the AWR2243 is configured.
 LinkBudget linkBudget(const RadarConfig& radar, double delay_us, double lane_bit_per_s = 600e6);
 
-/// Throws InputError where the samples cannot come through: names the rates, and the frame period, the samples per
-/// chirp, the loops and the packet delay (us and the card's ticks) that would fit, as far as there are such.
+/// Throws InputError where the link cannot carry the samples. The message names the rates, and the frame period,
+/// samples per chirp, loops and packet delay (us and ticks of the card) that would fit, where they exist.
 void checkLinkBudget(const RadarConfig& radar, double delay_us, double lane_bit_per_s = 600e6);
 
-/// "0.3 of 325.0 Mbit/s at a packet delay of 25 us".
+/// Summary of a budget, such as "0.3 of 325.0 Mbit/s at a packet delay of 25 us".
 std::string describe(const LinkBudget& link);
 
 }  // namespace mmradartwin

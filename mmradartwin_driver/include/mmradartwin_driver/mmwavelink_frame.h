@@ -17,12 +17,12 @@ namespace mmradartwin {
 constexpr std::size_t kMmwaveLinkSyncBytes = 4;
 constexpr std::size_t kMmwaveLinkHeaderBytes = 12;
 constexpr std::size_t kMmwaveLinkMaxLength = 252;
-/// Of a message that carries a CRC-32: ids and lengths of the sub-blocks included.
+/// Largest payload of a message with a CRC-32, ids and lengths of the sub-blocks included.
 constexpr std::size_t kMmwaveLinkMaxPayload = kMmwaveLinkMaxLength - kMmwaveLinkHeaderBytes - 4;
 
 constexpr std::uint8_t kSyncToRadar[kMmwaveLinkSyncBytes] = {0x34, 0x12, 0x21, 0x43};
 constexpr std::uint8_t kSyncFromRadar[kMmwaveLinkSyncBytes] = {0xBA, 0xDC, 0xCD, 0xAB};
-/// "Clear now, you send": the host's answer to the radar's interrupt, followed by 12 bytes of 0xFF.
+/// The host's answer to the radar's interrupt, followed by 12 bytes of 0xFF: the radar may send.
 constexpr std::uint8_t kClearToSend[kMmwaveLinkSyncBytes] = {0x78, 0x56, 0x65, 0x87};
 
 enum class MmwaveLinkDirection : std::uint8_t { kToFrontEnd = 1, kFromFrontEnd = 2, kToMain = 5, kFromMain = 6 };
@@ -60,19 +60,20 @@ struct MmwaveLinkHeader {
 std::uint16_t internetChecksum(const std::uint16_t* words, std::size_t count);
 /// CRC-32 of Ethernet and zlib.
 std::uint32_t crc32(const std::uint8_t* bytes, std::size_t size);
-/// CRC-16, polynomial 0x1021, initial value 0xFFFF, not reflected: that of the radar's first events after power-up.
+/// CRC-16 with polynomial 0x1021 and initial value 0xFFFF, not reflected: that of the radar's first events after
+/// power-up.
 std::uint16_t crc16(const std::uint8_t* bytes, std::size_t size);
 
 /// The message's bytes from SYNC to CRC. Throws std::length_error where it does not fit MSGLEN, std::invalid_argument
-/// for a field out of its bits or a CRC-64, which this host never sends.
+/// for a field beyond its bits or for a CRC-64, which this host never sends.
 std::vector<std::uint8_t> encodeMessage(const MmwaveLinkMessage& message);
 
-/// Reads the 12 bytes after SYNC. Empty where checksum or length are wrong: the length cannot be trusted then.
+/// Reads the 12 bytes after SYNC. Nothing where checksum or length are wrong, as the length cannot be trusted then.
 std::optional<MmwaveLinkHeader> decodeHeader(const std::uint8_t* bytes);
 
 struct DecodedMessage {
   std::optional<MmwaveLinkMessage> message;
-  std::string problem;  ///< why there is none
+  std::string problem;  ///< reason where there is no message
 };
 /// Reads a message from its header to its CRC (`size` = MSGLEN bytes, without SYNC).
 DecodedMessage decodeMessage(const std::uint8_t* bytes, std::size_t size);

@@ -10,25 +10,25 @@
 
 namespace mmradartwin {
 
-/// One of the FTDI chip's four ports: A and B have a serial engine (MPSSE), C and D only pins (bit bang).
+/// One of the FTDI chip's four ports. A and B have a serial engine (MPSSE), C and D only pins (bit bang).
 class FtdiChannel {
  public:
   enum class Mode : std::uint8_t { kReset = 0, kBitBang = 1, kMpsse = 2 };
 
   FtdiChannel(UsbTransport& usb, int channel) : usb_(usb), channel_(channel) {}
 
-  /// Resets the port, empties its buffers, and sets the mode; bits of `outputs` are driven in kBitBang.
+  /// Resets the port, empties its buffers, and sets the mode. The pins in `outputs` are driven in kBitBang.
   void open(Mode mode, std::uint8_t outputs);
   void write(const std::vector<std::uint8_t>& bytes);
-  /// Exactly `size` bytes without the chip's status bytes. Throws RigError after `timeout`.
+  /// Reads exactly `size` bytes without the chip's status bytes. Throws RigError after `timeout`.
   std::vector<std::uint8_t> read(std::size_t size, std::chrono::milliseconds timeout = std::chrono::seconds(1));
-  /// Sends a command that no engine knows and waits for the chip to say so; everything before that is thrown away.
-  /// Throws RigError where it does not.
+  /// Synchronises with the chip: sends a command that no engine knows, waits for the chip's error, and discards
+  /// everything before it. Throws RigError where the error does not come.
   void synchronise();
   char name() const { return static_cast<char>('A' + channel_); }
 
  private:
-  /// Moves what the chip has into received_. False after the time-out without a transfer.
+  /// Moves the chip's data into received_. False after the time-out without a transfer.
   bool receive(std::chrono::milliseconds timeout);
 
   UsbTransport& usb_;
@@ -44,17 +44,17 @@ class RadarPort {
   virtual ~RadarPort() = default;
   virtual void setBootMode(BootMode mode) = 0;
   virtual void setReset(bool active) = 0;
-  /// An even number of bytes; each pair is a word, little endian.
+  /// Writes an even number of bytes; each pair is a word, little endian.
   virtual void writeWords(const std::vector<std::uint8_t>& bytes) = 0;
   virtual std::vector<std::uint8_t> readWords(std::size_t words) = 0;
   virtual bool hostInterrupt() = 0;
 };
 
-/// The same through the capture card's FTDI chip: SPI at 10 MHz on port A, one chip-select pulse per word, a message's
-/// words batched in one transfer; HOST_INTR on port B, NRST on C, boot mode on D.
+/// RadarPort through the capture card's FTDI chip. SPI at 10 MHz is on port A, with one chip-select pulse per word and
+/// a message's words in one transfer. HOST_INTR is on port B, NRST on C, the boot mode on D.
 class FtdiRadarPort : public RadarPort {
  public:
-  /// Sets the chip up; leaves the radar's reset and boot mode alone until they are set. Throws RigError.
+  /// Sets the chip up. The radar's reset and boot mode stay unchanged until they are set. Throws RigError.
   explicit FtdiRadarPort(UsbTransport& usb);
 
   void setBootMode(BootMode mode) override;

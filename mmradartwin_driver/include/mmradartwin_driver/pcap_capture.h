@@ -10,29 +10,29 @@
 
 namespace mmradartwin {
 
-/// Something about a frame of a capture that was made from packets.
+/// Flaw in a frame of a capture that was made from packets.
 struct CaptureFlaw {
   std::uint64_t frame = 0;       ///< its index in the capture
   std::uint64_t lost_bytes = 0;  ///< these are zeros in the capture
-  std::vector<int> chirps;       ///< that are not whole
+  std::vector<int> chirps;       ///< that are incomplete
 };
 
 struct PcapCapture {
   std::uint64_t frames = 0;               ///< written
   std::int64_t first_stamp_ns = 0;        ///< start of the first one
-  std::uint64_t before_file = 0;          ///< frames of the recording that was under way when the file begins; left out
+  std::uint64_t before_file = 0;          ///< frames of a recording that had begun before the file; left out
   std::vector<CaptureFlaw> flaws;         ///< in order
   std::uint64_t lost_packets = 0;         ///< by the gaps in their numbers
   std::vector<std::uint64_t> recordings;  ///< index of each recording's first frame
-  std::vector<std::uint64_t> cut_off;     ///< bytes of last frames that ended within, one for each; left out
+  std::vector<std::uint64_t> cut_off;     ///< bytes of each recording's last frame, where it was incomplete; left out
   FrameAssembler::Counters counters;
 };
 
-/// Puts the samples in a pcap together, through the same assembler as those that arrive live, and writes them as a
-/// capture: frames back to back, at their place even where packets are missing (zeros). The card's answer to
-/// RECORD_START, where the file has it, begins a recording, and so does what follows a hole of more than 64 MB. A file
-/// that was begun within a recording gives the frames from its first packet on. Throws InputError: unreadable file, no
-/// packet of samples, packets of several cards of which `source` chooses none, output that cannot be written.
+/// Assembles the samples in a pcap as those that arrive live, and writes them as a capture: consecutive frames at their
+/// positions, with zeros for missing packets. A recording begins with the card's answer to RECORD_START, where the file
+/// has it, and after a hole of more than 64 MB. A file that begins within a recording gives the frames from its first
+/// packet on. Throws InputError: unreadable file, no packet of samples, packets of several cards of which `source`
+/// chooses none, output that cannot be written.
 PcapCapture pcapToCapture(const std::string& pcap, const RadarConfig& radar, const std::string& output,
                           const PcapSource& source = {});
 

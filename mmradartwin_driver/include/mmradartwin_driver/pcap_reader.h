@@ -9,7 +9,7 @@
 
 namespace mmradartwin {
 
-/// Whose traffic is wanted of a packet capture (pcap or pcapng; Ethernet, Linux "any" or raw IP) of DCA1000s.
+/// The wanted traffic in a packet capture (pcap or pcapng; Ethernet, Linux "any" or raw IP) of DCA1000s.
 struct PcapSource {
   std::uint16_t config = kDca1000ConfigPort;
   std::uint16_t data = kDca1000DataPort;
@@ -26,8 +26,8 @@ struct PcapCounters {
   std::uint64_t other = 0;  ///< not UDP over IPv4 to one of the two ports, fragments, malformed, of another card
   std::map<std::string, std::uint64_t> data_of_card;  ///< packets of samples by the address that sent them
 };
-/// Reads the whole file in its order. Where no card is chosen, the one that sends samples first is visited. Throws
-/// InputError: no such file, no capture, no such address, cut short (after visiting what is whole).
+/// Reads the whole file in order. Where no card is chosen, only the one that sends samples first is visited. Throws
+/// InputError: no such file, no packet capture, no IPv4 address, truncated file (after visiting all complete packets).
 PcapCounters readPcap(const std::string& file, const PcapVisitor& visitor, const PcapSource& source = {});
 
 /// Throws InputError where the file has no samples that were asked for, or those of several cards and none was chosen

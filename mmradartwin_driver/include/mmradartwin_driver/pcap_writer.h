@@ -21,10 +21,11 @@ namespace mmradartwin {
 /// last whole packet, and problem() says so: the rest is for the bag, the logs and whoever makes room.
 class PcapWriter {
  public:
-  /// "{stamp}" in the name becomes the time, as 20250131T235959. Throws InputError: exists already, cannot be written.
+  /// Opens the file. "{stamp}" in the name is replaced by the time, such as 20250131T235959. Throws InputError where
+  /// the file exists already or cannot be written.
   explicit PcapWriter(const std::string& file, std::size_t queue_bytes = 256u << 20,
                       std::uint64_t min_free_bytes = 1u << 30);
-  ~PcapWriter();  ///< writes what waits
+  ~PcapWriter();  ///< writes all waiting datagrams
 
   void add(const Datagram& datagram);
   /// Waits until everything added has been written.
@@ -33,7 +34,7 @@ class PcapWriter {
   const std::string& file() const { return file_; }
   std::uint64_t written() const { return written_; }
   std::uint64_t left_out() const { return left_out_; }
-  /// One line; empty while all is well.
+  /// Problem in one line; empty where there is none.
   std::string problem() const;
 
  private:

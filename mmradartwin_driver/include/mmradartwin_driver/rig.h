@@ -27,22 +27,22 @@ struct RigOptions {
   std::uint16_t config_port = kDca1000ConfigPort;
   std::uint16_t data_port = kDca1000DataPort;
   double packet_delay_us = 25;
-  /// The radar's kind, see radarDevice(). The rig configures such a radar, and starts it whenever the card has been
-  /// armed, so that frames and recording begin together. Without it another program runs the radar.
+  /// Kind of the radar, see radarDevice(). The rig configures this radar and starts it after each arming of the card,
+  /// so that frames and recording begin together. Without a kind another program runs the radar.
   std::optional<RadarDevice> radar;
   std::string radar_firmware;  ///< image for a radar whose flash is empty
-  bool configure_card = true;  ///< false: another program configures and arms it, only the data port is opened
-  std::string record_pcap;     ///< records everything between card and host there; "" = nowhere
-  std::size_t hand_over_bytes = 128u << 20;  ///< of frames that may wait for a slow taker; at least 16 frames do
+  bool configure_card = true;  ///< false: another program configures and arms it; only the data port is opened
+  std::string record_pcap;     ///< file for everything between card and host; "" = none
+  std::size_t hand_over_bytes = 128u << 20;  ///< of frames that may wait for a slow taker; at least 16 frames
   PacketReceiver::Options receiver;
   FrameAssembler::Options assembler;
 };
 
-/// What the rig is doing, for people and diagnostics.
+/// State of the rig, for people and diagnostics.
 struct RigState {
   enum class Phase { kConnecting, kArmed, kStreaming };
   Phase phase = Phase::kConnecting;
-  std::string problem;  ///< one line that says the next thing to do; empty while all is well
+  std::string problem;  ///< one line with the next thing to do; empty where there is none
   std::optional<FpgaVersion> version;
   std::optional<RadarHealth> radar;          ///< where the rig configures it
   std::optional<std::uint16_t> last_status;  ///< of the card, since it was armed
@@ -51,7 +51,7 @@ struct RigState {
   std::size_t buffer_bytes = 0;  ///< of the data socket, as granted
   FrameAssembler::Counters frames;
   PacketReceiver::Counters packets;
-  std::uint64_t frames_not_taken = 0;  ///< dropped because whoever takes the frames was too slow
+  std::uint64_t frames_not_taken = 0;  ///< dropped because the taker of frames was too slow
   std::uint64_t packets_recorded = 0;  ///< in the pcap
   std::uint64_t packets_not_recorded = 0;
 };
@@ -70,8 +70,8 @@ class Rig {
   using CubeSink = std::function<void(AdcCube&&)>;
   using EventSink = std::function<void(Level, const std::string&)>;
 
-  /// Cubes are delivered from one thread, events reported from two others, all the rig's own. Throws InputError for
-  /// options out of range.
+  /// Cubes are delivered from one thread, events are reported from two others; all belong to the rig. Throws InputError
+  /// for options out of range.
   Rig(const RadarConfig& radar, const RigOptions& options, CubeSink cubes, EventSink events);
   ~Rig();  ///< ends the thread and the recording
   RigState state() const;
@@ -83,12 +83,12 @@ class Rig {
   void prepareRadar();
   void configure();
   void arm();
-  /// Receives until the card must be armed anew.
+  /// Receives until the card must be armed again.
   void stream();
-  /// True where the status ended the recording: the card has been stopped.
+  /// Handles a status of the card. True where it ended the recording; the card has then been stopped.
   bool handleStatus(std::uint16_t status);
   bool receiveBatch(int timeout_ms);
-  /// Throws where the radar was started and nothing came.
+  /// Throws RigError where the radar was started and no sample arrived.
   void checkFirstSamples(Clock::duration silent);
   void report(const std::string& problem);
   void setPhase(RigState::Phase phase);

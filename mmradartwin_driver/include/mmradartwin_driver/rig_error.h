@@ -5,8 +5,8 @@
 
 namespace mmradartwin {
 
-/// Something about host, network or card that a person can put right: the message is one line that says what it is and
-/// what to do next. Trying again later is sensible, unlike with InputError.
+/// Problem of host, network or card that a person can solve. The message is one line that says what it is and what to
+/// do next. Trying again later may help, unlike with InputError.
 class RigError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -7,11 +7,12 @@
 
 namespace mmradartwin {
 
-/// A bound IPv4 datagram socket; closes itself. Never connected: the card answers from another port than it listens on.
+/// Bound IPv4 datagram socket that closes itself. It is never connected, as the card answers from another port than it
+/// listens on.
 class UdpSocket {
  public:
-  /// Binds host_ip:port. `purpose` stands in errors ("samples", "commands"). Throws RigError: no such address on this
-  /// host, port in use, not permitted; InputError for an address that is none.
+  /// Binds host_ip:port. purpose: named in errors ("samples", "commands"). Throws RigError (address not of this host,
+  /// port in use, no permission), InputError (invalid address).
   UdpSocket(const std::string& host_ip, std::uint16_t port, const std::string& purpose);
   ~UdpSocket();
   UdpSocket(const UdpSocket&) = delete;
@@ -25,7 +26,7 @@ class UdpSocket {
   int fd_ = -1;
 };
 
-/// Throws InputError where `ip` is no dotted IPv4 address.
+/// IPv4 address of a text. Throws InputError where `ip` is no dotted IPv4 address.
 in_addr parseIpv4(const std::string& ip);
 
 }  // namespace mmradartwin

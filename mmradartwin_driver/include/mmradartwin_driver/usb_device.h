@@ -9,14 +9,14 @@
 
 namespace mmradartwin {
 
-/// What the FTDI chip of the capture card needs of USB. A failed transfer throws RigError.
+/// USB functions that the FTDI chip of the capture card needs. A failed transfer throws RigError.
 class UsbTransport {
  public:
   virtual ~UsbTransport() = default;
   /// Vendor request to the device, without data.
   virtual void vendorRequest(std::uint8_t request, std::uint16_t value, std::uint16_t index) = 0;
   virtual void write(int interface, const std::vector<std::uint8_t>& bytes) = 0;
-  /// One bulk transfer as the chip sends it, its two status bytes per packet included. Empty after the time-out.
+  /// One bulk transfer as the chip sends it, with two status bytes per packet. Empty after the time-out.
   virtual std::vector<std::uint8_t> read(int interface, std::chrono::milliseconds timeout) = 0;
   virtual std::size_t packet_bytes() const = 0;  ///< largest packet of a bulk-in endpoint
 };
@@ -27,8 +27,8 @@ constexpr std::uint16_t kRadarUsbProduct = 0xFD03;
 /// The capture card's RADAR_FTDI port by libusb, its four interfaces claimed.
 class UsbDevice : public UsbTransport {
  public:
-  /// Opens the only such device. Throws RigError that says what to do: not plugged in, several of them, no permission,
-  /// held by another program.
+  /// Opens the only such device. Throws RigError with what to do: not plugged in, several devices, no permission, used
+  /// by another program.
   UsbDevice();
   ~UsbDevice() override;
   UsbDevice(const UsbDevice&) = delete;
@@ -45,7 +45,7 @@ class UsbDevice : public UsbTransport {
   std::size_t packet_bytes_ = 512;
 };
 
-/// What a person can do about libusb's `error` in `action` ("open", "claim interface 0", ...).
+/// Advice on libusb's `error` in `action` ("open", "claim interface 0", ...).
 std::string describeUsbError(int error, const std::string& action);
 
 }  // namespace mmradartwin

@@ -15,20 +15,20 @@ using std::chrono::milliseconds;
 
 constexpr std::uint16_t kErrorBlock = 0x0000;
 constexpr std::uint16_t kCrcError = 9;
-constexpr std::size_t kHuntWords = 64;  ///< how far behind its place SYNC is looked for
+constexpr std::size_t kHuntWords = 64;  ///< distance behind its position up to which SYNC is searched for
 
 bool isFault(std::uint16_t event) {
   return event == awr2243::kFrontEndCpuFault || event == awr2243::kAnalogFault || event == awr2243::kMainCpuFault;
 }
 
-/// The error code where the answer is one: of a refusal, and of a response whose only sub-block has id 0.
+/// Error code of an answer that has one: of a refusal, or of a response whose only sub-block has id 0.
 std::optional<std::uint16_t> errorCode(const MmwaveLinkMessage& answer) {
   for (const SubBlock& block : answer.sub_blocks) {
     if (block.id == kErrorBlock && block.data.size() >= 2) {
       return static_cast<std::uint16_t>(block.data[0] | block.data[1] << 8);
     }
   }
-  // A refusal without a reason: only the CRC can be meant, everything else is answered.
+  // A refusal without a reason concerns the CRC; every other error has a code.
   if (answer.type == MmwaveLinkType::kRefusal) return kCrcError;
   return std::nullopt;
 }
@@ -83,7 +83,7 @@ std::optional<MmwaveLinkMessage> Awr2243Control::receive(Clock::time_point deadl
     DecodedMessage decoded = decodeMessage(bytes.data(), bytes.size());
     if (decoded.message) return std::move(decoded.message);
   } else {
-    // Its length is unknown: what is left of it is read past, so that the next message is met at its start.
+    // The message's length is unknown: the rest of it is read, so that the next message begins at its start.
     port_.readWords((kMmwaveLinkMaxLength - kMmwaveLinkHeaderBytes) / 2);
   }
   garbled_ = true;
@@ -121,7 +121,7 @@ MmwaveLinkMessage Awr2243Control::command(const std::string& step, MmwaveLinkMes
         problem = garbled_ ? "its answers are garbled; check the flat cable between the boards"
                            : "no answer within " + milliseconds_text(limit) +
                                  "; check the board's power and boot-mode jumpers, and switch it off and on";
-        message.retry = true;  // it may have heard the command
+        message.retry = true;  // the radar may have received the command
       } else if (answer->type == MmwaveLinkType::kEvent) {
         dispatch(*answer);
       } else if (answer->sequence != message.sequence) {
@@ -133,7 +133,7 @@ MmwaveLinkMessage Awr2243Control::command(const std::string& step, MmwaveLinkMes
         }
         ++counters_.refusals_for_crc;
         problem = "it received every attempt with a CRC error; check the flat cable between the boards";
-        message.retry = false;  // it did not take the command: this is a new one
+        message.retry = false;  // the radar rejected the command: this is a new one
       } else {
         return *answer;
       }

@@ -1,10 +1,9 @@
-#include "awr2243/awr2243_device.h"
-
 #include <utility>
 
 #include "awr2243/awr2243_control.h"
 #include "awr2243/radar_watch.h"
 #include "awr2243/rig_self_test.h"
+#include "mmradartwin_driver/radar_device.h"
 #include "mmradartwin_driver/rig_error.h"
 
 namespace mmradartwin {

@@ -44,7 +44,7 @@ void Awr2243Link::guarded(Action action) {
   } catch (const RigError&) {
     drop();
     throw;
-  } catch (const InputError& error) {  // found out only at the device, such as firmware that is missing
+  } catch (const InputError& error) {  // an error that only the device shows, such as missing firmware
     drop();
     throw RigError(error.what());
   }

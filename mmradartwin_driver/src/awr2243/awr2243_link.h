@@ -11,28 +11,29 @@
 
 namespace mmradartwin {
 
-/// The AWR2243 as the rig needs it: opened, configured and started on demand, and all of that again after a cable was
-/// pulled or the radar reported a fault. One thread at a time. What fails throws RigError, after which the same call
-/// can be made again.
+/// Connection to an AWR2243 for the rig: opened, configured and started on demand, and again after a cable was pulled
+/// or the radar reported a fault. One thread at a time. A failure throws RigError; the same call may then be made
+/// again.
 class Awr2243Link {
  public:
   using OpenUsb = std::function<std::unique_ptr<UsbTransport>()>;
 
-  /// Reads the firmware image, where `image_file` is not empty. Throws InputError where that cannot be read.
+  /// Reads the firmware image where `image_file` is not empty. Throws InputError where it cannot be read.
   Awr2243Link(const Awr2243Registers& registers, const std::string& image_file, Awr2243Control::EventSink events);
   Awr2243Link(const Awr2243Registers& registers, const std::string& image_file, Awr2243Control::EventSink events,
               const Awr2243Control::Options& options, OpenUsb open_usb);
   ~Awr2243Link();  ///< stops the frames
 
-  /// Opens the USB port and brings the radar up, unless that has been done. Its LVDS clock runs afterwards, which the
+  /// Opens the USB port and brings the radar up, where that has not been done. Its LVDS clock then runs, which the
   /// capture card's FPGA must see before it is configured.
   void prepare();
-  /// Frames run from their first chirp when this returns; those that ran were stopped. The card must be recording.
+  /// Starts frames; they run from their first chirp when this returns. Running frames are stopped first. The card must
+  /// be recording.
   void start();
   void stop();
-  /// Lets go of the radar as it is; the next prepare() brings it up again.
+  /// Releases the radar without changing it; the next prepare() brings it up again.
   void close() { drop(); }
-  /// Delivers events. Throws RigError where the radar reported a fault or is gone.
+  /// Delivers events. Throws RigError where the radar reported a fault or is disconnected.
   void poll();
 
   bool running() const { return running_; }
@@ -40,7 +41,7 @@ class Awr2243Link {
   std::optional<int> temperature_deg_c() const;
 
  private:
-  /// Runs `action`; where it fails everything is closed, so that the next prepare() starts from the cable.
+  /// Runs `action`. Where it fails everything is closed, so that the next prepare() starts from the beginning.
   template <class Action>
   void guarded(Action action);
   void drop();

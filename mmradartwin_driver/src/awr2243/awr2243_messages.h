@@ -14,8 +14,8 @@ namespace mmradartwin {
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "payloads are copied as they lie in memory");
 
-/// The payloads of the radar's sub-blocks, byte by byte as they go out (little endian, without id and length). Fields
-/// without a name here are reserved and zero.
+/// Payloads of the radar's sub-blocks, byte by byte as sent (little endian, without id and length). Unnamed fields are
+/// reserved and zero.
 namespace awr2243 {
 
 struct Channels {
@@ -87,7 +87,7 @@ struct FrameTrigger {
 struct TestTarget {
   std::int16_t position_cm[3] = {}, velocity_cm_per_s[3] = {};
   std::uint16_t level = 0;                      ///< -0.1 dBFS
-  std::int16_t min_cm[3] = {}, max_cm[3] = {};  ///< where the target crosses them it starts again
+  std::int16_t min_cm[3] = {}, max_cm[3] = {};  ///< a target that crosses them starts again
 };
 struct TestSource {
   static constexpr std::uint16_t kId = 0x02C2;
@@ -101,7 +101,7 @@ struct TestSourceEnable {
   static constexpr std::uint16_t kId = 0x02C3;
   std::uint16_t enable = 0, reserved = 0;
 };
-/// Everything zero is the only safe value for the evaluation board: bypassing the regulator can destroy it.
+/// Bypass of the regulators. Only zeros are safe on the evaluation board: bypassing a regulator can destroy it.
 struct RegulatorBypass {
   static constexpr std::uint16_t kId = 0x02CC;
   std::uint16_t bypass = 0;
@@ -195,34 +195,33 @@ SubBlock subBlock(const Payload& payload) {
   return block;
 }
 
-/// The command that carries one sub-block: its message id is the sub-block's id / 32, its direction that of the
+/// Command that carries one sub-block. Its message id is the sub-block's id / 32. Its direction is that of the
 /// processor which owns the id (front end below 0x100, main processor from 0x200).
 MmwaveLinkMessage command(const SubBlock& block);
 
 Channels channels(const Awr2243Registers& registers);
 DataFormat dataFormat(const Awr2243Registers& registers);
 Profile profile(const Awr2243Registers& registers);
-/// One per slot, in the order in which they are sent.
+/// Chirps, one per slot, in the order in which they are sent.
 std::vector<Chirp> chirps(const Awr2243Registers& registers);
 Frame frame(const Awr2243Registers& registers);
 FrameApply frameApply(const Awr2243Registers& registers);
 
-/// The commands that write a firmware image to the radar's flash, in order. The CRC-32 of the image stands at its end:
-/// it is added where `image` does not bring it. Throws InputError for an empty image or one of more chunks than
-/// REMCHUNKS counts.
+/// Commands that write a firmware image to the radar's flash, in order. The image ends with its CRC-32, which is added
+/// where `image` lacks it. Throws InputError for an empty image, or one of more chunks than REMCHUNKS can count.
 std::vector<MmwaveLinkMessage> fileDownload(const std::vector<std::uint8_t>& image, const std::string& name);
 
 /// The image with its CRC-32 at the end.
 std::vector<std::uint8_t> withCrc(std::vector<std::uint8_t> image);
 
-/// One line for people, such as "RF calibration failed: TX power, RX gain (61 deg C)".
+/// Event in one line for people, such as "RF calibration failed: TX power, RX gain (61 deg C)".
 struct EventText {
   using Level = RadarEvent::Level;
   Level level = Level::kInfo;
   std::string text;
 };
 EventText describeEvent(const SubBlock& event);
-/// "invalid data in a sub-block", ... for the error codes of refusals.
+/// Meaning of the error code of a refusal, such as "invalid data in a sub-block".
 std::string describeError(std::uint16_t code);
 
 struct Calibration {
@@ -239,7 +238,7 @@ struct Version {
   std::uint8_t major = 0, minor = 0, build = 0, debug = 0, year = 0, month = 0, day = 0;
   std::string text() const;  ///< "2.2.4.1 (2021-06-30), hardware 5.1.1"
 };
-/// Of kMainVersion or kFrontEndVersion's answer (at least 10 bytes).
+/// Reads the answer of kMainVersion or kFrontEndVersion (at least 10 bytes). False where it is too short.
 bool parseVersion(const SubBlock& answer, Version& version);
 
 }  // namespace awr2243

@@ -43,7 +43,7 @@ class Checker {
     throw InputError(file_ + ": key " + key + ": " + why);
   }
 
-  /// `value` in steps of `step`, rounded to the nearest; both limits are in steps and allowed.
+  /// `value` in steps of `step`, rounded to the nearest. min and max are in steps and inclusive.
   long long steps(const std::string& key, double value, double step, long long min, long long max) const {
     const double count = std::round(value / step);
     if (!(count >= static_cast<double>(min) && count <= static_cast<double>(max))) {
@@ -223,7 +223,7 @@ RadarConfig withQuantisedValues(const RadarConfig& radar, const Awr2243Registers
   RadarConfig quantised = radar;
   quantised.carrier_hz = registers.start_frequency * kAwr2243StartFrequencyStep_hz;
   quantised.slope_hz_per_s = registers.slope * kAwr2243SlopeStep_hz_per_s;
-  // Divided rather than multiplied, so that 600 steps are 6e-06 and not its neighbour.
+  // Divided rather than multiplied, so that 600 steps give exactly 6e-06.
   quantised.idle_s = registers.idle / 1e8;
   quantised.adc_start_s = registers.adc_start / 1e8;
   quantised.ramp_end_s = registers.ramp_end / 1e8;

@@ -13,7 +13,7 @@ constexpr double kAwr2243SlopeStep_hz_per_s = 3.6e6 * 900 / 67108864.0 * 1e9;  /
 constexpr double kAwr2243TimeStep_s = 10e-9;
 constexpr double kAwr2243PeriodStep_s = 5e-9;
 
-/// A radar.yaml in the device's own units.
+/// Values of a radar.yaml in the device's own units.
 struct Awr2243Registers {
   std::uint32_t start_frequency = 0;  ///< 3.6e9/2^26 Hz
   std::int16_t slope = 0;             ///< 3.6e6*900/2^26 kHz/us
@@ -34,11 +34,11 @@ struct Awr2243Registers {
   std::uint16_t tx_mask() const;  ///< of all slots
 };
 
-/// Rounds what `radar` says to what the device can do, in its units. The optional keys of radar.yaml that configure a
-/// device must be there. Throws InputError naming `file`, the key, its value and the allowed range.
+/// Rounds the values of `radar` to those of the device, in its units. The optional keys of radar.yaml that configure a
+/// device are required. Throws InputError naming `file`, the key, its value and the allowed range.
 Awr2243Registers quantiseAwr2243(const RadarConfig& radar, const std::string& file);
 
-/// `radar` with the values that the device really uses (a slope of 75 MHz/us becomes 74.978).
+/// `radar` with the values that the device uses (a slope of 75 MHz/us becomes 74.978).
 RadarConfig withQuantisedValues(const RadarConfig& radar, const Awr2243Registers& registers);
 
 }  // namespace mmradartwin

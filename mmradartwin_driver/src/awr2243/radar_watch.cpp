@@ -11,7 +11,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kLookEvery{200};
-constexpr int kOpenEvery = 5;  ///< looks
+constexpr int kOpenEvery = 5;  ///< passes of the watch
 constexpr std::size_t kLatestEvents = 10;
 
 }  // namespace
@@ -112,7 +112,7 @@ RadarHealth RadarWatch::health() const {
 void RadarWatch::run() {
   for (int looks = 0; !stop_; ++looks) {
     std::this_thread::sleep_for(kLookEvery);
-    // Whoever configures the radar holds the link: there is nothing to watch then.
+    // A thread that configures the radar holds the link: there is nothing to watch then.
     const std::unique_lock<std::mutex> lock(link_mutex_, std::try_to_lock);
     if (!lock || (lost_ && looks % kOpenEvery != 0)) continue;
     try {

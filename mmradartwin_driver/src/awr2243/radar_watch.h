@@ -11,11 +11,11 @@
 
 namespace mmradartwin {
 
-/// An AWR2243 that one thread controls and a thread of this object watches: it fetches the events while frames run, and
-/// notices a pulled USB cable. Who receives the samples never waits for USB.
+/// AWR2243 that one thread controls and a thread of this object watches: it fetches events while frames run, and
+/// notices a pulled USB cable. The receiver of samples never waits for USB.
 class RadarWatch : public RadarControl {
  public:
-  /// Throws InputError where the firmware image cannot be read. `events` is called from either thread.
+  /// Throws InputError where the firmware image cannot be read. events: called from either thread.
   RadarWatch(const Awr2243Registers& registers, const std::string& image_file, EventSink events);
   RadarWatch(const Awr2243Registers& registers, const std::string& image_file, EventSink events,
              const Awr2243Control::Options& options, Awr2243Link::OpenUsb open_usb);
@@ -41,7 +41,7 @@ class RadarWatch : public RadarControl {
   RadarHealth state_;
   std::atomic<bool> lost_{false}, returned_{false}, stop_{false};
   std::mutex link_mutex_;  ///< of link_: one thread at a time
-  Awr2243Link link_;       // behind the state: when it goes, it stops the frames, and that is an event
+  Awr2243Link link_;       // after the state: its destructor stops the frames, which causes an event
   std::thread thread_;
 };
 

@@ -34,7 +34,7 @@ struct Source {
   bool q, bytes_swapped;
 };
 
-/// The ramp that this row of words carries, packet after packet.
+/// Ramp that this row of words carries, packet after packet.
 template <class Word>
 std::optional<Source> sourceOf(int packets, Word word) {
   const awr2243::TestPattern pattern = selfTestPattern();
@@ -223,7 +223,7 @@ CheckResult judgeTestSource(const RadarConfig& radar, const std::vector<std::uin
   const auto middle = levels_db.begin() + static_cast<std::ptrdiff_t>(levels_db.size() / 2);
   std::nth_element(levels_db.begin(), middle, levels_db.end());
   const double median_db = *middle, strongest_db = *std::max_element(levels_db.begin(), levels_db.end());
-  // Swapped I and Q conjugate the samples: ranges are mirrored, and angles too. Reversed lanes mirror the angles alone.
+  // Swapped I and Q conjugate the samples, which mirrors ranges and angles. Reversed lanes mirror only the angles.
   struct Place {
     bool far, other_side;
     double level_db = 0;
@@ -244,7 +244,7 @@ CheckResult judgeTestSource(const RadarConfig& radar, const std::vector<std::uin
   const Place& best = *std::max_element(places.begin(), places.end(),
                                         [](const Place& a, const Place& b) { return a.level_db < b.level_db; });
   result.level = CheckResult::Level::kProblem;
-  // Two equal targets stand as high as anything, and far above the rest; the strongest of noise does not.
+  // Two equal targets are as high as the strongest cell and far above the rest; the strongest noise is not.
   if (best.level_db < strongest_db - 6 || best.level_db < median_db + kAboveNoise_db) {
     result.found =
         text("the chip's two targets are not in the samples (%.0f dB where they should be, strongest %.0f dB)",

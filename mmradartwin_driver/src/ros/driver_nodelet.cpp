@@ -17,7 +17,7 @@ class DriverNodelet : public nodelet::Nodelet {
       driver_ = std::make_unique<RadarDriver>(getNodeHandle(), getPrivateNodeHandle());
     } catch (const InputError& error) {
       NODELET_FATAL_STREAM(error.what());
-      throw;  // the load fails
+      throw;  // the load of the nodelet fails
     }
   }
   std::unique_ptr<RadarDriver> driver_;

@@ -1,40 +1,35 @@
 #include "mmradartwin_driver/ros/live_session_message.h"
 
+#include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <map>
-#include <sstream>
 
+#include "mmradartwin_dsp/csv_reader.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/session_files.h"
 #include "mmradartwin_dsp/sha256.h"
 #include "mmradartwin_dsp/strict_yaml.h"
+#include "mmradartwin_dsp/text.h"
 
 namespace mmradartwin {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string trimmed(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(" \t\r");
-  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
-}
-
-/// The rows of the poses played, in the order of `poses`, with their new stamps; other columns stay as they are.
-std::string restamp(const std::string& csv, const std::vector<LivePose>& poses) {
-  std::istringstream in(csv);
-  std::string header;
-  std::getline(in, header);
-  std::map<std::string, std::string> rows;
-  for (std::string line; std::getline(in, line);) rows[trimmed(line.substr(0, line.find(',')))] = line;
-  std::string out = trimmed(header) + "\n";
+/// Rows of the played poses, in the order of `poses`, with their new stamps; other columns are unchanged.
+std::string restamp(const StoredFile& csv, const std::vector<LivePose>& poses) {
+  CsvReader reader(csv.bytes, csv.name);
+  const std::vector<std::string>& columns = reader.columns();
+  const auto stamp = static_cast<std::size_t>(std::find(columns.begin(), columns.end(), "stamp") - columns.begin());
+  std::map<std::string, std::vector<std::string>> rows;
+  while (reader.next()) rows[reader.fields()[0]] = reader.fields();
+  std::string out = join(columns, ",") + "\n";
   for (const LivePose& pose : poses) {
-    const std::string row = trimmed(rows.at(pose.name));
-    const std::size_t second = row.find(',', row.find(',') + 1);  // before the stamp
-    const std::size_t third = row.find(',', second + 1);
-    out += row.substr(0, second + 1) + formatStamp(pose.stamp_ns) + row.substr(third) + "\n";
+    std::vector<std::string> row = rows.at(pose.name);
+    row.at(stamp) = formatStamp(pose.stamp_ns);
+    out += join(row, ",") + "\n";
   }
   return out;
 }
@@ -53,7 +48,7 @@ mmradartwin_msgs::Session liveSessionMessage(const std::string& session, const s
   bool restamped = false;
   for (const StoredFile& stored : gatherSessionFiles(session)) {
     const bool of_poses = stored.name == poses_name;
-    message.files.push_back(toMsg(of_poses ? StoredFile{stored.name, restamp(stored.bytes, poses)} : stored));
+    message.files.push_back(toMsg(of_poses ? StoredFile{stored.name, restamp(stored, poses)} : stored));
     restamped = restamped || of_poses;
   }
   if (!restamped) {

@@ -63,7 +63,7 @@ RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& priva
   }
   rig_ = std::make_unique<Rig>(
       radar_, options_, [this](AdcCube&& cube) { publish(std::move(cube)); }, logEvent);
-  // A timer, not the arrival of data: silence is what has to be reported.
+  // A timer drives the report, since silence must be reported as well.
   timer_ = handle.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.update(); });
 }
 
@@ -99,7 +99,7 @@ void RadarDriver::readParameters(const ros::NodeHandle& private_nh) {
     throw InputError(private_nh.resolveName("radar_firmware") + ": " + options_.radar_firmware +
                      ": is used with configure_radar: true only");
   }
-  // Another program's packet delay is not known here.
+  // The packet delay of another program is unknown here.
   if (options_.configure_card) {
     try {
       checkLinkBudget(radar_, options_.packet_delay_us);
@@ -229,18 +229,13 @@ void RadarDriver::diagnoseDevice(diagnostic_updater::DiagnosticStatusWrapper& st
   }
 }
 
-/// The latest pose, often enough that none of a usual pose source goes by unseen for long.
+/// Reads the latest pose, often enough that no pose of a usual source stays unseen for long.
 void RadarDriver::observePose() {
   try {
     const geometry_msgs::TransformStamped T = tf_buffer_->lookupTransform(map_frame_, frame_id_, ros::Time(0));
-    geometry_msgs::Pose pose;
-    pose.position.x = T.transform.translation.x;
-    pose.position.y = T.transform.translation.y;
-    pose.position.z = T.transform.translation.z;
-    pose.orientation = T.transform.rotation;
-    pose_watch_.observe(toNanoseconds(T.header.stamp), fromMsg(pose));
+    pose_watch_.observe(toNanoseconds(T.header.stamp), fromMsg(T.transform));
   } catch (const tf2::TransformException&) {
-    // Not there yet, or its parts do not meet: the report tells its age.
+    // There is no pose yet, or its frames are not connected: the report states its age.
   }
 }
 

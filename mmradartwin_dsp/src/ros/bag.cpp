@@ -216,13 +216,9 @@ class BagContents {
       try {
         const geometry_msgs::TransformStamped T =
             buffer.lookupTransform(options_.map_frame, options_.radar_frame, toRosTime(reported_ns));
-        const auto& p = T.transform.translation;
-        const auto& q = T.transform.rotation;
         cube.on_the_way =
             !record_.whyNotBetween(reported_ns, options_.map_frame, options_.radar_frame, TransformLimits()).empty();
-        if (!cube.on_the_way) {
-          cube.T_map_radar = Eigen::Translation3d(p.x, p.y, p.z) * Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized();
-        }
+        if (!cube.on_the_way) cube.T_map_radar = fromMsg(T.transform);
       } catch (const tf2::TransformException&) {
         const bool late = newest_tf_ns_ > reported_ns + static_cast<std::int64_t>(kTfPatience_s * 1e9);
         if (!last && !late) return;

@@ -78,6 +78,12 @@ Eigen::Isometry3d fromMsg(const geometry_msgs::Pose& pose) {
   return Eigen::Translation3d(p) * q.normalized();
 }
 
+Eigen::Isometry3d fromMsg(const geometry_msgs::Transform& transform) {
+  const auto& p = transform.translation;
+  const auto& q = transform.rotation;
+  return Eigen::Translation3d(p.x, p.y, p.z) * Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized();
+}
+
 mmradartwin_msgs::RadarConfig toMsg(const RadarConfig& radar) {
   mmradartwin_msgs::RadarConfig msg;
   msg.device = radar.device;

@@ -1,6 +1,7 @@
 #include "mmradartwin_dsp/ros/frame_spool.h"
 
 #include <ros/serialization.h>
+#include <tf2_eigen/tf2_eigen.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <algorithm>
@@ -27,14 +28,10 @@ tf2_msgs::TFMessage transformOf(const Eigen::Isometry3d& T_map_radar, const ros:
   tf2_msgs::TFMessage tf;
   tf.transforms.resize(1);
   geometry_msgs::TransformStamped& T = tf.transforms.front();
+  T = tf2::eigenToTransform(T_map_radar);
   T.header.stamp = stamp;
   T.header.frame_id = BagOptions().map_frame;
   T.child_frame_id = BagOptions().radar_frame;
-  const geometry_msgs::Pose pose = toMsg(T_map_radar);
-  T.transform.translation.x = pose.position.x;
-  T.transform.translation.y = pose.position.y;
-  T.transform.translation.z = pose.position.z;
-  T.transform.rotation = pose.orientation;
   return tf;
 }
 

@@ -1,6 +1,7 @@
 #include <mmradartwin_msgs/Session.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
+#include <tf2_eigen/tf2_eigen.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <algorithm>
@@ -87,14 +88,10 @@ class SessionBagWriter {
     tf2_msgs::TFMessage tf;
     tf.transforms.resize(1);
     geometry_msgs::TransformStamped& T = tf.transforms.front();
+    T = tf2::eigenToTransform(pose.T_map_radar);
     T.header.stamp = recordTime(stamp_ns);
     T.header.frame_id = "map";
     T.child_frame_id = "radar_link";
-    const geometry_msgs::Pose msg = toMsg(pose.T_map_radar);
-    T.transform.translation.x = msg.position.x;
-    T.transform.translation.y = msg.position.y;
-    T.transform.translation.z = msg.position.z;
-    T.transform.rotation = msg.orientation;
     bag_.write("/tf", T.header.stamp, tf);
   }
 

@@ -127,8 +127,7 @@ void SignalChainNode::drain() {
       const geometry_msgs::Transform T = tf_buffer_.lookupTransform(map_frame_, radar_frame_, stamp).transform;
       const std::string why = tf_record_.whyNotBetween(toNanoseconds(stamp), map_frame_, radar_frame_, tf_limits_);
       if (why.empty()) {
-        T_map_radar = Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
-                      Eigen::Quaterniond(T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z).normalized();
+        T_map_radar = fromMsg(T);
       } else {
         ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f goes on without a pose: %s", stamp.toSec(), why.c_str());
       }

@@ -25,14 +25,13 @@ void TransformRecord::add(const tf2_msgs::TFMessage& message, bool fixed) {
     if (fixed) continue;
     const auto& p = transform.transform.translation;
     const auto& q = transform.transform.rotation;
-    const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
-    const bool usable = std::abs(rotation.norm() - 1) < 0.01 && std::isfinite(p.x + p.y + p.z);
+    const bool usable =
+        std::abs(Eigen::Quaterniond(q.w, q.x, q.y, q.z).norm() - 1) < 0.01 && std::isfinite(p.x + p.y + p.z);
     if (!usable) {
       ++unusable_;
       continue;
     }
-    const Stamped stamped{toNanoseconds(transform.header.stamp),
-                          Eigen::Isometry3d(Eigen::Translation3d(p.x, p.y, p.z) * rotation.normalized())};
+    const Stamped stamped{toNanoseconds(transform.header.stamp), fromMsg(transform.transform)};
     std::vector<Stamped>& edge = edges_[child];
     edge.insert(std::upper_bound(edge.begin(), edge.end(), stamped, earlier), stamped);
   }

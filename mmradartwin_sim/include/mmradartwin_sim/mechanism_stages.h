@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
 #include "mmradartwin_sim/path_record.h"
 #include "mmradartwin_sim/pose_context.h"
@@ -111,6 +112,17 @@ class ReceiveStage {
 
 // Frames, run for every chirp by Twin::simulateFrames() alone: the grid of a pose is what stays the same.
 
+/// One chirp of one frame of a pose, for what differs from chirp to chirp (docs/contracts.md section 3: chirps come as
+/// loop * slots + slot).
+struct ChirpContext {
+  const PoseContext& pose;
+  std::int64_t stamp_ns = 0;  ///< start of the pose's first frame
+  int frame = 0, chirp = 0, slot = 0;
+  double time_s = 0;             ///< centre of the chirp's ADC window after stamp_ns
+  std::uint64_t draw = 0;        ///< key of this chirp's random numbers: seed, stamp, frame and chirp make it
+  std::uint64_t frame_draw = 0;  ///< the same for all chirps of a frame
+};
+
 /// Adds echoes that are there for one chirp only; weights, filters and receiver act on them as on any path.
 class ChirpPathStage {
  public:
@@ -150,6 +162,13 @@ class DigitiseStage {
 
  protected:
   ~DigitiseStage() = default;
+};
+
+/// The bytes of one pose on their way from the ADC: frames back to back in the radar's capture layout.
+struct PayloadContext {
+  const RadarConfig& radar;
+  std::string pose;  ///< its name, "" where it has none
+  std::uint64_t draw = 0;
 };
 
 /// Changes the bytes of a pose on their way from the ADC.

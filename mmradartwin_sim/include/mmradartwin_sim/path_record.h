@@ -61,6 +61,8 @@ struct RecordCheck {
   double grid_error = 0;             ///< |grid - rebuilt| / |grid|
   bool ok() const { return worst_amplitude_error < 1e-12 && grid_error < 1e-12; }
 };
+/// Invariants of records and the grid that accumulate() made of them, by another arithmetic.
+RecordCheck checkRecords(const RadarConfig& radar, const std::vector<PathRecord>& records, const ComplexGrid& x);
 
 /// CSV header and rows of paths/{pose}.csv (docs/contracts.md: length_m,azimuth_dep_deg,...).
 struct Scene;

@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <functional>
-#include <string>
 
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_sim/ray_caster.h"
@@ -41,24 +40,6 @@ struct PoseContext {
   /// Only paths that meet this actor (index in `scene`) are wanted; others that are added are thrown away. -1: all
   /// paths are wanted.
   int only_actor = -1;
-};
-
-/// One chirp of one frame of a pose, for what differs from chirp to chirp (docs/contracts.md section 3: chirps come as
-/// loop * slots + slot).
-struct ChirpContext {
-  const PoseContext& pose;
-  std::int64_t stamp_ns = 0;  ///< start of the pose's first frame
-  int frame = 0, chirp = 0, slot = 0;
-  double time_s = 0;             ///< centre of the chirp's ADC window after stamp_ns
-  std::uint64_t draw = 0;        ///< key of this chirp's random numbers: seed, stamp, frame and chirp make it
-  std::uint64_t frame_draw = 0;  ///< the same for all chirps of a frame
-};
-
-/// The bytes of one pose on their way from the ADC: frames back to back in the radar's capture layout.
-struct PayloadContext {
-  const RadarConfig& radar;
-  std::string pose;  ///< its name, "" where it has none
-  std::uint64_t draw = 0;
 };
 
 }  // namespace mmradartwin

@@ -77,6 +77,8 @@ struct Scene {
   int actorIndex(const std::string& name) const;  ///< -1 where absent
   /// The actor of a path record's index; of -1 one that stands for what mechanisms put into the room.
   const Actor& actorOf(int index) const;
+  /// Names of the actors in a line of an error, cut where they are many.
+  std::string knownActors() const;
 };
 
 /// Reads scene.yaml strictly, its meshes (assimp) and materials, and builds facets. Throws InputError naming file and

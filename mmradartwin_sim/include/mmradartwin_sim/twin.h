@@ -16,11 +16,13 @@
 #include "mmradartwin_sim/path_record.h"
 #include "mmradartwin_sim/ray_caster.h"
 #include "mmradartwin_sim/scene.h"
+#include "mmradartwin_sim/trajectory.h"
 #include "mmradartwin_sim/twin_description.h"
 
 namespace mmradartwin {
 
 class MovingTwin;
+struct AssembledTwin;
 
 struct Simulation {
   std::int64_t stamp_ns = 0;
@@ -37,9 +39,6 @@ struct FrameOptions {
   double gain_db = 0;     ///< sample / 32768 = 10^(gain_db/20) x
   std::string pose_name;  ///< of mechanisms that concern one pose
 };
-
-/// Pose of the radar that is reported for a time; nothing where none is known.
-using Trajectory = std::function<std::optional<Eigen::Isometry3d>(std::int64_t stamp_ns)>;
 
 /// A twin ready to simulate. simulate() is const and may run for several poses at once; its result depends on pose and
 /// description alone, not on threads.
@@ -142,9 +141,8 @@ class Twin {
   void forEachChirp(const Simulation& pose, int frames,
                     const std::function<void(const ChirpContext&, ComplexGrid&)>& visit) const;
   friend class MovingTwin;
-  struct Impl;
-  explicit Twin(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
+  explicit Twin(std::unique_ptr<AssembledTwin> impl);
+  std::unique_ptr<AssembledTwin> impl_;
 };
 
 }  // namespace mmradartwin

@@ -94,6 +94,37 @@ void scaleRecord(std::complex<double> factor, PathRecord& record) {
   record.phase_rad = std::arg(record.c[0]);
 }
 
+/// Compares with phasors evaluated one by one at three samples: another arithmetic than the recurrence that made x.
+RecordCheck checkRecords(const RadarConfig& radar, const std::vector<PathRecord>& records, const ComplexGrid& x) {
+  RecordCheck result;
+  const int channels = radar.channels(), samples = radar.samples_per_chirp;
+  const std::vector<int> probes = {0, samples / 2, samples - 1};
+  Eigen::MatrixXcd direct = Eigen::MatrixXcd::Zero(channels, static_cast<Eigen::Index>(probes.size()));
+  for (const PathRecord& r : records) {
+    double power = 0;
+    for (int k = 0; k < channels; ++k) {
+      power += std::norm(r.c[k]);
+      const double rate = 2 * M_PI * radar.slope_hz_per_s * r.length_m[k] / kSpeedOfLight_m_per_s;
+      for (std::size_t i = 0; i < probes.size(); ++i) {
+        direct(k, static_cast<Eigen::Index>(i)) +=
+            r.c[k] * std::polar(1.0, rate * (radar.sample_time_s(probes[i]) - radar.window_center_s()));
+      }
+    }
+    const double expected = channels * r.amplitude * r.amplitude;
+    if (expected > 0)
+      result.worst_amplitude_error = std::max(result.worst_amplitude_error, std::abs(power / expected - 1));
+  }
+  double difference = 0, norm = 0;
+  for (int k = 0; k < channels; ++k) {
+    for (std::size_t i = 0; i < probes.size(); ++i) {
+      difference += std::norm(x(k, probes[i]) - direct(k, static_cast<Eigen::Index>(i)));
+      norm += std::norm(x(k, probes[i]));
+    }
+  }
+  result.grid_error = norm > 0 ? std::sqrt(difference / norm) : std::sqrt(difference);
+  return result;
+}
+
 void writePathsCsv(const std::vector<PathRecord>& records, const Scene& scene, const std::string& file) {
   std::ofstream out(file);
   out << "length_m,azimuth_dep_deg,elevation_dep_deg,azimuth_arr_deg,elevation_arr_deg,amplitude_db,phase_rad,bounces,"

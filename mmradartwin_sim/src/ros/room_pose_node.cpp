@@ -1,12 +1,14 @@
 #include "mmradartwin_sim/ros/room_pose_node.h"
 
 #include <sensor_msgs/point_cloud2_iterator.h>
+#include <tf2_eigen/tf2_eigen.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/strict_parameters.h"
 #include "mmradartwin_dsp/session.h"
 
@@ -16,11 +18,6 @@ namespace {
 constexpr double kWarnEvery_s = 5;
 // Materials do not matter here; a scene is loaded for a frequency that its materials hold for.
 constexpr double kFrequency_hz = 77.93e9;
-
-Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& T) {
-  return Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
-         Eigen::Quaterniond(T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z).normalized();
-}
 
 std::vector<Eigen::Vector3d> readPoints(const sensor_msgs::PointCloud2& cloud, const Eigen::Isometry3d& T) {
   std::vector<Eigen::Vector3d> points;
@@ -90,7 +87,7 @@ void RoomPoseNode::onImu(const sensor_msgs::Imu::ConstPtr& imu) {
   if (imu->linear_acceleration_covariance[0] == -1) return;  // sensor_msgs/Imu: not measured
   try {
     const Eigen::Matrix3d R =
-        toIsometry(tf_buffer_.lookupTransform(camera_frame_, imu->header.frame_id, ros::Time(0)).transform).linear();
+        fromMsg(tf_buffer_.lookupTransform(camera_frame_, imu->header.frame_id, ros::Time(0)).transform).linear();
     const auto& a = imu->linear_acceleration;
     const auto& w = imu->angular_velocity;
     gravity_.add(imu->header.stamp.toSec(), R * Eigen::Vector3d(a.x, a.y, a.z), R * Eigen::Vector3d(w.x, w.y, w.z));
@@ -135,8 +132,7 @@ void RoomPoseNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {
   }
   Eigen::Isometry3d T_camera_cloud;
   try {
-    T_camera_cloud =
-        toIsometry(tf_buffer_.lookupTransform(camera_frame_, cloud->header.frame_id, ros::Time(0)).transform);
+    T_camera_cloud = fromMsg(tf_buffer_.lookupTransform(camera_frame_, cloud->header.frame_id, ros::Time(0)).transform);
   } catch (const tf2::TransformException& error) {
     return refuse("tf does not know " + camera_frame_ + " -> " + cloud->header.frame_id +
                   ", which the camera's driver should publish: " + error.what());
@@ -162,19 +158,14 @@ void RoomPoseNode::publish(const Registration& fit, const ros::Time& stamp) {
   problem_.clear();
   last_ = fit.T_map_camera;
   trusted_at_ = stamp;
-  const Eigen::Quaterniond q(fit.T_map_camera.linear());
-  const Eigen::Vector3d p = fit.T_map_camera.translation();
-  geometry_msgs::TransformStamped T;
+  geometry_msgs::TransformStamped T = tf2::eigenToTransform(fit.T_map_camera);
   T.header.stamp = stamp;
   T.header.frame_id = map_frame_;
   T.child_frame_id = camera_frame_;
-  T.transform.translation.x = p.x(), T.transform.translation.y = p.y(), T.transform.translation.z = p.z();
-  T.transform.rotation.x = q.x(), T.transform.rotation.y = q.y();
-  T.transform.rotation.z = q.z(), T.transform.rotation.w = q.w();
   tf_broadcaster_.sendTransform(T);
   geometry_msgs::PoseWithCovarianceStamped pose;
   pose.header = T.header;
-  pose.pose.pose.position.x = p.x(), pose.pose.pose.position.y = p.y(), pose.pose.pose.position.z = p.z();
+  pose.pose.pose.position = tf2::toMsg(Eigen::Vector3d(fit.T_map_camera.translation()));
   pose.pose.pose.orientation = T.transform.rotation;
   for (int i = 0; i < 36; ++i) pose.pose.covariance[static_cast<std::size_t>(i)] = fit.covariance(i / 6, i % 6);
   pose_publisher_.publish(pose);

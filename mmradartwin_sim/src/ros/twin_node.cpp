@@ -21,11 +21,6 @@ namespace {
 constexpr double kWarnEvery_s = 5;
 constexpr double kMeasuredFor_s = 1;  // without a grid for so long the twin goes on at its own rate
 
-Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& T) {
-  return Eigen::Translation3d(T.translation.x, T.translation.y, T.translation.z) *
-         Eigen::Quaterniond(T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z).normalized();
-}
-
 }  // namespace
 
 TwinNode::TwinNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
@@ -226,7 +221,7 @@ void TwinNode::onRate(const ros::WallTimerEvent&) {
     const ros::WallTime now = ros::WallTime::now();
     if (last_ && last_ns_ == toNanoseconds(stamp) && (now - published_at_).toSec() < 1) return;
     published_at_ = now;
-    simulate(toIsometry(T.transform), toNanoseconds(stamp));
+    simulate(fromMsg(T.transform), toNanoseconds(stamp));
   } catch (const tf2::TransformException& error) {
     ROS_WARN_THROTTLE(kWarnEvery_s, "waiting for the pose of %s in %s: %s", radar_frame_.c_str(), map_frame_.c_str(),
                       error.what());
@@ -241,15 +236,15 @@ bool TwinNode::alike(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) con
 std::optional<Eigen::Isometry3d> TwinNode::reportedPose(std::int64_t stamp_ns) const {
   const auto at = [this](const ros::Time& time) { return tf_buffer_.lookupTransform(map_frame_, radar_frame_, time); };
   try {
-    return toIsometry(at(toRosTime(stamp_ns)).transform);
+    return fromMsg(at(toRosTime(stamp_ns)).transform);
   } catch (const tf2::TransformException&) {
   }
   try {
     const geometry_msgs::TransformStamped last = at(ros::Time(0));
-    const Eigen::Isometry3d T = toIsometry(last.transform);
+    const Eigen::Isometry3d T = fromMsg(last.transform);
     const std::int64_t last_ns = toNanoseconds(last.header.stamp), beyond_ns = stamp_ns - last_ns;
     if (last_ns == 0 || beyond_ns <= 0) return std::nullopt;
-    return T * (toIsometry(at(toRosTime(last_ns - beyond_ns)).transform).inverse() * T);
+    return T * (fromMsg(at(toRosTime(last_ns - beyond_ns)).transform).inverse() * T);
   } catch (const tf2::TransformException&) {
     return std::nullopt;
   }
@@ -260,7 +255,7 @@ bool TwinNode::placeActors(std::int64_t stamp_ns) {
     // The radar's pose is that of the grid, and the actor's may still be on its way.
     for (const ros::Time& time : {toRosTime(stamp_ns), ros::Time(0)}) {
       try {
-        return toIsometry(tf_buffer_.lookupTransform(map_frame_, frame, time).transform);
+        return fromMsg(tf_buffer_.lookupTransform(map_frame_, frame, time).transform);
       } catch (const tf2::TransformException&) {
       }
     }

@@ -8,7 +8,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/scene.h"
-#include "physics/curved_surface.h"
+#include "scene/curved_surface.h"
 #include "scene/vertex_weld.h"
 
 namespace mmradartwin {

@@ -6,17 +6,11 @@
 
 namespace mmradartwin {
 
-std::string knownActors(const Scene& scene) {
-  std::string known;
-  for (const Actor& a : scene.actors) known += (known.empty() ? "" : ", ") + a.name;
-  return known.size() > 400 ? known.substr(0, 400) + ", ..." : known;
-}
-
 int requireActor(const Scene& scene, const std::string& mechanism, const std::string& actor) {
   const int index = scene.actorIndex(actor);
   if (index >= 0) return index;
   throw InputError("mechanism " + mechanism + ": key actor: " + scene.file + " has no actor " + actor +
-                   "; known: " + knownActors(scene));
+                   "; known: " + scene.knownActors());
 }
 
 std::vector<bool> requireMaterial(const Scene& scene, const std::string& mechanism, const std::string& material) {

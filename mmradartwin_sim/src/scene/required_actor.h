@@ -7,9 +7,6 @@
 
 namespace mmradartwin {
 
-/// Names of the actors in a line of an error, cut where they are many.
-std::string knownActors(const Scene& scene);
-
 /// Index of the actor that a mechanism's parameter names. Throws InputError naming mechanism and known actors where
 /// there is no such actor.
 int requireActor(const Scene& scene, const std::string& mechanism, const std::string& actor);

@@ -8,7 +8,6 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/strict_yaml.h"
-#include "scene/required_actor.h"
 
 namespace mmradartwin {
 namespace {
@@ -49,6 +48,12 @@ const Actor& Scene::actorOf(int index) const {
     return actor;
   }();
   return index < 0 ? unmodelled : actors.at(static_cast<std::size_t>(index));
+}
+
+std::string Scene::knownActors() const {
+  std::string known;
+  for (const Actor& a : actors) known += (known.empty() ? "" : ", ") + a.name;
+  return known.size() > 400 ? known.substr(0, 400) + ", ..." : known;
 }
 
 Scene loadScene(const std::string& scene_yaml, double frequency_hz) {
@@ -97,7 +102,7 @@ Scene loadScene(const std::string& scene_yaml, double frequency_hz) {
     YamlMap overrides = yaml.map("actors");
     for (const std::string& name : overrides.keys()) {
       const int index = scene.actorIndex(name);
-      if (index < 0) overrides.fail(name, "is no actor of the meshes; known: " + knownActors(scene));
+      if (index < 0) overrides.fail(name, "is no actor of the meshes; known: " + scene.knownActors());
       YamlMap override_map = overrides.map(name);
       scene.actors[index].material_tag = override_map.text("material");
       override_map.rejectUnknownKeys();

@@ -4,7 +4,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "rays/view_cone.h"
-#include "twin/twin_impl.h"
+#include "twin/assembled_twin.h"
 
 namespace mmradartwin {
 namespace {
@@ -22,7 +22,7 @@ void addSum(const PoseContext& context, const std::vector<PathRecord>& filtered,
 
 MovingTwin::MovingTwin(const Twin& twin, const std::vector<std::string>& actors)
     : twin_(new Twin(twin.changed(twin.description().mechanisms))) {
-  Twin::Impl& m = *twin_->impl_;
+  AssembledTwin& m = *twin_->impl_;
   std::vector<int> movable;
   for (const std::string& name : actors) {
     const int actor = m.scene.actorIndex(name);
@@ -54,7 +54,7 @@ void MovingTwin::place(const std::string& actor, const Eigen::Isometry3d& T_map_
 }
 
 SceneChange MovingTwin::moveActors() {
-  Twin::Impl& m = *twin_->impl_;
+  AssembledTwin& m = *twin_->impl_;
   Scene& scene = *m.edited;
   SceneChange change;
   bool rebuild = false;
@@ -98,7 +98,7 @@ SceneChange MovingTwin::moveActors() {
 }
 
 void MovingTwin::trace(const PoseContext& context, const SceneChange* change) {
-  const Twin::Impl& m = *twin_->impl_;
+  const AssembledTwin& m = *twin_->impl_;
   std::vector<PathRecord> before = std::move(simulation_.records);
   std::vector<PathRecord>& records = simulation_.records;
   records.clear();
@@ -149,7 +149,7 @@ void MovingTwin::trace(const PoseContext& context, const SceneChange* change) {
 }
 
 void MovingTwin::sumAll(const PoseContext& context) {
-  const Twin::Impl& m = *twin_->impl_;
+  const AssembledTwin& m = *twin_->impl_;
   std::vector<PathRecord> paths;
   for (Part& part : parts_) {
     const auto first = simulation_.records.begin();
@@ -160,7 +160,7 @@ void MovingTwin::sumAll(const PoseContext& context) {
 }
 
 const Simulation& MovingTwin::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) {
-  Twin::Impl& m = *twin_->impl_;
+  AssembledTwin& m = *twin_->impl_;
   const bool was_valid = valid_;
   valid_ = false;
   const SceneChange change = placed_ ? moveActors() : SceneChange();

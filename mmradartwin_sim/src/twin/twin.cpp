@@ -3,35 +3,14 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
-#include "mmradartwin_sim/mechanism_registry.h"
 #include "rays/view_cone.h"
-#include "twin/twin_impl.h"
+#include "twin/assembled_twin.h"
 
 namespace mmradartwin {
 namespace {
-
-void raise(std::atomic<double>& maximum, double value) {
-  double known = maximum.load();
-  while (value > known && !maximum.compare_exchange_weak(known, value)) {
-  }
-}
-
-std::string formatPoint(const Eigen::Vector3d& p) {
-  std::ostringstream out;
-  out << '(' << p.x() << ", " << p.y() << ", " << p.z() << ") m";
-  return out.str();
-}
-
-/// Whether an actor was edited shows in what Embree and the facets would see.
-bool isSame(const Actor& a, const Actor& b) {
-  return a.present == b.present && a.vertices == b.vertices && a.material_tag == b.material_tag &&
-         a.occludes == b.occludes && a.material.scattering_coefficient == b.material.scattering_coefficient;
-}
 
 /// True where something stands in the way of a path from the radar and back.
 bool hides(const RayCaster& screen, const Eigen::Vector3d& radar, const PathRecord& r) {
@@ -43,65 +22,10 @@ bool hides(const RayCaster& screen, const Eigen::Vector3d& radar, const PathReco
   return r.vertices.size() > 1 && !screen.visible(from, radar);  // from a single point back on the way there
 }
 
-constexpr double kFollows_s = 0.2;  // poses further apart say nothing about the time between them
-
-/// Along poses that follow each other closely, evenly from one to the next; at others the radar stands.
-Trajectory trajectoryOf(std::vector<Pose> poses) {
-  std::sort(poses.begin(), poses.end(), [](const Pose& a, const Pose& b) { return a.stamp_ns < b.stamp_ns; });
-  return [poses = std::move(poses)](std::int64_t stamp_ns) -> std::optional<Eigen::Isometry3d> {
-    if (poses.empty()) return std::nullopt;
-    const auto after = std::upper_bound(poses.begin(), poses.end(), stamp_ns,
-                                        [](std::int64_t stamp, const Pose& p) { return stamp < p.stamp_ns; });
-    if (after == poses.begin()) return poses.front().T_map_radar;
-    const Pose& before = *std::prev(after);
-    if (after == poses.end()) return before.T_map_radar;
-    const double gap_s = static_cast<double>(after->stamp_ns - before.stamp_ns) * 1e-9;
-    if (gap_s > kFollows_s) return before.T_map_radar;
-    const double share = static_cast<double>(stamp_ns - before.stamp_ns) * 1e-9 / gap_s;
-    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-    T.linear() = Eigen::Quaterniond(before.T_map_radar.linear())
-                     .slerp(share, Eigen::Quaterniond(after->T_map_radar.linear()))
-                     .toRotationMatrix();
-    T.translation() = (1 - share) * before.T_map_radar.translation() + share * after->T_map_radar.translation();
-    return T;
-  };
-}
-
 }  // namespace
 
-/// Compares with phasors evaluated one by one at three samples: another arithmetic than the recurrence that made x.
-RecordCheck checkRecords(const RadarConfig& radar, const std::vector<PathRecord>& records, const ComplexGrid& x) {
-  RecordCheck result;
-  const int channels = radar.channels(), samples = radar.samples_per_chirp;
-  const std::vector<int> probes = {0, samples / 2, samples - 1};
-  Eigen::MatrixXcd direct = Eigen::MatrixXcd::Zero(channels, static_cast<Eigen::Index>(probes.size()));
-  for (const PathRecord& r : records) {
-    double power = 0;
-    for (int k = 0; k < channels; ++k) {
-      power += std::norm(r.c[k]);
-      const double rate = 2 * M_PI * radar.slope_hz_per_s * r.length_m[k] / kSpeedOfLight_m_per_s;
-      for (std::size_t i = 0; i < probes.size(); ++i) {
-        direct(k, static_cast<Eigen::Index>(i)) +=
-            r.c[k] * std::polar(1.0, rate * (radar.sample_time_s(probes[i]) - radar.window_center_s()));
-      }
-    }
-    const double expected = channels * r.amplitude * r.amplitude;
-    if (expected > 0)
-      result.worst_amplitude_error = std::max(result.worst_amplitude_error, std::abs(power / expected - 1));
-  }
-  double difference = 0, norm = 0;
-  for (int k = 0; k < channels; ++k) {
-    for (std::size_t i = 0; i < probes.size(); ++i) {
-      difference += std::norm(x(k, probes[i]) - direct(k, static_cast<Eigen::Index>(i)));
-      norm += std::norm(x(k, probes[i]));
-    }
-  }
-  result.grid_error = norm > 0 ? std::sqrt(difference / norm) : std::sqrt(difference);
-  return result;
-}
-
-Twin::Twin(TwinDescription description, std::uint64_t seed) : impl_(new Impl) {
-  Impl& m = *impl_;
+Twin::Twin(TwinDescription description, std::uint64_t seed) : impl_(new AssembledTwin) {
+  AssembledTwin& m = *impl_;
   m.description = std::move(description);
   m.seed = seed;
   m.scene = loadScene(m.description.scene_file, m.description.radar.center_frequency_hz());
@@ -109,10 +33,10 @@ Twin::Twin(TwinDescription description, std::uint64_t seed) : impl_(new Impl) {
   m.assemble();
 }
 
-Twin::Twin(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Twin::Twin(std::unique_ptr<AssembledTwin> impl) : impl_(std::move(impl)) {}
 
 Twin Twin::changed(std::vector<NamedParameters> mechanisms) const {
-  auto other = std::make_unique<Impl>();
+  auto other = std::make_unique<AssembledTwin>();
   other->description = impl_->description;
   other->description.mechanisms = std::move(mechanisms);
   other->seed = impl_->seed;
@@ -185,40 +109,6 @@ void Twin::removeHidden(const Eigen::Isometry3d& T_map_radar, std::vector<PathRe
   records.erase(std::remove_if(records.begin(), records.end(), hidden), records.end());
 }
 
-void Twin::Impl::assemble() {
-  Impl& m = *this;
-  const RadarConfig& radar = description.radar;
-  try {
-    for (const NamedParameters& named : m.description.mechanisms) {
-      m.mechanisms.push_back(MechanismRegistry::instance().create(named.mechanism));
-      m.mechanisms.back()->configure(named.values, m.scene, radar);
-      m.as_described.push_back(m.mechanisms.back().get());
-    }
-    std::stable_sort(m.mechanisms.begin(), m.mechanisms.end(), [](const auto& a, const auto& b) {
-      return std::make_pair(a->rank(), a->name()) < std::make_pair(b->rank(), b->name());
-    });
-    m.stages = StageLists(m.mechanisms);
-    m.edited = std::make_unique<Scene>(m.scene);
-    for (const SceneStage* stage : m.stages.scene) stage->editScene(*m.edited);
-    const bool same = std::equal(m.edited->actors.begin(), m.edited->actors.end(), m.scene.actors.begin(),
-                                 m.scene.actors.end(), isSame);
-    if (same && m.edited->occluders_only.empty()) {
-      m.edited.reset();
-    } else {
-      m.edited_rays = std::make_unique<RayCaster>(*m.edited);
-    }
-    if (m.edited && !m.edited->occluders_only.empty()) {
-      Scene alone;
-      alone.occluders_only = m.edited->occluders_only;
-      m.occluders_only = std::make_unique<RayCaster>(alone);
-      m.only_occluders_added = same;
-    }
-    for (const auto& mechanism : m.mechanisms) mechanism->build(m.model(), radar);
-  } catch (const InputError& e) {
-    throw InputError((m.description.file.empty() ? m.description.scene_file : m.description.file) + ": " + e.what());
-  }
-}
-
 Twin::~Twin() = default;
 Twin::Twin(Twin&&) noexcept = default;
 
@@ -268,16 +158,6 @@ void Twin::prepare(const std::vector<Eigen::Isometry3d>& poses) {
     }
   });
   for (double b : best) impl_->strongest = std::max(impl_->strongest, b);
-}
-
-void Twin::Impl::refuseUnusablePose(const PoseContext& c) const {
-  if (!c.T_map_radar.matrix().allFinite()) {
-    throw InputError("pose is not a number; correct x, y, z and the quaternion");
-  }
-  if (const auto inside = c.rays.insideActor(c.T_map_radar.translation())) {
-    throw InputError("pose at " + formatPoint(c.T_map_radar.translation()) + " lies inside actor " +
-                     c.scene.actors[*inside].name + "; correct the pose or the scene");
-  }
 }
 
 std::vector<PathRecord> Twin::trace(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns,
@@ -359,24 +239,6 @@ std::vector<PathRecord> Twin::traceAround(std::size_t mechanism, const Eigen::Is
     if (beside || !placed.hides || !hides(screen, radar, r)) records.push_back(r);
   }
   return records;
-}
-
-std::vector<PathRecord> Twin::Impl::weighted(const PoseContext& c, std::vector<PathRecord> records) const {
-  reweight(c, records, 0);
-  addRelativePaths(c, records);
-  return records;
-}
-
-void Twin::Impl::addRelativePaths(const PoseContext& c, std::vector<PathRecord>& records) const {
-  if (stages.needs_strongest) {
-    raise(strongest_so_far, strongestOf(c, records));
-    const std::size_t echoes = records.size();
-    for (const auto& [stage, m] : stages.paths) {
-      if (m->needsStrongestAmplitude()) addPaths(*stage, c, records);
-    }
-    reweight(c, records, echoes);
-  }
-  addReplicas(c, records);
 }
 
 std::vector<PathRecord> Twin::receivedPaths(const Eigen::Isometry3d& T_map_radar, std::vector<PathRecord> traced,

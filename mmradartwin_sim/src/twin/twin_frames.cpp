@@ -1,9 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanisms/base/random_draw.h"
 #include "mmradartwin_dsp/capture.h"
-#include "twin/twin_impl.h"
+#include "mmradartwin_sim/twin.h"
+#include "stages/random_draw.h"
+#include "twin/assembled_twin.h"
 
 namespace mmradartwin {
 namespace {
@@ -36,7 +37,7 @@ double Twin::clippedFraction() const {
   return fraction;
 }
 
-ChirpContext Twin::Impl::chirpContext(const PoseContext& c, std::int64_t stamp_ns, int frame, int chirp) const {
+ChirpContext AssembledTwin::chirpContext(const PoseContext& c, std::int64_t stamp_ns, int frame, int chirp) const {
   const RadarConfig& radar = c.radar;
   ChirpContext now{c};
   now.stamp_ns = stamp_ns;
@@ -50,7 +51,7 @@ ChirpContext Twin::Impl::chirpContext(const PoseContext& c, std::int64_t stamp_n
   return now;
 }
 
-void Twin::Impl::propagateWithDelays(const PoseContext& c, std::vector<PathRecord>& paths, DelayedGrid& grid) const {
+void AssembledTwin::propagateWithDelays(const PoseContext& c, std::vector<PathRecord>& paths, DelayedGrid& grid) const {
   grid.x.setZero(c.radar.channels(), c.radar.samples_per_chirp);
   propagate(c, paths, grid.x);
   if (stages.modulations.empty()) return;
@@ -61,8 +62,8 @@ void Twin::Impl::propagateWithDelays(const PoseContext& c, std::vector<PathRecor
   accumulate(c.radar, paths, grid.delayed);
 }
 
-void Twin::Impl::varyChirp(const ChirpContext& now, const DelayedGrid& still, ChirpScratch& scratch,
-                           ComplexGrid& x) const {
+void AssembledTwin::varyChirp(const ChirpContext& now, const DelayedGrid& still, ChirpScratch& scratch,
+                              ComplexGrid& x) const {
   const PoseContext& c = now.pose;
   const int receivers = c.radar.receivers(), first = now.slot * receivers;
   const bool modulates = !stages.modulations.empty();
@@ -86,7 +87,7 @@ void Twin::Impl::varyChirp(const ChirpContext& now, const DelayedGrid& still, Ch
 
 void Twin::forEachChirp(const Simulation& pose, int frames,
                         const std::function<void(const ChirpContext&, ComplexGrid&)>& visit) const {
-  const Impl& m = *impl_;
+  const AssembledTwin& m = *impl_;
   const RadarConfig& radar = m.description.radar;
   PoseContext c = m.context(pose.T_map_radar, pose.stamp_ns);
   c.receiver_gain = [&m, &c](double length_m) { return m.toneGain(c, length_m); };
@@ -94,12 +95,12 @@ void Twin::forEachChirp(const Simulation& pose, int frames,
   const bool varies = framesNeedRecords();
 
   // Paths that are the same in all chirps are propagated once.
-  Impl::DelayedGrid still;
+  AssembledTwin::DelayedGrid still;
   if (varies) {
     std::vector<PathRecord> paths = m.filtered(c, pose.records);
     m.propagateWithDelays(c, paths, still);
   }
-  Impl::ChirpScratch scratch;
+  AssembledTwin::ChirpScratch scratch;
   ComplexGrid x, chirp;
   for (int f = 0; f < frames; ++f) {
     for (int loop = 0; loop < radar.loops_per_frame; ++loop) {
@@ -127,7 +128,7 @@ void Twin::visitChirps(const Simulation& pose, int frames,
 }
 
 std::vector<AdcCube> Twin::simulateFrames(const Simulation& pose, const FrameOptions& options) const {
-  const Impl& m = *impl_;
+  const AssembledTwin& m = *impl_;
   const RadarConfig& radar = m.description.radar;
   std::size_t surplus_bytes = 0;
   for (const TransportStage* stage : m.stages.transport) surplus_bytes += stage->surplusBytes();

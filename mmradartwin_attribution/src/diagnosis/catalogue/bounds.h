@@ -155,11 +155,12 @@ inline constexpr double kLeastNatsOfBetterLatents = 0.5;
 /// Distance of two sets of latents below which both climb to one optimum; see
 /// docs/calibration_of_bounds.md#ksameoptimum_nats
 inline constexpr double kSameOptimum_nats = 1;
-/// Gain, the best place left out, from which on a finding is plain whatever its scatter over places; see
-/// docs/calibration_of_bounds.md#kplain_nats_per_pose
-inline constexpr double kPlain_nats_per_pose = 5;
-/// Most that the false-alarm rate of a plain finding is; see docs/calibration_of_bounds.md#kfalsealarmrateofplain
-inline constexpr double kFalseAlarmRateOfPlain = 0.01;
+/// Gain, the best place left out, from which on a finding is overwhelming, whatever its scatter over places; see
+/// docs/calibration_of_bounds.md#koverwhelming_nats_per_pose
+inline constexpr double kOverwhelming_nats_per_pose = 5;
+/// Upper limit of the false-alarm rate of an overwhelming finding; see
+/// docs/calibration_of_bounds.md#kfalsealarmrateofoverwhelming
+inline constexpr double kFalseAlarmRateOfOverwhelming = 0.01;
 /// Gain over its overdispersion from which on a move far away is believed; see
 /// docs/calibration_of_bounds.md#kleastnatsoffaraway
 inline constexpr double kLeastNatsOfFarAway = 60;
@@ -269,8 +270,8 @@ inline constexpr double kHides_db = -6;
 /// Price of each number of a law when laws are compared; see docs/calibration_of_bounds.md#kpriceoflawnumber_nats
 inline constexpr double kPriceOfLawNumber_nats = 4;
 /// Nats over the price that a law has at least; a fit sometimes finds what paths alone show less of; see
-/// docs/calibration_of_bounds.md#kleastworthoflaw_nats
-inline constexpr double kLeastWorthOfLaw_nats = -2;
+/// docs/calibration_of_bounds.md#kleastnetnatsoflaw
+inline constexpr double kLeastNetNatsOfLaw = -2;
 /// Effective number of places that tell of a law with nothing outside a part of its variable, at least; see
 /// docs/calibration_of_bounds.md#kfewestplacesoflaw
 inline constexpr double kFewestPlacesOfLaw = 3;
@@ -322,13 +323,8 @@ inline constexpr double kLeastSize_m = 0.05;
 /// docs/calibration_of_bounds.md#kleastloss_db
 inline constexpr double kLeastLoss_db = 0.5;
 /// Share of the measured power that a fit explains more before it counts as gaining in the maps, and less before the
-/// maps count as plainly worse; see docs/calibration_of_bounds.md#kleastexplainedmore
+/// maps count as clearly worse; see docs/calibration_of_bounds.md#kleastexplainedmore
 inline constexpr double kLeastExplainedMore = 0.002;
-/// Share of the measured power that a plain fit may explain less; see docs/calibration_of_bounds.md#kmostexplainedlost
-inline constexpr double kMostExplainedLost = 0.015;
-/// The same of a law of levels, beside which maps do not fit the actors' errors of level; see
-/// docs/calibration_of_bounds.md#kmostexplainedlost
-inline constexpr double kMostExplainedLostByLevels = 0.05;
 /// Correlation over poses of the gains of two fits from which on a name explains some of what a better one was rejected
 /// for by the maps; see docs/calibration_of_bounds.md#kcorrelationofsomeshared
 inline constexpr double kCorrelationOfSomeShared = 0.2;

@@ -18,11 +18,12 @@ namespace {
 
 double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
-constexpr std::int64_t kRolls_ns = 500'000'000;    ///< from either end of a stop, in which a radar may still move
-constexpr std::int64_t kBeside_ns = 1000'000'000;  ///< before or after a stop, in which tf has a moving radar elsewhere
-constexpr double kFullScale = 32768;               ///< of a sample, counts
+constexpr std::int64_t kRolls_ns = 500'000'000;  ///< time from either end of a stop within which a radar may still move
+/// Time before or after a stop within which tf shows a moving radar elsewhere.
+constexpr std::int64_t kBeside_ns = 1000'000'000;
+constexpr double kFullScale = 32768;  ///< of a sample, in counts
 
-/// True where tf has the radar elsewhere than at the pose, between two times.
+/// True where tf has the radar away from the pose at some time between two times.
 bool standsElsewhere(const std::vector<StampedTransform>& track, const Pose& pose, std::int64_t from_ns,
                      std::int64_t to_ns) {
   const auto before = [](const StampedTransform& t, std::int64_t stamp_ns) { return t.stamp_ns < stamp_ns; };
@@ -31,8 +32,8 @@ bool standsElsewhere(const std::vector<StampedTransform>& track, const Pose& pos
                      [&](const StampedTransform& t) { return !standsStill(t.T_map_radar, pose.T_map_radar); });
 }
 
-/// Leaves out frames at either end of a stop that differ from those in its middle: a radar is taken to stand while it
-/// is within 2 cm of its place of rest, which is five wavelengths.
+/// Leaves out frames at either end of a stop that differ from those in its middle. A radar counts as standing within 2
+/// cm of its place of rest, which is five wavelengths.
 void leaveOutMoving(const SignalChain& chain, const std::vector<StampedTransform>& track, const Pose& pose,
                     std::vector<AdcCube>& frames) {
   if (track.empty()) return;
@@ -65,7 +66,7 @@ void leaveOutMoving(const SignalChain& chain, const std::vector<StampedTransform
   frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
-/// True where packets were lost and not filled, which makes a capture too short.
+/// True where packets were lost and not filled, so that a capture is too short.
 bool missesPackets(const RadarConfig& radar, const std::vector<AdcCube>& frames) {
   const std::vector<int> order = payloadOrder(radar);
   Payload payload = toPayload(frames, order);
@@ -93,7 +94,7 @@ void transformGrid(const SignalChain& chain, PoseChannels& pose) {
 
 namespace {
 
-/// Frames of a pose, repaired and without those of a radar that moves. Tells of a capture that misses packets; throws
+/// Frames of a pose, repaired and without those of a moving radar. Reports a capture that lacks packets. Throws
 /// InputError where no frame can be used.
 std::vector<AdcCube> readFrames(const Recording& recording, const SignalChain& chain, const Pose& pose,
                                 const std::function<void(AdcCube&)>& repair, std::vector<PoseProblem>& problems) {
@@ -124,7 +125,7 @@ double cellNoiseOverSample(const RadarConfig& radar) {
   return window2 / (sum(window) * sum(window) * kFullScale * kFullScale);
 }
 
-/// Channels of a pose from its frames and what the examiner made of them.
+/// Channels of a pose from its frames and the examiner's result.
 PoseChannels channelsOf(const Recording& recording, const SignalChain& chain, const Pose& pose,
                         const std::vector<AdcCube>& frames, const PoseFrames& examined) {
   CoherentAverage uncorrected(recording.radar, 0);

@@ -8,16 +8,16 @@ namespace {
 
 constexpr int kFewestChannels = 4;      ///< the main lobe of a tone has four bins, and a beam as many as channels
 constexpr std::size_t kMostBeams = 10;  ///< of a pose
-constexpr double kWeakestShare = 1e-3;  ///< of the strongest path's power
+constexpr double kWeakestShare = 1e-3;  ///< power over that of the strongest path
 constexpr double kApart_bins = 1.5;     ///< between beams of one direction
-constexpr double kSameDirection = 0.3;  ///< share of a beam's power that another one holds
+constexpr double kSameDirection = 0.3;  ///< share of a beam's power that another one receives
 
 }  // namespace
 
 Eigen::VectorXcd formBeam(const EchoBeam& beam, const Eigen::MatrixXcd& range_spectra) {
   const Eigen::Index bins = beam.weights.size();
   Eigen::VectorXcd formed = (beam.weights.adjoint() * range_spectra.middleCols(beam.first_bin, bins)).transpose();
-  // The middle of Hann's window is sample N/2: referred to it, tones of one echo are real multiples of each other.
+  // The middle of Hann's window is sample N/2. Relative to it, tones of one echo are real multiples of each other.
   for (Eigen::Index i = 0; i < bins; ++i) {
     if ((beam.first_bin + i) % 2 != 0) formed[i] = -formed[i];
   }
@@ -38,18 +38,18 @@ std::vector<EchoBeam> chooseBeams(const RadarConfig& radar, const std::vector<Pa
   std::stable_sort(strongest.begin(), strongest.end(),
                    [](const PathRecord* a, const PathRecord* b) { return a->amplitude > b->amplitude; });
   std::vector<double> places;
-  for (const PathRecord* r : strongest) {
+  for (const PathRecord* record : strongest) {
     if (beams.size() == kMostBeams ||
-        r->amplitude * r->amplitude < kWeakestShare * std::pow(strongest.front()->amplitude, 2))
+        record->amplitude * record->amplitude < kWeakestShare * std::pow(strongest.front()->amplitude, 2))
       break;
-    const double place = 0.5 * meanLength_m(*r) / radar.range_bin_m();
+    const double place = 0.5 * meanLength_m(*record) / radar.range_bin_m();
     if (place < first_bin || place > bins - 1) continue;
     EchoBeam beam;
     beam.weights.resize(channels);
     for (int k = 0; k < channels; ++k) {
-      // Hamming's taper over the aperture keeps other directions out of the beam.
+      // Hamming's taper over the aperture suppresses other directions.
       const double across = (radar.virtual_element_m(k).y() - low) / std::max(high - low, 1e-9);
-      beam.weights[k] = std::polar(0.54 - 0.46 * std::cos(2 * M_PI * (0.05 + 0.9 * across)), std::arg(r->c[k]));
+      beam.weights[k] = std::polar(0.54 - 0.46 * std::cos(2 * M_PI * (0.05 + 0.9 * across)), std::arg(record->c[k]));
     }
     beam.weights.normalize();
     bool taken = false;

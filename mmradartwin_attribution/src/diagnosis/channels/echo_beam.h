@@ -9,9 +9,9 @@
 
 namespace mmradartwin::diagnosis::channels {
 
-/// Beam at a strong echo that is expected: the channels summed towards its direction, over as many range bins as there
-/// are channels. Single bins show where an echo comes from. The bins of a beam together show how far it went, as the
-/// tones of one echo hold one phase there.
+/// Beam at a strong expected echo: the channels summed towards its direction, over as many range bins as there are
+/// channels. Single bins show the direction of an echo. The bins of a beam together show its range, as the tones of one
+/// echo share one phase there.
 struct EchoBeam {
   int first_bin = 0;
   Eigen::VectorXcd weights;  ///< [M] of unit norm; the beam is weights^H times the channels
@@ -25,8 +25,8 @@ inline int middleBin(const EchoBeam& beam, int channels) { return beam.first_bin
 /// Forms a beam of range spectra [M][N]: its bins, with phases at the window's middle.
 Eigen::VectorXcd formBeam(const EchoBeam& beam, const Eigen::MatrixXcd& range_spectra);
 
-/// Chooses beams at the strongest of the paths that a pose is expected to receive, from `first_bin` on, no two of the
-/// same direction beside each other. EchoBeam::y is left empty. A radar with fewer than four channels has no beams.
+/// Beams at the strongest paths that a pose is expected to receive, from `first_bin` on, without neighbours of one
+/// direction. EchoBeam::y is left empty. A radar with fewer than four channels has no beams.
 std::vector<EchoBeam> chooseBeams(const RadarConfig& radar, const std::vector<PathRecord>& expected, int first_bin);
 
 }  // namespace mmradartwin::diagnosis::channels

@@ -17,24 +17,24 @@ namespace mmradartwin::diagnosis::channels {
 namespace {
 
 const std::string kName = "pose_time_lag";
-constexpr double kLongest_s = 1;         ///< lag that is looked for
-constexpr double kStep_s = 0.005;        ///< between lags that are tried
-constexpr double kAround_s = 1.2;        ///< of a motion's ends, within which frames are read
-constexpr double kSpeed_m_per_s = 0.05;  ///< of a radar that moves; tf of visual odometry trembles by less
-constexpr double kSmooth_s = 0.1;        ///< to either side, over which speeds are taken
+constexpr double kLongest_s = 1;         ///< longest delay that is tried
+constexpr double kStep_s = 0.005;        ///< between delays that are tried
+constexpr double kAround_s = 1.2;        ///< time about a motion's ends within which frames are read
+constexpr double kSpeed_m_per_s = 0.05;  ///< speed above which a radar moves; tf of visual odometry trembles by less
+constexpr double kSmooth_s = 0.1;        ///< half the time over which speeds are averaged
 constexpr double kRest_s = 0.5;          ///< a shorter stop is a part of the motion
-constexpr double kFarthest_s = 0.3;      ///< between frames that follow each other
+constexpr double kFarthest_s = 0.3;      ///< longest time between successive frames
 constexpr double kSlow_m_per_s[] = {0.01, 0.02, 0.05};  ///< slowest speeds that frames may show
-constexpr double kAtRest = 0.1;                         ///< Way::moves() of a radar that stands, at most
-constexpr double kMoved = 0.05;        ///< share of the change on the way that a radar at rest does not show
-constexpr double kMovedOverStill = 4;  ///< multiple of the change at rest that a radar at rest does not show
-constexpr double kNear_m = 0.3;        ///< range up to which there is leakage, which moves along with the radar
+constexpr double kAtRest = 0.1;                         ///< upper limit of Way::moves() for a standing radar
+constexpr double kMoved = 0.05;        ///< share of the change during motion that a radar at rest does not exceed
+constexpr double kMovedOverStill = 4;  ///< multiple of the change at rest that a radar at rest does not exceed
+constexpr double kNear_m = 0.3;        ///< range up to which there is leakage, which moves with the radar
 
 double secondsSince(std::int64_t zero_ns, std::int64_t stamp_ns) {
   return 1e-9 * static_cast<double>(stamp_ns - zero_ns);
 }
 
-/// Reported way of the radar: linear between frames; before the first and after the last frame it stands.
+/// Reported path of the radar: linear between frames. The radar stands before the first and after the last frame.
 class Way {
  public:
   Way(const std::vector<StampedTransform>& track, std::int64_t zero_ns) {
@@ -65,14 +65,15 @@ class Way {
   std::vector<Eigen::Vector3d> place_;
 };
 
-/// Time from a frame's stamp to its middle. Where radar.yaml does not say how long chirps last, their samples do.
+/// Time from a frame's stamp to its middle. Where radar.yaml does not state the chirps' duration, that of their samples
+/// is used.
 double halfFrame_s(const RadarConfig& radar) {
   const double sampled_s = radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
   const double said_s = radar.idle_s + radar.ramp_end_s;
   return 0.5 * radar.chirps_per_frame() * (std::isnan(said_s) ? sampled_s : said_s);
 }
 
-/// Changes between frames that follow each other, from one time to another.
+/// Changes between successive frames, from one time to another.
 std::vector<FrameChange> changesBetween(const Recording& recording, std::int64_t zero_ns, double from_s, double to_s) {
   const SignalChain chain(recording.radar);
   const RangeAngleAxes& axes = chain.axes();
@@ -117,12 +118,12 @@ std::vector<MovingStretch> motionsOf(const std::vector<StampedTransform>& track,
   std::vector<MovingStretch> motions;
   if (track.size() < 2) return motions;
   const Way way(track, zero_ns);
-  bool gap = true;  // frames or tf are missing, so that the beginning of a motion is not known
+  bool gap = true;  // frames or tf are missing, so that the start of a motion is unknown
   for (std::size_t i = 1; i < track.size(); ++i) {
     const double from_s = secondsSince(zero_ns, track[i - 1].stamp_ns);
     const double to_s = secondsSince(zero_ns, track[i].stamp_ns);
     if (to_s - from_s > kFarthest_s) {
-      if (!motions.empty() && motions.back().to_s > from_s - kRest_s) motions.pop_back();  // its end is not known
+      if (!motions.empty() && motions.back().to_s > from_s - kRest_s) motions.pop_back();  // its end is unknown
       gap = true;
       continue;
     }
@@ -149,9 +150,9 @@ std::vector<MovingStretch> motionsOf(const std::vector<StampedTransform>& track,
 
 namespace {
 
-/// Changes of frames while the radar stands and while it is on the way: medians.
+/// Medians of the changes of frames at rest and during motion.
 struct UsualChanges {
-  double still = 0, more = 0;  ///< at rest, and by how much more on the way
+  double still = 0, more = 0;  ///< at rest, and the excess during motion
 };
 
 std::optional<UsualChanges> usualChanges(const Way& way, const std::vector<MovingStretch>& motions,
@@ -173,7 +174,7 @@ std::optional<UsualChanges> usualChanges(const Way& way, const std::vector<Movin
   return UsualChanges{still, upperMedian(moving) - still};
 }
 
-/// Lag of least misfit, and that misfit.
+/// Delay of least misfit, and that misfit.
 std::pair<double, double> leastOverLags(const std::function<double(double)>& misfit) {
   std::pair<double, double> best{std::numeric_limits<double>::infinity(), 0};
   for (int i = -static_cast<int>(kLongest_s / kStep_s); i <= static_cast<int>(kLongest_s / kStep_s); ++i) {
@@ -182,7 +183,7 @@ std::pair<double, double> leastOverLags(const std::function<double(double)>& mis
   return best;
 }
 
-/// Misfit of frames' changes to a reported way that lags behind.
+/// Misfit of the changes of frames to a reported path with a delay.
 class LagMisfit {
  public:
   LagMisfit(const Way& way, const UsualChanges& usual)
@@ -194,7 +195,7 @@ class LagMisfit {
     }
     return sum;
   }
-  /// Slowest speed that frames show, of kSlow_m_per_s: that is a matter of the radar and of tf.
+  /// Slowest speed of kSlow_m_per_s that frames show, which depends on the radar and on tf.
   double slowestShown_m_per_s(const std::vector<std::vector<FrameChange>>& changes) const {
     double slow_m_per_s = kSpeed_m_per_s, least = std::numeric_limits<double>::infinity();
     for (double slow : kSlow_m_per_s) {
@@ -213,7 +214,7 @@ class LagMisfit {
 
  private:
   const Way& way_;
-  double least_;  ///< change that a radar at rest does not show: on the way there is now more and now less
+  double least_;  ///< change that a radar at rest does not exceed; changes vary during motion
 };
 
 }  // namespace
@@ -239,8 +240,8 @@ std::optional<PoseTimeLag> findPoseTimeLag(const std::vector<StampedTransform>& 
   result.lag_s = upperMedian(result.by_motion_s);
   std::vector<double> off;
   for (double lag_s : result.by_motion_s) off.push_back(std::abs(lag_s - result.lag_s));
-  // The error of a median is 1.25 times that of a mean. Two edges, each within a frame period, know no better than the
-  // second value.
+  // The error of a median is 1.25 times that of a mean. Two edges, each within a frame period, are no more accurate
+  // than the second value.
   const double scatter_s = std::max(1.4826 * upperMedian(off), period_s / std::sqrt(24.0));
   result.standard_error_s = 1.25 * scatter_s / std::sqrt(n);
   for (std::size_t g : telling) {
@@ -256,24 +257,24 @@ std::optional<PoseTimeLag> findPoseTimeLag(const std::vector<StampedTransform>& 
 
 namespace {
 
-/// Finding of a lag of the poses, beyond one that the twin states.
+/// Finding of a delay of the poses, beyond one that the twin states.
 FrameFinding findingOf(const PoseTimeLag& lag, double stated_s) {
-  FrameFinding f;
-  f.cause = kName;
+  FrameFinding finding;
+  finding.cause = kName;
   const double value_s = stated_s + lag.lag_s;
   const boost::math::students_t student(static_cast<double>(lag.by_motion_s.size()) - 1);
   const double half_s = boost::math::quantile(student, 0.975) * lag.standard_error_s;
-  f.parameters = {{"lag_s", "s", value_s, {{value_s - half_s, value_s + half_s}}}};
-  for (double nats : lag.nats) f.log_likelihood_gain += nats;
-  f.false_alarm_rate = lag.false_alarm_rate;
+  finding.parameters = {{"lag_s", "s", value_s, {{value_s - half_s, value_s + half_s}}}};
+  for (double nats : lag.nats) finding.log_likelihood_gain += nats;
+  finding.false_alarm_rate = lag.false_alarm_rate;
   std::ostringstream text;
   text << std::setprecision(3) << "frames begin and end to change " << std::abs(lag.lag_s) << " s "
        << (lag.lag_s > 0 ? "before" : "after") << " tf says that the radar moves or stops, at "
        << lag.by_motion_s.size() << " moves; poses are looked up by that much " << (lag.lag_s > 0 ? "later" : "earlier")
        << " than frames' stamps here";
   if (stated_s != 0) text << ", beyond the " << stated_s << " s that the twin states";
-  f.description = text.str();
-  return f;
+  finding.description = text.str();
+  return finding;
 }
 
 }  // namespace

@@ -12,40 +12,41 @@
 
 namespace mmradartwin::diagnosis::channels {
 
-/// Change between two frames that follow each other.
+/// Change between two successive frames.
 struct FrameChange {
-  double at_s = 0;    ///< time in the middle between the two
+  double at_s = 0;    ///< time in the middle between the two frames
   double change = 0;  ///< changeBetween() of their spectra
 };
 
-/// Stretch of time in which the radar is reported to move, from rest to rest.
+/// Interval in which the radar is reported to move, from rest to rest.
 struct MovingStretch {
   double from_s = 0, to_s = 0;
 };
 
-/// Lag by which reported poses begin and end to move later than the radar itself.
+/// Delay of reported poses behind the radar's motion.
 struct PoseTimeLag {
   double lag_s = 0, standard_error_s = 0;
-  std::vector<double> by_motion_s;  ///< lags of single motions, where these have one
-  std::vector<double> nats;         ///< over no lag, by each of these motions; misfits follow Laplace's law
-  double false_alarm_rate = 1;      ///< chance of so large a lag, by Student's law of the motions' scatter
+  std::vector<double> by_motion_s;  ///< delays of single motions, where these determine one
+  std::vector<double> nats;  ///< nats over no delay, by each of these motions; misfits follow Laplace's distribution
+  double false_alarm_rate =
+      1;  ///< probability of so large a delay by chance, by Student's t of the scatter over motions
 };
 
-/// Reported motions of at least 5 cm, in seconds since `zero_ns`. `track` is in order of time.
+/// Reported motions of at least 5 cm, in seconds since `zero_ns`. track: in order of time.
 std::vector<MovingStretch> motionsOf(const std::vector<StampedTransform>& track, std::int64_t zero_ns);
-/// Finds the lag from frames' changes about each motion. Nothing with fewer than three motions that tell it, and where
-/// frames change no more on the way than while the radar stands.
+/// Finds the delay from the changes of frames about each motion. Nothing with fewer than three motions that determine
+/// it, and where frames change no more during motion than at rest.
 std::optional<PoseTimeLag> findPoseTimeLag(const std::vector<StampedTransform>& track, std::int64_t zero_ns,
                                            const std::vector<MovingStretch>& motions,
                                            const std::vector<std::vector<FrameChange>>& changes, double period_s);
 
-/// Recording whose poses are where the radar was at each frame, rather than where it was reported to be then.
+/// Recording whose poses are the radar's positions at the frames' times, rather than those reported at these times.
 struct TimedRecording {
   Recording recording;
   std::optional<FrameFinding> finding;  ///< pose_time_lag
 };
-/// Reads the frames about the motions of a recording and corrects its poses for a lag. A recording without a track or
-/// without a lag stays as it is. A lag that the twin states is taken off first.
+/// Reads the frames about the motions of a recording and corrects its poses for a delay. A recording without a track or
+/// a delay is unchanged. A delay that the twin states is subtracted first.
 TimedRecording inTime(const Recording& recording, const std::vector<NamedParameters>& stated,
                       const ReadingProgress& on_progress);
 

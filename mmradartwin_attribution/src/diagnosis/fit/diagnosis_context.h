@@ -4,7 +4,7 @@
 
 #include "diagnosis/catalogue/stated_bounds.h"
 #include "diagnosis/channels/channel_data.h"
-#include "diagnosis/fit/hypothesis_fit.h"
+#include "diagnosis/fit/hypothesis_fitter.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/rooms.h"
@@ -14,21 +14,22 @@
 
 namespace mmradartwin::diagnosis::fit {
 
-/// Everything that the steps of a diagnosis share; made once for a session.
+/// Objects that the steps of a diagnosis share; made once per session.
 struct DiagnosisContext {
-  /// Keeps references. folds: parts of the locations that are held out in turn. Throws InputError where scene and radar
-  /// do not fit together.
+  /// Keeps references. folds: number of parts of the locations, each held out in turn. Throws InputError where scene
+  /// and radar do not fit together.
   DiagnosisContext(const Recording& recording, Twin& twin, ChannelData& data, const DiagnosisOptions& options,
                    int folds);
 
-  /// Tells options.on_progress of a stage and its share done. Throws DiagnosisCancelled where the user asks for it.
+  /// Reports a stage and the share of it that is done to options.on_progress. Throws DiagnosisCancelled where the user
+  /// has cancelled.
   void report(const std::string& stage, double share) const;
 
   const Recording& recording;
   Twin& twin;
   ChannelData& data;
   const DiagnosisOptions& options;
-  StatedAccuracy accuracy;  ///< the recording's where it states it, else the options'
+  StatedAccuracy accuracy;  ///< the recording's where it states one, else that of the options
   PoseAccuracy pose_accuracy;
   ExpectedEchoes echoes;
   ChannelLikelihood likelihood;

@@ -12,19 +12,24 @@
 namespace mmradartwin::diagnosis::fit {
 namespace {
 
-constexpr int kRisingFactor = 12;                  ///< times as many steps while each still gains kRising_nats
-constexpr double kLeastStep_nats = 0.2;            ///< promised gain below which a climb ends
-constexpr double kRising_nats = 5;                 ///< gain of the last step for which a climb goes on
-constexpr double kClimb_steps = 4;                 ///< like the last one, within which a climb has to reach its gain
-constexpr double kSearched[] = {0.3, 0.15};        ///< first steps of that search, in the coordinates' scale
-constexpr double kSearchTolerance = 0.02;          ///< in the coordinates' scale
-constexpr int kSearchPlaces = 12;                  ///< per coordinate
-constexpr double kLongestStep = 3;                 ///< in the coordinate's scale
-constexpr double kStepShares[] = {1.0, 0.4, 0.1};  ///< of a promised step, until one gains
-constexpr double kOneSidedFactors[] = {0.4, 2.0};  ///< of a start that rises from nothing
-constexpr Eigen::Index kMostRough = 4;             ///< coordinates that are searched without slopes
+constexpr int kRisingFactor = 12;        ///< factor on the number of steps while each gains kRising_nats
+constexpr double kLeastStep_nats = 0.2;  ///< expected gain of a step below which a climb ends
+constexpr double kRising_nats = 5;       ///< gain of the last step for which a climb goes on
+constexpr double kClimb_steps = 4;       ///< steps as good as the last one within which a climb has to reach least_nats
+constexpr double kSearched[] = {0.3, 0.15};        ///< first steps of the search without slopes, scaled
+constexpr double kSearchTolerance = 0.02;          ///< tolerance of that search, scaled
+constexpr int kSearchPlaces = 12;                  ///< evaluations of that search per coordinate
+constexpr double kLongestStep = 3;                 ///< longest step, scaled
+constexpr double kStepShares[] = {1.0, 0.4, 0.1};  ///< shares of a step that are tried until one gains
+constexpr double kOneSidedFactors[] = {0.4, 2.0};  ///< factors on a one-sided start
+constexpr int kScanned = 12;                       ///< values over the range of a number
+constexpr int kMostScanned = 48;                   ///< the same of a range, half a bin apart
+constexpr int kScanSteps = 2;                      ///< Fisher steps of the latents at a scanned value
+constexpr double kLeastForScan_nats = 3;           ///< gain over the null below which no other value is looked for
+constexpr double kLikelier_nats = 0.5;  ///< gain over the optimum for which a climb starts from a scanned value
+constexpr Eigen::Index kMostRough = 4;  ///< largest number of coordinates that are searched without slopes
 
-/// Calls `value` at places that lead to its maximum, without slopes (BOBYQA, Powell 2009).
+/// Calls `value` at places that approach its maximum, without slopes (BOBYQA, Powell 2009).
 void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector<double> scaled_values,
                          double initial_step, const std::function<double(const std::vector<double>&)>& value) {
   const unsigned n = static_cast<unsigned>(coordinates.size());
@@ -51,7 +56,7 @@ void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector
 }  // namespace
 
 LikelihoodClimb::LikelihoodClimb(ExpectedEchoes& source, const ChannelLikelihood& model, const ClimbTask& task)
-    : source_(source), model_(model), task_(task), globals_(task.nuisance.globals()) {
+    : source_(source), model_(model), task_(task), globals_(task.latents.globals()) {
   for (const Hypothesis& h : task.parts) {
     coordinates_.insert(coordinates_.end(), h.coordinates.begin(), h.coordinates.end());
   }
@@ -62,9 +67,9 @@ LikelihoodClimb::LikelihoodClimb(ExpectedEchoes& source, const ChannelLikelihood
 }
 
 std::vector<SessionLatents> LikelihoodClimb::startingLatents() const {
-  std::vector<SessionLatents> candidates = {task_.nuisance};
+  std::vector<SessionLatents> candidates = {task_.latents};
   if (task_.known == nullptr) {
-    SessionLatents without_headings = task_.nuisance;
+    SessionLatents without_headings = task_.latents;
     std::fill(without_headings.yaw_rad.begin(), without_headings.yaw_rad.end(), 0.0);
     SessionLatents without_ranges = without_headings;
     std::fill(without_ranges.actor_range_m.begin(), without_ranges.actor_range_m.end(), 0.0);
@@ -73,7 +78,7 @@ std::vector<SessionLatents> LikelihoodClimb::startingLatents() const {
     candidates.insert(candidates.end(), {without_headings, without_ranges, without_errors});
     for (const Hypothesis& h : task_.parts) {
       const int actor = source_.base().scene().actorIndex(h.subject);
-      if (actor >= 0) candidates.push_back(withoutErrors(task_.nuisance, actor));
+      if (actor >= 0) candidates.push_back(withoutErrors(task_.latents, actor));
     }
   }
   std::stable_sort(candidates.begin(), candidates.end(),
@@ -86,7 +91,7 @@ ModelState LikelihoodClimb::stateAt(const std::vector<double>& scaled_values, co
   s.mechanisms = mechanismsAt(scaled_values);
   s.actor_range_m = latents.actor_range_m;
   s.echoes = source_.echoes(s.mechanisms, s.actor_range_m);
-  s.nuisance = latents;
+  s.latents = latents;
   s.log_likelihood = model_.logLikelihood(s.echoes, latents, &s.by_pose);
   return s;
 }
@@ -98,15 +103,15 @@ void LikelihoodClimb::take(const ModelState& state, const std::vector<double>& s
 }
 
 ModelState LikelihoodClimb::consider(const std::vector<double>& scaled_values) {
-  ModelState s, best;
+  ModelState state, best;
   for (const SessionLatents& candidate : latents_) {
-    if (s.echoes.empty() || s.actor_range_m != candidate.actor_range_m) {
-      s = stateAt(scaled_values, candidate);
-    } else {  // equal ranges have the same echoes
-      s.nuisance = candidate;
-      s.log_likelihood = model_.logLikelihood(s.echoes, candidate, &s.by_pose);
+    if (state.echoes.empty() || state.actor_range_m != candidate.actor_range_m) {
+      state = stateAt(scaled_values, candidate);
+    } else {  // starts with equal ranges share their echoes
+      state.latents = candidate;
+      state.log_likelihood = model_.logLikelihood(state.echoes, candidate, &state.by_pose);
     }
-    if (best.echoes.empty() || s.log_likelihood > best.log_likelihood) best = s;
+    if (best.echoes.empty() || state.log_likelihood > best.log_likelihood) best = state;
   }
   take(best, scaled_values);
   return best;
@@ -119,12 +124,12 @@ void LikelihoodClimb::tryStarts() {
     if (task_.null == nullptr || task_.known != nullptr || task_.starts.size() < 2 || !parts.front().isGeometry()) {
       continue;
     }
-    // The right start may lose to a smaller one before the latents have settled on it.
-    SessionLatents settled = s.nuisance;
-    model_.fit(s.echoes, settled, kSettling);
-    take(stateAt(start, settled), start);
+    // The right start may lose to a smaller one until the latents are refitted.
+    SessionLatents refitted = s.latents;
+    model_.fit(s.echoes, refitted, kLatentSteps);
+    take(stateAt(start, refitted), start);
   }
-  // The promise of a quadratic is far off where a level rises from nothing.
+  // A quadratic predicts a one-sided level badly.
   const bool one_sided = parts.size() == 1 && std::any_of(coordinates_.begin(), coordinates_.end(),
                                                           [](const Coordinate& c) { return c.oneSided(); });
   for (double factor : kOneSidedFactors) {
@@ -133,7 +138,7 @@ void LikelihoodClimb::tryStarts() {
     for (double& v : other) v *= factor;
     consider(other);
   }
-  // A start that is worse than nothing is an error of the quadratic; only geometry has a valley to cross.
+  // A start below the null is an error of the quadratic. Only a geometry may have to cross a valley.
   if (!one_sided && !geometric_ && parts.size() == 1) consider(std::vector<double>(coordinates_.size(), 0.0));
 }
 
@@ -141,25 +146,25 @@ Scores LikelihoodClimb::derivatives(const ModelState& state, const std::vector<d
   std::vector<SessionCovariance> directions;
   SessionCovariance here;
   for (std::size_t j = 0; j < coordinates_.size(); ++j) {
-    const Coordinate& c = coordinates_[j];
-    const double step = c.logarithmic() ? kSmallStep * std::max(1e-4, std::abs(scaled_values[j])) : kSmallStep;
+    const Coordinate& coordinate = coordinates_[j];
+    const double step = coordinate.logarithmic() ? kSmallStep * std::max(1e-4, std::abs(scaled_values[j])) : kSmallStep;
     const auto covarianceAt = [&](double by) {
       std::vector<double> moved = scaled_values;
       moved[j] += by;
       return model_.covariance(
-          source_.echoesNear(mechanismsAt(moved), state.mechanisms, everyone_, state.actor_range_m), state.nuisance,
+          source_.echoesNear(mechanismsAt(moved), state.mechanisms, everyone_, state.actor_range_m), state.latents,
           everyone_);
     };
-    // The likelihood of one strong path is a narrow ridge. A difference to one side would contain the square of a turn
-    // or of a gain, which hides the slope and makes the information many times too large.
-    if (!c.oneSided()) {
+    // The likelihood of one strong path is a narrow ridge. A one-sided difference would contain the square of a turn or
+    // of a gain, which hides the slope and makes the information many times too large.
+    if (!coordinate.oneSided()) {
       directions.push_back(difference(covarianceAt(step), covarianceAt(-step), 2 * step));
       continue;
     }
-    if (here.empty()) here = model_.covariance(state.echoes, state.nuisance, everyone_);
+    if (here.empty()) here = model_.covariance(state.echoes, state.latents, everyone_);
     directions.push_back(difference(covarianceAt(step), here, everyone_, step));
   }
-  return model_.scores(model_.basis(state.echoes, state.nuisance), directions, everyone_);
+  return model_.scores(model_.basis(state.echoes, state.latents), directions, everyone_);
 }
 
 void LikelihoodClimb::climb() {
@@ -171,7 +176,7 @@ void LikelihoodClimb::climb() {
     const bool hopeless = task_.null != nullptr && i >= 2 &&
                           optimum_.state.log_likelihood + kClimb_steps * std::max(risen, screened_nats) <
                               task_.null->log_likelihood + task_.least_nats;
-    // On a ridge between a cause and the latents that stood in for it, every step is longer than the one before.
+    // On a ridge between a cause and the latents that absorbed it, each step is longer than the one before.
     const int most = risen > kRising_nats ? kRisingFactor * task_.steps : task_.steps;
     if (i >= most || screened_nats < kLeastStep_nats || hopeless) return;
     const double gained = stepBy(step);
@@ -192,7 +197,7 @@ double LikelihoodClimb::stepBy(const Eigen::VectorXd& step) {
       v = std::clamp(v, low, high);
     }
     ModelState s =
-        stateAt(next, model_.stepped(optimum_.state.nuisance, step.head(globals_), optimum_.scores, step, share));
+        stateAt(next, model_.stepped(optimum_.state.latents, step.head(globals_), optimum_.scores, step, share));
     if (s.log_likelihood <= optimum_.state.log_likelihood) continue;
     const double gained = s.log_likelihood - optimum_.state.log_likelihood;
     optimum_.state = std::move(s);
@@ -202,17 +207,42 @@ double LikelihoodClimb::stepBy(const Eigen::VectorXd& step) {
   return 0;
 }
 
-bool LikelihoodClimb::isWorthASearch() const {
+void LikelihoodClimb::scan() {
+  if (task_.parts.size() != 1 || coordinates_.size() != 1 || geometric_) return;
+  if (task_.null != nullptr && optimum_.state.log_likelihood < task_.null->log_likelihood + kLeastForScan_nats) {
+    return;
+  }
+  const Coordinate& c = coordinates_.front();
+  int count = kScanned;
+  if (c.unit == "m") {
+    const double half_bin_m = model_.data().radar.range_bin_m() / 2;
+    count = std::clamp(static_cast<int>(std::ceil((c.max - c.min) / half_bin_m)), kScanned, kMostScanned);
+  }
+  const double reached = optimum_.state.log_likelihood;
+  const SessionLatents from = optimum_.state.latents;
+  for (int i = 0; i <= count; ++i) {
+    const std::vector<double> there = {c.scaled(c.min + (c.max - c.min) * i / count)};
+    ModelState state = stateAt(there, from);
+    // Latents stand in for a part of the cause: they follow before values are compared.
+    model_.fit(state.echoes, state.latents, kScanSteps);
+    state.log_likelihood = model_.logLikelihood(state.echoes, state.latents, &state.by_pose);
+    take(state, there);
+  }
+  if (optimum_.state.log_likelihood > reached + kLikelier_nats) climb();
+}
+
+bool LikelihoodClimb::needsSearch() const {
   const Eigen::Index n = static_cast<Eigen::Index>(coordinates_.size());
   if (!geometric_ || n == 0 || n > kMostRough) return false;
-  if (task_.null != nullptr && broadGain(model_.data(), *task_.null, optimum_.state) < kWorthASearch_nats) return false;
+  if (task_.null != nullptr && gainWithoutBestPlace(model_.data(), *task_.null, optimum_.state) < kLeastForSearch_nats)
+    return false;
   if (task_.known == nullptr) return true;
   const double higher = optimum_.state.log_likelihood - task_.known->state.log_likelihood;
   double apart = 0;
   for (std::size_t j = 0; j < optimum_.scaled_values.size(); ++j) {
     apart = std::max(apart, std::abs(optimum_.scaled_values[j] - task_.known->scaled_values[j]));
   }
-  return !(higher < -kWorthASearch_nats || (apart < kSearched[1] && higher < kRising_nats));
+  return !(higher < -kLeastForSearch_nats || (apart < kSearched[1] && higher < kRising_nats));
 }
 
 void LikelihoodClimb::search(double first_step) {
@@ -227,7 +257,7 @@ void LikelihoodClimb::search(double first_step) {
     }
     step.head(globals_) =
         latents.solve(from.scores.total.head(globals_) - information.topRightCorner(globals_, n) * step.tail(n));
-    ModelState s = stateAt(next, model_.stepped(from.state.nuisance, step.head(globals_), from.scores, step, 1));
+    ModelState s = stateAt(next, model_.stepped(from.state.latents, step.head(globals_), from.scores, step, 1));
     const double value = s.log_likelihood;
     if (value > optimum_.state.log_likelihood) {
       optimum_.state = std::move(s);
@@ -242,9 +272,10 @@ Optimum LikelihoodClimb::run() {
   tryStarts();
   everyone_ = everyPose(optimum_.state);
   climb();
-  if (!isWorthASearch()) return std::move(optimum_);
-  // The likelihood is rough where paths come and go with every millimetre: slopes end at the first bump, a quadratic
-  // through values some millimetres apart does not. The latents follow to first order.
+  scan();
+  if (!needsSearch()) return std::move(optimum_);
+  // Where paths appear and vanish with each millimetre, slopes end at the first bump. A quadratic through values some
+  // millimetres apart does not. The latents follow to first order.
   for (double first_step : kSearched) {
     const double before = optimum_.state.log_likelihood;
     search(first_step);
@@ -261,7 +292,7 @@ std::vector<double> gainByLocation(const ChannelData& data, const ModelState& nu
   return gain;
 }
 
-double broadGain(const ChannelData& data, const ModelState& null, const ModelState& state) {
+double gainWithoutBestPlace(const ChannelData& data, const ModelState& null, const ModelState& state) {
   const double gain = state.log_likelihood - null.log_likelihood;
   const std::vector<double> by_location = gainByLocation(data, null, state);
   if (by_location.size() < 2) return gain;

@@ -11,31 +11,32 @@
 
 namespace mmradartwin::diagnosis::fit {
 
-constexpr double kWorthASearch_nats = 25;  ///< gain by slopes from which on a rough likelihood is searched
+constexpr double kLeastForSearch_nats = 25;  ///< gain along slopes from which a rough likelihood is also searched
 
-/// Highest likelihood that a climb has found.
+/// Place of the highest likelihood that a climb has found.
 struct Optimum {
   std::vector<double> scaled_values;
   ModelState state;
-  Scores scores;  ///< at the last place with derivatives
+  Scores scores;  ///< at the last place whose derivatives were taken
 };
 
 /// Task of a climb: to maximise the likelihood over the coordinates of several hypotheses.
 struct ClimbTask {
   const std::vector<NamedParameters>& base;  ///< mechanisms without the hypotheses
-  const SessionLatents& nuisance;            ///< latents to start from
+  const SessionLatents& latents;             ///< latents to start from
   const std::vector<Hypothesis>& parts;
-  const std::vector<std::vector<double>>& starts;  ///< scaled coordinates of all parts
-  int steps;                                       ///< Fisher steps, more while they gain much
-  /// A geometry is searched without slopes only where it gains over this state at more than one place; always where it
-  /// is null.
+  const std::vector<std::vector<double>>& starts;  ///< [starts][coordinates of all parts] scaled
+  int steps;                                       ///< Fisher steps; more are made while each gains much
+  /// State without the hypotheses. A geometry is searched without slopes only where it gains over this state at more
+  /// than one place; always where null.
   const ModelState* null = nullptr;
-  double least_nats = 0;                 ///< gain over the null that matters: a climb that will not reach it ends
-  const HypothesisFit* known = nullptr;  ///< a fit of the same, whose optimum needs no search
+  double least_nats = 0;  ///< gain over the null that matters; a climb that will not reach it stops
+  const HypothesisFit* known =
+      nullptr;  ///< earlier fit of the same hypothesis, whose optimum needs no search; may be null
 };
 
-/// Maximises a likelihood: from the best start by Fisher scoring, and where paths come and go within millimetres by a
-/// search without slopes.
+/// Maximises a likelihood by Fisher scoring from the best start. Where paths appear and vanish within millimetres, a
+/// search without slopes follows.
 class LikelihoodClimb {
  public:
   /// Keeps references.
@@ -46,20 +47,22 @@ class LikelihoodClimb {
   std::vector<NamedParameters> mechanismsAt(const std::vector<double>& scaled_values) const {
     return mechanismsWith(task_.base, task_.parts, scaled_values);
   }
-  /// Latents with which a start is tried: as given, and without those that may stand in for the cause.
+  /// Latents that each start is tried with: those given, and those without errors that may have absorbed the cause.
   std::vector<SessionLatents> startingLatents() const;
   ModelState stateAt(const std::vector<double>& scaled_values, const SessionLatents& latents) const;
-  /// Takes a state for the optimum where its likelihood is higher.
+  /// Makes a state the optimum where its likelihood is higher.
   void take(const ModelState& state, const std::vector<double>& scaled_values);
-  /// Tries values with each of the starting latents; returns the likeliest state.
+  /// Tries values with each of the starting latents. Returns the state of highest likelihood.
   ModelState consider(const std::vector<double>& scaled_values);
   void tryStarts();
   Scores derivatives(const ModelState& state, const std::vector<double>& scaled_values) const;
   void climb();
-  /// Takes the longest share of a step that gains; returns the gain, 0 where none does.
+  /// Takes the longest share of a step that gains. Returns the gain, 0 where no share gains.
   double stepBy(const Eigen::VectorXd& step);
-  bool isWorthASearch() const;
-  /// Searches without slopes around the optimum, from one first step on.
+  /// Tries values over the whole range of a single number, and climbs from one that is likelier than the optimum.
+  void scan();
+  bool needsSearch() const;
+  /// Searches without slopes around the optimum; first_step is scaled.
   void search(double first_step);
 
   ExpectedEchoes& source_;
@@ -73,9 +76,9 @@ class LikelihoodClimb {
   Optimum optimum_;
 };
 
-/// Gain of a state over the null, without the location that gains most.
-double broadGain(const ChannelData& data, const ModelState& null, const ModelState& state);
-/// [locations] gain of a state over the null.
+/// Gain in nats of a state over the null, without the location that gains most.
+double gainWithoutBestPlace(const ChannelData& data, const ModelState& null, const ModelState& state);
+/// [locations] gain in nats of a state over the null.
 std::vector<double> gainByLocation(const ChannelData& data, const ModelState& null, const ModelState& state);
 
 }  // namespace mmradartwin::diagnosis::fit

@@ -11,39 +11,40 @@
 namespace mmradartwin::diagnosis::fit {
 namespace {
 
-constexpr int kRefits = 3;                ///< Fisher steps of the latents at each place
-constexpr std::size_t kMostProfiled = 6;  ///< numbers profiled together: each pair of them is a place
-constexpr int kWidths = 3;                ///< widths that are tried of a step
-constexpr double kWidest = 1;             ///< first width where geometry is profiled, in the coordinate's scale
+constexpr int kRefits = 3;                ///< Fisher steps of the latents at each point
+constexpr std::size_t kMostProfiled = 6;  ///< numbers profiled jointly: each pair of them costs one point
+constexpr int kWidths = 3;                ///< widths of a step that are tried
+constexpr double kWidest = 1;             ///< largest width of a geometry's step, scaled
 
-/// Fall of the likelihood that a step should bring, in nats, and the narrowest step.
+/// Fall of the likelihood that a step should cause, in nats, and the narrowest step.
 struct Fall {
   double least, wanted, most;
-  double narrowest;  ///< in the coordinate's scale
+  double narrowest;  ///< scaled
 };
 constexpr Fall kSmooth = {1, 3, 15, 1e-6};
-constexpr Fall kRough = {10, 25, 80, 0.1};  ///< well above what paths that come and go within millimetres bring
-constexpr double kMostAlike = 0.95;         ///< bound of the correlation of two values, and of more together
+constexpr Fall kRough = {10, 25, 80, 0.1};  ///< well above the jumps of paths that appear and vanish within millimetres
+constexpr double kMostCorrelated = 0.95;    ///< limit of the correlation of two values
 
-/// The likelihood at one place, all latents refitted.
-struct Place {
+/// Likelihood at one point, with all latents refitted.
+struct ProfilePoint {
   double log_likelihood = 0;
-  Eigen::VectorXd by_location;  ///< [locations] with the prior of the headings there
-  Eigen::VectorXd latents;      ///< [2 errors] of the actors, in standard deviations
+  Eigen::VectorXd by_location;  ///< [locations] nats, with the prior of the headings there
+  Eigen::VectorXd latents;      ///< [2 errors] errors of the actors, in standard deviations
 };
 
-// Places are known by where paths begin and end, too: ranges and directions do not say everything.
-constexpr double kMostBlurred = 10;     ///< bound of the geometric error, times the likelihood's own
-constexpr double kCarriesShare = 0.1;   ///< of the pose's strongest amplitude, for an echo that places are known by
-constexpr double kSmallChange = 0.125;  ///< step of derivatives, in the coordinate's scale
-constexpr double kShows = 1;            ///< least information about a typical value by which ranges know of it
+// Paths that begin and end within the session locate things, too. Ranges and directions do not say everything.
+constexpr double kMostErrorRatio = 10;  ///< limit of the geometric standard error, over the likelihood's own
+/// Least amplitude of an echo that locates things, over the pose's strongest.
+constexpr double kLeastAmplitudeShare = 0.1;
+constexpr double kSmallChange = 0.125;   ///< step of numerical derivatives, scaled
+constexpr double kLeastInformation = 1;  ///< least information of ranges about a scaled value for which they locate it
 
-/// Variance of the coordinates by the ranges and directions of strong echoes, where actors have range errors and poses
-/// have heading errors. These errors are the same in all echoes of one actor or pose, however many there are. 0 for a
-/// coordinate that moves no echo.
+/// Variance of the scaled coordinates by the ranges and directions of strong echoes, where actors have range errors and
+/// poses have heading errors. All echoes of one actor or pose share these errors. 0 for a coordinate that moves no
+/// echo.
 Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_coordinate, int actors, int poses,
                                   const PoseAccuracy& accuracy, const LatentSpread& spread) {
-  // Unknowns: the coordinates, range errors of the actors and of what the scene lacks, headings of the poses.
+  // Unknowns: the coordinates, the range errors of actors and of everything outside the scene, the headings of poses.
   const Eigen::Index n = static_cast<Eigen::Index>(by_coordinate.size()), all = n + actors + 1 + poses;
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(all, all);
   information.diagonal().segment(n, actors + 1).setOnes();
@@ -58,9 +59,9 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
   for (std::size_t j = 0; j < shifts.size(); ++j) {
     for (const PathShift& p : by_coordinate[j]) shifts[j][{p.place, p.event, p.facets}] = &p;
   }
-  // The error of a pose's own place is the same in all its echoes: together they know a range as well as one does.
+  // The error of a pose's position is common to its echoes: all of them measure a range as well as one does.
   std::vector<double> echoes(strongest.size(), 0.0);
-  const auto carries = [&](const PathShift& p) { return p.amplitude >= kCarriesShare * strongest[p.place]; };
+  const auto carries = [&](const PathShift& p) { return p.amplitude >= kLeastAmplitudeShare * strongest[p.place]; };
   for (const auto& [key, path] : shifts.front()) echoes[path->place] += carries(*path);
   for (const auto& [key, path] : shifts.front()) {
     if (!carries(*path)) continue;
@@ -83,49 +84,49 @@ Eigen::VectorXd geometricVariance(const std::vector<std::vector<PathShift>>& by_
   const Eigen::ArrayXd own = information.diagonal().head(n).array();
   information.diagonal().head(n).array() += 1e-12;
   const Eigen::ArrayXd variance = information.inverse().diagonal().head(n).array();
-  return (own > kShows).select(variance, 0.0);
+  return (own > kLeastInformation).select(variance, 0.0);
 }
 
-/// Matrix of curvatures made definite: differences of a rough likelihood need not describe a top. No direction is
-/// flatter than that of two values with correlation kMostAlike.
-Eigen::MatrixXd fallingToAllSides(const Eigen::MatrixXd& fall) {
+/// Positive definite matrix close to these curvatures: numerical differences of a rough likelihood need not describe a
+/// maximum. Correlations are limited to kMostCorrelated.
+Eigen::MatrixXd positiveDefinite(const Eigen::MatrixXd& fall) {
   const Eigen::VectorXd scale = fall.diagonal().cwiseSqrt();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> alike(scale.cwiseInverse().asDiagonal() * fall *
                                                              scale.cwiseInverse().asDiagonal());
   const Eigen::MatrixXd to = scale.asDiagonal() * alike.eigenvectors();
-  return to * alike.eigenvalues().cwiseMax(1 - kMostAlike).asDiagonal() * to.transpose();
+  return to * alike.eigenvalues().cwiseMax(1 - kMostCorrelated).asDiagonal() * to.transpose();
 }
 
-/// A step to both sides of the fit along one coordinate.
+/// Steps to both sides of the fit along one coordinate.
 struct Step {
   double width = 0;
-  Place ahead, behind;
+  ProfilePoint ahead, behind;
   double curvature = 0;
-  bool flat = false;  ///< the likelihood does not fall: the width is all that is known of an error
+  bool flat = false;  ///< the likelihood does not fall: only the width limits the error
 };
 
-/// The likelihood about a fit, looked at along each coordinate and in the corner of each pair.
+/// Profile of the likelihood about a fit, along each coordinate and at one corner of each pair.
 class Profile {
  public:
   Profile(const ProfiledModel& model, const std::vector<Hypothesis>& parts, const ProfiledValues& fit);
-  /// Values at the best place that was looked at, with the fit's errors still.
+  /// Values at the best point, with the fit's errors.
   const ProfiledValues& best() const { return best_; }
-  /// True where the top lies beyond the steps: they tell no width.
+  /// True where the maximum lies beyond the steps, so that they give no width.
   bool endsBeyondItsSteps() const;
-  /// Values at the best place with their standard errors.
+  /// Values at the best point with their standard errors.
   ProfiledValues withErrors() const;
 
  private:
   std::vector<NamedParameters> mechanismsAt(const std::vector<double>& scaled_values) const {
     return mechanismsWith(model_.base, parts_, scaled_values);
   }
-  Place look(const std::vector<double>& scaled_values) const;
-  /// Takes a place for the best one where the likelihood is higher there.
-  void consider(const Place& place, const std::vector<double>& scaled_values);
-  /// Values of the scale that coordinate j may have.
+  ProfilePoint pointAt(const std::vector<double>& scaled_values) const;
+  /// Makes a point the best one where its likelihood is higher.
+  void consider(const ProfilePoint& point, const std::vector<double>& scaled_values);
+  /// Limits of the scaled value of coordinate j.
   std::pair<double, double> limits(std::size_t j) const;
   Step stepAlong(std::size_t j, const Fall& wanted);
-  void lookAtCorners();
+  void evaluateCorners();
   void climbToTop();
   Eigen::VectorXd geometricVarianceHere() const;
 
@@ -133,14 +134,14 @@ class Profile {
   const std::vector<Hypothesis>& parts_;
   const ProfiledValues& fit_;
   std::vector<Coordinate> coordinates_;
-  std::vector<char> traces_;  ///< by coordinate: it moves what is traced
-  Place here_;
+  std::vector<char> traces_;  ///< [coordinates] the coordinate changes traced paths
+  ProfilePoint here_;
   double highest_ = 0;
   ProfiledValues best_;
   std::vector<Step> steps_;
   Eigen::VectorXd slope_;
   Eigen::MatrixXd fall_, scores_, latents_;  ///< [n][n], [locations][n], [2 errors][n]
-  Eigen::MatrixXd covariance_;               ///< [n][n] by the fall
+  Eigen::MatrixXd covariance_;               ///< [n][n] inverse of the curvatures
   Eigen::VectorXd to_top_;
   std::vector<double> top_;
   Eigen::VectorXd geometric_;
@@ -154,37 +155,37 @@ Profile::Profile(const ProfiledModel& model, const std::vector<Hypothesis>& part
                    model.source.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0))));
   }
   const bool rough = std::count(traces_.begin(), traces_.end(), 1) > 0;
-  here_ = look(fit.scaled_values);
+  here_ = pointAt(fit.scaled_values);
   highest_ = here_.log_likelihood;
   for (std::size_t j = 0; j < coordinates_.size(); ++j) steps_.push_back(stepAlong(j, rough ? kRough : kSmooth));
-  lookAtCorners();
+  evaluateCorners();
   climbToTop();
 }
 
-Place Profile::look(const std::vector<double>& scaled_values) const {
+ProfilePoint Profile::pointAt(const std::vector<double>& scaled_values) const {
   const ChannelData& data = model_.likelihood.data();
   const LatentSpread& spread = model_.likelihood.spread();
-  SessionLatents fitted = model_.nuisance;
+  SessionLatents fitted = model_.latents;
   const std::vector<PoseEchoes> echoes = model_.source.echoes(mechanismsAt(scaled_values), fitted.actor_range_m);
   model_.likelihood.fit(echoes, fitted, kRefits);
   std::vector<double> by_pose;
-  Place place;
-  place.log_likelihood = model_.likelihood.logLikelihood(echoes, fitted, &by_pose);
-  place.by_location = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.locations.size()));
+  ProfilePoint point;
+  point.log_likelihood = model_.likelihood.logLikelihood(echoes, fitted, &by_pose);
+  point.by_location = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.locations.size()));
   for (std::size_t i = 0; i < by_pose.size(); ++i) {
     const double heading = fitted.yaw_rad[i] / model_.accuracy.heading_rad;
-    place.by_location[data.poses[i].location] += by_pose[i] - 0.5 * heading * heading;
+    point.by_location[data.poses[i].location] += by_pose[i] - 0.5 * heading * heading;
   }
   const Eigen::Index errors = static_cast<Eigen::Index>(fitted.actor_gain.size());
-  place.latents.resize(2 * errors);
-  place.latents << Eigen::Map<const Eigen::VectorXd>(fitted.actor_gain.data(), errors) / spread.actor_gain,
+  point.latents.resize(2 * errors);
+  point.latents << Eigen::Map<const Eigen::VectorXd>(fitted.actor_gain.data(), errors) / spread.actor_gain,
       Eigen::Map<const Eigen::VectorXd>(fitted.actor_range_m.data(), errors) / spread.actor_range_m;
-  return place;
+  return point;
 }
 
-void Profile::consider(const Place& place, const std::vector<double>& scaled_values) {
-  if (place.log_likelihood <= highest_) return;
-  highest_ = place.log_likelihood;
+void Profile::consider(const ProfilePoint& point, const std::vector<double>& scaled_values) {
+  if (point.log_likelihood <= highest_) return;
+  highest_ = point.log_likelihood;
   best_.scaled_values = scaled_values;
 }
 
@@ -205,9 +206,9 @@ Step Profile::stepAlong(std::size_t j, const Fall& wanted) {
   for (int i = 1;; ++i) {
     if (widest > 0) step.width = std::min(step.width, widest);
     moved[j] = fitted[j] + step.width;
-    step.ahead = look(moved);
+    step.ahead = pointAt(moved);
     moved[j] = fitted[j] - step.width;
-    step.behind = look(moved);
+    step.behind = pointAt(moved);
     const double fall = here_.log_likelihood - 0.5 * (step.ahead.log_likelihood + step.behind.log_likelihood);
     step.curvature = 2 * fall / (step.width * step.width);
     const bool narrower = fall > wanted.most && step.width > wanted.narrowest;
@@ -226,7 +227,7 @@ Step Profile::stepAlong(std::size_t j, const Fall& wanted) {
   return step;
 }
 
-void Profile::lookAtCorners() {
+void Profile::evaluateCorners() {
   const Eigen::Index n = static_cast<Eigen::Index>(coordinates_.size());
   slope_ = Eigen::VectorXd::Zero(n);
   fall_ = Eigen::MatrixXd::Zero(n, n);
@@ -245,17 +246,17 @@ void Profile::lookAtCorners() {
       std::vector<double> moved = fit_.scaled_values;
       moved[static_cast<std::size_t>(j)] += a.width;
       moved[static_cast<std::size_t>(k)] += b.width;
-      const Place corner = look(moved);
+      const ProfilePoint corner = pointAt(moved);
       consider(corner, moved);
       const double both = corner.log_likelihood - a.ahead.log_likelihood - b.ahead.log_likelihood;
-      const double most = kMostAlike * std::sqrt(a.curvature * b.curvature);
+      const double most = kMostCorrelated * std::sqrt(a.curvature * b.curvature);
       fall_(j, k) = fall_(k, j) = std::clamp(-(both + here_.log_likelihood) / (a.width * b.width), -most, most);
     }
   }
 }
 
 void Profile::climbToTop() {
-  covariance_ = fallingToAllSides(fall_).inverse();
+  covariance_ = positiveDefinite(fall_).inverse();
   to_top_ = covariance_ * slope_;
   top_ = fit_.scaled_values;
   for (std::size_t j = 0; j < top_.size(); ++j) {
@@ -265,7 +266,7 @@ void Profile::climbToTop() {
         std::clamp(fit_.scaled_values[j] + std::clamp(to_top_[static_cast<Eigen::Index>(j)], -width, width), low, high);
   }
   geometric_ = geometricVarianceHere();
-  consider(look(top_), top_);
+  consider(pointAt(top_), top_);
 }
 
 Eigen::VectorXd Profile::geometricVarianceHere() const {
@@ -277,7 +278,7 @@ Eigen::VectorXd Profile::geometricVarianceHere() const {
     moved[j] += kSmallChange;
     by_coordinate.push_back(model_.source.pathShifts(mechanismsAt(moved), mechanismsAt(fit_.scaled_values), everyone));
   }
-  return geometricVariance(by_coordinate, static_cast<int>(model_.nuisance.actor_gain.size()) - 1,
+  return geometricVariance(by_coordinate, static_cast<int>(model_.latents.actor_gain.size()) - 1,
                            static_cast<int>(everyone.size()), model_.accuracy, model_.likelihood.spread());
 }
 
@@ -292,7 +293,8 @@ bool Profile::endsBeyondItsSteps() const {
 ProfiledValues Profile::withErrors() const {
   const Eigen::MatrixXd centred = scores_.rowwise() - scores_.colwise().mean();
   const double locations = static_cast<double>(scores_.rows());
-  // An actor's error is the same at all places: its prior says how far it reaches, scatter over places does not.
+  // An actor's error is the same at all places, so that its prior bounds it and the scatter over places does not show
+  // it.
   const Eigen::MatrixXd scatter =
       centred.transpose() * centred * (locations / std::max(1.0, locations - 1)) + latents_.transpose() * latents_;
   const Eigen::MatrixXd robust = covariance_ * scatter * covariance_;
@@ -300,7 +302,7 @@ ProfiledValues Profile::withErrors() const {
   for (std::size_t k = 0; k < coordinates_.size(); ++k) {
     const Eigen::Index j = static_cast<Eigen::Index>(k);
     double variance = locations > 2 ? std::max(robust(j, j), covariance_(j, j)) : covariance_(j, j);
-    variance = std::max(variance, std::min(geometric_[j], kMostBlurred * kMostBlurred * variance));
+    variance = std::max(variance, std::min(geometric_[j], kMostErrorRatio * kMostErrorRatio * variance));
     result.standard_error[k] =
         std::sqrt(std::max(0.0, variance)) * std::abs(coordinates_[k].slope(result.scaled_values[k]));
   }
@@ -346,7 +348,7 @@ void profileParts(const ProfiledModel& model, const std::vector<Hypothesis>& par
       joint.standard_error.insert(joint.standard_error.end(), fits[i].standard_error.begin(),
                                   fits[i].standard_error.end());
     }
-    joint = profiled({model.source, model.likelihood, model.accuracy, beside, model.nuisance}, members, joint);
+    joint = profiled({model.source, model.likelihood, model.accuracy, beside, model.latents}, members, joint);
     auto scaled_values = joint.scaled_values.begin(), error = joint.standard_error.begin();
     for (std::size_t i : group) {
       const auto count = static_cast<std::ptrdiff_t>(fits[i].scaled_values.size());

@@ -9,10 +9,10 @@
 
 namespace mmradartwin::diagnosis::fit {
 
-/// Values of the coordinates of several hypotheses, in a row.
+/// Values of the coordinates of several hypotheses, one hypothesis after the other.
 struct ProfiledValues {
   std::vector<double> scaled_values;
-  std::vector<double> standard_error;  ///< of the values (not scaled)
+  std::vector<double> standard_error;  ///< [coordinates] of the values in their units
 };
 
 /// Model in which values are profiled.
@@ -21,20 +21,20 @@ struct ProfiledModel {
   const ChannelLikelihood& likelihood;
   const PoseAccuracy& accuracy;
   const std::vector<NamedParameters>& base;  ///< mechanisms without the parts
-  const SessionLatents& nuisance;            ///< from which latents are refitted
+  const SessionLatents& latents;             ///< start of each refit of the latents
 };
 
-/// Values and standard errors about a fit, by the profile likelihood: how far the likelihood with all latents refitted
-/// falls to both sides, and how much its slope scatters over places. Steps are as wide as the likelihood takes to fall
-/// by some nats, since slopes alone promise far too much where paths come and go within millimetres. The values move to
-/// the top of that fall where the likelihood gains by it.
-/// fit: coordinates of the parts, with standard errors that steps begin with. again: how often the steps may begin anew
-/// where the top lies beyond them.
+/// Values and standard errors about a fit, by the profile likelihood: its fall to both sides with all latents refitted,
+/// and the scatter of its slope over places. A step is as wide as a fall by some nats needs: slopes at the fit
+/// understate errors where paths appear and vanish within millimetres. The values move to the maximum of the fitted
+/// quadratic where the likelihood gains by it.
+/// fit: coordinates of the parts, with the standard errors that set the first steps. again: how often the profile may
+/// be repeated where the maximum lies beyond its steps.
 ProfiledValues profiled(const ProfiledModel& model, const std::vector<Hypothesis>& parts, const ProfiledValues& fit,
                         int again = 2);
 
-/// Profiles several hypotheses in place: together where they have few numbers, else one by one beside the others. A
-/// hypothesis with too many numbers of its own (a channel error) stays as it is.
+/// Profiles several hypotheses in place: jointly where they have few numbers, else one at a time given the others. A
+/// hypothesis with too many numbers (channel errors) is left unchanged.
 void profileParts(const ProfiledModel& model, const std::vector<Hypothesis>& parts, std::vector<ProfiledValues>& fits);
 
 }  // namespace mmradartwin::diagnosis::fit

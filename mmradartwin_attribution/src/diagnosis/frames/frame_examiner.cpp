@@ -23,8 +23,8 @@ namespace {
 
 using Complex = std::complex<float>;
 
-constexpr int kMostSlips = 3;              ///< of one pose, that are closed
-constexpr double kLeastScatter_db = 1e-4;  ///< of a frame's level over poses: floor of a division
+constexpr int kMostSlips = 3;              ///< slips of one pose that are closed
+constexpr double kLeastScatter_db = 1e-4;  ///< of a frame's level over poses: floor, against division by zero
 
 /// 95 % interval of a share of `trials` by Clopper and Pearson.
 std::array<double, 2> shareInterval(double hits, double trials) {
@@ -64,7 +64,7 @@ struct FrameExaminer::State {
   std::vector<PoseJudgement> judged;
   std::vector<PoseMotion> motion;
   std::vector<PoseFrames> poses;
-  mutable std::optional<LocatedMotion> located;  ///< motion at the poses so far, once it was asked for
+  mutable std::optional<LocatedMotion> located;  ///< motion at the poses so far, once it was computed
 
   const LocatedMotion& locate() const {
     if (!located) located = locateMotion(radar, motion);
@@ -79,9 +79,9 @@ struct FrameExaminer::State {
   FrameFinding unsteadiness() const;
   /// Checks the shape of a pose's frames; throws InputError.
   void requireShape(const Pose& pose, const std::vector<AdcCube>& frames) const;
-  /// Repairs the stream of a pose's bytes as far as it can be.
+  /// Repairs the byte stream of a pose as far as possible.
   FrameStack repairBytes(const std::vector<AdcCube>& frames, PoseJudgement& judged) const;
-  /// Levels of a frame at all poses but those of one location, dB.
+  /// Levels in dB of a frame at all poses except those of one location.
   std::vector<double> levelsOf_db(std::size_t frame, const std::string& without = "") const;
 };
 
@@ -120,31 +120,31 @@ FrameStack FrameExaminer::State::repairBytes(const std::vector<AdcCube>& frames,
 }
 
 void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames) {
-  State& s = *state_;
-  s.requireShape(pose, frames);
+  State& state = *state_;
+  state.requireShape(pose, frames);
   PoseJudgement judged;
   judged.pose = pose.name;
   judged.frames = static_cast<int>(frames.size());
-  // All later steps take samples for what they are, so bytes come first.
-  FrameStack stack = s.repairBytes(frames, judged);
+  // All later steps need correctly placed samples, so that bytes come first.
+  FrameStack stack = state.repairBytes(frames, judged);
   judged.rails = countRails(stack);
   ClippedValues clipped = clippedValues(judged.rails, stack);
   const std::map<std::size_t, Complex> clipped_means = clippedMeans(clipped, stack);
-  const double turn = s.examiner.commonTurn(stack);
+  const double turn = state.examiner.commonTurn(stack);
   turnFrames(-turn, stack);
   std::vector<Complex> average = medianShot(stack);
-  // Where the standing signal itself comes to the converter's limit, clipped values are no bursts.
+  // Where the static signal itself reaches the converter's limit, clipped values are no bursts.
   dropStandingClipped(clipped, average, stack);
   Bursts bursts = dropBursts(average, differenceVariance(stack), stack);
   judged.values = countClipped(clipped, bursts, stack);
   judged.bursts = bursts;
 
   average = meanShot(stack);
-  // A value that is clipped in every shot is nearer to the truth than none at all.
+  // A value that is clipped in every shot is closer to the truth than zero.
   for (const auto& [place, mean] : clipped_means) {
     if (average[place] == Complex(0)) average[place] = mean;
   }
-  ShotStatistics residuals = s.examiner.examine(stack, average);
+  ShotStatistics residuals = state.examiner.examine(stack, average);
   judged.turn_rad_per_frame = turn + residuals.turn_rad_per_frame;
   judged.turn_variance = residuals.turn_variance;
   judged.turn_cells = residuals.turn_cells;
@@ -166,55 +166,56 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   result.shots = residuals.shots;
   result.unsteadiness = std::move(residuals.unsteadiness);
   result.moving = std::move(residuals.cells);
-  s.poses.push_back(std::move(result));
-  const std::vector<double>& noise = s.poses.back().noise_variance;
-  s.motion.push_back({pose, stack.frames, std::move(residuals.evidence), std::move(residuals.echoes),
-                      std::accumulate(noise.begin(), noise.end(), 0.0) / static_cast<double>(noise.size())});
-  s.judged.push_back(std::move(judged));
-  s.located.reset();
+  state.poses.push_back(std::move(result));
+  const std::vector<double>& noise = state.poses.back().noise_variance;
+  state.motion.push_back({pose, stack.frames, std::move(residuals.evidence), std::move(residuals.echoes),
+                          std::accumulate(noise.begin(), noise.end(), 0.0) / static_cast<double>(noise.size())});
+  state.judged.push_back(std::move(judged));
+  state.located.reset();
 }
 
 FrameFinding FrameExaminer::State::packetLoss() const {
-  FrameFinding f;
-  f.cause = "packet_loss";
+  FrameFinding finding;
+  finding.cause = "packet_loss";
   long long lost = 0, packets = 0;
   for (const PoseJudgement& p : judged) {
     packets += p.packets.packets;
     lost += p.packets.lost;
-    f.log_likelihood_gain += p.packets.log_likelihood_gain;
-    f.nats_by_pose[p.pose] = p.packets.log_likelihood_gain;
-    if (p.packets.lost > 0) f.poses.push_back(p.pose);
+    finding.log_likelihood_gain += p.packets.log_likelihood_gain;
+    finding.nats_by_pose[p.pose] = p.packets.log_likelihood_gain;
+    if (p.packets.lost > 0) finding.poses.push_back(p.pose);
   }
-  if (lost == 0) return f;
-  f.false_alarm_rate = bounds::kFramesFalseAlarmRate;
+  if (lost == 0) return finding;
+  finding.false_alarm_rate = bounds::kFramesFalseAlarmRate;
   const double share = static_cast<double>(lost) / static_cast<double>(packets);
-  f.parameters = {number("lost_fraction", "1", share, shareInterval(lost, packets))};
+  finding.parameters = {number("lost_fraction", "1", share, shareInterval(lost, packets))};
   std::ostringstream text;
   text << lost << " of " << packets << " packets of " << kPacketBytes << " bytes are filled with zeros and not flagged";
-  f.description = text.str();
-  return f;
+  finding.description = text.str();
+  return finding;
 }
 
 std::vector<FrameFinding> FrameExaminer::State::misalignments() const {
   std::vector<FrameFinding> all;
-  for (const PoseJudgement& p : judged) {
-    if (p.slip_gain <= 0) continue;
-    FrameFinding f;
-    f.cause = "packet_misalignment";
-    f.poses = {p.pose};
-    f.log_likelihood_gain = p.slip_gain;
-    f.nats_by_pose = {{p.pose, p.slip_gain}};
-    f.false_alarm_rate = bounds::kFramesFalseAlarmRate;
-    f.parameters = {{"pose", "", p.pose, {}}};
-    f.description = "packets are missing and were not filled: from there on samples belong to other channels and times";
-    all.push_back(std::move(f));
+  for (const PoseJudgement& judgement : judged) {
+    if (judgement.slip_gain <= 0) continue;
+    FrameFinding finding;
+    finding.cause = "packet_misalignment";
+    finding.poses = {judgement.pose};
+    finding.log_likelihood_gain = judgement.slip_gain;
+    finding.nats_by_pose = {{judgement.pose, judgement.slip_gain}};
+    finding.false_alarm_rate = bounds::kFramesFalseAlarmRate;
+    finding.parameters = {{"pose", "", judgement.pose, {}}};
+    finding.description =
+        "packets are missing and were not filled: from there on samples belong to other channels and times";
+    all.push_back(std::move(finding));
   }
   return all;
 }
 
 FrameFinding FrameExaminer::State::saturation() const {
-  FrameFinding f;
-  f.cause = "adc_saturation";
+  FrameFinding finding;
+  finding.cause = "adc_saturation";
   // All poses have one converter: its limits are the outermost codes of the whole session.
   int high = 0, low = 0;
   for (const PoseJudgement& p : judged) {
@@ -222,67 +223,67 @@ FrameFinding FrameExaminer::State::saturation() const {
     low = std::min(low, p.rails.low.code);
   }
   double at_code = 0, next_codes = 0, clipped = 0, counted = 0, spread = 0;
-  for (const PoseJudgement& p : judged) {
-    counted += p.values.counted;
-    const bool top = p.rails.high.code == high, bottom = p.rails.low.code == low;
-    if ((!top && !bottom) || p.values.clipped <= 0) continue;
-    at_code += p.values.clipped;
-    next_codes += (top ? p.rails.high.next_codes : 0) + (bottom ? p.rails.low.next_codes : 0);
-    clipped += p.values.clipped;
-    spread += p.values.clipped;
-    f.poses.push_back(p.pose);
+  for (const PoseJudgement& judgement : judged) {
+    counted += judgement.values.counted;
+    const bool top = judgement.rails.high.code == high, bottom = judgement.rails.low.code == low;
+    if ((!top && !bottom) || judgement.values.clipped <= 0) continue;
+    at_code += judgement.values.clipped;
+    next_codes += (top ? judgement.rails.high.next_codes : 0) + (bottom ? judgement.rails.low.next_codes : 0);
+    clipped += judgement.values.clipped;
+    spread += judgement.values.clipped;
+    finding.poses.push_back(judgement.pose);
   }
-  f.log_likelihood_gain = pileUp({0, at_code, next_codes});
-  if (f.log_likelihood_gain > 0 && (high == INT16_MAX || low == INT16_MIN)) {
-    f.log_likelihood_gain += std::log(bounds::kOddsOfLastCode);
+  finding.log_likelihood_gain = pileUp({0, at_code, next_codes});
+  if (finding.log_likelihood_gain > 0 && (high == INT16_MAX || low == INT16_MIN)) {
+    finding.log_likelihood_gain += std::log(bounds::kOddsOfLastCode);
   }
-  f.false_alarm_rate = std::exp(-f.log_likelihood_gain);
-  if (f.false_alarm_rate > bounds::kFramesFalseAlarmRate || counted == 0) {
-    f.log_likelihood_gain = 0;
-    return f;
+  finding.false_alarm_rate = std::exp(-finding.log_likelihood_gain);
+  if (finding.false_alarm_rate > bounds::kFramesFalseAlarmRate || counted == 0) {
+    finding.log_likelihood_gain = 0;
+    return finding;
   }
   const double share = clipped / counted;
-  // Samples of a pose clip in all shots or in none unless noise decides: the error is the root of their number, times
-  // 0.2.
-  f.parameters = {number("clipped_fraction", "1", share,
-                         {std::max(0.0, share - 1.96 * std::sqrt(spread) / counted * 0.2),
-                          share + 1.96 * std::sqrt(spread) / counted * 0.2})};
+  // Samples of a pose clip in all shots or in none unless noise decides. The error is 0.2 times the root of their
+  // number.
+  finding.parameters = {number("clipped_fraction", "1", share,
+                               {std::max(0.0, share - 1.96 * std::sqrt(spread) / counted * 0.2),
+                                share + 1.96 * std::sqrt(spread) / counted * 0.2})};
   std::ostringstream text;
   text << "samples pile up at the outermost codes " << low << " and " << high << ": " << 100 * share
        << " % of all I and Q values";
-  f.description = text.str();
-  return f;
+  finding.description = text.str();
+  return finding;
 }
 
 FrameFinding FrameExaminer::State::interference() const {
-  FrameFinding f;
-  f.cause = "interference";
+  FrameFinding finding;
+  finding.cause = "interference";
   double frames = 0, hit = 0;
   for (const PoseJudgement& p : judged) {
     frames += p.bursts.frames;
     hit += p.bursts.hit_frames;
-    f.log_likelihood_gain += p.bursts.log_likelihood_gain;
-    f.nats_by_pose[p.pose] = p.bursts.log_likelihood_gain;
-    if (p.bursts.hit_frames > 0) f.poses.push_back(p.pose);
+    finding.log_likelihood_gain += p.bursts.log_likelihood_gain;
+    finding.nats_by_pose[p.pose] = p.bursts.log_likelihood_gain;
+    if (p.bursts.hit_frames > 0) finding.poses.push_back(p.pose);
   }
-  if (hit == 0) return f;
-  f.false_alarm_rate = bounds::kBurstsFalseAlarmRate;
-  f.parameters = {number("frame_fraction", "1", hit / frames, shareInterval(hit, frames))};
+  if (hit == 0) return finding;
+  finding.false_alarm_rate = bounds::kBurstsFalseAlarmRate;
+  finding.parameters = {number("frame_fraction", "1", hit / frames, shareInterval(hit, frames))};
   std::ostringstream text;
   text << "bursts within single chirps, the same wave at all receivers, in " << hit << " of " << frames << " frames";
-  f.description = text.str();
-  return f;
+  finding.description = text.str();
+  return finding;
 }
 
 FrameFinding FrameExaminer::State::drift() const {
-  FrameFinding f;
-  f.cause = "phase_drift";
+  FrameFinding finding;
+  finding.cause = "phase_drift";
   std::vector<const PoseJudgement*> used;
   for (const PoseJudgement& p : judged) {
     if (std::isfinite(p.turn_variance)) used.push_back(&p);
   }
-  if (used.empty()) return f;
-  // Random-effects mean (DerSimonian and Laird): poses may differ by more than each one's own error.
+  if (used.empty()) return finding;
+  // Random-effects mean (DerSimonian and Laird): poses may differ by more than their own errors.
   const auto mean = [&](double between, double& weights) {
     double sum = 0;
     weights = 0;
@@ -303,20 +304,20 @@ FrameFinding FrameExaminer::State::drift() const {
   const double between = room > 0 ? std::max(0.0, (chi2 - (poses - 1)) / room) : 0;
   const double turn = mean(between, weights);
   const double error = std::sqrt(1 / weights);
-  // A drift of the radar turns all cells alike. A turn of one echo at one pose may be that echo's own motion.
+  // A drift of the radar turns the phase of all cells alike. One echo at one pose may turn by its own motion.
   int cells = 0;
   for (const PoseJudgement* p : used) cells += p->turn_cells;
   const double freedom = std::max(poses, static_cast<double>(cells)) - 1;
-  if (freedom < 2) return f;
+  if (freedom < 2) return finding;
   const double t = std::abs(turn) / error;
   const boost::math::students_t_distribution<double> student(freedom);
-  f.false_alarm_rate = 2 * boost::math::cdf(boost::math::complement(student, t));
-  if (!(f.false_alarm_rate < bounds::kFramesFalseAlarmRate)) return f;
-  f.log_likelihood_gain = 0.5 * t * t;
+  finding.false_alarm_rate = 2 * boost::math::cdf(boost::math::complement(student, t));
+  if (!(finding.false_alarm_rate < bounds::kFramesFalseAlarmRate)) return finding;
+  finding.log_likelihood_gain = 0.5 * t * t;
   const double half = boost::math::quantile(student, 0.975) * error;
-  f.parameters = {number("rad_per_frame", "rad", turn, {turn - half, turn + half})};
+  finding.parameters = {number("rad_per_frame", "rad", turn, {turn - half, turn + half})};
   for (const PoseJudgement* p : used) {
-    if (std::abs(p->turn_rad_per_frame) > 3 * std::sqrt(p->turn_variance)) f.poses.push_back(p->pose);
+    if (std::abs(p->turn_rad_per_frame) > 3 * std::sqrt(p->turn_variance)) finding.poses.push_back(p->pose);
   }
   std::ostringstream text;
   text << "all cells turn alike by " << turn << " rad from each frame to the next; an average over "
@@ -324,8 +325,8 @@ FrameFinding FrameExaminer::State::drift() const {
        << -20 * std::log10(std::max(1e-9, std::abs(std::sin(0.5 * turn * used.front()->frames) /
                                                    (used.front()->frames * std::sin(0.5 * turn)))))
        << " dB by it";
-  f.description = text.str();
-  return f;
+  finding.description = text.str();
+  return finding;
 }
 
 std::vector<double> FrameExaminer::State::levelsOf_db(std::size_t frame, const std::string& without) const {
@@ -339,11 +340,11 @@ std::vector<double> FrameExaminer::State::levelsOf_db(std::size_t frame, const s
 }
 
 FrameFinding FrameExaminer::State::frameGain() const {
-  FrameFinding f;
-  f.cause = "unknown";
+  FrameFinding finding;
+  finding.cause = "unknown";
   std::size_t frames = 0;
   for (const PoseJudgement& p : judged) frames = std::max(frames, p.frame_gain_db.size());
-  // The median over poses of each frame's level is not moved by bursts at some poses. The gain changes where the median
+  // Bursts at some poses do not affect the median over poses of each frame's level. The gain changes where the median
   // differs between frames by far more than its error over poses.
   double chi2 = 0, lowest = 0, highest = 0;
   std::size_t lowest_at = 0, highest_at = 0, counted = 0;
@@ -354,7 +355,7 @@ FrameFinding FrameExaminer::State::frameGain() const {
     const double middle = middle_db[i] = quantile(levels, 0.5);
     std::vector<double> apart;
     for (double level : levels) apart.push_back(std::abs(level - middle));
-    // Normal errors have a deviation of 1.48 times their median size, and the median's own error is 1.25 times the
+    // The standard deviation of normal errors is 1.48 times their median size, and a median's error is 1.25 times a
     // mean's.
     scatter_db[i] = std::max(1.48 * quantile(apart, 0.5), kLeastScatter_db);
     const double error = 1.25 * scatter_db[i] / std::sqrt(static_cast<double>(levels.size()));
@@ -369,16 +370,16 @@ FrameFinding FrameExaminer::State::frameGain() const {
       highest_at = i;
     }
   }
-  if (counted < 3 || highest - lowest < bounds::kLeastFrameGain_db) return f;
+  if (counted < 3 || highest - lowest < bounds::kLeastFrameGain_db) return finding;
   const double excess = (chi2 - static_cast<double>(counted)) / std::sqrt(2.0 * static_cast<double>(counted));
-  if (excess < bounds::kLeastFrameGain_deviations) return f;
-  f.log_likelihood_gain = 0.5 * (chi2 - static_cast<double>(counted));
-  f.false_alarm_rate = std::exp(-0.5 * excess);
-  for (const PoseJudgement& p : judged) f.poses.push_back(p.pose);
-  f.mechanism = NamedParameters{"empirical_frame_gain", {}};
-  f.mechanism->values.set("gain_db", middle_db);
+  if (excess < bounds::kLeastFrameGain_deviations) return finding;
+  finding.log_likelihood_gain = 0.5 * (chi2 - static_cast<double>(counted));
+  finding.false_alarm_rate = std::exp(-0.5 * excess);
+  for (const PoseJudgement& p : judged) finding.poses.push_back(p.pose);
+  finding.mechanism = NamedParameters{"empirical_frame_gain", {}};
+  finding.mechanism->values.set("gain_db", middle_db);
   for (std::size_t i = 0; i < judged.size(); ++i) {
-    double& nats = f.nats_by_pose[judged[i].pose];
+    double& nats = finding.nats_by_pose[judged[i].pose];
     for (std::size_t j = 0; j < judged[i].frame_gain_db.size(); ++j) {
       const std::vector<double> others = levelsOf_db(j, motion[i].pose.location);
       if (others.empty()) continue;
@@ -389,25 +390,25 @@ FrameFinding FrameExaminer::State::frameGain() const {
   std::ostringstream text;
   text << "the common level of frames changes within a pose, at all poses alike: lowest in frame " << lowest_at << " ("
        << lowest << " dB), highest in frame " << highest_at << " (" << highest << " dB against the mean)";
-  f.description = text.str();
-  return f;
+  finding.description = text.str();
+  return finding;
 }
 
 FrameFinding FrameExaminer::State::unsteadiness() const {
-  FrameFinding f;
-  f.cause = "unknown";
+  FrameFinding finding;
+  finding.cause = "unknown";
   for (const PoseJudgement& p : judged) {
     if (p.unsteady_share < bounds::kLeastUnsteadyShare) continue;
-    f.poses.push_back(p.pose);
-    f.log_likelihood_gain += p.unsteady_nats;
+    finding.poses.push_back(p.pose);
+    finding.log_likelihood_gain += p.unsteady_nats;
   }
-  // Nobody who walks is in half of all bins at two thirds of the poses.
-  if (f.poses.size() < bounds::kFewestUnsteadyPoses || 3 * f.poses.size() < 2 * judged.size()) return {};
-  f.false_alarm_rate = bounds::kFramesFalseAlarmRate;
-  f.description = "frames of one pose disagree about what stands, in most of its echoes at once, at " +
-                  std::to_string(f.poses.size()) + " of " + std::to_string(judged.size()) +
-                  " poses: the radar itself changes from frame to frame";
-  return f;
+  // No walker is in half of all bins at two thirds of the poses.
+  if (finding.poses.size() < bounds::kFewestUnsteadyPoses || 3 * finding.poses.size() < 2 * judged.size()) return {};
+  finding.false_alarm_rate = bounds::kFramesFalseAlarmRate;
+  finding.description = "frames of one pose disagree about what stands, in most of its echoes at once, at " +
+                        std::to_string(finding.poses.size()) + " of " + std::to_string(judged.size()) +
+                        " poses: the radar itself changes from frame to frame";
+  return finding;
 }
 
 namespace {
@@ -420,19 +421,19 @@ bool standsWithin(const FrameFinding& f, const std::set<std::string>& poses) {
 }  // namespace
 
 std::vector<FrameFinding> FrameExaminer::findings() const {
-  const State& s = *state_;
-  std::vector<FrameFinding> all = s.misalignments();
-  all.push_back(s.saturation());
-  all.push_back(s.packetLoss());
-  // Movers, bursts and turns can be told only of a radar that is the same in all frames.
-  const bool steady = s.unsteadiness().poses.empty();
+  const State& state = *state_;
+  std::vector<FrameFinding> all = state.misalignments();
+  all.push_back(state.saturation());
+  all.push_back(state.packetLoss());
+  // Moving echoes, bursts and phase drift can be found only where the radar is the same in all frames.
+  const bool steady = state.unsteadiness().poses.empty();
   if (steady) {
-    all.push_back(s.interference());
-    all.push_back(s.drift());
+    all.push_back(state.interference());
+    all.push_back(state.drift());
   }
-  // A strong walker pulls the gain that a frame's samples share, which leaves something like a burst; remainders of
-  // bursts look like something that moves. Where one stands at poses of the other alone, the other is the cause.
-  const std::vector<FrameFinding> walkers = steady ? s.locate().walkers : std::vector<FrameFinding>();
+  // A strong walker changes the common gain of a frame, which leaves something like a burst. Remainders of bursts look
+  // like moving echoes. Where all poses of one have the other as well, the other is the cause.
+  const std::vector<FrameFinding> walkers = steady ? state.locate().walkers : std::vector<FrameFinding>();
   std::set<std::string> walked, hit;
   for (const FrameFinding& walker : walkers) walked.insert(walker.poses.begin(), walker.poses.end());
   all.erase(std::remove_if(all.begin(), all.end(),
@@ -454,7 +455,7 @@ std::vector<FrameFinding> FrameExaminer::findings() const {
 std::vector<FrameFinding> FrameExaminer::unexplained() const {
   if (FrameFinding f = state_->unsteadiness(); !f.poses.empty()) return {std::move(f)};
   std::vector<FrameFinding> all = state_->locate().unexplained;
-  // A tone of the radar's own is at most poses. A beat at a few of the poses with bursts is a remainder of these.
+  // A tone of the radar is at most poses. A beat at only some poses with bursts is a remainder of the bursts.
   const FrameFinding bursts = state_->interference();
   const std::set<std::string> hit(bursts.poses.begin(), bursts.poses.end());
   all.erase(

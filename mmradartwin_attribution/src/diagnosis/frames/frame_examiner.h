@@ -1,14 +1,12 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "diagnosis/frames/frame_finding.h"
+#include "diagnosis/frames/moving_cell.h"
 #include "diagnosis/rooms.h"
-#include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_dsp/adc_cube.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
@@ -16,51 +14,25 @@
 
 namespace mmradartwin::diagnosis::frames {
 
-/// Finding from raw samples and frames, which no average shows.
-struct FrameFinding {
-  /// adc_saturation, packet_loss, packet_misalignment, interference, moving_target or phase_drift; "unknown" among
-  /// FrameExaminer::unexplained().
-  std::string cause;
-  std::vector<FindingParameter> parameters;  ///< named as the cause has them
-  double log_likelihood_gain = 0;            ///< nats of the frame data
-  double false_alarm_rate = 1;               ///< upper bound for the whole session
-  std::vector<std::string> poses;            ///< names of those that carry it
-  std::vector<FindingPlace> where;
-  std::string description;  ///< in words and numbers
-  /// Mechanism of the twin for an unexplained() finding, where there is one (level_db over one ADC count).
-  std::optional<NamedParameters> mechanism;
-  /// Nats that it explains at each pose, by the pose's name; empty where it is not told pose by pose. Nats of an
-  /// unexplained() finding are those of numbers read at the poses of other locations.
-  std::map<std::string, double> nats_by_pose;
-};
-
-/// Echo that moves, as one cell of range and Doppler of a frame with many loops.
-struct MovingCell {
-  int bin = 0;                ///< range bin
-  double turn_rad = 0;        ///< phase from one transmitter's slot to the next
-  double power = 0;           ///< ratio to the noise
-  Eigen::VectorXcd channels;  ///< [M] as delivered, up to a common factor
-};
-
 /// Average and statistics of the frames of one pose without damaged samples.
 struct PoseFrames {
   std::string pose;
-  /// Average in ADC counts [M][N], as CoherentAverage makes it, but without lost, clipped and disturbed samples, with
-  /// slips closed and frames turned back. Samples that were never fit for use are zero; samples that always clipped are
-  /// as delivered.
+  /// Average in ADC counts [M][N] as CoherentAverage forms it, but without lost, clipped and disturbed samples, with
+  /// slips closed and the phase drift of frames removed. Samples that were never usable are zero. Samples that always
+  /// clipped are as delivered.
   ReceiveGrid mean;
-  /// Noise variance [M] of one complex sample of one shot in counts^2, which movers do not raise; at least the 1/6 of
-  /// rounding. The mean carries this over `shots`.
+  /// Noise variance [M] of one complex sample of one shot in counts^2, without the scatter of moving echoes; at least
+  /// 1/6, which is rounding. The mean has this divided by `shots`.
   std::vector<double> noise_variance;
-  int shots = 0;  ///< number of whole shots among frames x loops
-  /// Ratio [N] by range bin of the mean's variance to that of noise alone: 1 where nothing moves. Empty where nothing
-  /// moves in any bin.
+  int shots = 0;  ///< number of complete shots among frames x loops
+  /// Variance of the mean over that of noise alone, [N] by range bin: 1 where nothing moves. Empty where nothing moves
+  /// in any bin.
   std::vector<double> unsteadiness;
   std::vector<MovingCell> moving;
 };
 
-/// Examiner of a session's frames, pose after pose, which keeps statistics and no samples. It needs no scene: it looks
-/// at raw bytes, then at frames against each other.
+/// Examines a session's frames pose by pose, and keeps statistics but no samples. It needs no scene: it judges raw
+/// bytes, then frames relative to each other.
 class FrameExaminer {
  public:
   /// Throws InputError where the virtual array is no uniform line along y.
@@ -69,11 +41,12 @@ class FrameExaminer {
   FrameExaminer(FrameExaminer&&) noexcept;
   FrameExaminer& operator=(FrameExaminer&&) noexcept;
 
-  /// Examines all frames of a pose, in order. Throws InputError where one has not the radar's shape.
+  /// Examines all frames of a pose, in order. Throws InputError where a frame does not have the radar's shape.
   void addPose(const Pose& pose, const std::vector<AdcCube>& frames);
   /// Findings with a cause, by falling gain; empty for a clean session.
   std::vector<FrameFinding> findings() const;
-  /// Differences between frames that are none of the six causes: body-fixed tones, frames whose common gain changes.
+  /// Differences between frames that have none of the six causes: body-fixed tones, and frames whose common gain
+  /// changes.
   std::vector<FrameFinding> unexplained() const;
   const std::vector<PoseFrames>& poses() const;
 

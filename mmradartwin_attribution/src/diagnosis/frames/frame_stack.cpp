@@ -16,8 +16,8 @@ namespace {
 
 using Complex = std::complex<float>;
 
-constexpr int kNeighbourCodes = 16;            ///< inside of the outermost one, that tell how often it should come
-constexpr int kEchoesInBand = 8;               ///< a mover with its limbs holds an eighth of the range bins at most
+constexpr int kNeighbourCodes = 16;  ///< codes next to the outermost one that show how often it should occur
+constexpr int kEchoesInBand = 8;     ///< a moving body with its limbs fills at most an eighth of the range bins
 constexpr double kRoundingVariance = 1.0 / 6;  ///< of a complex value, 1/12 each for I and Q
 
 float medianOf(std::vector<float>& values) {
@@ -30,22 +30,22 @@ float medianOf(std::vector<float>& values) {
 /// Weight of one value where the same sample of all shots counts as one.
 double frameShare(const FrameStack& s) { return s.shots() > 0 ? 1.0 / s.shots() : 0; }
 
-/// Counts at one end of a histogram, whose element i counts code i - 32768; `share` is the weight of one value.
+/// Counts at one end of a histogram, whose element i counts code i - 32768. share: weight of one value.
 RailCounts countRail(const std::vector<int>& histogram, bool high, double share) {
-  RailCounts c;
+  RailCounts counts;
   const int codes = static_cast<int>(histogram.size());
   int edge = high ? codes - 1 : 0, far = high ? 0 : codes - 1;
   const int step = high ? -1 : 1;
   while (edge != far && histogram[static_cast<std::size_t>(edge)] == 0) edge += step;
   while (far != edge && histogram[static_cast<std::size_t>(far)] == 0) far -= step;
-  c.code = edge - 32768;
-  c.at_code = histogram[static_cast<std::size_t>(edge)] * share;
+  counts.code = edge - 32768;
+  counts.at_code = histogram[static_cast<std::size_t>(edge)] * share;
   const int inside = std::min(kNeighbourCodes, std::abs(edge - far));
   double sum = 0;
   for (int i = 1; i <= inside; ++i) sum += histogram[static_cast<std::size_t>(edge + i * step)];
-  c.next_codes =
+  counts.next_codes =
       std::abs(edge - far) < bounds::kLeastCodes ? std::numeric_limits<double>::infinity() : sum * share / inside;
-  return c;
+  return counts;
 }
 
 }  // namespace
@@ -82,32 +82,32 @@ FrameStack::FrameStack(const RadarConfig& radar, const Payload& payload, const s
   }
 }
 
-Rails countRails(const FrameStack& s) {
+Rails countRails(const FrameStack& stack) {
   Rails rails;
   std::vector<int> histogram(65536, 0);
   long long count = 0;
-  for (std::size_t i = 0; i < s.x.size(); ++i) {
-    if (!s.use[i]) continue;
-    ++histogram[static_cast<std::size_t>(static_cast<int>(s.x[i].real()) + 32768)];
-    ++histogram[static_cast<std::size_t>(static_cast<int>(s.x[i].imag()) + 32768)];
+  for (std::size_t i = 0; i < stack.x.size(); ++i) {
+    if (!stack.use[i]) continue;
+    ++histogram[static_cast<std::size_t>(static_cast<int>(stack.x[i].real()) + 32768)];
+    ++histogram[static_cast<std::size_t>(static_cast<int>(stack.x[i].imag()) + 32768)];
     count += 2;
   }
   if (count == 0) return rails;
-  rails.samples = static_cast<double>(count) * frameShare(s);
-  rails.high = countRail(histogram, true, frameShare(s));
-  rails.low = countRail(histogram, false, frameShare(s));
+  rails.samples = static_cast<double>(count) * frameShare(stack);
+  rails.high = countRail(histogram, true, frameShare(stack));
+  rails.low = countRail(histogram, false, frameShare(stack));
   return rails;
 }
 
 double pileUp(const RailCounts& counts) {
-  // The density of a sine's values grows to its ends as 1/sqrt(A^2 - v^2): the outermost code holds 1 + sqrt(2) times
-  // what the next one holds. Half a sample is added, since missing neighbours prove nothing.
+  // The density of a sine's values rises towards its ends as 1/sqrt(A^2 - v^2): the outermost code holds 1 + sqrt(2)
+  // times what the next one holds. Half a sample is added, since missing neighbours prove nothing.
   const double expected = (1 + std::sqrt(2.0)) * counts.next_codes + 0.5;
   if (!(counts.at_code > expected)) return 0;
   return counts.at_code * std::log(counts.at_code / expected) - (counts.at_code - expected);
 }
 
-ClippedValues clippedValues(const Rails& rails, const FrameStack& s) {
+ClippedValues clippedValues(const Rails& rails, const FrameStack& stack) {
   ClippedValues clipped;
   const bool high = pileUp(rails.high) > 0, low = pileUp(rails.low) > 0;
   if (!high && !low) return clipped;
@@ -115,10 +115,10 @@ ClippedValues clippedValues(const Rails& rails, const FrameStack& s) {
   const float top = high ? static_cast<float>(rails.high.code) : infinity;
   const float bottom = low ? static_cast<float>(rails.low.code) : -infinity;
   clipped.limit = std::min(top, -bottom);
-  for (std::size_t i = 0; i < s.x.size(); ++i) {
-    if (!s.use[i]) continue;
+  for (std::size_t i = 0; i < stack.x.size(); ++i) {
+    if (!stack.use[i]) continue;
     const auto beyond = [&](float v) { return v >= top || v <= bottom; };
-    const int count = beyond(s.x[i].real()) + beyond(s.x[i].imag());
+    const int count = beyond(stack.x[i].real()) + beyond(stack.x[i].imag());
     if (count) clipped.at.emplace_back(i, static_cast<std::uint8_t>(count));
   }
   return clipped;
@@ -138,56 +138,57 @@ std::map<std::size_t, Complex> clippedMeans(const ClippedValues& clipped, const 
 
 void dropStandingClipped(const ClippedValues& clipped, const std::vector<Complex>& average, FrameStack& s) {
   for (const auto& [at, count] : clipped.at) {
-    // A value that clips now and then has an average below the limit.
+    // A value that clips occasionally has an average below the limit.
     if (std::abs(average[at % s.values()]) < 0.8 * clipped.limit) continue;
     s.x[at] = 0;
     s.use[at] = 0;
   }
 }
 
-ClippedCount countClipped(const ClippedValues& clipped, const Bursts& bursts, FrameStack& s) {
+ClippedCount countClipped(const ClippedValues& clipped, const Bursts& bursts, FrameStack& stack) {
   const auto chirp = [&](std::size_t at) {
-    const std::size_t shot = at / s.values(), channel = at % s.values() / static_cast<std::size_t>(s.samples);
-    return shot * static_cast<std::size_t>(s.slots) + channel / static_cast<std::size_t>(s.receivers);
+    const std::size_t shot = at / stack.values(),
+                      channel = at % stack.values() / static_cast<std::size_t>(stack.samples);
+    return shot * static_cast<std::size_t>(stack.slots) + channel / static_cast<std::size_t>(stack.receivers);
   };
   double values = 0, used = 0;
-  for (std::size_t i = 0; i < s.use.size(); ++i) used += 2 * s.use[i];
+  for (std::size_t i = 0; i < stack.use.size(); ++i) used += 2 * stack.use[i];
   for (const auto& [at, count] : clipped.at) {
     if (bursts.hit[chirp(at)]) continue;
     values += count;
-    if (!s.use[at]) used += 2;
-    s.x[at] = 0;
-    s.use[at] = 0;
+    if (!stack.use[at]) used += 2;
+    stack.x[at] = 0;
+    stack.use[at] = 0;
   }
-  return {values * frameShare(s), used * frameShare(s)};
+  return {values * frameShare(stack), used * frameShare(stack)};
 }
 
-std::vector<Complex> medianShot(const FrameStack& s) {
-  std::vector<Complex> average(s.values());
+std::vector<Complex> medianShot(const FrameStack& stack) {
+  std::vector<Complex> average(stack.values());
   std::vector<float> re, im;
-  const std::size_t values = s.values();
+  const std::size_t values = stack.values();
   for (std::size_t i = 0; i < values; ++i) {
     re.clear();
     im.clear();
-    for (std::size_t at = i; at < s.x.size(); at += values) {
-      if (!s.use[at]) continue;
-      re.push_back(s.x[at].real());
-      im.push_back(s.x[at].imag());
+    for (std::size_t at = i; at < stack.x.size(); at += values) {
+      if (!stack.use[at]) continue;
+      re.push_back(stack.x[at].real());
+      im.push_back(stack.x[at].imag());
     }
     if (!re.empty()) average[i] = {medianOf(re), medianOf(im)};
   }
   return average;
 }
 
-std::vector<Complex> meanShot(const FrameStack& s) {
-  const std::size_t values = s.values();
+std::vector<Complex> meanShot(const FrameStack& stack) {
+  const std::size_t values = stack.values();
   std::vector<std::complex<double>> sum(values, 0);
   std::vector<int> count(values, 0);
-  for (int shot = 0; shot < s.shots(); ++shot) {
+  for (int shot = 0; shot < stack.shots(); ++shot) {
     const std::size_t base = static_cast<std::size_t>(shot) * values;
     for (std::size_t i = 0; i < values; ++i) {
-      if (!s.use[base + i]) continue;
-      sum[i] += std::complex<double>(s.x[base + i]);
+      if (!stack.use[base + i]) continue;
+      sum[i] += std::complex<double>(stack.x[base + i]);
       ++count[i];
     }
   }
@@ -198,46 +199,47 @@ std::vector<Complex> meanShot(const FrameStack& s) {
   return average;
 }
 
-std::vector<Complex> commonGains(const FrameStack& s, const std::vector<Complex>& average, double noise_variance) {
-  std::vector<Complex> gains(static_cast<std::size_t>(s.shots()), 1);
-  for (int shot = 0; shot < s.shots(); ++shot) {
+std::vector<Complex> commonGains(const FrameStack& stack, const std::vector<Complex>& average, double noise_variance) {
+  std::vector<Complex> gains(static_cast<std::size_t>(stack.shots()), 1);
+  for (int shot = 0; shot < stack.shots(); ++shot) {
     std::complex<double> with = 0;
     double power = 0;
-    const std::size_t base = static_cast<std::size_t>(shot) * s.values();
-    for (std::size_t i = 0; i < s.values(); ++i) {
-      if (!s.use[base + i]) continue;
-      with += std::complex<double>(std::conj(average[i]) * s.x[base + i]);
+    const std::size_t base = static_cast<std::size_t>(shot) * stack.values();
+    for (std::size_t i = 0; i < stack.values(); ++i) {
+      if (!stack.use[base + i]) continue;
+      with += std::complex<double>(std::conj(average[i]) * stack.x[base + i]);
       power += std::norm(average[i]);
     }
-    // The average itself carries 1/shots of the noise. Ten times all noise in it is a signal.
-    if (power > 10 * noise_variance * static_cast<double>(s.values()) / s.shots()) {
+    // The average itself has 1/shots of the noise. It is a signal from ten times that on.
+    if (power > 10 * noise_variance * static_cast<double>(stack.values()) / stack.shots()) {
       gains[static_cast<std::size_t>(shot)] = Complex(with / power);
     }
   }
   return gains;
 }
 
-double differenceVariance(const FrameStack& s) {
+double differenceVariance(const FrameStack& stack) {
   Eigen::FFT<float> fft(Eigen::FFT<float>::impl_type(), Eigen::FFT<float>::Unscaled);
-  const std::vector<double> window = hannWindow(s.samples);
-  std::vector<Complex> difference(static_cast<std::size_t>(s.samples)), spectrum(difference);
+  const std::vector<double> window = hannWindow(stack.samples);
+  std::vector<Complex> difference(static_cast<std::size_t>(stack.samples)), spectrum(difference);
   std::vector<float> power(difference.size()), variances;
-  for (int shot = 1; shot < s.shots(); ++shot) {
-    for (int k = 0; k < s.channels(); ++k) {
+  for (int shot = 1; shot < stack.shots(); ++shot) {
+    for (int k = 0; k < stack.channels(); ++k) {
       double window_power = 0;
       int count = 0;
-      for (int n = 0; n < s.samples; ++n) {
-        const std::size_t now = s.at(shot, k, n), before = s.at(shot - 1, k, n), i = static_cast<std::size_t>(n);
-        const bool used = s.use[now] && s.use[before];
-        difference[i] = used ? static_cast<float>(window[i]) * (s.x[now] - s.x[before]) : Complex(0);
+      for (int n = 0; n < stack.samples; ++n) {
+        const std::size_t now = stack.at(shot, k, n), before = stack.at(shot - 1, k, n),
+                          i = static_cast<std::size_t>(n);
+        const bool used = stack.use[now] && stack.use[before];
+        difference[i] = used ? static_cast<float>(window[i]) * (stack.x[now] - stack.x[before]) : Complex(0);
         if (!used) continue;
         window_power += window[i] * window[i];
         ++count;
       }
-      if (2 * count < s.samples) continue;
-      fft.fwd(spectrum.data(), difference.data(), s.samples);
+      if (2 * count < stack.samples) continue;
+      fft.fwd(spectrum.data(), difference.data(), stack.samples);
       std::transform(spectrum.begin(), spectrum.end(), power.begin(), [](const Complex& v) { return std::norm(v); });
-      // The median of an exponential is ln 2 of its mean, and two shots differ by twice the noise of one.
+      // The median of an exponential is ln 2 times its mean, and two shots differ by twice the noise of one.
       variances.push_back(medianOf(power) / static_cast<float>(2 * std::log(2.0) * window_power));
     }
   }
@@ -275,13 +277,13 @@ bool isOfEchoes(std::vector<float> power) {
   return left < (1 - bounds::kLeastShareOfMovers) * all;
 }
 
-/// One chirp's differences from the average times the shot's gain, at all receivers.
+/// Differences of one chirp from the average times the shot's gain, at all receivers.
 class ChirpResidual {
  public:
   ChirpResidual(const FrameStack& stack, const std::vector<Complex>& average, Complex gain, int shot, int slot)
       : stack_(stack), average_(average), gain_(gain), shot_(shot), slot_(slot) {}
   bool used(int receiver, int sample) const { return stack_.use[place(receiver, sample)]; }
-  /// 0 where the value is not to be used.
+  /// 0 for an unusable value.
   Complex at(int receiver, int sample) const {
     const std::size_t i = place(receiver, sample);
     return stack_.use[i] ? stack_.x[i] - gain_ * average_[i % stack_.values()] : Complex(0);
@@ -315,13 +317,13 @@ struct BurstWindow {
   double nats = 0;
 };
 
-/// Looks for bursts in one chirp after the other.
+/// Searches for bursts chirp by chirp.
 class BurstSearch {
  public:
   BurstSearch(const FrameStack& stack, double noise_variance)
       : receivers_(stack.receivers),
         samples_(stack.samples),
-        // Where noise is less than rounding, differences from the median are flips by one code, whose variance is at
+        // Where noise is less than rounding, differences from the median are single-code steps, whose variance is at
         // most 1/4 for each of I and Q.
         scale_(std::max(noise_variance, 0.5)),
         energy_(static_cast<std::size_t>(stack.samples)),
@@ -334,7 +336,7 @@ class BurstSearch {
           (receivers_ * w));
     }
   }
-  /// Reads the energy of a chirp's samples over the noise; false where none of them is to be used.
+  /// Reads the energy of a chirp's samples over the noise; false where no sample is usable.
   bool read(const ChirpResidual& chirp) {
     sorted_.clear();
     for (int n = 0; n < samples_; ++n) {
@@ -351,13 +353,13 @@ class BurstSearch {
       if (count) sorted_.push_back(energy_[i]);
     }
     if (sorted_.empty()) return false;
-    // An echo that moves, and a gain that flickers, are in all samples of the chirp.
+    // A moving echo and a varying gain are in all samples of the chirp.
     level_ = std::max(1.0, static_cast<double>(medianOf(sorted_)));
     return true;
   }
   /// True where the chirp read last differs from the average as a whole.
   bool moves() const { return level_ > bounds::kLeastNoiseOfMover; }
-  /// Window of the chirp read last that is most unlike noise and movers.
+  /// Window of the chirp read last that differs most from noise and moving echoes.
   BurstWindow window() const {
     const double least = moves() ? bounds::kLeastBurstOverMover : 1;
     BurstWindow best;
@@ -373,7 +375,7 @@ class BurstSearch {
     }
     return best;
   }
-  /// True where one direction holds most of a window's power beyond noise, and not one receiver alone, which would be a
+  /// True where one direction holds most of a window's power beyond noise. A single receiver does not count: that is a
   /// fault of its converter.
   bool isOneWave(const ChirpResidual& chirp, const BurstWindow& window) const {
     Eigen::MatrixXcd covariance = Eigen::MatrixXcd::Zero(receivers_, receivers_);
@@ -391,15 +393,15 @@ class BurstSearch {
 
  private:
   int receivers_, samples_;
-  double scale_;                    ///< variance of a sample by noise
+  double scale_;                    ///< noise variance of a sample
   std::vector<int> lengths_;        ///< of windows
-  std::vector<double> thresholds_;  ///< mean energy of each, that noise does not reach
+  std::vector<double> thresholds_;  ///< mean energy of each that noise does not reach
   std::vector<float> energy_, sorted_;
-  std::vector<double> sum_;  ///< of the energy of all samples before each
-  double level_ = 1;         ///< usual energy of the chirp's samples, 1 by noise
+  std::vector<double> sum_;  ///< energy of all samples before each one
+  double level_ = 1;         ///< usual energy of the chirp's samples; 1 for noise
 };
 
-/// Takes a chirp out of use.
+/// Discards a chirp.
 void dropChirp(int shot, int slot, FrameStack& s) {
   for (int r = 0; r < s.receivers; ++r) {
     for (int n = 0; n < s.samples; ++n) {
@@ -412,27 +414,27 @@ void dropChirp(int shot, int slot, FrameStack& s) {
 
 }  // namespace
 
-Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, FrameStack& s) {
-  const std::vector<Complex> gains = commonGains(s, average, noise_variance);
-  BurstSearch search(s, noise_variance);
+Bursts dropBursts(const std::vector<Complex>& average, double noise_variance, FrameStack& stack) {
+  const std::vector<Complex> gains = commonGains(stack, average, noise_variance);
+  BurstSearch search(stack, noise_variance);
   Bursts found;
-  found.hit.assign(static_cast<std::size_t>(s.shots()) * static_cast<std::size_t>(s.slots), 0);
-  std::vector<std::uint8_t> seen(static_cast<std::size_t>(s.frames), 0), hit(seen);
-  for (int shot = 0; shot < s.shots(); ++shot) {
-    const auto frame = static_cast<std::size_t>(shot / s.loops);
-    for (int slot = 0; slot < s.slots; ++slot) {
-      const ChirpResidual chirp(s, average, gains[static_cast<std::size_t>(shot)], shot, slot);
+  found.hit.assign(static_cast<std::size_t>(stack.shots()) * static_cast<std::size_t>(stack.slots), 0);
+  std::vector<std::uint8_t> seen(static_cast<std::size_t>(stack.frames), 0), hit(seen);
+  for (int shot = 0; shot < stack.shots(); ++shot) {
+    const auto frame = static_cast<std::size_t>(shot / stack.loops);
+    for (int slot = 0; slot < stack.slots; ++slot) {
+      const ChirpResidual chirp(stack, average, gains[static_cast<std::size_t>(shot)], shot, slot);
       if (!search.read(chirp)) continue;
       seen[frame] = 1;
       const BurstWindow window = search.window();
       if (window.length == 0) continue;
-      // Limbs beat, now and then all at once.
+      // Limbs move at several speeds and may add up for a moment.
       if (search.moves() && isOfEchoes(chirp.spectrum())) continue;
       if (!search.isOneWave(chirp, window)) continue;
       found.log_likelihood_gain += window.nats;
       hit[frame] = 1;
-      found.hit[static_cast<std::size_t>(shot * s.slots + slot)] = 1;
-      dropChirp(shot, slot, s);
+      found.hit[static_cast<std::size_t>(shot * stack.slots + slot)] = 1;
+      dropChirp(shot, slot, stack);
     }
   }
   for (std::size_t f = 0; f < seen.size(); ++f) {

@@ -18,32 +18,32 @@ namespace {
 
 constexpr double kCell_m = 0.15;             ///< of the map: about a range bin of the paper's radar
 constexpr int kMostCells = 1000;             ///< of the map, along either axis
-constexpr double kReach_m = 1.0;             ///< of a walker, and the width of a beam at some metres
-constexpr double kAround_m = 0.5;            ///< half the place of a finding
-constexpr double kAround_deg = 10;           ///< half the place of a finding by Doppler
-constexpr std::size_t kMostWalkers = 4;      ///< that are told
-constexpr std::size_t kFewestPlaces = 5;     ///< of a track that counts
-constexpr int kPasses = 3;                   ///< of tracks about a centre that moves with them
-constexpr float kBesideShare = 0.01f;        ///< of a peak, to which sidelobes of the window and of the array reach
-constexpr double kPlaceError_m = 0.3;        ///< of a walk without tracks
-constexpr double kRangeError_m = 0.1;        ///< of a place along the view, about a range bin
-constexpr double kAngleError_rad = 0.035;    ///< of a place across the view: 2 degrees, the array's errors
+constexpr double kReach_m = 1.0;             ///< radius of a walker's motion, and the width of a beam at some metres
+constexpr double kAround_m = 0.5;            ///< half the size of a finding's place
+constexpr double kAround_deg = 10;           ///< half the width of a finding's place by Doppler
+constexpr std::size_t kMostWalkers = 4;      ///< walkers that are stated
+constexpr std::size_t kFewestPlaces = 5;     ///< positions of a track that counts
+constexpr int kPasses = 3;                   ///< iterations of tracks about a moving centre
+constexpr float kBesideShare = 0.01f;        ///< share of a peak down to which sidelobes of window and array reach
+constexpr double kPlaceError_m = 0.3;        ///< standard error of a walk's place without tracks
+constexpr double kRangeError_m = 0.1;        ///< standard error along the view, about a range bin
+constexpr double kAngleError_rad = 0.035;    ///< standard error across the view: 2 degrees, the array's errors
 constexpr double kLimbSpeeds_m_per_s = 0.1;  ///< between parts of a walking body
 
 const double kLogFalseAlarm = std::log(bounds::kFramesFalseAlarmRate);
 
-/// Place in the map with its evidence, nats.
+/// Place in the map with its evidence in nats.
 struct Place {
   double x_m = 0, y_m = 0, evidence = 0;
 };
 
-/// Evidence of one pose as it counts beside others.
+/// Evidence of one pose, limited for the sum over poses.
 float bounded(float evidence) { return evidence / (1 + evidence / bounds::kConvincingNatsAtPose); }
 
 double degrees(double rad) { return rad * 180 / M_PI; }
 
-/// Logarithm of the chance that `poses` cells of pure noise add up to `evidence`, as Chernoff's bound over t. A cell
-/// holds half the square of the positive part of a normal number, for which E exp(t e) = 1/2 + 1/2 (1 - t)^(-1/2).
+/// Logarithm of the probability that `poses` cells of noise sum to `evidence`, by Chernoff's bound over t. A cell holds
+/// half the square of the positive part of a normal number, for which E exp(t e) = 1/2 + 1/2 (1 - t)^(-1/2).
 double logChance(double evidence, std::size_t poses) {
   double best = 0;
   for (double t = 0.02; t < 1; t += 0.02) {
@@ -63,7 +63,7 @@ class View {
         bins_(static_cast<int>(pose.evidence.rows())) {}
   /// Cell of a place; false where the place is behind the radar or beyond its range.
   bool cell(double x_m, double y_m, int& bin, int& beam) const {
-    // An array along y tells no elevation: the place is taken at the radar's height.
+    // An array along y does not measure elevation: the place is taken at the radar's height.
     const Eigen::Vector3d d = R_ * Eigen::Vector3d(x_m - p_.x(), y_m - p_.y(), 0);
     const double r = d.norm();
     if (d.x() <= 0 || r < 1e-3) return false;
@@ -101,7 +101,7 @@ class Search {
     const double reach_m = radar_.max_range_m();
     low_.array() -= reach_m;
     high_.array() += reach_m;
-    // Poses far apart make cells wider, not more.
+    // Poses far apart make cells larger, not more numerous.
     cell_m_ = std::max(kCell_m, (high_ - low_).maxCoeff() / kMostCells);
     columns_ = static_cast<int>((high_.x() - low_.x()) / cell_m_) + 1;
     rows_ = static_cast<int>((high_.y() - low_.y()) / cell_m_) + 1;
@@ -121,7 +121,7 @@ class Search {
       const auto carry = std::count_if(poses_.begin(), poses_.end(), [&](const PoseMotion& p) {
         return p.evidence.size() > 0 && p.evidence(bin, beam) > bounds::kLeastNatsAtPose;
       });
-      // Every cell of the map was a try; the radar has fewer cells.
+      // Every cell of the map was tried; the radar has fewer cells.
       const double tries = std::log(static_cast<double>(columns_) * rows_);
       if (carry > 2 && fixed >= place.evidence &&
           tries + logChance(bounds::kTrustInMotion * fixed, poses_.size()) < kLogFalseAlarm) {
@@ -137,7 +137,7 @@ class Search {
   }
 
  private:
-  /// Place of the map with most evidence over all poses.
+  /// Place in the map of highest evidence over all poses.
   Place strongestPlace() const {
     std::vector<float> sum(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), 0);
     for (std::size_t i = 0; i < poses_.size(); ++i) {
@@ -161,7 +161,7 @@ class Search {
     return {x(cell % columns_), y(cell / columns_), *best};
   }
 
-  /// Cell of range and angle that varies most, over all poses but those of one location, and its evidence.
+  /// Cell of range and angle of highest evidence, over all poses except those of one location, and this evidence.
   double strongestCell(int& bin, int& beam, const std::string& without = "") const {
     Eigen::ArrayXXf sum;
     for (const PoseMotion& p : poses_) {
@@ -172,36 +172,37 @@ class Search {
     return sum.size() > 0 ? sum.maxCoeff(&bin, &beam) : 0;
   }
 
-  /// Finding of a tone of the radar's own in a cell.
+  /// Finding of a tone of the radar in a cell.
   FrameFinding bodyFixed(int bin, int beam, double evidence) const {
-    FrameFinding f;
-    f.cause = "unknown";
-    f.log_likelihood_gain = evidence;
-    f.false_alarm_rate = std::min(1.0, std::exp(std::log(static_cast<double>(columns_) * rows_) +
-                                                logChance(bounds::kTrustInMotion * evidence, poses_.size())));
+    FrameFinding finding;
+    finding.cause = "unknown";
+    finding.log_likelihood_gain = evidence;
+    finding.false_alarm_rate = std::min(1.0, std::exp(std::log(static_cast<double>(columns_) * rows_) +
+                                                      logChance(bounds::kTrustInMotion * evidence, poses_.size())));
     FindingPlace place;
     const double range_m = bin * radar_.range_bin_m();
     place.range_m = {range_m - radar_.range_bin_m(), range_m + radar_.range_bin_m()};
     for (const PoseMotion& p : poses_) {
-      if (p.evidence.size() > 0 && p.evidence(bin, beam) > bounds::kLeastNatsAtPose) f.poses.push_back(p.pose.name);
+      if (p.evidence.size() > 0 && p.evidence(bin, beam) > bounds::kLeastNatsAtPose)
+        finding.poses.push_back(p.pose.name);
     }
-    place.poses = f.poses;
-    f.where = {place};
+    place.poses = finding.poses;
+    finding.where = {place};
     std::ostringstream text;
-    f.mechanism = toneIn(bin);
+    finding.mechanism = toneIn(bin);
     for (const PoseMotion& p : poses_) {
       int at_bin = 0, at_beam = 0;
       const bool told = strongestCell(at_bin, at_beam, p.pose.location) > 0 && p.evidence.size() > 0;
-      f.nats_by_pose[p.pose.name] = told ? p.evidence(at_bin, at_beam) : 0;
+      finding.nats_by_pose[p.pose.name] = told ? p.evidence(at_bin, at_beam) : 0;
     }
-    text << "frames disagree at one beat frequency (" << f.mechanism->values.number("beat_hz") / 1e6 << " MHz, range "
-         << range_m << " m) at " << f.poses.size() << " of " << poses_.size()
+    text << "frames disagree at one beat frequency (" << finding.mechanism->values.number("beat_hz") / 1e6
+         << " MHz, range " << range_m << " m) at " << finding.poses.size() << " of " << poses_.size()
          << " poses wherever the radar stands: it belongs to the radar, not to the room";
-    f.description = text.str();
-    return f;
+    finding.description = text.str();
+    return finding;
   }
 
-  /// Tone of the radar's own about a range bin: medians of the echoes there; its level is over one ADC count.
+  /// Tone of the radar about a range bin, from medians of the echoes there. Its level is relative to one ADC count.
   NamedParameters toneIn(int bin) const {
     std::vector<double> range_m, sine, power;
     const std::vector<double> window = hannWindow(radar_.samples_per_chirp);
@@ -224,19 +225,19 @@ class Search {
     return tone;
   }
 
-  /// Takes the evidence and echoes of a span of ranges out of a pose.
-  void clear(PoseMotion& p, double range_m, double half_m) const {
+  /// Removes the evidence and echoes of an interval of ranges from a pose.
+  void clear(PoseMotion& pose, double range_m, double half_m) const {
     const int low = std::max(0, static_cast<int>(std::floor((range_m - half_m) / radar_.range_bin_m())));
-    const int high = std::min(static_cast<int>(p.evidence.rows()) - 1,
+    const int high = std::min(static_cast<int>(pose.evidence.rows()) - 1,
                               static_cast<int>(std::ceil((range_m + half_m) / radar_.range_bin_m())));
     if (high >= low) {
-      const float peak = p.evidence.middleRows(low, high - low + 1).maxCoeff();
-      p.evidence.middleRows(low, high - low + 1).setZero();
-      p.evidence = (p.evidence < kBesideShare * peak).select(0.0f, p.evidence);
+      const float peak = pose.evidence.middleRows(low, high - low + 1).maxCoeff();
+      pose.evidence.middleRows(low, high - low + 1).setZero();
+      pose.evidence = (pose.evidence < kBesideShare * peak).select(0.0f, pose.evidence);
     }
-    p.echoes.erase(std::remove_if(p.echoes.begin(), p.echoes.end(),
-                                  [&](const MovingEcho& e) { return std::abs(e.range_m - range_m) <= half_m; }),
-                   p.echoes.end());
+    pose.echoes.erase(std::remove_if(pose.echoes.begin(), pose.echoes.end(),
+                                     [&](const MovingEcho& e) { return std::abs(e.range_m - range_m) <= half_m; }),
+                      pose.echoes.end());
   }
 
   struct Sighting {
@@ -245,7 +246,7 @@ class Search {
     Eigen::Vector2d place;  ///< in the map
   };
 
-  /// Sightings of one walker each: near its strongest one, and to one sense of motion at a pose. Strongest first.
+  /// Sightings by walker: near its strongest sighting, and with one sense of motion at a pose. Strongest first.
   std::vector<std::vector<Sighting>> sightingsOfWalkers() const {
     std::vector<Sighting> sightings;
     for (std::size_t i = 0; i < poses_.size(); ++i) {
@@ -254,23 +255,23 @@ class Search {
     std::stable_sort(sightings.begin(), sightings.end(),
                      [](const auto& a, const auto& b) { return a.echo.snr > b.echo.snr; });
     std::vector<std::vector<Sighting>> walkers;
-    for (const Sighting& s : sightings) {
+    for (const Sighting& sighting : sightings) {
       const auto known = std::find_if(walkers.begin(), walkers.end(), [&](const std::vector<Sighting>& w) {
-        if ((w.front().place - s.place).norm() > kReach_m) return false;
+        if ((w.front().place - sighting.place).norm() > kReach_m) return false;
         return std::none_of(w.begin(), w.end(), [&](const Sighting& other) {
-          return other.pose == s.pose && other.echo.radial_m_per_s * s.echo.radial_m_per_s < 0;
+          return other.pose == sighting.pose && other.echo.radial_m_per_s * sighting.echo.radial_m_per_s < 0;
         });
       });
       if (known != walkers.end()) {
-        known->push_back(s);
+        known->push_back(sighting);
       } else {
-        walkers.push_back({s});
+        walkers.push_back({sighting});
       }
     }
     return walkers;
   }
 
-  /// Walkers whose speed the frames tell by Doppler: one per place, and per sense of motion at a pose.
+  /// Walkers whose speed the frames show by Doppler: one per place and, at one pose, per sense of motion.
   LocatedMotion dopplerWalkers() const {
     LocatedMotion motion;
     for (const auto& walker : sightingsOfWalkers()) motion.walkers.push_back(dopplerWalker(walker));
@@ -278,29 +279,30 @@ class Search {
   }
 
   FrameFinding dopplerWalker(const std::vector<Sighting>& walker) const {
-    FrameFinding f;
-    f.cause = "moving_target";
-    f.false_alarm_rate = bounds::kDopplerFalseAlarmRate;
+    FrameFinding finding;
+    finding.cause = "moving_target";
+    finding.false_alarm_rate = bounds::kDopplerFalseAlarmRate;
     Eigen::Vector2d center = Eigen::Vector2d::Zero(), squares = center;
     double count = 0, speed = 0, speed_squares = 0;
     FindingPlace place;
     place.range_m =
         place.azimuth_deg = {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
     std::set<std::string> names;
-    for (const Sighting& s : walker) {
-      const double v = std::abs(s.echo.radial_m_per_s);
-      center += s.place;
-      squares += s.place.cwiseAbs2();
+    for (const Sighting& sighting : walker) {
+      const double v = std::abs(sighting.echo.radial_m_per_s);
+      center += sighting.place;
+      squares += sighting.place.cwiseAbs2();
       speed += v;
       speed_squares += v * v;
       ++count;
-      f.log_likelihood_gain += s.echo.snr - 1 - std::log(s.echo.snr);
-      const double azimuth_deg = degrees(s.echo.azimuth_rad);
-      place.range_m = {std::min((*place.range_m)[0], s.echo.range_m - kAround_m),
-                       std::max((*place.range_m)[1], s.echo.range_m + kAround_m)};
+      finding.log_likelihood_gain += sighting.echo.snr - 1 - std::log(sighting.echo.snr);
+      const double azimuth_deg = degrees(sighting.echo.azimuth_rad);
+      place.range_m = {std::min((*place.range_m)[0], sighting.echo.range_m - kAround_m),
+                       std::max((*place.range_m)[1], sighting.echo.range_m + kAround_m)};
       place.azimuth_deg = {std::min((*place.azimuth_deg)[0], azimuth_deg - kAround_deg),
                            std::max((*place.azimuth_deg)[1], azimuth_deg + kAround_deg)};
-      if (names.insert(poses_[s.pose].pose.name).second) f.poses.push_back(poses_[s.pose].pose.name);
+      if (names.insert(poses_[sighting.pose].pose.name).second)
+        finding.poses.push_back(poses_[sighting.pose].pose.name);
     }
     center /= count;
     speed /= count;
@@ -312,24 +314,24 @@ class Search {
     const double half_x = half(squares.x() / count, center.x(), floor_m);
     const double half_y = half(squares.y() / count, center.y(), floor_m);
     const double half_v = half(speed_squares / count, speed, kLimbSpeeds_m_per_s);
-    f.parameters = {{"x_m", "m", center.x(), {{center.x() - half_x, center.x() + half_x}}},
-                    {"y_m", "m", center.y(), {{center.y() - half_y, center.y() + half_y}}},
-                    {"speed_m_per_s", "m/s", speed, {{std::max(0.0, speed - half_v), speed + half_v}}}};
-    place.poses = f.poses;
+    finding.parameters = {{"x_m", "m", center.x(), {{center.x() - half_x, center.x() + half_x}}},
+                          {"y_m", "m", center.y(), {{center.y() - half_y, center.y() + half_y}}},
+                          {"speed_m_per_s", "m/s", speed, {{std::max(0.0, speed - half_v), speed + half_v}}}};
+    place.poses = finding.poses;
     place.x_m = center.x();
     place.y_m = center.y();
-    f.where = {place};
+    finding.where = {place};
     const Sighting& strongest = walker.front();
     std::ostringstream text;
     text << "something moves at (" << center.x() << ", " << center.y() << ") m in the map, at "
          << strongest.echo.range_m << " m and " << degrees(strongest.echo.azimuth_rad) << " deg of pose "
          << poses_[strongest.pose].pose.name << ", " << (strongest.echo.radial_m_per_s > 0 ? "away from" : "towards")
          << " the radar at " << speed << " m/s";
-    f.description = text.str();
-    return f;
+    finding.description = text.str();
+    return finding;
   }
 
-  /// Places of a walker, frame by frame, seen from one pose.
+  /// Positions of a walker, frame by frame, seen from one pose.
   struct Track {
     std::size_t pose = 0;
     std::vector<int> frame;
@@ -340,40 +342,40 @@ class Search {
 
   /// Track of the strongest echo of every frame near a place.
   Track track(std::size_t pose, const Eigen::Vector2d& place) const {
-    Track t;
-    t.pose = pose;
+    Track track;
+    track.pose = pose;
     double snr = 0;
-    for (const MovingEcho& e : poses_[pose].echoes) {
-      const Eigen::Vector2d seen = views_[pose].map(e.range_m, e.azimuth_rad);
+    for (const MovingEcho& echo : poses_[pose].echoes) {
+      const Eigen::Vector2d seen = views_[pose].map(echo.range_m, echo.azimuth_rad);
       if ((seen - place).norm() > kReach_m) continue;
-      if (!t.frame.empty() && t.frame.back() == e.frame) {
-        if (e.snr <= snr) continue;
-        t.places.back() = seen;
+      if (!track.frame.empty() && track.frame.back() == echo.frame) {
+        if (echo.snr <= snr) continue;
+        track.places.back() = seen;
       } else {
-        t.frame.push_back(e.frame);
-        t.places.push_back(seen);
+        track.frame.push_back(echo.frame);
+        track.places.push_back(seen);
       }
-      snr = e.snr;
+      snr = echo.snr;
     }
-    for (const auto& seen : t.places) t.mean += seen / static_cast<double>(t.places.size());
-    return t;
+    for (const auto& seen : track.places) track.mean += seen / static_cast<double>(track.places.size());
+    return track;
   }
 
-  /// Middle of a walk: the mean of each pose's track, weighed by how well the pose can know it.
+  /// Centre of a walk: the mean of each pose's track, weighted by the accuracy of the pose's view.
   Eigen::Vector2d middle(std::vector<Track>& tracks, Eigen::Matrix2d& covariance) const {
     Eigen::Matrix2d total = Eigen::Matrix2d::Zero();
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-    for (Track& t : tracks) {
-      const Eigen::Vector2d ray = t.mean - views_[t.pose].position();
+    for (Track& track : tracks) {
+      const Eigen::Vector2d ray = track.mean - views_[track.pose].position();
       const double r = std::max(ray.norm(), 0.1);
       const Eigen::Vector2d along = ray / r, across(-along.y(), along.x());
-      // A few seconds see a part of a walk of some decimetres.
-      const double part_m = 0.2 / std::sqrt(std::max(1.0, t.places.size() / 20.0));
+      // A few seconds show only a part of a walk, of some decimetres.
+      const double part_m = 0.2 / std::sqrt(std::max(1.0, track.places.size() / 20.0));
       const double range_m = std::hypot(part_m, 0.05), cross_m = std::hypot(part_m, kAngleError_rad * r);
-      t.information =
+      track.information =
           along * along.transpose() / (range_m * range_m) + across * across.transpose() / (cross_m * cross_m);
-      total += t.information;
-      sum += t.information * t.mean;
+      total += track.information;
+      sum += track.information * track.mean;
     }
     const Eigen::Matrix2d inverse = total.inverse();
     const Eigen::Vector2d center = inverse * sum;
@@ -395,10 +397,10 @@ class Search {
     double value = 0, low = 0, high = 0;
   };
 
-  /// Squared speed of bodies that turn back every straight_s. The mean square of the way between two frames, a time t
-  /// apart, is v^2 t^2 (1 - 2/3 t / straight_s): a share t / straight_s of the ways has a turn in it, and its mean
-  /// square is a third of v^2 t^2. Errors of single places add a constant to each track. `misfit` is that of the mean
-  /// over tracks, by which values of straight_s compare.
+  /// Squared speed of bodies that turn back every straight_s. The mean square displacement between two frames, a time t
+  /// apart, is v^2 t^2 (1 - 2/3 t / straight_s): a share t / straight_s of the displacements contains a turn, and their
+  /// mean square is a third of v^2 t^2. Errors of single positions add a constant to each track. misfit: that of the
+  /// mean over tracks, by which values of straight_s are compared.
   double speed2(const std::vector<const Track*>& tracks, double straight_s, double& misfit) const {
     constexpr int kLags = 8;
     double counts[kLags] = {}, means[kLags] = {}, grows[kLags];
@@ -446,7 +448,7 @@ class Search {
     return std::max(0.0, all_slope / all_weight);
   }
 
-  /// Speed for the time between two turns that leaves the least misfit.
+  /// Speed for the time between two turns of least misfit.
   double speedOf(const std::vector<const Track*>& tracks) const {
     double least = std::numeric_limits<double>::infinity(), best = 0;
     for (double straight_s : {100.0, 2.0, 1.4, 1.0, 0.8, 0.7, 0.65, 0.6, 0.55, 0.5, 0.45}) {
@@ -462,24 +464,24 @@ class Search {
   Speed speed(const std::vector<Track>& tracks) const {
     std::vector<const Track*> all;
     for (const Track& t : tracks) all.push_back(&t);
-    Speed s;
-    s.value = speedOf(all);
-    // One or two poses know a speed to a factor of two.
+    Speed speed;
+    speed.value = speedOf(all);
+    // One or two poses determine a speed to a factor of two.
     double variance = 0;
     for (std::size_t i = 0; all.size() > 2 && i < all.size(); ++i) {
       std::vector<const Track*> rest = all;
       rest.erase(rest.begin() + static_cast<long>(i));
-      variance += std::pow(speedOf(rest) - s.value, 2);
+      variance += std::pow(speedOf(rest) - speed.value, 2);
     }
     const double half = all.size() > 2 ? 1.96 * std::hypot(std::sqrt(variance * (all.size() - 1.0) / all.size()),
-                                                           bounds::kWalkSpeedError * s.value)
-                                       : s.value;
-    s.low = std::max(0.0, s.value - half);
-    s.high = s.value + half;
-    return s;
+                                                           bounds::kWalkSpeedError * speed.value)
+                                       : speed.value;
+    speed.low = std::max(0.0, speed.value - half);
+    speed.high = speed.value + half;
+    return speed;
   }
 
-  /// Centre of a walk that begins about a place, with its covariance, and the tracks that tell it.
+  /// Centre of a walk that begins about a place, with its covariance, and the tracks that determine it.
   struct Walk {
     Eigen::Vector2d center;
     Eigen::Matrix2d covariance;
@@ -504,54 +506,54 @@ class Search {
     return walk;
   }
 
-  /// Finding of a walker at a place, whose evidence is taken out of all poses.
+  /// Finding of a walker at a place, whose evidence is removed from all poses.
   FrameFinding walker(const Place& found, double false_alarm_rate) {
-    FrameFinding f;
-    f.cause = "moving_target";
-    f.false_alarm_rate = std::min(1.0, false_alarm_rate);
+    FrameFinding finding;
+    finding.cause = "moving_target";
+    finding.false_alarm_rate = std::min(1.0, false_alarm_rate);
     const Walk walk = walkAbout(found);
     const Eigen::Vector2d& center = walk.center;
-    const Speed v = speed(walk.tracks);
+    const Speed walking_speed = speed(walk.tracks);
     const auto interval = [](double value, double variance) {
       const double half = 1.96 * std::sqrt(variance);
       return std::vector<std::array<double, 2>>{{value - half, value + half}};
     };
-    f.parameters = {{"x_m", "m", center.x(), interval(center.x(), walk.covariance(0, 0))},
-                    {"y_m", "m", center.y(), interval(center.y(), walk.covariance(1, 1))},
-                    {"speed_m_per_s", "m/s", v.value, {{v.low, v.high}}}};
+    finding.parameters = {{"x_m", "m", center.x(), interval(center.x(), walk.covariance(0, 0))},
+                          {"y_m", "m", center.y(), interval(center.y(), walk.covariance(1, 1))},
+                          {"speed_m_per_s", "m/s", walking_speed.value, {{walking_speed.low, walking_speed.high}}}};
     for (std::size_t i = 0; i < poses_.size(); ++i) {
-      PoseMotion& p = poses_[i];
+      PoseMotion& pose = poses_[i];
       const Eigen::Vector3d d =
-          p.pose.T_map_radar.linear().transpose() *
+          pose.pose.T_map_radar.linear().transpose() *
           Eigen::Vector3d(center.x() - views_[i].position().x(), center.y() - views_[i].position().y(), 0);
-      // The walk's middle may be behind the radar and one of its ends before it.
-      if (p.evidence.size() == 0 || d.x() < -kReach_m || d.norm() > radar_.max_range_m()) continue;
+      // The walk's centre may be behind the radar and one of its ends before it.
+      if (pose.evidence.size() == 0 || d.x() < -kReach_m || d.norm() > radar_.max_range_m()) continue;
       const double range_m = (views_[i].position() - center).norm();
-      const float peak = peakAbout(p, d.norm());
+      const float peak = peakAbout(pose, d.norm());
       if (peak > bounds::kLeastNatsAtPose) {
-        f.log_likelihood_gain += peak;
-        f.poses.push_back(p.pose.name);
+        finding.log_likelihood_gain += peak;
+        finding.poses.push_back(pose.pose.name);
         const double azimuth_deg = degrees(std::atan2(d.y(), d.x()));
         const double around_deg = degrees(kAround_m / std::max(range_m, kAround_m));
         FindingPlace place;
         place.range_m = {range_m - kAround_m, range_m + kAround_m};
         place.azimuth_deg = {azimuth_deg - around_deg, azimuth_deg + around_deg};
-        place.poses = {p.pose.name};
+        place.poses = {pose.pose.name};
         place.x_m = center.x();
         place.y_m = center.y();
-        f.where.push_back(place);
+        finding.where.push_back(place);
       }
-      clear(p, range_m, kReach_m);
+      clear(pose, range_m, kReach_m);
     }
-    f.log_likelihood_gain = std::max(f.log_likelihood_gain, found.evidence);
+    finding.log_likelihood_gain = std::max(finding.log_likelihood_gain, found.evidence);
     std::ostringstream text;
-    text << "something moves about (" << center.x() << ", " << center.y() << ") m in the map at " << v.value
-         << " m/s; seen at " << f.poses.size() << " of " << poses_.size() << " poses";
-    f.description = text.str();
-    return f;
+    text << "something moves about (" << center.x() << ", " << center.y() << ") m in the map at " << walking_speed.value
+         << " m/s; seen at " << finding.poses.size() << " of " << poses_.size() << " poses";
+    finding.description = text.str();
+    return finding;
   }
 
-  /// Most evidence of a pose within reach of a range, over all angles.
+  /// Highest evidence of a pose near a range, over all angles.
   float peakAbout(const PoseMotion& p, double range_m) const {
     const int bin = static_cast<int>(std::lround(range_m / radar_.range_bin_m()));
     const int around = static_cast<int>(std::ceil(kReach_m / radar_.range_bin_m()));

@@ -15,12 +15,12 @@ namespace {
 
 using Complex = std::complex<float>;
 
-constexpr int kLeastLoops = 16;             ///< that make a Doppler spectrum: standing echoes take three of its bins
-constexpr std::size_t kEchoesPerFrame = 3;  ///< moving ones, the strongest, that are kept
+constexpr int kLeastLoops = 16;             ///< loops of a Doppler spectrum: static echoes fill three of its bins
+constexpr std::size_t kEchoesPerFrame = 3;  ///< moving echoes that are kept, the strongest
 constexpr double kLimb_m = 0.75;            ///< between parts of a body
-constexpr double kGhostBefore_m = 1;        ///< by which an echo by way of a wall may seem nearer than its body
-constexpr double kAlike = 2;  ///< frames for which a body's echo is alike, by which its average scatters more
-constexpr int kSkirtBins = 8, kPeakBins = 2;  ///< about a cell, beyond and within: its surroundings
+constexpr double kGhostBefore_m = 1;        ///< distance by which an echo over a wall may seem nearer than its body
+constexpr double kAlike = 2;  ///< frames over which a body's echo is correlated, by which its average scatters more
+constexpr int kSkirtBins = 8, kPeakBins = 2;  ///< distance from a cell that bounds its surroundings outside and inside
 
 template <typename T>
 T medianOf(std::vector<T> values) {
@@ -41,7 +41,7 @@ double weightedMedian(std::vector<std::pair<double, double>>& values) {
   return values.empty() ? 0 : values.back().first;
 }
 
-/// Standard error of a median, from the scatter of the values about it: normal but for outliers.
+/// Standard error of a median, from the scatter of the values about it: normal except for outliers.
 template <typename T>
 double errorOfMedian(std::vector<T> values, double median) {
   for (T& v : values) v = std::abs(v - median);
@@ -53,23 +53,22 @@ Eigen::FFT<float>& fft() {
   return fft;
 }
 
-/// Time from one chirp's start to the next: as radar.yaml says, else as short as its samples allow.
+/// Time from one chirp's start to the next: as radar.yaml states, else the shortest that its samples allow.
 double chirpPeriod_s(const RadarConfig& radar) {
   const double sampled_s = radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
   return (std::isfinite(radar.ramp_end_s) ? radar.ramp_end_s : sampled_s) +
          (std::isfinite(radar.idle_s) ? radar.idle_s : 0);
 }
 
-/// Offset of a peak from the middle one of three levels, by a parabola through their logarithms; at most 1/2 either
-/// way.
+/// Offset of a peak from the middle of three levels, by a parabola through their logarithms; at most 1/2 in magnitude.
 double peakOffset(double left, double middle, double right) {
   if (!(left > 0 && middle > 0 && right > 0)) return 0;
   const double l = std::log(left), m = std::log(middle), r = std::log(right), curve = l - 2 * m + r;
   return curve < 0 ? std::clamp(0.5 * (l - r) / curve, -0.5, 0.5) : 0;
 }
 
-/// Bodies among the echoes of one frame: arms and legs join the body that they are near and move along with, and echoes
-/// by way of a wall are left out.
+/// Bodies among the echoes of one frame. Arms and legs join the body that they are near and move with. Echoes over a
+/// wall are left out.
 std::vector<MovingEcho> bodiesOf(std::vector<MovingEcho> echoes) {
   struct Body {
     MovingEcho echo;
@@ -106,13 +105,13 @@ std::vector<MovingEcho> bodiesOf(std::vector<MovingEcho> echoes) {
 
 }  // namespace
 
-/// Range spectra of the residuals of those shots that are nearly whole.
+/// Range spectra of the residuals of shots that are nearly complete.
 struct ShotExaminer::Spectra {
   int channels = 0, bins = 0;
-  std::vector<int> shot;                   ///< numbers of the shots
-  std::vector<Complex> residual;           ///< [shot][bin][channel]; over the noise once readNoise() knows it
-  std::vector<Complex> average;            ///< [bin][channel]; over the noise likewise
-  std::vector<std::complex<double>> gain;  ///< [shot] common to all cells, taken out of the residuals
+  std::vector<int> shot;                   ///< indices of the shots
+  std::vector<Complex> residual;           ///< [shot][bin][channel]; in units of the noise after readNoise()
+  std::vector<Complex> average;            ///< [bin][channel]; likewise in units of the noise
+  std::vector<std::complex<double>> gain;  ///< [shot] common to all cells, removed from the residuals
   int per_frame = 1;                       ///< shots
   const Complex* at(std::size_t i, int bin) const {
     return &residual[(i * static_cast<std::size_t>(bins) + static_cast<std::size_t>(bin)) *
@@ -121,12 +120,12 @@ struct ShotExaminer::Spectra {
   Complex* at(std::size_t i, int bin) { return const_cast<Complex*>(std::as_const(*this).at(i, bin)); }
 };
 
-/// Cell of range and Doppler; `turns` are those of the phase over a frame, with their sign.
+/// Cell of range and Doppler; `turns` are those of the phase over a frame, signed.
 struct ShotExaminer::DopplerCell {
   int bin = 0, doppler = 0, turns = 0;
 };
 
-/// Doppler spectra of one frame's loops: by Hann's window, of unit noise.
+/// Doppler spectra of one frame's loops, with Hann's window and unit noise.
 class ShotExaminer::DopplerFrame {
  public:
   DopplerFrame(int channels, int bins, int loops)
@@ -148,7 +147,7 @@ class ShotExaminer::DopplerFrame {
     return Eigen::Map<const Eigen::VectorXcf>(&spectra_[static_cast<std::size_t>((doppler * bins_ + bin) * channels_)],
                                               channels_);
   }
-  /// Takes the shots from begin to end, all of one frame; loops without a shot count as zero.
+  /// Transforms the shots from begin to end, all of one frame. Loops without a shot count as zero.
   void transform(const Spectra& s, std::size_t begin, std::size_t end) {
     std::vector<Complex> in(static_cast<std::size_t>(loops_)), out(in);
     for (int b = 0; b < bins_; ++b) {
@@ -166,13 +165,13 @@ class ShotExaminer::DopplerFrame {
       for (int d = 0; d < loops_; ++d) power_(b, d) = cell(b, d).squaredNorm();
     }
   }
-  /// Cells that stand out of the noise and above their neighbours, by range and Doppler.
+  /// Cells of range and Doppler that exceed the noise and their neighbours.
   std::vector<DopplerCell> movingPeaks() const {
     std::vector<DopplerCell> peaks;
     for (int b = 1; b + 1 < bins_; ++b) {
       for (int d = 0; d < loops_; ++d) {
         const int turns = d < (loops_ + 1) / 2 ? d : d - loops_;
-        // Standing echoes leak into two turns per frame by the window, and flicker there.
+        // Static echoes leak into two turns per frame through the window, and flicker there.
         if (std::abs(turns) <= 2 || power_(b, d) < least_) continue;
         bool highest = true;
         for (int i = -1; i <= 1; ++i) {
@@ -219,40 +218,40 @@ Eigen::VectorXcf ShotExaminer::steering(double azimuth_rad) const {
 }
 
 ShotExaminer::Spectra ShotExaminer::spectra(const FrameStack& stack, const std::vector<Complex>& average) const {
-  Spectra s;
-  s.channels = stack.channels();
-  s.bins = stack.samples;
-  s.per_frame = stack.loops;
+  Spectra spectra;
+  spectra.channels = stack.channels();
+  spectra.bins = stack.samples;
+  spectra.per_frame = stack.loops;
   const std::size_t values = stack.values();
   for (int shot = 0; shot < stack.shots(); ++shot) {
     const auto first = stack.use.begin() + static_cast<long>(static_cast<std::size_t>(shot) * values);
     const auto used = std::count(first, first + static_cast<long>(values), std::uint8_t{1});
-    if (10 * static_cast<std::size_t>(used) >= 9 * values) s.shot.push_back(shot);
+    if (10 * static_cast<std::size_t>(used) >= 9 * values) spectra.shot.push_back(shot);
   }
-  s.residual.resize(s.shot.size() * values);
-  s.average.resize(values);
-  std::vector<Complex> in(static_cast<std::size_t>(s.bins)), out(in);
+  spectra.residual.resize(spectra.shot.size() * values);
+  spectra.average.resize(values);
+  std::vector<Complex> in(static_cast<std::size_t>(spectra.bins)), out(in);
   const auto transform = [&](Complex* to, int k) {
-    fft().fwd(out.data(), in.data(), s.bins);
-    for (int b = 0; b < s.bins; ++b) to[b * s.channels + k] = out[static_cast<std::size_t>(b)];
+    fft().fwd(out.data(), in.data(), spectra.bins);
+    for (int b = 0; b < spectra.bins; ++b) to[b * spectra.channels + k] = out[static_cast<std::size_t>(b)];
   };
-  for (int k = 0; k < s.channels; ++k) {
-    for (int n = 0; n < s.bins; ++n) {
+  for (int k = 0; k < spectra.channels; ++k) {
+    for (int n = 0; n < spectra.bins; ++n) {
       const auto i = static_cast<std::size_t>(n);
       in[i] = average[stack.at(0, k, n)] * window_[i];
     }
-    transform(s.average.data(), k);
+    transform(spectra.average.data(), k);
   }
-  for (std::size_t i = 0; i < s.shot.size(); ++i) {
-    for (int k = 0; k < s.channels; ++k) {
-      const std::size_t at = stack.at(s.shot[i], k, 0), still = stack.at(0, k, 0);
+  for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+    for (int k = 0; k < spectra.channels; ++k) {
+      const std::size_t at = stack.at(spectra.shot[i], k, 0), still = stack.at(0, k, 0);
       for (std::size_t n = 0; n < in.size(); ++n) {
         in[n] = stack.use[at + n] ? (stack.x[at + n] - average[still + n]) * window_[n] : 0;
       }
-      transform(s.at(i, 0), k);
+      transform(spectra.at(i, 0), k);
     }
   }
-  return s;
+  return spectra;
 }
 
 double ShotExaminer::commonTurn(const FrameStack& stack) const {
@@ -260,7 +259,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
   const auto bins = static_cast<std::size_t>(stack.samples);
   std::vector<std::vector<std::complex<double>>> steps(bins);  // unit phasors from frame to frame
   std::vector<Complex> in(bins), before(bins), now(bins);
-  // One receiver of each slot tells enough of strong echoes.
+  // One receiver of each slot is enough for strong echoes.
   for (int k = 0; k < stack.channels(); k += stack.receivers) {
     int last = -2;
     for (int f = 0; f < stack.frames; ++f) {
@@ -279,7 +278,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
       last = f;
     }
   }
-  // The median of angles about their middle: a burst spoils two steps, which the median leaves out.
+  // The median of angles about their mean direction leaves out the two steps that a burst spoils.
   struct Turn {
     double rad, error_rad;
   };
@@ -293,7 +292,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
   std::vector<Turn> of_bins;
   std::vector<std::complex<double>> each;
   for (const auto& of_bin : steps) {
-    // Half of the steps may turn anyhow. Forty steps of noise add up to a sixth of their number.
+    // Half of the steps may have any phase. Forty steps of noise sum to a sixth of their number.
     const std::complex<double> sum = std::accumulate(of_bin.begin(), of_bin.end(), std::complex<double>(0));
     if (!(std::abs(sum) > 0.5 * static_cast<double>(of_bin.size()))) continue;
     of_bins.push_back(middle(of_bin));
@@ -301,7 +300,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
   }
   if (of_bins.empty()) return 0;
   const Turn common = middle(each);
-  // Most of these bins are weak. Bins count by their own errors, but for those that turn by themselves.
+  // Most of these bins are weak. Bins are weighted by their errors, except for those that turn by themselves.
   std::vector<std::pair<double, double>> weighed;
   for (const Turn& t : of_bins) {
     const double apart = std::remainder(t.rad - common.rad, 2 * M_PI);
@@ -312,24 +311,27 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
   return common.rad + weightedMedian(weighed);
 }
 
-void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotStatistics& result) const {
-  s.gain.assign(s.shot.size(), 1);
+void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& spectra, ShotStatistics& result) const {
+  spectra.gain.assign(spectra.shot.size(), 1);
   result.frame_level.assign(static_cast<std::size_t>(stack.frames), 1);
-  const double freedom = static_cast<double>(s.shot.size()) - 1;
+  const double freedom = static_cast<double>(spectra.shot.size()) - 1;
   if (freedom < 1) return;
-  // The common gain is the weighted median over range bins: movers are in few of them.
+  // The common gain is the weighted median over range bins: moving echoes fill few of them.
   struct Cell {
     int bin;
     double power;
   };
   const auto still = [&](int b) {
-    return Eigen::Map<const Eigen::VectorXcf>(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
+    return Eigen::Map<const Eigen::VectorXcf>(&spectra.average[static_cast<std::size_t>(b * spectra.channels)],
+                                              spectra.channels);
   };
-  const auto varied = [&](std::size_t i, int b) { return Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels); };
+  const auto varied = [&](std::size_t i, int b) {
+    return Eigen::Map<const Eigen::VectorXcf>(spectra.at(i, b), spectra.channels);
+  };
   const auto beyondOne = [&](const std::vector<Cell>& cells) {
     std::vector<std::complex<double>> beyond;
     std::vector<std::pair<double, double>> re(cells.size()), im(cells.size());
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
       for (std::size_t c = 0; c < cells.size(); ++c) {
         const std::complex<double> share =
             std::complex<double>(still(cells[c].bin).dot(varied(i, cells[c].bin))) / cells[c].power;
@@ -340,12 +342,12 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotStati
     }
     return beyond;
   };
-  // Cells that vary by less than a tenth of themselves beside the common gain.
+  // Cells that vary by less than a tenth apart from the common gain.
   const auto steady = [&](const std::vector<std::complex<double>>& beyond) {
     std::vector<Cell> cells;
-    for (int b = 0; b < s.bins; ++b) {
+    for (int b = 0; b < spectra.bins; ++b) {
       double scatter = 0;
-      for (std::size_t i = 0; i < s.shot.size(); ++i) {
+      for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
         scatter += (varied(i, b) - Complex(beyond[i]) * still(b)).squaredNorm();
       }
       const double power = still(b).squaredNorm();
@@ -353,38 +355,38 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& s, ShotStati
     }
     return cells;
   };
-  std::vector<Cell> cells = steady(std::vector<std::complex<double>>(s.shot.size(), 0.0)), all;
-  // A gain that changes by more than a tenth lets cells be steady only beside it.
-  for (int b = 0; b < s.bins; ++b) {
+  std::vector<Cell> cells = steady(std::vector<std::complex<double>>(spectra.shot.size(), 0.0)), all;
+  // Where the gain changes by more than a tenth, cells are steady only relative to it.
+  for (int b = 0; b < spectra.bins; ++b) {
     if (still(b).squaredNorm() > 0) all.push_back({b, still(b).squaredNorm()});
   }
   std::vector<Cell> beside = steady(beyondOne(all));
   if (beside.size() > cells.size()) cells = std::move(beside);
   if (cells.empty()) return;
   const std::vector<std::complex<double>> common = beyondOne(cells);
-  for (std::size_t i = 0; i < s.shot.size(); ++i) {
+  for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
     const std::complex<double> beyond = common[i];
-    s.gain[i] = 1.0 + beyond;
-    result.frame_level[static_cast<std::size_t>(s.shot[i] / s.per_frame)] = std::abs(s.gain[i]);
-    Complex* e = s.at(i, 0);
-    for (std::size_t j = 0; j < s.average.size(); ++j) e[j] -= Complex(beyond) * s.average[j];
+    spectra.gain[i] = 1.0 + beyond;
+    result.frame_level[static_cast<std::size_t>(spectra.shot[i] / spectra.per_frame)] = std::abs(spectra.gain[i]);
+    Complex* e = spectra.at(i, 0);
+    for (std::size_t j = 0; j < spectra.average.size(); ++j) e[j] -= Complex(beyond) * spectra.average[j];
   }
 }
 
-void ShotExaminer::readSteadiness(const Spectra& s, ShotStatistics& result) const {
-  const double freedom = static_cast<double>(s.shot.size()) - 1;
+void ShotExaminer::readSteadiness(const Spectra& spectra, ShotStatistics& result) const {
+  const double freedom = static_cast<double>(spectra.shot.size()) - 1;
   if (freedom < 4) return;
-  std::vector<double> varied(static_cast<std::size_t>(s.bins), 0), standing(varied);
-  for (int b = 0; b < s.bins; ++b) {
+  std::vector<double> varied(static_cast<std::size_t>(spectra.bins), 0), standing(varied);
+  for (int b = 0; b < spectra.bins; ++b) {
     const auto bin = static_cast<std::size_t>(b);
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
-      varied[bin] += Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm() / freedom;
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+      varied[bin] += Eigen::Map<const Eigen::VectorXcf>(spectra.at(i, b), spectra.channels).squaredNorm() / freedom;
     }
-    standing[bin] =
-        Eigen::Map<const Eigen::VectorXcf>(&s.average[bin * static_cast<std::size_t>(s.channels)], s.channels)
-            .squaredNorm();
+    standing[bin] = Eigen::Map<const Eigen::VectorXcf>(
+                        &spectra.average[bin * static_cast<std::size_t>(spectra.channels)], spectra.channels)
+                        .squaredNorm();
   }
-  // Noise fills all bins alike: the steadiest bins hold nothing else.
+  // Noise fills all bins alike: the steadiest bins hold only noise.
   std::vector<double> sorted = varied;
   std::sort(sorted.begin(), sorted.end());
   const double noise = sorted[sorted.size() / 10];
@@ -398,65 +400,68 @@ void ShotExaminer::readSteadiness(const Spectra& s, ShotStatistics& result) cons
     }
     ++unsteady;
     const double q = varied[b] / std::max(noise, 1e-30);
-    result.unsteady_nats += freedom * s.channels * (q - 1 - std::log(q));
+    result.unsteady_nats += freedom * spectra.channels * (q - 1 - std::log(q));
   }
   if (all > 0) result.unsteady_share = unsteady / all;
 }
 
-void ShotExaminer::readNoise(Spectra& s, ShotStatistics& result) const {
+void ShotExaminer::readNoise(Spectra& spectra, ShotStatistics& result) const {
   double window_power = 0;
   for (float w : window_) window_power += w * w;
-  const double freedom = static_cast<double>(s.shot.size()) - 1;
-  // Movers fill few range bins, noise fills all of them alike: the median over bins tells the noise. It is of sums that
-  // are Gamma distributed with the number of shots (Wilson and Hilferty: median = mean (1 - 1/(9 n))^3).
+  const double freedom = static_cast<double>(spectra.shot.size()) - 1;
+  // Moving echoes fill few range bins, noise fills all of them alike: the median over bins gives the noise. It is a
+  // median of sums that follow a Gamma distribution with the number of shots (Wilson and Hilferty: median = mean (1 -
+  // 1/(9 n))^3).
   const double median_of_mean = std::pow(1 - 1 / (9 * std::max(freedom, 1.0)), 3);
-  result.noise_variance.assign(static_cast<std::size_t>(s.channels), 1.0 / 6);
+  result.noise_variance.assign(static_cast<std::size_t>(spectra.channels), 1.0 / 6);
   if (freedom < 1) return;
-  for (int k = 0; k < s.channels; ++k) {
-    std::vector<double> power(static_cast<std::size_t>(s.bins), 0);
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
-      for (int b = 0; b < s.bins; ++b) power[static_cast<std::size_t>(b)] += std::norm(s.at(i, b)[k]);
+  for (int k = 0; k < spectra.channels; ++k) {
+    std::vector<double> power(static_cast<std::size_t>(spectra.bins), 0);
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+      for (int b = 0; b < spectra.bins; ++b) power[static_cast<std::size_t>(b)] += std::norm(spectra.at(i, b)[k]);
     }
     const double variance = medianOf(power) / freedom / median_of_mean / window_power;
     result.noise_variance[static_cast<std::size_t>(k)] = std::max(variance, 1.0 / 6);
   }
   std::vector<float> scale;
   for (double v : result.noise_variance) scale.push_back(static_cast<float>(1 / std::sqrt(v * window_power)));
-  for (std::size_t i = 0; i < s.residual.size(); ++i) s.residual[i] *= scale[i % scale.size()];
-  for (std::size_t i = 0; i < s.average.size(); ++i) s.average[i] *= scale[i % scale.size()];
+  for (std::size_t i = 0; i < spectra.residual.size(); ++i) spectra.residual[i] *= scale[i % scale.size()];
+  for (std::size_t i = 0; i < spectra.average.size(); ++i) spectra.average[i] *= scale[i % scale.size()];
 }
 
-void ShotExaminer::readUnsteadiness(const Spectra& s, ShotStatistics& result) const {
-  const double values = static_cast<double>(s.shot.size()) * s.channels, freedom = values - s.channels;
-  // A radar that itself changes does so in all its echoes, which still are to be explained.
+void ShotExaminer::readUnsteadiness(const Spectra& spectra, ShotStatistics& result) const {
+  const double values = static_cast<double>(spectra.shot.size()) * spectra.channels,
+               freedom = values - spectra.channels;
+  // A changing radar changes all its echoes, which remain to be explained.
   if (freedom < 1 || result.unsteady_share > bounds::kLeastUnsteadyShare) return;
-  for (int b = 0; b < s.bins; ++b) {
+  for (int b = 0; b < spectra.bins; ++b) {
     double power = 0;
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
-      power += Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm();
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+      power += Eigen::Map<const Eigen::VectorXcf>(spectra.at(i, b), spectra.channels).squaredNorm();
     }
     const double beyond = power / freedom - 1;
     if (beyond < bounds::kLeastBinScatter_deviations / std::sqrt(freedom)) continue;
-    result.unsteadiness.resize(static_cast<std::size_t>(s.bins), 1.0);
+    result.unsteadiness.resize(static_cast<std::size_t>(spectra.bins), 1.0);
     result.unsteadiness[static_cast<std::size_t>(b)] += kAlike * beyond;
   }
 }
 
-void ShotExaminer::readEvidence(const Spectra& s, ShotStatistics& result) const {
-  result.evidence = Eigen::ArrayXXf::Zero(s.bins, kAngleBins);
-  const double freedom = static_cast<double>(s.shot.size()) - 1;
+void ShotExaminer::readEvidence(const Spectra& spectra, ShotStatistics& result) const {
+  result.evidence = Eigen::ArrayXXf::Zero(spectra.bins, kAngleBins);
+  const double freedom = static_cast<double>(spectra.shot.size()) - 1;
   if (freedom < 4) return;
-  Eigen::ArrayXXf ratio(s.bins, kAngleBins);
-  for (int b = 0; b < s.bins; ++b) {
-    Eigen::MatrixXcf c = Eigen::MatrixXcf::Zero(s.channels, s.channels);
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
-      const Eigen::Map<const Eigen::VectorXcf> e(s.at(i, b), s.channels);
+  Eigen::ArrayXXf ratio(spectra.bins, kAngleBins);
+  for (int b = 0; b < spectra.bins; ++b) {
+    Eigen::MatrixXcf c = Eigen::MatrixXcf::Zero(spectra.channels, spectra.channels);
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+      const Eigen::Map<const Eigen::VectorXcf> e(spectra.at(i, b), spectra.channels);
       c.noalias() += e * e.adjoint();
     }
     c /= static_cast<float>(freedom);
-    const Eigen::Map<const Eigen::VectorXcf> still(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
-    // Flicker of a standing echo (phase noise, gain) has the echo's channel vector and some permille of its power. That
-    // direction is left out where so little varies; a body that stands and breathes varies by more.
+    const Eigen::Map<const Eigen::VectorXcf> still(&spectra.average[static_cast<std::size_t>(b * spectra.channels)],
+                                                   spectra.channels);
+    // Flicker of a static echo (phase noise, gain) has the echo's channel vector and some permille of its power. That
+    // direction is left out where it varies by so little; a body that stands and breathes varies by more.
     const float standing = still.squaredNorm();
     Eigen::MatrixXcf beams = beams_;
     if (c.trace().real() < 0.01f * standing) {
@@ -465,17 +470,18 @@ void ShotExaminer::readEvidence(const Spectra& s, ShotStatistics& result) const 
     const Eigen::MatrixXcf varied = c * beams;
     for (int a = 0; a < kAngleBins; ++a) {
       const float size = beams.col(a).squaredNorm();
-      ratio(b, a) = size > 0.2f * static_cast<float>(s.channels) ? beams.col(a).dot(varied.col(a)).real() / size : 1.0f;
+      ratio(b, a) =
+          size > 0.2f * static_cast<float>(spectra.channels) ? beams.col(a).dot(varied.col(a)).real() / size : 1.0f;
     }
   }
-  // Skirts of strong echoes reach over many bins. A mover stands out of its surroundings in range, too.
+  // Skirts of strong echoes reach over many bins. A moving echo also exceeds its surroundings in range.
   std::vector<float> around;
   for (int a = 0; a < kAngleBins; ++a) {
-    for (int b = 0; b < s.bins; ++b) {
+    for (int b = 0; b < spectra.bins; ++b) {
       if (ratio(b, a) <= 1) continue;
       around.clear();
       for (int d = -kSkirtBins; d <= kSkirtBins; ++d) {
-        if (std::abs(d) > kPeakBins && b + d >= 0 && b + d < s.bins) around.push_back(ratio(b + d, a));
+        if (std::abs(d) > kPeakBins && b + d >= 0 && b + d < spectra.bins) around.push_back(ratio(b + d, a));
       }
       const double q = ratio(b, a) / std::max(1.0f, medianOf(around));
       if (q > 1) result.evidence(b, a) = static_cast<float>(freedom * (q - 1 - std::log(q)));
@@ -483,29 +489,30 @@ void ShotExaminer::readEvidence(const Spectra& s, ShotStatistics& result) const 
   }
 }
 
-void ShotExaminer::readEchoes(const Spectra& s, ShotStatistics& result) const {
-  // A bin holds M times the noise over all channels.
-  const auto least =
-      static_cast<float>(boost::math::gamma_q_inv(static_cast<double>(s.channels), bounds::kMovingBinFalseAlarmRate));
-  std::vector<float> power(static_cast<std::size_t>(s.bins));
+void ShotExaminer::readEchoes(const Spectra& spectra, ShotStatistics& result) const {
+  // A bin holds M times the noise, over all channels.
+  const auto least = static_cast<float>(
+      boost::math::gamma_q_inv(static_cast<double>(spectra.channels), bounds::kMovingBinFalseAlarmRate));
+  std::vector<float> power(static_cast<std::size_t>(spectra.bins));
   Eigen::VectorXf beam(kAngleBins);
-  for (std::size_t i = 0; i < s.shot.size(); ++i) {
+  for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
     std::vector<MovingEcho> echoes;
-    for (int b = 0; b < s.bins; ++b) {
-      power[static_cast<std::size_t>(b)] = Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels).squaredNorm();
+    for (int b = 0; b < spectra.bins; ++b) {
+      power[static_cast<std::size_t>(b)] =
+          Eigen::Map<const Eigen::VectorXcf>(spectra.at(i, b), spectra.channels).squaredNorm();
     }
-    for (int b = 1; b + 1 < s.bins; ++b) {
+    for (int b = 1; b + 1 < spectra.bins; ++b) {
       const float here = power[static_cast<std::size_t>(b)];
       const float left = power[static_cast<std::size_t>(b - 1)], right = power[static_cast<std::size_t>(b + 1)];
       if (here < least || here < left || here <= right) continue;
-      beam = (beams_.adjoint() * Eigen::Map<const Eigen::VectorXcf>(s.at(i, b), s.channels)).cwiseAbs2();
+      beam = (beams_.adjoint() * Eigen::Map<const Eigen::VectorXcf>(spectra.at(i, b), spectra.channels)).cwiseAbs2();
       int a = 0;
       const float peak = beam.maxCoeff(&a);
       MovingEcho echo;
-      echo.frame = s.shot[i] / s.per_frame;
+      echo.frame = spectra.shot[i] / spectra.per_frame;
       echo.range_m = (b + peakOffset(left, here, right)) * radar_.range_bin_m();
       echo.azimuth_rad = azimuth_rad(beam, a);
-      echo.snr = peak / s.channels;
+      echo.snr = peak / spectra.channels;
       echo.radial_m_per_s = std::numeric_limits<double>::quiet_NaN();
       echoes.push_back(echo);
     }
@@ -515,30 +522,31 @@ void ShotExaminer::readEchoes(const Spectra& s, ShotStatistics& result) const {
   }
 }
 
-void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& s, ShotStatistics& result) const {
+void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& spectra, ShotStatistics& result) const {
   result.turn_variance = std::numeric_limits<double>::infinity();
-  const double shots = static_cast<double>(s.shot.size());
-  if (stack.frames < 3 || s.shot.size() < 3) return;
+  const double shots = static_cast<double>(spectra.shot.size());
+  if (stack.frames < 3 || spectra.shot.size() < 3) return;
   std::vector<double> frame;
   double mean_frame = 0;
-  for (int shot : s.shot) frame.push_back(shot / stack.loops);
+  for (int shot : spectra.shot) frame.push_back(shot / stack.loops);
   for (double f : frame) mean_frame += f / shots;
   double spread = 0;
   for (double f : frame) spread += (f - mean_frame) * (f - mean_frame);
   if (!(spread > 0)) return;
-  // The turn is the mean slope of phases over every second bin (a Hann window ties neighbours together), weighed by
-  // each bin's own scatter: a bin in which something moves counts for little.
+  // The phase drift is the mean slope of phases over every second bin (a Hann window correlates neighbours), weighted
+  // by each bin's own scatter: a bin with motion has little weight.
   double weights = 0, weighted = 0, squares = 0, moments = 0;
-  for (int b = 0; b < s.bins; b += 2) {
-    const Eigen::Map<const Eigen::VectorXcf> still(&s.average[static_cast<std::size_t>(b * s.channels)], s.channels);
+  for (int b = 0; b < spectra.bins; b += 2) {
+    const Eigen::Map<const Eigen::VectorXcf> still(&spectra.average[static_cast<std::size_t>(b * spectra.channels)],
+                                                   spectra.channels);
     const double power = still.squaredNorm();
-    // The average carries noise of channels/shots.
-    if (power < 10 * s.channels / shots || power < 10) continue;
+    // The average has noise of channels/shots.
+    if (power < 10 * spectra.channels / shots || power < 10) continue;
     std::vector<double> phase;
     double mean = 0, slope = 0;
-    for (std::size_t i = 0; i < s.shot.size(); ++i) {
-      const Eigen::Map<const Eigen::VectorXcf> e(s.at(i, b), s.channels);
-      phase.push_back(std::arg(s.gain[i] + std::complex<double>(still.dot(e)) / power));
+    for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
+      const Eigen::Map<const Eigen::VectorXcf> e(spectra.at(i, b), spectra.channels);
+      phase.push_back(std::arg(spectra.gain[i] + std::complex<double>(still.dot(e)) / power));
       mean += phase.back() / shots;
     }
     for (std::size_t i = 0; i < phase.size(); ++i) slope += phase[i] * (frame[i] - mean_frame) / spread;
@@ -556,7 +564,7 @@ void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& s, ShotStati
   }
   if (result.turn_cells == 0) return;
   result.turn_rad_per_frame = weighted / weights;
-  // Cells that disagree beyond their scatter widen the error (Birge).
+  // Cells that disagree beyond their scatter increase the error (Birge).
   const double chi2 = moments - weighted * weighted / weights;
   const double ratio = result.turn_cells > 1 ? std::max(1.0, chi2 / (result.turn_cells - 1)) : 1.0;
   result.turn_variance = ratio / weights;
@@ -624,7 +632,7 @@ MovingCell ShotExaminer::movingCell(const DopplerFrame& frame, const DopplerCell
 std::optional<MovingEcho> ShotExaminer::dopplerEcho(const DopplerFrame& frame, const DopplerCell& peak) const {
   const int loops = frame.loops(), channels = radar_.channels(), b = peak.bin, d = peak.doppler;
   Eigen::VectorXcf v = frame.cell(b, d);
-  // Later slots see a mover further on its way.
+  // Later slots see a moving echo further on its way.
   for (int k = 0; k < channels; ++k) {
     const int slot = k / radar_.receivers();
     v[k] *= Complex(std::polar(1.0, -2 * M_PI * peak.turns * slot / (loops * radar_.slots())));

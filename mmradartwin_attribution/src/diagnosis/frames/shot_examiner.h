@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "diagnosis/frames/frame_examiner.h"
 #include "diagnosis/frames/frame_stack.h"
+#include "diagnosis/frames/moving_cell.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_dsp/range_angle.h"
 
@@ -17,39 +17,37 @@ struct MovingEcho {
   int frame = 0;
   double range_m = 0, azimuth_rad = 0;
   double snr = 0;             ///< ratio of power to noise after range and angle transforms
-  double radial_m_per_s = 0;  ///< away from the radar; NaN where a frame has too few loops to tell
+  double radial_m_per_s = 0;  ///< away from the radar; NaN where a frame has too few loops
 };
 
-/// Statistics of the shots of one pose beside their average.
+/// Statistics of the shots of one pose about their average.
 struct ShotStatistics {
   std::vector<double> noise_variance;  ///< [M] of one complex sample, counts^2
-  int shots = 0;                       ///< number of those that were used
-  /// Ratio [N] by range bin of the average's variance to that of noise alone; empty where shots differ by no more than
-  /// noise.
+  int shots = 0;                       ///< number of shots that were used
+  /// Variance of the average over that of noise alone, [N] by range bin; empty where shots differ by noise only.
   std::vector<double> unsteadiness;
-  /// Nats by which a cell [range][azimuth] varies more than noise does.
+  /// [range][azimuth] nats by which a cell varies more than noise.
   Eigen::ArrayXXf evidence;
   std::vector<MovingEcho> echoes;
   std::vector<MovingCell> cells;
-  /// Turn per frame that the cells agree on, beyond the turn that was taken out before, and its variance: infinite
-  /// where no cell stands out of the noise.
+  /// Phase per frame that the cells share, beyond the phase that was removed before, and its variance: infinite where
+  /// no cell exceeds the noise.
   double turn_rad_per_frame = 0, turn_variance = 0;
-  int turn_cells = 0;  ///< number of independent cells that it was read from
-  /// Level [frame] of the whole signal's amplitude against the average; 1 where the signal does not stand out of the
-  /// noise.
+  int turn_cells = 0;  ///< number of independent cells that give it
+  /// Level [frame] of the whole signal's amplitude over the average; 1 where the signal does not exceed the noise.
   std::vector<double> frame_level;
-  /// Share of the range bins with standing echoes that vary by more than a tenth of themselves beyond noise and beyond
-  /// the common gain: few where something moves, most where the radar itself changes.
+  /// Share of the range bins with static echoes that vary by more than a tenth beyond noise and the common gain: small
+  /// where something moves, near 1 where the radar itself changes.
   double unsteady_share = 0;
-  double unsteady_nats = 0;  ///< by which those bins vary more than noise does
+  double unsteady_nats = 0;  ///< by which those bins vary more than noise
 };
 
-/// Examiner of how shots differ, in range, angle and time.
+/// Examines how shots differ, in range, angle and time.
 class ShotExaminer {
  public:
   explicit ShotExaminer(const RadarConfig& radar);
   ShotStatistics examine(const FrameStack& stack, const std::vector<std::complex<float>>& average) const;
-  /// Turn from one frame to the next that standing echoes share, rad: the median over range bins whose phase follows
+  /// Phase from one frame to the next that static echoes share, rad: the median over range bins whose phase follows
   /// from the frame before. 0 where there is no such bin, and with fewer than 3 frames.
   double commonTurn(const FrameStack& stack) const;
   const RangeAngleAxes& axes() const { return chain_.axes(); }
@@ -69,9 +67,9 @@ class ShotExaminer {
   void readTurn(const FrameStack& stack, const Spectra& spectra, ShotStatistics& result) const;
   MovingCell movingCell(const DopplerFrame& frame, const DopplerCell& peak,
                         const std::vector<double>& noise_variance) const;
-  /// Echo of a peak; nothing where no direction holds most of its power, as of a sum of other echoes' sidelobes.
+  /// Echo of a peak. Nothing where no direction holds most of its power, as in a sum of other echoes' sidelobes.
   std::optional<MovingEcho> dopplerEcho(const DopplerFrame& frame, const DopplerCell& peak) const;
-  /// Azimuth of the strongest beam's peak, between beams.
+  /// Azimuth of the strongest beam's peak, interpolated between beams.
   double azimuth_rad(const Eigen::VectorXf& beam, int strongest) const;
   Eigen::VectorXcf steering(double azimuth_rad) const;
 

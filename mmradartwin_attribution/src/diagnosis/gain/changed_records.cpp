@@ -12,11 +12,12 @@
 namespace mmradartwin::diagnosis::gain {
 namespace {
 
-constexpr std::size_t kMostPerPose = 20, kMostPoses = 10;  ///< length of the list that a person reads
+constexpr std::size_t kMostPerPose = 20, kMostPoses = 10;  ///< limits of a list that a person reads
 /// Changes below these are not listed.
 constexpr double kSameLevel_db = 0.05, kSameRange_m = 5e-4, kSameAzimuth_deg = 0.02;
 
-/// Paths of one mechanism over the same facets and actors: their power, and range and azimuth summed by power.
+/// Paths of one mechanism over the same facets and actors: their power, and range and azimuth summed with power as
+/// weight.
 struct Bundle {
   double power = 0, range_m = 0, azimuth_rad = 0;
   void add(const PathRecord& path) {
@@ -85,7 +86,7 @@ std::vector<ChangedRecord> changedRecords(const Twin& twin, const ChannelData& d
   tbb::parallel_for(std::size_t{0}, shown.size(), [&](std::size_t i) {
     try {
       by_pose[i] = changedAt(without, with, *shown[i]);
-    } catch (const InputError&) {  // one of the twins has an actor where the radar stands
+    } catch (const InputError&) {  // one of the twins has an actor at the radar's position
     }
   });
   std::vector<ChangedRecord> all;

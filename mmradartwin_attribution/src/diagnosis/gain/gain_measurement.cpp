@@ -24,11 +24,11 @@ std::vector<PoseEchoes> GainMeasurement::heldOutEchoes(const std::vector<NamedPa
 }
 
 void GainMeasurement::ofFit(const ModelState& before, HypothesisFit& fit, Finding& finding) {
-  context_.fitter.settleFolds(before, fit);
+  context_.fitter.shortenFoldSteps(before, fit);
   measureHeldOutGain(context_.data, cellPowers(context_.data, context_.echoes.echoes(before.mechanisms)),
                      cellPowers(context_.data, heldOutEchoes(before.mechanisms, fit, {})), finding);
   std::vector<double> likelihood;
-  context_.likelihood.logLikelihood(heldOutEchoes(before.mechanisms, fit, fit.state.actor_range_m), fit.state.nuisance,
+  context_.likelihood.logLikelihood(heldOutEchoes(before.mechanisms, fit, fit.state.actor_range_m), fit.state.latents,
                                     &likelihood);
   context_.echoes.setBaseline(before.mechanisms);
   finding.gain->log_likelihood_per_pose = likelihoodGain(context_.data, before.by_pose, likelihood);

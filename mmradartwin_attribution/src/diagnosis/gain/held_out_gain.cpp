@@ -13,12 +13,12 @@ namespace mmradartwin::diagnosis::gain {
 namespace {
 
 constexpr double kLeastDrawnShare = 3e-4;  ///< weakest cell of a figure, as a share of the strongest cell's power
-constexpr double kShareBesidePlace =
-    0.05;                             ///< share of a change that may lie beyond either end of its place in the maps
-constexpr double kMinRange_m = 0.16;  ///< nearest cell that is evaluated
+/// Share of a change that may lie beyond either end of its place in the maps.
+constexpr double kShareBesidePlace = 0.05;
+constexpr double kMinRange_m = 0.16;          ///< nearest cell that is evaluated
 constexpr double kMaxAzimuth_rad = M_PI / 3;  ///< widest cell that is evaluated, to either side
 
-/// Numerator and denominator of the power that is not explained.
+/// Sums over cells of the unexplained and the measured power.
 struct PowerSums {
   double missed = 0, measured = 0;
 };
@@ -108,7 +108,7 @@ std::vector<PowerSums> sumsByLocation(const ChannelData& data, const std::vector
   return sums;
 }
 
-/// Explained power of locations counted `times` times each, once where that is null.
+/// Explained power with each location counted `times` times, once where that is null.
 double explained(const std::vector<PowerSums>& sums, const std::vector<int>* times) {
   double missed = 0, measured = 0;
   for (std::size_t l = 0; l < sums.size(); ++l) {
@@ -142,8 +142,8 @@ GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPow
 
 namespace {
 
-/// Simulated over measured power by cell [N][64], both summed over all poses. NaN where neither has an echo to speak
-/// of.
+/// Simulated over measured power in dB by cell [N][64], both summed over all poses. NaN where neither has a visible
+/// echo.
 RealGrid differences_db(const RangeAngleAxes& axes, const std::vector<CellPowers>& poses) {
   std::vector<double> measured(poses.front().measured.size(), 0.0), expected(measured);
   const double gain = std::pow(amplitudeGain(poses), 2);
@@ -171,8 +171,8 @@ RealGrid differences_db(const RangeAngleAxes& axes, const std::vector<CellPowers
   return grid;
 }
 
-/// Interval of an axis that holds all of a weight but kShareBesidePlace at either end. weights: pairs of place on the
-/// axis and weight, in any order.
+/// Interval of an axis that holds all of a weight except kShareBesidePlace at either end. weights: pairs of position on
+/// the axis and weight, in any order.
 std::array<double, 2> middle(std::vector<std::pair<double, double>> weights) {
   std::sort(weights.begin(), weights.end());
   double all = 0, below = 0;

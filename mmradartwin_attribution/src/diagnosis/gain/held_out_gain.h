@@ -12,7 +12,7 @@
 namespace mmradartwin::diagnosis::gain {
 
 /// Linear power in the evaluated cells of one pose's map: beyond 0.16 m and within 60 deg of the boresight. Range is
-/// the outer index, azimuth the inner one. Both lists are as long.
+/// the outer index, azimuth the inner one. Both lists have the same length.
 struct CellPowers {
   std::vector<double> measured;  ///< |S|^2 of the pose's average
   std::vector<double> expected;  ///< its expectation under a twin, before the session's gain
@@ -28,8 +28,8 @@ double explainedPower(const std::vector<CellPowers>& poses);
 GainMetric explainedPowerGain(const ChannelData& data, const std::vector<CellPowers>& before,
                               const std::vector<CellPowers>& after);
 
-/// Fills a finding's explained power before and after, the maps of its figure, and the cells that carry it where its
-/// one place has none yet. The gain is held out if `after` was expected by fits that did not see the pose.
+/// Fills a finding's explained power before and after, the maps of its figure and, where its only place has none, the
+/// cells that carry it. The gain is held out if `after` was expected by fits that did not see the pose.
 void measureHeldOutGain(const ChannelData& data, const std::vector<CellPowers>& before,
                         const std::vector<CellPowers>& after, Finding& finding);
 

@@ -9,13 +9,13 @@
 
 namespace mmradartwin::diagnosis::hypotheses {
 
-/// Values and 95 % intervals of the parameters that a cause is described by. scaled: of the hypothesis' coordinates;
-/// standard_error: of their values, from the scatter over that many locations (Student's t).
+/// Values and 95 % intervals of the parameters that describe a cause. scaled_values: [coordinates]. standard_error:
+/// [coordinates] of the values in their units, from the scatter over that many locations (Student's t).
 std::vector<FindingParameter> fittedParameters(const Hypothesis& hypothesis, const std::vector<double>& scaled_values,
                                                const std::vector<double>& standard_error, const std::string& cause,
                                                std::size_t locations);
 
-/// Nats by which the values lie off those that do nothing, by the errors that their intervals have, taken as
+/// Nats by which the values differ from those that do nothing. The errors are those of the intervals, taken as
 /// independent.
 double natsFromNothing(const Hypothesis& hypothesis, const std::vector<double>& scaled_values,
                        const std::vector<double>& standard_error);

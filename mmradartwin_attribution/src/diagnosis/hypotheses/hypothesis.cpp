@@ -14,16 +14,16 @@
 namespace mmradartwin::diagnosis::hypotheses {
 namespace {
 
-// Pairs of actors are tried as a corner where their bounds come this near.
+// Two actors are tried as a corner where their bounding boxes come this near.
 constexpr double kNear_m = 0.1;
-// A face has to be this large to mirror a room.
+// Least area of a face that mirrors a room.
 constexpr double kMirrorArea_m2 = 0.5;
 
-bool hasTried(const std::vector<ParameterSpec>& specs) {
+bool hasFittedNumber(const std::vector<ParameterSpec>& specs) {
   return std::any_of(specs.begin(), specs.end(), [](const ParameterSpec& s) { return !std::isnan(s.neutral); });
 }
 
-/// Mechanisms without a number that are there or not, about something in the scene.
+/// True for mechanisms about something in the scene that are present or absent and have no number.
 bool isPresence(const std::vector<ParameterSpec>& specs) {
   return std::any_of(specs.begin(), specs.end(), [](const ParameterSpec& s) {
     return (s.kind == ParameterKind::kText && s.required && s.name == "actor") ||
@@ -31,7 +31,8 @@ bool isPresence(const std::vector<ParameterSpec>& specs) {
   });
 }
 
-/// False of what lies: floors, ceilings, table tops reflect and scatter nothing (docs/contracts.md section 4).
+/// False for horizontal facets: floors, ceilings and table tops neither reflect nor scatter (docs/contracts.md, section
+/// 4).
 bool takesPart(const Scene& scene, const Actor& actor) {
   return std::any_of(actor.facets.begin(), actor.facets.end(), [&](int id) {
     const Facet& f = scene.facets[static_cast<std::size_t>(id)];
@@ -65,7 +66,7 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
   if (material) {
     std::set<std::string> tags;
     for (const Actor& a : scene.actors) {
-      // Where a material scatters already there is nothing to find missing.
+      // A material that scatters already lacks no scattering.
       const bool scatters = a.material.scattering_coefficient > 0 && spec("scattering_coefficient") != specs.end();
       if (a.present && !scatters) tags.insert(a.material_tag);
     }
@@ -87,7 +88,7 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
     for (std::size_t i = 0; i < scene.actors.size(); ++i) {
       const Actor& a = scene.actors[i];
       if (!a.present || mirrorArea_m2(scene, a) == 0) continue;
-      with("actors", std::vector<std::string>{a.name}, a.name);  // an alcove's own
+      with("actors", std::vector<std::string>{a.name}, a.name);  // an alcove within one actor
       for (std::size_t j = i + 1; j < scene.actors.size(); ++j) {
         const Actor& b = scene.actors[j];
         if (!b.present || a.bounds.exteriorDistance(b.bounds) > kNear_m || mirrorArea_m2(scene, b) == 0) continue;
@@ -98,30 +99,31 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
   if (!material && !actor && spec("walls") == specs.end() && spec("actors") == specs.end()) out.push_back(bare);
 }
 
-/// The same about the values that the twin states; nothing where zero of the scale would not be these.
-std::optional<Hypothesis> aboutStated(Hypothesis h, const NamedParameters& stated) {
-  h.stated = true;
+/// The hypothesis with the values that the twin states as neutral ones. Nothing where scale 0 would give other values.
+std::optional<Hypothesis> aboutStated(Hypothesis hypothesis, const NamedParameters& stated) {
+  hypothesis.stated = true;
   std::map<std::string, std::size_t> lengths;
-  for (const Coordinate& c : h.coordinates) {
+  for (const Coordinate& c : hypothesis.coordinates) {
     if (c.logarithmic() || c.reciprocal()) return std::nullopt;
-    if (c.element >= 0) lengths[c.parameter] = h.mechanism.values.numbers(c.parameter).size();
+    if (c.element >= 0) lengths[c.parameter] = hypothesis.mechanism.values.numbers(c.parameter).size();
   }
-  if (h.coordinates.empty()) return std::nullopt;
-  h.mechanism = stated;
+  if (hypothesis.coordinates.empty()) return std::nullopt;
+  hypothesis.mechanism = stated;
   for (const auto& [parameter, length] : lengths) {
     std::vector<double> list = stated.values.numbers(parameter);
-    if (!h.variant.empty() && list.size() != length) return std::nullopt;  // steps at other times
+    if (!hypothesis.variant.empty() && list.size() != length) return std::nullopt;  // the steps are at other times
     list.resize(length, 0.0);
-    h.mechanism.values.set(parameter, std::move(list));
+    hypothesis.mechanism.values.set(parameter, std::move(list));
   }
-  for (Coordinate& c : h.coordinates) {
-    const double value = c.element < 0 ? stated.values.number(c.parameter)
-                                       : h.mechanism.values.numbers(c.parameter)[static_cast<std::size_t>(c.element)];
+  for (Coordinate& c : hypothesis.coordinates) {
+    const double value = c.element < 0
+                             ? stated.values.number(c.parameter)
+                             : hypothesis.mechanism.values.numbers(c.parameter)[static_cast<std::size_t>(c.element)];
     const double step = c.typical - c.neutral;
     c.neutral = value;
     c.typical = value + step > c.max || value + step < c.min ? value - step : value + step;
   }
-  return h;
+  return hypothesis;
 }
 
 bool isSame(const NamedParameters& a, const NamedParameters& b) {
@@ -149,22 +151,22 @@ double Coordinate::slope(double scaled_values) const {
 }
 
 NamedParameters Hypothesis::at(const std::vector<double>& scaled_values) const {
-  NamedParameters m = mechanism;
+  NamedParameters fitted = mechanism;
   for (std::size_t i = 0; i < coordinates.size(); ++i) {
-    const Coordinate& c = coordinates[i];
-    if (!c.shape.empty()) {
-      std::vector<double> list = m.values.numbers(c.parameter);
-      for (std::size_t k = 0; k < list.size(); ++k) list[k] += c.value(scaled_values[i]) * c.shape[k];
-      m.values.set(c.parameter, std::move(list));
-    } else if (c.element < 0) {
-      m.values.set(c.parameter, c.value(scaled_values[i]));
+    const Coordinate& coordinate = coordinates[i];
+    if (!coordinate.shape.empty()) {
+      std::vector<double> list = fitted.values.numbers(coordinate.parameter);
+      for (std::size_t k = 0; k < list.size(); ++k) list[k] += coordinate.value(scaled_values[i]) * coordinate.shape[k];
+      fitted.values.set(coordinate.parameter, std::move(list));
+    } else if (coordinate.element < 0) {
+      fitted.values.set(coordinate.parameter, coordinate.value(scaled_values[i]));
     } else {
-      std::vector<double> list = m.values.numbers(c.parameter);
-      list[static_cast<std::size_t>(c.element)] = c.value(scaled_values[i]);
-      m.values.set(c.parameter, std::move(list));
+      std::vector<double> list = fitted.values.numbers(coordinate.parameter);
+      list[static_cast<std::size_t>(coordinate.element)] = coordinate.value(scaled_values[i]);
+      fitted.values.set(coordinate.parameter, std::move(list));
     }
   }
-  return m;
+  return fitted;
 }
 
 std::string Hypothesis::label() const {
@@ -205,16 +207,18 @@ std::vector<NamedParameters> mechanismsWith(std::vector<NamedParameters> base, c
   return base;
 }
 
-std::optional<Hypothesis> withSteps(Hypothesis h, int steps) {
-  const std::vector<ParameterSpec> specs = MechanismRegistry::instance().create(h.mechanism.mechanism)->parameters();
+std::optional<Hypothesis> withSteps(Hypothesis hypothesis, int steps) {
+  const std::vector<ParameterSpec> specs =
+      MechanismRegistry::instance().create(hypothesis.mechanism.mechanism)->parameters();
   const auto spec =
       std::find_if(specs.begin(), specs.end(), [](const ParameterSpec& s) { return s.name == "steps_db"; });
   if (spec == specs.end()) return std::nullopt;
-  h.coordinates.clear();
-  h.mechanism.values.set(spec->name, std::vector<double>(static_cast<std::size_t>(steps), 0.0));
-  for (int k = 0; k < steps; ++k) h.coordinates.push_back({spec->name, spec->unit, k, 0, 1, spec->min, spec->max, {}});
-  h.variant = std::to_string(steps) + (steps > 1 ? " steps" : " step");
-  return h;
+  hypothesis.coordinates.clear();
+  hypothesis.mechanism.values.set(spec->name, std::vector<double>(static_cast<std::size_t>(steps), 0.0));
+  for (int k = 0; k < steps; ++k)
+    hypothesis.coordinates.push_back({spec->name, spec->unit, k, 0, 1, spec->min, spec->max, {}});
+  hypothesis.variant = std::to_string(steps) + (steps > 1 ? " steps" : " step");
+  return hypothesis;
 }
 
 std::vector<Hypothesis> allHypotheses(const Twin& twin, const std::vector<NamedParameters>& present) {
@@ -223,20 +227,20 @@ std::vector<Hypothesis> allHypotheses(const Twin& twin, const std::vector<NamedP
   const std::size_t channels = static_cast<std::size_t>(twin.radar().channels());
   for (const std::string& name : registry.names()) {
     const std::vector<ParameterSpec> specs = registry.create(name)->parameters();
-    if (!hasTried(specs) && !isPresence(specs)) continue;
+    if (!hasFittedNumber(specs) && !isPresence(specs)) continue;
     Hypothesis bare;
     bare.mechanism = defaultMechanism(name);
     for (const ParameterSpec& s : specs) {
       if (std::isnan(s.neutral)) continue;
-      Coordinate c{s.name, s.unit, -1, s.neutral, s.typical, s.min, s.max, {}};
+      Coordinate coordinate{s.name, s.unit, -1, s.neutral, s.typical, s.min, s.max, {}};
       if (s.kind == ParameterKind::kNumber) {
         bare.mechanism.values.set(s.name, s.neutral);
-        bare.coordinates.push_back(c);
-      } else if (s.kind == ParameterKind::kNumbers) {  // per channel, the first one being the reference
+        bare.coordinates.push_back(coordinate);
+      } else if (s.kind == ParameterKind::kNumbers) {  // per channel; the first one is the reference
         bare.mechanism.values.set(s.name, std::vector<double>(channels, s.neutral));
         for (std::size_t k = 1; k < channels; ++k) {
-          c.element = static_cast<int>(k);
-          bare.coordinates.push_back(c);
+          coordinate.element = static_cast<int>(k);
+          bare.coordinates.push_back(coordinate);
         }
       }
     }
@@ -245,22 +249,23 @@ std::vector<Hypothesis> allHypotheses(const Twin& twin, const std::vector<NamedP
     for (int steps = 1; steps <= kMostSteps; ++steps) {
       if (std::optional<Hypothesis> stepped = withSteps(bare, steps)) all.push_back(std::move(*stepped));
     }
-    for (Hypothesis& h : all) {
-      const auto there = std::find_if(present.begin(), present.end(),
-                                      [&](const NamedParameters& m) { return excludeEachOther(m, h.mechanism); });
+    for (Hypothesis& hypothesis : all) {
+      const auto there = std::find_if(present.begin(), present.end(), [&](const NamedParameters& m) {
+        return excludeEachOther(m, hypothesis.mechanism);
+      });
       if (there != present.end()) {
         const std::vector<NamedParameters>& given = twin.description().mechanisms;
         const bool is_stated =
             std::any_of(given.begin(), given.end(), [&](const NamedParameters& m) { return isSame(m, *there); });
-        std::optional<Hypothesis> other = is_stated ? aboutStated(std::move(h), *there) : std::nullopt;
+        std::optional<Hypothesis> other = is_stated ? aboutStated(std::move(hypothesis), *there) : std::nullopt;
         if (!other) continue;
-        h = std::move(*other);
+        hypothesis = std::move(*other);
       }
-      try {  // what the scene or the radar does not allow is no hypothesis
-        const Twin with = twin.changed({h.at(std::vector<double>(h.coordinates.size(), 1.0))});
-        // Of what is there or not a note says that it is not.
-        if (h.coordinates.empty() && !with.notes().empty()) continue;
-        result.push_back(std::move(h));
+      try {  // a mechanism that the scene or the radar does not allow is no hypothesis
+        const Twin with = twin.changed({hypothesis.at(std::vector<double>(hypothesis.coordinates.size(), 1.0))});
+        // A mechanism without numbers that notes a problem has no effect.
+        if (hypothesis.coordinates.empty() && !with.notes().empty()) continue;
+        result.push_back(std::move(hypothesis));
       } catch (const InputError&) {
       }
     }

@@ -11,7 +11,7 @@ namespace mmradartwin::diagnosis::hypotheses {
 namespace {
 
 constexpr const char* kObservables[] = {"gain_db", "delay_m", "angle_deg", "phase_deg"};
-constexpr std::size_t kMostInWords = 12;  ///< points of a law; of more, the extremes
+constexpr std::size_t kMostInWords = 12;  ///< points of a law that are all written; of more, only the extremes
 
 }  // namespace
 

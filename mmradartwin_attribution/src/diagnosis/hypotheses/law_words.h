@@ -9,11 +9,11 @@
 
 namespace mmradartwin::diagnosis::hypotheses {
 
-/// A fitted law in words and numbers; for a mechanism outside the catalogue its name and values.
+/// A fitted law in words and numbers. A mechanism outside the catalogue is given by its name and values.
 std::string describeLaw(const Hypothesis& hypothesis, const NamedParameters& fitted);
-/// " of channels 4 5", "" for an empirical_law of all of them.
+/// Channels of an empirical_law in words, such as " of channels 4 5"; "" where it has all of them.
 std::string channelsInWords(const NamedParameters& law);
-/// What to measure so that these candidates can be told apart.
+/// Measurement that would distinguish these candidates, as a sentence.
 std::string experimentFor(const std::vector<CauseProbability>& candidates);
 
 }  // namespace mmradartwin::diagnosis::hypotheses

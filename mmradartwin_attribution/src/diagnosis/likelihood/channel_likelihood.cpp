@@ -11,30 +11,29 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr double kTailFreedom = 4;  ///< degrees of freedom of the complex t distribution
-
-/// Share of a beam's power that keeps its covariance definite in single precision: neighbouring bins of a Hann window
-/// are almost the same.
+/// Share of a beam's power that keeps its covariance positive definite in single precision: neighbouring bins of a Hann
+/// window are almost equal.
 constexpr double kBeamShare = 3e-6;
 
-/// Change of a cell's covariance, as a share, below which a group of echoes gives the cell no slope, and the range
-/// error that the change is judged at.
+/// Relative change of a cell's covariance below which a group of echoes has no slope in the cell, and the range error
+/// for which the change is evaluated.
 constexpr double kNegligibleShare = 3e-4, kMoved_m = 0.03;
 
-constexpr double kLeastStep_nats = 0.1;  ///< promised gain below which fit() ends
+constexpr double kLeastStep_nats = 0.1;  ///< expected gain below which fit() ends
 
-/// Places of the globals in scores; kShape and kActors are the first of several.
+/// Indices of the globals in scores; kShape and kActors are the first of several.
 enum Global {
   kGain,
   kFloor,
   kRelative,
-  kGraze,
+  kPoseSensitive,
   kRange,
+  kSpread,
   kShape,
   kActors = kShape + std::tuple_size_v<decltype(SessionLatents::floor_shape)>
 };
 
-/// Values that a global may have, and how far it may go in one step.
+/// Limits of a global, and the largest change in one step.
 struct Limits {
   double low, high, step;
 };
@@ -48,19 +47,15 @@ Limits limitsOf(int global, int errors, const LatentSpread& spread) {
   switch (global) {
     case kRelative:  // below -11.5 single precision would not keep every matrix definite
       return {-11.5, -2, 2};
-    case kGraze:
+    case kPoseSensitive:
       return {-6, 6, 2};
     case kRange:
       return {-6, 4, 2};
+    case kSpread:  // 0.05 to 4.3 dB
+      return {-9, 0, 1};
     default:
       return {-kAny, kAny, 2};
   }
-}
-
-/// Change of the sine of a group's mean direction in a bin by an error of the heading.
-double turnOf(double yaw_rad, const EchoGroup::Cell& cell) {
-  if (yaw_rad == 0 || cell.cosine == 0 || !(cell.power[0].real() > 0)) return 0;
-  return yaw_rad * cell.cosine / cell.power[0].real();
 }
 
 /// Phases 2 pi y_k / lambda of the virtual elements.
@@ -78,7 +73,7 @@ double groupGain(const EchoGroup& group, const SessionLatents& latents) {
   return std::exp(sum);
 }
 
-/// One-way range that a group's actors add beyond what its fields hold already.
+/// One-way range that a group's actors add beyond the range of its fields.
 double groupShift_m(const EchoGroup& group, const SessionLatents& latents) {
   double sum = -group.added_range_m;
   for (int a : group.actors) sum += latents.actor_range_m[errorOf(a, latents.actor_range_m.size())];
@@ -93,7 +88,7 @@ double& SessionLatents::global(int j) {
   if (j >= ranges) return actor_range_m[at(ranges)];
   if (j >= kActors) return actor_gain[at(kActors)];
   if (j >= kShape) return floor_shape[at(kShape)];
-  double* const first[] = {&log_gain, &log_floor, &log_relative, &log_graze, &log_range};
+  double* const first[] = {&log_gain, &log_floor, &log_relative, &log_pose_sensitive, &log_range, &log_spread};
   return *first[j];
 }
 
@@ -110,15 +105,15 @@ ChannelLikelihood::ChannelLikelihood(const ChannelData& data, int actors, const 
 
 void ChannelLikelihood::addClutter(const SessionLatents& latents, int pose, int cell, double factor,
                                    PackedHermitian& to) const {
-  const PoseChannels& p = data_.poses[pose];
+  const PoseChannels& channels = data_.poses[pose];
   const int bin = binOf(pose, cell);
   const auto [at, share] = shapeAt(bin);
   const auto* shape = &latents.floor_shape[static_cast<std::size_t>(at)];
   const double level = factor * std::exp(latents.log_floor + (1 - share) * shape[0] + share * shape[1]);
   if (isBeam(cell)) {
-    addApart(cell, level * p.beams[static_cast<std::size_t>(cell - samples_)].clutter, to);
+    addApart(cell, level * channels.beams[static_cast<std::size_t>(cell - samples_)].clutter, to);
   } else {
-    to.add(p.clutter.at(bin, size_), level);
+    to.add(channels.clutter.at(bin, size_), level);
   }
 }
 
@@ -169,14 +164,15 @@ void ChannelLikelihood::addRelative(const SessionLatents& latents, int cell, Pac
 
 ChannelLikelihood::PoseModel ChannelLikelihood::modelOf(const PoseEchoes& echoes, const SessionLatents& latents,
                                                         int pose) const {
-  PoseModel model{echoes, latents, pose, {}};
+  PoseModel model{echoes, latents, pose, {}, {}, {}};
   const double gain = std::exp(latents.log_gain);
-  const double grazing = std::exp(latents.log_graze);
+  const double pose_sensitive = std::exp(latents.log_pose_sensitive);
   for (std::size_t i = 0; i < echoes.all(); ++i) {
     const EchoGroup& group = echoes.at(i);
-    model.levels.push_back(
-        {gain * groupGain(group, latents) * (echoes.grazes(i) ? grazing : 1), groupShift_m(group, latents)});
+    model.levels.push_back({gain * groupGain(group, latents) * (echoes.isPoseSensitive(i) ? pose_sensitive : 1),
+                            groupShift_m(group, latents)});
   }
+  findStrongest(model);
   return model;
 }
 
@@ -186,7 +182,7 @@ double ChannelLikelihood::rangeVariance_m2(const SessionLatents& latents) const 
 
 PackedHermitian ChannelLikelihood::sigma(const PoseModel& model, int cell) const {
   const SessionLatents& latents = model.latents;
-  PackedHermitian s(channels_);
+  PackedHermitian covariance(channels_);
   PackedTurn turn;
   const double range_variance = rangeVariance_m2(latents);
   for (std::size_t i = 0; i < model.echoes.all(); ++i) {
@@ -194,14 +190,14 @@ PackedHermitian ChannelLikelihood::sigma(const PoseModel& model, int cell) const
     if (!fields) continue;
     const auto [u, shift] = model.levels[i];
     turn.set(apart_, turnOf(latents.yaw_rad[model.pose], *fields));
-    s.addTurned({fields->power, fields->shift, fields->curvature}, {u, u * shift, u * (shift * shift + range_variance)},
-                turn);
+    covariance.addTurned({fields->power, fields->shift, fields->curvature},
+                         {u, u * shift, u * (shift * shift + range_variance)}, turn);
   }
-  // The channels' independent share keeps the matrix definite where the first-order terms alone would not.
-  if (s.trace() > 0) addRelative(latents, cell, s);
-  addApart(cell, noiseOf(model.pose, cell), s);
-  addClutter(latents, model.pose, cell, 1, s);
-  return s;
+  // The independent share of channels keeps the matrix definite where the first-order terms alone would not.
+  if (covariance.trace() > 0) addRelative(latents, cell, covariance);
+  addApart(cell, noiseOf(model.pose, cell), covariance);
+  addClutter(latents, model.pose, cell, 1, covariance);
+  return covariance;
 }
 
 std::optional<EchoGroup::Cell> ChannelLikelihood::fieldsOf(const EchoGroup& group, int cell) const {
@@ -224,9 +220,7 @@ double ChannelLikelihood::poseLikelihood(const PoseEchoes& echoes, const Session
   for (int cell = firstBin(); cell < cells(pose); ++cell) {
     if (!factor.compute(sigma(model, cell))) return -1e9;
     factor.apply(dataOf(pose, cell), y.data());
-    double q = 0;
-    for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
-    sum += -factor.logDeterminant() - (channels_ + kTailFreedom) * std::log1p(q / kTailFreedom);
+    sum += CellLikelihood(factor, y.data(), strongestEcho(model, cell)).logLikelihood();
   }
   return weight() * sum;
 }
@@ -279,13 +273,13 @@ SessionCovariance ChannelLikelihood::covariance(const std::vector<PoseEchoes>& e
   return result;
 }
 
-/// Changes of one cell's covariance by the globals and the heading. Only directions that act in the cell enter its
-/// products. The memory is kept from cell to cell.
+/// Changes of one cell's covariance along the globals and the heading. Only directions that act in the cell enter its
+/// products. The memory is reused from cell to cell.
 struct ChannelLikelihood::CellDirections {
   CellDirections(int count, int channels)
       : acts(static_cast<std::size_t>(count)),
         raw(static_cast<std::size_t>(count), PackedHermitian(channels)),
-        whitened(channels * channels, count),
+        whitened(channels * channels + 1, count),
         products(static_cast<std::size_t>(count * count)) {}
   void clear() {
     for (int j : active) acts[j] = 0;
@@ -303,8 +297,8 @@ struct ChannelLikelihood::CellDirections {
   std::vector<int> active;
   std::vector<char> acts;
   std::vector<PackedHermitian> raw;
-  Eigen::MatrixXd whitened;      ///< [M^2][count] the active directions, in the first columns
-  std::vector<double> products;  ///< of the active directions in pairs
+  Eigen::MatrixXd whitened;      ///< [M^2 + 1][count] the active directions, in the first columns
+  std::vector<double> products;  ///< of pairs of the active directions
 };
 
 void ChannelLikelihood::addEchoDirections(const PoseModel& model, int cell, const PackedHermitian& inverse,
@@ -315,8 +309,8 @@ void ChannelLikelihood::addEchoDirections(const PoseModel& model, int cell, cons
   PackedTurn turn;
   PackedHermitian own(channels_);  // covariance of one group
   for (std::size_t i = 0; i < model.echoes.all(); ++i) {
-    const EchoGroup& g = model.echoes.at(i);
-    const auto fields = fieldsOf(g, cell);
+    const EchoGroup& group = model.echoes.at(i);
+    const auto fields = fieldsOf(group, cell);
     if (!fields) continue;
     const std::complex<float>*power = fields->power, *shift = fields->shift, *curvature = fields->curvature;
     const auto [f, moved] = model.levels[i];
@@ -325,17 +319,17 @@ void ChannelLikelihood::addEchoDirections(const PoseModel& model, int cell, cons
     turn.set(apart_, turnOf(latents.yaw_rad[model.pose], *fields));
     own.setZero();
     own.addTurned({power, shift, curvature}, {f, f * moved, f * (moved * moved + range_variance)}, turn);
-    for (int actor : g.actors) {
+    for (int actor : group.actors) {
       const int a = static_cast<int>(errorOf(actor, static_cast<std::size_t>(errors_)));
       to.touch(kActors + a).add(own, 1);
       to.touch(kActors + errors_ + a).addTurned({nullptr, shift, curvature}, {0, f, 2 * f * moved}, turn);
     }
-    if (model.echoes.grazes(i)) to.touch(kGraze).add(own, 1);
+    if (model.echoes.isPoseSensitive(i)) to.touch(kPoseSensitive).add(own, 1);
     to.touch(kRange).addTurned({curvature, nullptr, nullptr}, {f * range_variance, 0, 0}, turn);
     const double by_yaw = turnOf(1, *fields);
     if (by_yaw != 0) to.touch(heading).addTurnDerivative(own, by_yaw, apart_);
   }
-  for (int j : to.active) {  // a heading's trace is 0
+  for (int j : to.active) {  // the trace of a heading is 0
     if (j != heading) addRelative(latents, cell, to.raw[j]);
   }
 }
@@ -358,11 +352,11 @@ void ChannelLikelihood::addLevelDirections(const PoseModel& model, int cell, con
 }
 
 void ChannelLikelihood::addProducts(CellDirections& directions, BinBasis& basis, PoseBasis& out) const {
-  const int numbers = channels_ * channels_, count = static_cast<int>(directions.active.size());
+  const int numbers = channels_ * channels_ + 1, count = static_cast<int>(directions.active.size());
   const std::vector<int>& active = directions.active;
   Eigen::MatrixXd& whitened = directions.whitened;
   std::vector<double>& products = directions.products;
-  for (int a = 0; a < count; ++a) basis.factor.whiten(directions.raw[active[a]], whitened.col(a).data());
+  for (int a = 0; a < count; ++a) whiten(basis, directions.raw[active[a]], whitened.col(a).data());
   const Eigen::VectorXd score = whitened.leftCols(count).transpose() * basis.data;
   pairProducts(whitened.data(), numbers, count, products.data());
   basis.traces.resize(count);
@@ -372,24 +366,18 @@ void ChannelLikelihood::addProducts(CellDirections& directions, BinBasis& basis,
     out.score[active[a]] += weight() * score[ia];
     for (std::size_t b = 0; b <= a; ++b) {
       const Eigen::Index ib = static_cast<Eigen::Index>(b);
-      const double v = weight() * informationOf(products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
+      const double v =
+          weight() * tInformation(channels_, products[a * active.size() + b], basis.traces[ia], basis.traces[ib]);
       out.information(active[a], active[b]) += v;
       if (a != b) out.information(active[b], active[a]) += v;
     }
   }
 }
 
-void ChannelLikelihood::setData(const std::complex<double>* y, double w, BinBasis& basis) const {
-  basis.data.resize(channels_ * channels_);
-  int i = 0;
-  for (int k = 0; k < channels_; ++k) {
-    basis.data[i++] = w * std::norm(y[k]) - 1;
-    for (int l = 0; l < k; ++l) {
-      const std::complex<double> v = w * y[k] * std::conj(y[l]);
-      basis.data[i++] = M_SQRT2 * v.real();
-      basis.data[i++] = M_SQRT2 * v.imag();
-    }
-  }
+void ChannelLikelihood::whiten(const BinBasis& basis, const PackedHermitian& change, double* to) const {
+  basis.factor.whiten(change, to);
+  const Eigen::Index numbers = basis.level.size();
+  to[numbers] = basis.level.dot(Eigen::Map<const Eigen::VectorXd>(to, numbers));
 }
 
 void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents& latents, int pose, bool keep,
@@ -398,6 +386,7 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
   out.score = Eigen::VectorXd::Zero(globals + 1);
   out.information = Eigen::MatrixXd::Zero(globals + 1, globals + 1);
   out.log_likelihood = 0;
+  out.astray = Eigen::VectorXd::Zero(errors_);
   out.bins.clear();
   const PoseModel model = modelOf(echoes, latents, pose);
   CellDirections directions(globals + 1, channels_);
@@ -409,26 +398,30 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
     basis.cell = cell;
     if (!basis.factor.compute(covariance)) continue;
     basis.factor.apply(dataOf(pose, cell), y.data());
-    double q = 0;
-    for (int k = 0; k < channels_; ++k) q += std::norm(y[static_cast<std::size_t>(k)]);
-    const double w = (channels_ + kTailFreedom) / (kTailFreedom + q);
-    out.log_likelihood += -basis.factor.logDeterminant() - (channels_ + kTailFreedom) * std::log1p(q / kTailFreedom);
+    const CellLikelihood likelihood(basis.factor, y.data(), strongestEcho(model, cell));
+    out.log_likelihood += likelihood.logLikelihood();
+    if (const int group = model.strongest[static_cast<std::size_t>(cell)]; group >= 0) {
+      for (int actor : model.echoes.at(static_cast<std::size_t>(group)).actors) {
+        out.astray[static_cast<Eigen::Index>(errorOf(actor, static_cast<std::size_t>(errors_)))] +=
+            weight() * likelihood.astray();
+      }
+    }
+    out.score[kSpread] += weight() * likelihood.spreadScore();
+    out.information(kSpread, kSpread) += weight() * likelihood.spreadInformation();
     addEchoDirections(model, cell, basis.factor.inverse(), directions);
     addLevelDirections(model, cell, covariance, directions);
     basis.active = directions.active;
-    setData(y.data(), w, basis);
+    const int numbers = channels_ * channels_;
+    basis.data.setZero(numbers + 1);
+    basis.level.resize(numbers);
+    likelihood.score(basis.data.data());
+    likelihood.level(basis.level.data());
     addProducts(directions, basis, out);
     if (!keep) continue;
     basis.whitened = directions.whitened.leftCols(static_cast<Eigen::Index>(basis.active.size())).cast<float>();
     out.bins.push_back(std::move(basis));
   }
   out.log_likelihood *= weight();
-}
-
-/// Fisher information of the complex t distribution about its covariance (Lange, Little and Taylor 1989, in complex
-/// form).
-double ChannelLikelihood::informationOf(double product, double trace_a, double trace_b) const {
-  return ((channels_ + kTailFreedom) * product - trace_a * trace_b) / (channels_ + kTailFreedom + 1);
 }
 
 Basis ChannelLikelihood::basis(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents,
@@ -441,7 +434,7 @@ Basis ChannelLikelihood::basis(const std::vector<PoseEchoes>& echoes, const Sess
   return b;
 }
 
-/// Score and information of one pose by globals, further directions and, last, its heading.
+/// Score and information of one pose along globals, further directions and, last, its heading.
 struct ChannelLikelihood::PoseScores {
   Eigen::VectorXd score;
   Eigen::MatrixXd information;
@@ -450,25 +443,25 @@ struct ChannelLikelihood::PoseScores {
 ChannelLikelihood::PoseScores ChannelLikelihood::poseScores(const Basis& basis, std::size_t pose,
                                                             const std::vector<const PoseCovariance*>& further) const {
   const int globals = basis.latents.globals(), all = globals + static_cast<int>(further.size());
-  const PoseBasis& p = basis.poses[pose];
+  const PoseBasis& pose_basis = basis.poses[pose];
   PoseScores own;
   own.score = Eigen::VectorXd::Zero(all + 1);
-  own.score.head(globals) = p.score.head(globals);
-  own.score[all] = p.score[globals];
+  own.score.head(globals) = pose_basis.score.head(globals);
+  own.score[all] = pose_basis.score[globals];
   own.information = Eigen::MatrixXd::Zero(all + 1, all + 1);
-  own.information.topLeftCorner(globals, globals) = p.information.topLeftCorner(globals, globals);
-  own.information.col(all).head(globals) = p.information.col(globals).head(globals);
-  own.information.row(all).head(globals) = p.information.row(globals).head(globals);
-  own.information(all, all) = p.information(globals, globals);
-  for (const BinBasis& bin : p.bins) addFurther(bin, basis.latents, further, own);
+  own.information.topLeftCorner(globals, globals) = pose_basis.information.topLeftCorner(globals, globals);
+  own.information.col(all).head(globals) = pose_basis.information.col(globals).head(globals);
+  own.information.row(all).head(globals) = pose_basis.information.row(globals).head(globals);
+  own.information(all, all) = pose_basis.information(globals, globals);
+  for (const BinBasis& bin : pose_basis.bins) addFurther(bin, basis.latents, further, own);
   return own;
 }
 
 void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& latents,
                                    const std::vector<const PoseCovariance*>& further, PoseScores& own) const {
   const int globals = latents.globals(), more = static_cast<int>(further.size()), all = globals + more;
-  Eigen::MatrixXd v(channels_ * channels_, more);
-  PackedHermitian m(channels_);
+  Eigen::MatrixXd v(channels_ * channels_ + 1, more);
+  PackedHermitian change(channels_);
   std::vector<int> active;
   Eigen::VectorXd traces(more);
   for (int h = 0; h < more; ++h) {
@@ -476,10 +469,10 @@ void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& la
     if (field.empty()) continue;
     const auto* from = field.data() + static_cast<std::size_t>(bin.cell) * size_;
     if (std::all_of(from, from + size_, [](auto x) { return x == 0.0f; })) continue;
-    m.setZero();
-    m.add(from, 1);
-    addRelative(latents, bin.cell, m);
-    bin.factor.whiten(m, v.col(h).data());
+    change.setZero();
+    change.add(from, 1);
+    addRelative(latents, bin.cell, change);
+    whiten(bin, change, v.col(h).data());
     traces[h] = traceOfWhitened(v.col(h).data(), channels_);
     active.push_back(h);
   }
@@ -490,13 +483,13 @@ void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& la
     for (std::size_t a = 0; a < bin.active.size(); ++a) {
       const int g = bin.active[a] == globals ? all : bin.active[a];
       const Eigen::Index ia = static_cast<Eigen::Index>(a);
-      const double x = weight() * informationOf(products[ia], bin.traces[ia], traces[h]);
+      const double x = weight() * tInformation(channels_, products[ia], bin.traces[ia], traces[h]);
       own.information(globals + h, g) += x;
       own.information(g, globals + h) += x;
     }
     for (int k : active) {
       if (k > h) continue;
-      const double x = weight() * informationOf(v.col(h).dot(v.col(k)), traces[h], traces[k]);
+      const double x = weight() * tInformation(channels_, v.col(h).dot(v.col(k)), traces[h], traces[k]);
       own.information(globals + h, globals + k) += x;
       if (k != h) own.information(globals + k, globals + h) += x;
     }
@@ -504,51 +497,51 @@ void ChannelLikelihood::addFurther(const BinBasis& bin, const SessionLatents& la
 }
 
 void ChannelLikelihood::addWithoutHeading(const PoseScores& p, const SessionLatents& latents, std::size_t pose,
-                                          Scores& s) const {
+                                          Scores& scores) const {
   const Eigen::Index all = p.score.size() - 1;
   const double heading_prior = 1 / (accuracy_.heading_rad * accuracy_.heading_rad);
   const double own = p.information(all, all) + heading_prior;
   const double yaw = p.score[all] - heading_prior * latents.yaw_rad[pose];
   const Eigen::VectorXd coupling = p.information.col(all).head(all) / own;
-  s.by_location.row(data_.poses[pose].location) += (p.score.head(all) - coupling * yaw).transpose();
-  s.information += p.information.topLeftCorner(all, all) - own * coupling * coupling.transpose();
-  s.yaw_step[pose] = yaw / own;
-  s.yaw_coupling.row(static_cast<Eigen::Index>(pose)) = coupling.transpose();
+  scores.by_location.row(data_.poses[pose].location) += (p.score.head(all) - coupling * yaw).transpose();
+  scores.information += p.information.topLeftCorner(all, all) - own * coupling * coupling.transpose();
+  scores.yaw_step[pose] = yaw / own;
+  scores.yaw_coupling.row(static_cast<Eigen::Index>(pose)) = coupling.transpose();
 }
 
-void ChannelLikelihood::addPriors(const SessionLatents& latents, Scores& s) const {
-  s.prior = Eigen::VectorXd::Zero(latents.globals());
+void ChannelLikelihood::addPriors(const SessionLatents& latents, Scores& scores) const {
+  scores.prior = Eigen::VectorXd::Zero(latents.globals());
   for (int a = 0; a < errors_; ++a) {
     const double gain = 1 / (spread_.actor_gain * spread_.actor_gain);
     const double range = 1 / (spread_.actor_range_m * spread_.actor_range_m);
-    s.prior[kActors + a] = gain;
-    s.prior[kActors + errors_ + a] = range;
-    s.information(kActors + a, kActors + a) += gain;
-    s.total[kActors + a] -= gain * latents.actor_gain[a];
-    s.information(kActors + errors_ + a, kActors + errors_ + a) += range;
-    s.total[kActors + errors_ + a] -= range * latents.actor_range_m[a];
+    scores.prior[kActors + a] = gain;
+    scores.prior[kActors + errors_ + a] = range;
+    scores.information(kActors + a, kActors + a) += gain;
+    scores.total[kActors + a] -= gain * latents.actor_gain[a];
+    scores.information(kActors + errors_ + a, kActors + errors_ + a) += range;
+    scores.total[kActors + errors_ + a] -= range * latents.actor_range_m[a];
   }
-  // Levels of errors have a wide prior (a factor of 10 in power): none runs away where no data shows it.
+  // Levels of errors have a wide prior (a factor of 10 in power), so that none diverges where no data shows it.
   const double rough = 1 / (2.3 * 2.3);
   const SessionLatents usual;
   for (int j = kRelative; j < kActors; ++j) {
-    s.information(j, j) += rough;
-    s.total[j] -= rough * (latents.global(j) - usual.global(j));
+    scores.information(j, j) += rough;
+    scores.total[j] -= rough * (latents.global(j) - usual.global(j));
   }
 }
 
-void ChannelLikelihood::holdAtLimits(const SessionLatents& latents, Scores& s) const {
-  // A number at its limit that would go beyond it stays, and no other number moves as if it did not.
+void ChannelLikelihood::holdAtLimits(const SessionLatents& latents, Scores& scores) const {
+  // A number at its limit whose step leads beyond it is held, and drops out of the steps of all others.
   for (int j = 0; j < latents.globals(); ++j) {
     const Limits limits = limitsOf(j, errors_, spread_);
     const double v = latents.global(j);
-    if (s.total[j] > 0 ? v < limits.high : v > limits.low) continue;
-    s.total[j] = 0;
-    s.by_location.col(j).setZero();
-    s.yaw_coupling.col(j).setZero();
-    s.information.row(j).setZero();
-    s.information.col(j).setZero();
-    s.information(j, j) = 1;
+    if (scores.total[j] > 0 ? v < limits.high : v > limits.low) continue;
+    scores.total[j] = 0;
+    scores.by_location.col(j).setZero();
+    scores.yaw_coupling.col(j).setZero();
+    scores.information.row(j).setZero();
+    scores.information.col(j).setZero();
+    scores.information(j, j) = 1;
   }
 }
 
@@ -562,21 +555,21 @@ Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCo
     for (const SessionCovariance& d : directions) further.push_back(&d[j]);
     each[j] = poseScores(basis, static_cast<std::size_t>(poses[j]), further);
   });
-  Scores s;
-  s.by_location = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.locations.size()), all);
-  s.information = Eigen::MatrixXd::Zero(all, all);
-  s.yaw_step.assign(data_.poses.size(), 0.0);
-  s.yaw_coupling = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.poses.size()), all);
+  Scores scores;
+  scores.by_location = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.locations.size()), all);
+  scores.information = Eigen::MatrixXd::Zero(all, all);
+  scores.yaw_step.assign(data_.poses.size(), 0.0);
+  scores.yaw_coupling = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_.poses.size()), all);
   for (std::size_t j = 0; j < each.size(); ++j) {
     const std::size_t pose = static_cast<std::size_t>(poses[j]);
-    s.log_likelihood += basis.poses[pose].log_likelihood;
-    addWithoutHeading(each[j], latents, pose, s);
+    scores.log_likelihood += basis.poses[pose].log_likelihood;
+    addWithoutHeading(each[j], latents, pose, scores);
   }
-  s.total = s.by_location.colwise().sum().transpose();
-  addPriors(latents, s);
-  holdAtLimits(latents, s);
-  s.log_likelihood += prior(latents);
-  return s;
+  scores.total = scores.by_location.colwise().sum().transpose();
+  addPriors(latents, scores);
+  holdAtLimits(latents, scores);
+  scores.log_likelihood += prior(latents);
+  return scores;
 }
 
 SessionLatents ChannelLikelihood::stepped(const SessionLatents& from, const Eigen::VectorXd& g, const Scores& scores,
@@ -601,18 +594,18 @@ double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLate
   std::vector<int> all(echoes.size());
   std::iota(all.begin(), all.end(), 0);
   for (int i = 0; i < iterations; ++i) {
-    const Scores s = scores(basis(echoes, latents, false), {}, all);
-    best = s.log_likelihood;
-    const Eigen::VectorXd step = s.information.ldlt().solve(s.total);
-    const double screened_nats = 0.5 * s.total.dot(step);
+    const Scores derivatives = scores(basis(echoes, latents, false), {}, all);
+    best = derivatives.log_likelihood;
+    const Eigen::VectorXd step = derivatives.information.ldlt().solve(derivatives.total);
+    const double screened_nats = 0.5 * derivatives.total.dot(step);
     bool better = false;
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(step.size());
     // All numbers together; where that fails, headings alone, then globals alone.
     for (int attempt = 0; attempt < 6 && !better; ++attempt) {
       constexpr double kShares[] = {1.0, 0.5, 0.2, 0.05};
-      SessionLatents next = attempt < 4    ? stepped(latents, step, s, step, kShares[attempt])
-                            : attempt == 4 ? stepped(latents, none, s, none, 1)
-                                           : stepped(latents, step, s, step, 0.5);
+      SessionLatents next = attempt < 4    ? stepped(latents, step, derivatives, step, kShares[attempt])
+                            : attempt == 4 ? stepped(latents, none, derivatives, none, 1)
+                                           : stepped(latents, step, derivatives, step, 0.5);
       if (attempt == 5) next.yaw_rad = latents.yaw_rad;
       const double value = logLikelihood(echoes, next);
       if (value <= best) continue;
@@ -658,14 +651,14 @@ SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) c
   };
   latents.log_gain = quantile(ratio, 0.5);
   latents.log_floor = quantile(low, 0.25);
-  // Wide channel errors to start with: far outliers of a narrow t distribution would give headings no slope.
+  // Large independent errors to start with: outliers of a narrow t distribution would give headings no slope.
   latents.log_relative = -3;
   return latents;
 }
 
 ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes, const SessionLatents& latents,
                                                         int pose, int bin) const {
-  Whitened w;
+  Whitened cell;
   const PackedHermitian packed = sigma(modelOf(echoes, latents, pose), bin);
   Eigen::MatrixXcd full(channels_, channels_);
   std::size_t i = 0;
@@ -676,11 +669,11 @@ ChannelLikelihood::Whitened ChannelLikelihood::whitened(const PoseEchoes& echoes
     }
   }
   const Eigen::LLT<Eigen::MatrixXcd> llt(full);
-  w.inverse = llt.solve(Eigen::MatrixXcd::Identity(channels_, channels_));
+  cell.inverse = llt.solve(Eigen::MatrixXcd::Identity(channels_, channels_));
   const Eigen::VectorXcd y = data_.poses[pose].range_spectra.col(bin);
-  w.solved = w.inverse * y;
-  w.weight = (channels_ + kTailFreedom) / (kTailFreedom + y.dot(w.solved).real());
-  return w;
+  cell.solved = cell.inverse * y;
+  cell.weight = (channels_ + kTailFreedom) / (kTailFreedom + y.dot(cell.solved).real());
+  return cell;
 }
 
 std::vector<ChannelLikelihood::Whitened> ChannelLikelihood::whitened(const PoseEchoes& echoes,

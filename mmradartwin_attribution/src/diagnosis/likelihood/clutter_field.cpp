@@ -12,10 +12,10 @@ namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
 constexpr double kGrid_m = 0.2;                              ///< spacing of the things in the floor plan
-constexpr double kHeights_m[] = {-0.6, 0.0, 0.6};            ///< of the things, from the radar's
-constexpr double kNearest_m = 0.3;                           ///< things nearer to the radar are left out
-constexpr double kElsewhereShare = 0.05;                     ///< of the power at kReference_m, from no place
-constexpr double kReference_m = 3, kReferenceWidth_m = 0.5;  ///< where the mean power is 1, and to either side of it
+constexpr double kHeights_m[] = {-0.6, 0.0, 0.6};            ///< heights of the things relative to the radar
+constexpr double kNearest_m = 0.3;                           ///< least distance of the things from the radar
+constexpr double kElsewhereShare = 0.05;                     ///< share of the power at kReference_m that has no place
+constexpr double kReference_m = 3, kReferenceWidth_m = 0.5;  ///< range where the mean power is 1, and half its width
 
 }  // namespace
 
@@ -60,7 +60,7 @@ void expectClutter(const Scene& scene, ChannelData& data) {
       }
     }
   });
-  // Mean power over the session by bin; all channels have the same.
+  // Mean power over the session by bin, equal for all channels.
   std::vector<double> mean(static_cast<std::size_t>(bins), 0.0);
   for (const PoseChannels& p : data.poses) {
     for (int b = 0; b < bins; ++b) {

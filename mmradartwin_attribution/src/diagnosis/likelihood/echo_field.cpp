@@ -11,32 +11,35 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr int kLobe_bins = 2;       ///< reach of a weak path to either side
-constexpr int kSkirt_bins = 6;      ///< reach of a usual path
-constexpr int kFarSkirt_bins = 32;  ///< reach of a strong path: -60 to -100 dB, above the noise where no clutter is
-/// Shares of the power of the pose's strongest path below which a path is weak, and from which on it is strong. The
-/// likelihood jumps where a path passes one of them: see docs/calibration_of_bounds.md, likelihood.
+constexpr int kLobe_bins = 2;   ///< reach of a weak path to either side
+constexpr int kSkirt_bins = 6;  ///< reach of other paths
+/// Reach of a strong path: -60 to -100 dB, above the noise where there is no clutter.
+constexpr int kFarSkirt_bins = 32;
+/// Power over that of the pose's strongest path, below which a path is weak and from which it is strong. The likelihood
+/// jumps where a path passes one of them: see docs/calibration_of_bounds.md, reach of paths.
 constexpr double kWeakShare = 1e-6, kStrongShare = 0.003;
-constexpr double kLeastResponse = 1e-7;    ///< share of the strongest bin below which a changed response is left out
+/// Power over that of the strongest bin, below which a changed response is left out.
+constexpr double kLeastResponse = 1e-7;
 constexpr std::size_t kMostBeamBins = 16;  ///< kMaxChannels
-constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;  ///< share of a path's, of a weak path's power that a beam sees
+/// Share of a path's power (of a weak path's power) below which a beam skips it.
+constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;
 
 using Fields = EchoGroup::Fields;
 
-/// Fields of a cell, [kOfCell][size]; makes room for them.
+/// Fields of a cell, [kOfCell][size]; extends the cells where needed.
 std::complex<float>* cover(Fields& fields, int cell, std::size_t size) {
   const std::size_t of_cell = Fields::kOfCell * size;
   if (fields.cells == 0) fields.first = cell;
   if (cell < fields.first) {
     const auto before = static_cast<std::size_t>(fields.first - cell);
     fields.packed.insert(fields.packed.begin(), before * of_cell, {});
-    fields.cosine.insert(fields.cosine.begin(), before, 0.0f);
+    for (std::vector<float>* v : {&fields.cosine, &fields.mean, &fields.squares}) v->insert(v->begin(), before, 0.0f);
     fields.first = cell;
   }
   const auto at = static_cast<std::size_t>(cell - fields.first);
   if (at >= fields.cosine.size()) {
     fields.packed.resize((at + 1) * of_cell);
-    fields.cosine.resize(at + 1);
+    for (std::vector<float>* v : {&fields.cosine, &fields.mean, &fields.squares}) v->resize(at + 1);
   }
   fields.cells = static_cast<int>(fields.cosine.size());
   return fields.packed.data() + at * of_cell;
@@ -121,7 +124,7 @@ double EchoCollector::addedRange_m(const PerInteraction<int>& actors) const {
 }
 
 const PerInteraction<int>& actorsOf(const PathRecord& record) {
-  static const PerInteraction<int> lacking{-1};  // bounces off no actor
+  static const PerInteraction<int> lacking{-1};  // reflects off no actor
   return record.actors.empty() && record.bounces > 0 ? lacking : record.actors;
 }
 
@@ -141,7 +144,7 @@ EchoGroup& EchoCollector::group(const PathRecord& record) {
 void EchoCollector::outer(const std::complex<double>* c, double cosine,
                           std::vector<std::complex<float>>& packed) const {
   packed.resize(size_);
-  if (cosine == 0) {  // nothing that an error of direction changes
+  if (cosine == 0) {  // an error of the direction changes nothing
     std::size_t i = 0;
     for (int k = 0; k < channels_; ++k) {
       for (int l = 0; l <= k; ++l) packed[i++] = std::complex<float>(c[k] * std::conj(c[l]));
@@ -162,10 +165,11 @@ void EchoCollector::outer(const std::complex<double>* c, double cosine,
 
 namespace {
 
-/// Fields of all bins of a group while its paths are added. The memory is kept from group to group and zero between.
+/// Fields of all bins of a group while its paths are added. The memory is reused from group to group and is zero
+/// between groups.
 struct OpenFields {
   std::vector<std::complex<float>> sums;
-  std::vector<float> cosine;
+  std::vector<float> cosine, mean, squares;
   std::size_t size = 0, of_bin = 0;
   int first = 0, last = -1;
 
@@ -173,17 +177,21 @@ struct OpenFields {
     size = packed_size;
     of_bin = Fields::kOfCell * size;
     if (sums.size() != of_bin * static_cast<std::size_t>(bins)) sums.assign(of_bin * static_cast<std::size_t>(bins), 0);
-    cosine.resize(static_cast<std::size_t>(bins));
+    for (std::vector<float>* v : {&cosine, &mean, &squares}) v->resize(static_cast<std::size_t>(bins));
     first = bins;
     last = -1;
   }
+  /// power: of the path, mean over the channels.
   void add(int bin, const std::complex<float>* packed, const std::array<float, Fields::kOfCell>& factors,
-           double mean_cosine) {
+           double mean_cosine, float power) {
     first = std::min(first, bin);
     last = std::max(last, bin);
     const auto at = static_cast<std::size_t>(bin);
     addMultiples(packed, size, factors.data(), factors.size(), sums.data() + at * of_bin);
     cosine[at] += factors[0] * static_cast<float>(mean_cosine) * packed[0].real();
+    const float own = factors[0] * power;
+    mean[at] += own;
+    squares[at] += own * own;
   }
   void close(Fields& to) {
     if (last < first) return;
@@ -192,9 +200,14 @@ struct OpenFields {
     to.first = first;
     to.cells = last + 1 - first;
     to.packed.assign(from, end);
-    to.cosine.assign(cosine.begin() + first, cosine.begin() + last + 1);
+    const auto hand = [&](std::vector<float>& own, std::vector<float>& other) {
+      other.assign(own.begin() + first, own.begin() + last + 1);
+      std::fill(own.begin() + first, own.begin() + last + 1, 0.0f);
+    };
+    hand(cosine, to.cosine);
+    hand(mean, to.mean);
+    hand(squares, to.squares);
     std::fill(from, end, 0.0f);
-    std::fill(cosine.begin() + first, cosine.begin() + last + 1, 0.0f);
   }
 };
 
@@ -213,16 +226,18 @@ std::shared_ptr<const EchoGroup> EchoCollector::addTones(const std::vector<const
   return groups_.back();
 }
 
-void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g) {
+void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& group) {
   const bool weak = share < kWeakShare;
-  const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + g.added_range_m) / bin_m_;
+  const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + group.added_range_m) / bin_m_;
   thread_local std::vector<std::complex<float>> packed;
-  outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error drowns in the others
+  outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error is negligible beside the others'
   const bool strong = share >= kStrongShare;
   const int reach = weak ? kLobe_bins : strong ? std::min(kFarSkirt_bins, samples_ / 2 - 1) : kSkirt_bins;
   const int middle = static_cast<int>(std::lround(place));
   if (middle + reach < 0 || middle - reach > samples_ - 1) return;
-  // Spectra are periodic: the skirt of an echo near the first bin stands in the last ones.
+  // Spectra are periodic: the skirt of an echo near the first bin continues in the last ones.
+  double power = 0;
+  for (const std::complex<double>& c : record.c) power += std::norm(c) / channels_;
   const bool around = strong && (middle - reach < 0 || middle + reach > samples_ - 1);
   const int low = around ? 0 : std::max(0, middle - reach),
             high = around ? samples_ - 1 : std::min(samples_ - 1, middle + reach);
@@ -233,9 +248,9 @@ void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g
     const double slope = -per_bin / bin_m_;
     open_fields.add(bin, packed.data(),
                     {static_cast<float>(w * w), static_cast<float>(2 * w * slope), static_cast<float>(slope * slope)},
-                    cosine);
+                    cosine, static_cast<float>(power));
   }
-  addToBeams(record.c.data(), place, weak ? kOffBeamWeak : kOffBeam, g.beams);
+  addToBeams(record.c.data(), place, weak ? kOffBeamWeak : kOffBeam, group.beams);
 }
 
 void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, const Eigen::MatrixXcd& slope) {
@@ -247,13 +262,17 @@ void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, con
   int first = 0, last = samples_ - 1;
   while (level[first] < least) ++first;
   while (level[last] < least) --last;
-  // Responses and their derivatives are taken together: the covariance stays definite when it is shifted.
+  // Responses and their derivatives are taken together, so that the covariance stays definite when it is shifted.
   std::vector<std::complex<float>> packed;
   const auto addProducts = [&](Fields& f, int at, const Eigen::VectorXcd& c, const Eigen::VectorXcd& d, double turns) {
     std::complex<float>*power = cover(f, at, size_), *shift = power + size_, *curvature = shift + size_;
     outer(c.data(), turns, packed);
     accumulate(1, packed, power);
-    f.cosine[static_cast<std::size_t>(at - f.first)] += static_cast<float>(turns) * packed[0].real();
+    const auto i = static_cast<std::size_t>(at - f.first);
+    f.cosine[i] += static_cast<float>(turns) * packed[0].real();
+    const auto own = static_cast<float>(c.squaredNorm() / channels_);
+    f.mean[i] += own;
+    f.squares[i] += own * own;
     accumulate(-1, packed, shift);
     outer(d.data(), turns, packed);
     accumulate(-1, packed, shift);
@@ -299,6 +318,11 @@ void EchoCollector::addToBeams(const std::complex<double>* c, double place, doub
     add([&](int i, int j) { return w[i] * w[j]; });
     add([&](int i, int j) { return w[i] * slope[j] + slope[i] * w[j]; });
     add([&](int i, int j) { return slope[i] * slope[j]; });
+    double own = 0;
+    for (int i = 0; i < channels_; ++i) own += level * w[i] * w[i] / channels_;
+    const std::size_t at = static_cast<std::size_t>(static_cast<int>(b) - beams.first);
+    beams.mean[at] += static_cast<float>(own);
+    beams.squares[at] += static_cast<float>(own * own);
   }
 }
 

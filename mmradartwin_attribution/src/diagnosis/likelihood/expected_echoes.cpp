@@ -14,7 +14,7 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr double kNoFarSkirt = 1e3;  ///< times the strongest power: no echo is strong beside that
+constexpr double kNoFarSkirt = 1e3;  ///< factor on the strongest power beside which no echo is strong
 
 double strongestPower(const std::vector<PathRecord>& records) {
   double strongest = 0;
@@ -22,13 +22,13 @@ double strongestPower(const std::vector<PathRecord>& records) {
   return strongest;
 }
 
-/// True where a parameter of the mechanism weighs paths.
+/// True where a parameter of the mechanism changes the weights of paths.
 bool weighs(const std::string& mechanism) {
   const std::vector<ParameterSpec> specs = MechanismRegistry::instance().create(mechanism)->parameters();
   return std::any_of(specs.begin(), specs.end(), [](const ParameterSpec& s) { return s.weighs; });
 }
 
-/// Makes a pose's paths into what its channels receive of them, in place.
+/// Converts a pose's paths into what its channels receive of them, in place.
 class PathReceiver {
  public:
   PathReceiver(const Twin& twin, const Pose& pose) : twin_(twin), pose_(pose) {
@@ -71,8 +71,8 @@ std::vector<PoseEchoes> ExpectedEchoes::echoes(const std::vector<NamedParameters
   const std::vector<NamedParameters> geometry = paths_.geometryOf(mechanisms);
   std::vector<Part> parts;
   for (const NamedParameters& m : mechanisms) parts.push_back({&paths_.of(geometry, m, mechanisms, poses)});
-  const TracedPaths::ByPose* grazing = paths_.hasBaseline() ? &paths_.grazing(mechanisms, poses) : nullptr;
-  return collect(mechanisms, poses, {parts, grazing, actor_range_m});
+  const TracedPaths::ByPose* pose_sensitive = paths_.hasBaseline() ? &paths_.poseSensitive(mechanisms, poses) : nullptr;
+  return collect(mechanisms, poses, {parts, pose_sensitive, actor_range_m});
 }
 
 std::vector<PoseEchoes> ExpectedEchoes::echoesNear(const std::vector<NamedParameters>& mechanisms,
@@ -174,11 +174,11 @@ PoseEchoes ExpectedEchoes::collectAt(const Collection& collection, std::size_t i
       if (part != nullptr) hold(*part);
     }
   }
-  if (collection.grazing != nullptr) hold(*collection.grazing);
+  if (collection.pose_sensitive != nullptr) hold(*collection.pose_sensitive);
   std::array<KeptPose, 2>& kept = kept_poses_[i];
   if (!kept[1].echoes.groups.empty() && kept[1].signature == own.signature) std::swap(kept[0], kept[1]);
   if (!kept[0].echoes.groups.empty() && kept[0].signature == own.signature) return kept[0].echoes;
-  // The memory of records is kept from pose to pose: making their small vectors anew takes most of the time.
+  // The memory of records is reused from pose to pose: allocating their small vectors takes most of the time.
   thread_local std::vector<PathRecord> all;
   std::size_t count = 0, to = 0;
   for (const Part& part : collection.parts) count += part.here == nullptr ? (*part.there)[i]->size() : 0;
@@ -197,7 +197,7 @@ PoseEchoes ExpectedEchoes::collectAt(const Collection& collection, std::size_t i
   double strongest = 0;
   if (collection.without_mixing) {
     mixture.emplace(*collection.twin, linear, collection.mixing_key, data_.poses[i].pose, mixed_[i], paths_.call());
-    strongest = strongestPower(all);  // before tones lose what the receiver makes of them
+    strongest = strongestPower(all);  // before the receiver's losses are taken off the tones
     mixture->scaleTones(all, collector);
   }
   receiver.receive(all);
@@ -206,13 +206,14 @@ PoseEchoes ExpectedEchoes::collectAt(const Collection& collection, std::size_t i
   if (mixture) mixture->addTo(collector);
   PoseEchoes result;
   result.groups = collector.take();
-  if (collection.grazing != nullptr) {
-    Paths uncertain = *(*collection.grazing)[i];
+  if (collection.pose_sensitive != nullptr) {
+    Paths uncertain = *(*collection.pose_sensitive)[i];
     receiver.receive(uncertain);
     const std::vector<double> none;
-    EchoCollector of_grazing(base_.radar(), accuracy_.path_angle_rad, data_.poses[i].beams, none);
-    for (const auto& [actors, members] : byActors(uncertain)) of_grazing.addTones(members, kNoFarSkirt * strongest);
-    result.grazing = of_grazing.take();
+    EchoCollector of_pose_sensitive(base_.radar(), accuracy_.path_angle_rad, data_.poses[i].beams, none);
+    for (const auto& [actors, members] : byActors(uncertain))
+      of_pose_sensitive.addTones(members, kNoFarSkirt * strongest);
+    result.pose_sensitive = of_pose_sensitive.take();
   }
   if (mixture) return result;
   own.echoes = result;
@@ -239,7 +240,7 @@ void ExpectedEchoes::pointBeams(ChannelData& data, const std::vector<NamedParame
       beam.clutter = clutter.quadratic(beam.weights.data());
     }
   });
-  paths_.clearBaseline();  // grazing paths are to be collected in the beams, too
+  paths_.clearBaseline();  // pose-sensitive paths are to be collected in the beams, too
   kept_groups_.clear();
   kept_poses_.clear();
   mixed_.clear();

@@ -13,20 +13,20 @@ namespace mmradartwin::diagnosis::likelihood {
 
 /// Change of one echo by a change of mechanisms.
 struct PathShift {
-  std::size_t place;  ///< index of its pose among the poses named
+  std::size_t place;  ///< index of its pose among those asked for
   const std::string* event;
   PerInteraction<int> facets, actors;
   double amplitude;
-  double range_m, azimuth_rad;  ///< one-way range and departure azimuth, after less before
+  double range_m, azimuth_rad;  ///< one-way range and departure azimuth, after minus before
 };
 
-/// Mean change of echoes, weighed by amplitude.
+/// Mean change of echoes, weighted by amplitude.
 struct EchoShift {
-  std::vector<double> range_m;      ///< [actors] one-way, over echoes that meet this actor alone
-  std::vector<double> azimuth_rad;  ///< [poses named] over a pose's echoes that meet one actor
+  std::vector<double> range_m;      ///< [actors] one-way, over echoes that meet only this actor
+  std::vector<double> azimuth_rad;  ///< [poses asked for] over a pose's echoes that meet one actor
 };
 
-/// Mechanism of `list` that stands where mechanisms[index] does among those of its name and subject; null where the
+/// Mechanism of `list` that has the same rank as mechanisms[index] among those of its name and subject. Null where the
 /// list has fewer of them.
 const NamedParameters* sameInOtherList(const std::vector<NamedParameters>& mechanisms, std::size_t index,
                                        const std::vector<NamedParameters>& list);
@@ -35,10 +35,10 @@ const NamedParameters* sameInOtherList(const std::vector<NamedParameters>& mecha
 std::map<PerInteraction<int>, std::vector<const PathRecord*>> byActors(const std::vector<PathRecord>& records);
 
 /// Appends to `all` the paths of `there` that `here` has too, and those of `here` that `there` lacks. Scatter points of
-/// one facet share one name, and their cells change with every step: they stay as they are in `here`.
+/// one facet share a name, and their cells change with every step: those of `here` are kept.
 void addShared(const std::vector<PathRecord>& there, const std::vector<PathRecord>& here, std::vector<PathRecord>& all);
 
-/// Appends the shifts of paths that both lists have once, from `here` to `there`. place: see PathShift.
+/// Appends the shifts, from `here` to `there`, of paths that occur once in both lists. place: see PathShift.
 void addShifts(std::size_t place, const std::vector<PathRecord>& there, std::vector<PathRecord> here,
                std::vector<PathShift>& shifts);
 

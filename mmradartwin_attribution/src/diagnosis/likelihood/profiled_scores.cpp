@@ -11,25 +11,26 @@ Eigen::MatrixXd regularised(Eigen::MatrixXd information) {
   return information;
 }
 
-ProfiledScores profiledScores(const Scores& s, int globals) {
-  ProfiledScores e;
-  const Eigen::Index n = s.information.rows() - globals;
-  const Eigen::MatrixXd nuisance = s.information.topLeftCorner(globals, globals);
-  const Eigen::MatrixXd projection = nuisance.ldlt().solve(s.information.topRightCorner(globals, n));  // [g][n]
-  e.by_location = s.by_location.rightCols(n) - s.by_location.leftCols(globals) * projection;
-  e.information = regularised(s.information.bottomRightCorner(n, n) -
-                              s.information.topRightCorner(globals, n).transpose() * projection);
-  e.total = s.total.tail(n) - projection.transpose() * s.total.head(globals);
-  const double locations = static_cast<double>(e.by_location.rows());
+ProfiledScores profiledScores(const Scores& scores, int globals) {
+  ProfiledScores profiled;
+  const Eigen::Index n = scores.information.rows() - globals;
+  const Eigen::MatrixXd latent_information = scores.information.topLeftCorner(globals, globals);
+  // [g][n].
+  const Eigen::MatrixXd projection = latent_information.ldlt().solve(scores.information.topRightCorner(globals, n));
+  profiled.by_location = scores.by_location.rightCols(n) - scores.by_location.leftCols(globals) * projection;
+  profiled.information = regularised(scores.information.bottomRightCorner(n, n) -
+                                     scores.information.topRightCorner(globals, n).transpose() * projection);
+  profiled.total = scores.total.tail(n) - projection.transpose() * scores.total.head(globals);
+  const double locations = static_cast<double>(profiled.by_location.rows());
   if (locations > 1 && n > 0) {
-    const Eigen::MatrixXd centred = e.by_location.rowwise() - e.by_location.colwise().mean();
-    e.scatter = centred.transpose() * centred * (locations / (locations - 1));
-    // An actor's error is the same at all places: scatter over places does not show it, its prior does.
-    e.scatter += projection.transpose() * s.prior.asDiagonal() * projection;
-    const Eigen::MatrixXd ratio = e.information.ldlt().solve(e.scatter);
-    e.overdispersion = std::min(ratio.trace() / static_cast<double>(n), kMostOverdispersion);
+    const Eigen::MatrixXd centred = profiled.by_location.rowwise() - profiled.by_location.colwise().mean();
+    profiled.scatter = centred.transpose() * centred * (locations / (locations - 1));
+    // An actor's error is the same at all places: its prior shows it, the scatter over places does not.
+    profiled.scatter += projection.transpose() * scores.prior.asDiagonal() * projection;
+    const Eigen::MatrixXd ratio = profiled.information.ldlt().solve(profiled.scatter);
+    profiled.overdispersion = std::min(ratio.trace() / static_cast<double>(n), kMostOverdispersion);
   }
-  return e;
+  return profiled;
 }
 
 double overdispersionOf(double gain, const std::vector<double>& by_location) {
@@ -66,10 +67,10 @@ SessionCovariance difference(SessionCovariance of, const SessionCovariance& from
   return of;
 }
 
-SessionLatents withoutErrors(SessionLatents nuisance, int actor) {
-  nuisance.actor_range_m[static_cast<std::size_t>(actor)] = 0;
-  nuisance.actor_gain[static_cast<std::size_t>(actor)] = 0;
-  return nuisance;
+SessionLatents withoutErrors(SessionLatents latents, int actor) {
+  latents.actor_range_m[static_cast<std::size_t>(actor)] = 0;
+  latents.actor_gain[static_cast<std::size_t>(actor)] = 0;
+  return latents;
 }
 
 }  // namespace mmradartwin::diagnosis::likelihood

@@ -8,33 +8,33 @@
 
 namespace mmradartwin::diagnosis::likelihood {
 
-constexpr double kSmallStep = 0.125;        ///< step of numerical derivatives, in a coordinate's scale
-constexpr double kMostOverdispersion = 50;  ///< bound of every overdispersion over places
+constexpr double kSmallStep = 0.125;        ///< step of numerical derivatives, scaled
+constexpr double kMostOverdispersion = 50;  ///< limit of every overdispersion over places
 
 /// Scores of a hypothesis' coordinates with everything else of the model refitted to first order (Schur complement).
 struct ProfiledScores {
   Eigen::MatrixXd by_location;  ///< [locations][n]
   Eigen::MatrixXd information;  ///< [n][n]
-  Eigen::MatrixXd scatter;      ///< [n][n] covariance of the total score, from its scatter over places and the priors
-  Eigen::VectorXd total;        ///< [n]
-  double overdispersion = 1;    ///< scatter over places against what the likelihood expects
+  Eigen::MatrixXd scatter;  ///< [n][n] covariance of the total score, from its scatter over places and from the priors
+  Eigen::VectorXd total;    ///< [n]
+  double overdispersion = 1;  ///< scatter over places, divided by what the likelihood expects
 };
 
-/// Information with a tiny diagonal added: can be solved with also where a direction does nothing.
+/// Information with a tiny diagonal added, so that it can be inverted where a direction does nothing.
 Eigen::MatrixXd regularised(Eigen::MatrixXd information);
 ProfiledScores profiledScores(const Scores& scores, int globals);
-/// Factor by which a gain's variance over places exceeds that of a gain by chance (2 G for G nats); 1 to
+/// Variance of a gain of G nats over places, divided by that of a gain by chance (2 G); limited to 1 to
 /// kMostOverdispersion.
 double overdispersionOf(double gain, const std::vector<double>& by_location);
-/// Overdispersion of the gain of something that is there or not. Few places may see it, so that its gain is uneven by
-/// nature: only places that lose are counted.
+/// Overdispersion of the gain of something that is present or absent. Few places may see it, so that its gain is uneven
+/// by nature: only places that lose are counted.
 double overdispersionOfPresence(double gain, const std::vector<double>& by_location);
-/// Change of covariances from `from` to `of`, divided by `per`. of[i] is of poses[i], from is of all poses.
+/// Change of covariances from `from` to `of`, divided by `per`. of[i] belongs to poses[i], from to all poses.
 SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, const std::vector<int>& poses,
                              double per);
-/// Change of covariances between two sides, divided by `per`; both are of the same poses.
+/// Change of covariances from `from` to `of`, divided by `per`; both belong to the same poses.
 SessionCovariance difference(SessionCovariance of, const SessionCovariance& from, double per);
 /// Latents with the errors of one actor set to zero.
-SessionLatents withoutErrors(SessionLatents nuisance, int actor);
+SessionLatents withoutErrors(SessionLatents latents, int actor);
 
 }  // namespace mmradartwin::diagnosis::likelihood

@@ -10,14 +10,14 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-/// Share of the power of the pose's strongest echo from which on a path is sent through the receiver; products of
-/// weaker paths lie below all clutter.
+/// Power over that of the pose's strongest echo from which a path is sent through the receiver. Products of weaker
+/// paths lie below the clutter.
 constexpr double kStrongShare = 1e-2;
-constexpr std::size_t kMostPaired = 8;    ///< paths whose products in pairs are made
-constexpr double kRoundingShare = 1e-12;  ///< of a path's power
+constexpr std::size_t kMostPaired = 8;    ///< paths that are also sent in pairs
+constexpr double kRoundingShare = 1e-12;  ///< share of a path's power that is rounding
 constexpr std::size_t kMostKept = 64;     ///< responses of a pose
 
-/// Derivative of a path's samples by its one-way range, per metre, the phase in the window's middle held.
+/// Derivative of a path's samples by its one-way range, per metre, with the phase in the window's middle fixed.
 ComplexGrid byRange(const RadarConfig& radar, const ComplexGrid& x) {
   const double samples = static_cast<double>(x.cols());
   ComplexGrid slope = x;
@@ -28,7 +28,7 @@ ComplexGrid byRange(const RadarConfig& radar, const ComplexGrid& x) {
   return slope;
 }
 
-/// Record of a product of two paths: it has the errors of the actors of both.
+/// Record of a product of two paths, with the errors of the actors of both.
 PathRecord productOf(const PathRecord& a, const PathRecord& b) {
   PathRecord product = a;
   product.actors.insert(product.actors.end(), b.actors.begin(), b.actors.end());
@@ -63,7 +63,7 @@ void ReceiverMixture::send(Alone& path) const {
   if (path.sent) return;
   path.sent = true;
   path.x = through(twin_, {path.path}) - nothing_;
-  // The part along the path's own tone belongs to the path; the rest is an echo of its own.
+  // The part along the path's own tone belongs to the path; the rest is a separate echo.
   const ComplexGrid tone = through(linear_, {path.path});
   const std::complex<double> kept =
       tone.conjugate().cwiseProduct(path.x).sum() / std::max(tone.squaredNorm(), std::numeric_limits<double>::min());
@@ -75,12 +75,12 @@ void ReceiverMixture::scaleTones(std::vector<PathRecord>& paths, const EchoColle
   std::sort(paths.begin(), paths.end(),
             [](const PathRecord& a, const PathRecord& b) { return a.amplitude > b.amplitude; });
   const double least = paths.empty() ? 0 : std::sqrt(kStrongShare) * paths.front().amplitude;
-  for (PathRecord& r : paths) {
-    if (r.amplitude <= least) break;
-    Alone path{r, receiver_};
-    for (double& l : path.path.length_m) l += 2 * collector.addedRange_m(r.actors);
-    boost::hash_combine(path.signature, collector.addedRange_m(r.actors));
-    boost::hash_range(path.signature, r.actors.begin(), r.actors.end());
+  for (PathRecord& record : paths) {
+    if (record.amplitude <= least) break;
+    Alone path{record, receiver_};
+    for (double& l : path.path.length_m) l += 2 * collector.addedRange_m(record.actors);
+    boost::hash_combine(path.signature, collector.addedRange_m(record.actors));
+    boost::hash_range(path.signature, record.actors.begin(), record.actors.end());
     const std::vector<PathRecord> received = linear_.receivedPaths(pose_.T_map_radar, {path.path}, pose_.stamp_ns);
     if (received.empty()) continue;
     for (const PathRecord& part : received) addToSignature(part, path.signature);
@@ -91,7 +91,7 @@ void ReceiverMixture::scaleTones(std::vector<PathRecord>& paths, const EchoColle
       kept.tone = path.tone;
     }
     kept.used = call_;
-    scaleRecord(kept.tone, r);
+    scaleRecord(kept.tone, record);
     alone_.push_back(std::move(path));
   }
 }

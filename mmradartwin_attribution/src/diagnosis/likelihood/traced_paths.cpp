@@ -17,27 +17,27 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr double kSteady =
-    0.02;  ///< share by which a steady path's amplitude changes at most within the pose's accuracy
-constexpr double kFaint = 1e-3;  ///< share of the pose's strongest amplitude; less is below the clutter
-/// Error of a pose that grazing paths are found by, to both sides.
+/// Limit of the amplitude's relative change within the pose's accuracy, for a steady path.
+constexpr double kSteady = 0.02;
+constexpr double kFaint = 1e-3;  ///< amplitude over the pose's strongest one, below which a path is below the clutter
+/// Error of a pose for which pose-sensitive paths are found, to both sides.
 struct Offset {
   double direction_rad;
   double sigma;   ///< in standard deviations
-  double weight;  ///< share of poses that are off by so much
+  double weight;  ///< share of poses with such an error
 };
 constexpr Offset kOffsets[] = {{0, 1.41, 0.5}, {M_PI / 2, 2.8, 0.02}};  // the usual one; across it one in a hundred
-// Cells of scatter points, small beside the radar's resolution. They are seen from the pose as reported, so that a
-// turned or moved radar has the same ones.
+// Sizes of the cells of scatter points, small beside the radar's resolution. Cells are defined from the reported pose,
+// so that a turned or moved radar has the same ones.
 constexpr double kCloud_bins = 0.75, kCloud_lobes = 0.5, kCloudElevation = 0.175;
-constexpr std::size_t kMostTwins = 6;    ///< kept
+constexpr std::size_t kMostTwins = 6;    ///< twins that are kept
 constexpr std::size_t kMostTraced = 64;  ///< lists of one mechanism and geometry that are kept
-// Something this far behind the radar stays behind it whatever offset the radar has.
+// Something this far behind the radar stays behind it for any offset of the radar.
 constexpr double kBehind_m = 0.15, kBehindShare = 0.1;
 
 const auto kNoPaths = std::make_shared<const TracedPaths::Paths>();
 
-/// Text that is the same for mechanisms which trace the same paths.
+/// Text that is equal for mechanisms which trace the same paths.
 std::string traceKeyOf(const NamedParameters& mechanism) {
   NamedParameters tracing{mechanism.mechanism, {}};
   for (const ParameterSpec& s : MechanismRegistry::instance().create(mechanism.mechanism)->parameters()) {
@@ -49,7 +49,7 @@ std::string traceKeyOf(const NamedParameters& mechanism) {
   return description.toYaml();
 }
 
-/// Mechanisms of the list whose paths one of its mechanisms looks at when it is traced.
+/// Mechanisms of the list whose paths one of its mechanisms reads when it is traced.
 std::vector<NamedParameters> mechanismsReadBy(const NamedParameters& mechanism,
                                               const std::vector<NamedParameters>& list) {
   std::vector<NamedParameters> read;
@@ -64,7 +64,7 @@ std::vector<NamedParameters> mechanismsReadBy(const NamedParameters& mechanism,
   return read;
 }
 
-/// False where no part of a change lies before the radar, nor in the way of a path that bounces behind it.
+/// False where no part of a change lies before the radar or in the way of a path that reflects behind it.
 bool mayTouch(const SceneChange& change, const Eigen::Isometry3d& T_map_radar, const std::vector<PathRecord>& paths) {
   const Eigen::Vector3d p = T_map_radar.translation(), forward = T_map_radar.linear().col(0);
   for (const Eigen::AlignedBox3d& box : change.bounds) {
@@ -80,15 +80,16 @@ bool mayTouch(const SceneChange& change, const Eigen::Isometry3d& T_map_radar, c
 /// Appends paths of `from` that are weaker in `to`, scaled to the uncertain part of their amplitude.
 void addUncertain(const std::vector<PathRecord>& from, const std::vector<PathRecord>& to, double weight,
                   double strongest_amplitude, std::vector<PathRecord>& uncertain) {
-  for (const PathRecord& r : from) {
-    const auto same = std::find_if(to.begin(), to.end(),
-                                   [&](const PathRecord& o) { return o.event == r.event && o.facets == r.facets; });
+  for (const PathRecord& record : from) {
+    const auto same = std::find_if(to.begin(), to.end(), [&](const PathRecord& o) {
+      return o.event == record.event && o.facets == record.facets;
+    });
     const double other = same == to.end() ? 0 : same->amplitude;
-    if (r.amplitude <= other || r.amplitude == 0) continue;
-    const double lost = (r.amplitude - other) / r.amplitude;
+    if (record.amplitude <= other || record.amplitude == 0) continue;
+    const double lost = (record.amplitude - other) / record.amplitude;
     const double share = std::sqrt(weight) * lost;
-    if (lost <= kSteady || share * r.amplitude < kFaint * strongest_amplitude) continue;
-    uncertain.push_back(r);
+    if (lost <= kSteady || share * record.amplitude < kFaint * strongest_amplitude) continue;
+    uncertain.push_back(record);
     scaleRecord(share, uncertain.back());
   }
 }
@@ -138,8 +139,8 @@ std::vector<NamedParameters> TracedPaths::geometryOf(const std::vector<NamedPara
   for (const NamedParameters& m : mechanisms) {
     if (altersGeometry(m)) geometry.push_back(m);
   }
-  // Paths around a placed actor follow from the paths without it. Placed actors come last, whatever was tried last, so
-  // that the same edits always make the same paths.
+  // Paths around a placed actor follow from the paths without it. Placed actors come last in any order of trying, so
+  // that the same edits always give the same paths.
   std::stable_partition(geometry.begin(), geometry.end(),
                         [this](const NamedParameters& m) { return !editOf(m).addsToOthers(); });
   return geometry;
@@ -219,7 +220,7 @@ std::shared_ptr<const TracedPaths::Paths> TracedPaths::pathsAt(const Task& task,
   if (known && change && !mayTouch(*change, T, *known)) return known;
   ScatterCells cells{T, kCloud_bins * base_.radar().range_bin_m(), kCloud_lobes * 2 / base_.radar().channels(),
                      kCloudElevation};
-  // Points that the base scene hides stay apart where an edit lets rays through: they are weighed otherwise.
+  // Points that the base scene hides stay separate where an edit removes an occluder: they have other weights.
   if (task.opens) {
     cells.sides = [&](const std::vector<Eigen::Vector3d>& points) {
       return base_.rays().visible(T.translation(), points, std::vector<double>(points.size(), 1e-3));
@@ -228,7 +229,7 @@ std::shared_ptr<const TracedPaths::Paths> TracedPaths::pathsAt(const Task& task,
   Paths paths;
   try {
     if (known && edit.geometry == Geometry::kMoreScreens) {
-      // A screen only hides: no new trace is needed.
+      // A screen only hides paths: no new trace is needed.
       paths = *known;
       twin.removeHidden(T, paths);
     } else if (known && edit.placed) {
@@ -238,7 +239,7 @@ std::shared_ptr<const TracedPaths::Paths> TracedPaths::pathsAt(const Task& task,
                                              : twin.trace(task.mechanism, T, &cells);
     }
   } catch (const InputError&) {
-    // The edit puts something where the radar stood: the radar sees nothing.
+    // The edit places something at the radar's position: the radar sees nothing.
   }
   return paths.empty() ? kNoPaths : std::make_shared<const Paths>(std::move(paths));
 }
@@ -258,17 +259,17 @@ void TracedPaths::beginCall() {
     }
   };
   forget(known_, kMostTraced);
-  forget(grazing_, kMostTraced);
+  forget(pose_sensitive_, kMostTraced);
 }
 
-const TracedPaths::ByPose& TracedPaths::grazing(const std::vector<NamedParameters>& mechanisms,
-                                                const std::vector<int>& poses) {
-  // Edits that only add something leave the grazing paths of the rest as they are.
+const TracedPaths::ByPose& TracedPaths::poseSensitive(const std::vector<NamedParameters>& mechanisms,
+                                                      const std::vector<int>& poses) {
+  // Edits that only add something leave the pose-sensitive paths of the others unchanged.
   std::vector<NamedParameters> moving, smooth;
   for (const NamedParameters& m : geometryOf(mechanisms)) {
     if (!editOf(m).addsToOthers()) moving.push_back(m);
   }
-  Entry& entry = grazing_[traceKeyOf(moving)];
+  Entry& entry = pose_sensitive_[traceKeyOf(moving)];
   entry.used = std::max(entry.used, call_);
   entry.paths.resize(data_.poses.size());
   std::vector<std::size_t> missing;
@@ -281,17 +282,17 @@ const TracedPaths::ByPose& TracedPaths::grazing(const std::vector<NamedParameter
   }
   const Twin twin = base_.changed(smooth);
   tbb::parallel_for(std::size_t{0}, missing.size(),
-                    [&](std::size_t j) { entry.paths[missing[j]] = grazingAt(twin, missing[j]); });
+                    [&](std::size_t j) { entry.paths[missing[j]] = poseSensitiveAt(twin, missing[j]); });
   return entry.paths;
 }
 
-std::shared_ptr<const TracedPaths::Paths> TracedPaths::grazingAt(const Twin& twin, std::size_t pose) const {
+std::shared_ptr<const TracedPaths::Paths> TracedPaths::poseSensitiveAt(const Twin& twin, std::size_t pose) const {
   const Eigen::Isometry3d& here = data_.poses[pose].pose.T_map_radar;
   Paths at_pose;
   try {
     at_pose = twin.trace(here);
   } catch (const InputError&) {
-    return kNoPaths;  // an edit puts something where the radar stood
+    return kNoPaths;  // an edit places something at the radar's position
   }
   double strongest_power = 0;
   for (const PathRecord& r : at_pose) strongest_power = std::max(strongest_power, r.amplitude * r.amplitude);
@@ -324,9 +325,9 @@ void TracedPaths::setBaseline(const std::vector<NamedParameters>& mechanisms) {
     wanted.push_back(geometry + traceKeyOf(mechanismsReadBy(m, mechanisms)) + traceKeyOf(m));
   }
   if (wanted != baseline_) {
-    grazing_.clear();
-    grazing(mechanisms, everyPose());
-    grazing_.begin()->second.used = std::numeric_limits<std::size_t>::max();  // never forgotten
+    pose_sensitive_.clear();
+    poseSensitive(mechanisms, everyPose());
+    pose_sensitive_.begin()->second.used = std::numeric_limits<std::size_t>::max();  // never forgotten
   }
   baseline_ = wanted;
   for (auto entry = known_.begin(); entry != known_.end();) {

@@ -13,16 +13,17 @@
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-constexpr double kReach_m = 0.15;      ///< largest range of leakage (causes.md, A1)
-constexpr double kReach_bins = 1.5;    ///< that are looked at in any case
-constexpr double kStep_bins = 0.02;    ///< between ranges that are tried
-constexpr int kNeither = 12;           ///< steps about no range, a quarter of a bin, that are neither before nor behind
+constexpr double kReach_m = 0.15;    ///< largest range of leakage (docs/causes.md, A1)
+constexpr double kReach_bins = 1.5;  ///< range that is searched at least
+constexpr double kStep_bins = 0.02;  ///< between ranges that are tried
+/// Steps about range 0 (a quarter of a bin) that count neither as before nor as behind the radar.
+constexpr int kNeither = 12;
 constexpr double kTail = 4;            ///< degrees of freedom of the complex t, as in ChannelLikelihood
-constexpr double kShare = 0.5;         ///< of a bin that counts: neighbours overlap through the window
-constexpr int kRounds = 6;             ///< of re-weighting
-constexpr double kLeastScale = 1e-30;  ///< of a bin: floor of a division
+constexpr double kShare = 0.5;         ///< weight of a bin: neighbours overlap through the window
+constexpr int kRounds = 6;             ///< iterations of the weights
+constexpr double kLeastScale = 1e-30;  ///< floor of a bin's scale, against division by zero
 
-/// Tone of amplitude 1 at a range, [1][N], with phase 0 at the window's centre.
+/// Samples [1][N] of a tone of amplitude 1 at a range, with phase 0 at the window's centre.
 ComplexGrid unitTone(const RadarConfig& radar, double range_m) {
   ComplexGrid x(1, radar.samples_per_chirp);
   const double rate = 2 * M_PI * radar.slope_hz_per_s * 2 * range_m / kSpeedOfLight_m_per_s;
@@ -32,12 +33,12 @@ ComplexGrid unitTone(const RadarConfig& radar, double range_m) {
   return x;
 }
 
-/// First range bins of all poses, and last ones, where a tone behind the radar appears.
+/// First range bins of all poses, and the last ones, where a tone behind the radar appears.
 class FirstBins {
  public:
   FirstBins(const ChannelData& data, bool behind) : data_(data), chain_(data.radar) {
     reach_m_ = std::max(kReach_m, kReach_bins * data.radar.range_bin_m());
-    // The lobe of the window reaches two bins further.
+    // The window's main lobe reaches two bins further.
     const int last = std::max(4, static_cast<int>(std::ceil(reach_m_ / data.radar.range_bin_m())) + 2) - 1;
     const int samples = data.radar.samples_per_chirp;
     if (2 * last + 1 >= samples) return;
@@ -53,8 +54,8 @@ class FirstBins {
   /// Data of one bin at all poses.
   struct Bin {
     Eigen::MatrixXcd y;     ///< [channels][poses]
-    Eigen::VectorXd power;  ///< [poses], of all channels
-    /// Power [poses] that is left without a tone of these channels, whose value in this bin is the kernel.
+    Eigen::VectorXd power;  ///< [poses], summed over channels
+    /// Power [poses] without a tone of these channels, whose value in this bin is the kernel.
     Eigen::VectorXd left(const std::complex<double>& kernel, const Eigen::VectorXcd& tone) const {
       const Eigen::VectorXcd seen = y.transpose() * (std::conj(kernel) * tone.conjugate());
       return ((power - 2 * seen.real()).array() + std::norm(kernel) * tone.squaredNorm()).max(0.0);
@@ -90,7 +91,7 @@ struct ToneFit {
   double log_likelihood = 0;
 };
 
-/// Fits the channels of a tone (none where `with` is false) and the scale of each bin, by expectation-maximisation of
+/// Fits the channels of a tone (none where `with` is false) and the scale of each bin, by expectation maximisation of
 /// the complex t.
 ToneFit fitTone(const FirstBins& data, const Eigen::VectorXcd& kernel, bool with) {
   const std::size_t bins = data.bins().size();
@@ -123,7 +124,8 @@ ToneFit fitTone(const FirstBins& data, const Eigen::VectorXcd& kernel, bool with
   return fit;
 }
 
-/// Fits a tone at the only pose by least squares over all bins: the scale of a bin cannot be told from a tone in it.
+/// Fits a tone at the only pose by least squares over all bins: one pose does not separate a bin's scale from a tone in
+/// it.
 ToneFit fitOnlyPose(const FirstBins& data, const Eigen::VectorXcd& kernel) {
   ToneFit fit{Eigen::VectorXcd::Zero(data.channels()), 0};
   double all = 0;
@@ -168,7 +170,8 @@ ToneCurve tryRanges(const FirstBins& first, const ChannelData& data, bool behind
   return curve;
 }
 
-/// Judges the tone of the only pose by how much of its power no array response explains; false where it is too weak.
+/// Judges the tone of the only pose by the share of its power that no array response explains. False where the tone is
+/// too weak.
 bool judgeOnlyPose(const FirstBins& first, const ChannelData& data, const Eigen::VectorXcd& kernel,
                    BodyFixedTone& best) {
   const double beyond = (1 - best.array_share) / bounds::kEchoErrorShare;
@@ -188,7 +191,7 @@ bool judgeOnlyPose(const FirstBins& first, const ChannelData& data, const Eigen:
   return true;
 }
 
-/// Range between the steps and its standard error, by a parabola through the likelihood's peak.
+/// Sets the range and its standard error by a parabola through the likelihood's peak.
 void refineRange(const ToneCurve& curve, BodyFixedTone& best) {
   if (curve.highest == 0 || curve.highest + 1 >= static_cast<int>(curve.log_likelihood.size())) return;
   const double before = curve.log_likelihood[static_cast<std::size_t>(curve.highest) - 1];
@@ -201,7 +204,7 @@ void refineRange(const ToneCurve& curve, BodyFixedTone& best) {
   }
 }
 
-/// Chance of so large a gain by the F distribution.
+/// Probability of so large a gain by chance (F distribution).
 double falseAlarmRate(const ChannelData& data, double gain) {
   const double numbers = 2.0 * data.radar.channels() + 1;
   const double others =
@@ -227,7 +230,7 @@ BodyFixedTone findBodyFixedTone(const ChannelData& data, bool behind) {
     best.gain = curve.most - fitTone(first, Eigen::VectorXcd::Zero(kernel.size()), false).log_likelihood;
   }
   if (behind) {
-    // A constant lies at no range; within a quarter of a bin of that a tone is neither before nor behind.
+    // A constant has no range: within a quarter of a bin a tone is neither before nor behind the radar.
     const auto& values = curve.log_likelihood;
     const auto split = values.begin() + std::max(1, curve.steps - kNeither);
     best.behind = *std::max_element(values.begin(), split) - *std::max_element(split, values.end());

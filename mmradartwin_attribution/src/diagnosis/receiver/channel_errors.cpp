@@ -12,22 +12,24 @@
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-constexpr int kDirections = 512;  ///< of sin(azimuth) from -1 to 1: half a step turns the array's ends by 1.2 degrees
-constexpr double kFirst_m = 0.3;  ///< range up to which there is leakage
-constexpr double kLeftShare = 0.002;        ///< of a real echo's power that an array response leaves
-constexpr std::size_t kMostEchoes = 200;    ///< that are used, the strongest
-constexpr int kRounds = 40;                 ///< of directions and factors by turns
-constexpr double kGroup_m = 0.6;            ///< of echoes of one body, which are held out together
-constexpr std::size_t kMostOrders = 200;    ///< of channels, that are tried
-constexpr double kLeastNoisePower = 1e-30;  ///< floor of a division
-constexpr std::size_t kFewestPlaces = 3;    ///< from which on echoes are held out by location, not by range
+/// Steps of sin(azimuth) from -1 to 1: half a step turns the array's ends by 1.2 degrees.
+constexpr int kDirections = 512;
+constexpr double kFirst_m = 0.3;            ///< range up to which there is leakage
+constexpr double kLeftShare = 0.002;        ///< share of a real echo's power that no array response explains
+constexpr std::size_t kMostEchoes = 200;    ///< echoes that are used, the strongest
+constexpr int kRounds = 40;                 ///< alternations between directions and factors
+constexpr double kGroup_m = 0.6;            ///< range span of echoes of one body, which are held out together
+constexpr std::size_t kMostOrders = 200;    ///< orders of channels that are tried
+constexpr double kLeastNoisePower = 1e-30;  ///< floor of the noise, against division by zero
+/// Number of locations from which echoes are held out by location, not by range.
+constexpr std::size_t kFewestPlaces = 3;
 
 /// Echo whose channels are compared with array responses.
 struct Echo {
   Eigen::VectorXcd y;   ///< [M] as delivered
-  double turn_rad = 0;  ///< from one slot to the next
+  double turn_rad = 0;  ///< phase from one slot to the next
   double power = 0;     ///< ratio to the noise
-  int group = 0;        ///< of echoes that are held out together
+  int group = 0;        ///< echoes of one group are held out together
 };
 
 using Factors = Eigen::VectorXcd;
@@ -44,25 +46,26 @@ Eigen::MatrixXcd responses(const RadarConfig& radar) {
   return v;
 }
 
-/// Fits of factors on the channels to the echoes of a session, each from a direction of its own.
+/// Fits factors on the channels to the echoes of a session, each with its own direction.
 class EchoFit {
  public:
   explicit EchoFit(const ChannelData& data) : radar_(data.radar), directions_(responses(data.radar)) {
     const int first = static_cast<int>(std::ceil(kFirst_m / radar_.range_bin_m()));
     const bool by_place = data.locations.size() >= kFewestPlaces;
-    for (const PoseChannels& p : data.poses) {
-      const Eigen::VectorXd power =
-          p.range_spectra.colwise().squaredNorm().transpose() / static_cast<double>(p.range_spectra.rows());
+    for (const PoseChannels& channels : data.poses) {
+      const Eigen::VectorXd power = channels.range_spectra.colwise().squaredNorm().transpose() /
+                                    static_cast<double>(channels.range_spectra.rows());
       const auto group = [&](int bin) {
-        return by_place ? p.location : static_cast<int>(bin * radar_.range_bin_m() / kGroup_m);
+        return by_place ? channels.location : static_cast<int>(bin * radar_.range_bin_m() / kGroup_m);
       };
       for (int r = std::max(1, first); r + 1 < static_cast<int>(power.size()); ++r) {
         if (power[r] < power[r - 1] || power[r] < power[r + 1] ||
-            power[r] < bounds::kLeastEchoOverNoise * p.noise_power)
+            power[r] < bounds::kLeastEchoOverNoise * channels.noise_power)
           continue;
-        echoes_.push_back({p.range_spectra.col(r), 0, power[r] / std::max(p.noise_power, kLeastNoisePower), group(r)});
+        echoes_.push_back(
+            {channels.range_spectra.col(r), 0, power[r] / std::max(channels.noise_power, kLeastNoisePower), group(r)});
       }
-      for (const MovingCell& cell : p.moving) {
+      for (const MovingCell& cell : channels.moving) {
         if (cell.bin < first || cell.power < bounds::kLeastEchoOverNoise) continue;
         echoes_.push_back({cell.channels, cell.turn_rad, cell.power, group(cell.bin)});
       }
@@ -76,7 +79,7 @@ class EchoFit {
   int echoes() const { return static_cast<int>(echoes_.size()); }
   const std::set<int>& groups() const { return groups_; }
 
-  /// Puts channels where `order` says that they belong, and takes out the turn of movers from slot to slot.
+  /// Puts channels into the order `order`, and removes the phase of moving echoes from slot to slot.
   void arrange(const std::vector<int>& order) {
     const Eigen::Index channels = radar_.channels();
     y_.resize(channels, static_cast<Eigen::Index>(echoes_.size()));
@@ -90,15 +93,15 @@ class EchoFit {
     }
   }
 
-  /// Log-likelihood of every echo with these factors on the channels, its direction and amplitude free. Its errors are
-  /// alike in all channels, and their variance is its own, at least kLeftShare's.
+  /// Log-likelihood [echoes] with these factors on the channels, maximised over direction and amplitude. An echo's
+  /// errors have equal variance in all channels, at least that of kLeftShare.
   Eigen::VectorXd logLikelihood(const Factors& factors) const {
     const Directed d = direct(factors);
     return -static_cast<double>(radar_.channels()) * (1 - d.share.array() + kLeftShare).log().matrix();
   }
 
-  /// Factors of most likelihood, without the echoes of one group: directions, amplitudes and weights are found by turns
-  /// with least squares of the factors.
+  /// Factors of maximum likelihood, without the echoes of one group. Directions, amplitudes and weights alternate with
+  /// least squares of the factors.
   Factors fit(ChannelTie tie, std::optional<int> without = std::nullopt) const {
     const int channels = radar_.channels(), receivers = radar_.receivers();
     Factors factors = Factors::Ones(channels);
@@ -119,7 +122,7 @@ class EchoFit {
           sum.segment(t * receivers, receivers).setConstant(sum.segment(t * receivers, receivers).mean());
         }
       } else if (tie == ChannelTie::kReceivers) {
-        // The rank-one table of receivers and transmitters that is nearest.
+        // The nearest rank-one table of receivers and transmitters.
         const Eigen::Map<const Eigen::MatrixXcd> table(sum.data(), receivers, channels / receivers);
         const Eigen::JacobiSVD<Eigen::MatrixXcd> svd(table, Eigen::ComputeThinU | Eigen::ComputeThinV);
         const Eigen::MatrixXcd nearest =
@@ -131,7 +134,7 @@ class EchoFit {
     return factors;
   }
 
-  /// Phases [M] of factors without jumps, relative to channel 0, less the slope that a turn of the radar makes.
+  /// Phases [M] of factors without jumps, relative to channel 0 and without the slope of a turned radar.
   Eigen::VectorXd phases(const Factors& factors, ChannelTie tie) const {
     if (tie == ChannelTie::kTransmitters) return factors.array().arg();
     Eigen::VectorXd phase(factors.size()), place = places();
@@ -144,7 +147,7 @@ class EchoFit {
     return phase.array() - phase[0];
   }
 
-  /// Places [M] along the array, m.
+  /// Positions [M] along the array, m.
   Eigen::VectorXd places() const {
     Eigen::VectorXd place(radar_.channels());
     for (int k = 0; k < radar_.channels(); ++k) place[k] = radar_.virtual_element_m(k).y();
@@ -164,7 +167,7 @@ class EchoFit {
  private:
   /// Best direction of each echo, [echoes].
   struct Directed {
-    Eigen::VectorXd share;       ///< of the echo's power
+    Eigen::VectorXd share;       ///< share of the echo's power
     Eigen::VectorXcd amplitude;  ///< of the response
     Eigen::VectorXi direction;   ///< index
   };
@@ -189,14 +192,14 @@ class EchoFit {
   Eigen::MatrixXcd y_;  ///< [M][echoes] of power 1
 };
 
-/// Order of channels as they are.
+/// Delivered order of channels.
 std::vector<int> asItIs(const RadarConfig& radar) {
   std::vector<int> order(static_cast<std::size_t>(radar.channels()));
   std::iota(order.begin(), order.end(), 0);
   return order;
 }
 
-/// Orders of channels: receivers in any order, the same under all transmitters, and transmitters in any order. Empty
+/// Orders of channels: receivers in any order, the same for all transmitters, and transmitters in any order. Empty
 /// where there are too many.
 std::vector<std::vector<int>> orders(const RadarConfig& radar) {
   const int receivers = radar.receivers(), slots = radar.slots();
@@ -240,7 +243,7 @@ std::optional<ChannelOrder> findChannelOrder(const ChannelData& data) {
   std::stable_sort(tried.begin(), tried.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   const double gain = tried[0].first - as_it_is;
   if (gain < bounds::kLeastNatsOfChannelOrder) return std::nullopt;
-  // Two mirrored orders fit alike where nothing moves: the one that leaves transmitters in place is told.
+  // Mirrored orders fit alike where nothing moves. The one that keeps the transmitters in place is stated.
   const std::size_t chosen =
       tried[0].first - tried[1].first < bounds::kSameOrder_nats && tried[1].second < tried[0].second ? 1 : 0;
   return ChannelOrder{tried[chosen].second, gain, tried[0].first - tried[1].first};
@@ -248,7 +251,7 @@ std::optional<ChannelOrder> findChannelOrder(const ChannelData& data) {
 
 namespace {
 
-/// Fit of factors that are tied in one way, and of the same without each group.
+/// Fit of factors under one constraint, and the same without each group.
 struct TiedFit {
   ChannelTie tie;
   Factors factors;
@@ -266,7 +269,7 @@ TiedFit fitTied(const EchoFit& fit, ChannelTie tie, const Eigen::VectorXd& base)
   return t;
 }
 
-/// Fills the standard errors by the jackknife over groups.
+/// Sets the standard errors by the jackknife over groups.
 void setStandardErrors(const EchoFit& fit, const TiedFit& best, ChannelErrors& errors) {
   const auto groups = static_cast<double>(best.without.size());
   Eigen::ArrayXd phase2 = Eigen::ArrayXd::Zero(errors.phase_rad.size()), gain2 = phase2;
@@ -279,8 +282,8 @@ void setStandardErrors(const EchoFit& fit, const TiedFit& best, ChannelErrors& e
     const Eigen::ArrayXd centred = place.array() - place.mean();
     const double freedom = std::max(1.0, static_cast<double>(place.size()) - 2);
     const double rms = std::sqrt((errors.phase_rad.array() - errors.phase_rad.mean()).square().sum() / freedom);
-    // The slope of errors whose size is known from so few channels has Student's error: it is stated so that the 95 %
-    // interval by the number of groups is as wide.
+    // The slope of so few errors follows Student's t. Its error is scaled so that the 95 % interval by the number of
+    // groups has the right width.
     const double wide = rms * student95(freedom) / student95(groups - 1);
     phase2 += ((place.array() - place[0]) * wide).square() / centred.square().sum() * groups / (groups - 1);
   }
@@ -295,7 +298,7 @@ std::optional<ChannelErrors> findChannelErrors(const ChannelData& data) {
   if (!fit.enough()) return std::nullopt;
   fit.arrange(asItIs(data.radar));
   const Eigen::VectorXd base = fit.logLikelihood(Factors::Ones(data.radar.channels()));
-  // The fewest numbers that predict as well as more do.
+  // The fewest numbers that predict as well as more numbers.
   const TiedFit tied = fitTied(fit, ChannelTie::kReceivers, base), free = fitTied(fit, ChannelTie::kFree, base);
   TiedFit best = fitTied(fit, ChannelTie::kTransmitters, base);
   const double receivers = data.radar.receivers(), slots = data.radar.slots();

@@ -20,7 +20,7 @@ ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const
   session.unexplained = examiner.unexplained();
   if (by_echoes) session.conventions = findSampleConventionByEchoes(session.data);
   if (session.conventions.empty()) return session;
-  // Bytes are judged as they came, movers at their true places.
+  // Bytes are judged as delivered, moving echoes at their true places.
   FrameExaminer repaired(recording.radar);
   session.data = readChannels(recording, repaired, on_progress, [&](AdcCube& frame) {
     for (const SampleConvention& c : session.conventions) undoSampleConvention(c, recording.radar, frame);

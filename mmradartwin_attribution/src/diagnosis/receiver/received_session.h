@@ -14,14 +14,14 @@ namespace mmradartwin::diagnosis::receiver {
 /// Progress of a stage for options.on_progress, which throws DiagnosisCancelled where the user has cancelled. Keeps a
 /// reference to the options.
 ReadingProgress readingProgress(const DiagnosisOptions& options, const std::string& stage);
-/// Recording that was read, with the conventions of its samples as far as leakage and echoes tell them without a scene.
-/// The data are as they ought to have been delivered.
+/// Recording that was read, with the conventions of its samples that leakage and echoes show without a scene. These
+/// conventions are undone in the data.
 struct ReceivedSession {
   ChannelData data;
   std::vector<FrameFinding> frames, unexplained;
   std::vector<SampleConvention> conventions;
 };
-/// Reads a recording; `by_echoes`: looks for conventions. Throws InputError where no pose is left.
+/// Reads a recording. by_echoes: searches for conventions. Throws InputError where no pose is left.
 ReceivedSession receiveSession(const Recording& recording, bool by_echoes, const ReadingProgress& on_progress);
 
 }  // namespace mmradartwin::diagnosis::receiver

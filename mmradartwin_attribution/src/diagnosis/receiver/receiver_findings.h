@@ -12,14 +12,14 @@
 
 namespace mmradartwin::diagnosis::receiver {
 
-// Findings about frames and the receiver; their gain in maps is left open.
+// Findings about frames and the receiver, without their gain in maps.
 
 Finding findingOf(const FrameFinding& frames);
-/// False where a mechanism of the twin states the finding already: it is about the same thing, or a place near by, and
-/// no value is farther from the finding's than the width of its interval.
+/// False where a mechanism of the twin states the finding already: it concerns the same thing or a nearby place, and no
+/// value differs from the finding's by more than the width of its interval.
 bool differsFromStated(const Finding& f, const std::vector<NamedParameters>& stated);
 Finding findingOf(const SampleConvention& convention, const RadarConfig& radar);
-/// `rest` is the data without the tone: levels refer to its strongest echo.
+/// rest: the data without the tone, to whose strongest echo levels refer.
 Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest);
 Finding findingOf(const ChannelErrors& errors);
 

@@ -14,19 +14,19 @@ namespace mmradartwin::diagnosis::receiver {
 namespace {
 
 constexpr double kDbPerNeper = 8.685889638065035;
-constexpr Eigen::Index kFirst = 2;  ///< bin: leakage and offset stand below, their images at the end
-constexpr int kIterations = 6;      ///< of the image and of what stands beside it
+constexpr Eigen::Index kFirst = 2;  ///< first bin: leakage and offset lie below, and their images at the end
+constexpr int kIterations = 6;      ///< alternations between the image and the power beside it
 
 }  // namespace
 
-bool measureImage(const ChannelData& data, Finding& f) {
+bool measureImage(const ChannelData& data, Finding& finding) {
   const std::size_t locations = data.locations.size();
   if (locations < 3) return false;
   std::vector<std::complex<double>> shared;
   std::vector<double> host;
   std::complex<double> beta = 0;
   double hosts = 0;
-  // Cells are weighed by the power beside the image. Weights by all power there would favour cells in which echoes of
+  // Cells are weighted by the power beside the image. Weights by the total power would favour cells in which echoes of
   // the room weaken the image.
   for (int i = 0; i < kIterations; ++i) {
     shared.assign(locations, 0.0);
@@ -53,9 +53,9 @@ bool measureImage(const ChannelData& data, Finding& f) {
   const double width = boost::math::quantile(boost::math::students_t(n - 1), 0.975);
   const double half_db = width * std::max(bounds::kImageError_db, kDbPerNeper * std::sqrt(scatter * n / (n - 1)));
   const double image_db = kDbPerNeper * std::log(std::abs(beta));
-  f.mechanism->values.set("image_db", image_db);
-  f.mechanism->values.set("phase_deg", std::arg(beta) * 180 / M_PI);
-  for (FindingParameter& p : f.parameters) {
+  finding.mechanism->values.set("image_db", image_db);
+  finding.mechanism->values.set("phase_deg", std::arg(beta) * 180 / M_PI);
+  for (FindingParameter& p : finding.parameters) {
     if (p.name != "image_db") continue;
     p.value = image_db;
     p.ci95 = {{image_db - half_db, image_db + half_db}};

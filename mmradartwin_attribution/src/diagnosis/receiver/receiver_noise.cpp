@@ -10,7 +10,8 @@
 namespace mmradartwin::diagnosis::receiver {
 
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated) {
-  // The noise of a sample follows from that of a cell of the average by Hann's sums over N samples, N/2 and 3N/8.
+  // The noise of a sample follows from that of a cell of the average by the sums of Hann's window over N samples, N/2
+  // and 3N/8.
   std::vector<double> levels_db;
   for (const PoseChannels& p : data.poses) {
     if (!(p.noise_power > 0)) continue;
@@ -23,15 +24,15 @@ std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedPar
   const double error = std::max(bounds::kNoiseError_db, scatter / std::sqrt(static_cast<double>(levels_db.size())));
   if (std::abs(delta_db) < std::max(bounds::kLeastNoiseChange_db, bounds::kLeastNoiseChange_errors * error))
     return std::nullopt;
-  Finding f;
-  f.cause = "noise_floor";
-  f.mechanism = stated;
-  f.mechanism->values.set("delta_db", stated.values.number("delta_db") + delta_db);
-  f.parameters = {{"delta_db", "dB", delta_db, {{delta_db - 1.96 * error, delta_db + 1.96 * error}}}};
-  f.candidates = {{f.cause, 1.0}};
-  f.evidence.log_likelihood_gain = 0.5 * delta_db * delta_db / (error * error);
-  f.evidence.false_alarm_rate = std::min(1.0, std::exp(-f.evidence.log_likelihood_gain));
-  return f;
+  Finding finding;
+  finding.cause = "noise_floor";
+  finding.mechanism = stated;
+  finding.mechanism->values.set("delta_db", stated.values.number("delta_db") + delta_db);
+  finding.parameters = {{"delta_db", "dB", delta_db, {{delta_db - 1.96 * error, delta_db + 1.96 * error}}}};
+  finding.candidates = {{finding.cause, 1.0}};
+  finding.evidence.log_likelihood_gain = 0.5 * delta_db * delta_db / (error * error);
+  finding.evidence.false_alarm_rate = std::min(1.0, std::exp(-finding.evidence.log_likelihood_gain));
+  return finding;
 }
 
 }  // namespace mmradartwin::diagnosis::receiver

@@ -8,7 +8,7 @@
 
 namespace mmradartwin::diagnosis::receiver {
 
-/// Finding of noise that departs from the level that the twin's noise_floor states; nothing where it does not.
+/// Finding of a noise level other than the one that the twin's noise_floor states; nothing where they agree.
 std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedParameters& stated);
 
 }  // namespace mmradartwin::diagnosis::receiver

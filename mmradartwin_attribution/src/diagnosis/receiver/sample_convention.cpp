@@ -16,13 +16,13 @@
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-constexpr std::size_t kPoses = 8;     ///< that are looked at: a convention shows at every one
-constexpr int kIterations = 30;       ///< for latents to settle; see docs/calibration_of_bounds.md#kiterations
-constexpr double kBetter_nats = 1;    ///< by which a step to another order is taken
-constexpr int kMostReceivers = 4;     ///< whose orders are all tried
-constexpr int kMostTransmitters = 3;  ///< whose orders are all tried
+constexpr std::size_t kPoses = 8;     ///< poses that are tried: a convention shows at every one
+constexpr int kIterations = 30;       ///< Fisher steps of the latents; see docs/calibration_of_bounds.md#kiterations
+constexpr double kBetter_nats = 1;    ///< gain from which a step to another order is taken
+constexpr int kMostReceivers = 4;     ///< receivers up to which all orders are tried
+constexpr int kMostTransmitters = 3;  ///< transmitters up to which all orders are tried
 
-/// Grid with a mechanism undone; each conjugation is its own inverse.
+/// Grid with a mechanism undone. Each conjugation is its own inverse.
 ComplexGrid undone(const ComplexGrid& x, const NamedParameters& mechanism) {
   ComplexGrid y(x.rows(), x.cols());
   if (mechanism.mechanism == "iq_conjugation") return x.conjugate();
@@ -30,7 +30,7 @@ ComplexGrid undone(const ComplexGrid& x, const NamedParameters& mechanism) {
     for (Eigen::Index n = 0; n < x.cols(); ++n) y.col(n) = x.col((x.cols() - n) % x.cols()).conjugate();
     return y;
   }
-  // order[i] is the true channel that stands in place i.
+  // order[i] is the true channel at index i.
   const std::vector<double>& order = mechanism.values.numbers("order");
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     y.row(static_cast<Eigen::Index>(order[static_cast<std::size_t>(i)])) = x.row(i);
@@ -46,7 +46,7 @@ void undo(const NamedParameters& mechanism, const RadarConfig& radar, MovingCell
     cell.bin = (radar.samples_per_chirp - cell.bin) % radar.samples_per_chirp;
     cell.turn_rad = -cell.turn_rad;
   } else if (mechanism.mechanism == "channel_conjugation") {
-    cell.channels = before.reverse();  // conjugated but for a common phase
+    cell.channels = before.reverse();  // conjugated up to a common phase
   } else {
     const std::vector<double>& order = mechanism.values.numbers("order");
     for (std::size_t i = 0; i < order.size(); ++i) {
@@ -55,14 +55,14 @@ void undo(const NamedParameters& mechanism, const RadarConfig& radar, MovingCell
   }
 }
 
-/// Permutation of channels in this order.
+/// Permutation of channels into this order.
 NamedParameters permutation(const std::vector<int>& order) {
   NamedParameters m = defaultMechanism("channel_permutation");
   m.values.set("order", std::vector<double>(order.begin(), order.end()));
   return m;
 }
 
-/// Orders that exchanged lanes and transmitters make: receivers in any order, the same under every transmitter, and
+/// Orders that exchanged lanes and transmitters cause: receivers in any order, the same for every transmitter, and
 /// transmitters in any order. Empty where there are too many.
 std::vector<std::vector<int>> ordersOfLanes(const RadarConfig& radar) {
   std::vector<std::vector<int>> all;
@@ -127,7 +127,7 @@ void undoSampleConvention(const SampleConvention& convention, const RadarConfig&
 std::vector<SampleConvention> findSampleConventionByEchoes(const ChannelData& data) {
   std::vector<SampleConvention> all;
   ChannelData as_meant = data;
-  // Leakage from transmitters into receivers lies some centimetres before the radar, not behind it.
+  // Leakage from transmitters to receivers lies some centimetres before the radar, not behind it.
   const BodyFixedTone tone = findBodyFixedTone(as_meant, true);
   if (isUnambiguous(tone) && tone.behind > bounds::kLeastNatsBehind) {
     all.push_back({defaultMechanism("iq_conjugation"), tone.behind, std::nullopt});
@@ -141,7 +141,7 @@ std::vector<SampleConvention> findSampleConventionByEchoes(const ChannelData& da
 
 namespace {
 
-/// Some of the poses of a session, evenly.
+/// Some poses of a session, evenly spread.
 ChannelData somePoses(const ChannelData& data) {
   ChannelData some = data;
   if (some.poses.size() > kPoses) {
@@ -163,7 +163,7 @@ class ConventionLikelihood {
         start_(model_.start(echoes_)),
         as_it_is_(data_) {}
   double poses() const { return static_cast<double>(as_it_is_.poses.size()); }
-  /// With latents fitted in so many iterations; null: samples as they are said to be.
+  /// Log-likelihood with the mechanism undone (null: samples as delivered) after that many steps of the latents.
   double operator()(const NamedParameters* mechanism, int iterations) {
     data_.poses = as_it_is_.poses;
     if (mechanism != nullptr) undoSampleConvention({*mechanism, 0, {}}, data_);
@@ -178,7 +178,7 @@ class ConventionLikelihood {
 
  private:
   const PoseAccuracy accuracy_;
-  ChannelData data_;  ///< that the likelihood looks at
+  ChannelData data_;  ///< data that the likelihood refers to
   ExpectedEchoes source_;
   const std::vector<PoseEchoes> echoes_;
   const ChannelLikelihood model_;
@@ -186,8 +186,8 @@ class ConventionLikelihood {
   const ChannelData as_it_is_;
 };
 
-/// Orders a step away from one: two places exchanged, or one channel taken out and put elsewhere, or all channels
-/// shifted: of the right order but for a shift, no other step is better.
+/// Orders one step from another: two channels exchanged, one channel moved elsewhere, or all channels shifted. Only a
+/// shift leads from a shifted order to the right one.
 std::vector<std::vector<int>> ordersBeside(const std::vector<int>& order) {
   std::vector<std::vector<int>> all;
   for (std::size_t i = 0; i < order.size(); ++i) {
@@ -214,7 +214,7 @@ std::vector<std::vector<int>> ordersBeside(const std::vector<int>& order) {
   return all;
 }
 
-/// Best order that can be reached from one step by step.
+/// Best order that steps reach from an order.
 std::vector<int> climb(std::vector<int> order, ConventionLikelihood& likelihood) {
   double best = likelihood.of(order);
   for (bool better = true; better;) {
@@ -232,7 +232,7 @@ std::vector<int> climb(std::vector<int> order, ConventionLikelihood& likelihood)
   return order;
 }
 
-/// Orders from which others are reached: as it is, reversed, and the best one that exchanged lanes make.
+/// Orders from which steps begin: as delivered, reversed, and the best one of exchanged lanes.
 std::vector<std::vector<int>> startOrders(const RadarConfig& radar, ConventionLikelihood& likelihood) {
   std::vector<int> same(static_cast<std::size_t>(radar.channels()));
   std::iota(same.begin(), same.end(), 0);

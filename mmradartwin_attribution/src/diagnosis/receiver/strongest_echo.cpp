@@ -10,35 +10,36 @@ namespace mmradartwin::diagnosis::receiver {
 namespace {
 
 constexpr double kDbPerNeper = 8.685889638065035;
-constexpr double kLevelError_db = 0.3;  ///< of an echo alone in its cell
-constexpr double kSharedError_db = 3;   ///< of an echo whose cell belongs to others, how it adds to which is chance
-constexpr double kReach_bins = 2.5;     ///< within which echoes share a cell
-constexpr double kLobeOverTone = 1.5;   ///< power summed over Hann's lobe over a tone's own
+constexpr double kLevelError_db = 0.3;  ///< standard error for an echo alone in its cell
+/// Standard error for an echo that shares its cell, as relative phases are random.
+constexpr double kSharedError_db = 3;
+constexpr double kReach_bins = 2.5;    ///< distance within which echoes share a cell
+constexpr double kLobeOverTone = 1.5;  ///< power summed over Hann's main lobe, over that of the tone
 
 /// Mean power over the channels, by range bin.
 Eigen::VectorXd measuredPower(const PoseChannels& pose) {
   return pose.range_spectra.colwise().squaredNorm().transpose() / static_cast<double>(pose.range_spectra.rows());
 }
 
-/// Power of a tone about a bin, wherever it lies between the bins.
+/// Power of a tone about a bin, at any position between the bins.
 double tonePower(const Eigen::VectorXd& power, Eigen::Index bin) {
   return power.segment(bin - 2, 5).sum() / kLobeOverTone;
 }
 
-/// Adds to a finding's level, with an error of its own; does nothing to a finding without a level.
-void changeLevel(Finding& f, double by_db, double error_db) {
-  const auto level = std::find_if(f.parameters.begin(), f.parameters.end(),
+/// Changes a finding's level by by_db and adds an error. Does nothing to a finding without a level.
+void changeLevel(Finding& finding, double by_db, double error_db) {
+  const auto level = std::find_if(finding.parameters.begin(), finding.parameters.end(),
                                   [](const FindingParameter& p) { return p.name == "level_db"; });
-  if (level == f.parameters.end()) return;
+  if (level == finding.parameters.end()) return;
   const double was_db = std::get<double>(level->value), half_db = level->ci95[0][1] - was_db;
   const double level_db = was_db + by_db, both_db = std::hypot(half_db, 1.96 * error_db);
   level->value = level_db;
   level->ci95 = {{level_db - both_db, level_db + both_db}};
-  f.mechanism->values.set("level_db", level_db);
+  finding.mechanism->values.set("level_db", level_db);
 }
 
-/// Strongest echo of a session as measured where the twin has an echo, and the share that the twin gives it of the
-/// power there. Echoes that the twin has and the room has not are weak in the data.
+/// Strongest measured echo of a session at the twin's echoes, and the twin's share of the power there. An echo that
+/// only the twin has is weak in the data.
 struct MeasuredEcho {
   double amplitude = 0, share = 1;
 };
@@ -71,7 +72,7 @@ MeasuredEcho strongestMeasured(const Twin& twin, const ChannelData& data) {
   return echo;
 }
 
-/// Error of the strongest echo's level.
+/// Standard error of the strongest echo's level.
 double errorOf_db(const MeasuredEcho& echo) { return kLevelError_db + kSharedError_db * (1 - echo.share); }
 
 }  // namespace

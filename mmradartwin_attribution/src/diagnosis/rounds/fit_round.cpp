@@ -15,56 +15,61 @@
 namespace mmradartwin::diagnosis::rounds {
 namespace {
 
-constexpr std::size_t kMostNames = 5;  ///< fits of one round
+constexpr std::size_t kMostNames = 5;  ///< named causes fitted in a round
 constexpr std::size_t kMostLaws = 4;
-constexpr double kMostFits = 20;  ///< of a round, some six geometries and a box among them
-constexpr double kWorthAFit = 4;  ///< nats promised
-constexpr double kWorthAFitOfGeometry = 0.5;
-constexpr double kLonger[] = {1.5, 2};   ///< starts of a geometry
-constexpr double kWorthABox = 15;        ///< nats of a round one there,
-constexpr double kShareWorthABox = 0.3;  ///< and so much of what the best other fit brings
-constexpr double kNoRival = 1 / 40.0;    ///< of what a plain name brings: who promises less waits for the next round
-constexpr double kShareOfPlain = 0.25;   ///< of the same: who will not bring as much is not fitted to the end
-constexpr double kObjectPlaces = 500;    ///< places of an 8 by 6 m room that a session resolves, as a family
+constexpr double kMostFits = 20;         ///< of a round, for the progress display
+constexpr double kLeastForFit_nats = 4;  ///< screened gain
+constexpr double kLeastForFitOfGeometry_nats = 0.5;
+constexpr double kStartFactors[] = {1.5, 2};  ///< factors on the starts of a geometry
+constexpr double kLeastForBox_nats = 15;      ///< gain of a point object from which a box is tried
+constexpr double kLeastShareForBox = 0.3;     ///< screened gain of a box, over the gain of the best fit
+constexpr double kLeastShareOfRound =
+    1 / 40.0;  ///< screened gain over that of an overwhelming named cause; others wait for the next round
+/// Gain over that of an overwhelming named cause; a climb that will not reach it stops.
+constexpr double kLeastShareOfOverwhelming = 0.25;
+/// Places that a session resolves in a room of 8 by 6 m, as a family of hypotheses.
+constexpr double kObjectPlaces = 500;
 
 bool isObject(const Hypothesis& h) { return h.form() == MechanismForm::kUnmodelledObject; }
 bool isPlaced(const Hypothesis& h) { return isObject(h) || h.form() == MechanismForm::kLateEcho; }
 
 }  // namespace
 
-void FitRound::fitOne(Screened s) {
-  const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism), box = isUnmodelledBox(s.hypothesis);
-  if (s.hypothesis.isGeometry()) {
-    // Latents stand in for a part of it only, as much as their own spread lets them.
-    const std::vector<std::vector<double>> starts = s.starts;
-    for (double longer : kLonger) {
+void FitRound::fitOne(Screened screened) {
+  const bool law = !isCatalogued(screened.hypothesis.mechanism.mechanism), box = isUnmodelledBox(screened.hypothesis);
+  if (screened.hypothesis.isGeometry()) {
+    // Latents absorb a part of a geometry, within their priors: longer starts are tried as well.
+    const std::vector<std::vector<double>> starts = screened.starts;
+    for (double longer : kStartFactors) {
       for (std::vector<double> start : starts) {
         for (double& scaled_values : start) scaled_values *= longer;
-        s.starts.push_back(std::move(start));
+        screened.starts.push_back(std::move(start));
       }
     }
   }
-  context_.report("fitting " + s.hypothesis.label(), std::min(1.0, static_cast<double>(fits_.size()) / kMostFits));
-  const bool around = s.hypothesis.isMove() || box || s.hypothesis.form() == MechanismForm::kLateEcho;
+  context_.report("fitting " + screened.hypothesis.label(),
+                  std::min(1.0, static_cast<double>(fits_.size()) / kMostFits));
+  const bool around = screened.hypothesis.isMove() || box || screened.hypothesis.form() == MechanismForm::kLateEcho;
   // A geometry climbs slowly at first.
-  const double least_nats = s.hypothesis.isGeometry() ? 0 : kShareOfPlain * plain_name_;
-  fits_.push_back(around ? fitObject(context_.fitter, state_, s)
-                         : context_.fitter.fit(state_, s.hypothesis, s.starts, least_nats));
+  const double least_nats = screened.hypothesis.isGeometry() ? 0 : kLeastShareOfOverwhelming * best_overwhelming_name_;
+  fits_.push_back(around ? fitObject(context_.fitter, state_, screened)
+                         : context_.fitter.fit(state_, screened.hypothesis, screened.starts, least_nats));
   context_.echoes.setBaseline(state_.mechanisms);
-  if (!law && context_.fitter.isPlain(fits_.back().gain_without_best_place))
-    plain_name_ = std::max(plain_name_, fits_.back().gain);
-  if (isObject(s.hypothesis) && !box && fits_.back().gain_without_best_place > std::max(kWorthABox, best_object_)) {
+  if (!law && context_.fitter.isOverwhelming(fits_.back().gain_without_best_place))
+    best_overwhelming_name_ = std::max(best_overwhelming_name_, fits_.back().gain);
+  if (isObject(screened.hypothesis) && !box &&
+      fits_.back().gain_without_best_place > std::max(kLeastForBox_nats, best_object_)) {
     best_object_ = fits_.back().gain_without_best_place;
     if (isUnmodelledBox(screened_.back().hypothesis)) screened_.pop_back();
-    screened_.push_back(asBox(context_.data, state_, fits_.back()));  // last: the slowest of all fits
+    screened_.push_back(asBox(context_.data, state_, fits_.back()));  // last, since it is the slowest fit
   }
-  // What latents bring that the fit has found, and the twin as it is had not, is nobody's gain.
-  if (std::optional<ModelState> better = context_.fitter.improved(state_, fits_.back().state.nuisance)) {
+  // Better latents that a fit has found are no gain of its hypothesis: they become the null's.
+  if (std::optional<ModelState> better = context_.fitter.improved(state_, fits_.back().state.latents)) {
     const double nats = better->log_likelihood - state_.log_likelihood;
     state_ = std::move(*better);
-    // Where that is much, it is one place's, and what the others gain beside it is seen by fits from there alone.
+    // A large improvement moves the optimum of the earlier fits: they are fitted again.
     for (HypothesisFit& earlier : fits_) {
-      if (nats > kWorthAFit && &earlier != &fits_.back()) {
+      if (nats > kLeastForFit_nats && &earlier != &fits_.back()) {
         earlier = context_.fitter.fit(state_, earlier.hypothesis, {earlier.scaled_values});
         context_.echoes.setBaseline(state_.mechanisms);
       } else {
@@ -81,56 +86,56 @@ std::vector<HypothesisFit> FitRound::fit(std::vector<Screened> screened, std::si
   screened_ = std::move(screened);
   std::size_t names_fitted = 0, geometries_fitted = 0, laws_fitted = 0, objects_fitted = 0;
   for (std::size_t i = 0; i < screened_.size(); ++i) {
-    Screened s = screened_[i];  // a copy: more may be put behind it
+    Screened screened = screened_[i];  // a copy, since more may be appended
     TriedHypothesis looked_at;
-    looked_at.label = s.hypothesis.label();
-    looked_at.screened_nats = s.screened_nats;
+    looked_at.label = screened.hypothesis.label();
+    looked_at.screened_nats = screened.screened_nats;
     looked_at.gain = std::numeric_limits<double>::quiet_NaN();
     looked_at.round = round;
-    // A promise is a quadratic's and often far too small, most so of geometry, of places and of laws, which paths
-    // promise: names get several chances, laws without a name four. A geometry that latents have covered promises less
-    // than what they leave over (7 cm of position 10 nats, of 1400).
-    const bool law = !isCatalogued(s.hypothesis.mechanism.mechanism);
-    const bool object = isObject(s.hypothesis), geometry = s.hypothesis.isGeometry();
+    // The screened gain follows from a quadratic and is often far too small, most of all for geometries, places and
+    // laws. Several named causes and four laws are therefore fitted. See
+    // docs/calibration_of_bounds.md#screened-gain-of-a-geometry.
+    const bool law = !isCatalogued(screened.hypothesis.mechanism.mechanism);
+    const bool object = isObject(screened.hypothesis), geometry = screened.hypothesis.isGeometry();
     std::size_t& fitted = law ? laws_fitted : object ? objects_fitted : geometry ? geometries_fitted : names_fitted;
-    const bool moved = s.hypothesis.isMove();
-    const bool box = isUnmodelledBox(s.hypothesis);
-    const double rival = kNoRival * plain_name_;
-    const double worth = box                 ? (fits_.empty() ? kWorthABox : kShareWorthABox * fits_.front().gain)
-                         : object            ? bounds::kLeastNatsOfObject
-                         : law               ? bounds::kLeastNatsOfLaw
-                         : geometry || moved ? kWorthAFitOfGeometry
-                                             : std::max(kWorthAFit, rival);
-    // Where an actor went is known by the fit alone: what little the quadratic promises does not rank it.
+    const bool moved = screened.hypothesis.isMove();
+    const bool box = isUnmodelledBox(screened.hypothesis);
+    const double rival = kLeastShareOfRound * best_overwhelming_name_;
+    const double least_nats = box      ? (fits_.empty() ? kLeastForBox_nats : kLeastShareForBox * fits_.front().gain)
+                              : object ? bounds::kLeastNatsOfObject
+                              : law    ? bounds::kLeastNatsOfLaw
+                              : geometry || moved ? kLeastForFitOfGeometry_nats
+                                                  : std::max(kLeastForFit_nats, rival);
+    // Only a fit knows where an actor went: its screened gain does not rank it.
     const std::size_t most = law      ? kMostLaws
                              : object ? kMostObjects
                              : moved  ? kMostNames + kMostOutOfPlace
                                       : kMostNames;
-    if (s.screened_nats > worth && (box || fitted < most)) {
+    if (screened.screened_nats > least_nats && (box || fitted < most)) {
       ++fitted;
-      fitOne(std::move(s));
-    } else if (worth == rival && s.screened_nats > kWorthAFit && s.screened_nats <= rival) {
+      fitOne(std::move(screened));
+    } else if (least_nats == rival && screened.screened_nats > kLeastForFit_nats && screened.screened_nats <= rival) {
       looked_at.verdict = "promises little beside what is plain";
     }
     tried.push_back(looked_at);
   }
-  // Where a geometry explains most, latents may hide that another one explains more: each is fitted then.
+  // Where a geometry explains most, latents may hide that another geometry explains more: each is fitted then.
   const bool leads = !fits_.empty() && fits_.front().hypothesis.isGeometry() && fits_.front().ranking() > 0;
   for (const Screened& s : screened_) {
     const auto fitted = [&](const HypothesisFit& f) { return f.hypothesis.label() == s.hypothesis.label(); };
     if (leads && s.hypothesis.isGeometry() && std::none_of(fits_.begin(), fits_.end(), fitted)) fitOne(s);
   }
-  for (HypothesisFit& f : fits_) {
-    context_.fitter.judge(f, family + static_cast<std::size_t>(isPlaced(f.hypothesis) ? kObjectPlaces : 0));
-    TriedHypothesis& t = triedAs(f, round, tried);
-    t.gain = f.gain;
-    t.gain_without_best_place = f.gain_without_best_place;
-    t.overdispersion = f.overdispersion;
-    t.held_out_gain = f.held_out_gain;
-    t.false_alarm_rate = f.false_alarm_rate;
-    for (std::size_t i = 0; i < f.scaled_values.size(); ++i) {
-      const Coordinate& c = f.hypothesis.coordinates[i];
-      t.fitted += (i ? "; " : "") + c.parameter + " " + number(c.value(f.scaled_values[i]));
+  for (HypothesisFit& fit : fits_) {
+    context_.fitter.judge(fit, family + static_cast<std::size_t>(isPlaced(fit.hypothesis) ? kObjectPlaces : 0));
+    TriedHypothesis& t = triedAs(fit, round, tried);
+    t.gain = fit.gain;
+    t.gain_without_best_place = fit.gain_without_best_place;
+    t.overdispersion = fit.overdispersion;
+    t.held_out_gain = fit.held_out_gain;
+    t.false_alarm_rate = fit.false_alarm_rate;
+    for (std::size_t i = 0; i < fit.scaled_values.size(); ++i) {
+      const Coordinate& c = fit.hypothesis.coordinates[i];
+      t.fitted += (i ? "; " : "") + c.parameter + " " + number(c.value(fit.scaled_values[i]));
     }
   }
   return std::move(fits_);

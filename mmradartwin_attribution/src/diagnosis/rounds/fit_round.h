@@ -9,14 +9,14 @@
 
 namespace mmradartwin::diagnosis::rounds {
 
-/// One round of a diagnosis: of what a ranking promises most of, which are fitted and from where.
+/// One round of fits: the hypotheses with the highest screened gains, each from its starts.
 class FitRound {
  public:
-  /// Keeps references. state: what fits are compared with; gets the better latents that they find.
+  /// Keeps references. state: what fits are compared with; better latents that a fit finds are written to it.
   FitRound(DiagnosisContext& context, ModelState& state) : context_(context), state_(state) {}
 
-  /// screened: most promising first. Fits, best first, judged as of so large a family; puts behind `tried` what was
-  /// looked at.
+  /// Fits of a round, best first, with false-alarm rates for a family of that size. screened: highest gain first. Every
+  /// hypothesis that was considered is appended to `tried`.
   std::vector<HypothesisFit> fit(std::vector<Screened> screened, std::size_t family, int round,
                                  std::vector<TriedHypothesis>& tried);
 
@@ -26,11 +26,12 @@ class FitRound {
   DiagnosisContext& context_;
   ModelState& state_;
   std::vector<Screened> screened_;
-  std::vector<HypothesisFit> fits_;          ///< best first
-  double best_object_ = 0, plain_name_ = 0;  ///< nats of the best fits of these kinds
+  std::vector<HypothesisFit> fits_;  ///< best first
+  double best_object_ = 0,
+         best_overwhelming_name_ = 0;  ///< nats of the best object, and of the best overwhelming named cause
 };
 
-/// The row of a fit of that round.
+/// Row of `tried` about a fit of that round.
 TriedHypothesis& triedAs(const HypothesisFit& fit, int round, std::vector<TriedHypothesis>& tried);
 
 }  // namespace mmradartwin::diagnosis::rounds

@@ -14,19 +14,19 @@
 namespace mmradartwin::diagnosis::rounds {
 Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
                   const Scene& scene, const ChannelData& data) {
-  Finding f;
-  const NamedParameters m = best.hypothesis.at(best.scaled_values);
-  const bool named = isCatalogued(m.mechanism);
-  f.cause = named ? m.mechanism : "unknown";
-  f.mechanism = m;
-  f.parameters =
-      fittedParameters(best.hypothesis, best.scaled_values, best.standard_error, f.cause, data.locations.size());
-  // Names that explain nearly as much, by their share of probability.
+  Finding finding;
+  const NamedParameters mechanism = best.hypothesis.at(best.scaled_values);
+  const bool named = isCatalogued(mechanism.mechanism);
+  finding.cause = named ? mechanism.mechanism : "unknown";
+  finding.mechanism = mechanism;
+  finding.parameters =
+      fittedParameters(best.hypothesis, best.scaled_values, best.standard_error, finding.cause, data.locations.size());
+  // Hypotheses that explain nearly as much share the probability.
   double sum = 0;
   std::vector<std::pair<std::string, double>> alike;
   for (const HypothesisFit& other : fits) {
     const double behind = (best.ranking() - other.ranking()) / best.overdispersion;
-    // Those ahead were refused, or are the same thing.
+    // Fits ahead of this one were rejected, or state the same cause.
     if (behind > bounds::kNotToldApart_nats || behind < 0 || !(other.gain > 0)) continue;
     const std::string& name = other.hypothesis.mechanism.mechanism;
     const double weight = std::exp(-behind);
@@ -37,71 +37,71 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
       sum += weight;
     }
   }
-  for (const auto& [cause, weight] : alike) f.candidates.push_back({cause, weight / sum});
-  if (f.candidates.size() > 1) f.experiment = experimentFor(f.candidates);
+  for (const auto& [cause, weight] : alike) finding.candidates.push_back({cause, weight / sum});
+  if (finding.candidates.size() > 1) finding.experiment = experimentFor(finding.candidates);
   for (const HypothesisFit& other : fits) {
-    // Those ahead were refused.
-    if (other.hypothesis.mechanism.mechanism == m.mechanism || other.ranking() > best.ranking()) continue;
+    // Fits ahead of this one were rejected.
+    if (other.hypothesis.mechanism.mechanism == mechanism.mechanism || other.ranking() > best.ranking()) continue;
     const std::string& name = other.hypothesis.mechanism.mechanism;
-    f.evidence.runner_up = isCatalogued(name) ? name : "unknown";
-    f.evidence.margin = best.gain - std::max(0.0, other.gain);
+    finding.evidence.runner_up = isCatalogued(name) ? name : "unknown";
+    finding.evidence.margin = best.gain - std::max(0.0, other.gain);
     break;
   }
   FindingPlace place;
   if (scene.actorIndex(best.hypothesis.subject) >= 0) place.actors = {best.hypothesis.subject};
-  if (const std::optional<Eigen::Vector2d> at = placeOf(m, scene)) {
+  if (const std::optional<Eigen::Vector2d> at = placeOf(mechanism, scene)) {
     place.x_m = at->x();
     place.y_m = at->y();
   }
-  f.where.push_back(std::move(place));
+  finding.where.push_back(std::move(place));
   if (best.hypothesis.stated) {
     std::string states;
     for (const Coordinate& c : best.hypothesis.coordinates) {
       states += (states.empty() ? "" : ", ") + c.parameter + " " + number(c.neutral);
     }
-    f.description = "instead of what the twin states: " + states;
+    finding.description = "instead of what the twin states: " + states;
   }
-  describeGain(best, before, data, f);
-  return f;
+  describeGain(best, before, data, finding);
+  return finding;
 }
 
-void describeGain(const HypothesisFit& fit, const ModelState& before, const ChannelData& data, Finding& f) {
-  f.evidence.log_likelihood_gain = fit.gain;
-  f.evidence.false_alarm_rate = fit.false_alarm_rate;
+void describeGain(const HypothesisFit& fit, const ModelState& before, const ChannelData& data, Finding& finding) {
+  finding.evidence.log_likelihood_gain = fit.gain;
+  finding.evidence.false_alarm_rate = fit.false_alarm_rate;
   std::vector<std::pair<double, std::string>> poses;
   for (std::size_t i = 0; i < before.by_pose.size(); ++i) {
     poses.emplace_back(fit.state.by_pose[i] - before.by_pose[i], data.poses[i].pose.name);
   }
   std::stable_sort(poses.begin(), poses.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-  f.where.front().poses.clear();
+  finding.where.front().poses.clear();
   for (std::size_t i = 0; i < std::min<std::size_t>(10, poses.size()) && poses[i].first > 1; ++i) {
-    f.where.front().poses.push_back(poses[i].second);
+    finding.where.front().poses.push_back(poses[i].second);
   }
-  if (f.cause == "unknown") {
-    f.description =
-        "no cause of the catalogue explains this; what it looks like: " + describeLaw(fit.hypothesis, *f.mechanism) +
-        "; " + number(fit.gain, 4) + " nats over " + std::to_string(data.poses.size()) + " poses";
+  if (finding.cause == "unknown") {
+    finding.description = "no cause of the catalogue explains this; what it looks like: " +
+                          describeLaw(fit.hypothesis, *finding.mechanism) + "; " + number(fit.gain, 4) + " nats over " +
+                          std::to_string(data.poses.size()) + " poses";
   }
 }
 
-std::optional<Eigen::Vector2d> placeOf(const NamedParameters& m, const Scene& scene) {
-  const MechanismForm form = traitsOf(m.mechanism).form;
+std::optional<Eigen::Vector2d> placeOf(const NamedParameters& mechanism, const Scene& scene) {
+  const MechanismForm form = traitsOf(mechanism.mechanism).form;
   const bool of_place = form == MechanismForm::kUnmodelledObject || form == MechanismForm::kLateEcho ||
-                        (form == MechanismForm::kLaw && LawVariable::isAboutPlace(m.values.text("variable")));
-  if (of_place) return Eigen::Vector2d(m.values.number("x_m"), m.values.number("y_m"));
+                        (form == MechanismForm::kLaw && LawVariable::isAboutPlace(mechanism.values.text("variable")));
+  if (of_place) return Eigen::Vector2d(mechanism.values.number("x_m"), mechanism.values.number("y_m"));
   const bool moved = form == MechanismForm::kActorMoved;
   const bool of_actor =
       moved || form == MechanismForm::kActorAbsent || form == MechanismForm::kReplica || form == MechanismForm::kLaw;
   if (!of_actor) return std::nullopt;
-  const int actor = scene.actorIndex(m.values.text("actor"));
+  const int actor = scene.actorIndex(mechanism.values.text("actor"));
   if (actor < 0) return std::nullopt;
   const Eigen::Vector2d middle = scene.actors[static_cast<std::size_t>(actor)].bounds.center().head<2>();
-  return moved ? middle + Eigen::Vector2d(m.values.number("dx_m"), m.values.number("dy_m")) : middle;
+  return moved ? middle + Eigen::Vector2d(mechanism.values.number("dx_m"), mechanism.values.number("dy_m")) : middle;
 }
 
 namespace {
 
-/// Reason why an object is none, "" where it may be one.
+/// Reason why an object is no finding, "" where it may be one.
 std::string rejectionOfObject(const Parameters& values, const std::vector<FrameFinding>& walkers) {
   const double size_m = values.number("size_m"), x_m = values.number("x_m"), y_m = values.number("y_m");
   const std::string which = ": " + number(size_m) + " m at (" + number(x_m) + ", " + number(y_m) + ")";
@@ -145,9 +145,9 @@ bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure) {
     case ClutterLikeness::kUnlessMapsGainOrLoud:
       return !explains_more && !fit.hypothesis.subject.empty() && is_below_bound();
     case ClutterLikeness::kUnlessSure:
-      return !sure && !fit.plain;
+      return !sure && !fit.overwhelming;
     case ClutterLikeness::kUnlessSureOrStrong:
-      return !sure && !fit.plain && is_below_bound();
+      return !sure && !fit.overwhelming && is_below_bound();
   }
   return false;
 }

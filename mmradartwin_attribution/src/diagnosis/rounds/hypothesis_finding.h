@@ -13,44 +13,43 @@
 
 namespace mmradartwin::diagnosis::rounds {
 
-/// What a fitted hypothesis says, as a finding without its gain on held-out places. `fits`: all of the round, by rank;
-/// `before`: what the twin without it came to.
+/// Finding that states a fitted hypothesis, without its gain on held-out places. fits: all of the round, by rank.
+/// before: state of the twin without the hypothesis.
 Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
                   const Scene& scene, const ChannelData& data);
 
-/// Sets what of a finding its fit says over `before`: evidence but for its rival, the poses that carry it most, an
-/// unknown's description.
+/// Sets what a finding says about its fit over `before`: the evidence except the runner-up, the poses that carry most
+/// of it, and the description of an unknown.
 void describeGain(const HypothesisFit& fit, const ModelState& before, const ChannelData& data, Finding& f);
 
-/// Where in map a mechanism says that something is: an object, a place, the middle of an actor that moved (where it
-/// then stands), is gone or has a law of its own; nothing of all others.
+/// Where in map a mechanism says that something is: an object, a location, the middle of an actor where it now stands,
+/// is missing or has a law of its own. Nothing for other mechanisms.
 std::optional<Eigen::Vector2d> placeOf(const NamedParameters& mechanism, const Scene& scene);
 
-/// Why something fitted is nothing found, "" where it may be: an object or a scattering that clutter is as large as, a
-/// panel that lets all through, a ghost of edges alone, an object where one of the `walkers` (other causes are passed
-/// over) walks, whose echo does not average out over a pose's frames.
+/// Reason why a fit is no finding, "" where it may be one. Refused are: an object or a scattering as weak as clutter, a
+/// panel that lets everything through, a second image (ghost) by edges alone, and an object where one of the `walkers`
+/// walks, whose echo does not average out over a pose's frames. Other causes in `walkers` are ignored.
 std::string rejectionReason(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers);
 
-/// True where the likelihood may have gained by what stands about in any room and no scene has: an object, a late echo
-/// or one actor's weak replica that explains no more of the measured power (explains_more), or a small object, a
-/// material that scatters somewhat and what shines through a panel of which it is not `sure` that they explain more, by
-/// however little.
+/// True where the likelihood may have gained by clutter that no scene lists. That holds for an object, a late echo or
+/// one actor's weak replica that explains no more of the measured power (explains_more). It also holds for a small
+/// object, a scattering material and a transmitting panel where it is not `sure` that they explain more.
 bool isLikeClutter(const HypothesisFit& fit, bool explains_more, bool sure);
 
-/// An actor that is gone explains as much as the same one moved away, without a number: that something is wrong with it
-/// is then as sure.
+/// Gives an absent actor that ranks no lower than the same actor moved away the lower false-alarm rate of the two: it
+/// explains as much without a number.
 void preferAbsences(std::vector<HypothesisFit>& fits);
-/// Of an object that the scene lacks and an actor that moved to its place and explains nearly as much, the actor comes
-/// first: a box of any size at any angle bends to more, and who stands where it stood would have lost its echoes there.
+/// Puts a moved actor before an object at its new place where both explain nearly as much. A box of any size and angle
+/// adapts to more, and an actor at its old place would have lost its echoes there.
 void preferMoves(std::vector<HypothesisFit>& fits, const Scene& scene);
 
-/// Nats by which a fit explains each pose better [poses].
+/// [poses] nats by which a fit explains each pose better.
 Eigen::VectorXd gainByPose(const HypothesisFit& fit, const ModelState& before);
-/// Pearson's, of two gains: near 1 where they explain the same.
+/// Pearson correlation of two gains; near 1 where they explain the same poses.
 double correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
 
-/// That something is wrong with all echoes is as sure as the surest name for it; which name, its likelihood says: where
-/// two gain alike over poses, the likelier one is as sure as the other.
+/// Gives the better of two causes of all echoes that gain alike over poses the lower false-alarm rate of the two. How
+/// sure an error of all echoes is follows from its surest name; which name it has follows from the likelihood.
 void preferBetterNames(std::vector<HypothesisFit>& fits, const ModelState& before);
 
 }  // namespace mmradartwin::diagnosis::rounds

@@ -16,7 +16,7 @@
 namespace mmradartwin::diagnosis::rounds {
 namespace {
 
-constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is looked for in a round
+constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is searched for in a round
 
 }  // namespace
 
@@ -34,7 +34,7 @@ std::vector<RangeShift> HypothesisRounds::takeRangeErrors(ModelState& state) {
   std::vector<RangeShift> shifted = ranking_.shifted(state);
   const auto is_error = [&](const RangeShift& shift) {
     if (std::abs(shift.shift_m) > most_error_m) return false;
-    SessionLatents latents = withoutErrors(state.nuisance, shift.actor);
+    SessionLatents latents = withoutErrors(state.latents, shift.actor);
     latents.actor_range_m[static_cast<std::size_t>(shift.actor)] = shift.shift_m;
     std::optional<ModelState> better = context_.fitter.improved(state, latents);
     if (better) state = std::move(*better);
@@ -102,7 +102,7 @@ bool HypothesisRounds::findOne(int round) {
       return true;
     }
     context_.report("taken back: " + fit.hypothesis.label(), 1);
-    // What looks like an actor's own error may have another cause.
+    // An effect that looks like an actor's own error may have another cause.
     if (!fit.hypothesis.isMove()) maps.addRejected(fit);
   }
   return false;

@@ -9,9 +9,9 @@
 
 namespace mmradartwin::diagnosis::rounds {
 
-// The likelihood gains a little by its own shortcomings, too: a pose's error looks like a little of many things at
-// edges. Where the maps do not gain, a fit needs more evidence. Real effects need not show in maps (an image at -26
-// dB), so that only maps that get plainly worse speak against much evidence.
+// The likelihood gains a little by its own errors: a pose error resembles small amounts of many effects at edges. Where
+// the maps do not gain, a fit needs more evidence. Real effects need not show in maps (a receiver image at -26 dB), so
+// that only clearly worse maps speak against much evidence.
 std::string MapEvidence::rejection(const HypothesisFit& fit, const FindingGain& gain) {
   const auto explained = *gain.explained_power.difference_ci95;
   const double explained_more = gain.explained_power.after - gain.explained_power.before;
@@ -24,29 +24,30 @@ std::string MapEvidence::rejection(const HypothesisFit& fit, const FindingGain& 
     return "clutter is like that, by what the maps gain" + by_how_much;
   }
   if (in_maps) return "";
-  const bool plainly_worse = explained[1] < 0 && explained_more < -bounds::kLeastExplainedMore;
+  // The likelihood knows the errors that it was given and trusts the twin in all else; what makes maps worse has no
+  // second witness.
+  const bool clearly_worse = explained[1] < 0 && explained_more < -bounds::kLeastExplainedMore;
   const Eigen::VectorXd nats_by_pose = gainByPose(fit, before_);
-  if (isWorthIt(fit, explained_more, plainly_worse, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
+  if (!clearly_worse && hasEnoughEvidence(fit, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
   if (likelier) rejected_.push_back({nats_by_pose, true});
-  return "the maps gain nothing" + by_how_much;
+  return (clearly_worse ? "the maps get worse" : "the maps gain nothing") + by_how_much;
 }
 
 void MapEvidence::addRejected(const HypothesisFit& fit) { rejected_.push_back({gainByPose(fit, before_), false}); }
 
-/// True of a fit whose evidence is large enough though the maps do not gain. The maps of echoes that are many points'
-/// differ from what is expected of them by as much as they hold; and few places see an actor, so that little is left of
-/// a gain without the best of them.
-bool MapEvidence::isWorthIt(const HypothesisFit& fit, double explained_more, bool plainly_worse, bool likelier) {
+/// True of a fit that has enough evidence although the maps do not gain. Maps of many scatter points differ from their
+/// expectation by as much as they hold. Few places see one actor, so that little of its gain is left without the best
+/// place.
+bool MapEvidence::hasEnoughEvidence(const HypothesisFit& fit, bool likelier) {
   const bool traces = context_.echoes.altersGeometry(fit.hypothesis.at(fit.scaled_values));
   const double least_nats = leastNats(fit.hypothesis, fit.scaled_values, traces, context_.data.poses.size());
-  const bool in_nats = !plainly_worse && fit.gain_without_best_place / fit.overdispersion > least_nats;
-  const double most_lost = isOfLevels(fit.hypothesis) ? bounds::kMostExplainedLostByLevels : bounds::kMostExplainedLost;
-  const bool plain = fit.plain && !isFaintAddition(fit.hypothesis, fit.scaled_values);
-  return (likelier || fit.isFarAway()) && ((plain && (explained_more > -most_lost || !plainly_worse)) || in_nats);
+  const bool overwhelming = fit.overwhelming && !isFaintAddition(fit.hypothesis, fit.scaled_values);
+  return (likelier || fit.isFarAway()) &&
+         (overwhelming || fit.gain_without_best_place / fit.overdispersion > least_nats);
 }
 
-/// True where a better fit that was rejected explains the same poses. A law without a name may be the cause of
-/// something else beside such a fit, and so may a name beside errors of the session.
+/// True where a better, rejected fit explains the same poses. Two kinds are exempt: a law without a name, which may be
+/// the cause of something else, and a named cause given errors of the session.
 bool MapEvidence::explainsTheSame(const HypothesisFit& fit, const Eigen::VectorXd& nats_by_pose) const {
   const bool named = isCatalogued(fit.hypothesis.mechanism.mechanism);
   return std::any_of(rejected_.begin(), rejected_.end(), [&](const Rejected& other) {

@@ -1,9 +1,11 @@
 #include "diagnosis/rounds/selection.h"
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
 #include "diagnosis/catalogue/bounds.h"
+#include "diagnosis/fit/hypothesis_fitter.h"
 #include "diagnosis/fit/profiled_values.h"
 #include "diagnosis/hypotheses/fitted_parameters.h"
 #include "diagnosis/receiver/receiver_findings.h"
@@ -13,8 +15,8 @@
 namespace mmradartwin::diagnosis::rounds {
 namespace {
 
-constexpr std::size_t kWaysToErr = 4;   ///< geometries that common errors of actors and poses look like
-constexpr std::size_t kMostRivals = 2;  ///< kept of each finding
+constexpr std::size_t kGeometriesOfCommonErrors = 4;  ///< geometries that common errors of actors and poses resemble
+constexpr std::size_t kMostRivals = 2;                ///< rivals kept of each finding
 
 }  // namespace
 
@@ -42,10 +44,10 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
                             std::size_t family) {
   const auto accepted = accepted_;
   const auto findings = findings_;
-  const SessionLatents latents = state_.nuisance;
+  const SessionLatents latents_before = state_.latents;
   family_ = family;
   accept(fit, fits, std::move(finding));
-  state_.nuisance = fit.state.nuisance;
+  state_.latents = fit.state.latents;
   writeBackFindings();
   if (accepted_.size() > 1) refitTogether();
   context_.echoes.setBaseline(mechanisms_);
@@ -54,12 +56,14 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
     withdrawExplainedByUnknown();
   }
   const bool stands = acceptedAs(fit.hypothesis) != accepted_.end();
-  if (!stands || isWithinErrors(fit)) {
+  const bool is_nothing = stands && mayBeNothing(fit.hypothesis);
+  if (!stands || is_nothing || isWithinErrors(fit)) {
     accepted_ = accepted;
     findings_ = findings;
     writeBackFindings();
-    state_.nuisance = latents;
+    state_.latents = latents_before;
     context_.echoes.setBaseline(mechanisms_);
+    if (is_nothing) return "its interval holds the value that does nothing";
     return stands ? "no larger than what errors of actors and poses look like" : "worth nothing beside the rest";
   }
   for (const Accepted& before : accepted) {
@@ -70,12 +74,12 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
   exchangeNames();
   takeOutImage();
   context_.echoes.setBaseline(mechanisms_);
-  const SessionLatents nuisance = state_.nuisance;
-  state_ = context_.fitter.state(mechanisms_, &nuisance);
+  const SessionLatents latents = state_.latents;
+  state_ = context_.fitter.state(mechanisms_, &latents);
   return "";
 }
 
-/// Fits all findings of rounds at once, and withdraws findings that are then worth nothing beside the others.
+/// Fits all findings of rounds jointly, and withdraws findings that then gain nothing given the others.
 void Selection::refitTogether() {
   while (true) {
     context_.report("fitting all findings together", 0);
@@ -85,8 +89,8 @@ void Selection::refitTogether() {
       parts.push_back(a.hypothesis);
       start.push_back(a.scaled_values);
     }
-    const JointFit fit = context_.fitter.refit(before_rounds_, state_.nuisance, parts, start);
-    state_.nuisance = fit.nuisance;
+    const JointFit fit = context_.fitter.refit(before_rounds_, state_.latents, parts, start);
+    state_.latents = fit.latents;
     std::size_t weakest = 0;
     double weakest_rate = -1;
     for (std::size_t i = 0; i < accepted_.size(); ++i) {
@@ -94,10 +98,10 @@ void Selection::refitTogether() {
       a.scaled_values = fit.scaled_values[i];
       a.standard_error = fit.standard_error[i];
       const std::size_t numbers = a.hypothesis.coordinates.size();
-      // A finding that is there or not, or plain whatever its scatter, was judged by its own round. A law is judged
-      // again: it may have stood for what a name had not been fitted to yet.
-      if (numbers == 0 || (a.plain && context_.fitter.isPlain(fit.worth[i].nats))) continue;
-      const double rate = context_.fitter.falseAlarmRate(fit.worth[i].scattered(), a.hypothesis, numbers, family_);
+      // A finding without numbers, or with an overwhelming gain, was judged by its own round. A law is judged again: it
+      // may have stood for a named cause that had not been fitted yet.
+      if (numbers == 0 || (a.overwhelming && context_.fitter.isOverwhelming(fit.evidence[i].nats))) continue;
+      const double rate = context_.fitter.falseAlarmRate(fit.evidence[i].scattered(), a.hypothesis, numbers, family_);
       if (rate > weakest_rate) {
         weakest = i;
         weakest_rate = rate;
@@ -118,7 +122,7 @@ void Selection::withdraw(std::size_t i) {
 }
 
 /// Withdraws causes of all echoes that are no larger than their own errors where something is unknown: the residual of
-/// the unknown's law looks like a little of such a cause. See docs/calibration_of_bounds.md#causes-beside-an-unknown.
+/// the unknown's law resembles a little of such a cause. See docs/calibration_of_bounds.md#causes-beside-an-unknown.
 void Selection::withdrawExplainedByUnknown() {
   const auto is_doubtful = [&](const Accepted& a) {
     const Hypothesis& h = a.hypothesis;
@@ -160,7 +164,7 @@ void Selection::profileFound() {
     parts.push_back(a.hypothesis);
     fits.push_back({a.scaled_values, a.standard_error});
   }
-  profileParts({context_.echoes, context_.likelihood, context_.pose_accuracy, before_rounds_, state_.nuisance}, parts,
+  profileParts({context_.echoes, context_.likelihood, context_.pose_accuracy, before_rounds_, state_.latents}, parts,
                fits);
   for (std::size_t i = 0; i < accepted_.size(); ++i) {
     Accepted& a = accepted_[i];
@@ -173,43 +177,55 @@ void Selection::profileFound() {
   writeBackFindings();
 }
 
-/// True of a geometry whose numbers are no larger than the errors of actors and poses make them, and of a move that is
-/// no farther than an actor's range error: where paths come and go with every millimetre the likelihood may gain much
-/// by either. See docs/calibration_of_bounds.md#sure-offset.
-bool Selection::isWithinErrors(const HypothesisFit& f) const {
-  const Hypothesis& h = f.hypothesis;
-  const auto a = acceptedAs(h);
-  if (a == accepted_.end() || !(h.isMove() || h.isGeometry())) return false;
-  if (h.isMove()) {
-    const NamedParameters move = h.at(a->scaled_values);
+/// True where the 95 % interval of what was found holds the values that do nothing. One-sided numbers have no such
+/// interval: they are there or not.
+bool Selection::mayBeNothing(const Hypothesis& hypothesis) const {
+  const auto found = acceptedAs(hypothesis);
+  if (hypothesis.coordinates.empty() || hypothesis.isOneSided()) return false;
+  const boost::math::chi_squared distribution(static_cast<double>(hypothesis.coordinates.size()));
+  return 2 * natsFromNothing(hypothesis, found->scaled_values, found->standard_error) <
+         boost::math::quantile(distribution, 0.95);
+}
+
+/// True of a geometry whose numbers are within the errors of actors and poses, and of a move within an actor's range
+/// error. The likelihood may gain much by either where paths appear and vanish with each millimetre. See
+/// docs/calibration_of_bounds.md#sure-offset.
+bool Selection::isWithinErrors(const HypothesisFit& fit) const {
+  const Hypothesis& hypothesis = fit.hypothesis;
+  const auto accepted = acceptedAs(hypothesis);
+  if (accepted == accepted_.end() || !(hypothesis.isMove() || hypothesis.isGeometry())) return false;
+  const double per_pose =
+      fit.gain_without_best_place / fit.overdispersion / static_cast<double>(context_.data.poses.size());
+  if (hypothesis.isMove()) {
+    const NamedParameters move = hypothesis.at(accepted->scaled_values);
     const Actor& actor =
-        context_.twin.scene().actors[static_cast<std::size_t>(context_.twin.scene().actorIndex(h.subject))];
+        context_.twin.scene().actors[static_cast<std::size_t>(context_.twin.scene().actorIndex(hypothesis.subject))];
     const double reach_m = actor.bounds.sizes().head<2>().norm() / 2;
     const double farthest_m = std::hypot(move.values.number("dx_m"), move.values.number("dy_m")) +
                               std::abs(move.values.number("dyaw_deg")) * M_PI / 180 * reach_m;
-    if (farthest_m < f.stated.mostRangeError_m()) return true;
+    const bool is_sure = farthest_m > fit.stated.leastMove_m() && per_pose > bounds::kLeastNatsOfOffsetPerPose;
+    if (farthest_m < fit.stated.mostRangeError_m() && !is_sure) return true;
   }
-  // An interval may be wide where the likelihood is rough, so that a large offset with much evidence is believed
-  // whatever its interval says.
-  const double per_pose =
-      f.gain_without_best_place / f.overdispersion / static_cast<double>(context_.data.poses.size());
-  const bool is_aside =
-      h.isGeometry() && f.moved_m() > f.stated.sureOffset_m() && per_pose > bounds::kLeastNatsOfOffsetPerPose;
-  if (f.isFarAway() || is_aside) return false;
-  std::vector<double> errors = a->standard_error;
+  // The interval of an offset may be wide where the likelihood is rough. A large offset with much evidence is therefore
+  // accepted whatever its interval.
+  const bool is_aside = hypothesis.isGeometry() && fit.moved_m() > fit.stated.sureOffset_m() &&
+                        per_pose > bounds::kLeastNatsOfOffsetPerPose;
+  if (fit.isFarAway() || is_aside) return false;
+  std::vector<double> errors = accepted->standard_error;
   bool shifts = false;
   for (std::size_t i = 0; i < errors.size(); ++i) {
-    if (h.coordinates[i].unit != "m") continue;
+    if (hypothesis.coordinates[i].unit != "m") continue;
     shifts = true;
-    errors[i] = std::max(errors[i], f.stated.commonOffset_m());
+    errors[i] = std::max(errors[i], fit.stated.commonOffset_m());
   }
-  if (f.plain && !shifts) return false;
-  const double nats = natsFromNothing(h, a->scaled_values, errors);
-  return context_.fitter.falseAlarmRate(nats, h, h.coordinates.size(), kWaysToErr) > bounds::kFalseAlarmRateOfRound;
+  if (fit.overwhelming && !shifts) return false;
+  const double nats = natsFromNothing(hypothesis, accepted->scaled_values, errors);
+  return context_.fitter.falseAlarmRate(nats, hypothesis, hypothesis.coordinates.size(), kGeometriesOfCommonErrors) >
+         bounds::kFalseAlarmRateOfRound;
 }
 
-/// Measures a receiver's image, once found, against its hosts and takes it out of the data. Fitted as a power its level
-/// would be some 2 dB high, and the residual of that would look like echoes.
+/// Measures a receiver image that was found against its hosts, and removes it from the data. Fitted as a power, its
+/// level would be some 2 dB high and its residual would look like echoes.
 void Selection::takeOutImage() {
   const auto image = std::find_if(accepted_.begin(), accepted_.end(), [](const Accepted& a) {
     return a.hypothesis.form() == MechanismForm::kReceiverImage;
@@ -228,28 +244,29 @@ void Selection::writeBackFindings() {
   mechanisms_ = before_rounds_;
   extended_ = extended_before_rounds_;
   for (const Accepted& a : accepted_) {
-    Finding& f = findings_[a.finding];
-    f.mechanism = a.hypothesis.at(a.scaled_values);
-    f.parameters =
-        fittedParameters(a.hypothesis, a.scaled_values, a.standard_error, f.cause, context_.data.locations.size());
-    for (FindingPlace& place : f.where) {
-      const std::optional<Eigen::Vector2d> at = placeOf(*f.mechanism, context_.twin.scene());
+    Finding& finding = findings_[a.finding];
+    finding.mechanism = a.hypothesis.at(a.scaled_values);
+    finding.parameters = fittedParameters(a.hypothesis, a.scaled_values, a.standard_error, finding.cause,
+                                          context_.data.locations.size());
+    for (FindingPlace& place : finding.where) {
+      const std::optional<Eigen::Vector2d> at = placeOf(*finding.mechanism, context_.twin.scene());
       if (!place.x_m || !at) continue;
       place.x_m = at->x();
       place.y_m = at->y();
     }
-    replaceOrAppend(*f.mechanism, mechanisms_);
-    replaceOrAppend(*f.mechanism, extended_);
+    replaceOrAppend(*finding.mechanism, mechanisms_);
+    replaceOrAppend(*finding.mechanism, extended_);
   }
 }
 
-/// Adds a finding; an unknown stays the last one. fits: all fits of its round.
+/// Adds a finding; an unknown stays last. fits: all fits of its round.
 void Selection::accept(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding) {
   const std::size_t at = findings_.size() - (unknownNats() > 0 ? 1 : 0);
   for (Accepted& a : accepted_) a.finding += a.finding >= at ? 1 : 0;
   std::vector<std::string> beside;
   for (const Accepted& a : accepted_) beside.push_back(a.hypothesis.label());
-  accepted_.push_back({fit.hypothesis, fit.scaled_values, fit.standard_error, fit.plain, at, std::move(beside), {}});
+  accepted_.push_back(
+      {fit.hypothesis, fit.scaled_values, fit.standard_error, fit.overwhelming, at, std::move(beside), {}});
   for (const HypothesisFit& other : fits) {
     // Fits ahead of this one were rejected.
     const bool rival = other.ranking() < fit.ranking() && other.numbers() < fit.numbers() &&
@@ -262,25 +279,25 @@ void Selection::accept(const HypothesisFit& fit, const std::vector<HypothesisFit
   findings_.insert(findings_.begin() + static_cast<std::ptrdiff_t>(at), std::move(finding));
 }
 
-/// Rival of a finding's round that explains more beside all other findings than the finding itself, which then takes
-/// its name; nothing where there is none.
-std::optional<HypothesisFit> Selection::betterName(const Accepted& a) {
+/// Rival of a finding's round that explains more than the finding, given all other findings; it then replaces the
+/// finding. Nothing where there is none.
+std::optional<HypothesisFit> Selection::betterName(const Accepted& accepted) {
   std::vector<NamedParameters> others = before_rounds_;
   for (const Accepted& other : accepted_) {
-    if (&other != &a) replaceOrAppend(other.hypothesis.at(other.scaled_values), others);
+    if (&other != &accepted) replaceOrAppend(other.hypothesis.at(other.scaled_values), others);
   }
   std::optional<ModelState> null;
   std::optional<HypothesisFit> own, best;
-  for (const auto& [rival, scaled_values] : a.rivals) {
+  for (const auto& [rival, scaled_values] : accepted.rivals) {
     const bool free = std::none_of(accepted_.begin(), accepted_.end(), [&, &r = rival](const Accepted& other) {
-      return &other != &a && excludeEachOther(r.mechanism, other.hypothesis.mechanism);
+      return &other != &accepted && excludeEachOther(r.mechanism, other.hypothesis.mechanism);
     });
     if (!free) continue;
     if (!null) {
       context_.report("names beside what was found since", 0);
       context_.echoes.setBaseline(others);
-      null = context_.fitter.state(others, &state_.nuisance);
-      own = context_.fitter.fit(*null, a.hypothesis, {a.scaled_values});
+      null = context_.fitter.state(others, &state_.latents);
+      own = context_.fitter.fit(*null, accepted.hypothesis, {accepted.scaled_values});
     }
     HypothesisFit f = context_.fitter.fit(*null, rival, {scaled_values});
     context_.fitter.judge(f, family_);
@@ -289,14 +306,14 @@ std::optional<HypothesisFit> Selection::betterName(const Accepted& a) {
     best = std::move(f);
   }
   if (!best) return best;
-  Finding& f = findings_[a.finding];
+  Finding& f = findings_[accepted.finding];
   f = findingOf(*best, {*best, *own}, *null, context_.twin.scene(), context_.data);
   if (context_.data.locations.size() > 1) f.gain.emplace();
   return best;
 }
 
-/// Fits the rivals of each finding but the last anew. A cause that was named before others were known may have a
-/// simpler name beside them: a transmitter's error and a turned mount look like an error of every channel.
+/// Fits the rivals of each finding but the last again. A cause that was named before others were known may have a
+/// simpler name given them: a transmitter's error and a turned mount together look like an error of every channel.
 void Selection::exchangeNames() {
   bool exchanged = false;
   for (std::size_t i = 0; i + 1 < accepted_.size(); ++i) {
@@ -306,8 +323,8 @@ void Selection::exchangeNames() {
     const std::string was = a.hypothesis.label(), is = better->hypothesis.label();
     context_.report("found " + is + " instead of " + was, 1);
     renameVerdict(was, "found, later called " + is);
-    a = {better->hypothesis, better->scaled_values, better->standard_error, better->plain, a.finding, {}, {}};
-    state_.nuisance = better->state.nuisance;
+    a = {better->hypothesis, better->scaled_values, better->standard_error, better->overwhelming, a.finding, {}, {}};
+    state_.latents = better->state.latents;
     exchanged = true;
   }
   if (exchanged) refitAndProfile();
@@ -328,7 +345,7 @@ void Selection::orderByGain() {
     findings_[places[i]] = std::move(ordered[i]);
     accepted_[i].finding = places[i];
   }
-  const SessionLatents found = state_.nuisance;
+  const SessionLatents found = state_.latents;
   mechanisms_ = before_rounds_;
   extended_ = extended_before_rounds_;
   std::vector<std::string> before;
@@ -340,23 +357,23 @@ void Selection::orderByGain() {
     replaceOrAppend(a.hypothesis.at(a.scaled_values), mechanisms_);
     replaceOrAppend(a.hypothesis.at(a.scaled_values), extended_);
   }
-  state_.nuisance = found;
+  state_.latents = found;
 }
 
-/// Measures a finding's gain over mechanisms_ again, in nats, maps and metrics.
+/// Measures a finding's gain over mechanisms_ again, in nats, explained power and metrics.
 void Selection::measureAgain(const Accepted& a) {
   context_.report("gain of " + a.hypothesis.label() + " beside those before it", 0);
-  Finding& f = findings_[a.finding];
+  Finding& finding = findings_[a.finding];
   context_.echoes.setBaseline(mechanisms_);
-  const SessionLatents nuisance = state_.nuisance;
-  state_ = context_.fitter.state(mechanisms_, &nuisance);
+  const SessionLatents latents = state_.latents;
+  state_ = context_.fitter.state(mechanisms_, &latents);
   HypothesisFit fit = context_.fitter.fit(state_, a.hypothesis, {a.scaled_values});
   context_.fitter.judge(fit, family_);
-  describeGain(fit, state_, context_.data, f);
-  if (!f.gain) return;  // one location
-  f.where.front().range_m = f.where.front().azimuth_deg = std::nullopt;
-  gains_.ofFit(state_, fit, f);
-  gains_.addMetrics(extended_, fit, *f.gain);
+  describeGain(fit, state_, context_.data, finding);
+  if (!finding.gain) return;  // with one location there is no gain
+  finding.where.front().range_m = finding.where.front().azimuth_deg = std::nullopt;
+  gains_.ofFit(state_, fit, finding);
+  gains_.addMetrics(extended_, fit, *finding.gain);
 }
 
 }  // namespace mmradartwin::diagnosis::rounds

@@ -17,16 +17,16 @@
 
 namespace mmradartwin::diagnosis::rounds {
 
-/// Forward selection with joint refit and backward deletion: what rounds have found so far, fitted together, and the
-/// state of everything else beside it.
+/// Forward selection with joint refit and backward deletion: the findings of the rounds so far, fitted jointly, and the
+/// state of everything else given them.
 class Selection {
  public:
-  /// Keeps references. findings: all of the session; those of rounds are put behind the others. tried: the hypotheses
-  /// that were looked at; the verdict on one may change later.
+  /// Keeps references. findings: all of the session; those of rounds are appended. tried: hypotheses that were
+  /// considered, whose verdicts may change later.
   Selection(DiagnosisContext& context, GainMeasurement& gains, std::vector<Finding>& findings,
             std::vector<TriedHypothesis>& tried);
-  /// Mechanisms as the engine simulates them, and `extended` as the recording has them, with what was taken out of the
-  /// data.
+  /// Starts a selection. mechanisms: as the engine simulates them. extended: as the recording has them, with what was
+  /// taken out of the data.
   void begin(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& extended,
              ModelState state);
 
@@ -36,25 +36,25 @@ class Selection {
   /// Nats of the unknown that was found; 0 where there is none.
   double unknownNats() const;
 
-  /// Takes a fit of a round over state() as one finding more, with the round's other `fits` as its rivals, and refits
-  /// all. `family`: how many hypotheses the round had. Why it does not stand after all, "" where it does; then nothing
-  /// has changed.
+  /// Takes a round's fit over state() as one more finding and refits all. fits: all of the round, as its rivals.
+  /// family: number of hypotheses of the round. Returns the reason why the finding does not stand, with nothing
+  /// changed; "" where it stands.
   std::string take(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding,
                    std::size_t family);
-  /// Findings of rounds by falling gain, an unknown last; gains that were measured beside others than those that now
-  /// stand before them are measured again.
+  /// Sorts the findings of rounds by falling gain, an unknown last. Gains are measured again where other findings now
+  /// precede them.
   void orderByGain();
 
  private:
-  /// What rounds have found, as it was fitted last; `finding` is its place among the findings.
+  /// Finding of a round as it was fitted last; `finding` is its index among the findings.
   struct Accepted {
     Hypothesis hypothesis;
     std::vector<double> scaled_values, standard_error;
-    bool plain;
+    bool overwhelming;
     std::size_t finding;
-    /// Labels of those beside which its gain was measured; none where it was not.
+    /// Labels of the findings given which its gain was measured; none where it was not.
     std::optional<std::vector<std::string>> beside;
-    /// Simpler names that explained nearly as much in its round, with their numbers.
+    /// Simpler hypotheses that explained nearly as much in its round, with their scaled values.
     std::vector<std::pair<Hypothesis, std::vector<double>>> rivals;
   };
   std::vector<Accepted>::const_iterator acceptedAs(const Hypothesis& h) const;
@@ -66,6 +66,7 @@ class Selection {
   void refitAndProfile();
   void renameVerdict(const std::string& label, const std::string& verdict);
   void profileFound();
+  bool mayBeNothing(const Hypothesis& hypothesis) const;
   bool isWithinErrors(const HypothesisFit& fit) const;
   std::optional<HypothesisFit> betterName(const Accepted& a);
   void exchangeNames();
@@ -77,11 +78,11 @@ class Selection {
   std::vector<Finding>& findings_;
   std::vector<TriedHypothesis>& tried_;
   std::vector<NamedParameters> mechanisms_, extended_;
-  /// The same without what rounds have found.
+  /// Mechanisms without the findings of rounds.
   std::vector<NamedParameters> before_rounds_, extended_before_rounds_;
   ModelState state_;
   std::vector<Accepted> accepted_;
-  std::size_t family_ = 1;  ///< hypotheses of the last round
+  std::size_t family_ = 1;  ///< number of hypotheses of the last round
 };
 
 }  // namespace mmradartwin::diagnosis::rounds

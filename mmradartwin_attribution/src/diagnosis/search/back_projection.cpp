@@ -10,18 +10,18 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kGrid_m = 0.1, kLateGrid_m = 0.2;     ///< spacing of the places, of those of late points
-constexpr double kNearest_m = 0.4;                     ///< to the radar, for a pose to see a place
-constexpr double kWidest_sine = 0.95;                  ///< of the azimuth at which a pose sees a place
+constexpr double kGrid_m = 0.1, kLateGrid_m = 0.2;  ///< spacing of the places, of those of late points
+constexpr double kNearest_m = 0.4;                  ///< distance from the radar at which a pose sees a place
+constexpr double kWidest_sine = 0.95;               ///< limit of the sine of the azimuth at which a pose sees a place
 constexpr double kSizes_m[] = {0.04, 0.15, 0.3, 0.5};  ///< diameters that are tried
-constexpr double kLeastLate_m = 0.4, kMostLate_m = 3;  ///< of a late echo behind its place
+constexpr double kLeastLate_m = 0.4, kMostLate_m = 3;  ///< delay of a late echo, as one-way range
 constexpr double kLateRcs_dbsm[] = {-15, -5, 5};       ///< levels of late points that are tried
-constexpr double kLeastRcs_dbsm = -25;                 ///< small things lie about with less
-constexpr double kWide_m[] = {0.12, 0.25};             ///< radii of something wide
-constexpr double kApart_m = 0.5;                       ///< between places that are kept
-constexpr std::size_t kMostPlaces = 4;                 ///< kept
-constexpr double kMostCells = 1e6;                     ///< of a room that is searched
-constexpr double kNearby_m = 0.6;                      ///< from a place, for an actor that may have been moved there
+constexpr double kLeastRcs_dbsm = -25;                 ///< unlisted small things have less
+constexpr double kWide_m[] = {0.12, 0.25};             ///< radii of a wide object
+constexpr double kApart_m = 0.5;                       ///< least distance between places that are kept
+constexpr std::size_t kMostPlaces = 4;                 ///< places that are kept
+constexpr double kMostCells = 1e6;                     ///< cells of a room that is searched
+constexpr double kNearby_m = 0.6;                      ///< distance of an actor that may have been moved to a place
 constexpr double kLargest_m = 2.5;                     ///< diagonal of an actor that can be moved
 constexpr double kOffset_m = 0.1;                      ///< typical change of a place that is fitted
 
@@ -31,10 +31,10 @@ std::string placeName(const ProjectedPlace& place) {
   return at.str();
 }
 
-/// Thing that may stand at a place.
+/// Object that may stand at a place.
 struct Source {
   double size_m = 0;                  ///< diameter of an upright metal cylinder, whose nearest line echoes; 0: a point
-  double behind_m = 0, rcs_dbsm = 0;  ///< of a point: how late it answers, and its level
+  double behind_m = 0, rcs_dbsm = 0;  ///< of a point: delay as one-way range, and radar cross-section
 };
 
 }  // namespace
@@ -47,24 +47,24 @@ Eigen::Vector2d awayFromRadar(const ChannelData& data, const Eigen::Vector2d& pl
 
 namespace {
 
-/// Nats of one more source at every place of a grid over the scene, all poses together and nothing refitted; best
+/// Nats of one more source at every place of a grid over the scene, over all poses and with nothing refitted; best
 /// first.
 std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& model, const ModelState& null,
                                     const std::vector<Source>& sources, double grid_m) {
   const ChannelData& data = model.data();
   const RadarConfig& radar = data.radar;
   const int channels = radar.channels(), samples = radar.samples_per_chirp;
-  // Covariances of all bins, inverted once.
+  // Inverse covariances of all bins.
   std::vector<std::vector<ChannelLikelihood::Whitened>> cells(data.poses.size());
   tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t i) {
-    cells[i] = model.whitened(null.echoes[i], null.nuisance, static_cast<int>(i));
+    cells[i] = model.whitened(null.echoes[i], null.latents, static_cast<int>(i));
   });
   Eigen::AlignedBox3d bounds;
   for (const Actor& a : twin.scene().actors) bounds.extend(a.bounds);
   const int nx = static_cast<int>(bounds.sizes().x() / grid_m), ny = static_cast<int>(bounds.sizes().y() / grid_m);
   if (nx < 1 || ny < 1 || static_cast<double>(nx) * ny > kMostCells) return {};
   std::vector<ProjectedPlace> places(static_cast<std::size_t>(nx) * ny);
-  const double wave = 2 * M_PI / radar.wavelength_m(), gain = std::exp(null.nuisance.log_gain);
+  const double wave = 2 * M_PI / radar.wavelength_m(), gain = std::exp(null.latents.log_gain);
   tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t j) {
     ProjectedPlace& place = places[j];
     place.x_m = bounds.min().x() + grid_m * (static_cast<double>(j % static_cast<std::size_t>(nx)) + 0.5);
@@ -83,8 +83,8 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
       double looked_m = -1;  // radius for which `visible` holds
       bool visible = false;
       for (std::size_t k = 0; k < sources.size(); ++k) {
-        const Source& s = sources[k];
-        const double radius_m = 0.5 * s.size_m, near_m = r - radius_m, at_m = near_m + s.behind_m;
+        const Source& source = sources[k];
+        const double radius_m = 0.5 * source.size_m, near_m = r - radius_m, at_m = near_m + source.behind_m;
         const int bin = static_cast<int>(std::lround(at_m / radar.range_bin_m()));
         if (near_m < kNearest_m || bin < model.firstBin() || bin >= samples) continue;
         if (radius_m != looked_m) {
@@ -96,18 +96,18 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
         const double w = hannResponse(bin - at_m / radar.range_bin_m());
         // Power of a metal cylinder: (lambda/(8 pi r))^2 a/(a + r); of a point: lambda^2 sigma/((4 pi)^3 r^4).
         const double level = radar.wavelength_m() / (8 * M_PI * near_m);
-        const double spread =
-            radius_m > 0 ? radius_m / (radius_m + near_m) : std::pow(10.0, s.rcs_dbsm / 10) / (M_PI * near_m * near_m);
+        const double spread = radius_m > 0 ? radius_m / (radius_m + near_m)
+                                           : std::pow(10.0, source.rcs_dbsm / 10) / (M_PI * near_m * near_m);
         gained(data.poses[i].location, static_cast<Eigen::Index>(k)) += model.gainOfPoint(
             cell, gain * w * w * level * level * spread, v.dot(cell.inverse * v).real(), std::norm(v.dot(cell.solved)));
       }
     }
     for (std::size_t k = 0; k < sources.size(); ++k) {
-      // The place that gains most does not count: something that only one place sees is no object.
+      // The location that gains most is left out: what only one location sees is no object.
       const auto nats = gained.col(static_cast<Eigen::Index>(k));
-      const double broad = nats.sum() - std::max(0.0, nats.maxCoeff());
-      if (broad <= place.screened_nats) continue;
-      place.screened_nats = broad;
+      const double without_best = nats.sum() - std::max(0.0, nats.maxCoeff());
+      if (without_best <= place.screened_nats) continue;
+      place.screened_nats = without_best;
       place.size_m = sources[k].size_m;
       place.behind_m = sources[k].behind_m;
       place.rcs_dbsm = sources[k].rcs_dbsm;
@@ -118,8 +118,8 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
   return places;
 }
 
-/// The best places that lie apart from each other and from the twin's own things of that mechanism: residuals around
-/// one of them come from its shape.
+/// The best places that lie apart from each other and from the twin's own objects of that mechanism, whose residuals
+/// follow from their shape.
 std::vector<ProjectedPlace> apart(const std::vector<ProjectedPlace>& places, const ModelState& null,
                                   const std::string& mechanism) {
   std::vector<ProjectedPlace> known;
@@ -177,24 +177,24 @@ Hypothesis objectAt(const ProjectedPlace& place) {
 }
 
 void freePlace(const ChannelData& data, Screened& object) {
-  Hypothesis& h = object.hypothesis;
-  const Eigen::Vector2d place(h.mechanism.values.number("x_m"), h.mechanism.values.number("y_m"));
-  const bool late = h.form() == MechanismForm::kLateEcho;
+  Hypothesis& hypothesis = object.hypothesis;
+  const Eigen::Vector2d place(hypothesis.mechanism.values.number("x_m"), hypothesis.mechanism.values.number("y_m"));
+  const bool late = hypothesis.form() == MechanismForm::kLateEcho;
   std::vector<std::pair<const char*, double>> free = {{"y_m", kOffset_m}, {"x_m", kOffset_m}};
   if (late) free.insert(free.begin(), {"behind_m", 0.5 * data.radar.range_bin_m()});
   for (const auto& [key, step_m] : free) {
-    const double at_m = h.mechanism.values.number(key);
+    const double at_m = hypothesis.mechanism.values.number(key);
     const double least_m = std::string(key) == "behind_m" ? 0.5 * kLeastLate_m : -1000;
-    h.coordinates.insert(h.coordinates.begin(), {key, "m", -1, at_m, at_m + step_m, least_m, 1000});
+    hypothesis.coordinates.insert(hypothesis.coordinates.begin(), {key, "m", -1, at_m, at_m + step_m, least_m, 1000});
     for (std::vector<double>& start : object.starts) start.insert(start.begin(), 0.0);
   }
   if (late) return;
-  // The side that faces the radar echoes: the axis of something wide stands behind the place.
+  // The side that faces the radar echoes: the axis of a wide object stands behind the place.
   const Eigen::Vector2d away = awayFromRadar(data, place);
   for (double radius_m : kWide_m) {
     const Eigen::Vector2d axis = place + radius_m * away;
-    object.starts.push_back(
-        {h.coordinates[0].scaled(axis.x()), h.coordinates[1].scaled(axis.y()), h.coordinates[2].scaled(2 * radius_m)});
+    object.starts.push_back({hypothesis.coordinates[0].scaled(axis.x()), hypothesis.coordinates[1].scaled(axis.y()),
+                             hypothesis.coordinates[2].scaled(2 * radius_m)});
   }
 }
 

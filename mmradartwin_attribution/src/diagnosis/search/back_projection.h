@@ -13,25 +13,25 @@ struct ProjectedPlace {
   double x_m = 0, y_m = 0;   ///< map; of a cylinder, its axis
   double screened_nats = 0;  ///< nats that it explains, without the location that gains most
   double size_m = 0;         ///< diameter of an upright metal cylinder; 0: a point
-  double behind_m = 0;       ///< of a point: how much later its echo comes than its distance says, one-way
-  double rcs_dbsm = 0;       ///< of a point: its level
+  double behind_m = 0;       ///< of a point: how much later than its distance its echo arrives, as one-way range
+  double rcs_dbsm = 0;       ///< of a point: its radar cross-section
 };
 
-/// Unit vector in map's plane from where the radar was on average to a place.
+/// Unit vector in map's plane from the radar's mean position to a place.
 Eigen::Vector2d awayFromRadar(const ChannelData& data, const Eigen::Vector2d& place);
-/// Places where one more upright cylinder explains most, all poses together and nothing refitted. A grid over the scene
-/// is searched; the places lie apart, best first.
+/// Places on a grid over the scene where one more upright cylinder explains most, over all poses and with nothing
+/// refitted. Places lie apart from each other, best first.
 std::vector<ProjectedPlace> projectBack(const Twin& twin, const ChannelLikelihood& model, const ModelState& null);
-/// Places where a point explains most whose echo comes late by some distance, as projectBack() finds them.
+/// Places where a point with a delayed echo explains most, found as by projectBack().
 std::vector<ProjectedPlace> projectLateBack(const Twin& twin, const ChannelLikelihood& model, const ModelState& null);
 /// Hypothesis of an object at this place; its size is free.
 Hypothesis objectAt(const ProjectedPlace& place);
-/// Hypothesis of a late echo of this place and distance behind it; its level is free.
+/// Hypothesis of a late echo of this place and delay; its level is free.
 Hypothesis lateEchoAt(const ProjectedPlace& place);
-/// Frees the place of objectAt() as well, with starts at the place and behind it as seen from the radar; of
-/// lateEchoAt() frees place and distance.
+/// Frees further coordinates: the place of objectAt(), with starts there and behind it as seen from the radar; the
+/// place and delay of lateEchoAt().
 void freePlace(const ChannelData& data, Screened& object);
-/// Indices of the actors that stand near a place and are small enough to be moved, nearest first.
+/// Indices of actors near a place that are small enough to be moved, nearest first.
 std::vector<int> objectsNear(const Scene& scene, double x_m, double y_m);
 
 }  // namespace mmradartwin::diagnosis::search

@@ -14,15 +14,15 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr std::size_t kScreenPoses = 44;      ///< enough to rank hypotheses
+constexpr std::size_t kScreenPoses = 44;      ///< poses that rank hypotheses
 constexpr std::size_t kFewestPoses = 12;      ///< for costly hypotheses, or those of many numbers
-constexpr std::size_t kLawPoses = 66;         ///< at which paths are measured for laws without a name
-constexpr std::size_t kSecondLook = 9;        ///< hypotheses that are looked at on more poses
-constexpr std::size_t kSecondLookPoses = 66;  ///< then; geometries are looked at on all
+constexpr std::size_t kLawPoses = 66;         ///< poses at which paths are measured for laws without a name
+constexpr std::size_t kSecondLook = 9;        ///< hypotheses that are screened again on more poses
+constexpr std::size_t kSecondLookPoses = 66;  ///< number of these poses; geometries are screened on all
 constexpr std::size_t kSuspects = 6;          ///< actors whose geometry is tried
 constexpr std::size_t kNeighbours = 2;        ///< actors near a place where an object seems to stand
-constexpr std::size_t kMostElsewhere = 2;     ///< actors that are looked for elsewhere by a shift of their echoes
-constexpr double kGainPerNumber_nats = 0.5;   ///< by chance
+constexpr std::size_t kMostElsewhere = 2;     ///< actors that are searched for by a shift of their echoes
+constexpr double kGainPerNumber_nats = 0.5;   ///< expected gain per number by chance
 
 /// Indices of `wanted` of the poses, evenly spread.
 std::vector<int> spread(std::size_t count, std::size_t wanted) {
@@ -32,27 +32,27 @@ std::vector<int> spread(std::size_t count, std::size_t wanted) {
   return poses;
 }
 
-bool promisesMore(const Screened& a, const Screened& b) { return a.screened_nats > b.screened_nats; }
+bool hasMoreScreenedNats(const Screened& a, const Screened& b) { return a.screened_nats > b.screened_nats; }
 
-/// Looks of one round.
+/// Screens of one round.
 class Looks {
  public:
   Looks(DiagnosisContext& context, HypothesisScreen& screen, const std::vector<Hypothesis>& all,
         const ModelState& state)
       : context_(context), screen_(screen), all_(all), state_(state) {}
 
-  /// Chooses the actors whose geometry is tried, and those that are looked for elsewhere.
+  /// Chooses the actors whose geometry is tried, and those that are searched for at other places.
   void suspect(const std::vector<RangeShift>& shifted);
-  /// Looks for objects and late points that the twin lacks; actors near an object become suspicious.
+  /// Searches for objects and late points that the twin lacks. Actors near an object become suspicious.
   void placeObjects();
-  /// Looks at every hypothesis, then at the best ones on more poses. no_use: see HypothesisRanking.
-  void lookAtAll(std::set<std::string>& no_use);
+  /// Screens every hypothesis, then the best ones on more poses. without_gain: see HypothesisRanking.
+  void lookAtAll(std::set<std::string>& without_gain);
   void lookAgain();
   void addLaws();
   void addReplicas();
   void addSharedLatents();
   void addPlaced();
-  /// All hypotheses that were looked at, most promising first.
+  /// All hypotheses that were screened, highest screened gain first.
   std::vector<Screened> ranked();
 
  private:
@@ -60,15 +60,15 @@ class Looks {
   const std::string& nameOf(int actor) const {
     return context_.twin.scene().actors[static_cast<std::size_t>(actor)].name;
   }
-  /// Actor that a hypothesis moves, where the actor is looked for elsewhere; else -1.
+  /// Actor that a hypothesis moves and that is searched for at other places; else -1.
   int outOfPlace(const Hypothesis& hypothesis) const;
   Screened look(const Hypothesis& hypothesis, const std::vector<int>& poses);
   Screened lookAtSome(const Hypothesis& hypothesis) { return look(hypothesis, spread(kScreenPoses)); }
   std::vector<Screened> bestOf(std::size_t most, const std::vector<ProjectedPlace>& places,
                                Hypothesis (*hypothesisAt)(const ProjectedPlace&));
-  /// Takes off what chance promises: half a nat per number on the poses looked at, scaled up as the promise is.
+  /// Subtracts the gain by chance: half a nat per number on the poses of the screen, scaled to all poses.
   void takeOffChance(std::size_t poses, Screened& screened) const;
-  /// Adds a hypothesis that something else points at, or its start where the hypothesis is known.
+  /// Adds a hypothesis that another screen suggests, or adds its start to a known hypothesis.
   void suggest(Screened screened);
 
   DiagnosisContext& context_;
@@ -76,7 +76,7 @@ class Looks {
   const std::vector<Hypothesis>& all_;
   const ModelState& state_;
   std::set<std::string> suspicious_;  ///< actors whose geometry is tried
-  std::set<int> out_of_place_;        ///< actors that are looked for elsewhere
+  std::set<int> out_of_place_;        ///< actors that are searched for at other places
   std::vector<Screened> placed_;      ///< objects and late points
   std::vector<Screened> screened_;
   std::map<std::string, std::size_t> looked_at_;  ///< number of poses, by label
@@ -110,7 +110,7 @@ std::vector<Screened> Looks::bestOf(std::size_t most, const std::vector<Projecte
                                     Hypothesis (*hypothesisAt)(const ProjectedPlace&)) {
   std::vector<Screened> best;
   for (const ProjectedPlace& place : places) best.push_back(lookAtSome(hypothesisAt(place)));
-  std::stable_sort(best.begin(), best.end(), promisesMore);
+  std::stable_sort(best.begin(), best.end(), hasMoreScreenedNats);
   best.resize(std::min(most, best.size()));
   return best;
 }
@@ -141,49 +141,50 @@ void Looks::takeOffChance(std::size_t poses, Screened& screened) const {
       kGainPerNumber_nats * numbers * static_cast<double>(context_.data.poses.size()) / static_cast<double>(poses);
 }
 
-void Looks::lookAtAll(std::set<std::string>& no_use) {
+void Looks::lookAtAll(std::set<std::string>& without_gain) {
   for (std::size_t i = 0; i < all_.size(); ++i) {
-    const Hypothesis& h = all_[i];
-    context_.report("trying " + h.label(), static_cast<double>(i) / static_cast<double>(all_.size()));
-    const bool of_actor = context_.twin.scene().actorIndex(h.subject) >= 0;
-    const std::vector<double> typical(h.coordinates.size(), 1.0);
-    // A costly hypothesis traces the session anew. Actors without suspicion are tried only by what is there or not, on
-    // a few poses.
-    const bool costly = of_actor && suspicious_.count(h.subject) == 0 && context_.echoes.altersGeometry(h.at(typical));
-    if (costly && (!h.isOneSided() || no_use.count(h.label()) > 0)) continue;
-    // A hypothesis of more numbers needs more evaluations: fewer poses rank it.
+    const Hypothesis& hypothesis = all_[i];
+    context_.report("trying " + hypothesis.label(), static_cast<double>(i) / static_cast<double>(all_.size()));
+    const bool of_actor = context_.twin.scene().actorIndex(hypothesis.subject) >= 0;
+    const std::vector<double> typical(hypothesis.coordinates.size(), 1.0);
+    // A costly hypothesis traces the session again. For actors without suspicion only one-sided hypotheses are tried,
+    // on a few poses.
+    const bool costly = of_actor && suspicious_.count(hypothesis.subject) == 0 &&
+                        context_.echoes.altersGeometry(hypothesis.at(typical));
+    if (costly && (!hypothesis.isOneSided() || without_gain.count(hypothesis.label()) > 0)) continue;
+    // A hypothesis of more numbers needs more evaluations, so that fewer poses rank it.
     std::vector<int> poses =
-        spread(costly ? kFewestPoses : std::max(kFewestPoses, kScreenPoses / (1 + h.coordinates.size() / 3)));
-    Screened s = look(h, poses);
-    if (outOfPlace(h) >= 0) poses = spread(context_.data.poses.size());  // around() promises for all poses
-    if (costly && !(s.screened_nats > 0)) no_use.insert(h.label());
+        spread(costly ? kFewestPoses : std::max(kFewestPoses, kScreenPoses / (1 + hypothesis.coordinates.size() / 3)));
+    Screened s = look(hypothesis, poses);
+    // around() scales its gain to all poses.
+    if (outOfPlace(hypothesis) >= 0) poses = spread(context_.data.poses.size());
+    if (costly && !(s.screened_nats > 0)) without_gain.insert(hypothesis.label());
     takeOffChance(poses.size(), s);
     looked_at_[s.hypothesis.label()] = poses.size();
     screened_.push_back(std::move(s));
     context_.echoes.setBaseline(state_.mechanisms);
   }
-  std::stable_sort(screened_.begin(), screened_.end(), promisesMore);
+  std::stable_sort(screened_.begin(), screened_.end(), hasMoreScreenedNats);
 }
 
 void Looks::lookAgain() {
-  // All geometries are kept: every latent holds a part of an error of all ranges or directions, which makes its score
-  // small.
+  // All geometries are kept: latents absorb most of an error of all ranges or directions, which makes its score small.
   std::size_t kept = 0;
   screened_.erase(std::remove_if(screened_.begin(), screened_.end(),
                                  [&](const Screened& s) { return ++kept > kSecondLook && !s.hypothesis.isGeometry(); }),
                   screened_.end());
-  for (Screened& s : screened_) {
-    context_.report("looking again at " + s.hypothesis.label(), 0);
-    const double numbers = static_cast<double>(s.hypothesis.coordinates.size());
-    const std::vector<int> poses = spread(numbers > 3                 ? kScreenPoses
-                                          : s.hypothesis.isGeometry() ? context_.data.poses.size()
-                                                                      : kSecondLookPoses);
-    if (looked_at_[s.hypothesis.label()] < poses.size()) {
-      s = screen_.screen(state_, s.hypothesis, poses);
-      takeOffChance(poses.size(), s);
+  for (Screened& screened : screened_) {
+    context_.report("looking again at " + screened.hypothesis.label(), 0);
+    const double numbers = static_cast<double>(screened.hypothesis.coordinates.size());
+    const std::vector<int> poses = spread(numbers > 3                        ? kScreenPoses
+                                          : screened.hypothesis.isGeometry() ? context_.data.poses.size()
+                                                                             : kSecondLookPoses);
+    if (looked_at_[screened.hypothesis.label()] < poses.size()) {
+      screened = screen_.screen(state_, screened.hypothesis, poses);
+      takeOffChance(poses.size(), screened);
       context_.echoes.setBaseline(state_.mechanisms);
     }
-    s.screened_nats -= numbers;
+    screened.screened_nats -= numbers;
   }
 }
 
@@ -239,7 +240,7 @@ void Looks::addPlaced() {
 }
 
 std::vector<Screened> Looks::ranked() {
-  std::stable_sort(screened_.begin(), screened_.end(), promisesMore);
+  std::stable_sort(screened_.begin(), screened_.end(), hasMoreScreenedNats);
   return std::move(screened_);
 }
 
@@ -258,7 +259,7 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   Looks looks(context_, screen_, all, state);
   looks.suspect(shifted);
   looks.placeObjects();
-  looks.lookAtAll(no_use_);
+  looks.lookAtAll(without_gain_);
   looks.lookAgain();
   looks.addLaws();
   looks.addReplicas();

@@ -9,27 +9,28 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kStep = 0.125;         ///< of derivatives, in the coordinate's scale
-constexpr double kMostStart = 8;        ///< bound of a start, in the coordinate's scale
-constexpr Eigen::Index kAlongLaw = 25;  ///< places of a law at which a name is compared
+constexpr double kStep = 0.125;         ///< step of numerical derivatives, scaled
+constexpr double kMostStart = 8;        ///< limit of a start, scaled
+constexpr Eigen::Index kAlongLaw = 25;  ///< places of a law at which a named hypothesis is compared
 
-/// Least squares of a geometry's coordinates v to the latents z = D v of actors and poses in standard deviations: they
-/// stand in for what the geometry does to ranges and directions.
-Screened sharedGeometry(ExpectedEchoes& source, const Hypothesis& h, const ModelState& null, const LatentSpread& spread,
-                        const PoseAccuracy& accuracy, const std::vector<int>& poses) {
-  const SessionLatents& n = null.nuisance;
-  const Eigen::Index actors = static_cast<Eigen::Index>(n.actor_range_m.size()) - 1;  // the last is of none
+/// Geometry that explains the latents: least squares of its coordinates v in z = D v, where z holds the errors of
+/// actors and poses in standard deviations and D how the geometry changes ranges and directions.
+Screened sharedGeometry(ExpectedEchoes& source, const Hypothesis& hypothesis, const ModelState& null,
+                        const LatentSpread& spread, const PoseAccuracy& accuracy, const std::vector<int>& poses) {
+  const SessionLatents& n = null.latents;
+  const Eigen::Index actors =
+      static_cast<Eigen::Index>(n.actor_range_m.size()) - 1;  // the last one belongs to no actor
   const Eigen::Index rows = actors + static_cast<Eigen::Index>(poses.size());
-  const Eigen::Index columns = static_cast<Eigen::Index>(h.coordinates.size());
+  const Eigen::Index columns = static_cast<Eigen::Index>(hypothesis.coordinates.size());
   Eigen::VectorXd latents(rows);
   for (Eigen::Index a = 0; a < actors; ++a) latents[a] = n.actor_range_m[a] / spread.actor_range_m;
   for (std::size_t j = 0; j < poses.size(); ++j) {
     latents[actors + static_cast<Eigen::Index>(j)] = n.yaw_rad[poses[j]] / accuracy.heading_rad;
   }
   const auto with = [&](const std::vector<double>& scaled_values) {
-    return mechanismsWith(null.mechanisms, {h}, scaled_values);
+    return mechanismsWith(null.mechanisms, {hypothesis}, scaled_values);
   };
-  const std::vector<double> nothing(h.coordinates.size(), 0.0);
+  const std::vector<double> nothing(hypothesis.coordinates.size(), 0.0);
   Eigen::MatrixXd design(rows, columns);
   for (Eigen::Index c = 0; c < columns; ++c) {
     std::vector<double> moved = nothing;
@@ -46,7 +47,7 @@ Screened sharedGeometry(ExpectedEchoes& source, const Hypothesis& h, const Model
   const Eigen::VectorXd v = design.completeOrthogonalDecomposition().solve(latents);
   std::vector<double> start;
   for (Eigen::Index c = 0; c < columns; ++c) start.push_back(std::clamp(v[c], -kMostStart, kMostStart));
-  return {h, 0.5 * (design * v).squaredNorm(), {start}};
+  return {hypothesis, 0.5 * (design * v).squaredNorm(), {start}};
 }
 
 }  // namespace
@@ -55,8 +56,9 @@ std::vector<Screened> sharedLatents(ExpectedEchoes& source, const ModelState& nu
                                     const PoseAccuracy& accuracy, const std::vector<Hypothesis>& all,
                                     const std::vector<int>& poses) {
   const Scene& scene = source.base().scene();
-  const SessionLatents& n = null.nuisance;
-  // An error that all poses or all actors share is a cause. The score test does not see it, since the latents hold it.
+  const SessionLatents& n = null.latents;
+  // An error that all poses or all actors share is a cause. The score test does not see it, since the latents have
+  // absorbed it.
   std::vector<Screened> screened;
   for (const Hypothesis& h : all) {
     if (!h.isGeometry()) continue;
@@ -67,28 +69,29 @@ std::vector<Screened> sharedLatents(ExpectedEchoes& source, const ModelState& nu
       s.screened_nats = 0;
     screened.push_back(std::move(s));
   }
-  // Levels of one material's actors, or of one actor, farther off than such errors are point at the material.
-  for (const Hypothesis& h : all) {
-    if (h.form() != MechanismForm::kMaterialLevel || h.coordinates.size() != 1) continue;
+  // Level errors of one material's actors, or of one actor, beyond their prior suggest the material.
+  for (const Hypothesis& hypothesis : all) {
+    if (hypothesis.form() != MechanismForm::kMaterialLevel || hypothesis.coordinates.size() != 1) continue;
     double sum = 0, count = 0;
     for (std::size_t a = 0; a < scene.actors.size(); ++a) {
       const Actor& actor = scene.actors[a];
-      if ((actor.name != h.subject && actor.material_tag != h.subject) || n.actor_gain[a] == 0) continue;
+      if ((actor.name != hypothesis.subject && actor.material_tag != hypothesis.subject) || n.actor_gain[a] == 0)
+        continue;
       sum += n.actor_gain[a];
       ++count;
     }
     const double z = count > 0 ? sum / (spread.actor_gain * std::sqrt(count)) : 0;
     if (std::abs(z) < bounds::kSharedLatent_sigmas) continue;
     const double delta_db = 10 / std::log(10.0) * sum / count;
-    const Coordinate& c = h.coordinates.front();
-    screened.push_back({h, 0.5 * z * z, {{c.scaled(c.neutral + delta_db)}}});
+    const Coordinate& c = hypothesis.coordinates.front();
+    screened.push_back({hypothesis, 0.5 * z * z, {{c.scaled(c.neutral + delta_db)}}});
   }
   return screened;
 }
 
 namespace {
 
-/// Named hypothesis of a level that falls or rises with range or time, with the mean slope as start.
+/// Named hypothesis of a level that changes linearly with range or time; its start is the law's mean slope.
 std::optional<Screened> namedSlope(const Screened& law, const Parameters& values, const std::vector<Hypothesis>& all) {
   const std::vector<double>&at = values.numbers("at"), &gain_db = values.numbers("gain_db");
   const std::string& variable = values.text("variable");

@@ -8,15 +8,16 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr int kFine = 48, kFinest = 128;  ///< nodes of the finest table; most of them where ranges span a hall
-constexpr double kFineRange_m = 0.2;      ///< between these nodes of ranges
-constexpr int kMostNodes = 8;             ///< of a curve
-constexpr double kShortest = 3.5;         ///< fine steps in a ripple's period
-constexpr double kMostPeriods = 10, kShortest_m = 0.85;  ///< of a ripple; ten periods of range in a room are so short
-constexpr double kSettling[] = {0.05, 0.1, 0.2, 0.4};    ///< of the variable's span, in which an exponential falls by e
-constexpr int kSectors = 24;                             ///< parts of the variable's span whose edges are tried
-constexpr int kNarrowestBump = 4;                        ///< parts between a bump's ends
-constexpr double kLeastShare = 0.02;                     ///< of the paths that lie beyond a table's first and last node
+constexpr int kFine = 48, kFinest = 128;  ///< nodes of the finest table; the limit where ranges span a hall
+constexpr double kFineRange_m = 0.2;      ///< spacing of these nodes over range
+constexpr int kMostNodes = 8;             ///< nodes of a curve
+constexpr double kShortest = 3.5;         ///< fine steps in a ripple's shortest period
+constexpr double kMostPeriods = 10, kShortest_m = 0.85;  ///< periods of a ripple; ten of the shortest span a room
+/// Shares of the variable's span in which an exponential falls by e.
+constexpr double kDecayShares[] = {0.05, 0.1, 0.2, 0.4};
+constexpr int kSectors = 24;          ///< parts of the variable's span whose edges are tried
+constexpr int kNarrowestBump = 4;     ///< parts between a bump's ends
+constexpr double kLeastShare = 0.02;  ///< share of the paths beyond a table's first and last node
 
 std::string threeDigits(double value) {
   std::ostringstream out;
@@ -24,7 +25,7 @@ std::string threeDigits(double value) {
   return out.str();
 }
 
-/// Adds the weights of a table's nodes at x; beyond the ends the first or last node has all.
+/// Adds the weights of a table's nodes at x. Beyond the ends the first or last node has weight 1.
 void addHat(const std::vector<double>& at, double x, double weight, Eigen::Ref<Eigen::RowVectorXd> row) {
   const Eigen::Index last = static_cast<Eigen::Index>(at.size()) - 1;
   if (x <= at.front() || last == 0) {
@@ -52,7 +53,7 @@ Eigen::MatrixXd hats(const std::vector<double>& fine, const std::vector<double>&
   return m;
 }
 
-/// Nodes between which the sorted numbers lie evenly.
+/// Nodes between which the sorted numbers are evenly distributed.
 std::vector<double> evenNodes(const std::vector<double>& sorted, int count) {
   std::vector<double> nodes;
   for (int k = 0; k < count; ++k) {
@@ -94,38 +95,39 @@ Eigen::MatrixXd LawForms::onFine(const LawForm& form) const {
 std::vector<LawForm> LawForms::curves() const {
   std::vector<LawForm> forms;
   for (int count = 2; count <= kMostNodes; ++count) {
-    LawForm f;
+    LawForm form;
     if (turns_) {
-      for (int k = 0; k <= count; ++k) f.at.push_back(-180 + 360.0 * k / count);
+      for (int k = 0; k <= count; ++k) form.at.push_back(-180 + 360.0 * k / count);
     } else {
-      f.at = evenNodes(sorted_, count);
-      f.of_points = true;
+      form.at = evenNodes(sorted_, count);
+      form.of_points = true;
     }
-    const Eigen::Index nodes = static_cast<Eigen::Index>(f.at.size());
+    const Eigen::Index nodes = static_cast<Eigen::Index>(form.at.size());
     if (nodes < count) continue;
-    f.shapes = Eigen::MatrixXd::Identity(nodes, nodes);
+    form.shapes = Eigen::MatrixXd::Identity(nodes, nodes);
     if (turns_) {
-      f.shapes = f.shapes.leftCols(nodes - 1).eval();
-      f.shapes(nodes - 1, 0) = 1;
+      form.shapes = form.shapes.leftCols(nodes - 1).eval();
+      form.shapes(nodes - 1, 0) = 1;
     }
-    if (!constant_) f.shapes = f.shapes.rightCols(f.shapes.cols() - 1).eval();  // the session's gain is free already
-    forms.push_back(std::move(f));
+    // The session's gain is free already.
+    if (!constant_) form.shapes = form.shapes.rightCols(form.shapes.cols() - 1).eval();
+    forms.push_back(std::move(form));
   }
   return forms;
 }
 
 LawForm LawForms::shaped(const std::vector<std::vector<double>>& shapes, int searched, const std::string& words) const {
-  LawForm f;
-  f.at = fine_;
-  f.searched = searched;
-  f.words = words;
+  LawForm form;
+  form.at = fine_;
+  form.searched = searched;
+  form.words = words;
   const Eigen::Index first = constant_ ? 1 : 0;
   const Eigen::Index nodes = static_cast<Eigen::Index>(fine_.size());
-  f.shapes = Eigen::MatrixXd::Ones(nodes, first + static_cast<Eigen::Index>(shapes.size()));
+  form.shapes = Eigen::MatrixXd::Ones(nodes, first + static_cast<Eigen::Index>(shapes.size()));
   for (std::size_t k = 0; k < shapes.size(); ++k) {
-    f.shapes.col(first + static_cast<Eigen::Index>(k)) = Eigen::Map<const Eigen::VectorXd>(shapes[k].data(), nodes);
+    form.shapes.col(first + static_cast<Eigen::Index>(k)) = Eigen::Map<const Eigen::VectorXd>(shapes[k].data(), nodes);
   }
-  return f;
+  return form;
 }
 
 void LawForms::addRipples(bool in_sine, std::vector<LawForm>& to) const {
@@ -162,8 +164,8 @@ std::vector<LawForm> LawForms::others() const {
   std::vector<LawForm> forms;
   const int count = static_cast<int>(fine_.size());
   if (!turns_) addRipples(false, forms);
-  if (of_azimuth_) addRipples(true, forms);  // as interference at an aperture goes
-  for (double share : kSettling) {
+  if (of_azimuth_) addRipples(true, forms);  // interference at an aperture has this form
+  for (double share : kDecayShares) {
     for (bool grows : {false, true}) {
       if (turns_) break;
       std::vector<double> shape;

@@ -11,20 +11,20 @@ namespace mmradartwin::diagnosis::search {
 /// Form of a law over a variable: a table, linear between its points.
 struct LawForm {
   std::vector<double> at;  ///< values of the variable
-  Eigen::MatrixXd shapes;  ///< [at][numbers] table of each number at 1
-  int searched = 0;        ///< further numbers (edges, a period) that are searched for
+  Eigen::MatrixXd shapes;  ///< [at][numbers] the table for each number at 1
+  int searched = 0;        ///< further numbers (edges, a period) that were searched for
   std::string words = "";  ///< "" for a curve, whose numbers are the table's own
   bool local = false;      ///< zero outside a part of the variable
   bool of_points = false;  ///< each number is one point of the table
 
-  /// Numbers that have a price: a constant is free.
+  /// Numbers that have a price; a constant is free.
   int priced(bool constant) const { return static_cast<int>(shapes.cols()) - (constant ? 1 : 0) + searched; }
 };
 
 /// Forms that a law over one variable may have, given the values of the variable.
 class LawForms {
  public:
-  /// values: of all paths, in any order, at least one. constant: a constant is fitted along; a curve contains it, in
+  /// values: of all paths, in any order, at least one. constant: a constant is fitted as well. A curve contains it; in
   /// other forms it is the first number.
   LawForms(const std::string& variable, std::vector<double> values, bool constant);
 

@@ -22,25 +22,26 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kHuber_sigmas = 2;                         ///< deviation from which on a path counts less
-constexpr int kReweighings = 3;                             ///< of the paths
+constexpr double kHuber_sigmas = 2;                         ///< deviation from which a path counts less (Huber)
+constexpr int kReweighings = 3;                             ///< iterations of the weights
 constexpr double kPlanGrid_m = 0.3, kPlanFineGrid_m = 0.1;  ///< spacing of spots in the floor plan; about the best one
-constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};     ///< of spots
-constexpr std::size_t kMostSpots = 10000;                   ///< a hall has too many to tell apart
+constexpr double kPlanRadii_m[] = {0.4, 0.8, 1.4, 2.4};     ///< radii of spots
+constexpr std::size_t kMostSpots = 10000;                   ///< spots of a hall would exceed it
 constexpr int kSpotNumbers = 4;                             ///< place (two), radius and level
-constexpr int kBearings = 24;                               ///< directions of half a turn
-constexpr int kOften = 12;                                  ///< least paths of an actor with laws of its own
-constexpr double kScattersLess = 0.7;  ///< of the scatter before a law, at which the law is judged by its own scatter
-constexpr double kWeakest_db = -45;    ///< weaker echoes count as so strong in a law over amplitudes
-constexpr double kGainPerNumber_nats = 0.5;  ///< by chance
-constexpr double kMostStart = 8;             ///< bound of a start, in the coordinate's scale
+constexpr int kBearings = 24;                               ///< directions over half a turn
+constexpr int kLeastPathsOfActor = 12;                      ///< measured paths of an actor that has laws of its own
+/// Residual scatter over the previous one, below which a law is judged by its own scatter.
+constexpr double kOwnScatterShare = 0.7;
+constexpr double kWeakest_db = -45;          ///< in a law over amplitudes, weaker echoes count as this strong
+constexpr double kGainPerNumber_nats = 0.5;  ///< expected gain per number by chance
+constexpr double kMostStart = 8;             ///< limit of a start, scaled
 
-/// Deviations of all paths by one observable, robustly weighted. P: paths, G: latents, K: directions of a law.
+/// Deviations of all paths in one observable, robustly weighted. P: paths, G: latents, K: directions of a law.
 struct Sample {
   Observable observable;
-  Eigen::VectorXd off;     ///< [P] measured less expected
+  Eigen::VectorXd off;     ///< [P] measured minus expected
   Eigen::VectorXd weight;  ///< [P] 0 where a path does not show the observable
-  double scatter = 1;      ///< of the residuals
+  double scatter = 1;      ///< standard deviation of the residuals
   Eigen::MatrixXd latent;  ///< [P][G] directions of the latents: a constant and the actors' errors
   Eigen::LDLT<Eigen::MatrixXd> latent_solver;
   Eigen::VectorXd latent_prior;  ///< [G] precision
@@ -54,18 +55,18 @@ struct Sample {
 };
 
 /// Regression of an observable on the directions of a law.
-struct Promise {
+struct LawRegression {
   double raw = 0;             ///< nats by which the law explains the paths
-  double overdispersion = 1;  ///< scatter of the scores over places against what chance brings
+  double overdispersion = 1;  ///< scatter of the scores over places, divided by that expected by chance
   Eigen::VectorXd value;      ///< [K] in the observable's unit
-  double constant = 0;        ///< fitted along
+  double constant = 0;        ///< fitted as well
 };
 
-/// Measured paths of a session, and the laws that they promise.
+/// Measured paths of a session, and the laws that they support.
 class LawScreen {
  public:
   LawScreen(const Twin& base, const ChannelLikelihood& model, const ModelState& null, const std::vector<int>& poses);
-  /// Variable of a law, and whose paths it changes.
+  /// Variable of a law, and the actor whose paths it changes.
   struct Over {
     std::string variable, actor = "";  ///< actor empty: all paths
     double bearing_deg = 0;            ///< direction of standing_m
@@ -75,26 +76,26 @@ class LawScreen {
   /// [observables]
   const std::vector<Sample>& samples() const { return samples_; }
   const Sample& gain() const { return samples_.front(); }
-  /// Gain over the radar's place, along the direction that promises most.
+  /// Gain over the radar's position, along the best direction.
   std::optional<Screened> bestBearing() const;
-  /// Gain over the distance to a place at which paths pass or the radar stands, for the place that promises most.
+  /// Gain over the distance to a place that paths pass or where the radar stands, for the best place.
   std::optional<Screened> bestPlace(const std::string& variable) const;
-  /// Steps of the gain, at the times between poses that promise most.
+  /// Steps of the gain, at the best times between poses.
   std::optional<Screened> bestSteps() const;
-  /// False where poses differ in gain by far more than these steps, or a slope over time, explains.
+  /// False where gains differ between poses by far more than these steps, or a slope over time, explain.
   bool gainsFollowTime(const std::optional<Screened>& steps) const;
   /// Actors with enough measured paths for a law of their own.
-  std::vector<std::string> oftenSeen() const;
+  std::vector<std::string> actorsOftenSeen() const;
 
  private:
   Sample sampleOf(const Observable& observable, std::size_t kind) const;
   /// Regression on directions [P][K], beyond what a constant and the actors' own errors explain.
-  Promise promise(const Sample& s, const Eigen::MatrixXd& directions) const;
+  LawRegression regress(const Sample& s, const Eigen::MatrixXd& directions) const;
   /// Directions [P][K] of the paths' gains, from numbers [poses][K] of their poses.
-  Eigen::MatrixXd alikeAtPose(const Eigen::MatrixXd& of_poses) const;
+  Eigen::MatrixXd directionsOfPoses(const Eigen::MatrixXd& of_poses) const;
   /// [poses][steps] 1 for a pose after a step.
   Eigen::MatrixXd afterSteps(const std::vector<double>& steps_s) const;
-  /// Effective number of places that tell of a direction, by the shares of their paths.
+  /// Effective number of places that determine a direction, by the shares of their paths.
   double places(const Sample& s, const Eigen::VectorXd& direction) const;
   Hypothesis law(const Observable& o, const Over& over, const std::vector<double>& at) const;
 
@@ -130,7 +131,7 @@ LawScreen::LawScreen(const Twin& base, const ChannelLikelihood& model, const Mod
   for (std::size_t kind = 0; kind < of.size(); ++kind) samples_.push_back(sampleOf(of[kind], kind));
 }
 
-/// Phases in degrees, each within half a turn of their mean direction: a law may lead beyond 180 degrees.
+/// Unwraps phases in degrees to within half a turn of their mean direction: a law may lead beyond 180 degrees.
 void wrapAround(const Eigen::VectorXd& weight, Eigen::VectorXd& phase_deg) {
   std::complex<double> sum = 0;
   for (Eigen::Index i = 0; i < phase_deg.size(); ++i) sum += std::polar(weight[i], phase_deg[i] * M_PI / 180);
@@ -138,36 +139,36 @@ void wrapAround(const Eigen::VectorXd& weight, Eigen::VectorXd& phase_deg) {
   for (double& v : phase_deg) v = mean_deg + std::remainder(v - mean_deg, 360);
 }
 
-Sample LawScreen::sampleOf(const Observable& o, std::size_t kind) const {
+Sample LawScreen::sampleOf(const Observable& observable, std::size_t kind) const {
   using Kind = Observable::Kind;
   const Eigen::Index count = static_cast<Eigen::Index>(location_.size());
   const Eigen::Index actors = static_cast<Eigen::Index>(base_.scene().actors.size());
-  const bool of_gain = o.kind == Kind::kGain, of_actors = of_gain || o.kind == Kind::kDelay;
-  Sample s;
-  s.observable = o;
-  s.off.resize(count);
+  const bool of_gain = observable.kind == Kind::kGain, of_actors = of_gain || observable.kind == Kind::kDelay;
+  Sample sample;
+  sample.observable = observable;
+  sample.off.resize(count);
   Eigen::VectorXd shows(count);
-  s.latent = Eigen::MatrixXd::Zero(count, 1 + actors);
+  sample.latent = Eigen::MatrixXd::Zero(count, 1 + actors);
   Eigen::Index at = 0;
   for (const MeasuredPose& pose : poses_) {
     for (const MeasuredPath& p : pose.paths) {
       const double share = of_gain ? p.share : 1;
-      s.off[at] = p.off[kind];
+      sample.off[at] = p.off[kind];
       // The heading error of a pose is one number, however many paths the pose has.
-      shows[at] = o.kind == Kind::kAngleOfPose ? 1 / static_cast<double>(pose.paths.size())
-                  : of_actors || p.alone       ? 1
-                                               : 0;
-      s.latent(at, 0) = share;
+      shows[at] = observable.kind == Kind::kAngleOfPose ? 1 / static_cast<double>(pose.paths.size())
+                  : of_actors || p.alone                ? 1
+                                                        : 0;
+      sample.latent(at, 0) = share;
       for (int a : p.record.actors) {
-        if (a >= 0 && of_actors) s.latent(at, 1 + a) += share;
+        if (a >= 0 && of_actors) sample.latent(at, 1 + a) += share;
       }
       ++at;
     }
   }
-  if (o.kind == Kind::kChannelPhase) wrapAround(shows, s.off);
+  if (observable.kind == Kind::kChannelPhase) wrapAround(shows, sample.off);
   const double own = of_gain ? 10 / std::log(10.0) * model_.spread().actor_gain : model_.spread().actor_range_m;
-  s.weight = shows;
-  if (shows.sum() == 0) return s;
+  sample.weight = shows;
+  if (shows.sum() == 0) return sample;
   const auto median = [&](const Eigen::VectorXd& of) {
     std::vector<double> v;
     for (Eigen::Index i = 0; i < count; ++i) {
@@ -177,66 +178,71 @@ Sample LawScreen::sampleOf(const Observable& o, std::size_t kind) const {
     std::nth_element(v.begin(), middle, v.end());
     return *middle;
   };
-  s.scatter = std::max(o.floor, 1.4826 * median((s.off.array() - median(s.off)).abs().matrix()));
+  sample.scatter =
+      std::max(observable.floor, 1.4826 * median((sample.off.array() - median(sample.off)).abs().matrix()));
   const auto setBaseline = [&] {
-    Eigen::MatrixXd information = s.latent.transpose() * s.weight.asDiagonal() * s.latent;
-    information.diagonal() += s.latent_prior;
-    s.latent_solver.compute(information);
-    s.latents = s.latent_solver.solve(s.latent.transpose() * s.weight.cwiseProduct(s.off));
-    s.rest = s.off - s.latent * s.latents;
+    Eigen::MatrixXd information = sample.latent.transpose() * sample.weight.asDiagonal() * sample.latent;
+    information.diagonal() += sample.latent_prior;
+    sample.latent_solver.compute(information);
+    sample.latents = sample.latent_solver.solve(sample.latent.transpose() * sample.weight.cwiseProduct(sample.off));
+    sample.rest = sample.off - sample.latent * sample.latents;
   };
   for (int i = 0; i < kReweighings; ++i) {
-    s.latent_prior = Eigen::VectorXd::Constant(1 + actors, s.scatter * s.scatter / (own * own));
-    s.latent_prior[0] = 1e-9;
+    sample.latent_prior = Eigen::VectorXd::Constant(1 + actors, sample.scatter * sample.scatter / (own * own));
+    sample.latent_prior[0] = 1e-9;
     setBaseline();
-    s.scatter = std::max(o.floor, 1.4826 * median(s.rest.cwiseAbs()));
-    s.weight = shows.cwiseProduct((kHuber_sigmas * s.scatter / s.rest.array().abs().max(1e-12)).min(1.0).matrix());
+    sample.scatter = std::max(observable.floor, 1.4826 * median(sample.rest.cwiseAbs()));
+    sample.weight =
+        shows.cwiseProduct((kHuber_sigmas * sample.scatter / sample.rest.array().abs().max(1e-12)).min(1.0).matrix());
   }
   setBaseline();
-  return s;
+  return sample;
 }
 
-Promise LawScreen::promise(const Sample& s, const Eigen::MatrixXd& directions) const {
+LawRegression LawScreen::regress(const Sample& sample, const Eigen::MatrixXd& directions) const {
   const Eigen::Index n = directions.cols();
   // Latents are eliminated: only the part of a direction that they cannot follow counts.
-  const Eigen::MatrixXd weighted = s.weight.asDiagonal() * directions;
-  const Eigen::MatrixXd follow = s.latent_solver.solve(s.latent.transpose() * weighted);  // [G][K]
-  const Eigen::MatrixXd seen_by_paths = directions.transpose() * weighted - (weighted.transpose() * s.latent) * follow;
-  const Eigen::VectorXd total = weighted.transpose() * s.rest;
-  Promise p;
+  const Eigen::MatrixXd weighted = sample.weight.asDiagonal() * directions;
+  const Eigen::MatrixXd follow = sample.latent_solver.solve(sample.latent.transpose() * weighted);  // [G][K]
+  const Eigen::MatrixXd seen_by_paths =
+      directions.transpose() * weighted - (weighted.transpose() * sample.latent) * follow;
+  const Eigen::VectorXd total = weighted.transpose() * sample.rest;
+  LawRegression regression;
   Eigen::LDLT<Eigen::MatrixXd> solver;
   Eigen::VectorXd latents_after, after;
-  double left = 0, scatter = s.scatter;
+  double left = 0, scatter = sample.scatter;
   while (true) {
-    const double prior = std::pow(scatter / s.observable.usual, 2);
+    const double prior = std::pow(scatter / sample.observable.usual, 2);
     Eigen::MatrixXd information = seen_by_paths;
     information.diagonal().array() += prior;
     solver.compute(information);
-    p.value = solver.solve(total);
-    latents_after = s.latents - follow * p.value;
-    after = s.off - s.latent * latents_after - directions * p.value;
-    const double squares = s.squares(after, latents_after);
-    left = squares + prior * p.value.squaredNorm();
+    regression.value = solver.solve(total);
+    latents_after = sample.latents - follow * regression.value;
+    after = sample.off - sample.latent * latents_after - directions * regression.value;
+    const double squares = sample.squares(after, latents_after);
+    left = squares + prior * regression.value.squaredNorm();
     // Residuals of a law of many times the usual size scatter far less than the paths did before.
-    const double own = std::max(s.observable.floor, std::sqrt(squares / std::max(1.0, s.weight.sum())));
-    if (own > kScattersLess * scatter) break;
+    const double own = std::max(sample.observable.floor, std::sqrt(squares / std::max(1.0, sample.weight.sum())));
+    if (own > kOwnScatterShare * scatter) break;
     scatter = own;
   }
-  p.constant = latents_after[0];
+  regression.constant = latents_after[0];
   // The scatter is free as well: nats at its maximum likelihood.
-  p.raw = whole_ * 0.5 * s.weight.sum() * std::log(std::max(1.0, s.squares(s.rest, s.latents) / left));
+  regression.raw =
+      whole_ * 0.5 * sample.weight.sum() * std::log(std::max(1.0, sample.squares(sample.rest, sample.latents) / left));
   const double locations = static_cast<double>(model_.data().locations.size());
   if (locations > 1) {
-    const Eigen::MatrixXd seen = directions - s.latent * follow;
+    const Eigen::MatrixXd seen = directions - sample.latent * follow;
     Eigen::MatrixXd by_location = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model_.data().locations.size()), n);
     for (Eigen::Index i = 0; i < after.size(); ++i) {
-      by_location.row(location_[static_cast<std::size_t>(i)]) += s.weight[i] * after[i] * seen.row(i);
+      by_location.row(location_[static_cast<std::size_t>(i)]) += sample.weight[i] * after[i] * seen.row(i);
     }
-    const double own = left / std::max(1.0, s.weight.sum());
+    const double own = left / std::max(1.0, sample.weight.sum());
     const Eigen::MatrixXd spread = by_location.transpose() * by_location * (locations / (locations - 1) / own);
-    p.overdispersion = std::clamp(solver.solve(spread).trace() / static_cast<double>(n), 1.0, kMostOverdispersion);
+    regression.overdispersion =
+        std::clamp(solver.solve(spread).trace() / static_cast<double>(n), 1.0, kMostOverdispersion);
   }
-  return p;
+  return regression;
 }
 
 double LawScreen::places(const Sample& s, const Eigen::VectorXd& direction) const {
@@ -247,21 +253,21 @@ double LawScreen::places(const Sample& s, const Eigen::VectorXd& direction) cons
   return std::pow(by_location.sum(), 2) / std::max(1e-300, by_location.squaredNorm());
 }
 
-Hypothesis LawScreen::law(const Observable& o, const Over& over, const std::vector<double>& at) const {
-  Hypothesis h;
-  h.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kLaw));
-  h.mechanism.values.set("variable", over.variable);
-  h.mechanism.values.set("at", at);
-  h.mechanism.values.set(o.parameter, std::vector<double>(at.size(), 0.0));
-  h.mechanism.values.set("actor", over.actor);
-  h.mechanism.values.set("bearing_deg", over.bearing_deg);
-  h.mechanism.values.set("channels", o.channels);
-  h.subject = std::string(o.parameter) + " over " + over.variable + (over.actor.empty() ? "" : " of " + over.actor) +
-              channelsInWords(h.mechanism);
-  return h;
+Hypothesis LawScreen::law(const Observable& observable, const Over& over, const std::vector<double>& at) const {
+  Hypothesis hypothesis;
+  hypothesis.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kLaw));
+  hypothesis.mechanism.values.set("variable", over.variable);
+  hypothesis.mechanism.values.set("at", at);
+  hypothesis.mechanism.values.set(observable.parameter, std::vector<double>(at.size(), 0.0));
+  hypothesis.mechanism.values.set("actor", over.actor);
+  hypothesis.mechanism.values.set("bearing_deg", over.bearing_deg);
+  hypothesis.mechanism.values.set("channels", observable.channels);
+  hypothesis.subject = std::string(observable.parameter) + " over " + over.variable +
+                       (over.actor.empty() ? "" : " of " + over.actor) + channelsInWords(hypothesis.mechanism);
+  return hypothesis;
 }
 
-/// Coordinates of a form's numbers, o.typical being the typical value.
+/// Coordinates of a form's numbers; o.typical is the typical value.
 std::vector<Coordinate> coordinatesOf(const LawForm& form, const Observable& o) {
   std::vector<Coordinate> coordinates;
   for (Eigen::Index k = 0; k < form.shapes.cols(); ++k) {
@@ -277,10 +283,10 @@ std::vector<Coordinate> coordinatesOf(const LawForm& form, const Observable& o) 
   return coordinates;
 }
 
-std::optional<Screened> LawScreen::best(const Sample& s, const Over& over) const {
+std::optional<Screened> LawScreen::best(const Sample& sample, const Over& over) const {
   const int actor = base_.scene().actorIndex(over.actor);
   const LawVariable of(over.variable, {0, 0, over.bearing_deg, actor});
-  const Observable& o = s.observable;
+  const Observable& observable = sample.observable;
   std::vector<LawVariable::Values> values;
   std::vector<double> all;
   for (const MeasuredPose& pose : poses_) {
@@ -295,8 +301,8 @@ std::optional<Screened> LawScreen::best(const Sample& s, const Over& over) const
       values.push_back(v);
     }
   }
-  if (all.empty() || s.weight.sum() == 0) return std::nullopt;
-  const LawForms forms(over.variable, std::move(all), o.constant);
+  if (all.empty() || sample.weight.sum() == 0) return std::nullopt;
+  const LawForms forms(over.variable, std::move(all), observable.constant);
   if (!forms.varies()) return std::nullopt;
   const Eigen::Index nodes = static_cast<Eigen::Index>(forms.fine().size());
   Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(values.size()), nodes);
@@ -305,45 +311,46 @@ std::optional<Screened> LawScreen::best(const Sample& s, const Over& over) const
     for (int i = 0; i < values[p].count; ++i) {
       forms.addAt(values[p].value[static_cast<std::size_t>(i)], 1.0 / values[p].count, row);
     }
-    basis.row(static_cast<Eigen::Index>(p)) = s.latent(static_cast<Eigen::Index>(p), 0) * row;
+    basis.row(static_cast<Eigen::Index>(p)) = sample.latent(static_cast<Eigen::Index>(p), 0) * row;
   }
 
   std::vector<LawForm> tried = forms.curves();
-  if (!o.isOfChannels()) {
+  if (!observable.isOfChannels()) {
     std::vector<LawForm> others = forms.others();
     std::move(others.begin(), others.end(), std::back_inserter(tried));
   }
-  double most = bounds::kLeastWorthOfLaw_nats;
+  double most = bounds::kLeastNetNatsOfLaw;
   const LawForm* best = nullptr;
-  Promise of_best;
+  LawRegression of_best;
   for (const LawForm& form : tried) {
     const Eigen::MatrixXd directions = basis * forms.onFine(form);
-    if (form.local && places(s, directions.rightCols(1)) < bounds::kFewestPlacesOfLaw) continue;
-    const Promise p = promise(s, directions);
-    const double worth = p.raw / p.overdispersion - bounds::kPriceOfLawNumber_nats * form.priced(o.constant);
-    if (worth <= most) continue;
-    most = worth;
+    if (form.local && places(sample, directions.rightCols(1)) < bounds::kFewestPlacesOfLaw) continue;
+    const LawRegression p = regress(sample, directions);
+    const double net_nats =
+        p.raw / p.overdispersion - bounds::kPriceOfLawNumber_nats * form.priced(observable.constant);
+    if (net_nats <= most) continue;
+    most = net_nats;
     best = &form;
     of_best = p;
   }
   if (best == nullptr) return std::nullopt;
   Screened result;
-  result.hypothesis = law(o, over, best->at);
+  result.hypothesis = law(observable, over, best->at);
   result.hypothesis.variant = best->words;
-  result.hypothesis.coordinates = coordinatesOf(*best, o);
-  result.hypothesis.searched = best->searched + 1;  // and the variable
-  result.screened_nats = of_best.raw / of_best.overdispersion - kGainPerNumber_nats * best->priced(o.constant);
+  result.hypothesis.coordinates = coordinatesOf(*best, observable);
+  result.hypothesis.searched = best->searched + 1;  // one more for the variable
+  result.screened_nats = of_best.raw / of_best.overdispersion - kGainPerNumber_nats * best->priced(observable.constant);
   result.starts = {{}};
   for (Eigen::Index k = 0; k < of_best.value.size(); ++k) {
     // All values of a curve contain the constant; in other forms it is the first number.
-    const bool has_constant = o.constant && (k == 0 || best->words.empty());
+    const bool has_constant = observable.constant && (k == 0 || best->words.empty());
     const double value = of_best.value[k] + (has_constant ? of_best.constant : 0);
-    result.starts.front().push_back(std::clamp(value / o.typical, -kMostStart, kMostStart));
+    result.starts.front().push_back(std::clamp(value / observable.typical, -kMostStart, kMostStart));
   }
   return result;
 }
 
-std::vector<std::string> LawScreen::oftenSeen() const {
+std::vector<std::string> LawScreen::actorsOftenSeen() const {
   std::vector<int> paths(base_.scene().actors.size(), 0);
   for (const MeasuredPose& pose : poses_) {
     for (const MeasuredPath& p : pose.paths) {
@@ -354,7 +361,7 @@ std::vector<std::string> LawScreen::oftenSeen() const {
   }
   std::vector<std::string> names;
   for (std::size_t a = 0; a < paths.size(); ++a) {
-    if (paths[a] >= kOften) names.push_back(base_.scene().actors[a].name);
+    if (paths[a] >= kLeastPathsOfActor) names.push_back(base_.scene().actors[a].name);
   }
   return names;
 }
@@ -379,10 +386,10 @@ std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const 
   if (location_.empty()) return std::nullopt;
   Eigen::AlignedBox3d bounds;
   for (const Actor& a : base_.scene().actors) bounds.extend(a.bounds);
-  const Observable& o = gain().observable;
+  const Observable& observable = gain().observable;
   struct Spot {
     double x_m = 0, y_m = 0, radius_m = 0;
-    Promise promise;
+    LawRegression regression;
   };
   const auto spotAt = [&](double x_m, double y_m, double radius_m) {
     const LawVariable passing(variable, {x_m, y_m});
@@ -394,7 +401,7 @@ std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const 
         direction(at++, 0) = v.count > 0 ? p.share * std::max(0.0, 1 - v.value[0] / radius_m) : 0;
       }
     }
-    return Spot{x_m, y_m, radius_m, promise(gain(), direction)};
+    return Spot{x_m, y_m, radius_m, regress(gain(), direction)};
   };
   std::vector<Spot> spots;
   for (double x = bounds.min().x() + 0.5 * kPlanGrid_m; x < bounds.max().x(); x += kPlanGrid_m) {
@@ -404,7 +411,7 @@ std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const 
     }
   }
   const auto better = [](const Spot& a, const Spot& b) {
-    return a.promise.raw / a.promise.overdispersion < b.promise.raw / b.promise.overdispersion;
+    return a.regression.raw / a.regression.overdispersion < b.regression.raw / b.regression.overdispersion;
   };
   const auto bestOf = [&](std::vector<Spot>& all) {
     tbb::parallel_for(std::size_t{0}, all.size(),
@@ -423,20 +430,21 @@ std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const 
     }
   }
   const Spot best = bestOf(near);
-  const double nats = best.promise.raw / best.promise.overdispersion;
+  const double nats = best.regression.raw / best.regression.overdispersion;
   if (!(nats > bounds::kPriceOfLawNumber_nats * kSpotNumbers)) return std::nullopt;
   Screened result;
-  result.hypothesis = law(o, {variable}, {0, best.radius_m});
+  result.hypothesis = law(observable, {variable}, {0, best.radius_m});
   result.hypothesis.mechanism.values.set("x_m", best.x_m);
   result.hypothesis.mechanism.values.set("y_m", best.y_m);
-  result.hypothesis.coordinates = {{o.parameter, o.unit, 0, 0, o.typical, -o.limit, o.limit}};
+  result.hypothesis.coordinates = {
+      {observable.parameter, observable.unit, 0, 0, observable.typical, -observable.limit, observable.limit}};
   result.hypothesis.searched = 4;  // place, radius and the variable
   result.screened_nats = nats - kGainPerNumber_nats * kSpotNumbers;
-  result.starts = {{std::clamp(best.promise.value[0] / o.typical, -kMostStart, kMostStart)}};
+  result.starts = {{std::clamp(best.regression.value[0] / observable.typical, -kMostStart, kMostStart)}};
   return result;
 }
 
-Eigen::MatrixXd LawScreen::alikeAtPose(const Eigen::MatrixXd& of_poses) const {
+Eigen::MatrixXd LawScreen::directionsOfPoses(const Eigen::MatrixXd& of_poses) const {
   Eigen::MatrixXd of_paths(gain().off.size(), of_poses.cols());
   Eigen::Index at = 0;
   for (std::size_t i = 0; i < poses_.size(); ++i) {
@@ -463,30 +471,32 @@ bool LawScreen::gainsFollowTime(const std::optional<Screened>& steps) const {
   Eigen::MatrixXd time(poses, 1);
   for (Eigen::Index i = 0; i < poses; ++i) time(i, 0) = poses_[static_cast<std::size_t>(i)].where.session_s;
   time.array() /= std::max(1.0, time.maxCoeff());
-  double by_time = promise(gain(), alikeAtPose(time)).raw;
+  double by_time = regress(gain(), directionsOfPoses(time)).raw;
   if (steps) {
     const std::vector<double>& steps_s = steps->hypothesis.mechanism.values.numbers("steps_s");
-    by_time = std::max(by_time, promise(gain(), alikeAtPose(afterSteps(steps_s))).raw);
+    by_time = std::max(by_time, regress(gain(), directionsOfPoses(afterSteps(steps_s))).raw);
   }
-  const double by_pose = promise(gain(), alikeAtPose(Eigen::MatrixXd::Identity(poses, poses))).raw;
+  const double by_pose = regress(gain(), directionsOfPoses(Eigen::MatrixXd::Identity(poses, poses))).raw;
   const double by_chance = kGainPerNumber_nats * whole_ * static_cast<double>(poses);
   return by_pose - by_chance < bounds::kBeyondTime * by_time + bounds::kPriceOfLawNumber_nats;
 }
 
 std::optional<Screened> LawScreen::bestSteps() const {
-  const Sample& s = gain();
+  const Sample& sample = gain();
   std::set<double> stamps_s;
   std::set<int> places;
   for (const MeasuredPose& pose : poses_) {
     stamps_s.insert(pose.where.session_s);
     places.insert(pose.location);
   }
-  if (stamps_s.size() < 2 || s.weight.sum() == 0) return std::nullopt;
+  if (stamps_s.size() < 2 || sample.weight.sum() == 0) return std::nullopt;
   std::vector<double> between_s;
   for (auto stamp = std::next(stamps_s.begin()); stamp != stamps_s.end(); ++stamp) {
     between_s.push_back(0.5 * (*std::prev(stamp) + *stamp));
   }
-  const auto of = [&](const std::vector<double>& steps_s) { return promise(s, alikeAtPose(afterSteps(steps_s))); };
+  const auto of = [&](const std::vector<double>& steps_s) {
+    return regress(sample, directionsOfPoses(afterSteps(steps_s)));
+  };
   // At least two places lie between two steps: a gain of one place may be the place's own.
   const auto isTold = [&](std::vector<double> steps_s) {
     std::sort(steps_s.begin(), steps_s.end());
@@ -498,7 +508,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
     return std::all_of(between.begin(), between.end(),
                        [&](const std::set<int>& of) { return of.size() >= std::min<std::size_t>(2, places.size()); });
   };
-  // One step at the time that promises most beside the others.
+  // Moves one step to the best time, given the others.
   const auto moved = [&](std::vector<double> steps_s, std::size_t which) {
     std::vector<double> best = steps_s;
     double most = -INFINITY;
@@ -506,7 +516,7 @@ std::optional<Screened> LawScreen::bestSteps() const {
       if (std::count(steps_s.begin(), steps_s.end(), t) > (steps_s[which] == t ? 1 : 0)) continue;
       steps_s[which] = t;
       if (!isTold(steps_s)) continue;
-      const Promise p = of(steps_s);
+      const LawRegression p = of(steps_s);
       if (p.raw / p.overdispersion <= most) continue;
       most = p.raw / p.overdispersion;
       best = steps_s;
@@ -515,16 +525,16 @@ std::optional<Screened> LawScreen::bestSteps() const {
   };
   std::vector<double> steps_s;
   std::optional<Screened> result;
-  double most = bounds::kLeastWorthOfLaw_nats;
+  double most = bounds::kLeastNetNatsOfLaw;
   while (steps_s.size() < std::min<std::size_t>(kMostSteps, between_s.size())) {
     steps_s.push_back(-1);
     steps_s = moved(steps_s, steps_s.size() - 1);
-    if (steps_s.back() < 0) break;  // there is no time for one more
+    if (steps_s.back() < 0) break;  // no time is left for one more step
     for (std::size_t which = steps_s.size() - 1; which-- > 0;) steps_s = moved(steps_s, which);
     std::vector<double> sorted_s = steps_s;
     std::sort(sorted_s.begin(), sorted_s.end());
-    const Promise p = of(sorted_s);
-    const double count = static_cast<double>(steps_s.size()), nats = p.raw / p.overdispersion;
+    const LawRegression regression = of(sorted_s);
+    const double count = static_cast<double>(steps_s.size()), nats = regression.raw / regression.overdispersion;
     if (nats - bounds::kPriceOfLawNumber_nats * 2 * count <= most) continue;
     most = nats - bounds::kPriceOfLawNumber_nats * 2 * count;
     result.emplace();
@@ -534,10 +544,11 @@ std::optional<Screened> LawScreen::bestSteps() const {
     h = withSteps(std::move(h), steps).value();
     h.mechanism.values.set("steps_s", sorted_s);
     h.variant += steps > 1 ? " where they show" : " where it shows";
-    h.searched = steps;  // when
+    h.searched = steps;  // the times of the steps
     result->screened_nats = nats - kGainPerNumber_nats * 2 * count;
     result->starts = {{}};
-    for (double step_db : p.value) result->starts.front().push_back(std::clamp(step_db, -kMostStart, kMostStart));
+    for (double step_db : regression.value)
+      result->starts.front().push_back(std::clamp(step_db, -kMostStart, kMostStart));
   }
   return result;
 }
@@ -548,14 +559,14 @@ ScreenedLaws screenLaws(const Twin& base, const ChannelLikelihood& model, const 
                         const std::vector<int>& poses) {
   ScreenedLaws result;
   for (const NamedParameters& m : null.mechanisms) {
-    if (traitsOf(m.mechanism).form == MechanismForm::kLaw) return result;  // what one leaves over looks like another
+    if (traitsOf(m.mechanism).form == MechanismForm::kLaw) return result;  // residuals of one law resemble another
   }
   if (poses.empty()) return result;
   const LawScreen screen(base, model, null, poses);
   const auto add = [&](std::optional<Screened> s) {
     if (s) result.laws.push_back(std::move(*s));
   };
-  // An error of directions looks like an error of each channel: the best channel law stands for all.
+  // An error of directions resembles an error of each channel: the best channel law stands for all.
   std::map<std::string, std::optional<Screened>> of_channels;  // by variable
   for (const Sample& s : screen.samples()) {
     for (const std::string& variable : s.observable.over) {
@@ -568,7 +579,7 @@ ScreenedLaws screenLaws(const Twin& base, const ChannelLikelihood& model, const 
     }
   }
   for (auto& [variable, law] : of_channels) add(std::move(law));
-  for (const std::string& actor : screen.oftenSeen()) {
+  for (const std::string& actor : screen.actorsOftenSeen()) {
     for (const char* variable : {"foot_m", "time_s"}) add(screen.best(screen.gain(), {variable, actor}));
   }
   const auto drifts = [](const NamedParameters& m) {

@@ -11,20 +11,20 @@ namespace mmradartwin::diagnosis::search {
 namespace {
 
 constexpr double kSides_m[] = {0.25, 0.45};               ///< sides of a box that are tried
-constexpr double kTurned_deg = 15, kSquare_deg = 90;      ///< between its tried turns; a square is itself again
+constexpr double kTurned_deg = 15, kSquare_deg = 90;      ///< step of its turns; a square repeats after a quarter turn
 constexpr std::size_t kFacing = 5;                        ///< poses that a side of a box may face
-constexpr double kGrown[] = {0.6, 0.8, 1.25, 1.6};        ///< factors of a side
-constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1};  ///< of a place
-constexpr double kTurns_deg[] = {-8, -3, 3, 8};           ///< about itself
-constexpr double kAbout_m[] = {-0.1, 0, 0.1};             ///< from the place that hidden paths pass
-constexpr int kSweeps = 4;                                ///< over the surroundings of a fit
-constexpr double kHigher_nats = 5;                        ///< gain of a sweep that is worth another
-constexpr double kWorthSweeps_nats = 15;                  ///< gain of a fit that is worth sweeps
+constexpr double kSideFactors[] = {0.6, 0.8, 1.25, 1.6};  ///< factors on a side
+constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1};  ///< shifts of a place
+constexpr double kTurns_deg[] = {-8, -3, 3, 8};           ///< turns about itself
+constexpr double kPlaceOffsets_m[] = {-0.1, 0, 0.1};      ///< offsets from the place that hidden paths pass
+constexpr int kSweeps = 4;                                ///< sweeps over the surroundings of a fit
+constexpr double kLeastSweepGain_nats = 5;                ///< gain of a sweep from which another one follows
+constexpr double kLeastForSweeps_nats = 15;               ///< gain of a fit from which it is swept
 
-/// Places of a box's coordinates.
+/// Indices of a box's coordinates.
 enum Coordinates { kX, kY, kSide, kYaw };
 
-/// Hypothesis of a box, its middle at a place to start with.
+/// Hypothesis of a box whose middle starts at a place.
 Hypothesis boxAt(const Eigen::Vector2d& middle) {
   Hypothesis h;
   h.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kUnmodelledObject));
@@ -36,7 +36,7 @@ Hypothesis boxAt(const Eigen::Vector2d& middle) {
   return h;
 }
 
-/// Boxes that keep a side, a corner or the middle of the fitted one, as scaled coordinates.
+/// Scaled coordinates of boxes that share a side, a corner or the middle with the fitted one.
 std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
   const std::vector<Coordinate>& c = fit.hypothesis.coordinates;
   const Eigen::Vector2d center(c[kX].value(fit.scaled_values[kX]), c[kY].value(fit.scaled_values[kY]));
@@ -47,7 +47,7 @@ std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
   const auto add = [&](const Eigen::Vector2d& at, double size_m, double turned_deg) {
     boxes.push_back({c[kX].scaled(at.x()), c[kY].scaled(at.y()), c[kSide].scaled(size_m), c[kYaw].scaled(turned_deg)});
   };
-  for (double grown : kGrown) {
+  for (double grown : kSideFactors) {
     const double half_m = 0.5 * (grown - 1) * side_m;
     for (int i : {-1, 0, 1}) {
       for (int j : {-1, 0, 1}) add(center + half_m * (i * u + j * v), grown * side_m, yaw_deg);
@@ -61,7 +61,7 @@ std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
   return boxes;
 }
 
-/// Places and turns around a fit (of a late echo: places and distances), as scaled coordinates.
+/// Scaled coordinates of places and turns around a fit; of a late echo, places and delays.
 std::vector<std::vector<double>> placesAround(const HypothesisFit& fit) {
   std::vector<std::vector<double>> places;
   const auto add = [&](std::size_t coordinate, double by) {
@@ -89,15 +89,15 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
   const NamedParameters fitted = cylinder.hypothesis.at(cylinder.scaled_values);
   const Eigen::Vector2d axis(fitted.values.number("x_m"), fitted.values.number("y_m"));
   Screened box{boxAt(axis), cylinder.gain, {}};
-  Hypothesis& h = box.hypothesis;
-  h.variant = "a box " + cylinder.hypothesis.variant;
+  Hypothesis& hypothesis = box.hypothesis;
+  hypothesis.variant = "a box " + cylinder.hypothesis.variant;
   const double radius_m = 0.5 * fitted.values.number("size_m");
   // The cylinder's front is the near side of the box, half a side before its middle.
   const auto startBehind = [&](const Eigen::Vector2d& toward_radar, double yaw_deg) {
     for (double side_m : kSides_m) {
       const Eigen::Vector2d center = axis + (radius_m - 0.5 * side_m) * toward_radar;
-      box.starts.push_back({h.coordinates[0].scaled(center.x()), h.coordinates[1].scaled(center.y()),
-                            h.coordinates[2].scaled(side_m), h.coordinates[3].scaled(yaw_deg)});
+      box.starts.push_back({hypothesis.coordinates[0].scaled(center.x()), hypothesis.coordinates[1].scaled(center.y()),
+                            hypothesis.coordinates[2].scaled(side_m), hypothesis.coordinates[3].scaled(yaw_deg)});
     }
   };
   const Eigen::Vector2d toward_most = -awayFromRadar(data, axis);
@@ -126,8 +126,8 @@ std::optional<Screened> boxThatHides(const Screened& law) {
   h.variant = "a box that hides what is behind it, about " + number(place.x(), 2) + ", " + number(place.y(), 2) + " m";
   for (double side_m : kSides_m) {
     for (double yaw_deg = 0; yaw_deg < kSquare_deg; yaw_deg += 2 * kTurned_deg) {
-      for (double dx_m : kAbout_m) {
-        for (double dy_m : kAbout_m) {
+      for (double dx_m : kPlaceOffsets_m) {
+        for (double dy_m : kPlaceOffsets_m) {
           box.starts.push_back({h.coordinates[kX].scaled(place.x() + dx_m), h.coordinates[kY].scaled(place.y() + dy_m),
                                 h.coordinates[kSide].scaled(side_m), h.coordinates[kYaw].scaled(yaw_deg)});
         }
@@ -140,11 +140,11 @@ std::optional<Screened> boxThatHides(const Screened& law) {
 HypothesisFit fitObject(HypothesisFitter& fitter, const ModelState& null, const Screened& object) {
   const Hypothesis& h = object.hypothesis;
   HypothesisFit best = fitter.fit(null, h, object.starts);
-  for (int i = 0; i < kSweeps && best.gain_without_best_place > kWorthSweeps_nats; ++i) {
+  for (int i = 0; i < kSweeps && best.gain_without_best_place > kLeastForSweeps_nats; ++i) {
     HypothesisFit other = fitter.fit(null, h, isUnmodelledBox(h) ? boxesAround(best) : placesAround(best), 0, &best);
     const double higher = other.gain - best.gain;
     if (higher > 0) best = std::move(other);
-    if (higher < kHigher_nats) break;
+    if (higher < kLeastSweepGain_nats) break;
   }
   return best;
 }

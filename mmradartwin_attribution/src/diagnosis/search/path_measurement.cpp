@@ -10,12 +10,12 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kDominant = 0.5;       ///< least share of a path in the power expected in its direction
-constexpr double kAlone = 0.7;          ///< least share in the power of all channels, where channels are compared
-constexpr double kLeastPower = 1e-5;    ///< of a path, of the pose's strongest path's
-constexpr double kFarthest_bins = 2.2;  ///< from its expected place that a path is looked for
+constexpr double kDominant = 0.5;       ///< share of a path in the power expected in its direction
+constexpr double kAlone = 0.7;          ///< share in the power of all channels, for comparisons of channels
+constexpr double kLeastPower = 1e-5;    ///< power of a path over that of the pose's strongest one
+constexpr double kFarthest_bins = 2.2;  ///< distance from its expected bin within which a path is searched
 
-/// Groups of channels that may share an error: those of one transmitter (the first one excepted), or of one receiver.
+/// Groups of channels that may share an error: those of one transmitter (except the first), or of one receiver.
 std::vector<std::vector<double>> channelGroups(const RadarConfig& radar) {
   const int receivers = static_cast<int>(radar.rx_position_m.size());
   std::vector<std::vector<double>> groups;
@@ -78,29 +78,29 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
   for (const PathRecord& r : records) most = std::max(most, r.amplitude);
   MeasuredPose result{data.location, {twin.tracedScene(), T, session_s, most}, {}};
   const int channels = radar.channels(), samples = radar.samples_per_chirp;
-  const double gain = std::exp(state.nuisance.log_gain), wave = 2 * M_PI / radar.wavelength_m();
+  const double gain = std::exp(state.latents.log_gain), wave = 2 * M_PI / radar.wavelength_m();
   std::map<int, Eigen::MatrixXcd> expected;  // by bin
-  for (PathRecord& r : records) {
-    if (r.bounces == 0 || r.amplitude * r.amplitude < kLeastPower * most * most) continue;
-    const double place = 0.5 * meanLength_m(r) / radar.range_bin_m();
+  for (PathRecord& record : records) {
+    if (record.bounces == 0 || record.amplitude * record.amplitude < kLeastPower * most * most) continue;
+    const double place = 0.5 * meanLength_m(record) / radar.range_bin_m();
     const int bin = static_cast<int>(std::lround(place));
     if (bin < model.firstBin() || bin >= samples) continue;
-    const Eigen::VectorXcd a = Eigen::Map<const Eigen::VectorXcd>(r.c.data(), channels).normalized();
+    const Eigen::VectorXcd a = Eigen::Map<const Eigen::VectorXcd>(record.c.data(), channels).normalized();
     Eigen::MatrixXcd& sigma = expected[bin];
     if (sigma.size() == 0) {
-      sigma = model.whitened(state.echoes[static_cast<std::size_t>(pose)], state.nuisance, pose, bin).inverse.inverse();
+      sigma = model.whitened(state.echoes[static_cast<std::size_t>(pose)], state.latents, pose, bin).inverse.inverse();
     }
-    double latent = 0;  // gains of the path's actors in the state; they are fitted anew beside a law
-    for (int actor : r.actors) latent += state.nuisance.actor_gain[errorOf(actor, state.nuisance.actor_gain.size())];
+    double latent = 0;  // gains of the path's actors in the state; a law is fitted with these free
+    for (int actor : record.actors) latent += state.latents.actor_gain[errorOf(actor, state.latents.actor_gain.size())];
     const double response = hannResponse(bin - place), all = a.dot(sigma * a).real();
-    const double own = gain * std::exp(latent) * channels * r.amplitude * r.amplitude * response * response;
+    const double own = gain * std::exp(latent) * channels * record.amplitude * record.amplitude * response * response;
     MeasuredPath path;
     path.share = std::min(1.0, own / all);
     if (path.share < kDominant) continue;
     path.alone = own >= kAlone * sigma.trace().real();
     const double gain_db =
         10 / std::log(10.0) * (std::log(std::norm(a.dot(data.range_spectra.col(bin))) / all) + path.share * latent);
-    // The peak's place follows from the ratio of a Hann window's two highest bins.
+    // The peak's position follows from the ratio of a Hann window's two highest bins.
     const auto height = [&](int k) { return k < 0 || k >= samples ? 0.0 : std::abs(a.dot(data.range_spectra.col(k))); };
     int peak = bin;
     for (int k = bin - 2; k <= bin + 2; ++k) peak = height(k) > height(peak) ? k : peak;
@@ -108,7 +108,7 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
     const double ratio = height(peak + side) / std::max(1e-30, height(peak));
     const double apart = peak + side * std::clamp((2 * ratio - 1) / (1 + ratio), -0.5, 0.5) - place;
     if (std::abs(apart) > kFarthest_bins) continue;
-    // The direction follows from phases between neighbouring elements, less the expected ones.
+    // The direction follows from phases between neighbouring elements, relative to the expected ones.
     double turn = 0, information = 0;
     for (int k = 0; k + 1 < channels; ++k) {
       const double span = wave * (radar.virtual_element_m(k + 1).y() - radar.virtual_element_m(k).y());
@@ -117,9 +117,9 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
       turn -= span * std::abs(step) * std::arg(step);
       information += span * span * std::abs(step);
     }
-    const double cosine = std::max(0.2, std::hypot(r.departure.x(), r.departure.z()));
+    const double cosine = std::max(0.2, std::hypot(record.departure.x(), record.departure.z()));
     const double angle_deg = information > 0 ? turn / information / cosine * 180 / M_PI : 0;
-    const Eigen::VectorXcd against = data.range_spectra.col(peak).cwiseProduct(a.conjugate());  // less expected phases
+    const Eigen::VectorXcd against = data.range_spectra.col(peak).cwiseProduct(a.conjugate());  // with phase errors
     for (const Observable& o : of) {
       const std::complex<double> to_others = o.isOfChannels() ? ratioOf(o.channels, against) : 0;
       switch (o.kind) {
@@ -133,7 +133,7 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
           path.off.push_back(angle_deg);
           break;
         case Observable::Kind::kAngleOfPose:
-          path.off.push_back(-state.nuisance.yaw_rad[static_cast<std::size_t>(pose)] * 180 / M_PI);
+          path.off.push_back(-state.latents.yaw_rad[static_cast<std::size_t>(pose)] * 180 / M_PI);
           break;
         case Observable::Kind::kChannelGain:
           path.off.push_back(20 * std::log10(std::abs(to_others) + 1e-300));
@@ -143,7 +143,7 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
           break;
       }
     }
-    path.record = std::move(r);
+    path.record = std::move(record);
     result.paths.push_back(std::move(path));
   }
   return result;

@@ -14,12 +14,12 @@ namespace mmradartwin::diagnosis::search {
 struct Observable {
   enum class Kind { kGain, kDelay, kAngle, kAngleOfPose, kChannelGain, kChannelPhase } kind;
   const char *parameter, *unit;
-  double typical, limit;              ///< values of a law, in `unit`
+  double typical, limit;              ///< of a law's values, in `unit`
   double usual;                       ///< prior standard deviation of a law's values
-  double floor;                       ///< least scatter of a path that is believed
-  bool constant;                      ///< a constant is fitted along; not for the gain, which the session has already
-  std::vector<std::string> over;      ///< variables over which laws of all paths are looked for
-  std::vector<double> channels = {};  ///< these against the others; empty: all channels
+  double floor;                       ///< lower limit of a path's scatter
+  bool constant;                      ///< a constant is fitted as well; not for the gain, which the session has already
+  std::vector<std::string> over;      ///< variables over which laws of all paths are searched for
+  std::vector<double> channels = {};  ///< weights of these channels, compared with the others; empty: all channels
 
   bool isOfChannels() const { return !channels.empty(); }
 };
@@ -32,7 +32,7 @@ struct MeasuredPath {
   PathRecord record;        ///< as received
   double share = 1;         ///< of the cell's expected power; a law on the path shows by this share
   bool alone = false;       ///< the channels hold little else
-  std::vector<double> off;  ///< [observables] measured less expected, in the observable's unit
+  std::vector<double> off;  ///< [observables] measured minus expected, in the observable's unit
 };
 
 /// Measured paths of one pose.
@@ -42,8 +42,8 @@ struct MeasuredPose {
   std::vector<MeasuredPath> paths;
 };
 
-/// Measures the paths of one pose one by one: level, range, azimuth and channels against what the state expects. twin:
-/// with the state's mechanisms; the result refers to its scene.
+/// Measures the paths of one pose one by one: level, range, azimuth and channels relative to what the state expects.
+/// twin: with the state's mechanisms; the result refers to its scene.
 MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, const ModelState& state, int pose,
                           double session_s, const std::vector<Observable>& of);
 

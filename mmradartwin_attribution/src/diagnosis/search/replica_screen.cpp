@@ -16,27 +16,28 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kLeastPower = 1e-4;    ///< of the pose's strongest echo, for echoes whose replicas are looked for
-constexpr double kNearest_bins = 1.75;  ///< from an echo: nearer bins are its own main lobe
-constexpr double kFarthest_m = 3;       ///< from an echo
-constexpr double kStep_bins = 0.125;    ///< between distances
-constexpr double kTypical_db = -15;     ///< of a replica's level
+/// Power of an echo whose replicas are searched for, over that of the pose's strongest one.
+constexpr double kLeastPower = 1e-4;
+constexpr double kNearest_bins = 1.75;           ///< from an echo: nearer bins belong to its main lobe
+constexpr double kFarthest_m = 3;                ///< from an echo
+constexpr double kStep_bins = 0.125;             ///< between distances
+constexpr double kTypical_db = -15;              ///< of a replica's level
 constexpr double kLevels_db[] = {-20, -12, -5};  ///< levels by which distances are scanned
 constexpr std::size_t kLevels = std::size(kLevels_db);
-constexpr std::ptrdiff_t kApart_steps = 8;  ///< between peaks of one scan
+constexpr std::ptrdiff_t kApart_steps = 8;  ///< distance between peaks of one scan
 constexpr std::size_t kLooks = 4;           ///< peaks that are judged by the whole likelihood
-/// Distance of a second face within the main lobe. It shows in how wide an actor's echoes are, which no bin tells
-/// alone.
+/// Distance of a second face within the main lobe. It shows only in the width of an actor's echoes, which no single bin
+/// gives.
 constexpr double kSecondFace_bins = 0.6;
-constexpr std::size_t kFaces = 16;  ///< actors with most power, of whom a second face is looked for
+constexpr std::size_t kFaces = 16;  ///< actors of highest power, of which a second face is searched for
 
 using Gains = std::array<double, kLevels>;  ///< nats, by level
 
-/// A replica to be judged.
+/// Replica to be judged.
 struct Peak {
   std::size_t target;  ///< 0: all echoes, else an actor's index plus one
   double behind_m;
-  double rank;  ///< nats promised; for second faces the power received. The highest are judged.
+  double rank;  ///< nats; for second faces the received power. The highest are judged.
 };
 
 /// One scan of a session.
@@ -44,7 +45,7 @@ class ReplicaScan {
  public:
   ReplicaScan(const Twin& base, const ChannelLikelihood& model, const ModelState& null, const std::vector<int>& poses);
   std::size_t targets() const { return targets_; }
-  /// Distances of a target that promise more than least_nats and more than those around them.
+  /// Distances of a target with a gain above least_nats and above that of their neighbours.
   std::vector<Peak> peaksOf(std::size_t target, double least_nats) const;
   /// Second faces of the actors that are seen at all.
   std::vector<Peak> secondFaces() const;
@@ -52,7 +53,7 @@ class ReplicaScan {
   double binWidth_m() const { return bin_m_; }
 
  private:
-  /// Gains of one pose: what each target's replicas would explain.
+  /// Gains of one pose: nats that each target's replicas would explain.
   void scan(const Twin& twin, std::size_t j);
   /// Gains of the replicas of one echo, added to its targets.
   void scanEcho(const PathRecord& record, const std::vector<ChannelLikelihood::Whitened>& cells,
@@ -67,7 +68,7 @@ class ReplicaScan {
   std::vector<double> distances_m_;
   std::array<double, kLevels> levels_;         ///< of power
   std::vector<std::vector<Gains>> sums_;       ///< [poses][targets * distances]
-  std::vector<std::vector<double>> received_;  ///< [poses][targets] power, of the strongest echo's
+  std::vector<std::vector<double>> received_;  ///< [poses][targets] power, over that of the strongest echo
 };
 
 ReplicaScan::ReplicaScan(const Twin& base, const ChannelLikelihood& model, const ModelState& null,
@@ -97,7 +98,7 @@ void ReplicaScan::scan(const Twin& twin, std::size_t j) {
   const PoseChannels& p = model_.data().poses[pose];
   const Eigen::Isometry3d& T = p.pose.T_map_radar;
   const std::vector<PathRecord> records = twin.receivedPaths(T, twin.trace(T, p.pose.stamp_ns), p.pose.stamp_ns);
-  const std::vector<ChannelLikelihood::Whitened> cells = model_.whitened(null_.echoes[pose], null_.nuisance, poses_[j]);
+  const std::vector<ChannelLikelihood::Whitened> cells = model_.whitened(null_.echoes[pose], null_.latents, poses_[j]);
   double strongest = 0;
   for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude);
   for (const PathRecord& r : records) {
@@ -114,7 +115,7 @@ void ReplicaScan::scan(const Twin& twin, std::size_t j) {
 void ReplicaScan::scanEcho(const PathRecord& record, const std::vector<ChannelLikelihood::Whitened>& cells,
                            const std::set<std::size_t>& met, std::vector<Gains>& sums) const {
   const int channels = base_.radar().channels(), samples = base_.radar().samples_per_chirp;
-  const SessionLatents& latents = null_.nuisance;
+  const SessionLatents& latents = null_.latents;
   double own = std::exp(latents.log_gain);
   for (int a : record.actors) own *= std::exp(latents.actor_gain[errorOf(a, latents.actor_gain.size())]);
   const Eigen::Map<const Eigen::VectorXcd> c(record.c.data(), channels);
@@ -181,20 +182,20 @@ std::vector<Peak> ReplicaScan::secondFaces() const {
 }
 
 Hypothesis ReplicaScan::hypothesisOf(const Peak& peak) const {
-  Hypothesis h;
-  h.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kReplica));
+  Hypothesis hypothesis;
+  hypothesis.mechanism = defaultMechanism(mechanismOfForm(MechanismForm::kReplica));
   if (peak.target > 0) {
-    h.subject = base_.scene().actors[peak.target - 1].name;
-    h.mechanism.values.set("actor", h.subject);
+    hypothesis.subject = base_.scene().actors[peak.target - 1].name;
+    hypothesis.mechanism.values.set("actor", hypothesis.subject);
   }
-  h.mechanism.values.set("behind_m", peak.behind_m);
-  h.coordinates = {{"level_db", "dB", -1, -200, kTypical_db, -60, 10}};
-  h.searched = peak.target > 0 ? 1 : 0;  // the actor
-  return h;
+  hypothesis.mechanism.values.set("behind_m", peak.behind_m);
+  hypothesis.coordinates = {{"level_db", "dB", -1, -200, kTypical_db, -60, 10}};
+  hypothesis.searched = peak.target > 0 ? 1 : 0;  // one more for the actor
+  return hypothesis;
 }
 
-/// The best of the highest peaks by `look`. The scan has one level and takes echoes one by one: the whole likelihood
-/// decides. The distance becomes a coordinate to be fitted.
+/// The best of the highest peaks by `look`. The scan has few levels and takes echoes one by one, so that the whole
+/// likelihood decides. The distance becomes a coordinate to be fitted.
 std::optional<Screened> bestOf(const ReplicaScan& scan, std::vector<Peak> peaks, std::size_t looks,
                                const std::function<Screened(const Hypothesis&)>& look) {
   std::sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) { return a.rank > b.rank; });
@@ -219,7 +220,7 @@ std::vector<Screened> screenReplicas(const Twin& base, const ChannelLikelihood& 
                                      const std::vector<int>& poses, double least_nats,
                                      const std::function<Screened(const Hypothesis&)>& look) {
   for (const NamedParameters& m : null.mechanisms) {
-    if (traitsOf(m.mechanism).form == MechanismForm::kReplica) return {};  // what one leaves over looks like another
+    if (traitsOf(m.mechanism).form == MechanismForm::kReplica) return {};  // residuals of one replica resemble another
   }
   const ReplicaScan scan(base, model, null, poses);
   std::vector<Screened> result;

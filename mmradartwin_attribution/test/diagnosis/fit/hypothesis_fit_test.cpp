@@ -16,7 +16,7 @@ HypothesisFit fitOf(const std::string& mechanism, const std::vector<Coordinate>&
   fit.hypothesis.mechanism.mechanism = mechanism;
   fit.hypothesis.coordinates = coordinates;
   for (std::size_t i = 0; i < values.size(); ++i) fit.scaled_values.push_back(coordinates[i].scaled(values[i]));
-  fit.plain = true;
+  fit.overwhelming = true;
   return fit;
 }
 
@@ -26,7 +26,7 @@ TEST(HypothesisFit, FarAwayIsWhatNoErrorOfActorsLooksLike) {
   HypothesisFit fit = fitOf("scene_registration", {x, y, yaw}, {0.13, -0.10, 1.6});
   EXPECT_NEAR(fit.moved_m(), std::hypot(0.13, 0.10), 1e-12);
   EXPECT_TRUE(fit.isFarAway());
-  fit.plain = false;
+  fit.overwhelming = false;
   fit.gain_without_best_place = 100;
   EXPECT_TRUE(fit.isFarAway());
   fit.overdispersion = 2;
@@ -105,12 +105,12 @@ TEST_F(FittedEffect, NothingIsGainedWhereNothingIsWrong) {
 TEST_F(FittedEffect, SeveralAreFittedTogether) {
   measure(
       {mechanismWith("gain_drift", {{"db_per_hour", 80.0}}), mechanismWith("radar_yaw_offset", {{"yaw_deg", 2.0}})});
-  const JointFit joint = fitted_->fitter.refit(firstOrder(), fitted_->null.nuisance, {drift_, yaw_}, {{8.0}, {3.0}});
+  const JointFit joint = fitted_->fitter.refit(firstOrder(), fitted_->null.latents, {drift_, yaw_}, {{8.0}, {3.0}});
   ASSERT_EQ(joint.scaled_values.size(), 2U);
   EXPECT_NEAR(5 * joint.scaled_values[0][0], 80, 3 * joint.standard_error[0][0]);
   EXPECT_NEAR(0.5 * joint.scaled_values[1][0], 2, 0.4);
-  EXPECT_GT(joint.worth[0].scattered(), 0);
-  EXPECT_GT(joint.worth[1].nats, 10);
+  EXPECT_GT(joint.evidence[0].scattered(), 0);
+  EXPECT_GT(joint.evidence[1].nats, 10);
 }
 
 TEST_F(FittedEffect, FalseAlarmsOfAFamilyFollowChance) {
@@ -126,21 +126,21 @@ TEST_F(FittedEffect, FalseAlarmsOfAFamilyFollowChance) {
   EXPECT_LT(fitted_->fitter.falseAlarmRate(gain + 3, drift_, 1, 1), rate);
 }
 
-TEST_F(FittedEffect, PlainIsWhatGainsFiveNatsAPose) {
+TEST_F(FittedEffect, IsOverwhelmingWhereItGainsFiveNatsAPose) {
   measure({});
-  EXPECT_FALSE(fitted_->fitter.isPlain(50));
-  EXPECT_TRUE(fitted_->fitter.isPlain(50.1));
+  EXPECT_FALSE(fitted_->fitter.isOverwhelming(50));
+  EXPECT_TRUE(fitted_->fitter.isOverwhelming(50.1));
   HypothesisFit f = fit(drift_, 1);
   f.gain_without_best_place = 51;
   f.overdispersion = 49;
   fitted_->fitter.judge(f, 300);
-  EXPECT_TRUE(f.plain);
+  EXPECT_TRUE(f.overwhelming);
   EXPECT_LE(f.false_alarm_rate, 0.01);
 }
 
 TEST_F(FittedEffect, LatentsThatAreNoBetterAreNotTakenOver) {
   measure({});
-  EXPECT_FALSE(fitted_->fitter.improved(fitted_->null, fitted_->null.nuisance).has_value());
+  EXPECT_FALSE(fitted_->fitter.improved(fitted_->null, fitted_->null.latents).has_value());
 }
 
 }  // namespace

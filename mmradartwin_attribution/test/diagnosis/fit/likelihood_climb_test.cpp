@@ -19,7 +19,7 @@ class ClimbInARoom : public ::testing::Test {
                 const HypothesisFit* known = nullptr) {
     const std::vector<Hypothesis> parts = {hypothesis};
     return LikelihoodClimb(fitted_->source, fitted_->model,
-                           {base_, fitted_->null.nuisance, parts, starts, 4, &fitted_->null, 0, known})
+                           {base_, fitted_->null.latents, parts, starts, 4, &fitted_->null, 0, known})
         .run();
   }
   MadeRoom room_{10};
@@ -54,16 +54,16 @@ TEST(Gain, WithoutTheBestPlaceIsThatOfTheOthers) {
   null.log_likelihood = 4;
   state.log_likelihood = 10.5;  // its latents are half a nat nearer to what is usual
   EXPECT_EQ(gainByLocation(data, null, state), (std::vector<double>{5, -1, 2}));
-  EXPECT_DOUBLE_EQ(broadGain(data, null, state), 1.5);
+  EXPECT_DOUBLE_EQ(gainWithoutBestPlace(data, null, state), 1.5);
   // A place that loses takes nothing off.
   state.by_pose = {0, 0, 0, 0};
   state.log_likelihood = 0;
-  EXPECT_DOUBLE_EQ(broadGain(data, null, state), -4);
+  EXPECT_DOUBLE_EQ(gainWithoutBestPlace(data, null, state), -4);
   // One place has no others.
   data.locations = {"a"};
   for (PoseChannels& p : data.poses) p.location = 0;
   state.log_likelihood = 9;
-  EXPECT_DOUBLE_EQ(broadGain(data, null, state), 5);
+  EXPECT_DOUBLE_EQ(gainWithoutBestPlace(data, null, state), 5);
 }
 
 }  // namespace

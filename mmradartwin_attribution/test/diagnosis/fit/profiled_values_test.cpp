@@ -23,7 +23,7 @@ class DarkPlate : public ::testing::Test {
   /// The likelihood with the level at a value of the scale and all latents refitted.
   double profileAt(double scaled) {
     const std::vector<NamedParameters> mechanisms = mechanismsWith(firstOrder(), {plate_}, {scaled});
-    SessionLatents latents = fitted_->null.nuisance;
+    SessionLatents latents = fitted_->null.latents;
     const auto echoes = fitted_->source.echoes(mechanisms, latents.actor_range_m);
     return fitted_->model.fit(echoes, latents, 20);
   }
@@ -32,7 +32,7 @@ class DarkPlate : public ::testing::Test {
   }
 
   ProfiledModel model() {
-    return {fitted_->source, fitted_->model, accuracy_, fitted_->null.mechanisms, fitted_->null.nuisance};
+    return {fitted_->source, fitted_->model, accuracy_, fitted_->null.mechanisms, fitted_->null.latents};
   }
 
   const PoseAccuracy accuracy_;

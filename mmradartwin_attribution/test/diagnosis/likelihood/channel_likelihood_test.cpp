@@ -57,14 +57,14 @@ class ThreeActors : public ::testing::Test {
       data_.poses.push_back(p);
     }
     measure(0.1);
-    nuisance_.log_gain = 0.2;
-    nuisance_.log_floor = std::log(1e-9);
-    nuisance_.log_relative = -3.5;
-    nuisance_.log_range = 0.3;
-    nuisance_.floor_shape = {0.1, -0.2, 0.3, 0, 0.2, -0.1};
-    nuisance_.actor_gain = {0.1, -0.2, 0.15, 0};
-    nuisance_.actor_range_m = {0.006, -0.004, 0.003, 0};
-    nuisance_.yaw_rad = {0.002, -0.003};
+    latents_.log_gain = 0.2;
+    latents_.log_floor = std::log(1e-9);
+    latents_.log_relative = -3.5;
+    latents_.log_range = 0.3;
+    latents_.floor_shape = {0.1, -0.2, 0.3, 0, 0.2, -0.1};
+    latents_.actor_gain = {0.1, -0.2, 0.15, 0};
+    latents_.actor_range_m = {0.006, -0.004, 0.003, 0};
+    latents_.yaw_rad = {0.002, -0.003};
   }
   /// Fills the channels, each of which an echo has with an error of its own.
   void measure(double channel_error) {
@@ -109,14 +109,14 @@ class ThreeActors : public ::testing::Test {
       PoseEchoes& of_pose = all.emplace_back();
       of_pose.groups = collector.take();
       collector.addTones({&paths_[i][1]}, 0.03 * 0.03);
-      of_pose.grazing = collector.take();
+      of_pose.pose_sensitive = collector.take();
     }
     return all;
   }
 
   ChannelData data_;
   std::vector<std::vector<PathRecord>> paths_;
-  SessionLatents nuisance_;
+  SessionLatents latents_;
 };
 
 /// Slope of a pose's likelihood by central differences, and how far off they may be.
@@ -128,10 +128,10 @@ struct Slope {
 TEST_F(ThreeActors, ScoresAreTheLikelihoodsSlopes) {
   const ChannelLikelihood model(data_, 3, PoseAccuracy());
   const auto expected = echoes();
-  const Basis basis = model.basis(expected, nuisance_);
+  const Basis basis = model.basis(expected, latents_);
   const auto slopeOf = [&](const std::function<double&(SessionLatents&)>& number, double step, std::size_t pose) {
     const auto at = [&](double by) {
-      SessionLatents latents = nuisance_;
+      SessionLatents latents = latents_;
       number(latents) += by;
       return model.byPose(expected, latents, {0, 1})[pose];
     };
@@ -146,16 +146,16 @@ TEST_F(ThreeActors, ScoresAreTheLikelihoodsSlopes) {
   const double by_level = 0.5 * 3e-4 * cells, by_metre = by_level / 0.03;
   const double by_radian =
       by_level * 2 * M_PI / data_.radar.wavelength_m() * data_.radar.virtual_element_m(data_.radar.channels() - 1).y();
-  const int ranges = nuisance_.globals() - static_cast<int>(nuisance_.actor_range_m.size());
+  const int ranges = latents_.globals() - static_cast<int>(latents_.actor_range_m.size());
   for (std::size_t pose = 0; pose < 2; ++pose) {
-    for (int j = 0; j < nuisance_.globals(); ++j) {
+    for (int j = 0; j < latents_.globals(); ++j) {
       const Slope want = slopeOf([j](SessionLatents& n) -> double& { return n.global(j); }, 1e-4, pose);
       EXPECT_NEAR(basis.poses[pose].score[j], want.value,
                   1e-3 * std::abs(want.value) + want.error + (j < ranges ? by_level : by_metre))
           << "of number " << j << ", pose " << pose;
     }
     const Slope want = slopeOf([pose](SessionLatents& n) -> double& { return n.yaw_rad[pose]; }, 1e-5, pose);
-    EXPECT_NEAR(basis.poses[pose].score[nuisance_.globals()], want.value,
+    EXPECT_NEAR(basis.poses[pose].score[latents_.globals()], want.value,
                 1e-3 * std::abs(want.value) + want.error + by_radian)
         << "of the heading, pose " << pose;
   }
@@ -164,11 +164,11 @@ TEST_F(ThreeActors, ScoresAreTheLikelihoodsSlopes) {
 // A step in which a number goes beyond its limit promises what it cannot bring.
 TEST_F(ThreeActors, PromisesNothingBeyondALimit) {
   const int relative = 2;
-  nuisance_.global(relative) = -11.5;
+  latents_.global(relative) = -11.5;
   for (double channel_error : {0.1, 0.0}) {
     measure(channel_error);
     const ChannelLikelihood model(data_, 3, PoseAccuracy());
-    const Basis basis = model.basis(echoes(), nuisance_);
+    const Basis basis = model.basis(echoes(), latents_);
     const double beyond = basis.poses[0].score[relative] + basis.poses[1].score[relative];
     ASSERT_EQ(beyond < 0, channel_error == 0) << beyond;
     const Scores scores = model.scores(basis, {}, {0, 1});
@@ -180,14 +180,13 @@ TEST_F(ThreeActors, PromisesNothingBeyondALimit) {
 TEST_F(ThreeActors, ScoresOfAMechanismAreTheLikelihoodsSlopes) {
   PoseAccuracy known;
   known.heading_rad = 1e-7;  // nothing is eliminated
-  nuisance_.yaw_rad = {0, 0};
+  latents_.yaw_rad = {0, 0};
   const ChannelLikelihood model(data_, 3, known);
   const double step = 0.01;
-  const auto at = [&](double share) { return model.covariance(echoes(share), nuisance_, {0, 1}); };
-  const Scores scores = model.scores(model.basis(echoes(), nuisance_), {difference(at(1.5), at(0.5), 1)}, {0, 1});
+  const auto at = [&](double share) { return model.covariance(echoes(share), latents_, {0, 1}); };
+  const Scores scores = model.scores(model.basis(echoes(), latents_), {difference(at(1.5), at(0.5), 1)}, {0, 1});
   const double want =
-      (model.logLikelihood(echoes(1 + step), nuisance_) - model.logLikelihood(echoes(1 - step), nuisance_)) /
-      (2 * step);
+      (model.logLikelihood(echoes(1 + step), latents_) - model.logLikelihood(echoes(1 - step), latents_)) / (2 * step);
   EXPECT_NEAR(scores.total[scores.total.size() - 1], want, 0.01 * std::abs(want));
 }
 

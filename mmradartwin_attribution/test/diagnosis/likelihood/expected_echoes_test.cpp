@@ -143,18 +143,18 @@ TEST_F(CabinetScene, ExpectsEchoesThatAPosesErrorMayBring) {
     offset.values.set("left_m", left_m);
     return source.echoes({specular, offset})[0];
   };
-  EXPECT_TRUE(source.echoes({specular})[0].grazing.empty());
+  EXPECT_TRUE(source.echoes({specular})[0].pose_sensitive.empty());
   const PoseEchoes off = beside(0.503);
-  ASSERT_EQ(off.grazing.size(), 1);
-  EXPECT_EQ(twin.scene().actors[static_cast<std::size_t>(off.grazing[0]->actors[0])].name, "cabinet");
+  ASSERT_EQ(off.pose_sensitive.size(), 1);
+  EXPECT_EQ(twin.scene().actors[static_cast<std::size_t>(off.pose_sensitive[0]->actors[0])].name, "cabinet");
   // The shadow of an edge at a metre is some centimetres wide at this wavelength: 1 cm takes a part, rarely.
-  EXPECT_GT(power(off.grazing, 8), 1e-3 * power(off, 8));
+  EXPECT_GT(power(off.pose_sensitive, 8), 1e-3 * power(off, 8));
   // It is weighed as the echo itself is.
   NamedParameters darker = defaultMechanism("material_reflectivity");
   darker.values.set("actor", std::string("cabinet"));
   darker.values.set("delta_db", -10.0);
   const PoseEchoes dark = source.echoes({specular, offset, darker})[0];
-  EXPECT_NEAR(power(dark.grazing, 8) / power(off.grazing, 8), 0.1, 1e-6);
+  EXPECT_NEAR(power(dark.pose_sensitive, 8) / power(off.pose_sensitive, 8), 0.1, 1e-6);
 }
 
 // A square law makes echoes of two at the sum of their ranges, four times as strong as those of each at twice its own.

@@ -54,9 +54,9 @@ TEST(LikeClutter, IsBelievedByWhatTheMapsExplain) {
   EXPECT_TRUE(isLikeClutter(objectAt(2, 1, 0.08), true, false)) << "small things lie about";
   EXPECT_FALSE(isLikeClutter(objectAt(2, 1, 0.08), true, true));
   EXPECT_TRUE(isLikeClutter(fitOf("transmission", 9), true, false));
-  HypothesisFit plain = fitOf("transmission", 9);
-  plain.plain = true;
-  EXPECT_FALSE(isLikeClutter(plain, true, false));
+  HypothesisFit overwhelming = fitOf("transmission", 9);
+  overwhelming.overwhelming = true;
+  EXPECT_FALSE(isLikeClutter(overwhelming, true, false));
   EXPECT_FALSE(isLikeClutter(fitOf("range_bias", 9), false, false)) << "clutter has no range bias";
 }
 

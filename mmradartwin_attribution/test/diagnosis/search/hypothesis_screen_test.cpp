@@ -25,7 +25,7 @@ TEST(HypothesisScreen, SuspectsAreThoseWithTheLargestErrors) {
   MadeRoom room(4);
   room.measure(firstOrder());
   FittedRoom fitted(room, firstOrder());
-  SessionLatents& latents = fitted.null.nuisance;
+  SessionLatents& latents = fitted.null.latents;
   const LatentSpread spread = fitted.model.spread();
   latents.actor_gain = {spread.actor_gain, 0, -2 * spread.actor_gain, 0};
   latents.actor_range_m = {0, 0, 3 * spread.actor_range_m, 0};
@@ -58,9 +58,9 @@ TEST(HypothesisScreen, AMaterialThatReflectsLessIsPromisedItsLevel) {
   room.measure(truth);
   FittedRoom fitted(room, firstOrder());
   // As if its actor had no gain of its own that could stand in for it.
-  SessionLatents latents = fitted.null.nuisance;
+  SessionLatents latents = fitted.null.latents;
   latents.actor_gain[1] = 0;
-  fitted.null.nuisance = latents;
+  fitted.null.latents = latents;
   fitted.null.log_likelihood = fitted.model.logLikelihood(fitted.null.echoes, latents, &fitted.null.by_pose);
   fitted.null.basis = fitted.model.basis(fitted.null.echoes, latents);
   fitted.null.covariance = fitted.model.covariance(fitted.null.echoes, latents, fitted.everyPose());

@@ -96,7 +96,7 @@ class SharedLatents : public ::testing::Test {
   void SetUp() override {
     room_.measure(firstOrder());
     fitted_.emplace(room_, firstOrder());
-    SessionLatents& latents = fitted_->null.nuisance;
+    SessionLatents& latents = fitted_->null.latents;
     std::fill(latents.actor_gain.begin(), latents.actor_gain.end(), 0.0);
     std::fill(latents.actor_range_m.begin(), latents.actor_range_m.end(), 0.0);
     std::fill(latents.yaw_rad.begin(), latents.yaw_rad.end(), 0.0);
@@ -113,7 +113,7 @@ class SharedLatents : public ::testing::Test {
 TEST_F(SharedLatents, LevelsOfOneMaterialsActorsAreItsReflectivity) {
   const double delta_db = -5;
   for (int actor : {0, 2})
-    fitted_->null.nuisance.actor_gain[static_cast<std::size_t>(actor)] = delta_db / (10 / std::log(10.0));
+    fitted_->null.latents.actor_gain[static_cast<std::size_t>(actor)] = delta_db / (10 / std::log(10.0));
   const std::vector<Screened> found = shared({reflectivityOf("Metal"), reflectivityOf("Plate")});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].hypothesis.subject, "Metal");
@@ -123,13 +123,13 @@ TEST_F(SharedLatents, LevelsOfOneMaterialsActorsAreItsReflectivity) {
 }
 
 TEST_F(SharedLatents, LevelsWithinTheirErrorsPointAtNothing) {
-  fitted_->null.nuisance.actor_gain[0] = -3 / 4.343;  // two standard deviations
+  fitted_->null.latents.actor_gain[0] = -3 / 4.343;  // two standard deviations
   EXPECT_TRUE(shared({reflectivityOf("Metal")}).empty());
 }
 
 TEST_F(SharedLatents, RangesThatAllActorsShareAreABiasOfRanges) {
   const double bias_m = 0.045;
-  for (int actor : {0, 1, 2}) fitted_->null.nuisance.actor_range_m[static_cast<std::size_t>(actor)] = bias_m;
+  for (int actor : {0, 1, 2}) fitted_->null.latents.actor_range_m[static_cast<std::size_t>(actor)] = bias_m;
   const Hypothesis range_bias = hypothesisOf("range_bias", {{"range_m", "m", -1, 0, 0.02, -5, 5, {}}});
   const std::vector<Screened> found = shared({range_bias});
   ASSERT_EQ(found.size(), 1U);
@@ -139,7 +139,7 @@ TEST_F(SharedLatents, RangesThatAllActorsShareAreABiasOfRanges) {
 
 TEST_F(SharedLatents, HeadingsThatAllPosesShareAreATurnOfTheRadar) {
   const double turned_deg = 2;
-  std::fill(fitted_->null.nuisance.yaw_rad.begin(), fitted_->null.nuisance.yaw_rad.end(), turned_deg * M_PI / 180);
+  std::fill(fitted_->null.latents.yaw_rad.begin(), fitted_->null.latents.yaw_rad.end(), turned_deg * M_PI / 180);
   const Hypothesis yaw = hypothesisOf("radar_yaw_offset", {{"yaw_deg", "deg", -1, 0, 0.5, -180, 180, {}}});
   const std::vector<Screened> found = shared({yaw});
   ASSERT_EQ(found.size(), 1U);

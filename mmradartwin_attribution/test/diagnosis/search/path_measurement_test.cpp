@@ -84,7 +84,7 @@ TEST_F(MeasuredRoom, ATransmittersChannelsAreMeasuredAgainstTheOthers) {
 
 TEST_F(MeasuredRoom, WhatAPosesHeadingIsOffByIsMeasuredOnce) {
   measure();
-  fitted_->null.nuisance.yaw_rad[0] = 0.01;
+  fitted_->null.latents.yaw_rad[0] = 0.01;
   EXPECT_NEAR(off(pathsAt(0).at(0), Kind::kAngleOfPose), -0.01 * 180 / M_PI, 1e-9);
 }
 

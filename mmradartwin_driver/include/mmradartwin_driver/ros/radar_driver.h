@@ -22,7 +22,7 @@ namespace mmradartwin {
 /// map_frame (empty: poses are not watched), pose_age_limit_s.
 class RadarDriver {
  public:
-  /// Throws InputError for unusable parameters; everything about the rig is reported and tried again.
+  /// Throws InputError for unusable parameters. Problems of the rig are reported, and the rig tries again.
   RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh);
   ~RadarDriver();
 
@@ -49,7 +49,7 @@ class RadarDriver {
   PacketReceiver::Counters diagnosed_packets_;
   std::uint64_t diagnosed_not_taken_ = 0;
   ros::WallTime diagnosed_at_;
-  std::unique_ptr<Rig> rig_;  ///< last: its thread uses the rest
+  std::unique_ptr<Rig> rig_;  ///< last member: its thread uses the others
 };
 
 }  // namespace mmradartwin

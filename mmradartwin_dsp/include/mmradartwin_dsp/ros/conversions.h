@@ -1,6 +1,7 @@
 #pragma once
 
 #include <geometry_msgs/Pose.h>
+#include <geometry_msgs/Transform.h>
 #include <mmradartwin_msgs/AdcCube.h>
 #include <mmradartwin_msgs/RadarConfig.h>
 #include <mmradartwin_msgs/RangeAngleMap.h>
@@ -22,6 +23,8 @@ ros::Time toRosTime(std::int64_t stamp_ns);
 std::int64_t toNanoseconds(const ros::Time& stamp);
 geometry_msgs::Pose toMsg(const Eigen::Isometry3d& T);
 Eigen::Isometry3d fromMsg(const geometry_msgs::Pose& pose);
+/// tf takes quaternions whose length is not quite 1, and tf2::transformToEigen would stretch by them.
+Eigen::Isometry3d fromMsg(const geometry_msgs::Transform& transform);
 
 mmradartwin_msgs::RadarConfig toMsg(const RadarConfig& radar);
 RadarConfig fromMsg(const mmradartwin_msgs::RadarConfig& msg);

@@ -3,7 +3,7 @@
 
 #include "mechanisms/base/built_in_mechanism.h"
 #include "physics/aperture.h"
-#include "physics/curved_surface.h"
+#include "physics/curved_echo.h"
 #include "physics/elements_in_map.h"
 #include "physics/image_record.h"
 #include "physics/polarisation.h"

@@ -1,8 +1,8 @@
 #include <cmath>
 
 #include "mechanisms/base/built_in_mechanism.h"
-#include "mechanisms/base/random_draw.h"
 #include "mechanisms/base/receiver_wave.h"
+#include "stages/random_draw.h"
 
 namespace mmradartwin {
 namespace {

@@ -2,8 +2,8 @@
 
 #include "mechanisms/base/built_in_mechanism.h"
 #include "mechanisms/base/point_echo.h"
-#include "mechanisms/base/random_draw.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "stages/random_draw.h"
 
 namespace mmradartwin {
 namespace {

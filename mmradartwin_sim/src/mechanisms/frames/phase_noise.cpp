@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "mechanisms/base/built_in_mechanism.h"
-#include "mechanisms/base/random_draw.h"
+#include "stages/random_draw.h"
 
 namespace mmradartwin {
 namespace {

@@ -110,6 +110,7 @@ class ElevationPattern(Pattern):
     """The same in elevation."""
     name = "elevation_pattern"
     defaults = {"cos_exponent": 12.0}
+    plain = {"cos_exponent": 30.0}
 
     def cosine(self, directions_radar):
         return np.sqrt(1 - directions_radar[:, 2]**2)

@@ -21,13 +21,15 @@ def uncatalogued(cls):
 
 
 class Effect:
-    """One hidden effect. `defaults`: parameters with typical values; `main`: the one that a strength scales.
+    """One hidden effect. `defaults`: parameters with typical values; `main`: the one that a strength scales;
+    `plain`: parameters for a session of few poses, where typical values do not show plainly.
 
     A session calls the stages in the order below; each returns its input unless the effect acts there. Effects of lower
     rank act first: 0 adds echoes, 1 is a law on all echoes, 2 acts on the received grid.
     """
     name = ""
     defaults = {}
+    plain = {}
     main = None
     rank = 1
 

@@ -23,6 +23,7 @@ class RadarPitchOffset(Effect):
     """Mount pitch about y, nose down positive."""
     name, main = "radar_pitch_offset", "pitch_deg"
     defaults = {"pitch_deg": 4.0}
+    plain = {"pitch_deg": 8.0}
 
     def pose(self, measurement, station):
         c, s = math.cos(math.radians(self.p["pitch_deg"])), math.sin(math.radians(self.p["pitch_deg"]))

@@ -125,6 +125,7 @@ class ActorMoved(Effect):
     """In both, elsewhere: true minus twin, turned about its centroid."""
     name = "actor_moved"
     defaults = {"actor": None, "dx_m": None, "dy_m": None, "dyaw_deg": 0.0, "distance_m": 0.15}
+    plain = {"distance_m": 0.4}
     main = "distance_m"
 
     def prepare(self, measurement):

@@ -52,6 +52,7 @@ class RangeScale(Effect):
     """The chirp's slope is 1 + scale times what radar.yaml says."""
     name, main = "range_scale", "scale"
     defaults = {"scale": 0.005}
+    plain = {"scale": 0.03}
 
     def radar(self, radar):
         return dataclasses.replace(radar, slope_hz_per_s=radar.slope_hz_per_s * (1 + self.p["scale"]))
@@ -86,6 +87,7 @@ class IfLowpass(BeatLaw):
     """Sixth-order Butterworth edge in the last bins."""
     name, main = "if_lowpass", "corner_hz"
     defaults = {"corner_hz": 3.6e6}
+    plain = {"corner_hz": 1.8e6}
 
     def if_response(self, measurement, beat_hz):
         b, a = butter(6, 2 * math.pi * self.p["corner_hz"], analog=True)
@@ -97,6 +99,7 @@ class ExcessAttenuation(Effect):
     """dB of power lost per metre of one-way range."""
     name, main = "excess_attenuation", "db_per_m"
     defaults = {"db_per_m": 0.8}
+    plain = {"db_per_m": 2.0}
 
     def echoes(self, measurement, station, echoes):
         gain = lambda lengths: 10**(-self.p["db_per_m"] * lengths[:, 0] / 2 / 20)
@@ -109,6 +112,7 @@ class GainDrift(Effect):
     """Gain that changes with time: a rate, or steps_db at steps_s after the first pose, else at equal parts."""
     name, main, rank = "gain_drift", "db_per_hour", 2
     defaults = {"db_per_hour": 4.0, "steps_db": None, "steps_s": None}
+    plain = {"db_per_hour": 120.0}
 
     def gain_db(self, measurement, index):
         """At one pose, 0 at the first."""

@@ -17,6 +17,7 @@ class MaterialReflectivity(Effect):
     """A material's or an actor's echo stronger or weaker at all ranges, once per interaction."""
     name, main, rank = "material_reflectivity", "delta_db", 0
     defaults = {"material": None, "actor": None, "delta_db": -6.0}
+    plain = {"material": "Concrete", "delta_db": -12.0}
 
     def prepare(self, measurement):
         if self.p["material"] is None and self.p["actor"] is None:

@@ -1,21 +1,31 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <vector>
 
-#include "mmradartwin_sim/twin.h"
+#include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_dsp/receive_grid.h"
+#include "mmradartwin_sim/mechanism.h"
+#include "mmradartwin_sim/path_record.h"
+#include "mmradartwin_sim/ray_caster.h"
+#include "mmradartwin_sim/scene.h"
+#include "mmradartwin_sim/trajectory.h"
+#include "mmradartwin_sim/twin_description.h"
 #include "twin/stage_lists.h"
 
 namespace mmradartwin {
 
-/// Invariants of records and the grid that accumulate() made of them, by another arithmetic.
-RecordCheck checkRecords(const RadarConfig& radar, const std::vector<PathRecord>& records, const ComplexGrid& x);
+/// Whether an actor was edited shows in what Embree and the facets would see.
+bool isSame(const Actor& a, const Actor& b);
 
-struct Twin::Impl {
+/// Scene and mechanisms of a twin, put together, and the steps from a pose to its paths and grid.
+struct AssembledTwin {
   TwinDescription description;
   std::uint64_t seed;
   Scene scene;  // as described

@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "mmradartwin_sim/ray_caster.h"
-#include "physics/curved_surface.h"
+#include "scene/curved_surface.h"
 #include "scene/vertex_weld.h"
 
 namespace mmradartwin {

@@ -1,7 +1,7 @@
 #include "mmradartwin_sim/mechanism_registry.h"
 
 #include "mmradartwin_dsp/input_error.h"
-#include "twin/built_in_mechanisms.h"
+#include "stages/built_in_mechanisms.h"
 
 namespace mmradartwin {
 

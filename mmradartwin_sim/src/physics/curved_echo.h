@@ -3,19 +3,13 @@
 #include <Eigen/Geometry>
 #include <complex>
 #include <optional>
-#include <vector>
 
+#include "mmradartwin_sim/path_record.h"
+#include "mmradartwin_sim/pose_context.h"
+#include "mmradartwin_sim/scene.h"
 #include "physics/elements_in_map.h"
 
 namespace mmradartwin {
-
-/// Facets of an actor, five and more, that folds of less than 32 deg join: ids. weld: as below.
-std::vector<std::vector<int>> smoothParts(const Scene& scene, const Actor& actor, const std::vector<int>& weld);
-
-/// Spheres and straight circular cylinders that tessellated parts of an actor stand for: facets joined by folds of less
-/// than 32 deg (12 sides and more) whose vertices lie on one such surface, over an arc of 60 deg and more. weld: the
-/// actor's vertices, each by the first at its place. Sets Facet::curved of what was found.
-void findCurvedSurfaces(Scene& scene, int actor, const std::vector<int>& weld);
 
 /// First-order echo of a curved surface, without its material and without asking whether anything is in its way.
 struct CurvedEcho {

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "mmradartwin_sim/mechanism_registry.h"
-
 namespace mmradartwin {
+
+class MechanismRegistry;
 
 /// Adds the mechanisms of src/mechanisms; CMake writes its source from the files there.
 void registerBuiltInMechanisms(MechanismRegistry& registry);
