@@ -9,15 +9,16 @@
 int main(int argc, char** argv) {
   using namespace mmradartwin;
   std::string input, radar, output;
-  std::uint16_t data_port = 4098, config_port = 4096;
+  PcapSource source;
   CLI::App app("Makes a capture from recorded packets (tcpdump, Wireshark, or the driver's record_pcap).");
   app.add_option("PCAP", input, "pcap or pcapng file")->required();
   app.add_option("--radar", radar, "radar.yaml of the radar that was recorded")->required();
   app.add_option("--output", output, "capture to write")->required();
-  app.add_option("--data-port", data_port, "UDP port of the samples")->capture_default_str();
-  app.add_option("--config-port", config_port, "UDP port of the card's answers")->capture_default_str();
+  app.add_option("--data-port", source.data, "UDP port of the samples")->capture_default_str();
+  app.add_option("--config-port", source.config, "UDP port of the card's answers")->capture_default_str();
+  app.add_option("--card-ip", source.card_ip, "address of the card whose samples are wanted, where several sent some");
   return runProgram(app, argc, argv, [&] {
-    const PcapCapture capture = pcapToCapture(input, loadRadarConfig(radar), output, data_port, config_port);
+    const PcapCapture capture = pcapToCapture(input, loadRadarConfig(radar), output, source);
     if (capture.before_file > 0) {
       std::cerr << "note: the file begins within a recording: " << capture.before_file
                 << " frame(s) came before it and are left out\n";
@@ -33,7 +34,9 @@ int main(int argc, char** argv) {
       std::cerr << "error: a last frame was cut off after " << bytes << " bytes and left out\n";
     }
     std::cerr << output << ": " << capture.frames << " frame(s), the first at " << formatStamp(capture.first_stamp_ns)
-              << " s, " << capture.flaws.size() << " with losses\n";
+              << " s, " << capture.flaws.size() << " with losses";
+    if (capture.lost_packets > 0) std::cerr << "; " << capture.lost_packets << " packets lost";
+    std::cerr << "\n";
     return capture.flaws.empty() && capture.cut_off.empty() ? 0 : 2;
   });
 }

@@ -19,6 +19,8 @@ int main(int argc, char** argv) {
   app.add_option("--source-port", options.source_port, "port that they come from")->capture_default_str();
   app.add_option("--recorded-data-port", options.recorded.data, "UDP port of the samples in the file")
       ->capture_default_str();
+  app.add_option("--recorded-card-ip", options.recorded.card_ip,
+                 "address in the file of the card whose samples are sent, where there are several");
   app.add_option("--rate", options.rate, "times the recorded pace")
       ->capture_default_str()
       ->check(CLI::Range(1e-3, 1e3));

@@ -20,6 +20,7 @@ std::uint64_t replayPackets(const std::string& file, const PacketReplayOptions& 
   if (!(options.rate > 0) || !std::isfinite(options.rate)) {
     throw InputError("rate " + std::to_string(options.rate) + ": must be above 0");
   }
+  demandOneCard(file, readPcap(file, {}, options.recorded), options.recorded, "--recorded-card-ip");
   const UdpSocket socket(options.card_ip, options.source_port, "the replay");
   sockaddr_in host{};
   host.sin_family = AF_INET;
@@ -40,12 +41,7 @@ std::uint64_t replayPackets(const std::string& file, const PacketReplayOptions& 
       throw RigError("cannot send to " + options.host_ip + ": " + std::strerror(errno));
     }
   };
-  const PcapCounters counters = readPcap(file, visitor, options.recorded);
-  if (counters.data == 0) {
-    throw InputError(file + ": no samples to port " + std::to_string(options.recorded.data) +
-                     ": give the port that the card sent them to");
-  }
-  return counters.data;
+  return readPcap(file, visitor, options.recorded).data;
 }
 
 }  // namespace mmradartwin

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <optional>
+#include <set>
 
-#include "mmradartwin_driver/pcap_reader.h"
+#include "mmradartwin_driver/udp_socket.h"
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/input_error.h"
 
@@ -99,10 +101,47 @@ class CaptureOutput {
   bool new_recording_ = true, start_seen_ = false;
 };
 
+/// Counts packets that never came, by the numbers that the card gives them.
+class LostPackets {
+ public:
+  void add(std::uint32_t sequence) {
+    const std::int64_t ahead = next_ ? static_cast<std::int64_t>(sequence) - *next_ : 0;
+    if (ahead >= 0 && ahead <= kMost) {
+      if (static_cast<std::int64_t>(missing_.size()) + ahead > kMost) endRecording();  // these come no more
+      for (std::int64_t i = 0; i < ahead; ++i) missing_.insert(missing_.end(), static_cast<std::uint32_t>(*next_ + i));
+    } else if (-kMost <= ahead && ahead < 0 && sequence != 1) {
+      missing_.erase(sequence);  // late, or a copy
+      return;
+    } else {
+      endRecording();
+    }
+    next_ = sequence + std::int64_t{1};
+  }
+  /// The card was armed: its packets begin at 1.
+  void begin() {
+    endRecording();
+    next_ = 1;
+  }
+  std::uint64_t total() const { return before_ + missing_.size(); }
+
+ private:
+  static constexpr std::int64_t kMost = kLongestHole_bytes / 1456;
+
+  void endRecording() {
+    before_ += missing_.size();
+    missing_.clear();
+  }
+
+  std::optional<std::int64_t> next_;
+  std::set<std::uint32_t> missing_;
+  std::uint64_t before_ = 0;
+};
+
 }  // namespace
 
 PcapCapture pcapToCapture(const std::string& pcap, const RadarConfig& radar, const std::string& output,
-                          std::uint16_t data_port, std::uint16_t config_port) {
+                          const PcapSource& source) {
+  if (!source.card_ip.empty()) parseIpv4(source.card_ip);
   CaptureOutput out(radar, output);
   std::uint64_t epochs = 1;
   FrameAssembler* counted = nullptr;
@@ -116,19 +155,28 @@ PcapCapture pcapToCapture(const std::string& pcap, const RadarConfig& radar, con
   });
   counted = &assembler;
   PcapVisitor visitor;
-  visitor.data = [&](const DataPacket& packet) { assembler.add(packet); };
+  LostPackets lost;
+  visitor.data = [&](const DataPacket& packet) {
+    lost.add(packet.sequence);
+    assembler.add(packet);
+  };
   visitor.reply = [&](const Dca1000Reply& reply, std::int64_t) {
     if (reply.code != static_cast<std::uint16_t>(Dca1000Command::kRecordStart)) return;
     out.seeStart();
+    lost.begin();
     assembler.restart();
   };
-  const PcapCounters counters = readPcap(pcap, visitor, {config_port, data_port});
+  const PcapCounters counters = readPcap(pcap, visitor, source);
   assembler.flush();
   out.finish();
   out.result.counters = assembler.counters();
-  if (counters.data == 0) {
-    throw InputError(pcap + ": holds no packet of samples to UDP port " + std::to_string(data_port) + " among its " +
-                     std::to_string(counters.frames) + "; give the card's data port with --data-port");
+  out.result.lost_packets = lost.total();
+  try {
+    demandOneCard(pcap, counters, source, "--card-ip");
+  } catch (const InputError&) {
+    std::error_code error;
+    if (std::filesystem::is_regular_file(output, error)) std::filesystem::remove(output, error);
+    throw;
   }
   return std::move(out.result);
 }

@@ -6,10 +6,12 @@
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <map>
 #include <mutex>
 
 #include "emulated_rig.h"
+#include "mmradartwin_driver/packet_replay.h"
 #include "mmradartwin_driver/pcap_capture.h"
 #include "mmradartwin_driver/pcap_reader.h"
 #include "mmradartwin_driver/pcap_writer.h"
@@ -202,6 +204,102 @@ TEST(PcapCapture, TakesRecordingsApart) {
   std::vector<std::uint8_t> expected(sent.begin(), sent.begin() + 4 * 2048);
   expected.insert(expected.end(), sent.begin() + 5 * 2048, sent.end());
   EXPECT_EQ(expected, readBytes(folder.file("a.bin")));
+}
+
+/// Two cards that send to one host at the same time; of the first, packets 5, 9 and 10 are lost.
+class TwoCards : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
+    const std::string random = randomBytes(60 * 2048, 10);
+    for (std::size_t card = 0; card < 2; ++card) {
+      sent[card].assign(random.begin() + static_cast<std::ptrdiff_t>(card * 30 * 2048),
+                        random.begin() + static_cast<std::ptrdiff_t>((card + 1) * 30 * 2048));
+    }
+    PcapWriter writer(folder.file("a.pcap"));
+    const std::uint8_t start[] = {0x5a, 0xa5, 0x05, 0x00, 0x00, 0x00, 0xaa, 0xee};
+    std::int64_t stamp_ns = 1'700'000'000'000'000'000;
+    writer.add({endpoint(kCards[0], 1024), endpoint("192.168.33.30", 4096), start, sizeof start, stamp_ns});
+    const auto send = [&](std::size_t card, std::uint32_t sequence) {
+      const std::size_t at = (sequence - 1) * 1456;
+      if (sequence == 0 || at >= sent[card].size()) return;
+      const auto datagram =
+          dataDatagram(sequence, at, &sent[card][at], std::min<std::size_t>(1456, sent[card].size() - at));
+      writer.add({endpoint(kCards[card], 1024), endpoint("192.168.33.30", 4098), datagram.data(), datagram.size(),
+                  stamp_ns += 500'000});
+    };
+    for (std::uint32_t sequence = 1; sequence <= 45; ++sequence) {
+      if (sequence != 5 && sequence != 9 && sequence != 10) send(0, sequence);
+      // The second card is armed while the first one sends.
+      if (sequence == 3) {
+        writer.add({endpoint(kCards[1], 1024), endpoint("192.168.33.30", 4096), start, sizeof start, stamp_ns});
+      }
+      if (sequence >= 3) send(1, sequence - 2);
+    }
+  }
+  /// Status of the program, and what it says.
+  std::pair<int, std::string> run(const std::string& arguments) const {
+    const std::string command = std::string(MMRADARTWIN_PCAP_TO_CAPTURE) + " " + folder.file("a.pcap") + " --radar " +
+                                folder.file("radar.yaml") + " --output " + folder.file("a.bin") + " " + arguments +
+                                " 2>" + folder.file("log");
+    const int status = WEXITSTATUS(std::system(command.c_str()));
+    const std::vector<std::uint8_t> log = readBytes(folder.file("log"));
+    return {status, std::string(log.begin(), log.end())};
+  }
+
+  static constexpr const char* kCards[] = {"192.168.33.180", "192.168.33.181"};
+  TestFolder folder;
+  std::vector<std::uint8_t> sent[2];
+};
+
+TEST_F(TwoCards, AreAskedFor) {
+  const auto [status, log] = run("");
+  EXPECT_EQ(2, status);
+  EXPECT_NE(std::string::npos, log.find("2 cards: 192.168.33.180 (40 packets), 192.168.33.181 (43 packets)")) << log;
+  EXPECT_NE(std::string::npos, log.find("--card-ip")) << log;
+  EXPECT_FALSE(std::filesystem::exists(folder.file("a.bin")));
+  const auto [other_status, other_log] = run("--card-ip 192.168.33.182");
+  EXPECT_EQ(2, other_status);
+  EXPECT_NE(std::string::npos, other_log.find("no packet of samples from 192.168.33.182")) << other_log;
+  EXPECT_EQ(2, run("--card-ip 192.168.33.x").first);
+  EXPECT_THROW(replayPackets(folder.file("a.pcap"), {}), InputError);
+}
+
+TEST_F(TwoCards, AreTakenApart) {
+  const auto [status, log] = run("--card-ip 192.168.33.180");
+  EXPECT_EQ(2, status);
+  EXPECT_NE(std::string::npos, log.find("30 frame(s)")) << log;
+  EXPECT_NE(std::string::npos, log.find("3 packets lost")) << log;
+  std::vector<std::uint8_t> expected = sent[0];
+  for (const std::ptrdiff_t lost : {4, 8, 9}) {
+    std::fill(expected.begin() + lost * 1456, expected.begin() + (lost + 1) * 1456, std::uint8_t{0});
+  }
+  EXPECT_TRUE(expected == readBytes(folder.file("a.bin")));
+  const auto [whole_status, whole_log] = run("--card-ip 192.168.33.181");
+  EXPECT_EQ(0, whole_status);
+  EXPECT_NE(std::string::npos, whole_log.find("30 frame(s)")) << whole_log;
+  EXPECT_NE(std::string::npos, whole_log.find("0 with losses\n")) << whole_log;
+  EXPECT_TRUE(sent[1] == readBytes(folder.file("a.bin")));
+}
+
+TEST(PcapCapture, CountsLostPacketsOfLateAndDoubledOnes) {
+  TestFolder folder;
+  writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
+  const std::string random = randomBytes(20 * 2048, 11);
+  const std::vector<std::uint8_t> sent(random.begin(), random.end());
+  {
+    PcapWriter writer(folder.file("a.pcap"));
+    std::int64_t stamp_ns = 1'700'000'000'000'000'000;
+    // The file begins with packet 2; 5 comes after 7, 8 twice, 11 and 12 never.
+    for (const std::uint32_t sequence : {2, 3, 4, 6, 7, 5, 8, 8, 9, 10, 13, 14, 15}) {
+      const std::size_t at = (sequence - 1) * 1456;
+      const auto datagram = dataDatagram(sequence, at, &sent[at], 1456);
+      writer.add({endpoint("192.168.33.180", 1024), endpoint("192.168.33.30", 4098), datagram.data(), datagram.size(),
+                  stamp_ns += 100'000});
+    }
+  }
+  const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  EXPECT_EQ(2u, pcapToCapture(folder.file("a.pcap"), radar, folder.file("a.bin")).lost_packets);
 }
 
 TEST(PcapCapture, SaysThatThereAreNoSamples) {

@@ -1,4 +1,4 @@
-// import_settings: settings of mmWave Studio and of the DCA1000's command line -> radar.yaml.
+// import_settings: settings of mmWave Studio, the mmWave SDK and the DCA1000's command line -> radar.yaml.
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <fstream>
@@ -12,10 +12,16 @@ int main(int argc, char** argv) {
   using namespace mmradartwin;
   std::vector<std::string> files;
   std::string output, device;
-  CLI::App app("Makes a radar.yaml of mmWave Studio's Lua script, XML or JSON, and the DCA1000's cf.json.");
-  app.add_option("FILE", files, "*.lua, *.xml, *.mmwave.json, setup.json, cf.json, of one configuration")->required();
+  CLI::App app(
+      "Makes a radar.yaml of mmWave Studio's Lua script, XML or JSON, the SDK's profile.cfg, and the DCA1000's "
+      "cf.json.");
+  app.add_option(
+         "FILE", files,
+         "*.lua, *.xml, *.mmwave.json, setup.json, cf.json, profile.cfg, of one configuration; known by their content")
+      ->required();
   app.add_option("--output", output, "radar.yaml to write")->required();
-  app.add_option("--device", device, "awr2243, xwr1843, ...: where the files do not say");
+  app.add_option("--device", device,
+                 "awr2243, xwr1843, ...: where the files do not say, and what a script is told that it runs on");
   return runProgram(app, argc, argv, [&] {
     const ImportedSettings settings = importSettings(files, device);
     if (std::filesystem::exists(output)) throw InputError(output + ": exists already; give a new name");

@@ -8,6 +8,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/strict_yaml.h"
+#include "mmradartwin_dsp/text.h"
 #include "raw_settings.h"
 #include "text_file.h"
 
@@ -20,6 +21,8 @@ using nlohmann::json;
 constexpr int kLastChirp = 511;
 
 std::string shortest(double value) { return yamlNumber(value); }
+
+std::string said(double value) { return significantNumber(value, 12); }
 
 std::string lowerCase(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -42,6 +45,16 @@ class JsonPlace {
     for (std::size_t i = 0; i < value_.size(); ++i) all.emplace_back(value_[i], where_ + "/" + std::to_string(i));
     return all;
   }
+  /// What stands in a list or an object, each with its key.
+  std::vector<std::pair<std::string, JsonPlace>> children() const {
+    std::vector<std::pair<std::string, JsonPlace>> all;
+    if (!value_.is_structured()) return all;
+    for (const auto& item : value_.items()) {
+      all.emplace_back(value_.is_object() ? item.key() : "", JsonPlace(item.value(), where_ + "/" + item.key()));
+    }
+    return all;
+  }
+  bool isNonZero() const { return (value_.is_number() || value_.is_string()) && number() != 0; }
   /// Numbers stand as such, or as text in hexadecimal.
   double number() const {
     if (value_.is_number()) return value_.get<double>();
@@ -66,6 +79,51 @@ class JsonPlace {
   std::string where_;
 };
 
+/// Whether a number below a key that contains `part` is not 0 (structures, named ..._t, do not count as such a key).
+bool holdsNonZero(const JsonPlace& place, const std::string& part, bool below = false) {
+  for (const auto& [key, child] : place.children()) {
+    const bool structure = key.size() > 2 && key.compare(key.size() - 2, 2, "_t") == 0;
+    const bool counts = below || (!structure && key.find(part) != std::string::npos);
+    if (child.children().empty() ? counts && child.isNonZero() : holdsNonZero(child, part, counts)) return true;
+  }
+  return false;
+}
+
+/// What a frame of equal chirps, sent by one transmitter each, does not have. Studio writes all lists, mostly empty.
+void refuseBeyondTdm(const JsonPlace& rf) {
+  const auto refuse = [](const JsonPlace& place, const std::string& what) {
+    throw InputError(place.where() + ": " + what + "; " + kOnlyTdm);
+  };
+  if (rf.has("MIMOScheme")) {
+    const std::string scheme = lowerCase(rf["MIMOScheme"].text());
+    const std::vector<std::string> known = {"", "tdm", "none", "simo", "siso"};
+    if (std::find(known.begin(), known.end(), scheme) == known.end()) {
+      refuse(rf["MIMOScheme"], "transmitters send by " + rf["MIMOScheme"].text());
+    }
+  }
+  struct Feature {
+    std::string key, part, what;  ///< part: of the keys whose values count; "*": any entry does
+  };
+  const std::vector<Feature> features = {
+      {"rlBpmChirps", "constBpmVal", "transmitters are inverted by chirp (BPM)"},
+      {"rlBpmCommonCfg_t", "b2SrcSel", "transmitters are inverted by chirp (BPM)"},
+      {"rlRfPhaseShiftCfgs", "PhaseShift", "transmitters' phases are shifted by chirp (beam steering or DDMA)"},
+      {"rlDynPerChirpPhShftCfgs", "PhaseShift", "transmitters' phases are shifted by chirp (beam steering or DDMA)"},
+      {"rlDynChirpCfgs", "*", "chirps change while frames are sent"},
+      {"rlLoopbackBursts", "loopbackSel", "frames hold loopback bursts"}};
+  for (const Feature& feature : features) {
+    if (!rf.has(feature.key)) continue;
+    const JsonPlace place = rf[feature.key];
+    const bool there = feature.part == "*" ? !place.children().empty() : holdsNonZero(place, feature.part);
+    if (there) refuse(place, feature.what);
+  }
+  for (const auto& [key, place] : rf.children()) {
+    if (key.find("AdvChirp") != std::string::npos && !place.children().empty()) {
+      refuse(place, "chirps differ from their profile (advanced chirps)");
+    }
+  }
+}
+
 void readMmwave(const JsonPlace& root, RawSettings& settings) {
   const auto devices = root["mmWaveDevices"].items();
   if (devices.size() != 1) {
@@ -80,6 +138,7 @@ void readMmwave(const JsonPlace& root, RawSettings& settings) {
   const auto set = [&settings](const std::string& name, const JsonPlace& place) {
     settings.set(name, place.integer(), place.where());
   };
+  refuseBeyondTdm(rf);
   for (const JsonPlace& item : rf["rlProfiles"].items()) {
     const JsonPlace p = item["rlProfileCfg_t"];
     RawSettings::Profile profile{};
@@ -128,6 +187,10 @@ void readMmwave(const JsonPlace& root, RawSettings& settings) {
   set("interleave", raw["rlDevDataFmtCfg_t"]["chInterleave"]);
   set("interface", raw["rlDevDataPathCfg_t"]["intfSel"]);
   set("packet", raw["rlDevDataPathCfg_t"]["transferFmtPkt0"]);
+  if (raw["rlDevDataPathCfg_t"].has("transferFmtPkt1")) {
+    const JsonPlace second = raw["rlDevDataPathCfg_t"]["transferFmtPkt1"];
+    settings.set("second_packet", second.integer() & 0x3f, second.where());  // above: a channel of CSI2
+  }
   if (raw.has("rlDevLaneEnable_t")) {
     const JsonPlace lanes = raw["rlDevLaneEnable_t"]["laneEn"];
     settings.set("lanes", __builtin_popcount(static_cast<unsigned>(lanes.integer())), lanes.where());
@@ -157,8 +220,8 @@ void readCard(const JsonPlace& card, RawSettings& settings) {
 /// Deeper than any of TI's files by far; messages quote values, and quoting recurses.
 constexpr int kDeepestJson = 100;
 
-void readJson(const std::string& file, const std::vector<std::string>& files, RawSettings& settings) {
-  const std::string text = readTextFile(file, "give a JSON file that exists");
+void readJson(const std::string& file, const std::string& text, const std::vector<std::string>& files,
+              RawSettings& settings) {
   json root;
   try {
     root = json::parse(text, [&file](int depth, json::parse_event_t, json&) {
@@ -194,7 +257,7 @@ void readJson(const std::string& file, const std::vector<std::string>& files, Ra
     if (!given) {
       std::vector<std::string> known = files;
       known.insert(known.end(), {file, beside});
-      readJson(beside, known, settings);
+      readJson(beside, readTextFile(beside, "give a JSON file that exists"), known, settings);
     }
   }
   if (!known) {
@@ -240,8 +303,13 @@ void placeAntennas(ImportedSettings& imported, const std::string& digits, const 
 void RawSettings::set(const std::string& name, double value, const std::string& where) {
   const auto [known, fresh] = values.emplace(name, Given{value, where});
   if (fresh || known->second.value == value) return;
-  throw InputError(where + ": " + name + " is " + shortest(value) + ", but " + known->second.where + " says " +
-                   shortest(known->second.value) + "; give files of one configuration");
+  throw InputError(where + ": " + name + " is " + said(value) + ", but " + known->second.where + " says " +
+                   said(known->second.value) + "; give one configuration");
+}
+
+std::string partOf(const std::string& device) {
+  const std::size_t digit = device.find_first_of("0123456789");
+  return digit == std::string::npos ? "" : device.substr(digit, 4);
 }
 
 void RawSettings::setDevice(const std::string& name, const std::string& where) {
@@ -249,19 +317,53 @@ void RawSettings::setDevice(const std::string& name, const std::string& where) {
   for (const char c : lowerCase(name)) {
     if (std::isalnum(static_cast<unsigned char>(c))) plain += c;
   }
+  const auto isFamily = [](const std::string& text) { return text.compare(0, 3, "xwr") == 0; };
+  const bool same_part = !partOf(plain).empty() && partOf(plain) == partOf(device);
+  if (same_part && (isFamily(plain) || isFamily(device))) {
+    // The prefix of one and the variant (such as AOP) of the other.
+    const auto variantOf = [](const std::string& text) { return text.substr(text.find(partOf(text)) + 4); };
+    const std::string& exact = isFamily(device) ? plain : device;
+    const std::string variant =
+        variantOf(plain).size() > variantOf(device).size() ? variantOf(plain) : variantOf(device);
+    device = exact.substr(0, exact.find(partOf(exact)) + 4) + variant;
+    return;
+  }
   if (!device.empty() && device != plain) {
     throw InputError(where + ": the device is " + plain + ", but " + device_from + " says " + device +
-                     "; give files of one configuration");
+                     "; give one configuration");
   }
   device = plain;
   device_from = where;
 }
 
 void RawSettings::setProfile(int id, const Profile& profile, const std::string& where) {
-  if (!profiles.emplace(id, profile).second) {
-    throw InputError(where + ": profile " + std::to_string(id) + " is given twice");
+  const auto [known, fresh] = profiles.emplace(id, profile);
+  const auto values = [](const Profile& p) {
+    return std::vector<std::pair<const char*, double>>{{"start in GHz", p.start_ghz},
+                                                       {"idle time in us", p.idle_us},
+                                                       {"ADC start in us", p.adc_start_us},
+                                                       {"ramp end in us", p.ramp_end_us},
+                                                       {"slope in MHz/us", p.slope_mhz_per_us},
+                                                       {"sample rate in ksps", p.ksps},
+                                                       {"number of samples", p.samples},
+                                                       {"first high-pass code", p.hpf1},
+                                                       {"second high-pass code", p.hpf2},
+                                                       {"receiver gain code", p.rx_gain},
+                                                       {"backoff of TX 0 in dB", p.backoff_db[0]},
+                                                       {"backoff of TX 1 in dB", p.backoff_db[1]},
+                                                       {"backoff of TX 2 in dB", p.backoff_db[2]}};
+  };
+  if (fresh) {
+    profile_from[id] = where;
+    return;
   }
-  profile_from = where;
+  const auto now = values(profile), before = values(known->second);
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    if (now[i].second == before[i].second) continue;
+    throw InputError(where + ": profile " + std::to_string(id) + " is given twice: its " + now[i].first + " is " +
+                     said(now[i].second) + ", but " + profile_from[id] + " says " + said(before[i].second) +
+                     "; give one configuration");
+  }
 }
 
 void RawSettings::setChirps(int first, int last, const Chirp& chirp, const std::string& where) {
@@ -269,7 +371,14 @@ void RawSettings::setChirps(int first, int last, const Chirp& chirp, const std::
     throw InputError(where + ": chirps " + std::to_string(first) + " to " + std::to_string(last) +
                      ": must be within 0 to " + std::to_string(kLastChirp) + ", in order");
   }
-  for (int i = first; i <= last; ++i) chirps[i] = chirp;
+  for (int i = first; i <= last; ++i) {
+    const auto [known, fresh] = chirps.emplace(i, chirp);
+    if (fresh) {
+      known->second.where = where;
+    } else if (known->second.tx_mask != chirp.tx_mask || known->second.profile != chirp.profile) {
+      known->second.conflict = where;
+    }
+  }
 }
 
 int wholeNumber(double value, const std::string& what) {
@@ -281,20 +390,51 @@ int wholeNumber(double value, const std::string& what) {
 
 namespace {
 
+enum class SettingsFormat { kXml, kJson, kSdk, kLua };  // scripts are run last: for the device that other files name
+
+/// By what a file holds, and by its name only where that does not tell.
+SettingsFormat formatOf(const std::string& file, const std::string& text) {
+  const std::size_t start = text.compare(0, 3, "\xEF\xBB\xBF") == 0 ? 3 : 0;
+  const std::size_t first = text.find_first_not_of(" \t\r\n", start);
+  const char head = first == std::string::npos ? '\0' : text[first];
+  if (head == '<') return SettingsFormat::kXml;
+  if (head == '{') return SettingsFormat::kJson;
+  if (text.find("ar1.") != std::string::npos) return SettingsFormat::kLua;
+  if (looksLikeSdkSettings(text)) return SettingsFormat::kSdk;
+  const std::string extension = lowerCase(fs::path(file).extension().string());
+  if (extension == ".lua") return SettingsFormat::kLua;
+  if (extension == ".json") return SettingsFormat::kJson;
+  if (extension == ".xml") return SettingsFormat::kXml;
+  throw InputError(file +
+                   ": is no settings file that is known; give mmWave Studio's .lua, .xml or .json, the DCA1000's "
+                   "cf.json, or profile.cfg of the mmWave SDK");
+}
+
 RawSettings readSettings(const std::vector<std::string>& files, const std::string& device) {
-  if (files.empty()) throw InputError("no settings file; give a .lua script, XML or JSON files");
+  if (files.empty()) throw InputError("no settings file; give a .lua script, XML, JSON or profile.cfg");
   RawSettings raw;
   if (!device.empty()) raw.setDevice(device, "--device");
+  std::multimap<SettingsFormat, std::pair<std::string, std::string>> texts;
   for (const std::string& file : files) {
-    const std::string extension = lowerCase(fs::path(file).extension().string());
-    if (extension == ".lua") {
-      readLuaSettings(file, raw);
-    } else if (extension == ".json") {
-      readJson(file, files, raw);
-    } else if (extension == ".xml") {
-      readXmlSettings(file, raw);
-    } else {
-      throw InputError(file + ": settings are read from .lua, .xml and .json; give one of these");
+    std::string text = readTextFile(file, "give a settings file that exists");
+    const SettingsFormat format = formatOf(file, text);
+    texts.emplace(format, std::make_pair(file, std::move(text)));
+  }
+  for (const auto& [format, named] : texts) {
+    const auto& [file, text] = named;
+    switch (format) {
+      case SettingsFormat::kXml:
+        readXmlSettings(file, text, raw);
+        break;
+      case SettingsFormat::kJson:
+        readJson(file, text, files, raw);
+        break;
+      case SettingsFormat::kSdk:
+        readSdkSettings(file, text, raw);
+        break;
+      case SettingsFormat::kLua:
+        readLuaSettings(file, text, raw);
+        break;
     }
   }
   if (raw.device.empty()) {
@@ -309,8 +449,7 @@ struct Device {
 };
 
 Device knownDevice(const RawSettings& raw) {
-  const std::size_t digit = raw.device.find_first_of("0123456789");
-  const std::string digits = digit == std::string::npos ? "" : raw.device.substr(digit, 4);
+  const std::string digits = partOf(raw.device);
   const std::vector<std::string> known = {"1243", "1443", "2243", "1642", "1843", "6443", "6843"};
   const std::optional<CaptureLayout> layout = captureLayoutOf(raw.device);
   if (!layout || std::find(known.begin(), known.end(), digits) == known.end()) {
@@ -345,13 +484,18 @@ FrameChirps frameChirps(const RawSettings& raw) {
                                                            ": mmWave Studio's XML keeps the chirps that were set last "
                                                            "only; give the script or the JSON instead"));
     }
+    if (!found->second.conflict.empty()) {
+      throw InputError(found->second.conflict + ": chirp " + std::to_string(chirp) +
+                       " is configured otherwise than at " + found->second.where + "; give one configuration");
+    }
     if (profile_id && *profile_id != found->second.profile) {
-      throw InputError(raw.profile_from + ": the frame's chirps have several profiles; a radar.yaml holds one");
+      throw InputError(found->second.where + ": the frame's chirps have several profiles; a radar.yaml holds one");
     }
     profile_id = found->second.profile;
     const unsigned mask = found->second.tx_mask;
     if (mask != 1 && mask != 2 && mask != 4) {
-      throw InputError("chirp " + std::to_string(chirp) + " is sent by transmitters of mask " + std::to_string(mask) +
+      throw InputError(found->second.where + ": chirp " + std::to_string(chirp) + " is sent by transmitters of mask " +
+                       std::to_string(mask) +
                        ": where several send at once (or none), its position in the virtual array is not known here");
     }
     transmitters.push_back(mask == 4 ? 2 : static_cast<int>(mask) - 1);
@@ -394,10 +538,10 @@ void setGains(ImportedSettings& imported, const RawSettings::Profile& profile, c
   }
 }
 
-void setHighPass(RadarConfig& radar, const RawSettings& raw, const RawSettings::Profile& profile) {
+void setHighPass(RadarConfig& radar, const std::string& profile_from, const RawSettings::Profile& profile) {
   const double corner1[] = {175e3, 235e3, 350e3, 700e3}, corner2[] = {350e3, 700e3, 1.4e6, 2.8e6};
   if (profile.hpf1 < 0 || profile.hpf1 > 3 || profile.hpf2 < 0 || profile.hpf2 > 3) {
-    throw InputError(raw.profile_from + ": high-pass codes " + std::to_string(profile.hpf1) + " and " +
+    throw InputError(profile_from + ": high-pass codes " + std::to_string(profile.hpf1) + " and " +
                      std::to_string(profile.hpf2) + ": must be 0 to 3");
   }
   radar.if_highpass_hz = {corner1[profile.hpf1], corner2[profile.hpf2]};
@@ -409,12 +553,17 @@ void setSampleFormat(ImportedSettings& imported, const RawSettings& raw, const D
   demand(raw, "adc_format", {1, 2}, "samples must be complex (code 1 or 2)");
   demand(raw, "interface", {1}, "samples must leave over LVDS (code 1)");
   demand(raw, "packet", {1}, "packets must hold ADC samples only (code 1)");
+  demand(raw, "second_packet", {0},
+         "a second packet (chirp parameters, chirp quality) stands between the samples; "
+         "captures are known with ADC samples only (0)");
   demand(raw, "lane_format", {0}, "lanes must be in their order (format map 0)");
   demand(raw, "iq_swap", {0, 1}, "must be 0 (I first) or 1 (Q first)");
-  const int lanes =
-      static_cast<int>(required(raw, "lanes", "how many LVDS lanes there are (LVDSLaneConfig, laneEn or cf.json)"));
   const bool four_lanes = device.layout == CaptureLayout::kFourLane;
-  if (lanes != (four_lanes ? 4 : 2)) {
+  if (!raw.sdk_from.empty() && !raw.values.count("lanes")) {
+    imported.assumed.push_back(std::string(four_lanes ? "four" : "two") + " LVDS lanes, as this device has them");
+  } else if (const int lanes = static_cast<int>(
+                 required(raw, "lanes", "how many LVDS lanes there are (LVDSLaneConfig, laneEn or cf.json)"));
+             lanes != (four_lanes ? 4 : 2)) {
     throw InputError(raw.values.at("lanes").where + ": " + std::to_string(lanes) + " LVDS lanes of an " + raw.device +
                      ": known are four of xWR1243, 1443 and 2243, and two of the others");
   }
@@ -425,6 +574,11 @@ void setSampleFormat(ImportedSettings& imported, const RawSettings& raw, const D
     imported.radar.iq_order = raw.values.at("iq_swap").value != 0 ? IqOrder::kQi : IqOrder::kIq;
   } else {
     imported.assumed.push_back("iq_order: I first, as devices send it unless told otherwise");
+  }
+  if (raw.values.count("adc_format") && raw.values.at("adc_format").value == 2) {
+    imported.assumed.push_back(
+        "complex 2x samples: the band is symmetric, so that range bins beyond N/2 hold no echo, and the range ends at "
+        "half of what radar.yaml's numbers give");
   }
   for (const char* name : {"adc_bits", "adc_format", "packet"}) {
     if (!raw.values.count(name)) {
@@ -449,7 +603,7 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
   radar.loops_per_frame = static_cast<int>(required(raw, "loops", "how many loops a frame has (FrameConfig)"));
   radar.frame_period_s = required(raw, "period_ms", "the frame period (FrameConfig)") / 1e3;
   setGains(imported, profile, chirps.transmitters);
-  setHighPass(radar, raw, profile);
+  setHighPass(radar, raw.profile_from.at(chirps.profile), profile);
   setSampleFormat(imported, raw, device);
   const int rx_mask = static_cast<int>(required(raw, "rx_mask", "which receivers are on (ChanNAdcConfig)"));
   for (int rx = 0; rx < 4; ++rx) {
@@ -460,6 +614,7 @@ ImportedSettings importSettings(const std::vector<std::string>& files, const std
     imported.assumed.push_back("the card's packet delay is no part of radar.yaml: give the driver packet_delay_us:=" +
                                shortest(raw.values.at("packet_delay_us").value));
   }
+  imported.assumed.insert(imported.assumed.end(), raw.notes.begin(), raw.notes.end());
   parseRadarConfig(toYaml(radar), files.front());  // its ranges hold for imported values too
   return imported;
 }

@@ -7,7 +7,6 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "raw_settings.h"
-#include "text_file.h"
 
 namespace mmradartwin {
 namespace {
@@ -117,8 +116,7 @@ void readDataPath(const Section& section, RawSettings& settings) {
 
 }  // namespace
 
-void readXmlSettings(const std::string& file, RawSettings& settings) {
-  const std::string text = readTextFile(file, "give an XML file that exists");
+void readXmlSettings(const std::string& file, const std::string& text, RawSettings& settings) {
   tinyxml2::XMLDocument document;
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
     throw InputError(file + ": is no XML: " + document.ErrorStr());

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <filesystem>
 #include <fstream>
 
 #include "test_radar.h"
@@ -238,7 +240,7 @@ TEST(ImportSettings, ComesToAnEndWithHostileFiles) {
     names += "N" + std::to_string(i) + " = " + before + " + " + before + " + " + before + "\n";
   }
   write(folder / "a.lua", names + "ar1.FrameConfig(0, 0, 8, N59, 40, 0, 1)\n");
-  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "a.lua"}); }), "is no number"));
+  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "a.lua"}); }), "a.lua:61", "whole number"));
   write(folder / "b.lua", "ar1.FrameConfig(0, 0, 8, " + std::string(100000, '(') + "1, 40, 0, 1)\n");
   EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "b.lua"}); }), "b.lua"));
   write(folder / "c.lua", "ar1.ChirpConfig(-2147483648, 4294967295, 0, 0, 0, 0, 0, 1, 0, 0)\n");
@@ -258,6 +260,287 @@ TEST(ImportSettings, ComesToAnEndWithHostileFiles) {
                             "laneEn"));
 }
 
+/// A script in which the part decides, as TI's own do, and of which only a part is ever run.
+std::string scriptOfParts(const std::string& part, const std::string& end = "") {
+  return "--[==[ a comment ]] that goes on\nar1.ProfileConfig(0, 1) ]==]\n" + part +
+         "function unused()\n  ar1.ProfileConfig(0, 76, 9, 9, 90, 0, 0, 0, 0, 0, 0, 9, 0, 128, 9000, 0, 0, 30)\n"
+         "  ar1.FrameConfig(0, 2, 8, 99, 77, 0, 1)\nend\n"
+         "local path = \"C:\\ti\\mmwave_studio\" .. RSTD.GetRstdPath() .. os.date(\"%Y\")\n"
+         "if (0 ~= ar1.PowerOn(1, 1000, 0, 0)) then WriteToLog(\"failed\", \"red\") return end\n"
+         "ar1.ChanNAdcConfig(1, 1, 1, 1, 1, 1, 1, 2, 1, 0)\nar1.DataPathConfig(513, 1216644097, 0)\n"
+         "local four = part == 1243 or part == 1443 or part == 2243\n"
+         "ar1.LVDSLaneConfig(0, 1, 1, four and 1 or 0, four and 1 or 0, 1, 0, 0)\n"
+         "local rate = four and 10000 or 5000\n"
+         "if part == 6843 then start = 60.25 else start = 77 end\n"
+         "ar1.ProfileConfig(0, start, 100, 6, 60, 0, 0, 0, 0, 0, 0, 29.982, 0, 256, rate, 0, 0, 30)\n"
+         "for chirp = 0, 1 do\n  local tx = {chirp == 0 and 1 or 0, 0, chirp}\n"
+         "  ar1.ChirpConfig(chirp, chirp, 0, 0, 0, 0, 0, unpack(tx))\nend\n"
+         "local begin = os.clock()\nrepeat RSTD.Sleep(1) until os.clock() - begin > 3\n"
+         "ar1.FrameConfig(0, 1, 8, math.pow(2, 5), 40, 0, 1)\n" +
+         end;
+}
+
+const char kFuses[] =
+    "local _, fuses = ar1.ReadRegister(0xFFFFE214, 0, 31)\n"
+    "local code = bit_rshift(bit_and(fuses, 0x03FC0000), 18)\n"
+    "part = code == 0x20 and 1243 or code == 0xA0 and 1443 or code == 0x60 and 1642 or code == 0x70 and 1843\n"
+    "  or code == 0xE1 and 6843 or (code == 0x31 or code == 0x32) and 2243 or 0\n";
+
+TEST(ImportLua, PartDecidesTheBranch) {
+  const TestFolder folder;
+  const std::vector<std::string> questions = {
+      kFuses,
+      "local _, fuses = ar1.ReadRegister(0xFFFFE214, 18, 25)\n"
+      "part = fuses == 0x30 and 2243 or (fuses == 0xE2 or fuses == 0xE4) and 6843 or 0\n",
+      "part = ar1.partNumber\n",
+      "part = ar1.GetPartNumber()\n",
+      "part = tonumber(partId)\n",
+      "local lanes = {awr2243 = 4, iwr6843 = 2}\n"
+      "part = chip == nil and 0 or lanes[DEVICE_TYPE] == 4 and 2243 - 0 or 6840 + 3\n",
+      "part = radarType == \"xWR22xx\" and 2200 + 43 or radarType == \"xWR68xx\" and 6800 + 43 or 0\n",
+      "local name = ar1.getDeviceName()\npart = name == \"AWR2243\" and 2243 or name == \"IWR6843\" and 6843 or "
+      "name == \"AWR1843\" and 1843 or 0\n"};
+  for (const std::string& question : questions) {
+    write(folder / "a.lua", scriptOfParts(question));
+    SCOPED_TRACE(question);
+    const RadarConfig four = importSettings({folder / "a.lua"}, "awr2243").radar;
+    EXPECT_EQ(four.layout, CaptureLayout::kFourLane);
+    EXPECT_EQ(four.sample_rate_hz, 10e6);
+    EXPECT_EQ(four.carrier_hz, 77e9);
+    EXPECT_EQ(four.loops_per_frame, 32);
+    EXPECT_EQ(four.frame_period_s, 0.04);
+    EXPECT_EQ(four.tx_enable, (std::vector<std::vector<int>>{{0}, {2}}));
+    const RadarConfig sixty = importSettings({folder / "a.lua"}, "iwr6843").radar;
+    EXPECT_EQ(sixty.layout, CaptureLayout::kTwoLane);
+    EXPECT_EQ(sixty.carrier_hz, 60.25e9);
+    EXPECT_EQ(sixty.sample_rate_hz, 5e6);
+    EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "a.lua"}); }), "a.lua:", "--device"));
+  }
+  // What the script itself chooses later is known as well, and so is what another file says.
+  write(folder / "a.lua", scriptOfParts(kFuses, "ar1.deviceVariantSelection(\"XWR1843\")\n"));
+  EXPECT_EQ(importSettings({folder / "a.lua"}).radar.layout, CaptureLayout::kTwoLane);
+  EXPECT_EQ(importSettings({folder / "a.lua"}, "iwr1843").radar.device, "iwr1843");
+  write(folder / "a.lua", scriptOfParts(kFuses));
+  write(folder / "other.json", R"({"mmWaveDevice": "awr1443", "DCA1000Config": {"lvdsMode": 1}})");
+  EXPECT_EQ(importSettings({folder / "a.lua", folder / "other.json"}).radar.sample_rate_hz, 10e6);
+  EXPECT_TRUE(saysInOneLine(inputError([&] {
+                              importSettings({folder / "a.lua", folder / "other.json"}, "awr1843");
+                            }),
+                            "awr1443", "--device"));
+}
+
+TEST(ImportLua, NamesBothOfTwoCallsThatContradict) {
+  const TestFolder folder;
+  const auto refusal = [&](const std::string& end) {
+    write(folder / "a.lua", scriptOfParts("part = 2243\n", end));
+    return inputError([&] { importSettings({folder / "a.lua"}, "awr2243"); });
+  };
+  const std::string profile = "ar1.ProfileConfig(0, 77, 100, 6, 60, 0, 0, 0, 0, 0, 0, 29.982, 0, ";
+  EXPECT_EQ(refusal(profile + "256, 10000, 0, 0, 30)\nar1.ChirpConfig(1, 1, 0, 0, 0, 0, 0, 0, 0, 1)\n"), "");
+  EXPECT_TRUE(saysInOneLine(refusal(profile + "128, 10000, 0, 0, 30)\n"), "a.lua:24", "number of samples is 128",
+                            "a.lua:16 says 256"));
+  EXPECT_TRUE(
+      saysInOneLine(refusal("ar1.ChirpConfig(1, 1, 0, 0, 0, 0, 0, 0, 1, 0)\n"), "a.lua:24", "chirp 1", "a.lua:19"));
+  EXPECT_TRUE(saysInOneLine(refusal("ar1.FrameConfig(0, 1, 8, 64, 40, 0, 1)\n"), "a.lua:24", "loops is 64",
+                            "a.lua:23 says 32"));
+  // Chirps that no frame has do no harm; a function's line is told with the line that called it.
+  EXPECT_EQ(refusal("ar1.ChirpConfig(2, 2, 0, 0, 0, 0, 0, 0, 1, 0)\nar1.ChirpConfig(2, 2, 0, 0, 0, 0, 0, 1, 0, 0)\n"),
+            "");
+  EXPECT_TRUE(saysInOneLine(refusal("local function set(n)\n  ar1.FrameConfig(0, 1, 8, n, 40, 0, 1)\nend\nset(64)\n"),
+                            "a.lua:25 (called from line 27)", "loops is 64"));
+}
+
+TEST(ImportLua, RefusesWhatOnlyStudioCanAnswer) {
+  const TestFolder folder;
+  const auto refusal = [&](const std::string& end) {
+    write(folder / "a.lua", scriptOfParts("part = 2243\n", end));
+    return inputError([&] { importSettings({folder / "a.lua"}, "awr2243"); });
+  };
+  EXPECT_TRUE(saysInOneLine(refusal("ar1.ChirpConfig(1, 1, 0, io.read(\"*n\") + 1, 0, 0, 0, 0, 0, 1)\n"), "a.lua:24",
+                            "argument 4", "read()"));
+  EXPECT_TRUE(saysInOneLine(refusal("if temperature() > 50 then ar1.FrameConfig(0, 1, 8, 64, 40, 0, 1) end\n"),
+                            "temperature()", "a.lua:24"));
+  EXPECT_TRUE(saysInOneLine(refusal("if askUser() == 0 then ar1.FrameConfig(0, 0, 8, 32, 40, 0, 1) end\n"), "askUser()",
+                            "a.lua:24"));
+  EXPECT_TRUE(saysInOneLine(refusal("ar1.FrameConfig(0, 1, 8, \"many\", 40, 0, 1)\n"), "argument 4", "'many'"));
+  EXPECT_TRUE(saysInOneLine(refusal("ar1.FrameConfig(0, 1, 8, LOOPS, 40, 0, 1)\n"), "argument 4", "'nil'"));
+  EXPECT_TRUE(saysInOneLine(refusal("ar1.FrameConfig(0, 1, 8, LOOPS * 2, 40, 0, 1)\n"), "a.lua:24", "LOOPS"));
+  EXPECT_TRUE(saysInOneLine(refusal("error(\"no card\")\n"), "a.lua:24", "no card"));
+  EXPECT_TRUE(saysInOneLine(refusal("x = = 1\n"), "a.lua:24", "is no Lua"));
+  // Names that are not there are asked for as Lua's own defaults; what is left after os.exit() is not run.
+  EXPECT_EQ(refusal("LOOPS = LOOPS or 32\nar1.FrameConfig(0, 1, 8, LOOPS, 40, 0, 1)\n"), "");
+  EXPECT_EQ(refusal("os.exit()\nar1.FrameConfig(0, 1, 8, 64, 40, 0, 1)\n"), "");
+  EXPECT_EQ(refusal("local now = require\"socket\".gettime()\nos.execute(\"mkdir \" .. os.date(\"%Y\", now))\n"
+                    "local f = assert(io.open(path .. now))\nf:write(now)\n"),
+            "");
+  EXPECT_EQ(refusal("local f = io.open(path, \"w\")\nfor line in f:lines() do print(#line) end\nf:close()\n"), "");
+  write(folder / "a.lua", scriptOfParts("part = 2243\n", "dofile(\"C:\\\\more\\nlines.lua\")\n"));
+  const ImportedSettings noted = importSettings({folder / "a.lua"}, "awr2243");
+  EXPECT_TRUE(saysInOneLine(noted.assumed.back(), "a.lua:24", "lines.lua", "not run"));
+  EXPECT_EQ(toYaml(parseRadarConfig(toYaml(noted), "a.yaml")), toYaml(noted.radar));
+  write(folder / "a.lua", "function main()\n" + script() + "end\n");
+  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "a.lua"}); }), "no ar1.* call"));
+}
+
+TEST(ImportLua, HostileScriptsEnd) {
+  const TestFolder folder;
+  const auto refusal = [&](const std::string& text) {
+    write(folder / "a.lua", text + "\nar1.FrameConfig(0, 1, 8, 64, 40, 0, 1)\n");
+    return inputError([&] { importSettings({folder / "a.lua"}, "awr2243"); });
+  };
+  const std::string steps = "million steps", bytes = " MB";
+  EXPECT_TRUE(saysInOneLine(refusal("while true do end"), "a.lua:1", steps));
+  EXPECT_TRUE(saysInOneLine(refusal("function f() while true do pcall(f) end end\nwhile true do pcall(f) end"), steps));
+  EXPECT_TRUE(saysInOneLine(refusal("local s = string.rep('a', 5000)\nstring.find(s, '.-.-.-.-.-.-b')"), steps));
+  EXPECT_TRUE(saysInOneLine(refusal("for word in range(1, 3) do end"), steps));
+  EXPECT_TRUE(saysInOneLine(refusal("local t = {}\nwhile true do t[#t + 1] = {} end"), bytes));
+  EXPECT_TRUE(saysInOneLine(refusal("local s = string.rep('a', 1e9)"), bytes));
+  EXPECT_TRUE(saysInOneLine(refusal("setmetatable({}, {__gc = function() while true do end end})"), "__gc"));
+  EXPECT_TRUE(saysInOneLine(refusal("for i = 1, 1e6 do ar1.GetStatus() end"), "too many calls"));
+  EXPECT_TRUE(saysInOneLine(refusal("local function f() return 1 + f() end f()"), bytes));
+  EXPECT_TRUE(saysInOneLine(refusal("\x1bLua"), "a.lua"));
+  // Nothing of the machine can be reached.
+  EXPECT_TRUE(saysInOneLine(
+      refusal("io.open('" + folder / "made" + "', 'w'):write('x')\nos.execute('touch " + folder / "made" + "')"),
+      "chirp 0"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "made"));
+}
+
+TEST(ImportSettings, WaveformsBeyondTdmAreNamed) {
+  const TestFolder folder;
+  const auto json = [&](const std::string& from, const std::string& to) {
+    std::string text = mmwaveJson();
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    write(folder / "a.json", text.replace(at, from.size(), to));
+    return inputError([&] { importSettings({folder / "a.json"}, "awr1843"); });
+  };
+  const std::string frame = "\"rlFrameCfg_t\"";
+  const auto with = [&](const std::string& entry) { return json(frame, entry + ", " + frame); };
+  // As Studio writes them where nothing of this is used.
+  EXPECT_EQ(with(R"("rlBpmChirps": [], "rlRfPhaseShiftCfgs": [], "rlDynPerChirpPhShftCfgs": [], "rlDynChirpCfgs": [],
+      "rlLoopbackBursts": [], "rlRfMiscConf_t": {"miscCtl": "1"})"),
+            "");
+  EXPECT_EQ(with(R"("rlRfPhaseShiftCfgs": [{"rlRfPhaseShiftCfg_t": {"chirpStartIdx": 1, "chirpEndIdx": 1,
+      "tx0PhaseShift": 0, "tx1PhaseShift": 0, "tx2PhaseShift": 0}}])"),
+            "");
+  EXPECT_TRUE(saysInOneLine(with(R"("rlBpmChirps": [{"rlBpmChirpCfg_t": {"chirpStartIdx": 1, "chirpEndIdx": 1,
+      "constBpmVal": "0xC"}}])"),
+                            "rlBpmChirps", "BPM", "TDM"));
+  EXPECT_TRUE(saysInOneLine(with(R"("rlRfPhaseShiftCfgs": [{"rlRfPhaseShiftCfg_t": {"chirpStartIdx": 0,
+      "chirpEndIdx": 1, "tx0PhaseShift": 0, "tx1PhaseShift": 0, "tx2PhaseShift": 16}}])"),
+                            "rlRfPhaseShiftCfgs", "phases are shifted by chirp", "DDMA"));
+  EXPECT_TRUE(saysInOneLine(with(R"("rlDynPerChirpPhShftCfgs": [{"rlDynPerChirpPhShftCfg_t": {"chirpSegSel": 0,
+      "phShiftPerTx": [{"tx0PhaseShift": [0, 0, 3]}]}}])"),
+                            "rlDynPerChirpPhShftCfgs"));
+  EXPECT_TRUE(saysInOneLine(with(R"("rlDynChirpCfgs": [{"rlDynChirpCfg_t": {"chirpSegSel": 0}}])"), "rlDynChirpCfgs"));
+  EXPECT_TRUE(saysInOneLine(json("\"TDM\"", "\"DDMA\""), "MIMOScheme", "DDMA"));
+  EXPECT_TRUE(saysInOneLine(json("\"TDM\"", "\"BPM\""), "MIMOScheme", "BPM"));
+  EXPECT_TRUE(saysInOneLine(json("\"transferFmtPkt1\": \"0x0\"", "\"transferFmtPkt1\": \"0xE\""), "transferFmtPkt1",
+                            "second packet"));
+  EXPECT_TRUE(saysInOneLine(json("\"transferFmtPkt0\": \"0x1\"", "\"transferFmtPkt0\": \"0x6\""), "transferFmtPkt0"));
+  EXPECT_EQ(json("\"b2AdcOutFmt\": 1", "\"b2AdcOutFmt\": 2"), "");
+  const ImportedSettings twice = importSettings({folder / "a.json"}, "awr1843");
+  EXPECT_TRUE(std::any_of(twice.assumed.begin(), twice.assumed.end(), [](const std::string& line) {
+    return contains(line, "complex 2x") && contains(line, "beyond N/2 hold no echo");
+  }));
+  // The same in a script.
+  const auto lua = [&](const std::string& call) {
+    write(folder / "a.lua", script() + call + "\n");
+    return inputError([&] { importSettings({folder / "a.lua"}); });
+  };
+  EXPECT_EQ(lua("ar1.BpmChirpConfig(0, 1, 0, 0, 0, 0, 0, 0)\nar1.SetPerChirpPhaseShifterConfig(0, 1, 0, 0, nil)"), "");
+  EXPECT_TRUE(saysInOneLine(lua("ar1.BpmChirpConfig(1, 1, 0, 0, 1, 1, 0, 0)"), "a.lua:21", "BpmChirpConfig", "BPM"));
+  EXPECT_TRUE(saysInOneLine(lua("ar1.SetPerChirpPhaseShifterConfig(0, 0, 0, 32, 0)"), "SetPerChirpPhaseShifterConfig"));
+  EXPECT_TRUE(saysInOneLine(lua("ar1.AdvChirpConfig(0, 0, 0, 0, 0, 0, 0, 0, 4, 1, 0, 4, 0, 0, 0, 0, 0)"), "AdvChirp"));
+  EXPECT_TRUE(saysInOneLine(lua("ar1.AdvanceFrameConfig(4, 1536, 0, 0)"), "AdvanceFrameConfig"));
+  EXPECT_TRUE(saysInOneLine(lua("ar1.ContStrConfig(77, 9000, 94, 0)"), "ContStrConfig"));
+  EXPECT_TRUE(saysInOneLine(lua("ar1.ProfileConfig_mult(1, 0, 77)"), "ProfileConfig_mult", "several devices"));
+}
+
+/// As TI's visualizer saves it.
+std::string profileCfg(const std::string& platform = "% Platform:xWR18xx\n") {
+  return "% *****************************************\r\n% Created for SDK ver:03.05\n" + platform +
+         "% Frequency:77\nsensorStop\nflushCfg\ndfeDataOutputMode 1\nchannelCfg 15 5 0\nadcCfg 2 1\n"
+         "adcbufCfg -1 0 1 1 1\nprofileCfg 0 77 267 7 57.14 0 0 70 1 256 5209 0 0 158\n"
+         "chirpCfg 0 0 0 0 0 0 0 1\nchirpCfg 1 1 0 0 0 0 0 4   % the third transmitter\n"
+         "frameCfg 0 1 16 0 33.333 1 0\nlowPower 0 0\nguiMonitor -1 1 1 0 0 0 1\ncfarCfg -1 0 2 8 4 3 0 15 1\n"
+         "bpmCfg -1 0 0 1\nlvdsStreamCfg -1 0 1 0\nsensorStart\n";
+}
+
+TEST(ImportSdk, ProfileCfg) {
+  const TestFolder folder;
+  write(folder / "best_range.txt", profileCfg());
+  const ImportedSettings settings = importSettings({folder / "best_range.txt"}, "iwr1843");
+  const RadarConfig& radar = settings.radar;
+  EXPECT_EQ(radar.device, "iwr1843");
+  EXPECT_EQ(radar.carrier_hz, 77e9);
+  EXPECT_EQ(radar.slope_hz_per_s, 70e12);
+  EXPECT_EQ(radar.samples_per_chirp, 256);
+  EXPECT_EQ(radar.sample_rate_hz, 5.209e6);
+  EXPECT_EQ(radar.adc_start_s, 7e-6);
+  EXPECT_EQ(radar.idle_s, 267e-6);
+  EXPECT_NEAR(radar.ramp_end_s, 57.14e-6, 1e-12);
+  EXPECT_EQ(radar.loops_per_frame, 16);
+  EXPECT_NEAR(radar.frame_period_s, 33.333e-3, 1e-9);
+  EXPECT_EQ(radar.rx_gain_db, 30);
+  EXPECT_EQ(radar.tx_enable, (std::vector<std::vector<int>>{{0}, {2}}));
+  EXPECT_EQ(radar.rx_enable, (std::vector<int>{0, 1, 2, 3}));
+  EXPECT_EQ(radar.layout, CaptureLayout::kTwoLane);
+  EXPECT_EQ(radar.iq_order, IqOrder::kQi);
+  // The comment names the family where nothing else names the device.
+  EXPECT_EQ(importSettings({folder / "best_range.txt"}).radar.device, "xwr1843");
+  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "best_range.txt"}, "iwr6843"); }), "xwr1843",
+                            "--device says iwr6843"));
+  write(folder / "best_range.txt", profileCfg(""));
+  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "best_range.txt"}); }), "which device"));
+  // What stands before a later flushCfg does not hold.
+  write(folder / "two.cfg", profileCfg() +
+                                "flushCfg\nprofileCfg 0 78 267 7 57.14 0 0 60 1 128 5209 0 0 30\n"
+                                "chirpCfg 0 0 0 0 0 0 0 2\nframeCfg 0 0 32 0 50 1 0\n");
+  EXPECT_EQ(importSettings({folder / "two.cfg"}).radar.carrier_hz, 78e9);
+  EXPECT_EQ(importSettings({folder / "two.cfg"}).radar.tx_enable, (std::vector<std::vector<int>>{{1}}));
+  // Four lanes, interleaved, and the older form of adcbufCfg.
+  std::string older = profileCfg("% Platform:xWR14xx\n");
+  older.replace(older.find("adcbufCfg -1 0 1 1 1"), 20, "adcbufCfg 0 0 0 1");
+  older.replace(older.find("lvdsStreamCfg -1 0 1 0\n"), 23, "");
+  write(folder / "older.cfg", older);
+  const RadarConfig four = importSettings({folder / "older.cfg"}).radar;
+  EXPECT_EQ(four.layout, CaptureLayout::kFourLane);
+  EXPECT_EQ(four.iq_order, IqOrder::kIq);
+}
+
+TEST(ImportSdk, RefusesWhatIsNotTdm) {
+  const TestFolder folder;
+  const auto refusal = [&](const std::string& from, const std::string& to) {
+    std::string text = profileCfg();
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    write(folder / "profile.cfg", text.replace(at, from.size(), to));
+    return inputError([&] { importSettings({folder / "profile.cfg"}); });
+  };
+  EXPECT_TRUE(saysInOneLine(refusal("bpmCfg -1 0", "bpmCfg -1 1"), "profile.cfg:18", "bpmCfg", "BPM", "TDM"));
+  EXPECT_TRUE(saysInOneLine(refusal("dfeDataOutputMode 1", "dfeDataOutputMode 3"), "advanced frames"));
+  EXPECT_TRUE(saysInOneLine(refusal("frameCfg 0 1 16 0 33.333 1 0", "advFrameCfg 2 0 0 1 0"), "advFrameCfg"));
+  EXPECT_TRUE(saysInOneLine(refusal("adcCfg 2 1", "adcCfg 2 0"), "profile.cfg:9", "complex"));
+  EXPECT_TRUE(saysInOneLine(refusal("adcCfg 2 1", "adcCfg 1 1"), "16 bits"));
+  EXPECT_TRUE(saysInOneLine(refusal("adcbufCfg -1 0", "adcbufCfg -1 1"), "adcbufCfg", "real"));
+  EXPECT_TRUE(saysInOneLine(refusal("1 256 5209 0 0 158", "1 256 5209 0 0"), "profileCfg has 13 arguments"));
+  EXPECT_TRUE(saysInOneLine(refusal("57.14 0 0 70", "57.14 0 4 70"), "profileCfg", "phases"));
+  EXPECT_TRUE(saysInOneLine(refusal("chirpCfg 1 1 0 0 0 0 0 4", "chirpCfg 1 1 0 0 0 2 0 4"), "chirpCfg", "differs"));
+  EXPECT_TRUE(
+      saysInOneLine(refusal("chirpCfg 1 1 0 0 0 0 0 4", "chirpCfg 1 1 0 0 0 0 0 5"), "profile.cfg:13", "mask 5"));
+  EXPECT_TRUE(saysInOneLine(refusal("chirpCfg 1 1 0 0 0 0 0 4", "chirpCfg 0 1 0 0 0 0 0 4"), "profile.cfg:13",
+                            "profile.cfg:12"));
+  EXPECT_TRUE(saysInOneLine(refusal("lvdsStreamCfg -1 0 1 0", "lvdsStreamCfg -1 0 4 0"), "lvdsStreamCfg"));
+  EXPECT_TRUE(saysInOneLine(refusal("lvdsStreamCfg -1 0 1 0", "lvdsStreamCfg -1 0 1 1"), "lvdsStreamCfg"));
+  EXPECT_TRUE(saysInOneLine(refusal("channelCfg 15 5 0", "channelCfg 15 5 1"), "cascade"));
+  EXPECT_TRUE(saysInOneLine(refusal("frameCfg 0 1 16", "frameCfg 0 1 many"), "'many'"));
+  EXPECT_TRUE(saysInOneLine(refusal("adcCfg 2 1", "chirpComnCfg 8 0 0 256 4 28 0"), "chirpComnCfg", "xWRL6432"));
+  EXPECT_EQ(refusal("lvdsStreamCfg -1 0 1 0", "lvdsStreamCfg -1 0 0 0"), "");
+  EXPECT_TRUE(contains(importSettings({folder / "profile.cfg"}).assumed.back(), "no ADC samples"));
+}
+
 TEST(ImportSettings, RefusesWhatItDoesNotKnow) {
   const TestFolder folder;
   const auto refusal = [&](const std::string& name, const std::string& text) {
@@ -270,8 +553,7 @@ TEST(ImportSettings, RefusesWhatItDoesNotKnow) {
     EXPECT_NE(at, std::string::npos) << from;
     return refusal("a.lua", text.replace(at, from.size(), to));
   };
-  EXPECT_TRUE(saysInOneLine(lua("77 -- GHz", "readFrequency()"), "a.lua:", "argument 2", "START_FREQ"));
-  EXPECT_TRUE(saysInOneLine(lua("ADC_SAMPLES = 64", "ADC_SAMPLES = 64\nADC_SAMPLES = 128"), "several values"));
+  EXPECT_TRUE(saysInOneLine(lua("77 -- GHz", "readFrequency()"), "a.lua:15", "argument 2", "readFrequency()"));
   EXPECT_TRUE(saysInOneLine(lua("0, 48)", "0)"), "17 arguments", "18"));
   EXPECT_TRUE(
       saysInOneLine(lua("ar1.ChirpConfig(1, 1, 0, 0", "ar1.ChirpConfig(1, 1, 0, 5"), "differs from its profile"));
@@ -287,7 +569,7 @@ TEST(ImportSettings, RefusesWhatItDoesNotKnow) {
   EXPECT_TRUE(saysInOneLine(refusal("b.json", mmwaveJson("0x3", "0x4", "advancedFrameChirp")), "advancedFrameChirp"));
   EXPECT_TRUE(saysInOneLine(refusal("b.json", "{\"other\": 1}"), "none of the known JSON files"));
   EXPECT_TRUE(saysInOneLine(refusal("b.json", "no json"), "is no JSON"));
-  EXPECT_TRUE(saysInOneLine(refusal("b.ini", "[a]"), ".xml"));
+  EXPECT_TRUE(saysInOneLine(refusal("b.ini", "[a]"), ".xml", "profile.cfg"));
   write(folder / "a.mmwave.json", mmwaveJson());
   EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "a.mmwave.json"}); }), "which device"));
   write(folder / "cf.json", R"({"DCA1000Config": {"dataLoggingMode": "raw", "lvdsMode": 1, "dataFormatMode": 3}})");

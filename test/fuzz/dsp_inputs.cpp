@@ -88,6 +88,16 @@ const char kLua[] =
     "ar1.ProfileConfig(0, 77, 7, 6, 20, 0, 0, 0, 0, 0, 0, 75, 0, ADC, 5000, 0, 0, 48)\n"
     "ar1.ChirpConfig(0, 0, 0, 0, 0, 0, 0, 1, 0, 0)\nar1.ChirpConfig(1, 1, 0, 0, 0, 0, 0, 0, 0, 1)\n"
     "ar1.FrameConfig(0, 1, 200, 2*(8+1), 50, 0, 1)\nar1.CaptureCardConfig_Mode(1, 1, 1, 2, 3, 30)\n";
+const char kLuaParts[] =
+    "local _, fuses = ar1.ReadRegister(0xFFFFE214, 0, 31)\nlocal part = bit_rshift(fuses, 18) == 0x31 and 2243 or "
+    "1843\n"
+    "for i = 0, 1 do ar1.ChirpConfig(i, i, 0, 0, 0, 0, 0, 1 - i, 0, i) end\n"
+    "local path = string.gsub(debug.getinfo(1, 'S').source, \"(.-)%.lua\", \"%1\") .. os.date()\n"
+    "if ar1.partNumber ~= part then error(\"other\") end\nrepeat pcall(sleep, 1) until os.clock() > temperature()\n";
+const char kSdk[] =
+    "% Platform:xWR18xx\nsensorStop\nflushCfg\ndfeDataOutputMode 1\nchannelCfg 15 5 0\nadcCfg 2 1\n"
+    "adcbufCfg -1 0 1 1 1\nprofileCfg 0 77 267 7 57.14 0 0 70 1 256 5209 0 0 30\nchirpCfg 0 0 0 0 0 0 0 1\n"
+    "chirpCfg 1 1 0 0 0 0 0 4\nframeCfg 0 1 16 0 100 1 0\nbpmCfg -1 0 0 1\nlvdsStreamCfg -1 0 1 0\nsensorStart\n";
 const char kJson[] = R"({"mmWaveDevices": [{"rfConfig": {"waveformType": "legacyFrameChirp",
  "rlChanCfg_t": {"rxChannelEn": "0xF"}, "rlAdcOutCfg_t": {"fmt": {"b2AdcBits": 2, "b2AdcOutFmt": 1}},
  "rlProfiles": [{"rlProfileCfg_t": {"profileId": 0, "startFreqConst_GHz": 77.0, "idleTimeConst_usec": 100.0,
@@ -127,8 +137,9 @@ std::vector<HostileInput> hostileInputs() {
       {"capture",
        readCapture,
        {captureSeed(0, 7, 3, 1024), captureSeed(1, 7, 3, 1024), captureSeed(2, 4, 1, 256), captureSeed(3, 0, 15, 300)}},
-      {"settings_lua", settings(".lua"), {kLua, "A = B + B\nB = A + A\nar1.FrameConfig(0, A, 8, 1, 40, 0)"}},
+      {"settings_lua", settings(".lua"), {kLua, kLuaParts, "A = B + B\nB = A + A\nar1.FrameConfig(0, A, 8, 1, 40, 0)"}},
       {"settings_json", settings(".json"), {kJson, kCard, R"({"configUsed": "settings.json"})", "[[[[[["}},
+      {"settings_sdk", settings(".cfg"), {kSdk, "chirpCfg 0 511 0 0 0 0 0 7\nframeCfg 0 0 1 0 1 1 0"}},
       {"settings_xml", settings(".xml"), {kXml, "<configuration><configuration>"}},
   };
 }

@@ -2,16 +2,18 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 
 #include "mmradartwin_driver/dca1000_protocol.h"
 
 namespace mmradartwin {
 
-/// Ports of a DCA1000's traffic in a packet capture (pcap or pcapng; Ethernet, Linux "any" or raw IP).
-struct PcapPorts {
+/// The wanted traffic in a packet capture (pcap or pcapng; Ethernet, Linux "any" or raw IP) of DCA1000s.
+struct PcapSource {
   std::uint16_t config = kDca1000ConfigPort;
   std::uint16_t data = kDca1000DataPort;
+  std::string card_ip;  ///< empty: of the one card that the file holds
 };
 struct PcapVisitor {
   std::function<void(const DataPacket&)> data;                            ///< to the host's data port
@@ -21,10 +23,16 @@ struct PcapCounters {
   std::uint64_t frames = 0;  ///< in the file
   std::uint64_t data = 0;
   std::uint64_t replies = 0;
-  std::uint64_t other = 0;  ///< not UDP over IPv4 to one of the two ports, fragments, malformed
+  std::uint64_t other = 0;  ///< not UDP over IPv4 to one of the two ports, fragments, malformed, of another card
+  std::map<std::string, std::uint64_t> data_of_card;  ///< packets of samples by the address that sent them
 };
-/// Reads the whole file in order. Throws InputError: no such file, no packet capture, truncated file (after visiting
-/// all complete packets).
-PcapCounters readPcap(const std::string& file, const PcapVisitor& visitor, const PcapPorts& ports = {});
+/// Reads the whole file in order. Where no card is chosen, only the one that sends samples first is visited. Throws
+/// InputError: no such file, no packet capture, no IPv4 address, truncated file (after visiting all complete packets).
+PcapCounters readPcap(const std::string& file, const PcapVisitor& visitor, const PcapSource& source = {});
+
+/// Throws InputError where the file has no samples that were asked for, or those of several cards and none was chosen
+/// with `option`.
+void demandOneCard(const std::string& file, const PcapCounters& counters, const PcapSource& source,
+                   const std::string& option);
 
 }  // namespace mmradartwin

@@ -12,12 +12,15 @@ struct ImportedSettings {
   std::vector<std::string> assumed;  ///< lines: what the files do not say, and what radar.yaml has instead
 };
 
-/// Reads the settings of TI's tools: a mmWave Studio Lua script (ar1.* calls), mmWave Studio's XML (which keeps the
-/// chirps that were set last only, so that a frame of several transmitters needs another file) or JSON (*.mmwave.json;
-/// a setup.json names one), and the DCA1000's cf.json (its lanes), in any combination as long as one of them holds the
-/// radar's profile, chirps and frame. Values of two files that contradict each other are an error, as is everything
-/// whose meaning is not known for certain: a profile that changes from chirp to chirp, real samples, fewer than 16
-/// bits, advanced frames, expressions in Lua other than numbers, names and + - * / ( ).
+/// Reads the settings of TI's tools, known by what the files hold: a mmWave Studio Lua script, mmWave Studio's XML
+/// (which keeps the chirps that were set last only, so that a frame of several transmitters needs another file) or JSON
+/// (*.mmwave.json; a setup.json names one), the commands of the mmWave SDK's demos (profile.cfg), and the DCA1000's
+/// cf.json (its lanes), in any combination as long as one of them holds the radar's profile, chirps and frame.
+///
+/// A script is run, without access to anything but its own text, and what it gives to ar1.* counts. It is told that it
+/// runs on the device that `device` or another file names. Two places that contradict each other are an error, as is
+/// everything whose meaning is not known for certain: a profile that changes from chirp to chirp, several transmitters
+/// at once (BPM, DDMA), shifted phases, real samples, fewer than 16 bits, further packets, advanced frames.
 ///
 /// No file of TI's says where the antennas are: positions are those of the BOOST boards, receivers half a wavelength
 /// (at the chirp's start) apart; with three transmitters TX0 at 0, TX2 four and TX1 two halves along y, TX1 one half
