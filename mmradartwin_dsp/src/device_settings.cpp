@@ -320,11 +320,11 @@ void RawSettings::setDevice(const std::string& name, const std::string& where) {
   const auto isFamily = [](const std::string& text) { return text.compare(0, 3, "xwr") == 0; };
   const bool same_part = !partOf(plain).empty() && partOf(plain) == partOf(device);
   if (same_part && (isFamily(plain) || isFamily(device))) {
-    // The prefix of one and the variant (such as AOP) of the other.
+    // The prefix of one and the variant (such as AOP) of the other; a person who names the device means just that.
     const auto variantOf = [](const std::string& text) { return text.substr(text.find(partOf(text)) + 4); };
     const std::string& exact = isFamily(device) ? plain : device;
-    const std::string variant =
-        variantOf(plain).size() > variantOf(device).size() ? variantOf(plain) : variantOf(device);
+    const bool stated = device_from == "--device" || variantOf(device).size() > variantOf(plain).size();
+    const std::string variant = variantOf(stated ? device : plain);
     device = exact.substr(0, exact.find(partOf(exact)) + 4) + variant;
     return;
   }
@@ -449,7 +449,8 @@ struct Device {
 };
 
 Device knownDevice(const RawSettings& raw) {
-  const std::string digits = partOf(raw.device);
+  const std::size_t digit = raw.device.find_first_of("0123456789");
+  const std::string digits = digit == std::string::npos ? "" : raw.device.substr(digit, 4);
   const std::vector<std::string> known = {"1243", "1443", "2243", "1642", "1843", "6443", "6843"};
   const std::optional<CaptureLayout> layout = captureLayoutOf(raw.device);
   if (!layout || std::find(known.begin(), known.end(), digits) == known.end()) {

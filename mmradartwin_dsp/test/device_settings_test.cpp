@@ -320,6 +320,8 @@ TEST(ImportLua, PartDecidesTheBranch) {
   write(folder / "a.lua", scriptOfParts(kFuses, "ar1.deviceVariantSelection(\"XWR1843\")\n"));
   EXPECT_EQ(importSettings({folder / "a.lua"}).radar.layout, CaptureLayout::kTwoLane);
   EXPECT_EQ(importSettings({folder / "a.lua"}, "iwr1843").radar.device, "iwr1843");
+  write(folder / "a.lua", scriptOfParts(kFuses, "ar1.deviceVariantSelection(\"XWR6843AOP\")\n"));
+  EXPECT_EQ(importSettings({folder / "a.lua"}, "iwr6843").radar.device, "iwr6843");
   write(folder / "a.lua", scriptOfParts(kFuses));
   write(folder / "other.json", R"({"mmWaveDevice": "awr1443", "DCA1000Config": {"lvdsMode": 1}})");
   EXPECT_EQ(importSettings({folder / "a.lua", folder / "other.json"}).radar.sample_rate_hz, 10e6);
