@@ -8,6 +8,7 @@
 #include <random>
 
 #include "diagnosis/channels/echo_beam.h"
+#include "diagnosis/likelihood/channel_draw.h"
 #include "diagnosis/likelihood/profiled_scores.h"
 #include "mmradartwin_dsp/paper_radar.h"
 
@@ -191,6 +192,32 @@ TEST_F(ThreeActors, ScoresOfAMechanismAreTheLikelihoodsSlopes) {
   const double want =
       (model.logLikelihood(echoes(1 + step), latents_) - model.logLikelihood(echoes(1 - step), latents_)) / (2 * step);
   EXPECT_NEAR(scores.total[scores.total.size() - 1], want, 0.05 * std::abs(want));
+}
+
+// Draws have the expected covariance, and the strongest echo a level that does not fade.
+TEST_F(ThreeActors, DrawsChannelsAsItExpectsThem) {
+  const ChannelLikelihood model(data_, 3, PoseAccuracy());
+  const auto expected = echoes();
+  const auto bins = model.expectedBins(expected[0], latents_, 0);
+  constexpr int kDraws = 1000;
+  std::mt19937 random(5);
+  Eigen::VectorXd power = Eigen::VectorXd::Zero(data_.radar.samples_per_chirp), squares = power;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Eigen::VectorXd own =
+        drawnChannels(model, expected[0], latents_, 0, random).colwise().squaredNorm().transpose();
+    power += own / kDraws;
+    squares += own.cwiseProduct(own) / kDraws;
+  }
+  int alone = 0;
+  for (const auto& bin : bins) {
+    const double trace = bin.covariance.trace().real();
+    EXPECT_NEAR(power[bin.bin], trace, 0.15 * trace) << bin.bin;
+    const double variance = squares[bin.bin] / (power[bin.bin] * power[bin.bin]) - 1;
+    if (bin.echo.power * data_.radar.channels() < 0.9 * trace) continue;
+    ++alone;
+    EXPECT_LT(variance, 0.5) << bin.bin;  // 1 where it fades
+  }
+  EXPECT_GT(alone, 0);
 }
 
 }  // namespace

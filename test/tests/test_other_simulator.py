@@ -1,0 +1,66 @@
+"""Sessions that another simulator measured: what ought to be said of them, as their README states the truth."""
+import os
+import unittest
+
+from diagnose_program import PROGRAM, diagnose
+from in_folder import InFolder
+
+DATA = os.path.join(os.environ.get("MMRADARTWIN_DATA", os.path.join(os.path.dirname(__file__), "../../../shared/data")),
+                    "other_simulator")
+
+
+@unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
+@unittest.skipUnless(os.path.isdir(DATA), "other_simulator is not here; set MMRADARTWIN_DATA to the folder with it")
+class OtherSimulator(InFolder):
+    def findings_of(self, session):
+        status, findings, errors = diagnose(os.path.join(DATA, session), self.at(session))
+        self.assertEqual(status, 0, msg=errors)
+        return findings["findings"]
+
+    def assert_holds(self, finding, name, truth):
+        """The parameter's interval holds the truth and not the value that does nothing."""
+        told = finding["parameters"][name]
+        low, high = told["ci95"]
+        self.assertLessEqual(low, truth)
+        self.assertGreaterEqual(high, truth)
+        self.assertGreater(low * high, 0)
+
+    def test_where_nothing_is_hidden_nothing_is_named(self):
+        for session in "W0", "W0_jit", "P3b":
+            with self.subTest(session):
+                self.assertEqual(self.findings_of(session), [])
+
+    def test_the_array_is_turned(self):
+        first, *rest = self.findings_of("H_yaw")
+        self.assertEqual((first["cause"], rest), ("radar_yaw_offset", []))
+        self.assert_holds(first, "yaw_deg", 4.0)
+
+    def test_the_cabinet_is_turned(self):
+        first, *rest = self.findings_of("H_turned")
+        self.assertEqual(first["cause"], "actor_moved")
+        self.assert_holds(first, "dyaw_deg", 8.0)
+        self.assertLessEqual({one["cause"] for one in rest}, {"wall_ghost"})
+
+    def test_the_cabinet_is_weak_and_the_walls_are_not_strong(self):
+        first, *rest = self.findings_of("H_cab_40")
+        self.assertEqual((first["cause"], rest), ("material_reflectivity", []))
+        subject = first["parameters"].get("material") or first["parameters"].get("actor")
+        self.assertIn(subject["value"], ("Metal", "cabinet"))
+        self.assert_holds(first, "delta_db", -12.04)
+
+    def test_the_elements_look_ahead(self):
+        first, *rest = self.findings_of("W1")
+        self.assertEqual(first["cause"], "element_pattern")
+        self.assertLessEqual({one["cause"] for one in rest}, {"unknown"})
+
+    def test_bounces_are_missing(self):
+        causes = [one["cause"] for one in self.findings_of("P0")]
+        self.assertEqual(causes[0], "trace_coverage")
+        self.assertLessEqual(set(causes), {"trace_coverage", "unknown"})
+
+    def test_no_law_stands_that_makes_the_maps_worse(self):
+        self.assertLessEqual({one["cause"] for one in self.findings_of("W3")}, {"floor_ceiling_multipath"})
+
+
+if __name__ == "__main__":
+    unittest.main()
