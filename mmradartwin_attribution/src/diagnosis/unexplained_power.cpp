@@ -17,6 +17,9 @@ namespace mmradartwin::diagnosis {
 namespace {
 
 constexpr int kDraws = 8;
+/// Fewer places cannot tell a twin that lacks much from one actor that stands wrong: the bootstrap over them is too
+/// narrow.
+constexpr std::size_t kLeastLocations = 8;
 constexpr double kLeastLacking = 0.01;  ///< share of the power below which nobody misses anything
 constexpr double kNoFloor = -100;       ///< logarithm of a floor that is none
 constexpr std::size_t kWorstPoses = 5;  ///< poses that are named
@@ -62,6 +65,7 @@ FindingPlace worstPlace(const ChannelData& data, const std::vector<CellPowers>& 
 }  // namespace
 
 std::optional<Finding> unexplainedPower(DiagnosisContext& context, const ModelState& state) {
+  if (context.data.locations.size() < kLeastLocations) return std::nullopt;
   context.report("what a right twin would explain", 0);
   const std::vector<PoseEchoes> echoes = context.echoes.echoes(state.mechanisms);
   const std::vector<CellPowers> measured = cellPowers(context.data, echoes);
