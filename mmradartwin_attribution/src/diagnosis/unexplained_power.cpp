@@ -11,7 +11,6 @@
 #include "diagnosis/gain/held_out_gain.h"
 #include "diagnosis/likelihood/channel_draw.h"
 #include "diagnosis/numbers/number_text.h"
-#include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin::diagnosis {
 namespace {
@@ -27,12 +26,11 @@ constexpr int kMostBounces = 8;         ///< that the paths of `specular` may ha
 constexpr double kLeastPerBounce_nats = 3;
 
 /// Explained power of the data, and of channels drawn from the model, with the interval of their difference. The floor
-/// is left out: a fit puts what it cannot explain into it.
+/// is left out: a fit puts what it cannot explain into it. echoes: of the twin; shifted: with the actors' range errors.
 GainMetric againstDraw(DiagnosisContext& context, const ModelState& state, const std::vector<CellPowers>& measured,
-                       const std::vector<PoseEchoes>& echoes, unsigned draw) {
+                       const std::vector<PoseEchoes>& echoes, const std::vector<PoseEchoes>& shifted, unsigned draw) {
   SessionLatents latents = state.latents;
   latents.log_floor = kNoFloor;
-  const std::vector<PoseEchoes> shifted = context.echoes.echoes(state.mechanisms, state.actor_range_m);
   ChannelData drawn = context.data;
   tbb::parallel_for(std::size_t{0}, drawn.poses.size(), [&](std::size_t i) {
     std::mt19937 random(static_cast<unsigned>(i * kDraws) + draw);
@@ -41,7 +39,7 @@ GainMetric againstDraw(DiagnosisContext& context, const ModelState& state, const
   return explainedPowerGain(context.data, measured, cellPowers(drawn, echoes));
 }
 
-/// Poses at which most is missing, the worst first, and the range of the strongest missing cell there.
+/// Poses at which most is missing, the worst first.
 FindingPlace worstPlace(const ChannelData& data, const std::vector<CellPowers>& cells) {
   std::vector<std::pair<double, std::size_t>> missing;
   const double gain = std::sqrt(powerGain(cells));
@@ -68,10 +66,11 @@ std::optional<Finding> unexplainedPower(DiagnosisContext& context, const ModelSt
   if (context.data.locations.size() < kLeastLocations) return std::nullopt;
   context.report("what a right twin would explain", 0);
   const std::vector<PoseEchoes> echoes = context.echoes.echoes(state.mechanisms);
+  const std::vector<PoseEchoes> shifted = context.echoes.echoes(state.mechanisms, state.actor_range_m);
   const std::vector<CellPowers> measured = cellPowers(context.data, echoes);
   double least_lacking = std::numeric_limits<double>::infinity(), right = 0, explained = 0;
   for (unsigned draw = 0; draw < kDraws; ++draw) {
-    const GainMetric drawn = againstDraw(context, state, measured, echoes, draw);
+    const GainMetric drawn = againstDraw(context, state, measured, echoes, shifted, draw);
     least_lacking = std::min(least_lacking, (*drawn.difference_ci95)[0]);
     right += drawn.after / kDraws;
     explained = drawn.before;
