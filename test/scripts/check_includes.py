@@ -137,7 +137,7 @@ class Sources:
         return file.rsplit(".", 1)[0]
 
 
-    def library_arrows(self):
+    def arrows_of_code(self):
         """(unit, included unit) of all includes among the packages' libraries."""
         library = {file for file in self.includes if file.split("/")[1] in ("include", "src")}
         arrows = {(self.unit(a), self.unit(b)) for a, b in self.arrows() if a in library and b in library}
@@ -218,7 +218,7 @@ def levels(units, arrows):
 
 
 def check_circles(sources):
-    arrows = sources.library_arrows()
+    arrows = sources.arrows_of_code()
     _, circles = levels(sorted({unit for arrow in arrows for unit in arrow}), arrows)
     for circle in circles:
         yield f"{min(circle)}: includes itself in a circle of {', '.join(sorted(circle))}"
@@ -235,7 +235,7 @@ def print_levels(sources):
     parts = [f"{package}/{part}/" for package in PACKAGES for part in ("include", "src")]
     code = [file for file in sources.includes if file.startswith(tuple(parts))]
     folders = [*PACKAGES, *ROOMS]
-    all_arrows = sources.library_arrows()
+    all_arrows = sources.arrows_of_code()
     print("folder  units  levels  arrows  circles")
     for folder in folders:
         units = sorted({sources.unit(file) for file in code if sources.unit(file).startswith(folder + "/")})
