@@ -25,12 +25,17 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   app.add_option("--seed", options.seed, "of the phases of scatter points")->capture_default_str();
+  std::string noise = "thermal";
+  app.add_option("--noise", noise, "of samples, where the twin has no noise_floor: thermal noise of the radar, or none")
+      ->check(CLI::IsMember({"thermal", "none"}))
+      ->capture_default_str();
   std::string diffuse_records = "cells";
   app.add_option("--diffuse-records", diffuse_records, "in paths/{pose}.csv: summed by cells of a facet, or all points")
       ->check(CLI::IsMember({"cells", "points"}))
       ->capture_default_str();
   app.add_option("--jobs", options.jobs, "threads; 0 = all cores")->check(CLI::Range(0, 1024))->capture_default_str();
   return runProgram(app, argc, argv, [&] {
+    options.noise = noise == "none" ? SimulatedNoise::kNone : SimulatedNoise::kThermal;
     options.diffuse_records = diffuseRecordsFrom(diffuse_records, "--diffuse-records");
     loadMechanismPlugins(plugins, "--plugins");
     std::unique_ptr<ProgressBar> bar;
@@ -42,6 +47,12 @@ int main(int argc, char** argv) {
       if (done > shown) bar->show(shown = done);
     });
     bar.reset();
+    if (result.noise_dbfs) {
+      std::cerr << "note: thermal noise of " << *result.noise_dbfs
+                << " dBFS is added to each sample; --noise none leaves it out\n";
+    } else if (noise == "none") {
+      std::cerr << "note: no noise is written but what the twin states\n";
+    }
     for (const std::string& note : result.notes) std::cerr << "note: " << note << "\n";
     for (const PoseProblem& problem : result.problems) std::cerr << "error: " << problem.message << "\n";
     std::cerr << result.poses << " pose(s) in " << options.output << ", gain " << result.gain_db

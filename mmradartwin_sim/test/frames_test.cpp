@@ -462,6 +462,7 @@ TEST_F(FramesTest, EveryMechanismCanBeSwitchedOn) {
 
 class FrameSessionTest : public FramesTest {
  protected:
+  SimulatedNoise noise = SimulatedNoise::kNone;
   SimulateResult run(const std::string& mechanisms, const std::string& output, int frames, int jobs = 0,
                      std::uint64_t seed = 1) {
     std::filesystem::create_directories(path("session"));
@@ -480,6 +481,7 @@ class FrameSessionTest : public FramesTest {
     options.frames = frames;
     options.jobs = jobs;
     options.seed = seed;
+    options.noise = noise;
     return simulateSession(options);
   }
   std::vector<std::int16_t> samples(const std::string& output, const std::string& only = "") const {
@@ -501,6 +503,23 @@ TEST_F(FrameSessionTest, KeepsItsGainUnderNoise) {
   double power = 0;
   for (std::size_t i = 0; i < a.size(); ++i) power += std::pow((b[i] - a[i]) / 32768.0, 2);
   EXPECT_NEAR(10 * std::log10(2 * power / static_cast<double>(a.size())), -50, 0.1);
+}
+
+TEST_F(FrameSessionTest, AddsThermalNoiseWhereTheTwinStatesNone) {
+  const SimulateResult plain = run("", "plain", 10);
+  noise = SimulatedNoise::kThermal;
+  const SimulateResult noisy = run("", "noisy", 10);
+  EXPECT_FALSE(plain.noise_dbfs);
+  ASSERT_TRUE(noisy.noise_dbfs);
+  EXPECT_EQ(plain.gain_db, noisy.gain_db);
+  // -174 dBm/Hz and 12 dB noise figure in 5 MHz, against 12 dBm and twice 10.5 dBi.
+  EXPECT_NEAR(*noisy.noise_dbfs - noisy.gain_db, -174 + 67 + 12 - 12 - 21, 0.1);
+  const auto a = samples("plain"), b = samples("noisy");
+  ASSERT_EQ(a.size(), b.size());
+  double power = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) power += std::pow((b[i] - a[i]) / 32768.0, 2);
+  EXPECT_NEAR(db(std::sqrt(2 * power / static_cast<double>(a.size()))), *noisy.noise_dbfs, 0.1);
+  EXPECT_FALSE(run("  noise_floor: {level_dbfs: -50}\n", "stated", 1).noise_dbfs);
 }
 
 TEST_F(FrameSessionTest, StrongestSampleOfAllFramesIsAtMinusSix) {

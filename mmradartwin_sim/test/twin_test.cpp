@@ -433,6 +433,7 @@ TEST_F(SimulateSessionTest, WritesASessionThatReadsBack) {
   options.output = path("out");
   options.frames = 3;
   options.jobs = 1;
+  options.noise = SimulatedNoise::kNone;
   const SimulateResult result = simulateSession(options);
   EXPECT_EQ(result.poses, 2);
   ASSERT_EQ(result.problems.size(), 2u) << "one inside the cabinet, one not a number";

@@ -20,6 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kStrongest_dbfs = -6;
+const std::string kNoise = "noise_floor";
+constexpr double kLowestNoise_dbfs = -200;  // that noise_floor takes
 
 /// A path as it is to stand in a session of `folder`: relative, so that both may be moved together.
 std::string relativeTo(const std::string& folder, const std::string& file) {
@@ -240,6 +242,24 @@ void writeSession(const Job& job, std::vector<Simulation>& simulated, SimulateRe
   writer.finish();
 }
 
+bool statesNoise(const Twin& twin) {
+  const std::vector<NamedParameters>& mechanisms = twin.description().mechanisms;
+  return std::any_of(mechanisms.begin(), mechanisms.end(),
+                     [](const NamedParameters& m) { return m.mechanism == kNoise; });
+}
+
+/// The twin with a noise floor of this level.
+Twin withNoise(const Twin& twin, const std::vector<Pose>& poses, double level_dbfs) {
+  std::vector<NamedParameters> mechanisms = twin.description().mechanisms;
+  NamedParameters noise{kNoise, {}};
+  noise.values.set("level_dbfs", level_dbfs);
+  noise.values.set("delta_db", 0.0);
+  mechanisms.push_back(std::move(noise));
+  Twin noisy = twin.changed(std::move(mechanisms));
+  noisy.setSession(poses);
+  return noisy;
+}
+
 void writeResolvedTwin(const Job& job) {
   std::ofstream resolved(fs::path(job.options.output) / "twin.resolved.yaml");
   resolved << "# The twin that made this session, with all its parameters.\n" << job.twin.description().toYaml();
@@ -247,6 +267,13 @@ void writeResolvedTwin(const Job& job) {
 }
 
 }  // namespace
+
+double thermalNoise_db(double sample_rate_hz) {
+  constexpr double kBoltzmann_J_per_K = 1.380649e-23, kTemperature_K = 290;
+  constexpr double kNoiseFigure_db = 12, kTransmitted_dbw = 12 - 30, kAntennaGain_dbi = 10.5;
+  return 10 * std::log10(kBoltzmann_J_per_K * kTemperature_K * sample_rate_hz) + kNoiseFigure_db - kTransmitted_dbw -
+         2 * kAntennaGain_dbi;
+}
 
 SimulateResult simulateSession(const SimulateOptions& options, const std::function<void(int, int)>& progress) {
   const Recording recording = openInput(options);
@@ -262,10 +289,17 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
   std::vector<Simulation> simulated = simulatePoses(job, progress, levels, result);
   refuseNothing(job, simulated, result);
   result.gain_db = gainOf_db(twin, levels);
-  writeSession(job, simulated, result);
+  std::optional<Twin> noisy;
+  if (options.noise == SimulatedNoise::kThermal && !statesNoise(twin)) {
+    const double level_dbfs = result.gain_db + thermalNoise_db(twin.radar().sample_rate_hz);
+    result.noise_dbfs = std::max(kLowestNoise_dbfs, std::min(0.0, level_dbfs));
+    noisy.emplace(withNoise(twin, recording.poses, *result.noise_dbfs));
+  }
+  const Job written{options, recording, noisy ? *noisy : twin};
+  writeSession(written, simulated, result);
   result.notes = twin.notes();
   for (std::string& note : meshNotes(twin.scene())) result.notes.push_back(std::move(note));
-  writeResolvedTwin(job);
+  writeResolvedTwin(written);
   return result;
 }
 
