@@ -125,6 +125,20 @@ double cellNoiseOverSample(const RadarConfig& radar) {
   return window2 / (sum(window) * sum(window) * kFullScale * kFullScale);
 }
 
+/// Variance of an average over `shots` alike samples, counts^2. variance: of a complex sample, the converter's rounding
+/// within it. Rounding averages out as far as noise dithers it: Gaussian noise of deviation s (counts, in I and in Q)
+/// leaves sum over k of exp(-4 pi^2 k^2 s^2) / (2 pi^2 k^2) of the 1/12 in each (Gray and Stockham, Dithered
+/// quantizers, 1993, characteristic function of the rounding error).
+double varianceOfAverage(double variance, int shots) {
+  constexpr double kRounding = 1.0 / 12;
+  const double dither = std::max(0.0, variance / 2 - kRounding);
+  double left = 0;
+  for (int k = 1; k <= 100; ++k) {
+    left += std::exp(-4 * M_PI * M_PI * k * k * dither) / (2 * M_PI * M_PI * k * k);
+  }
+  return (variance - 2 * left) / shots + 2 * left;
+}
+
 /// Channels of a pose from its frames and the examiner's result.
 PoseChannels channelsOf(const Recording& recording, const SignalChain& chain, const Pose& pose,
                         const std::vector<AdcCube>& frames, const PoseFrames& examined) {
@@ -135,21 +149,24 @@ PoseChannels channelsOf(const Recording& recording, const SignalChain& chain, co
   channels.grid = examined.mean;
   channels.moving = examined.moving;
   if (uncorrected.complete()) channels.uncorrected_average = uncorrected.grid();
-  std::vector<double> noise = examined.noise_variance;
+  channels.shots = std::max(1, examined.shots);
+  std::vector<double> of_shot = examined.noise_variance, noise;
+  for (const double variance : of_shot) noise.push_back(varianceOfAverage(variance, channels.shots));
   if (recording.channels) {
     correctChannels(*recording.channels, channels.grid.x);
     if (uncorrected.complete()) correctChannels(*recording.channels, channels.uncorrected_average.x);
     for (std::size_t k = 0; k < noise.size(); ++k) {
       noise[k] /= std::norm(recording.channels->error(k));
+      of_shot[k] /= std::norm(recording.channels->error(k));
       for (MovingCell& cell : channels.moving) {
         cell.channels[static_cast<Eigen::Index>(k)] /= recording.channels->error(k);
       }
     }
   }
-  channels.noise_power = cellNoiseOverSample(recording.radar) * sum(noise) / static_cast<double>(noise.size()) /
-                         std::max(1, examined.shots);
+  const double per_cell = cellNoiseOverSample(recording.radar) / static_cast<double>(noise.size());
+  channels.noise_power = per_cell * sum(noise);
+  channels.shot_noise_power = per_cell * sum(of_shot);
   channels.unsteadiness = examined.unsteadiness;
-  channels.shots = std::max(1, examined.shots);
   transformGrid(chain, channels);
   return channels;
 }

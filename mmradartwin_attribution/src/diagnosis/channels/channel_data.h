@@ -28,7 +28,8 @@ struct PoseChannels {
   int shots = 1;  ///< frames times loops of the average
   std::vector<EchoBeam> beams;
   BinCovariance clutter;   ///< covariance of clutter in all bins, see clutter_field.h
-  double noise_power = 0;  ///< in a cell of range_spectra, from the scatter of the frames
+  double noise_power = 0;  ///< in a cell of range_spectra, from the scatter of the frames and the converter's rounding
+  double shot_noise_power = 0;  ///< the same in a spectrum of one shot
   /// Factor [N] on the noise power in bins whose frames scatter more, since moving echoes partly remain in the average.
   /// Empty where nothing moves.
   std::vector<double> unsteadiness;

@@ -14,8 +14,8 @@ std::optional<Finding> noiseFloorFinding(const ChannelData& data, const NamedPar
   // and 3N/8.
   std::vector<double> levels_db;
   for (const PoseChannels& p : data.poses) {
-    if (!(p.noise_power > 0)) continue;
-    levels_db.push_back(10 * std::log10(p.noise_power * p.shots * 2.0 / 3 * data.radar.samples_per_chirp));
+    if (!(p.shot_noise_power > 0)) continue;
+    levels_db.push_back(10 * std::log10(p.shot_noise_power * 2.0 / 3 * data.radar.samples_per_chirp));
   }
   if (levels_db.size() < 2) return std::nullopt;
   const double stated_db = stated.values.number("level_dbfs") + stated.values.number("delta_db");

@@ -35,7 +35,7 @@ class ChannelDataTest : public ::testing::Test {
     measure(pose.name, {{bin_ * radar_.range_bin_m(), 0.2, amplitude_}});
   }
   void measure(const std::string& pose, const std::vector<DrawnTone>& tones, const Change& change = {}) {
-    std::normal_distribution<double> noise(0, kNoise);
+    std::normal_distribution<double> noise(0, noise_);
     const ComplexGrid still = gridOf(radar_, tones);
     std::vector<AdcCube>& cubes = cubes_[pose];
     cubes.clear();
@@ -75,6 +75,7 @@ class ChannelDataTest : public ::testing::Test {
   Recording recording_;
   std::map<std::string, std::vector<AdcCube>> cubes_;
   std::mt19937_64 random_{1};
+  double noise_ = kNoise;
 };
 
 TEST_F(ChannelDataTest, TonesHaveTheirAmplitudeOverFullScale) {
@@ -102,6 +103,28 @@ TEST_F(ChannelDataTest, NoisePowerIsThatOfEmptyCells) {
     for (int b = 30; b < 60; ++b) power += p.range_spectra.col(b).squaredNorm() / 8 / 30 / 3;
   }
   EXPECT_NEAR(power / expected, 1, 0.15);
+}
+
+TEST_F(ChannelDataTest, RoundingOfFramesThatAreAlikeDoesNotAverageOut) {
+  // Noise of a hundredth of a count dithers nothing: 40 frames tell no more than one of them.
+  noise_ = 0.01;
+  for (int i = 0; i < 3; ++i) {
+    measure("p" + std::to_string(i),
+            {{20.37 * radar_.range_bin_m(), 0.2, {611.3, 105.1}}, {9.71 * radar_.range_bin_m(), -0.3, {97.7, 30.9}}});
+  }
+  const double of_one = (1.0 / 6) * (3 * 64 / 8.0) / (32.0 * 32.0) / 32768 / 32768;
+  const ChannelData data = read();
+  double power = 0;
+  for (const PoseChannels& p : data.poses) {
+    EXPECT_NEAR(p.noise_power / of_one, 1, 0.02);
+    for (int b = 40; b < 60; ++b) power += p.range_spectra.col(b).squaredNorm() / 8 / 20 / 3;
+  }
+  EXPECT_NEAR(10 * std::log10(power / of_one), 0, 3);
+  // Noise of 0.37 counts in I and in Q leaves 2 exp(-4 pi^2 0.137) / (2 pi^2) = 0.00045 of the rounding.
+  noise_ = 0.37;
+  for (int i = 0; i < 3; ++i) measure("p" + std::to_string(i), {{20.37 * radar_.range_bin_m(), 0.2, {611.3, 105.1}}});
+  const double expected = of_one * 6 * ((2 * 0.137 + 1.0 / 6) / kFrames + 0.00045);
+  EXPECT_NEAR(read().poses[0].noise_power / expected, 1, 0.1);
 }
 
 TEST_F(ChannelDataTest, NumbersLocationsInOrderOfAppearance) {

@@ -20,7 +20,7 @@ ChannelData drawnNoise(double level_dbfs, double scatter_db, int poses = 16) {
     p.shots = 20 + i;
     // A cell of an average over so many shots: v sum w^2 / (sum w)^2 / shots, (3N/8) / (N/2)^2 = 3 / (2N).
     const double sample_power = std::pow(10.0, (level_dbfs + scatter(random)) / 10);
-    p.noise_power = sample_power * 3 / (2 * 64.0) / p.shots;
+    p.shot_noise_power = sample_power * 3 / (2 * 64.0);
   }
   return data;
 }
@@ -51,7 +51,7 @@ TEST(NoiseFloor, IsNoneWhereItAgreesOrNothingWasRead) {
   EXPECT_FALSE(noiseFloorFinding(drawnNoise(-66, 3), stated(-70, 3))) << "within its own error";
   EXPECT_FALSE(noiseFloorFinding(drawnNoise(-60, 0.05, 1), stated(-70, 3)));
   ChannelData silent = drawnNoise(-60, 0.05);
-  for (PoseChannels& p : silent.poses) p.noise_power = 0;
+  for (PoseChannels& p : silent.poses) p.shot_noise_power = 0;
   EXPECT_FALSE(noiseFloorFinding(silent, stated(-70, 3)));
 }
 
