@@ -21,6 +21,7 @@ std::optional<Finding> unexplainedPower(DiagnosisContext& context, const ModelSt
 struct MissingBounces {
   int max_bounces = 0;
   std::size_t specular = 0;  ///< index of the mechanism that traces them
+  int tried = 0;             ///< orders up to the highest one that can be traced
   ModelState state;          ///< with them
 };
 /// Number of bounces up to which paths make the data likelier than a twin's state does; nothing where none do. No
