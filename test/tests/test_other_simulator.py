@@ -48,6 +48,13 @@ class OtherSimulator(InFolder):
         self.assertIn(subject["value"], ("Metal", "cabinet"))
         self.assert_holds(first, "delta_db", -12.04)
 
+    def test_a_box_is_found_that_few_poses_face(self):
+        first, *rest = self.findings_of("H_obj_40")
+        self.assertEqual((first["cause"], rest), ("actor_unmodelled", []))
+        self.assertEqual(first["parameters"]["shape"]["value"], "box")
+        for name, truth in (("x_m", 1.15), ("y_m", 3.35), ("size_m", 0.3)):
+            self.assert_holds(first, name, truth)
+
     def test_the_elements_look_ahead(self):
         first, *rest = self.findings_of("W1")
         self.assertEqual(first["cause"], "element_pattern")

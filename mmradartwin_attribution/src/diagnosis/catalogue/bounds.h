@@ -264,9 +264,6 @@ inline constexpr double kLeastNatsElsewhere = 5;
 /// Standard deviations from none at which an error that latents share is tried as a cause; see
 /// docs/calibration_of_bounds.md#ksharedlatent_sigmas
 inline constexpr double kSharedLatent_sigmas = 3;
-/// Level of a law over passing paths, at most, for which something may hide what is behind it; see
-/// docs/calibration_of_bounds.md#khides_db
-inline constexpr double kHides_db = -6;
 /// Price of each number of a law when laws are compared; see docs/calibration_of_bounds.md#kpriceoflawnumber_nats
 inline constexpr double kPriceOfLawNumber_nats = 4;
 /// Nats over the price that a law has at least; a fit sometimes finds what paths alone show less of; see

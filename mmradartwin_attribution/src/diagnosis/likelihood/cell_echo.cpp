@@ -7,14 +7,10 @@ namespace mmradartwin::diagnosis::likelihood {
 
 double ChannelLikelihood::floorOf(const PoseModel& model, int cell) const {
   const PoseChannels& p = data_.poses[model.pose];
-  const SessionLatents& latents = model.latents;
   const int bin = binOf(model.pose, cell);
-  const auto [at, share] = shapeAt(bin);
-  const auto* shape = &latents.floor_shape[static_cast<std::size_t>(at)];
-  const double level = std::exp(latents.log_floor + (1 - share) * shape[0] + share * shape[1]);
   const double clutter =
       isBeam(cell) ? p.beams[static_cast<std::size_t>(cell - samples_)].clutter : p.clutter.at(bin, size_)[0].real();
-  return level * clutter + noiseOf(model.pose, cell);
+  return clutterLevel(model.latents, bin) * clutter + noiseOf(model.pose, cell);
 }
 
 void ChannelLikelihood::findStrongest(PoseModel& model) const {
@@ -85,6 +81,23 @@ std::vector<ChannelLikelihood::ExpectedBin> ChannelLikelihood::expectedBins(cons
   for (int bin = firstBin(); bin < samples_; ++bin) {
     bins.push_back(
         {bin, model.strongest[static_cast<std::size_t>(bin)], sigma(model, bin).full(), strongestEcho(model, bin)});
+  }
+  return bins;
+}
+
+std::vector<ChannelLikelihood::MissingEcho> ChannelLikelihood::withoutStrongest(const PoseEchoes& echoes,
+                                                                                const SessionLatents& latents,
+                                                                                int pose) const {
+  std::vector<MissingEcho> bins(static_cast<std::size_t>(samples_));
+  InverseFactor factor;
+  std::array<std::complex<double>, kMaxChannels> z;
+  const PoseModel model = modelOf(echoes, latents, pose);
+  for (int bin = firstBin(); bin < samples_; ++bin) {
+    const auto at = static_cast<std::size_t>(bin);
+    if (model.strongest[at] < 0 || !factor.compute(sigma(model, bin))) continue;
+    factor.apply(dataOf(pose, bin), z.data());
+    const CellLikelihood with(factor, z.data(), strongestEcho(model, bin));
+    bins[at] = {model.strongest[at], weight() * (with.withoutEcho() - with.logLikelihood())};
   }
   return bins;
 }

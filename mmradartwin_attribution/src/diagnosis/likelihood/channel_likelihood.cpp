@@ -107,14 +107,18 @@ void ChannelLikelihood::addClutter(const SessionLatents& latents, int pose, int 
                                    PackedHermitian& to) const {
   const PoseChannels& channels = data_.poses[pose];
   const int bin = binOf(pose, cell);
-  const auto [at, share] = shapeAt(bin);
-  const auto* shape = &latents.floor_shape[static_cast<std::size_t>(at)];
-  const double level = factor * std::exp(latents.log_floor + (1 - share) * shape[0] + share * shape[1]);
+  const double level = factor * clutterLevel(latents, bin);
   if (isBeam(cell)) {
     addApart(cell, level * channels.beams[static_cast<std::size_t>(cell - samples_)].clutter, to);
   } else {
     to.add(channels.clutter.at(bin, size_), level);
   }
+}
+
+double ChannelLikelihood::clutterLevel(const SessionLatents& latents, int bin) const {
+  const auto [at, share] = shapeAt(bin);
+  const auto* shape = &latents.floor_shape[static_cast<std::size_t>(at)];
+  return std::exp(latents.log_floor + (1 - share) * shape[0] + share * shape[1]);
 }
 
 std::pair<int, double> ChannelLikelihood::shapeAt(int bin) const {

@@ -154,6 +154,14 @@ class ChannelLikelihood {
   /// All bins of a pose from firstBin() on.
   std::vector<ExpectedBin> expectedBins(const PoseEchoes& echoes, const SessionLatents& latents, int pose) const;
 
+  /// Nats that a bin gains where its strongest echo is not there; beams do not count.
+  struct MissingEcho {
+    int group = -1;  ///< of the echo, -1 where the bin has none
+    double nats = 0;
+  };
+  /// [bins] of a pose; bins before firstBin() have no echo.
+  std::vector<MissingEcho> withoutStrongest(const PoseEchoes& echoes, const SessionLatents& latents, int pose) const;
+
   const ChannelData& data() const { return data_; }
   const LatentSpread& spread() const { return spread_; }
   int firstBin() const { return 2; }     ///< nearer bins hold the radar's own leakage and are judged separately
@@ -165,6 +173,8 @@ class ChannelLikelihood {
   int binOf(int pose, int cell) const;
   /// Nodes of floor_shape about a bin: the index of the first one and the weight of the second one.
   std::pair<int, double> shapeAt(int bin) const;
+  /// Factor of the latents on the clutter of a bin.
+  double clutterLevel(const SessionLatents& latents, int bin) const;
   const std::complex<double>* dataOf(int pose, int cell) const;
   /// Noise power of the average in a cell, with the unsteadiness of moving echoes.
   double noiseOf(int pose, int cell) const;

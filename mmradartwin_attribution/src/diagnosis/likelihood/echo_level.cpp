@@ -6,8 +6,10 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr double kUnknownShare = 0.05;  ///< of the echoes: their level is not the twin's
-constexpr double kLeastSpread = 1e-5;   ///< a level known to 0.014 dB
+constexpr double kUnknownShare = 0.05;                     ///< of the echoes: their level is not the twin's
+constexpr double kLeftOfHidden[] = {0, 1e-4, 1e-3, 1e-2};  ///< power that edges and weaker ways leave of a hidden echo
+constexpr double kLeastRest = 1e-9;
+constexpr double kLeastSpread = 1e-5;  ///< a level known to 0.014 dB
 
 /// Square of the echo's share of a cell from which on the level of a path is log-normal, and up to which it is that of
 /// a sum of phasors; between them the law is a mixture.
@@ -55,7 +57,9 @@ CellLikelihood::CellLikelihood(const InverseFactor& factor, const std::complex<d
   for (int k = 0; k < channels_; ++k) q += std::norm(z[k]);
   const double freedom = channels_ + kTailFreedom;
   t_weight_ = freedom / (kTailFreedom + q);
-  log_likelihood_ = -factor.logDeterminant() - freedom * std::log1p(q / kTailFreedom);
+  determinant_ = factor.logDeterminant();
+  squares_ = q;
+  log_likelihood_ = -determinant_ - freedom * std::log1p(q / kTailFreedom);
   usual_ = known_ = by_level_ = level_information_ = echo_share_ = across_weight_ = 0;
   along_.fill(0);
   std::copy(z, z + channels_, across_.begin());
@@ -74,6 +78,7 @@ CellLikelihood::CellLikelihood(const InverseFactor& factor, const std::complex<d
   }
   const double x = std::max(1e-30, std::norm(amplitude)), across = std::max(0.0, q - x);
   echo_share_ = std::min(1.0, echo.power * g);
+  along_squares_ = x;
   across_weight_ = (freedom - 1) / (kTailFreedom + across);
   const double squares = echo_share_ * echo_share_, spread = std::max(kLeastSpread, echo.spread);
   usual_ = (1 - kUnknownShare) * squares;
@@ -93,6 +98,20 @@ CellLikelihood::CellLikelihood(const InverseFactor& factor, const std::complex<d
   const double both = 1 - usual_ + known_;
   log_likelihood_ += std::log(both);
   for (double* v : {&known_, &by_level_, &spread_score_, &level_information_, &spread_information_}) *v /= both;
+}
+
+double CellLikelihood::withoutEcho() const {
+  // Sherman and Morrison: with the share f of its power left, the determinant changes by r = 1 - (1 - f) e, and what
+  // lies along s weighs 1 / r as much.
+  const double freedom = channels_ + kTailFreedom;
+  double mean = 0;
+  for (const double left : kLeftOfHidden) {
+    const double rest = std::max(kLeastRest, 1 - (1 - left) * echo_share_);
+    const double q = squares_ + along_squares_ * (1 - rest) / rest;
+    mean += std::exp(-std::log(rest) - freedom * (std::log1p(q / kTailFreedom) - std::log1p(squares_ / kTailFreedom)));
+  }
+  return -determinant_ - freedom * std::log1p(squares_ / kTailFreedom) +
+         std::log(std::max(1e-300, mean / std::size(kLeftOfHidden)));
 }
 
 void CellLikelihood::score(double* to) const {

@@ -36,6 +36,8 @@ class CellLikelihood {
   double logLikelihood() const { return log_likelihood_; }
   /// Probability that the level is expected to be known by, less that with which the measured level is it.
   double astray() const { return usual_ - known_; }
+  /// Log-likelihood of the same channels where the echo is hidden: of its power nothing is left, or 20 to 40 dB less.
+  double withoutEcho() const;
   /// Score by the echo's log spread, and its information.
   double spreadScore() const { return spread_score_; }
   double spreadInformation() const { return spread_information_; }
@@ -50,6 +52,8 @@ class CellLikelihood {
  private:
   int channels_;
   std::array<std::complex<double>, kMaxChannels> along_, across_, unit_;  ///< parts of z along u and across; u
+  double determinant_, squares_;                                          ///< log |Sigma|, and |z|^2
+  double along_squares_ = 0;                                              ///< of z along u
   double log_likelihood_, t_weight_, across_weight_, echo_share_;
   double usual_, known_;                 ///< probability that the level is known, before and after it is measured
   double by_level_, level_information_;  ///< slope and information of the known level

@@ -16,6 +16,8 @@ constexpr double kWidest_sine = 0.95;               ///< limit of the sine of th
 constexpr double kSizes_m[] = {0.04, 0.15, 0.3, 0.5};  ///< diameters that are tried
 constexpr double kLeastLate_m = 0.4, kMostLate_m = 3;  ///< delay of a late echo, as one-way range
 constexpr double kLateRcs_dbsm[] = {-15, -5, 5};       ///< levels of late points that are tried
+constexpr double kFacing = 0.1;                        ///< share of poses that a flat side faces
+constexpr std::size_t kMostFaced = 5;                  ///< poses that are kept of them
 constexpr double kLeastRcs_dbsm = -25;                 ///< unlisted small things have less
 constexpr double kWide_m[] = {0.12, 0.25};             ///< radii of a wide object
 constexpr double kApart_m = 0.5;                       ///< least distance between places that are kept
@@ -35,6 +37,7 @@ std::string placeName(const ProjectedPlace& place) {
 struct Source {
   double size_m = 0;                  ///< diameter of an upright metal cylinder, whose nearest line echoes; 0: a point
   double behind_m = 0, rcs_dbsm = 0;  ///< of a point: delay as one-way range, and radar cross-section
+  bool side = false;                  ///< a flat side, which echoes as a mirror to the poses that it faces
 };
 
 }  // namespace
@@ -46,6 +49,11 @@ Eigen::Vector2d awayFromRadar(const ChannelData& data, const Eigen::Vector2d& pl
 }
 
 namespace {
+
+/// Nats of a flat side that a pose may face or not, from those that it has where it does.
+double mayFace(double nats) {
+  return nats > 0 ? nats + std::log(kFacing + (1 - kFacing) * std::exp(-nats)) : std::log1p(kFacing * std::expm1(nats));
+}
 
 /// Nats of one more source at every place of a grid over the scene, over all poses and with nothing refitted; best
 /// first.
@@ -73,6 +81,7 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
     Eigen::ArrayXXd gained = Eigen::ArrayXXd::Zero(static_cast<Eigen::Index>(data.locations.size()),
                                                    static_cast<Eigen::Index>(sources.size()));
     Eigen::VectorXcd v(channels);
+    std::vector<std::pair<double, int>> facing;
     for (std::size_t i = 0; i < data.poses.size(); ++i) {
       const Eigen::Isometry3d& T = data.poses[i].pose.T_map_radar;
       const Eigen::Vector3d point(place.x_m, place.y_m, T.translation().z());
@@ -96,10 +105,13 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
         const double w = hannResponse(bin - at_m / radar.range_bin_m());
         // Power of a metal cylinder: (lambda/(8 pi r))^2 a/(a + r); of a point: lambda^2 sigma/((4 pi)^3 r^4).
         const double level = radar.wavelength_m() / (8 * M_PI * near_m);
-        const double spread = radius_m > 0 ? radius_m / (radius_m + near_m)
-                                           : std::pow(10.0, source.rcs_dbsm / 10) / (M_PI * near_m * near_m);
-        gained(data.poses[i].location, static_cast<Eigen::Index>(k)) += model.gainOfPoint(
-            cell, gain * w * w * level * level * spread, v.dot(cell.inverse * v).real(), std::norm(v.dot(cell.solved)));
+        const double spread = source.side    ? 1
+                              : radius_m > 0 ? radius_m / (radius_m + near_m)
+                                             : std::pow(10.0, source.rcs_dbsm / 10) / (M_PI * near_m * near_m);
+        const double nats = model.gainOfPoint(cell, gain * w * w * level * level * spread,
+                                              v.dot(cell.inverse * v).real(), std::norm(v.dot(cell.solved)));
+        gained(data.poses[i].location, static_cast<Eigen::Index>(k)) += source.side ? mayFace(nats) : nats;
+        if (source.side && nats > 0) facing.emplace_back(-nats, static_cast<int>(i));
       }
     }
     for (std::size_t k = 0; k < sources.size(); ++k) {
@@ -112,6 +124,8 @@ std::vector<ProjectedPlace> project(const Twin& twin, const ChannelLikelihood& m
       place.behind_m = sources[k].behind_m;
       place.rcs_dbsm = sources[k].rcs_dbsm;
     }
+    std::sort(facing.begin(), facing.end());
+    for (std::size_t i = 0; i < std::min(kMostFaced, facing.size()); ++i) place.faced.push_back(facing[i].second);
   });
   std::stable_sort(places.begin(), places.end(),
                    [](const ProjectedPlace& a, const ProjectedPlace& b) { return a.screened_nats > b.screened_nats; });
@@ -144,6 +158,12 @@ std::vector<ProjectedPlace> projectBack(const Twin& twin, const ChannelLikelihoo
   std::vector<Source> cylinders;
   for (double size_m : kSizes_m) cylinders.push_back({size_m, 0, 0});
   return apart(project(twin, model, null, cylinders, kGrid_m), null, mechanismOfForm(MechanismForm::kUnmodelledObject));
+}
+
+std::vector<ProjectedPlace> projectSidesBack(const Twin& twin, const ChannelLikelihood& model, const ModelState& null) {
+  Source side;
+  side.side = true;
+  return apart(project(twin, model, null, {side}, kGrid_m), null, mechanismOfForm(MechanismForm::kUnmodelledObject));
 }
 
 std::vector<ProjectedPlace> projectLateBack(const Twin& twin, const ChannelLikelihood& model, const ModelState& null) {

@@ -15,6 +15,7 @@ struct ProjectedPlace {
   double size_m = 0;         ///< diameter of an upright metal cylinder; 0: a point
   double behind_m = 0;       ///< of a point: how much later than its distance its echo arrives, as one-way range
   double rcs_dbsm = 0;       ///< of a point: its radar cross-section
+  std::vector<int> faced;    ///< poses that a flat side faces, those that gain most first
 };
 
 /// Unit vector in map's plane from the radar's mean position to a place.
@@ -24,6 +25,8 @@ Eigen::Vector2d awayFromRadar(const ChannelData& data, const Eigen::Vector2d& pl
 std::vector<ProjectedPlace> projectBack(const Twin& twin, const ChannelLikelihood& model, const ModelState& null);
 /// Places where a point with a delayed echo explains most, found as by projectBack().
 std::vector<ProjectedPlace> projectLateBack(const Twin& twin, const ChannelLikelihood& model, const ModelState& null);
+/// Places where a flat side explains most that few poses face and the others do not see; found as by projectBack().
+std::vector<ProjectedPlace> projectSidesBack(const Twin& twin, const ChannelLikelihood& model, const ModelState& null);
 /// Hypothesis of an object at this place; its size is free.
 Hypothesis objectAt(const ProjectedPlace& place);
 /// Hypothesis of a late echo of this place and delay; its level is free.

@@ -78,6 +78,7 @@ class Looks {
   std::set<std::string> suspicious_;  ///< actors whose geometry is tried
   std::set<int> out_of_place_;        ///< actors that are searched for at other places
   std::vector<Screened> placed_;      ///< objects and late points
+  std::vector<Screened> boxes_;       ///< boxes that a side shows
   std::vector<Screened> screened_;
   std::map<std::string, std::size_t> looked_at_;  ///< number of poses, by label
 };
@@ -121,6 +122,10 @@ void Looks::placeObjects() {
   const std::size_t objects = placed_.size();
   for (Screened& s : bestOf(1, projectLateBack(context_.twin, context_.likelihood, state_), lateEchoAt)) {
     placed_.push_back(std::move(s));
+  }
+  for (const ProjectedPlace& side : projectSidesBack(context_.twin, context_.likelihood, state_)) {
+    if (!(side.screened_nats > bounds::kLeastNatsOfLaw)) break;
+    boxes_.push_back(screen_.amongStarts(state_, boxFacing(context_.data, side), spread(kScreenPoses)));
   }
   context_.echoes.setBaseline(state_.mechanisms);
   for (std::size_t i = 0; i < objects; ++i) {
@@ -209,9 +214,11 @@ void Looks::addLaws() {
   screened_.erase(std::remove_if(screened_.begin(), screened_.end(), isNoName), screened_.end());
   for (Screened& s : laws.laws) {
     if (std::optional<Screened> named = namedLike(s, all_); named && !isNoName(*named)) suggest(std::move(*named));
-    const std::optional<Screened> box = s.screened_nats > bounds::kLeastNatsOfLaw ? boxThatHides(s) : std::nullopt;
-    if (box) screened_.push_back(screen_.amongStarts(state_, *box, spread(kScreenPoses)));
     screened_.push_back(std::move(s));
+  }
+  for (const HidingPlace& place : laws.hiding) {
+    if (!(place.screened_nats > bounds::kLeastNatsOfLaw)) break;
+    screened_.push_back(screen_.amongStarts(state_, boxAbout(place), spread(kScreenPoses)));
   }
 }
 
@@ -233,6 +240,7 @@ void Looks::addSharedLatents() {
 
 void Looks::addPlaced() {
   context_.echoes.setBaseline(state_.mechanisms);
+  for (Screened& s : boxes_) screened_.push_back(std::move(s));
   for (Screened& s : placed_) {
     freePlace(context_.data, s);
     screened_.push_back(std::move(s));

@@ -86,6 +86,8 @@ class LawScreen {
   bool gainsFollowTime(const std::optional<Screened>& steps) const;
   /// Actors with enough measured paths for a law of their own.
   std::vector<std::string> actorsOftenSeen() const;
+  /// [poses that were looked at]
+  const std::vector<MeasuredPose>& measured() const { return poses_; }
 
  private:
   Sample sampleOf(const Observable& observable, std::size_t kind) const;
@@ -596,6 +598,7 @@ ScreenedLaws screenLaws(const Twin& base, const ChannelLikelihood& model, const 
   }
   std::stable_sort(result.laws.begin(), result.laws.end(),
                    [](const Screened& a, const Screened& b) { return a.screened_nats > b.screened_nats; });
+  result.hiding = hidingPlaces(base.scene(), model, null, poses, screen.measured());
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include "diagnosis/fit/hypothesis_fit.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/rooms.h"
+#include "diagnosis/search/hiding_places.h"
 
 namespace mmradartwin::diagnosis::search {
 
@@ -14,6 +15,7 @@ struct ScreenedLaws {
   /// False where gains differ between poses by far more than steps or a slope over time explain, so that gain_drift is
   /// no name for it.
   bool gains_follow_time = true;
+  std::vector<HidingPlace> hiding;  ///< places where something stands before echoes that are not there
 };
 
 /// Laws without a name that a session supports: at most one per observable (gain, delay or angle of paths, gain and

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/numbers/number_text.h"
 #include "diagnosis/search/back_projection.h"
 
@@ -114,21 +113,35 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
   return box;
 }
 
-std::optional<Screened> boxThatHides(const Screened& law) {
-  const NamedParameters& m = law.hypothesis.mechanism;
-  if (traitsOf(m.mechanism).form != MechanismForm::kLaw || m.values.text("variable") != "passing_m" ||
-      law.hypothesis.coordinates.front().value(law.starts.front().front()) > bounds::kHides_db) {
-    return std::nullopt;
-  }
-  const Eigen::Vector2d place(m.values.number("x_m"), m.values.number("y_m"));
-  Screened box{boxAt(place), 0, {}};
+Screened boxFacing(const ChannelData& data, const ProjectedPlace& side) {
+  const Eigen::Vector2d seen(side.x_m, side.y_m);
+  Screened box{boxAt(seen), side.screened_nats, {}};
   Hypothesis& h = box.hypothesis;
-  h.variant = "a box that hides what is behind it, about " + number(place.x(), 2) + ", " + number(place.y(), 2) + " m";
-  for (double side_m : kSides_m) {
+  h.variant = "a box whose side faces some poses, about " + number(seen.x(), 2) + ", " + number(seen.y(), 2) + " m";
+  for (const int pose : side.faced) {
+    const Eigen::Vector2d radar = data.poses[static_cast<std::size_t>(pose)].pose.T_map_radar.translation().head<2>();
+    const Eigen::Vector2d way = (radar - seen).normalized(), along(-way.y(), way.x());
+    const double yaw_deg = std::fmod(std::atan2(way.y(), way.x()) * 180 / M_PI + 360, kSquare_deg);
+    for (const double side_m : kSides_m) {
+      for (const double aside : {-0.3, 0.0, 0.3}) {
+        const Eigen::Vector2d center = seen - 0.5 * side_m * way + aside * side_m * along;
+        box.starts.push_back({h.coordinates[kX].scaled(center.x()), h.coordinates[kY].scaled(center.y()),
+                              h.coordinates[kSide].scaled(side_m), h.coordinates[kYaw].scaled(yaw_deg)});
+      }
+    }
+  }
+  return box;
+}
+
+Screened boxAbout(const HidingPlace& place) {
+  Screened box{boxAt({place.x_m, place.y_m}), 0, {}};
+  Hypothesis& h = box.hypothesis;
+  h.variant = "a box that hides what is behind it, about " + number(place.x_m, 2) + ", " + number(place.y_m, 2) + " m";
+  for (const double side_m : {M_SQRT1_2 * place.width_m, place.width_m}) {  // the width may be a diagonal
     for (double yaw_deg = 0; yaw_deg < kSquare_deg; yaw_deg += 2 * kTurned_deg) {
-      for (double dx_m : kPlaceOffsets_m) {
-        for (double dy_m : kPlaceOffsets_m) {
-          box.starts.push_back({h.coordinates[kX].scaled(place.x() + dx_m), h.coordinates[kY].scaled(place.y() + dy_m),
+      for (const double dx_m : kPlaceOffsets_m) {
+        for (const double dy_m : kPlaceOffsets_m) {
+          box.starts.push_back({h.coordinates[kX].scaled(place.x_m + dx_m), h.coordinates[kY].scaled(place.y_m + dy_m),
                                 h.coordinates[kSide].scaled(side_m), h.coordinates[kYaw].scaled(yaw_deg)});
         }
       }

@@ -149,6 +149,29 @@ TEST(EchoLevel, FadesWhereNoEchoStandsOut) {
   }
 }
 
+TEST(EchoLevel, AHiddenEchoIsTheSameCellWithLittleOfItsPower) {
+  for (const double there_db : {0.0, -25.0, -60.0}) {
+    const Vector y = measured(1, there_db, 0, -35).front();
+    const Cell cell;
+    InverseFactor factor;
+    ASSERT_TRUE(factor.compute(packed(cell.covariance())));
+    Vector z(kChannels);
+    factor.apply(y.data(), z.data());
+    double mean = 0;
+    for (const double left : {0.0, 1e-4, 1e-3, 1e-2}) {
+      Cell hidden;
+      hidden.echo = left;
+      const Matrix covariance = hidden.covariance();
+      const double q = y.dot(covariance.inverse() * y).real();
+      mean += 0.25 * std::exp(-std::log(std::abs(covariance.determinant())) - (kChannels + 4) * std::log1p(q / 4) - 50);
+    }
+    const double expected = std::log(mean) + 50;
+    EXPECT_NEAR(CellLikelihood(factor, z.data(), cell.expected()).withoutEcho(), expected, 1e-3) << there_db;
+    // Where the echo is there it is likelier with it; where it is hidden, without.
+    EXPECT_EQ(cell.logLikelihood(y) > expected, there_db == 0.0) << there_db;
+  }
+}
+
 /// Score of a change of the covariance of a cell, and the slope of the log-likelihood along it, the model's echo going
 /// along.
 void expectSlope(const Vector& y, const std::function<Cell(double)>& at) {

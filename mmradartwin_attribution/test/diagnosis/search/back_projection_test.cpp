@@ -65,11 +65,33 @@ TEST(BackProjection, FindsAPointThatAnswersLate) {
   EXPECT_EQ(places[0].rcs_dbsm, -5);
 }
 
+TEST(BackProjection, FindsASideThatFewPosesFace) {
+  MadeRoom room(12);
+  room.measure(firstOrder());
+  const Eigen::Vector2d place(2.45, 0.75);
+  const std::vector<int> faced = {1, 5, 8};
+  for (const int i : faced) {
+    const auto pose = static_cast<std::size_t>(i);
+    const double r = (room.data.poses[pose].pose.T_map_radar.translation().head<2>() - place).norm();
+    addPoint(room, pose, place, 0, room.data.radar.wavelength_m() / (8 * M_PI * r));
+  }
+  FittedRoom fitted(room, firstOrder());
+  const std::vector<ProjectedPlace> places = projectSidesBack(*room.twin, fitted.model, fitted.null);
+  ASSERT_FALSE(places.empty());
+  EXPECT_NEAR(places[0].x_m, place.x(), 0.11);
+  EXPECT_NEAR(places[0].y_m, place.y(), 0.11);
+  EXPECT_GT(places[0].screened_nats, 10);
+  std::vector<int> told(places[0].faced.begin(), places[0].faced.begin() + 3);
+  std::sort(told.begin(), told.end());
+  EXPECT_EQ(told, faced);
+}
+
 TEST(BackProjection, IsSilentAboutARoomThatIsAsTheTwinHasIt) {
   MadeRoom room(12);
   room.measure(firstOrder());
   FittedRoom fitted(room, firstOrder());
   for (const ProjectedPlace& p : projectBack(*room.twin, fitted.model, fitted.null)) EXPECT_LT(p.screened_nats, 10);
+  for (const ProjectedPlace& p : projectSidesBack(*room.twin, fitted.model, fitted.null)) EXPECT_LT(p.screened_nats, 8);
 }
 
 TEST(BackProjection, AnObjectsPlaceAndSizeAreThoseOfItsHypothesis) {

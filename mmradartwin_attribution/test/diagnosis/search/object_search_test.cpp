@@ -67,37 +67,33 @@ TEST_F(FittedCylinder, BecomesABoxThatFacesThePosesThatGainMost) {
   }
 }
 
-Screened dimsAt(const std::string& variable, double level_db) {
-  Screened law;
-  law.hypothesis.mechanism = defaultMechanism("empirical_law");
-  law.hypothesis.mechanism.values.set("variable", variable);
-  law.hypothesis.mechanism.values.set("at", std::vector<double>{0, 0.5});
-  law.hypothesis.mechanism.values.set("gain_db", std::vector<double>{0, 0});
-  law.hypothesis.mechanism.values.set("x_m", 1.5);
-  law.hypothesis.mechanism.values.set("y_m", -0.5);
-  law.hypothesis.coordinates = {{"gain_db", "dB", 0, 0, 2, -60, 60, {}}};
-  law.starts = {{level_db / 2}};
-  return law;
-}
-
-TEST(BoxThatHides, StandsAboutThePlaceThatPathsPass) {
-  const auto box = boxThatHides(dimsAt("passing_m", -12));
-  ASSERT_TRUE(box.has_value());
-  EXPECT_TRUE(isUnmodelledBox(box->hypothesis));
-  for (const std::vector<double>& start : box->starts) {
-    const NamedParameters m = box->hypothesis.at(start);
+TEST(BoxAbout, StandsAboutThePlaceThatPathsPass) {
+  const Screened box = boxAbout({1.5, -0.5, 0.4, 20});
+  EXPECT_TRUE(isUnmodelledBox(box.hypothesis));
+  ASSERT_FALSE(box.starts.empty());
+  for (const std::vector<double>& start : box.starts) {
+    const NamedParameters m = box.hypothesis.at(start);
     EXPECT_LE(std::abs(m.values.number("x_m") - 1.5), 0.1 + 1e-9);
     EXPECT_LE(std::abs(m.values.number("y_m") + 0.5), 0.1 + 1e-9);
     EXPECT_GT(m.values.number("size_m"), 0.2);
   }
 }
 
-TEST(BoxThatHides, IsNothingOfOtherLaws) {
-  EXPECT_FALSE(boxThatHides(dimsAt("passing_m", -4)).has_value());  // it lets too much through
-  EXPECT_FALSE(boxThatHides(dimsAt("distance_m", -12)).has_value());
-  Screened other;
-  other.hypothesis.mechanism = defaultMechanism("gain_drift");
-  EXPECT_FALSE(boxThatHides(other).has_value());
+TEST_F(FittedCylinder, ABoxThatFacesAPoseHasASideAtThePlace) {
+  ProjectedPlace side;
+  side.x_m = 2.6;
+  side.y_m = 1.1;
+  side.faced = {4};
+  const Screened box = boxFacing(data_, side);
+  EXPECT_TRUE(isUnmodelledBox(box.hypothesis));
+  ASSERT_FALSE(box.starts.empty());
+  const Eigen::Vector2d radar = data_.poses[4].pose.T_map_radar.translation().head<2>(), seen(2.6, 1.1);
+  const Eigen::Vector2d way = (radar - seen).normalized();
+  for (const std::vector<double>& start : box.starts) {
+    const NamedParameters m = box.hypothesis.at(start);
+    const Eigen::Vector2d from_middle = seen - Eigen::Vector2d(m.values.number("x_m"), m.values.number("y_m"));
+    EXPECT_NEAR(from_middle.dot(way), 0.5 * m.values.number("size_m"), 1e-9);
+  }
 }
 
 TEST(FitObject, FindsAMovedCupboard) {
