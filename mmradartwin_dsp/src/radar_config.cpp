@@ -16,80 +16,6 @@ constexpr int kLanes = 4;
 /// Share of the pitch by which an element may lie off the uniform line: 1 % of half a wavelength is 1.8 deg of phase.
 constexpr double kPitchTolerance = 0.01;
 
-std::vector<Eigen::Vector3d> positions(YamlMap& yaml, const std::string& key) {
-  std::vector<Eigen::Vector3d> positions;
-  for (const std::vector<double>& row : yaml.rows(key, 3, -10, 10)) positions.emplace_back(row[0], row[1], row[2]);
-  if (positions.empty()) yaml.fail(key, "is empty; give at least one position [x, y, z] in metres");
-  return positions;
-}
-
-RadarConfig read(YamlMap yaml) {
-  RadarConfig radar;
-  radar.device = yaml.text("device");
-  radar.carrier_hz = yaml.number("carrier_hz", 1e9, 1e12);
-  radar.slope_hz_per_s = yaml.number("slope_hz_per_s", 1e9, 1e16);
-  radar.samples_per_chirp = static_cast<int>(yaml.integer("samples_per_chirp", 2, 16384));
-  radar.sample_rate_hz = yaml.number("sample_rate_hz", 1e4, 1e9);
-  radar.adc_start_s = yaml.number("adc_start_s", 0, 1e-2);
-  radar.loops_per_frame = static_cast<int>(yaml.integer("loops_per_frame", 1, 32768));
-  radar.frame_period_s = yaml.number("frame_period_s", 1e-5, 1000);
-  radar.tx_position_m = positions(yaml, "tx_position_m");
-  radar.rx_position_m = positions(yaml, "rx_position_m");
-  radar.layout = captureLayoutOf(radar.device).value_or(CaptureLayout::kFourLane);
-  if (yaml.has("layout")) {
-    radar.layout =
-        yaml.choice("layout", {"4lane", "2lane"}) == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
-  }
-  if (yaml.has("iq_order")) {
-    radar.iq_order = yaml.choice("iq_order", {"iq", "qi"}) == "qi" ? IqOrder::kQi : IqOrder::kIq;
-  }
-  if (yaml.has("idle_s")) radar.idle_s = yaml.number("idle_s", 0, 1);
-  if (yaml.has("ramp_end_s")) radar.ramp_end_s = yaml.number("ramp_end_s", 1e-7, 1);
-  if (yaml.has("rx_gain_db")) radar.rx_gain_db = yaml.number("rx_gain_db", 0, 120);
-  if (yaml.has("tx_backoff_db")) radar.tx_backoff_db = yaml.number("tx_backoff_db", 0, 60);
-  if (yaml.has("if_highpass_hz")) {
-    radar.if_highpass_hz = yaml.numbers("if_highpass_hz", 1, 1e9);
-    if (radar.if_highpass_hz.size() != 2) yaml.fail("if_highpass_hz", "needs two corners, [Hz, Hz]");
-  }
-  if (yaml.has("tx_enable")) {
-    for (const std::vector<long long>& slot : yaml.integerLists("tx_enable", 0, 31)) {
-      if (slot.empty()) yaml.fail("tx_enable", "has a slot without a transmitter");
-      radar.tx_enable.emplace_back(slot.begin(), slot.end());
-    }
-    if (static_cast<int>(radar.tx_enable.size()) != radar.slots()) {
-      yaml.fail("tx_enable", "has " + std::to_string(radar.tx_enable.size()) + " slots; tx_position_m has " +
-                                 std::to_string(radar.slots()) + ": give one list per slot");
-    }
-  }
-  if (yaml.has("rx_enable")) {
-    for (const long long rx : yaml.integers("rx_enable", 0, 31)) radar.rx_enable.push_back(static_cast<int>(rx));
-    if (static_cast<int>(radar.rx_enable.size()) != radar.receivers()) {
-      yaml.fail("rx_enable", "names " + std::to_string(radar.rx_enable.size()) + " receivers; rx_position_m has " +
-                                 std::to_string(radar.receivers()) + ": give one number per receiver");
-    }
-  }
-  yaml.rejectUnknownKeys();
-
-  if (radar.layout == CaptureLayout::kTwoLane && radar.samples_per_chirp % 2 != 0) {
-    yaml.fail("samples_per_chirp", "'" + std::to_string(radar.samples_per_chirp) +
-                                       "' is odd; layout 2lane stores samples in pairs, so it must be even");
-  }
-  const double adc_end_s = radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
-  // Values are typed by hand: a nanosecond more or less is rounding.
-  if (radar.ramp_end_s < adc_end_s - 1e-9) {
-    yaml.fail("ramp_end_s", yamlNumber(radar.ramp_end_s) + " ends before the last sample; it must be at least " +
-                                yamlNumber(adc_end_s) + " (adc_start_s + samples_per_chirp/sample_rate_hz)");
-  }
-  const double busy_s =
-      radar.chirps_per_frame() * (std::isnan(radar.chirp_period_s()) ? adc_end_s : radar.chirp_period_s());
-  if (busy_s > radar.frame_period_s + 1e-9) {
-    yaml.fail("frame_period_s", yamlNumber(radar.frame_period_s) + " is shorter than the frame's " +
-                                    std::to_string(radar.chirps_per_frame()) + " chirps; it must be at least " +
-                                    yamlNumber(busy_s));
-  }
-  return radar;
-}
-
 void writePositions(std::ostream& out, const std::string& key, const std::vector<Eigen::Vector3d>& positions) {
   out << key << ": [";
   for (std::size_t i = 0; i < positions.size(); ++i) {
@@ -174,12 +100,6 @@ double RadarConfig::virtual_pitch_m() const {
     }
   }
   return pitch;
-}
-
-RadarConfig loadRadarConfig(const std::string& file) { return read(YamlMap::load(file)); }
-
-RadarConfig parseRadarConfig(const std::string& yaml_text, const std::string& name) {
-  return read(YamlMap::parse(yaml_text, name));
 }
 
 std::string toYaml(const RadarConfig& radar) {
