@@ -30,7 +30,10 @@ double wrapped(double x, double period) { return x - period * std::round(x / per
 }  // namespace
 
 EvaluationField::EvaluationField(const AttributionConfig& config, const RadarConfig& radar, const RangeAngleAxes& axes)
-    : config_(config), axes_(axes), channels_(radar.channels()), range_bin_m_(radar.range_bin_m()) {
+    : config_(config),
+      axes_(axes),
+      channels_(static_cast<int>(radar.virtualLine().channels.size())),
+      range_bin_m_(radar.range_bin_m()) {
   sine_bin_ = radar.wavelength_m() / (2 * radar.virtual_pitch_m()) / (kAngleBins / 2);
   bool any_range = false, any_angle = false;
   for (double r : axes_.range_m) {

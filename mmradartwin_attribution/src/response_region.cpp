@@ -236,13 +236,15 @@ void RegionModel::addImages(const Eigen::Isometry3d& T, std::vector<ResponseRegi
   const std::vector<MirrorImage> images =
       mirrors_->find(T, config.image_order, 2 * max_range_m_, config.max_elevation_rad);
   const Eigen::Isometry3d T_radar_map = T.inverse();
-  const int channels = radar_.channels();
+  const VirtualLine line = radar_.virtualLine();
+  const int channels = static_cast<int>(line.channels.size());
   const auto addChannels = [&](const MirrorImage& image, Eigen::VectorXcd& sum) {
     const Eigen::Vector3d departure = (T_radar_map * image.vertices.front()).normalized();
     const Eigen::Vector3d arrival = (T_radar_map * image.vertices.back()).normalized();
     for (int k = 0; k < channels; ++k) {
-      const double closer_m = departure.dot(radar_.tx_position_m[k / radar_.receivers()]) +
-                              arrival.dot(radar_.rx_position_m[k % radar_.receivers()]);
+      const int channel = line.channels[k];
+      const double closer_m = departure.dot(radar_.tx_position_m[channel / radar_.receivers()]) +
+                              arrival.dot(radar_.rx_position_m[channel % radar_.receivers()]);
       sum[k] += std::polar(1.0, -2 * M_PI * closer_m / wavelength_m_);
     }
   };
@@ -262,7 +264,7 @@ void RegionModel::addImages(const Eigen::Isometry3d& T, std::vector<ResponseRegi
     for (int u = -kSteps; u <= kSteps; ++u) {
       std::complex<double> total = 0;
       for (int k = 0; k < channels; ++k) {
-        total += sum[k] * std::polar(1.0, 2 * M_PI * k * radar_.virtual_pitch_m() * u / kSteps / wavelength_m_);
+        total += sum[k] * std::polar(1.0, 2 * M_PI * k * line.pitch_m * u / kSteps / wavelength_m_);
       }
       beam[u + kSteps] = std::abs(total) / channels;
     }

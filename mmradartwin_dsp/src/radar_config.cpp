@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
@@ -16,6 +17,66 @@ constexpr int kLanes = 4;
 /// Share of the pitch by which an element may lie off the uniform line: 1 % of half a wavelength is 1.8 deg of phase.
 constexpr double kPitchTolerance = 0.01;
 
+/// More slots are not searched for those on a line: there would be too many sets.
+constexpr int kMostSlotsSearched = 12;
+
+/// Elements of some slots by their y, and the first of them that is off the uniform line; -1 where all are on it.
+struct LineFit {
+  VirtualLine line;
+  int off = -1;
+};
+
+LineFit fitLine(const RadarConfig& radar, const std::vector<int>& slots) {
+  LineFit fit;
+  std::vector<int>& channels = fit.line.channels;
+  for (const int slot : slots) {
+    for (int rx = 0; rx < radar.receivers(); ++rx) channels.push_back(slot * radar.receivers() + rx);
+  }
+  std::stable_sort(channels.begin(), channels.end(),
+                   [&radar](int a, int b) { return radar.virtual_element_m(a).y() < radar.virtual_element_m(b).y(); });
+  const Eigen::Vector3d origin = radar.virtual_element_m(channels.front());
+  const double length_m = (radar.virtual_element_m(channels.back()) - origin).y();
+  const double pitch_m = fit.line.pitch_m = length_m / static_cast<double>(channels.size() - 1);
+  for (std::size_t i = 1; i < channels.size(); ++i) {
+    const Eigen::Vector3d off =
+        radar.virtual_element_m(channels[i]) - origin - Eigen::Vector3d(0, static_cast<double>(i) * pitch_m, 0);
+    if (pitch_m > 0 && off.norm() <= kPitchTolerance * pitch_m) continue;
+    fit.off = channels[i];
+    break;
+  }
+  return fit;
+}
+
+std::vector<int> allSlots(const RadarConfig& radar) {
+  std::vector<int> slots(static_cast<std::size_t>(radar.slots()));
+  std::iota(slots.begin(), slots.end(), 0);
+  return slots;
+}
+
+std::string listOf(const std::vector<int>& values) {
+  std::string text;
+  for (const int value : values) text += (text.empty() ? "" : ", ") + std::to_string(value);
+  return "[" + text + "]";
+}
+
+/// What is wrong with a slot that is not on the line of the others.
+std::string describeOffLine(const RadarConfig& radar, int slot, const std::vector<int>& line) {
+  const Eigen::Vector3d& at = radar.tx_position_m[static_cast<std::size_t>(slot)];
+  const Eigen::Vector3d off = at - radar.tx_position_m[static_cast<std::size_t>(line.front())];
+  std::ostringstream text;
+  text << "slot " << slot << " at y = " << at.y() << " m ";
+  const double least_m = kPitchTolerance * fitLine(radar, line).line.pitch_m;
+  if (std::abs(off.z()) > least_m) {
+    text << "lies " << std::abs(off.z()) << " m " << (off.z() > 0 ? "above" : "below") << " the line of slots ";
+  } else if (std::abs(off.x()) > least_m) {
+    text << "lies " << std::abs(off.x()) << " m " << (off.x() > 0 ? "before" : "behind") << " the line of slots ";
+  } else {
+    text << "does not continue the line of slots ";
+  }
+  text << listOf(line);
+  return text.str();
+}
+
 void writePositions(std::ostream& out, const std::string& key, const std::vector<Eigen::Vector3d>& positions) {
   out << key << ": [";
   for (std::size_t i = 0; i < positions.size(); ++i) {
@@ -23,12 +84,6 @@ void writePositions(std::ostream& out, const std::string& key, const std::vector
         << yamlNumber(positions[i].z()) << "]";
   }
   out << "]\n";
-}
-
-void writeIntegers(std::ostream& out, const std::vector<int>& values) {
-  out << "[";
-  for (std::size_t i = 0; i < values.size(); ++i) out << (i ? ", " : "") << values[i];
-  out << "]";
 }
 
 }  // namespace
@@ -79,27 +134,51 @@ double RadarConfig::window_center_s() const { return adc_start_s + samples_per_c
 double RadarConfig::center_frequency_hz() const { return carrier_hz + slope_hz_per_s * window_center_s(); }
 double RadarConfig::wavelength_m() const { return kSpeedOfLight_m_per_s / center_frequency_hz(); }
 
-double RadarConfig::virtual_pitch_m() const {
-  const int last = channels() - 1;
-  if (last < 1) {
-    throw InputError("tx_position_m, rx_position_m: the virtual array has " + std::to_string(channels()) +
+VirtualLine RadarConfig::virtualLine() const {
+  const std::vector<int> slots = angle_slots.empty() ? allSlots(*this) : angle_slots;
+  if (static_cast<int>(slots.size()) * receivers() < 2) {
+    throw InputError("tx_position_m, rx_position_m: the virtual array has " +
+                     std::to_string(static_cast<int>(slots.size()) * receivers()) +
                      " element(s); the angle transform needs a uniform line of at least two along y");
   }
-  const Eigen::Vector3d origin = virtual_element_m(0);
-  const double pitch = (virtual_element_m(last) - origin).y() / last;
-  for (int k = 1; k <= last; ++k) {
-    const Eigen::Vector3d off = virtual_element_m(k) - origin - Eigen::Vector3d(0, k * pitch, 0);
-    if (!(pitch > 0) || off.norm() > kPitchTolerance * pitch) {
-      const Eigen::Vector3d at = virtual_element_m(k);
-      std::ostringstream message;
-      message << "tx_position_m, rx_position_m: the virtual array (tx + rx, element " << k << " = slot "
-              << k / receivers() << ", rx " << k % receivers() << " at y = " << at.y()
-              << " m) is no uniform line along y in ascending order; the angle transform needs one, so list slots and "
-                 "receivers from right (-y) to left (+y) with equal spacing";
-      throw InputError(message.str());
+  const LineFit fit = fitLine(*this, slots);
+  if (fit.off < 0) return fit.line;
+  std::ostringstream message;
+  const std::vector<int> line = slotsOnALine();
+  if (angle_slots.empty() && !line.empty()) {
+    message << "tx_position_m: ";
+    for (const int slot : slots) {
+      if (std::find(line.begin(), line.end(), slot) == line.end())
+        message << describeOffLine(*this, slot, line) << ", ";
     }
+    message
+        << "so the virtual array is no uniform line along y, which the angle transform needs; correct the positions, "
+           "or leave what is off the line out of the transform by angle_slots: "
+        << listOf(line);
+  } else {
+    const Eigen::Vector3d at = virtual_element_m(fit.off);
+    message
+        << (angle_slots.empty() ? "" : "angle_slots, ")
+        << "tx_position_m, rx_position_m: the virtual array (tx + rx, element " << fit.off << " = slot "
+        << fit.off / receivers() << ", rx " << fit.off % receivers() << " at y = " << at.y() << " m, z = " << at.z()
+        << " m) is no uniform line along y, which the angle transform needs; correct the positions (in any order of "
+           "slots and receivers)";
   }
-  return pitch;
+  throw InputError(message.str());
+}
+
+std::vector<int> RadarConfig::slotsOnALine() const {
+  if (slots() > kMostSlotsSearched) return {};
+  std::vector<int> best;
+  for (unsigned set = 1; set < 1u << slots(); ++set) {
+    std::vector<int> chosen;
+    for (int slot = 0; slot < slots(); ++slot) {
+      if (set >> slot & 1u) chosen.push_back(slot);
+    }
+    if (chosen.size() <= best.size() || static_cast<int>(chosen.size()) * receivers() < 2) continue;
+    if (fitLine(*this, chosen).off < 0) best = chosen;
+  }
+  return best;
 }
 
 std::string toYaml(const RadarConfig& radar) {
@@ -130,16 +209,12 @@ std::string toYaml(const RadarConfig& radar) {
   if (!radar.tx_enable.empty()) {
     out << "tx_enable: [";
     for (std::size_t slot = 0; slot < radar.tx_enable.size(); ++slot) {
-      out << (slot ? ", " : "");
-      writeIntegers(out, radar.tx_enable[slot]);
+      out << (slot ? ", " : "") << listOf(radar.tx_enable[slot]);
     }
     out << "]\n";
   }
-  if (!radar.rx_enable.empty()) {
-    out << "rx_enable: ";
-    writeIntegers(out, radar.rx_enable);
-    out << "\n";
-  }
+  if (!radar.rx_enable.empty()) out << "rx_enable: " << listOf(radar.rx_enable) << "\n";
+  if (!radar.angle_slots.empty()) out << "angle_slots: " << listOf(radar.angle_slots) << "\n";
   return out.str();
 }
 

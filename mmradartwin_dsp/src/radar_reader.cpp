@@ -1,4 +1,5 @@
 // Reads radar.yaml (loadRadarConfig() and parseRadarConfig() of radar_config.h).
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -60,6 +61,15 @@ RadarConfig read(YamlMap yaml) {
       yaml.fail("rx_enable", "names " + std::to_string(radar.rx_enable.size()) + " receivers; rx_position_m has " +
                                  std::to_string(radar.receivers()) + ": give one number per receiver");
     }
+  }
+  if (yaml.has("angle_slots")) {
+    for (const long long slot : yaml.integers("angle_slots", 0, radar.slots() - 1)) {
+      if (std::find(radar.angle_slots.begin(), radar.angle_slots.end(), slot) != radar.angle_slots.end()) {
+        yaml.fail("angle_slots", "names slot " + std::to_string(slot) + " twice; name each once");
+      }
+      radar.angle_slots.push_back(static_cast<int>(slot));
+    }
+    if (radar.angle_slots.empty()) yaml.fail("angle_slots", "is empty; name slots, or leave the key out for all");
   }
   yaml.rejectUnknownKeys();
 

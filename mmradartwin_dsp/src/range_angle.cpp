@@ -35,13 +35,13 @@ std::vector<double> hannWindow(int samples) {
 }
 
 struct SignalChain::Plan {
-  explicit Plan(const RadarConfig& config) : radar(config), pitch_m(config.virtual_pitch_m()) {
+  explicit Plan(const RadarConfig& config) : radar(config), line(config.virtualLine()) {
     const std::vector<double> hann = hannWindow(radar.samples_per_chirp);
     window = Eigen::Map<const Eigen::ArrayXd>(hann.data(), static_cast<Eigen::Index>(hann.size()));
     window_sum = window.sum();
     for (int r = 0; r < radar.samples_per_chirp; ++r) axes.range_m.push_back(r * radar.range_bin_m());
     for (int a = 0; a < kAngleBins; ++a) {
-      const double sine = (a - kAngleBins / 2) / (kAngleBins / 2.0) * radar.wavelength_m() / (2 * pitch_m);
+      const double sine = (a - kAngleBins / 2) / (kAngleBins / 2.0) * radar.wavelength_m() / (2 * line.pitch_m);
       axes.azimuth_rad.push_back(std::abs(sine) <= 1 ? std::asin(sine) : std::numeric_limits<double>::quiet_NaN());
     }
   }
@@ -54,7 +54,7 @@ struct SignalChain::Plan {
   }
 
   RadarConfig radar;
-  double pitch_m;
+  VirtualLine line;
   Eigen::ArrayXd window;
   double window_sum = 0;
   RangeAngleAxes axes;
@@ -88,9 +88,9 @@ ComplexGrid SignalChain::spatialSpectra(const ComplexGrid& range_spectra) const 
   std::array<std::complex<double>, kAngleBins> elements;
   for (Eigen::Index r = 0; r < range_spectra.cols(); ++r) {
     elements.fill(0);
-    for (Eigen::Index k = 0; k < range_spectra.rows(); ++k) {
-      auto& element = elements[static_cast<std::size_t>(k % kAngleBins)];
-      k % 2 == 0 ? element += range_spectra(k, r) : element -= range_spectra(k, r);
+    for (std::size_t k = 0; k < plan_->line.channels.size(); ++k) {
+      const std::complex<double> x = range_spectra(plan_->line.channels[k], r);
+      k % 2 == 0 ? elements[k % kAngleBins] += x : elements[k % kAngleBins] -= x;
     }
     fft().inv(spectra.row(r).data(), elements.data(), kAngleBins);
   }
@@ -106,7 +106,7 @@ RangeAngleMap SignalChain::map(const ReceiveGrid& grid) const {
   map.frames = grid.frames;
   map.pose_valid = grid.pose_valid;
   map.T_map_radar = grid.T_map_radar;
-  const double full_scale = plan_->radar.channels() * plan_->window_sum * grid.full_scale;
+  const double full_scale = static_cast<double>(plan_->line.channels.size()) * plan_->window_sum * grid.full_scale;
   map.power_db = (10 * (spectra.array().abs2() / (full_scale * full_scale)).log10()).max(kFloor_db);
   for (int a = 0; a < kAngleBins; ++a) {
     if (std::isnan(plan_->axes.azimuth_rad[static_cast<std::size_t>(a)])) {

@@ -131,8 +131,11 @@ struct Residuals {
       r.segment(at + 2, 2 * channels()) = e / scatter.channel;
     }
     if (level_slope) {
-      double slope = 0;
-      for (int k = 1; k < channels(); ++k) slope += (k - 0.5 * (channels() - 1)) * p(kFirstPhase + k - 1);
+      double slope = 0, mean_m = 0;
+      for (int k = 0; k < channels(); ++k) mean_m += radar.virtual_element_m(k).y() / channels();
+      for (int k = 1; k < channels(); ++k) {
+        slope += (radar.virtual_element_m(k).y() - mean_m) / radar.virtual_pitch_m() * p(kFirstPhase + k - 1);
+      }
       r(values() - 1) = slope / 1e-3;
     }
     return 0;

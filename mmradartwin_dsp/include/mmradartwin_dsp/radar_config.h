@@ -21,6 +21,12 @@ enum class IqOrder { kIq, kQi };
 /// xWR12xx, 14xx and 22xx have four lanes, xWR16xx, 18xx, 64xx and 68xx two. Empty for any other name.
 std::optional<CaptureLayout> captureLayoutOf(const std::string& device);
 
+/// The uniform line along y that the angle transform needs.
+struct VirtualLine {
+  std::vector<int> channels;  ///< virtual elements k of the line, from right (-y) to left (+y)
+  double pitch_m = 0;
+};
+
 /// The radar: what radar.yaml says. SI units; positions in radar_link (x boresight, y left, z up).
 struct RadarConfig {
   std::string device;
@@ -40,6 +46,7 @@ struct RadarConfig {
   std::vector<double> if_highpass_hz;
   std::vector<std::vector<int>> tx_enable;  ///< device's TX numbers, one list per slot
   std::vector<int> rx_enable;
+  std::vector<int> angle_slots;  ///< slots that the angle transform takes; empty: all
 
   RadarConfig();
 
@@ -63,8 +70,13 @@ struct RadarConfig {
   double window_center_s() const;      ///< t_c = adc_start + N/(2 f_s)
   double center_frequency_hz() const;  ///< carrier + slope t_c
   double wavelength_m() const;         ///< lambda_c, at the centre of the ADC window
-  /// Pitch d of the virtual array, which must be a uniform line along y in order of k. Throws InputError otherwise.
-  double virtual_pitch_m() const;
+  /// The elements of the angle transform, which must be a uniform line along y, in any order of slots and receivers.
+  /// Throws InputError otherwise; it names the slot or the element that is off the line.
+  VirtualLine virtualLine() const;
+  /// Pitch d of virtualLine(). Throws InputError as that does.
+  double virtual_pitch_m() const { return virtualLine().pitch_m; }
+  /// Slots whose elements make the longest uniform line along y; empty where none do.
+  std::vector<int> slotsOnALine() const;
 };
 
 /// Reads radar.yaml strictly. Where it does not name a layout, the device's is taken, four lanes for a device that is

@@ -47,9 +47,9 @@ class SignalChain {
   const RangeAngleAxes& axes() const;
   /// Windowed range spectra X_k[r], [M][N], in units of the grid. Throws InputError on a wrong shape.
   ComplexGrid rangeSpectra(const ComplexGrid& x) const;
-  /// S[r,a] = sum_k X_k[r] exp(+j 2 pi d k sin(theta_a)/lambda_c), [N][64].
+  /// S[r,a] = sum_k X_k[r] exp(+j 2 pi d k sin(theta_a)/lambda_c), [N][64]; k counts along RadarConfig::virtualLine().
   ComplexGrid spatialSpectra(const ComplexGrid& range_spectra) const;
-  /// 20 log10(|S|/(M sum(w) full_scale)).
+  /// 20 log10(|S|/(M sum(w) full_scale)), M the elements of the line.
   RangeAngleMap map(const ReceiveGrid& grid) const;
 
  private:

@@ -149,6 +149,11 @@ RadarConfig fromMsg(const mmradartwin_msgs::RadarConfig& msg) {
     }
   }
   radar.rx_enable.assign(msg.rx_enable.begin(), msg.rx_enable.end());
+  // The message has no field for angle_slots: where not all slots are on a line, those that make the longest are taken.
+  if (radar.slots() > 1) {
+    const std::vector<int> line = radar.slotsOnALine();
+    if (static_cast<int>(line.size()) < radar.slots()) radar.angle_slots = line;
+  }
   // A message is held to the same ranges as the file.
   return parseRadarConfig(toYaml(radar), "radar/config");
 }

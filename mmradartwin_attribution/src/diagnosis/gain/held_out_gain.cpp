@@ -32,12 +32,16 @@ std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<Po
   const std::size_t size = static_cast<std::size_t>(channels) * (channels + 1) / 2;
   std::vector<int> angles;
   Eigen::MatrixXcd steering(channels, kAngleBins);
-  const double wave = 2 * M_PI * data.radar.virtual_pitch_m() / data.radar.wavelength_m();
+  const VirtualLine line = data.radar.virtualLine();
+  const double wave = 2 * M_PI * line.pitch_m / data.radar.wavelength_m();
+  steering.setZero();
   for (int a = 0; a < kAngleBins; ++a) {
     const double azimuth = axes.azimuth_rad[static_cast<std::size_t>(a)];
     if (!(std::abs(azimuth) <= kMaxAzimuth_rad)) continue;
-    for (int k = 0; k < channels; ++k) {
-      steering(k, static_cast<Eigen::Index>(angles.size())) = std::polar(1.0 / channels, wave * k * std::sin(azimuth));
+    const auto elements = static_cast<double>(line.channels.size());
+    for (std::size_t k = 0; k < line.channels.size(); ++k) {
+      steering(line.channels[k], static_cast<Eigen::Index>(angles.size())) =
+          std::polar(1.0 / elements, wave * static_cast<double>(k) * std::sin(azimuth));
     }
     angles.push_back(a);
   }
