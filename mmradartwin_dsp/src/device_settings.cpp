@@ -282,6 +282,19 @@ void demand(const RawSettings& settings, const std::string& name, const std::vec
   throw InputError(value->second.where + ": " + shortest(value->second.value) + ": " + why);
 }
 
+/// Whether a device of this name has the antennas of TI's BOOST boards: its part, a letter of its revision, or the
+/// board. Antennas on the package (AOP), those of ODS boards and of cascades stand elsewhere.
+bool hasBoostAntennas(const std::string& device) {
+  const std::string part = partOf(device);
+  std::string variant = device.substr(device.find(part) + part.size());
+  for (const std::string& board : {std::string("boost"), std::string("isk")}) {
+    const bool ends =
+        variant.size() >= board.size() && variant.compare(variant.size() - board.size(), board.size(), board) == 0;
+    if (ends) variant.resize(variant.size() - board.size());
+  }
+  return variant.size() <= 1;
+}
+
 void placeAntennas(ImportedSettings& imported, const std::string& digits, const std::vector<int>& receivers,
                    const std::vector<int>& transmitters) {
   const bool two = digits.compare(0, 2, "16") == 0;  // xWR16xx have two transmitters, the others three
@@ -296,6 +309,11 @@ void placeAntennas(ImportedSettings& imported, const std::string& digits, const 
                              shortest(half_m) +
                              " m (half a wavelength at the chirp's start) apart along y; check "
                              "them, and the sign of y, against the board as it is mounted");
+  const std::vector<int> line = imported.radar.slotsOnALine();
+  if (line.empty() || static_cast<int>(line.size()) == imported.radar.slots()) return;
+  imported.radar.angle_slots = line;
+  imported.assumed.push_back(
+      "angle_slots: the slots on a line; the others' transmitter is raised, which the angle transform cannot use");
 }
 
 }  // namespace
@@ -456,6 +474,14 @@ Device knownDevice(const RawSettings& raw) {
   if (!layout || std::find(known.begin(), known.end(), digits) == known.end()) {
     throw InputError(raw.device_from + ": device '" + raw.device +
                      "' is not known; known are xWR1243, 1443, 2243, 1642, 1843, 6443 and 6843");
+  }
+  if (!hasBoostAntennas(raw.device)) {
+    const std::string plain = raw.device.substr(0, raw.device.find(digits) + digits.size());
+    throw InputError(raw.device_from + ": device '" + raw.device +
+                     "': its antennas are not those of TI's BOOST boards, the only ones that are known here, and no "
+                     "settings file says where they are; give the positions yourself: import with --device " +
+                     plain + ", then set tx_position_m and rx_position_m in radar.yaml by the data sheet of '" +
+                     raw.device + "'");
   }
   return {digits, *layout};
 }

@@ -101,6 +101,35 @@ TEST(ImportSettings, ElevatedTransmitterOfThree) {
   EXPECT_NEAR(radar.tx_position_m[1].y(), 2 * radar.tx_position_m[1].z(), 1e-12);
 }
 
+TEST(ImportSettings, OtherAntennasAreRefused) {
+  const TestFolder folder;
+  const auto refusal = [&](const std::string& device) {
+    std::string lua = script();
+    const std::string part = "ar1.SelectChipVersion(\"AR1243\")\nar1.deviceVariantSelection(\"XWR2243\")\n";
+    write(folder / "a.lua", lua.erase(lua.find(part), part.size()));
+    return inputError([&] { importSettings({folder / "a.lua"}, device); });
+  };
+  for (const char* device : {"iwr6843aop", "IWR6843AOPEVM", "awr6843-aop", "awr1843AOP", "iwr6843ods"}) {
+    EXPECT_TRUE(saysInOneLine(refusal(device), "--device", "antennas", "give the positions", "tx_position_m"))
+        << device;
+  }
+  for (const char* device : {"awr2243", "awr2243P", "awr2243boost", "AWR2243PBOOST"}) EXPECT_EQ(refusal(device), "");
+}
+
+TEST(ImportSettings, ARaisedTransmitterIsLeftOutOfTheAngleTransform) {
+  const TestFolder folder;
+  std::string lua = script(
+      "ar1.ChirpConfig(0, 0, 0, 0, 0, 0, 0, 1, 0, 0)\n"
+      "ar1.ChirpConfig(1, 1, 0, 0, 0, 0, 0, 0, 1, 0)\n"
+      "ar1.ChirpConfig(2, 2, 0, 0, 0, 0, 0, 0, 0, 1)\n");
+  const std::string frame = "ar1.FrameConfig(0, 1, 200";
+  write(folder / "a.lua", lua.replace(lua.find(frame), frame.size(), "ar1.FrameConfig(0, 2, 200"));
+  const ImportedSettings settings = importSettings({folder / "a.lua"});
+  EXPECT_EQ(settings.radar.angle_slots, (std::vector<int>{0, 2}));
+  EXPECT_NEAR(settings.radar.virtual_pitch_m(), 299792458.0 / 77e9 / 2, 1e-7);
+  EXPECT_TRUE(contains(toYaml(settings), "# - angle_slots"));
+}
+
 TEST(ImportSettings, StudioJsonWithItsSetup) {
   const TestFolder folder;
   write(folder / "a.mmwave.json", mmwaveJson());

@@ -24,8 +24,9 @@ struct ImportedSettings {
 ///
 /// No file of TI's says where the antennas are: positions are those of the BOOST boards, receivers half a wavelength
 /// (at the chirp's start) apart; with three transmitters TX0 at 0, TX2 four and TX1 two halves along y, TX1 one half
-/// higher; with two, TX1 four halves along y. They are listed in `assumed`. `device` names it where no file does.
-/// Argument orders: mmWave Studio's own help on the ar1 functions, and mmWaveLink's structures. Throws InputError.
+/// higher; with two, TX1 four halves along y. A device with other antennas (AOP, ODS) is refused. They are listed in
+/// `assumed`. `device` names it where no file does. Argument orders: mmWave Studio's own help on the ar1 functions, and
+/// mmWaveLink's structures. Throws InputError.
 ImportedSettings importSettings(const std::vector<std::string>& files, const std::string& device = "");
 
 /// radar.yaml with what was assumed as comments at its head.
