@@ -1,4 +1,5 @@
 #include <cstdlib>
+#include <map>
 #include <random>
 
 #include "mmradartwin_dsp/input_error.h"
@@ -135,6 +136,49 @@ TEST_F(SceneTest, TurnsGltfUpright) {
   EXPECT_EQ(scene.actors[0].name, "chair");
   EXPECT_NEAR(scene.actors[0].bounds.max().z(), 1, 1e-6);
   EXPECT_NEAR(scene.actors[0].bounds.max().y(), 0, 1e-6);
+}
+
+TEST_F(SceneTest, NumbersNodesNamedAlike) {
+  // Three nodes share one triangle, each moved along x by 1 m more; a fourth bears the second one's number already.
+  write(
+      "chairs.gltf",
+      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1,2,3]}],"nodes":[{"name":"chair","mesh":0},)"
+      R"({"name":"chair","mesh":0,"translation":[1,0,0]},{"name":"chair_2","mesh":0,"translation":[2,0,0]},)"
+      R"({"name":"chair","mesh":0,"translation":[3,0,0]}],)"
+      R"("materials":[{"name":"Metal"}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],)"
+      R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],)"
+      R"("bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,)"
+      R"(AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]})");
+  write("s.yaml",
+        "meshes: [{file: chairs.gltf}]\nmaterials: materials.yaml\nactors: {chair_4: {material: Concrete}}\n");
+  const Scene scene = loadScene(path("s.yaml"), kFrequency_hz);
+  ASSERT_EQ(scene.actors.size(), 4u);
+  const std::map<std::string, double> left_m = {{"chair", 0}, {"chair_3", 1}, {"chair_2", 2}, {"chair_4", 3}};
+  for (const auto& [name, x_m] : left_m) {
+    const int index = scene.actorIndex(name);
+    ASSERT_GE(index, 0) << name << " of " << scene.knownActors();
+    EXPECT_NEAR(scene.actors[static_cast<std::size_t>(index)].bounds.min().x(), x_m, 1e-6) << name;
+  }
+  EXPECT_EQ(scene.actors[static_cast<std::size_t>(scene.actorIndex("chair_4"))].material_tag, "Concrete");
+  const std::vector<std::string> notes = meshNotes(scene);
+  ASSERT_FALSE(notes.empty());
+  EXPECT_NE(notes[0].find("chair is chair_3, chair is chair_4"), std::string::npos) << notes[0];
+}
+
+TEST_F(SceneTest, ReadsObjNumbersWithoutAZeroBeforeThePoint) {
+  write("sheet.mtl", "newmtl Metal\nKd .5 .5 .5\n");
+  write("sheet.obj",
+        "# v .5 is no vertex here\nmtllib sheet.mtl\no v.05\nvn -1. 0 .0\nvt .5 .5\n"
+        "v 0 .05 -0.05\nv\t0 +.5 -.05\nv 0 5.e-1 .25\nv 0 .5e-1 2.5E-1\nusemtl Metal\nf 1/1/1 2/1/1 3/1/1 4/1/1\n");
+  write("s.yaml", "meshes: [{file: sheet.obj}]\nmaterials: materials.yaml\n");
+  const Scene scene = loadScene(path("s.yaml"), kFrequency_hz);
+  ASSERT_EQ(scene.actors.size(), 1u);
+  EXPECT_EQ(scene.actors[0].name, "v.05") << "other lines stay as they are";
+  EXPECT_EQ(scene.actors[0].material_tag, "Metal");
+  ASSERT_EQ(scene.facets.size(), 1u);
+  EXPECT_NEAR(scene.facets[0].area_m2, 0.45 * 0.3, 1e-12);
+  EXPECT_EQ(scene.actors[0].bounds.min(), V(0, 0.05, -0.05));
+  EXPECT_EQ(scene.actors[0].bounds.max(), V(0, 0.5, 0.25));
 }
 
 TEST_F(SceneTest, SaysWhatIsWrong) {

@@ -33,6 +33,7 @@ struct Facet {
 /// A named thing with one surface material.
 struct Actor {
   std::string name;
+  std::string name_in_mesh;  ///< where nodes of the mesh file are named alike, so that this one was numbered; else ""
   std::string material_tag;
   Material material;
   std::vector<Eigen::Vector3d> vertices;  ///< map, metres
@@ -95,7 +96,8 @@ void moveActor(Scene& scene, int actor, const Eigen::Isometry3d& T_map_map);
 /// Takes an actor out of paths and occlusion; indices stay.
 void removeActor(Scene& scene, int actor);
 /// Reads one mesh file into actors in file coordinates (glTF's y-up turned to z-up), without material look-up or
-/// facets: OBJ object or group name = actor, glTF node name = actor, otherwise the file's stem. Throws InputError.
+/// facets: OBJ object or group name = actor, glTF node name = actor (the second of a name becomes NAME_2),
+/// otherwise the file's stem. Throws InputError.
 std::vector<Actor> loadMesh(const std::string& file);
 
 }  // namespace mmradartwin

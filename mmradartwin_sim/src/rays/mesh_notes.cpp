@@ -81,8 +81,9 @@ std::string listed(const std::vector<std::string>& names) {
 }  // namespace
 
 std::vector<std::string> meshNotes(const Scene& scene) {
-  std::vector<std::string> open, crossed, broken;
+  std::vector<std::string> open, crossed, broken, numbered;
   for (const Actor& actor : scene.actors) {
+    if (!actor.name_in_mesh.empty()) numbered.push_back(actor.name_in_mesh + " is " + actor.name);
     const std::vector<int> weld = weldVertices(actor.vertices);
     const std::size_t edges = actor.facets.size() >= kBody ? openEdges(actor, weld) : 0;
     if (edges > 0) open.push_back(actor.name + " (" + std::to_string(edges) + " open edges)");
@@ -96,6 +97,10 @@ std::vector<std::string> meshNotes(const Scene& scene) {
     }
   }
   std::vector<std::string> notes;
+  if (!numbered.empty()) {
+    notes.push_back(scene.file +
+                    ": objects of a mesh file that are named alike are numbered in its order: " + listed(numbered));
+  }
   if (!open.empty()) {
     notes.push_back(scene.file +
                     ": open meshes are traced as surfaces without an inside, so that a radar within them is "

@@ -1,3 +1,5 @@
+#include <assimp/DefaultIOSystem.h>
+#include <assimp/MemoryIOWrapper.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
@@ -9,10 +11,13 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <set>
+#include <sstream>
 #include <unordered_map>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/scene.h"
+#include "scene/obj_numbers.h"
 #include "scene/ply_reader.h"
 
 namespace mmradartwin {
@@ -81,6 +86,43 @@ std::string lowerExtension(const std::string& file) {
   std::string e = std::filesystem::path(file).extension().string();
   std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return std::tolower(c); });
   return e;
+}
+
+/// The files that assimp opens, one of them with another text.
+class FilesWithOneMended : public Assimp::DefaultIOSystem {
+ public:
+  FilesWithOneMended(std::string file, std::string text) : file_(std::move(file)), text_(std::move(text)) {}
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    if (file != file_) return DefaultIOSystem::Open(file, mode);
+    return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(text_.data()), text_.size());
+  }
+
+ private:
+  const std::string file_, text_;
+};
+
+/// Has assimp read an OBJ file with a digit on either side of every point.
+void mendNumbers(const std::string& file, Assimp::Importer& importer) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  std::optional<std::string> mended = withDigitsAroundPoints(text.str());
+  if (mended) importer.SetIOHandler(new FilesWithOneMended(file, std::move(*mended)));  // the importer deletes it
+}
+
+/// Numbers actors that are named alike: the second of a name becomes NAME_2, or the next number that is free.
+void numberNames(std::vector<Actor>& actors) {
+  std::set<std::string> taken, seen;
+  for (const Actor& actor : actors) taken.insert(actor.name);
+  for (Actor& actor : actors) {
+    if (seen.insert(actor.name).second) continue;
+    actor.name_in_mesh = actor.name;
+    int number = 2;
+    while (taken.count(actor.name_in_mesh + "_" + std::to_string(number))) ++number;
+    actor.name += "_" + std::to_string(number);
+    taken.insert(actor.name);
+    seen.insert(actor.name);
+  }
 }
 
 class Collector {
@@ -198,7 +240,10 @@ std::vector<Actor> loadMesh(const std::string& file) {
     const std::string text = mesh.toObj();
     scene = importer.ReadFileFromMemory(text.data(), text.size(), steps, "obj");
   } else {
-    if (extension == ".obj") exact = readObjVertices(file);
+    if (extension == ".obj") {
+      exact = readObjVertices(file);
+      mendNumbers(file, importer);
+    }
     scene = importer.ReadFile(file, steps);
   }
   if (!scene || !scene->mRootNode) {
@@ -210,6 +255,7 @@ std::vector<Actor> loadMesh(const std::string& file) {
   actors.erase(std::remove_if(actors.begin(), actors.end(), [](const Actor& a) { return a.triangles.empty(); }),
                actors.end());
   if (actors.empty()) throw InputError(file + ": holds no triangles; export the surfaces as a triangle mesh");
+  numberNames(actors);
   return actors;
 }
 
