@@ -2,10 +2,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <sstream>
 
 #include "mmradartwin_attribution/mount_calibration.h"
 #include "mmradartwin_dsp/input_error.h"
@@ -73,7 +75,28 @@ void print(const CalibratedValue& v, const std::string& label) {
   }
 }
 
+/// Refuses a mount in other units than m and rad. Antennas of a rig do not stand 5 m beside its camera, and no angle is
+/// beyond a full turn.
+void checkMount(const std::vector<double>& mount) {
+  constexpr double kFarthest_m = 5, kTurn_rad = 2 * M_PI;
+  const std::vector<const char*> names = {"x", "y", "z", "yaw", "pitch", "roll"};
+  const auto refuse = [&](std::size_t i, const std::string& allowed, const std::string& unit, const char* si,
+                          double factor) {
+    std::ostringstream text;
+    text << "--mount: " << names[i] << " is " << mount[i] << "; x y z yaw pitch roll are in [m, rad], allowed: at most "
+         << allowed << " either way; is it in " << unit << "? then " << mount[i] * factor << " " << si;
+    throw InputError(text.str());
+  };
+  for (std::size_t i = 0; i < mount.size(); ++i) {
+    if (!std::isfinite(mount[i]))
+      throw InputError(std::string("--mount: ") + names[i] + " is no number; give [m, rad]");
+    if (i < 3 && std::abs(mount[i]) > kFarthest_m) refuse(i, "5 m", "mm", "m", 1e-3);
+    if (i >= 3 && std::abs(mount[i]) > kTurn_rad) refuse(i, "2 pi", "degrees", "rad", M_PI / 180);
+  }
+}
+
 int run(const Arguments& arguments) {
+  checkMount(arguments.mount);
   if (arguments.reflector_m.empty() == arguments.wall.empty()) {
     throw InputError("give what the radar was held in front of: either --reflector X Y Z (map, m) or --wall ACTOR");
   }
