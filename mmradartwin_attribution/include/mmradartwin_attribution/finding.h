@@ -56,6 +56,8 @@ const CauseDescription& causeDescription(const std::string& cause);
 struct CauseProbability {
   std::string cause;
   double probability = 0;
+  /// What tells candidates of the same cause apart, such as two orders of channels; else empty.
+  std::vector<FindingParameter> parameters = {};
 };
 
 struct FindingEvidence {

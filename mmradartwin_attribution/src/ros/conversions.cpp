@@ -1,5 +1,6 @@
 #include "mmradartwin_attribution/ros/conversions.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -57,9 +58,10 @@ mmradartwin_msgs::Finding toMsg(const Finding& finding) {
   msg.residual_class = className(cause.residual_class);
   msg.action = cause.action();
   msg.description = finding.description.value_or("");
-  for (const CauseProbability& candidate : finding.candidates) {
-    if (candidate.cause == finding.cause) msg.probability = candidate.probability;
-  }
+  // The finding itself is the first of its candidates; others of its cause have other parameters.
+  const auto own = std::find_if(finding.candidates.begin(), finding.candidates.end(),
+                                [&](const CauseProbability& c) { return c.cause == finding.cause; });
+  if (own != finding.candidates.end()) msg.probability = own->probability;
   msg.false_alarm_rate = finding.evidence.false_alarm_rate;
   msg.log_likelihood_gain = finding.evidence.log_likelihood_gain;
   const GainMetric explained = finding.gain ? finding.gain->explained_power : GainMetric();

@@ -80,6 +80,9 @@ std::string problemOfEvidence(const Finding& finding) {
     causeDescription(candidate.cause);
     if (!(candidate.probability >= 0 && candidate.probability <= 1)) return "candidates: probabilities must be 0 to 1";
     total += candidate.probability;
+    for (const FindingParameter& parameter : candidate.parameters) {
+      if (!finite(parameter.value)) return "candidates/" + parameter.name + ": is not finite";
+    }
   }
   if (total > 1 + 1e-9) return "candidates: probabilities add up to more than 1";
   if (!std::isfinite(finding.evidence.log_likelihood_gain)) return "evidence/log_likelihood_gain: is not finite";

@@ -72,7 +72,9 @@ Json json(const Finding& finding) {
   }
   j["candidates"] = Json::array();
   for (const CauseProbability& candidate : finding.candidates) {
-    j["candidates"].push_back(Json{{"cause", candidate.cause}, {"probability", candidate.probability}});
+    Json c{{"cause", candidate.cause}, {"probability", candidate.probability}};
+    for (const FindingParameter& parameter : candidate.parameters) c["parameters"][parameter.name] = json(parameter);
+    j["candidates"].push_back(c);
   }
   j["experiment"] = orNull(finding.experiment);
   j["evidence"] = {{"log_likelihood_gain", finding.evidence.log_likelihood_gain},

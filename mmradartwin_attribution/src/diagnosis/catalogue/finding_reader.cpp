@@ -201,6 +201,11 @@ Finding readFinding(Entry e) {
   }
   for (Entry& candidate : e.at("candidates").items()) {
     finding.candidates.push_back({candidate.at("cause").text(), candidate.at("probability").number()});
+    if (candidate.has("parameters")) {
+      for (auto& [name, entry] : candidate.at("parameters").members()) {
+        finding.candidates.back().parameters.push_back(readParameter(name, entry));
+      }
+    }
     candidate.finish();
   }
   finding.experiment = e.optionalText("experiment");

@@ -192,6 +192,12 @@ class EchoFit {
   Eigen::MatrixXcd y_;  ///< [M][echoes] of power 1
 };
 
+/// Whether all channels are on the line along y: elements beside it see an echo's elevation, which a response over
+/// azimuth does not have.
+bool allOnALine(const RadarConfig& radar) {
+  return static_cast<int>(radar.virtualLine().channels.size()) == radar.channels();
+}
+
 /// Delivered order of channels.
 std::vector<int> asItIs(const RadarConfig& radar) {
   std::vector<int> order(static_cast<std::size_t>(radar.channels()));
@@ -228,6 +234,7 @@ double student95(double freedom) {
 }
 
 std::optional<ChannelOrder> findChannelOrder(const ChannelData& data) {
+  if (!allOnALine(data.radar)) return std::nullopt;
   EchoFit fit(data);
   if (!fit.enough() || data.radar.channels() < 4) return std::nullopt;
   const std::vector<int> same = asItIs(data.radar);
@@ -246,7 +253,13 @@ std::optional<ChannelOrder> findChannelOrder(const ChannelData& data) {
   // Mirrored orders fit alike where nothing moves. The one that keeps the transmitters in place is stated.
   const std::size_t chosen =
       tried[0].first - tried[1].first < bounds::kSameOrder_nats && tried[1].second < tried[0].second ? 1 : 0;
-  return ChannelOrder{tried[chosen].second, gain, tried[0].first - tried[1].first};
+  ChannelOrder found{tried[chosen].second, gain, tried[0].first - tried[1].first, {}};
+  std::swap(tried[0], tried[chosen]);
+  const double most = std::max(tried[0].first, tried[1].first);
+  for (const auto& [nats, order] : tried) {
+    if (most - nats <= bounds::kNotToldApart_nats) found.alike.emplace_back(order, most - nats);
+  }
+  return found;
 }
 
 namespace {
@@ -294,6 +307,7 @@ void setStandardErrors(const EchoFit& fit, const TiedFit& best, ChannelErrors& e
 }  // namespace
 
 std::optional<ChannelErrors> findChannelErrors(const ChannelData& data) {
+  if (!allOnALine(data.radar)) return std::nullopt;
   EchoFit fit(data);
   if (!fit.enough()) return std::nullopt;
   fit.arrange(asItIs(data.radar));
@@ -311,6 +325,7 @@ std::optional<ChannelErrors> findChannelErrors(const ChannelData& data) {
   errors.tie = best.tie;
   errors.gain = best.gain;
   errors.held_out_gain = best.held_out;
+  errors.receivers = data.radar.receivers();
   errors.echoes = fit.echoes();
   errors.groups = static_cast<int>(fit.groups().size());
   errors.phase_rad = fit.phases(best.factors, best.tie);
@@ -333,8 +348,16 @@ void widenGains(const ChannelData& data, const Hypothesis& hypothesis, std::vect
 }
 
 double arrayShare(const RadarConfig& radar, const Eigen::VectorXcd& channels) {
-  return (responses(radar).adjoint() * channels).cwiseAbs2().maxCoeff() /
-         (static_cast<double>(channels.size()) * channels.squaredNorm());
+  const VirtualLine line = radar.virtualLine();
+  const Eigen::MatrixXcd all = responses(radar);
+  Eigen::MatrixXcd of_line(static_cast<Eigen::Index>(line.channels.size()), all.cols());
+  Eigen::VectorXcd on_line(of_line.rows());
+  for (Eigen::Index i = 0; i < of_line.rows(); ++i) {
+    of_line.row(i) = all.row(line.channels[static_cast<std::size_t>(i)]);
+    on_line[i] = channels[line.channels[static_cast<std::size_t>(i)]];
+  }
+  return (of_line.adjoint() * on_line).cwiseAbs2().maxCoeff() /
+         (static_cast<double>(on_line.size()) * on_line.squaredNorm());
 }
 
 }  // namespace mmradartwin::diagnosis::receiver

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/channels/channel_data.h"
@@ -26,6 +27,7 @@ struct ChannelErrors {
   double apart_rad = 0;  ///< largest difference of a receiver's phase between transmitters, with unconstrained errors
   double gain = 0;       ///< nats over no errors
   double held_out_gain = 0;    ///< nats of echoes at ranges (or locations) that the fit did not see
+  int receivers = 0;           ///< of the radar: with one, a transmitter's error is that of a channel
   int echoes = 0, groups = 0;  ///< numbers of echoes, and of their groups, which give the standard errors
 };
 
@@ -34,6 +36,8 @@ struct ChannelOrder {
   std::vector<int> order;  ///< order[i] is the true channel at index i
   double gain = 0;         ///< nats over the delivered order
   double margin = 0;       ///< nats over the next best order
+  /// Orders that the echoes do not tell from it, itself first, and the nats by which each is behind the best.
+  std::vector<std::pair<std::vector<int>, double>> alike;
 };
 
 /// 97.5 % quantile of Student's t.
@@ -41,14 +45,14 @@ double student95(double freedom);
 
 /// Finds another order of channels. Nothing where too few echoes exceed the noise, or where the delivered order fits as
 /// well. Only moving echoes distinguish mirrored orders: transmitters take turns, and a mirrored array sees the echo
-/// move backwards.
+/// move backwards. Nothing where angle_slots leaves slots out.
 std::optional<ChannelOrder> findChannelOrder(const ChannelData& data);
 /// Finds errors of channels. Nothing where the echoes are array responses already, or where they are too few.
 std::optional<ChannelErrors> findChannelErrors(const ChannelData& data);
 /// Widens the standard errors of a hypothesis' channel gains to those that echoes alone give. A likelihood that takes
 /// the twin's echoes as exact gives a tenth of them.
 void widenGains(const ChannelData& data, const Hypothesis& hypothesis, std::vector<double>& standard_error);
-/// Share of a channel vector's power that the best single direction explains.
+/// Share of a channel vector's power that the best single direction explains, on the line of the angle transform.
 double arrayShare(const RadarConfig& radar, const Eigen::VectorXcd& channels);
 
 }  // namespace mmradartwin::diagnosis::receiver

@@ -15,7 +15,8 @@
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-constexpr double kLeastGain_db = -60;  ///< least gain of a tone's channel that is written
+constexpr double kLeastGain_db = -60;       ///< least gain of a tone's channel that is written
+constexpr double kFarthestLeakage_m = 0.3;  ///< range up to which there is leakage
 
 }  // namespace
 
@@ -71,26 +72,79 @@ bool differsFromStated(const Finding& finding, const std::vector<NamedParameters
   });
 }
 
+namespace {
+
+/// True for the order M-1 ... 0.
+bool isReversed(const NamedParameters& mechanism, const RadarConfig& radar) {
+  if (mechanism.mechanism != "channel_permutation") return false;
+  std::vector<double> reversed(static_cast<std::size_t>(radar.channels()));
+  std::iota(reversed.rbegin(), reversed.rend(), 0.0);
+  return mechanism.values.numbers("order") == reversed;
+}
+
+/// Parameters of a convention's finding.
+std::vector<FindingParameter> parametersOf(const NamedParameters& mechanism) {
+  if (mechanism.mechanism != "channel_permutation") return {};
+  return {{"order", "1", mechanism.values.numbers("order"), {}}};
+}
+
+/// All conventions that are not told apart, each with its probability. A reversed order and conjugated channels are the
+/// same data, so that each stands for both.
+std::vector<CauseProbability> candidatesOf(const SampleConvention& convention, const RadarConfig& radar) {
+  std::vector<std::pair<NamedParameters, double>> alike = convention.alike;
+  if (alike.empty()) alike.emplace_back(convention.mechanism, 1.0);
+  std::vector<CauseProbability> all;
+  const auto add = [&all](const CauseProbability& candidate) {
+    const auto same = std::find_if(all.begin(), all.end(), [&](const CauseProbability& c) {
+      return c.cause == candidate.cause && c.parameters.empty() == candidate.parameters.empty() &&
+             (c.parameters.empty() || c.parameters.front().value == candidate.parameters.front().value);
+    });
+    if (same == all.end()) {
+      all.push_back(candidate);
+    } else {
+      same->probability += candidate.probability;
+    }
+  };
+  for (const auto& [mechanism, probability] : alike) {
+    if (mechanism.mechanism == "channel_conjugation" || isReversed(mechanism, radar)) {
+      std::vector<double> reversed(static_cast<std::size_t>(radar.channels()));
+      std::iota(reversed.rbegin(), reversed.rend(), 0.0);
+      add({"channel_conjugation", probability / 2});
+      add({"channel_permutation", probability / 2, {{"order", "1", reversed, {}}}});
+    } else {
+      add({mechanism.mechanism, probability, parametersOf(mechanism)});
+    }
+  }
+  // What tells candidates apart is written where their names do not.
+  for (CauseProbability& candidate : all) {
+    const auto named =
+        std::count_if(all.begin(), all.end(), [&](const CauseProbability& c) { return c.cause == candidate.cause; });
+    if (named < 2) candidate.parameters.clear();
+  }
+  return all;
+}
+
+}  // namespace
+
 Finding findingOf(const SampleConvention& convention, const RadarConfig& radar) {
   Finding finding;
   finding.cause = convention.mechanism.mechanism;
   finding.mechanism = convention.mechanism;
-  finding.candidates = {{finding.cause, 1.0}};
-  std::vector<double> reversed(static_cast<std::size_t>(radar.channels()));
-  std::iota(reversed.rbegin(), reversed.rend(), 0.0);
-  const bool is_reversed =
-      finding.cause == "channel_permutation" && finding.mechanism->values.numbers("order") == reversed;
-  if (finding.cause == "channel_permutation") {
-    finding.parameters.push_back({"order", "1", finding.mechanism->values.numbers("order"), {}});
-  }
-  if (finding.cause == "channel_conjugation" || is_reversed) {
+  finding.candidates = candidatesOf(convention, radar);
+  if (isReversed(convention.mechanism, radar)) {
     finding.cause = "channel_conjugation";  // the data are the same; this convention is the likelier mistake
     finding.mechanism = defaultMechanism(finding.cause);
-    finding.parameters.clear();
-    finding.candidates = {{"channel_conjugation", 0.5}, {"channel_permutation", 0.5}};
+  }
+  finding.parameters = parametersOf(*finding.mechanism);
+  if (finding.candidates.size() > 1) {
     finding.experiment =
-        "look into the order of the receivers' lanes (self-test pattern): data alone cannot tell a reversed order of "
-        "all channels from conjugated channels";
+        finding.cause == "channel_conjugation" && finding.candidates.size() == 2
+            ? "look into the order of the receivers' lanes (self-test pattern): data alone cannot tell a reversed "
+              "order "
+              "of all channels from conjugated channels"
+            : "record a strong target on a known side of the radar, such as a corner reflector on its left, or someone "
+              "who walks, in frames of several loops: an order and its mirror image show the same echoes on either "
+              "side; or look into the order of transmitters (tx_enable) and lanes (self-test pattern)";
   }
   finding.evidence.log_likelihood_gain = convention.gain;
   finding.evidence.false_alarm_rate = std::min(1.0, bounds::kConventionTries * std::exp(-convention.gain));
@@ -98,13 +152,31 @@ Finding findingOf(const SampleConvention& convention, const RadarConfig& radar) 
   return finding;
 }
 
+namespace {
+
+/// Probability that a tone is constant: evidence of a constant, whose range is 0 within kMostConstantRange_m, against
+/// that of leakage, whose range may be any beyond.
+double probabilityOfConstant(const BodyFixedTone& tone) {
+  const double error_m = std::max(tone.range_error_m, bounds::kToneRangeError_m), near_m = bounds::kMostConstantRange_m;
+  const double far_m = std::max(kFarthestLeakage_m, tone.range_m);
+  const auto below = [&](double range_m) {
+    return 0.5 * std::erfc((tone.range_m - range_m) / error_m / std::sqrt(2.0));
+  };
+  const double constant = (below(near_m) - below(-near_m)) / (2 * near_m);
+  const double leakage = (below(far_m) - below(near_m)) / (far_m - near_m);
+  return constant + leakage > 0 ? constant / (constant + leakage) : tone.range_m < near_m;
+}
+
+}  // namespace
+
 Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest) {
   const double rms = std::sqrt(tone.channels.squaredNorm() / static_cast<double>(tone.channels.size()));
   const double level_db = 20 * std::log10(rms / strongestMeasured(rest));
   const double error_db = 8.686 / std::sqrt(2 * std::max(1.0, tone.gain));
   Finding finding;
   // A constant has no range; leakage travels some centimetres.
-  const bool constant = tone.range_m < std::max(bounds::kMostConstantRange_m, 3 * tone.range_error_m);
+  const double probability = probabilityOfConstant(tone);
+  const bool constant = probability >= 0.5;
   finding.cause = constant ? "dc_offset" : "tx_rx_leakage";
   NamedParameters mechanism = defaultMechanism(finding.cause);
   mechanism.values.set("level_db", level_db);
@@ -126,7 +198,15 @@ Finding findingOf(const BodyFixedTone& tone, const ChannelData& rest) {
   finding.parameters.push_back(
       {"level_db", "dB", level_db, {{level_db - 1.96 * error_db, level_db + 1.96 * error_db}}});
   finding.mechanism = mechanism;
-  finding.candidates = {{finding.cause, 1.0}};
+  const double own = std::max(probability, 1 - probability);
+  if (std::log(own / (1 - own)) < bounds::kNotToldApart_nats) {
+    finding.candidates = {{finding.cause, own}, {constant ? "tx_rx_leakage" : "dc_offset", 1 - own}};
+    finding.experiment =
+        "record with all transmitters off: a constant offset stays, leakage goes; or with a steeper ramp, which tells "
+        "its range";
+  } else {
+    finding.candidates = {{finding.cause, 1.0}};
+  }
   std::ostringstream text;
   text << std::setprecision(3) << "a tone of the radar's own, "
        << (rest.poses.size() > 1 ? "the same at all poses" : "") << (rest.poses.size() > 1 ? ", " : "")
@@ -179,6 +259,14 @@ Finding findingOf(const ChannelErrors& errors) {
   for (const FindingParameter& p : finding.parameters) m.values.set(p.name, p.value);
   finding.mechanism = m;
   finding.candidates = {{finding.cause, 1.0}};
+  if (errors.receivers == 1) {
+    // Every transmitter is one channel: both causes are the same data.
+    const char* other = finding.cause == "tx_imbalance" ? "channel_phase_error" : "tx_imbalance";
+    finding.candidates = {{finding.cause, 0.5}, {other, 0.5}};
+    finding.experiment =
+        "record with a second receiver: with one, an error of a transmitter and an error of its channel are the same "
+        "data";
+  }
   finding.evidence.log_likelihood_gain = errors.gain;
   finding.evidence.false_alarm_rate = std::min(1.0, std::exp(-errors.held_out_gain));
   finding.where.emplace_back();

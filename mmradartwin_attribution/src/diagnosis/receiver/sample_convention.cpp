@@ -1,6 +1,7 @@
 #include "diagnosis/receiver/sample_convention.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <numeric>
@@ -60,6 +61,13 @@ NamedParameters permutation(const std::vector<int>& order) {
   NamedParameters m = defaultMechanism("channel_permutation");
   m.values.set("order", std::vector<double>(order.begin(), order.end()));
   return m;
+}
+
+/// Turns the nats by which alike conventions are behind into probabilities.
+void setProbabilities(SampleConvention& convention) {
+  double sum = 0;
+  for (auto& [mechanism, behind] : convention.alike) sum += behind = std::exp(-behind);
+  for (auto& [mechanism, weight] : convention.alike) weight /= sum;
 }
 
 /// Orders that exchanged lanes and transmitters cause: receivers in any order, the same for every transmitter, and
@@ -135,6 +143,8 @@ std::vector<SampleConvention> findSampleConventionByEchoes(const ChannelData& da
   }
   if (const std::optional<ChannelOrder> order = findChannelOrder(as_meant)) {
     all.push_back({permutation(order->order), order->gain, order->margin});
+    for (const auto& [other, behind] : order->alike) all.back().alike.emplace_back(permutation(other), behind);
+    setProbabilities(all.back());
   }
   return all;
 }
@@ -273,6 +283,11 @@ std::optional<SampleConvention> findSampleConvention(const Twin& twin, const Cha
   if (gain < bounds::kLeastConventionNatsPerPose * likelihood.poses()) return std::nullopt;
   SampleConvention convention{tried.front().second, gain, std::nullopt};
   if (tried.size() > 1) convention.margin = tried[0].first - tried[1].first;
+  for (const auto& [nats, mechanism] : tried) {
+    const double behind = tried.front().first - nats;
+    if (behind <= bounds::kNotToldApart_nats) convention.alike.emplace_back(mechanism, behind);
+  }
+  setProbabilities(convention);
   return convention;
 }
 

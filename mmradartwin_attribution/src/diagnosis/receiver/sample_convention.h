@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/channels/channel_data.h"
@@ -14,6 +15,8 @@ struct SampleConvention {
   NamedParameters mechanism;     ///< iq_conjugation, channel_conjugation or channel_permutation
   double gain = 0;               ///< nats over the stated convention, on a part of the poses
   std::optional<double> margin;  ///< nats over the next best convention
+  /// Conventions that the data do not tell apart, itself first, and the probability of each. Empty: itself alone.
+  std::vector<std::pair<NamedParameters, double>> alike = {};
 };
 
 /// Tries all conventions on a part of the session. Nothing where the data fit best as delivered.

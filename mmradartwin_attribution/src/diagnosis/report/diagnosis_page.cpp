@@ -95,7 +95,7 @@ void writeEvidence(const Finding& finding, std::ostream& html) {
   if (finding.candidates.size() < 2) return;
   html << "<p>Not told apart:";
   for (const CauseProbability& candidate : finding.candidates) {
-    html << " " << candidate.cause << " (" << shownNumber(candidate.probability, 2) << ")";
+    html << " " << escaped(shownCandidate(candidate));
   }
   if (finding.experiment) html << ". To tell: " << escaped(*finding.experiment);
   html << "</p>";

@@ -38,7 +38,7 @@ std::string findingText(const Finding& finding, int number) {
   if (finding.candidates.size() > 1) {
     out << "   not told apart:";
     for (const CauseProbability& candidate : finding.candidates) {
-      out << " " << candidate.cause << " (" << shownNumber(candidate.probability, 2) << ")";
+      out << " " << shownCandidate(candidate);
     }
     if (finding.experiment) out << "; to tell: " << *finding.experiment;
     out << "\n";

@@ -35,6 +35,12 @@ std::string shownParameter(const FindingParameter& parameter) {
   return out.str();
 }
 
+std::string shownCandidate(const CauseProbability& candidate) {
+  std::string text = candidate.cause;
+  for (const FindingParameter& parameter : candidate.parameters) text += " " + shownParameter(parameter);
+  return text + " (" + shownNumber(candidate.probability, 2) + ")";
+}
+
 std::vector<std::string> shownBesides(const Finding& finding) {
   std::vector<std::string> words;
   if (!finding.mechanism || finding.cause == "unknown") return words;

@@ -13,6 +13,8 @@ namespace mmradartwin::diagnosis::report {
 std::string shownNumber(double value, int significant_digits = 3);
 /// "name = value unit (low to high)".
 std::string shownParameter(const FindingParameter& parameter);
+/// "cause (probability)" of a candidate, with what tells it from others of the same cause.
+std::string shownCandidate(const CauseProbability& candidate);
 /// Parameters of a finding's mechanism beyond those of its cause, in words: the shape of an object, the time of a step
 /// of gain. Left out: what stands at its default, lists without elements, and the laws of an unknown, which
 /// findings.json holds.

@@ -12,6 +12,49 @@
 #include "mmradartwin_sim/law_variable.h"
 
 namespace mmradartwin::diagnosis::rounds {
+namespace {
+
+/// Share of the gain below which a difference of rankings is rounding.
+constexpr double kRounding = 1e-6;
+
+/// Candidates of a finding: hypotheses that explain nearly as much share the probability. Hypotheses of the finding's
+/// own cause about something else are candidates where nothing at all tells them from it; their parameters say which.
+std::vector<CauseProbability> candidatesOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits,
+                                           std::size_t locations) {
+  const std::string own = best.hypothesis.mechanism.mechanism;
+  std::vector<CauseProbability> alike;
+  std::vector<std::string> labels;
+  double sum = 0;
+  const auto add = [&](const HypothesisFit& fit, const std::string& cause, double weight) {
+    alike.push_back({cause, weight});
+    labels.push_back(fit.hypothesis.label());
+    sum += weight;
+    if (cause != own || !isCatalogued(cause)) return;
+    alike.back().parameters = fittedParameters(fit.hypothesis, fit.scaled_values, fit.standard_error, cause, locations);
+  };
+  for (const HypothesisFit& other : fits) {
+    const double behind = (best.ranking() - other.ranking()) / best.overdispersion;
+    // Fits ahead of this one were rejected, or state the same cause.
+    if (behind > bounds::kNotToldApart_nats || behind < 0 || !(other.gain > 0)) continue;
+    const std::string& name = other.hypothesis.mechanism.mechanism;
+    const std::string cause = isCatalogued(name) ? name : "unknown";
+    const bool is_there =
+        std::any_of(alike.begin(), alike.end(), [&](const CauseProbability& a) { return a.cause == cause; });
+    const bool is_tie = cause == own && behind <= kRounding * std::max(1.0, std::abs(best.gain)) &&
+                        std::find(labels.begin(), labels.end(), other.hypothesis.label()) == labels.end();
+    if (!is_there || is_tie) add(other, cause, std::exp(-behind));
+  }
+  const auto of_own =
+      std::count_if(alike.begin(), alike.end(), [&](const CauseProbability& a) { return a.cause == own; });
+  for (CauseProbability& candidate : alike) {
+    candidate.probability /= sum;
+    if (of_own < 2) candidate.parameters.clear();
+  }
+  return alike;
+}
+
+}  // namespace
+
 Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& fits, const ModelState& before,
                   const Scene& scene, const ChannelData& data) {
   Finding finding;
@@ -21,23 +64,7 @@ Finding findingOf(const HypothesisFit& best, const std::vector<HypothesisFit>& f
   finding.mechanism = mechanism;
   finding.parameters =
       fittedParameters(best.hypothesis, best.scaled_values, best.standard_error, finding.cause, data.locations.size());
-  // Hypotheses that explain nearly as much share the probability.
-  double sum = 0;
-  std::vector<std::pair<std::string, double>> alike;
-  for (const HypothesisFit& other : fits) {
-    const double behind = (best.ranking() - other.ranking()) / best.overdispersion;
-    // Fits ahead of this one were rejected, or state the same cause.
-    if (behind > bounds::kNotToldApart_nats || behind < 0 || !(other.gain > 0)) continue;
-    const std::string& name = other.hypothesis.mechanism.mechanism;
-    const double weight = std::exp(-behind);
-    const std::string cause = isCatalogued(name) ? name : "unknown";
-    const auto at = std::find_if(alike.begin(), alike.end(), [&](const auto& a) { return a.first == cause; });
-    if (at == alike.end()) {
-      alike.emplace_back(cause, weight);
-      sum += weight;
-    }
-  }
-  for (const auto& [cause, weight] : alike) finding.candidates.push_back({cause, weight / sum});
+  finding.candidates = candidatesOf(best, fits, data.locations.size());
   if (finding.candidates.size() > 1) finding.experiment = experimentFor(finding.candidates);
   for (const HypothesisFit& other : fits) {
     // Fits ahead of this one were rejected.

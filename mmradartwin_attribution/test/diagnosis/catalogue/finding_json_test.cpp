@@ -178,6 +178,15 @@ TEST(FindingJson, WhatIsReadOfAFieldIsWhatWasWritten) {
   EXPECT_EQ(read.findings[3].description, "4 dB at 3 m \xc2\xb1 \"0.2\" m");
 }
 
+TEST(FindingJson, CandidatesOfOneCauseSayWhatTellsThemApart) {
+  Findings all = session();
+  all.findings[0].candidates = {{"element_pattern", 0.5, {{"cos_exponent", "1", 2.1, {}}}},
+                                {"element_pattern", 0.5, {{"cos_exponent", "1", 3.5, {}}}}};
+  const Findings read = parseFindings(toJson(all), "findings.json");
+  EXPECT_EQ(std::get<double>(read.findings[0].candidates[1].parameters.at(0).value), 3.5);
+  EXPECT_EQ(toJson(read), toJson(all));
+}
+
 TEST(FindingJson, NoKeyMayBeAddedAnywhere) {
   using J = nlohmann::json;
   const std::vector<std::string> objects = {"/poses",

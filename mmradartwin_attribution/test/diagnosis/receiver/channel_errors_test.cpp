@@ -97,6 +97,22 @@ TEST_F(ChannelErrorsTest, EveryChannelMayHaveItsOwnError) {
   for (int k = 0; k < 8; ++k) EXPECT_NEAR(errors->phase_rad[k] * 180 / M_PI, expected[k] * 180 / M_PI, 1.5) << k;
 }
 
+TEST_F(ChannelErrorsTest, ARaisedSlotIsNotJudged) {
+  // Echoes from above turn the raised slot's channels: no error of theirs.
+  Eigen::VectorXcd turned = none();
+  turned.tail(4) *= std::polar(1.0, 0.6);
+  ChannelData data = draw(turned);
+  EXPECT_TRUE(findChannelErrors(data));
+  data.radar.tx_position_m[1].z() = 0.0019467;
+  data.radar.angle_slots = {0};
+  EXPECT_FALSE(findChannelErrors(data));
+  EXPECT_FALSE(findChannelOrder(data));
+  Eigen::VectorXcd echo = arrayResponse(radar_, 0.25);
+  echo.tail(4) *= -1;
+  EXPECT_LT(arrayShare(radar_, echo), 0.7);
+  EXPECT_NEAR(arrayShare(data.radar, echo), 1, 1e-3) << "of the slots on the line";
+}
+
 TEST_F(ChannelErrorsTest, FewOrWeakEchoesSayNothing) {
   Eigen::VectorXcd factors = none();
   factors.tail(4) *= std::polar(1.0, 0.6);
@@ -121,6 +137,9 @@ TEST_F(ChannelErrorsTest, FindsTheOrderOfChannels) {
   for (int k : order) mirrored.push_back(7 - k);
   EXPECT_EQ(found->order, mirrored);
   EXPECT_LT(found->margin, 1);
+  ASSERT_EQ(found->alike.size(), 2u);
+  EXPECT_EQ(found->alike[0].first, mirrored);
+  EXPECT_EQ(found->alike[1].first, order);
 }
 
 TEST_F(ChannelErrorsTest, WhatMovesTellsMirroredOrdersApart) {
@@ -151,6 +170,7 @@ TEST_F(ChannelErrorsTest, WhatMovesTellsMirroredOrdersApart) {
   ASSERT_TRUE(found);
   EXPECT_EQ(found->order, order);
   EXPECT_GT(found->margin, 10);
+  EXPECT_EQ(found->alike.size(), 1u);
 }
 
 TEST_F(ChannelErrorsTest, ArrayShareIsOneForADirectionAndFallsBesideIt) {

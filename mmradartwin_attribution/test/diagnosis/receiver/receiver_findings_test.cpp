@@ -73,6 +73,68 @@ TEST(ReceiverFindings, TonesWithARangeLeakAndOthersAreConstant) {
   EXPECT_EQ(offset.parameter("range_m"), nullptr);
 }
 
+TEST(ReceiverFindings, ConventionsThatTieAreNoCertainty) {
+  const RadarConfig radar = paperRadar();
+  SampleConvention convention{defaultMechanism("channel_permutation"), 40, 0.0};
+  NamedParameters other = convention.mechanism;
+  convention.mechanism.values.set("order", std::vector<double>{3, 2, 1, 0, 7, 6, 5, 4});
+  other.values.set("order", std::vector<double>{4, 5, 6, 7, 0, 1, 2, 3});
+  convention.alike = {{convention.mechanism, 0.5}, {other, 0.5}};
+  const Finding tie = findingOf(convention, radar);
+  EXPECT_EQ(tie.cause, "channel_permutation");
+  ASSERT_EQ(tie.candidates.size(), 2u);
+  EXPECT_EQ(tie.candidates[0].probability, 0.5);
+  EXPECT_EQ(std::get<std::vector<double>>(tie.candidates[1].parameters.at(0).value)[0], 4);
+  ASSERT_TRUE(tie.experiment);
+  EXPECT_NE(tie.experiment->find("left"), std::string::npos);
+  // Where a reversed order is one of them, it stands for conjugated channels too.
+  other.values.set("order", std::vector<double>{7, 6, 5, 4, 3, 2, 1, 0});
+  convention.alike = {{convention.mechanism, 0.5}, {other, 0.5}};
+  const Finding three = findingOf(convention, radar);
+  ASSERT_EQ(three.candidates.size(), 3u);
+  EXPECT_EQ(three.candidates[1].cause, "channel_conjugation");
+  EXPECT_EQ(three.candidates[1].probability, 0.25);
+  EXPECT_NO_THROW(toJson(three));
+}
+
+TEST(ReceiverFindings, AToneWhoseRangeIsUnknownIsEither) {
+  const RadarConfig radar = paperRadar();
+  const ChannelData rest = sessionOf(radar, {gridOf(radar, {{3.0, 0.1, 0.02}})}, 1e-12);
+  BodyFixedTone tone;
+  tone.channels = Eigen::VectorXcd::Constant(8, 0.002);
+  tone.gain = 300;
+  tone.range_m = 0.03;
+  tone.range_error_m = 0.02;
+  const Finding either = findingOf(tone, rest);
+  ASSERT_EQ(either.candidates.size(), 2u);
+  EXPECT_LT(either.candidates[0].probability, 0.9);
+  EXPECT_EQ(either.candidates[0].cause, either.cause);
+  EXPECT_TRUE(either.experiment);
+  // Constants are at 0 within 1 cm, leakage anywhere up to 30 cm: an error of metres leaves both alike.
+  tone.range_error_m = 10;
+  EXPECT_NEAR(findingOf(tone, rest).candidates[0].probability, 0.5, 0.01);
+  tone.range_error_m = 0.001;
+  EXPECT_EQ(findingOf(tone, rest).cause, "tx_rx_leakage");
+  EXPECT_EQ(findingOf(tone, rest).candidates.size(), 1u);
+}
+
+TEST(ReceiverFindings, ErrorsOfOneReceiversTransmittersAreThoseOfItsChannels) {
+  ChannelErrors errors;
+  errors.phase_rad = Eigen::VectorXd::LinSpaced(2, 0, 0.7);
+  errors.gain_db = Eigen::VectorXd::Zero(2);
+  errors.phase_error_rad = errors.gain_error_db = Eigen::VectorXd::Constant(2, 0.01);
+  errors.groups = 5;
+  errors.receivers = 1;
+  errors.tie = ChannelTie::kTransmitters;
+  const Finding one = findingOf(errors);
+  ASSERT_EQ(one.candidates.size(), 2u);
+  EXPECT_EQ(one.candidates[1].cause, "channel_phase_error");
+  EXPECT_EQ(one.candidates[1].probability, 0.5);
+  EXPECT_TRUE(one.experiment);
+  errors.receivers = 4;
+  EXPECT_EQ(findingOf(errors).candidates.size(), 1u);
+}
+
 TEST(ReceiverFindings, ErrorsOfChannelsHaveStudentsIntervals) {
   ChannelErrors errors;
   errors.phase_rad = Eigen::VectorXd::LinSpaced(8, 0, 0.7);

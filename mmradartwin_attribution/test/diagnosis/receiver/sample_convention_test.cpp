@@ -8,6 +8,7 @@
 #include "diagnosis/catalogue/default_mechanism.h"
 #include "diagnosis/channels/drawn_channels.h"
 #include "diagnosis/receiver/cabinet_room.h"
+#include "diagnosis/receiver/receiver_findings.h"
 
 namespace mmradartwin::diagnosis {
 namespace {
@@ -153,6 +154,15 @@ TEST_F(SampleConventionTest, LeakageAndEchoesTellItWithoutAScene) {
   std::vector<double> mirrored;
   for (double k : kOrder) mirrored.push_back(7 - k);
   EXPECT_EQ(second[0].mechanism.values.numbers("order"), mirrored) << "of mirrored orders, that of lanes alone";
+  const Finding finding = findingOf(second[0], radar_);
+  ASSERT_EQ(finding.candidates.size(), 2u) << "the mirrored order is as likely";
+  for (const CauseProbability& candidate : finding.candidates) {
+    EXPECT_EQ(candidate.cause, "channel_permutation");
+    EXPECT_NEAR(candidate.probability, 0.5, 0.01);
+  }
+  EXPECT_EQ(std::get<std::vector<double>>(finding.candidates[0].parameters.at(0).value), mirrored);
+  EXPECT_EQ(std::get<std::vector<double>>(finding.candidates[1].parameters.at(0).value), kOrder);
+  EXPECT_TRUE(finding.experiment);
   ChannelData both = draw();
   deliver(both, [](const ComplexGrid& x) { return permuted(x.conjugate()); });
   const auto third = findSampleConventionByEchoes(both);

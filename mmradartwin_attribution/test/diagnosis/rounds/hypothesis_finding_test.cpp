@@ -30,6 +30,35 @@ FrameFinding walkerAt(double x_m, double y_m) {
   return walker;
 }
 
+Finding findingOfFits(const std::vector<HypothesisFit>& fits) {
+  return findingOf(fits.front(), fits, ModelState(), Scene(), ChannelData());
+}
+
+TEST(Candidates, EqualEvidenceIsNoCertainty) {
+  const Finding two = findingOfFits({fitOf("gain_drift", 100), fitOf("range_bias", 100)});
+  ASSERT_EQ(two.candidates.size(), 2u);
+  EXPECT_EQ(two.candidates[0].probability, 0.5);
+  EXPECT_EQ(two.candidates[1].cause, "range_bias");
+  EXPECT_TRUE(two.experiment);
+  EXPECT_TRUE(two.candidates[0].parameters.empty()) << "their names tell them apart";
+  EXPECT_EQ(findingOfFits({fitOf("gain_drift", 100), fitOf("range_bias", 90)}).candidates.size(), 1u);
+}
+
+TEST(Candidates, NorIsItOfOneCauseAboutTwoThings) {
+  const auto absent = [](const std::string& actor, double gain) {
+    HypothesisFit fit = fitOf("actor_absent", gain, actor);
+    fit.hypothesis.mechanism.values.set("actor", actor);
+    return fit;
+  };
+  const Finding tie = findingOfFits({absent("chair", 100), absent("table", 100 - 5e-11)});
+  ASSERT_EQ(tie.candidates.size(), 2u);
+  EXPECT_NEAR(tie.candidates[0].probability, 0.5, 1e-9);
+  ASSERT_EQ(tie.candidates[1].parameters.size(), 1u);
+  EXPECT_EQ(std::get<std::string>(tie.candidates[1].parameters[0].value), "table");
+  EXPECT_TRUE(tie.experiment);
+  EXPECT_EQ(findingOfFits({absent("chair", 100), absent("table", 98)}).candidates.size(), 1u) << "told apart";
+}
+
 TEST(RejectionReason, NamesValuesThatNoSurfaceHas) {
   EXPECT_NE(rejectionReason(with(fitOf("diffuse_scattering", 9), "scattering_coefficient", 0.05), {}), "");
   EXPECT_EQ(rejectionReason(with(fitOf("diffuse_scattering", 9), "scattering_coefficient", 0.5), {}), "");
