@@ -190,6 +190,20 @@ class SessionWithoutScene(InFolder):
         self.assertEqual(causes(findings), ["channel_permutation"])
         self.assertEqual(parameter(findings, "channel_permutation", "order"), order)
 
+    def test_transmitters_exchanged_are_as_likely_as_the_mirrored_lanes(self):
+        exchanged, mirrored = [4, 5, 6, 7, 0, 1, 2, 3], [3, 2, 1, 0, 7, 6, 5, 4]
+        findings, _ = self.found(327, {"channel_permutation": {"order": exchanged}})
+        self.assertEqual(causes(findings), ["channel_permutation"])
+        first = findings["findings"][0]
+        self.assertEqual(len(first["candidates"]), 2)
+        for candidate in first["candidates"]:
+            self.assertEqual(candidate["cause"], "channel_permutation")
+            self.assertAlmostEqual(candidate["probability"], 0.5, delta=0.01)
+        orders = [c["parameters"]["order"]["value"] for c in first["candidates"]]
+        self.assertCountEqual(orders, [exchanged, mirrored])
+        self.assertEqual(orders[0], first["parameters"]["order"]["value"])
+        self.assertIn("reflector", first["experiment"])
+
     def test_leakage_at_one_pose(self):
         findings, truth = self.found(325, {"tx_rx_leakage": {"range_m": 0.08, "level_db": 3.0}}, poses=1)
         self.assertEqual(causes(findings), ["tx_rx_leakage"])
