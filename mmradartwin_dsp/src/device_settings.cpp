@@ -346,6 +346,8 @@ void RawSettings::setDevice(const std::string& name, const std::string& where) {
     device = exact.substr(0, exact.find(partOf(exact)) + 4) + variant;
     return;
   }
+  // A person may leave out the variant that a file names: so its antennas are not those of the file's device.
+  if (device_from == "--device" && same_part && plain.compare(0, device.size(), device) == 0) return;
   if (!device.empty() && device != plain) {
     throw InputError(where + ": the device is " + plain + ", but " + device_from + " says " + device +
                      "; give one configuration");

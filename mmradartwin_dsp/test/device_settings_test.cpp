@@ -116,6 +116,18 @@ TEST(ImportSettings, OtherAntennasAreRefused) {
   for (const char* device : {"awr2243", "awr2243P", "awr2243boost", "AWR2243PBOOST"}) EXPECT_EQ(refusal(device), "");
 }
 
+TEST(ImportSettings, TheAdviceForOtherAntennasWorks) {
+  const TestFolder folder;
+  std::string setup = kSetup;
+  write(folder / "a.mmwave.json", mmwaveJson());
+  write(folder / "setup.json", setup.replace(setup.find("awr1843"), 7, "awr1843AOP"));
+  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "setup.json"}); }), "setup.json", "awr1843aop",
+                            "--device awr1843,"));
+  EXPECT_EQ(importSettings({folder / "setup.json"}, "awr1843").radar.device, "awr1843");
+  EXPECT_TRUE(saysInOneLine(inputError([&] { importSettings({folder / "setup.json"}, "awr6843"); }), "awr1843aop",
+                            "--device says awr6843"));
+}
+
 TEST(ImportSettings, ARaisedTransmitterIsLeftOutOfTheAngleTransform) {
   const TestFolder folder;
   std::string lua = script(
