@@ -74,20 +74,21 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
 
   RunDescription description;
   description.command = command;
-  description.recording = arguments.input.recording;
+  description.recording = arguments.input.recording();
   description.simulated = from_twin ? "twin" : arguments.simulated;
   description.version = packageVersion();
   description.attribution_yaml = toYaml(options.config);
   description.radar_yaml = toYaml(recording.radar);
-  std::vector<std::string> more = {arguments.config, arguments.input.radar, arguments.input.channels,
+  std::vector<std::string> more = {arguments.config, arguments.input.radarFile(), arguments.input.channels,
                                    twin.description().file, twin.description().scene_file};
+  more.insert(more.end(), arguments.input.recordings.begin() + 1, arguments.input.recordings.end());
   if (from_twin) {
     description.twin_yaml = twin.description().toYaml();
   } else {
     const std::vector<std::string> files = inputFiles(arguments.simulated, other, {});
     more.insert(more.end(), files.begin(), files.end());
   }
-  description.inputs = hashFiles(inputFiles(arguments.input.recording, recording, more));
+  description.inputs = hashFiles(inputFiles(arguments.input.recording(), recording, more));
   report.write(evaluation, options.config, description);
 
   for (const PoseProblem& problem : evaluation.problems) std::cerr << "error: " << problem.message << '\n';

@@ -2,17 +2,22 @@
 
 #include <CLI/CLI.hpp>
 
-#include "mmradartwin_dsp/ros/bag.h"
+#include "mmradartwin_dsp/bag_kind.h"
+#include "mmradartwin_dsp/ros/bag_arguments.h"
 
 namespace mmradartwin {
 
 void RecordingArguments::addTo(CLI::App& app) {
-  app.add_option("recording", recording, "session directory, session.yaml or bag")->required();
+  app.add_option("recording", recordings,
+                 "session directory, session.yaml or bag; several bags, the parts of one, are read as one")
+      ->required();
   app.add_option("--twin", twin, "twin.yaml (default: the session's, or the base mechanisms)");
   app.add_option("--scene", scene, "scene.yaml where the recording names none");
-  app.add_option("--radar", radar, "radar.yaml for a recording without one");
+  app.add_option("--radar", radar,
+                 "radar.yaml for a recording without one; of a bag with several radars the namespace of one");
   app.add_option("--layout", layout, "byte layout of the captures, instead of radar.yaml's")
       ->check(CLI::IsMember({"4lane", "2lane"}));
+  addBagArguments(app, bag);
 }
 
 void RecordingArguments::addChannelsTo(CLI::App& app) {
@@ -20,8 +25,14 @@ void RecordingArguments::addChannelsTo(CLI::App& app) {
                  "channels.yaml of calibrate: channel errors to take out of the measured branch");
 }
 
+std::string RecordingArguments::radarFile() const { return isBag(recording()) ? "" : radar; }
+
 Recording RecordingArguments::open() const {
-  Recording opened = open(recording);
+  std::optional<CaptureLayout> lanes;
+  if (!layout.empty()) lanes = layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
+  BagOptions together = bag;
+  together.further.assign(recordings.begin() + 1, recordings.end());
+  Recording opened = openRecording(recording(), radar, lanes, together);
   if (!channels.empty()) opened.channels = loadChannelCorrection(channels, opened.radar);
   return opened;
 }
@@ -29,7 +40,7 @@ Recording RecordingArguments::open() const {
 Recording RecordingArguments::open(const std::string& path) const {
   std::optional<CaptureLayout> lanes;
   if (!layout.empty()) lanes = layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
-  return openRecording(path, radar, lanes);
+  return openRecording(path, radarFile(), lanes, bag);
 }
 
 std::optional<std::string> RecordingArguments::sceneFile(const Recording& opened) const {

@@ -2,8 +2,9 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "mmradartwin_dsp/session.h"
+#include "mmradartwin_dsp/ros/bag.h"
 #include "mmradartwin_sim/twin.h"
 
 namespace CLI {
@@ -14,13 +15,18 @@ namespace mmradartwin {
 
 /// What evaluate, diagnose and calibrate take alike: a recording and what stands beside it.
 struct RecordingArguments {
-  std::string recording, twin, scene, radar, layout, channels;
+  std::string twin, scene, radar, layout, channels;
+  std::vector<std::string> recordings;  ///< several bags are read as one
+  BagOptions bag;
 
-  /// Adds the argument `recording` and --twin, --scene, --radar and --layout.
+  /// Adds the argument `recording`, --twin, --scene, --radar and --layout, and what is taken of bags.
   void addTo(CLI::App& app);
   /// Adds --channels.
   void addChannelsTo(CLI::App& app);
 
+  const std::string& recording() const { return recordings.front(); }
+  /// "" where --radar is the namespace of one of a bag's radars.
+  std::string radarFile() const;
   /// Throws InputError.
   Recording open() const;
   /// Another recording of the same radar and layout, without `channels`.

@@ -10,7 +10,7 @@
 #include "mmradartwin_dsp/map_picture.h"
 #include "mmradartwin_dsp/program.h"
 #include "mmradartwin_dsp/range_angle.h"
-#include "mmradartwin_dsp/ros/bag.h"
+#include "mmradartwin_dsp/ros/bag_arguments.h"
 
 namespace fs = std::filesystem;
 using namespace mmradartwin;
@@ -18,7 +18,8 @@ using namespace mmradartwin;
 namespace {
 
 struct Options {
-  std::string input, output, radar, layout, channels;
+  std::vector<std::string> inputs;
+  std::string output, radar, layout, channels;
   BagOptions bag;
   bool mat = false;
   bool cubes = false;
@@ -54,7 +55,9 @@ void writeMat(const Options& options, const Recording& recording, const Pose& po
 int process(const Options& options) {
   std::optional<CaptureLayout> layout;
   if (!options.layout.empty()) layout = options.layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
-  Recording recording = openRecording(options.input, options.radar, layout, options.bag);
+  BagOptions bag = options.bag;
+  bag.further.assign(options.inputs.begin() + 1, options.inputs.end());
+  Recording recording = openRecording(options.inputs.front(), options.radar, layout, bag);
   if (!options.channels.empty()) recording.channels = loadChannelCorrection(options.channels, recording.radar);
   const SignalChain chain = [&] {
     try {
@@ -100,15 +103,18 @@ int process(const Options& options) {
 int main(int argc, char** argv) {
   Options options;
   CLI::App app("Turns a session directory, a rosbag or a bare DCA1000 capture into range-angle maps.");
-  app.add_option("INPUT", options.input, "session directory, .bag, or .bin capture")->required();
+  app.add_option("INPUT", options.inputs,
+                 "session directory, .bin capture, or bag; several bags, the parts of one recording, are read as one")
+      ->required();
   app.add_option("--output", options.output, "folder for maps/, pictures/ and mat/")->required();
-  app.add_option("--radar", options.radar, "radar.yaml; needed for a bare capture, else instead of the session's");
+  app.add_option(
+      "--radar", options.radar,
+      "radar.yaml; needed for a bare capture, else instead of the session's; of a bag with several radars the "
+      "namespace of one");
   app.add_option("--layout", options.layout, "byte layout of the captures, instead of the radar's")
       ->check(CLI::IsMember({"4lane", "2lane"}));
   app.add_option("--channels", options.channels, "channels.yaml of calibrate: channel errors to take out of the grids");
-  app.add_option("--map-frame", options.bag.map_frame, "tf frame of the room, for bags")->capture_default_str();
-  app.add_option("--radar-frame", options.bag.radar_frame, "tf frame of the radar, for bags")->capture_default_str();
-  app.add_option("--ns", options.bag.ns, "namespace of the bag's topics; needed only where it holds several");
+  addBagArguments(app, options.bag);
   app.add_flag("--mat", options.mat,
                "also write grid and map of each pose as a MATLAB file (Octave and SciPy read it too)");
   app.add_flag("--cubes", options.cubes, "with --mat: the raw cubes too, [frame][chirp][sample][rx][I,Q]");

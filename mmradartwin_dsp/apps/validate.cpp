@@ -4,19 +4,19 @@
 #include <optional>
 
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/ros/bag_arguments.h"
 #include "mmradartwin_dsp/ros/bag_validation.h"
 
 int main(int argc, char** argv) {
   using namespace mmradartwin;
-  std::string bag;
+  std::vector<std::string> bags;
   BagOptions options;
   BagLimits limits;
   double stamp_tolerance_ms = limits.stamp_tolerance_s * 1e3;
   CLI::App app("Says what is missing or odd in a recorded bag. Exit status 0: nothing, 2: something.");
-  app.add_option("BAG", bag, "bag to look at")->required();
-  app.add_option("--ns", options.ns, "look at the radar of this namespace only");
-  app.add_option("--map-frame", options.map_frame, "tf frame of the room")->capture_default_str();
-  app.add_option("--radar-frame", options.radar_frame, "tf frame of the radar")->capture_default_str();
+  app.add_option("BAG", bags, "bag to look at; several, the parts of one recording, are read as one")->required();
+  addBagArguments(app, options);
+  app.add_option("--radar", options.ns, "look at the radar of this namespace only; the same as --ns");
   app.add_option("--stamp-tolerance-ms", stamp_tolerance_ms, "frames' stamps may be off the frame period by so much")
       ->capture_default_str();
   app.add_option("--tf-gap-s", limits.tf.gap_s,
@@ -28,6 +28,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   return runProgram(app, argc, argv, [&] {
     limits.stamp_tolerance_s = stamp_tolerance_ms * 1e-3;
+    options.further.assign(bags.begin() + 1, bags.end());
+    const std::string& bag = bags.front();
     std::vector<BagFinding> findings;
     {
       std::optional<ProgressBar> progress;

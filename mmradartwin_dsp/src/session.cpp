@@ -9,6 +9,7 @@
 #include <set>
 #include <sstream>
 
+#include "mmradartwin_dsp/bag_kind.h"
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/csv_reader.h"
 #include "mmradartwin_dsp/input_error.h"
@@ -152,6 +153,9 @@ Recording openSession(const std::string& path, const SessionOptions& options) {
   if (!fs::exists(file, error)) {
     throw InputError(file.string() +
                      ": no such session; give a folder that holds a session.yaml (an unfinished recording has none)");
+  }
+  if (isBag(file.string())) {
+    throw InputError(path + ": is a bag, and a session is asked for; make one of it by bag_to_session");
   }
   YamlMap yaml = YamlMap::load(file.string());
   yaml.choice("format", {"mmradartwin_session/1"});

@@ -220,9 +220,9 @@ TEST(ValidateBag, SeveralRadars) {
     if (i == 10) cube.samples[0] = 32767;
   };
   EXPECT_EQ(finding(scene),
-            "2 several radars: programs need --ns to tell them apart; /left/radar/adc, /right/radar/adc\n"
-            "1 /left/: saturated sample(s); frame 10 at 1700000000.5 s\n"
-            "1 /right/: saturated sample(s); frame 10 at 1700000000.5 s");
+            "2 several radars: programs need --radar to tell them apart; /left/radar/adc, /right/radar/adc\n"
+            "1 /left: saturated sample(s); frame 10 at 1700000000.5 s\n"
+            "1 /right: saturated sample(s); frame 10 at 1700000000.5 s");
   const TestFolder folder;
   BagOptions options;
   options.ns = "/left";

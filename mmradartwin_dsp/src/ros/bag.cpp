@@ -4,7 +4,6 @@
 #include <mmradartwin_msgs/Session.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
-#include <tf2/buffer_core.h>
 #include <tf2/exceptions.h>
 #include <tf2_msgs/TFMessage.h>
 
@@ -17,12 +16,16 @@
 #include <mutex>
 #include <set>
 
+#include "mmradartwin_dsp/bag_kind.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
-#include "mmradartwin_dsp/ros/transform_record.h"
+#include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_dsp/session_files.h"
 #include "mmradartwin_dsp/stationary_poses.h"
 #include "mmradartwin_dsp/temporary_folder.h"
+#include "mmradartwin_dsp/text.h"
+#include "ros/bag_set.h"
+#include "ros/recorded_tf.h"
 
 namespace mmradartwin {
 namespace {
@@ -41,25 +44,27 @@ struct CubeIndex {
   bool on_the_way = false;  ///< within a jump of tf, or a gap with two different ends: no pose is its own
 };
 
-std::string withoutSlash(const std::string& name) {
-  return name.substr(std::min(name.find_first_not_of('/'), name.size()));
+constexpr char kCubes[] = "radar/adc";
+
+std::vector<std::string> allFiles(const std::string& file, const BagOptions& options) {
+  std::vector<std::string> files = {file};
+  files.insert(files.end(), options.further.begin(), options.further.end());
+  return files;
 }
 
 class BagContents {
  public:
-  BagContents(const std::string& file, const BagOptions& options) : file_(file), options_(options) {
-    if (!fs::is_regular_file(file)) throw InputError(file + ": no such bag; give a file that exists");
-    try {
-      bag_.open(file, rosbag::bagmode::Read);
-    } catch (const rosbag::BagUnindexedException&) {
-      throw InputError(file + ": bag has no index; run `rosbag reindex " + file + "` first");
-    } catch (const rosbag::BagException& error) {
-      throw InputError(file + ": cannot be read as a bag (" + error.what() + ")");
-    }
+  BagContents(const std::string& file, const BagOptions& options) : bags_(allFiles(file, options)), options_(options) {
     findTopics();
     readConfig();
     session = only<mmradartwin_msgs::Session>("session");
-    readFrames();
+    radar_frame_ = radarFrame(bags_, topic(kCubes), options.radar_frame);
+    RecordedTf tf(kTfCache_s + std::abs(options.clock_offset_s) + std::abs(options.pose_lag_s));
+    const TfWarningCount warnings;
+    readFrames(tf);
+    judge(tf);
+    notes_ = {warnings.text(), bags_.noteOnNextPart()};
+    notes_.erase(std::remove(notes_.begin(), notes_.end(), ""), notes_.end());
   }
 
   /// Visits the cubes of a stretch of time. rosbag is not thread-safe: one visitor at a time.
@@ -73,12 +78,12 @@ class BagContents {
       first = std::min(first, cube.recorded);
       last = std::max(last, cube.recorded);
     }
-    rosbag::View view(bag_, rosbag::TopicQuery(topic("radar/adc")), first, last);
-    for (const rosbag::MessageInstance& message : view) {
+    const auto view = bags_.view({topic(kCubes)}, first, last);
+    for (const rosbag::MessageInstance& message : *view) {
       const auto cube = message.instantiate<mmradartwin_msgs::AdcCube>();
       if (!cube || !stamps.count(toNanoseconds(cube->header.stamp))) continue;
       if (cube->radar_hash != radar_hash) {
-        throw InputError(file_ + ": pose '" + pose + "': frame " + std::to_string(cube->sequence) +
+        throw InputError(file() + ": pose '" + pose + "': frame " + std::to_string(cube->sequence) +
                          " was taken with another radar configuration than " + topic("radar/config") +
                          " says; cut the bag with rosbag filter");
       }
@@ -88,7 +93,22 @@ class BagContents {
     }
   }
 
-  std::string label() const { return file_ + ":" + topic("radar/config"); }
+  const std::string& file() const { return bags_.label(); }
+  std::string label() const { return file() + ":" + topic("radar/config"); }
+
+  std::string whyNoPose() const {
+    const std::string edge = options_.map_frame + " -> " + radar_frame_;
+    const auto posed = [](const CubeIndex& cube) { return cube.T_map_radar || cube.on_the_way; };
+    if (std::none_of(cubes.begin(), cubes.end(), posed)) {
+      return "bag holds no pose: tf says nowhere what " + edge + " is at the time of a frame; record /tf all the while";
+    }
+    return "bag holds no pose: in tf, " + edge +
+           " nowhere stands still (2 cm, 1 deg) for 1 s while frames come; check the frames' names, or keep the radar "
+           "still longer";
+  }
+
+  /// What is odd in the bag and does no harm.
+  const std::vector<std::string>& notes() const { return notes_; }
 
   RadarConfig radar;
   std::uint64_t radar_hash = 0;
@@ -100,34 +120,41 @@ class BagContents {
   std::string topic(const std::string& name) const { return prefix_ + name; }
 
   void findTopics() {
-    rosbag::View view(bag_);
+    const auto view = bags_.view();
     std::set<std::string> cube_topics, all;
-    for (const rosbag::ConnectionInfo* connection : view.getConnections()) {
+    std::map<std::string, std::string> radars;  // topics by namespace
+    for (const rosbag::ConnectionInfo* connection : view->getConnections()) {
       all.insert(connection->topic);
-      if (connection->datatype == "mmradartwin_msgs/AdcCube") cube_topics.insert(connection->topic);
+      if (connection->datatype != "mmradartwin_msgs/AdcCube") continue;
+      cube_topics.insert(connection->topic);
+      if (const auto ns = namespaceOf(connection->topic, kCubes)) radars[*ns] = connection->topic;
     }
-    const std::string wanted = withoutSlash(options_.ns.empty() ? "radar/adc" : options_.ns + "/radar/adc");
-    std::string found;
-    for (const std::string& name : cube_topics) {
-      if (withoutSlash(name) == wanted) found = name;
+    const std::string ns = normalNamespace(options_.ns);
+    if (ns.empty() && radars.size() > 1) {
+      std::vector<std::string> topics, choices;
+      for (const auto& [name, topic] : radars) {
+        topics.push_back(topic);
+        choices.push_back("--radar " + name);
+      }
+      throw InputError(file() + ": bag holds frames of " + std::to_string(radars.size()) + " radars, " +
+                       join(topics, " and ") + "; say which: " + join(choices, " or "));
     }
-    if (found.empty() && options_.ns.empty() && cube_topics.size() == 1) found = *cube_topics.begin();
-    const std::string ending = "radar/adc";
-    if (found.size() < ending.size() || found.compare(found.size() - ending.size(), ending.size(), ending) != 0) {
-      std::string others;
-      for (const std::string& name : cube_topics.empty() ? all : cube_topics)
-        others += (others.empty() ? "" : ", ") + name;
-      throw InputError(file_ + ": bag holds no frames on topic " + wanted + " (it has " +
-                       (others.empty() ? "nothing" : others) + "); record radar/adc, radar/config and tf");
+    const auto found = ns.empty() ? radars.begin() : radars.find(ns);
+    if (found == radars.end()) {
+      const std::set<std::string>& others = cube_topics.empty() ? all : cube_topics;
+      throw InputError(file() + ": bag holds no frames on topic " +
+                       withoutSlash(ns.empty() ? kCubes : ns + "/" + kCubes) + " (it has " +
+                       (others.empty() ? "nothing" : join({others.begin(), others.end()}, ", ")) +
+                       "); record radar/adc, radar/config and tf");
     }
-    prefix_ = found.substr(0, found.size() - ending.size());
+    prefix_ = found->second.substr(0, found->second.size() - std::string(kCubes).size());
   }
 
   template <typename Message>
   boost::shared_ptr<Message> only(const std::string& name) {
-    rosbag::View view(bag_, rosbag::TopicQuery(topic(name)));
+    const auto view = bags_.view({topic(name)});
     boost::shared_ptr<Message> last;
-    for (const rosbag::MessageInstance& message : view) {
+    for (const rosbag::MessageInstance& message : *view) {
       last = message.instantiate<Message>();
       if (!last) refuseVersion(message);
     }
@@ -135,30 +162,30 @@ class BagContents {
   }
 
   [[noreturn]] void refuseVersion(const rosbag::MessageInstance& message) const {
-    throw InputError(file_ + ": topic " + message.getTopic() + " holds " + message.getDataType() +
+    throw InputError(file() + ": topic " + message.getTopic() + " holds " + message.getDataType() +
                      " of another version; convert the bag with rosbag fix");
   }
 
   void readConfig() {
-    rosbag::View view(bag_, rosbag::TopicQuery(topic("radar/config")));
+    const auto view = bags_.view({topic("radar/config")});
     boost::shared_ptr<mmradartwin_msgs::RadarConfig> config;
-    for (const rosbag::MessageInstance& message : view) {
+    for (const rosbag::MessageInstance& message : *view) {
       const auto next = message.instantiate<mmradartwin_msgs::RadarConfig>();
       if (!next) refuseVersion(message);
       if (config && radarHash(*next) != radarHash(*config)) {
-        throw InputError(file_ + ": holds several radar configurations on " + topic("radar/config") +
+        throw InputError(file() + ": holds several radar configurations on " + topic("radar/config") +
                          "; cut it with rosbag filter so that it holds one");
       }
       config = next;
     }
     if (!config) {
-      throw InputError(file_ + ": bag holds no radar configuration on topic " + topic("radar/config") +
-                       "; record it too (it is latched)");
+      throw InputError(file() + ": bag holds no radar configuration on topic " + topic("radar/config") +
+                       "; record it too (it is latched)" + bags_.adviceForLatched());
     }
     try {
       radar = fromMsg(*config);
     } catch (const InputError& error) {
-      throw InputError(file_ + ": " + error.what());
+      throw InputError(file() + ": " + error.what());
     }
     radar_hash = radarHash(*config);
   }
@@ -168,59 +195,76 @@ class BagContents {
         cube.receivers == radar.receivers()) {
       return;
     }
-    throw InputError(file_ + ": pose '" + pose + "': frame " + std::to_string(cube.sequence) +
+    throw InputError(file() + ": pose '" + pose + "': frame " + std::to_string(cube.sequence) +
                      " has another shape than radar/config says");
   }
 
   /// Indexes the frames and finds T_map_radar at each one's stamp.
-  void readFrames() {
-    tf2::BufferCore buffer{ros::Duration(kTfCache_s)};
-    rosbag::View fixed(bag_, rosbag::TopicQuery(std::vector<std::string>{"/tf_static", "tf_static"}));
-    std::size_t transforms = 0;
+  void readFrames(RecordedTf& tf) {
     const auto feed = [&](const rosbag::MessageInstance& message, bool is_static) {
-      const auto tf = message.instantiate<tf2_msgs::TFMessage>();
-      if (!tf) return;
-      record_.add(*tf, is_static);
-      record_.keep(kTfCache_s);
-      for (const geometry_msgs::TransformStamped& transform : tf->transforms) {
-        transforms += buffer.setTransform(transform, "bag", is_static) ? 1 : 0;
-        if (!is_static) newest_tf_ns_ = std::max(newest_tf_ns_, toNanoseconds(transform.header.stamp));
-      }
+      const auto transforms = message.instantiate<tf2_msgs::TFMessage>();
+      if (transforms) tf.add(*transforms, is_static, message.getCallerId(), toNanoseconds(message.getTime()));
     };
-    for (const rosbag::MessageInstance& message : fixed) feed(message, true);
-    rosbag::View view(bag_, rosbag::TopicQuery(std::vector<std::string>{"/tf", "tf", topic("radar/adc")}));
+    const auto fixed = bags_.view({"/tf_static", "tf_static"});
+    for (const rosbag::MessageInstance& message : *fixed) feed(message, true);
+    const auto view = bags_.view({"/tf", "tf", topic(kCubes)});
     std::deque<CubeIndex> waiting;
-    for (const rosbag::MessageInstance& message : view) {
+    for (const rosbag::MessageInstance& message : *view) {
       if (message.getDataType() == "tf2_msgs/TFMessage") {
         feed(message, false);
-        settle(buffer, waiting, false);
+        settle(tf, waiting, false);
         continue;
       }
       const auto cube = message.instantiate<mmradartwin_msgs::AdcCube>();
       if (!cube) refuseVersion(message);
       waiting.push_back({toNanoseconds(cube->header.stamp), message.getTime(), std::nullopt, false});
+      frames_.add(waiting.back().stamp_ns, toNanoseconds(message.getTime()));
     }
-    settle(buffer, waiting, true);
+    settle(tf, waiting, true);
     std::stable_sort(cubes.begin(), cubes.end(), [](const auto& a, const auto& b) { return a.stamp_ns < b.stamp_ns; });
-    if (cubes.empty()) throw InputError(file_ + ": bag holds no frames on topic " + topic("radar/adc"));
-    if (transforms == 0) {
-      throw InputError(file_ + ": bag holds no tf; record /tf and /tf_static too, with " + options_.map_frame + " -> " +
-                       options_.radar_frame);
-    }
   }
 
-  void settle(const tf2::BufferCore& buffer, std::deque<CubeIndex>& waiting, bool last) {
+  /// Refuses frames and transforms from which no pose, or a wrong one, would follow.
+  void judge(const RecordedTf& tf) const {
+    const auto refuse = [this](const std::string& why) {
+      if (!why.empty()) throw InputError(file() + ": " + why);
+    };
+    if (cubes.empty()) refuse("bag holds no frames on topic " + topic(kCubes));
+    refuse(frames_.whyNoTime("frames on " + topic(kCubes), "the driver"));
+    refuseFramesTwice();
+    if (tf.empty()) {
+      refuse("bag holds no tf; record /tf and /tf_static too, with " + options_.map_frame + " -> " + radar_frame_ +
+             bags_.adviceForLatched());
+    }
+    refuse(tf.whyWrong(options_.map_frame, radar_frame_, frames_, options_.clock_offset_s));
+    if (session) return;  // its poses have stamps of their own
+    const std::string not_connected = tf.whyNotConnected(options_.map_frame, radar_frame_);
+    if (not_connected.empty()) return;
+    refuse(not_connected + (bags_.holds("tf_static") ? "" : bags_.adviceForLatched()));
+  }
+
+  void refuseFramesTwice() const {
+    if (options_.further.empty()) return;
+    const auto twice = std::adjacent_find(cubes.begin(), cubes.end(),
+                                          [](const auto& a, const auto& b) { return a.stamp_ns == b.stamp_ns; });
+    if (twice == cubes.end()) return;
+    throw InputError(file() + ": the frame stamped " + formatStamp(twice->stamp_ns) +
+                     " s is in two of the bags; give only one of those that hold the same recording");
+  }
+
+  void settle(const RecordedTf& tf, std::deque<CubeIndex>& waiting, bool last) {
     while (!waiting.empty()) {
       CubeIndex& cube = waiting.front();
-      const std::int64_t reported_ns = cube.stamp_ns + std::llround(options_.pose_lag_s * 1e9);
+      const std::int64_t reported_ns =
+          cube.stamp_ns + std::llround((options_.pose_lag_s - options_.clock_offset_s) * 1e9);
       try {
         const geometry_msgs::TransformStamped T =
-            buffer.lookupTransform(options_.map_frame, options_.radar_frame, toRosTime(reported_ns));
+            tf.buffer().lookupTransform(options_.map_frame, radar_frame_, toRosTime(reported_ns));
         cube.on_the_way =
-            !record_.whyNotBetween(reported_ns, options_.map_frame, options_.radar_frame, TransformLimits()).empty();
+            !tf.record().whyNotBetween(reported_ns, options_.map_frame, radar_frame_, TransformLimits()).empty();
         if (!cube.on_the_way) cube.T_map_radar = fromMsg(T.transform);
       } catch (const tf2::TransformException&) {
-        const bool late = newest_tf_ns_ > reported_ns + static_cast<std::int64_t>(kTfPatience_s * 1e9);
+        const bool late = tf.newest_ns() > reported_ns + static_cast<std::int64_t>(kTfPatience_s * 1e9);
         if (!last && !late) return;
       }
       cubes.push_back(cube);
@@ -228,13 +272,12 @@ class BagContents {
     }
   }
 
-  std::string file_;
+  BagSet bags_;
   BagOptions options_;
-  rosbag::Bag bag_;
   std::mutex mutex_;
-  std::string prefix_;
-  TransformRecord record_;
-  std::int64_t newest_tf_ns_ = 0;
+  std::string prefix_, radar_frame_;
+  StampRecord frames_;
+  std::vector<std::string> notes_;
 };
 
 using CubesByPose = std::map<std::string, std::vector<CubeIndex>>;
@@ -306,7 +349,9 @@ Recording fromSessionMessage(BagContents& bag, const std::string& folder, CubesB
 
 Recording fromStretches(BagContents& bag, const std::string& file, const std::string& folder, CubesByPose& assigned) {
   Recording recording;
-  recording.name = fs::path(file).stem().string();
+  fs::path name = fs::path(file).filename();
+  if (name.extension() == ".active") name = name.stem();  // of a recorder that was cut off
+  recording.name = name.stem().string();
   for (const Stretch& stretch : stretchesOf(bag)) {
     recording.poses.push_back(stretch.pose);
     recording.pose_names.push_back(stretch.pose.name);
@@ -358,18 +403,19 @@ Recording openBag(const std::string& file, const BagOptions& options) {
   recording.radar = bag->radar;
   recording.radar_file = bag->label();
   if (recording.poses.empty() && recording.problems.empty()) {
-    throw InputError(file + ": bag holds no pose: in tf, " + options.map_frame + " -> " + options.radar_frame +
-                     " nowhere stands still (2 cm, 1 deg) for 1 s while frames come; check the frames' names, or keep "
-                     "the radar still longer");
+    throw InputError(bag->file() + ": " + bag->whyNoPose());
+  }
+  if (options.on_note) {
+    for (const std::string& note : bag->notes()) options.on_note(file + ": " + note);
   }
   if (options.exclude_duplicates) excludeDuplicates(recording);
-  recording.forEachFrame = [bag, temporary, assigned, file, from_files = recording.forEachFrame,
+  recording.forEachFrame = [bag, temporary, assigned, from_files = recording.forEachFrame,
                             pattern = recording.capture_pattern](const Pose& pose,
                                                                  const std::function<void(const AdcCube&)>& visit) {
     const auto cubes = assigned->find(pose.name);
     if (cubes != assigned->end() && !cubes->second.empty()) return bag->forEachFrame(pose.name, cubes->second, visit);
     if (fs::exists(captureOf(pattern, pose.name))) return from_files(pose, visit);
-    throw InputError(file + ": pose '" + pose.name +
+    throw InputError(bag->file() + ": pose '" + pose.name +
                      "': bag holds no frames of it; its capture was missing or its time was cut out");
   };
   recording.track = trackOf(*bag);
@@ -384,10 +430,50 @@ Recording openBag(const std::string& file, const BagOptions& options) {
   recording.withPoseLag = [file, options](double lag_s) {
     BagOptions later = options;
     later.pose_lag_s += lag_s;
+    later.on_note = nullptr;  // once is enough
     return openBag(file, later);
   };
   return recording;
 }
+
+namespace {
+
+/// By its name or by its bytes: what is called a bag and is none shall be told so.
+bool meansBag(const std::string& path) {
+  if (fs::is_directory(path)) return false;
+  if (isBag(path) || !whyNoBag(path).empty()) return true;
+  std::string name = fs::path(path).filename().string();
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  const auto ends = [&name](const std::string& end) {
+    return name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
+  };
+  return ends(".bag") || ends(".bag.active");
+}
+
+Recording openBagOf(const std::string& path, const std::string& radar, BagOptions options) {
+  if (!radar.empty() && options.ns.empty() && !fs::is_regular_file(radar) && fs::path(radar).extension().empty()) {
+    options.ns = radar;
+  } else if (!radar.empty() && normalNamespace(radar) != normalNamespace(options.ns)) {
+    throw InputError(path + ": a bag brings its own radar; --radar is of it the namespace of one of several radars " +
+                     "(/left), not a file");
+  }
+  return openBag(path, options);
+}
+
+[[noreturn]] void refuseFolderOfBags(const std::string& folder) {
+  std::vector<std::string> bags;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (isBag(entry.path().string())) bags.push_back(entry.path().string());
+  }
+  std::sort(bags.begin(), bags.end());
+  const std::string other = whyNoBag(folder);
+  if (!other.empty()) throw InputError(folder + ": " + other);
+  if (bags.empty()) openSession(folder);  // says that it is none
+  throw InputError(folder + ": folder holds no session.yaml but " + std::to_string(bags.size()) +
+                   " bag(s); give those that are one recording: " + join(bags, " "));
+}
+
+}  // namespace
 
 Recording openRecording(const std::string& path, const std::string& radar_file,
                         const std::optional<CaptureLayout>& layout, const BagOptions& bag_options) {
@@ -395,13 +481,14 @@ Recording openRecording(const std::string& path, const std::string& radar_file,
   if (!fs::exists(path)) {
     throw InputError(path + ": no such file or folder; give a session directory, a .bag or a .bin capture");
   }
-  if (extension == ".bag") {
-    if (!radar_file.empty() || layout) {
-      throw InputError(path +
-                       ": a bag brings its own radar and holds cubes, not captures; leave --radar and --layout out");
-    }
-    return openBag(path, bag_options);
+  if (meansBag(path)) {
+    if (layout) throw InputError(path + ": a bag holds cubes, not captures; leave --layout out");
+    return openBagOf(path, radar_file, bag_options);
   }
+  if (!bag_options.further.empty()) {
+    throw InputError(path + ": is no bag, and only bags are read together; give one session or capture");
+  }
+  if (fs::is_directory(path) && !fs::exists(fs::path(path) / "session.yaml")) refuseFolderOfBags(path);
   if (extension == ".bin") {
     if (radar_file.empty())
       throw InputError(path + ": a bare capture needs a radar description; give --radar radar.yaml");

@@ -3,13 +3,10 @@
 #include <mmradartwin_msgs/AdcCube.h>
 #include <mmradartwin_msgs/RadarConfig.h>
 #include <mmradartwin_msgs/Session.h>
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <set>
@@ -18,13 +15,11 @@
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
 #include "mmradartwin_dsp/stationary_poses.h"
+#include "mmradartwin_dsp/text.h"
+#include "ros/bag_set.h"
 
 namespace mmradartwin {
 namespace {
-
-std::string withoutSlash(const std::string& name) {
-  return name.substr(std::min(name.find_first_not_of('/'), name.size()));
-}
 
 std::string seconds(std::int64_t stamp_ns) { return formatStamp(stamp_ns) + " s"; }
 
@@ -205,7 +200,8 @@ void checkTransforms(const TransformRecord& tf, const BagOptions& options, const
   }
 }
 
-void checkPoses(const std::string& file, const BagOptions& options, Findings& findings) {
+void checkPoses(const std::string& file, const std::string& label, BagOptions options, Findings& findings) {
+  options.on_note = [&](const std::string& note) { findings.add(note.substr(file.size() + 2), ""); };
   try {
     const Recording recording = openBag(file, options);
     for (const PoseProblem& problem : recording.problems) findings.add("unusable pose(s)", problem.message);
@@ -220,7 +216,8 @@ void checkPoses(const std::string& file, const BagOptions& options, Findings& fi
   } catch (const InputError& error) {
     // What it says may have been found above already: then nothing is added but that there is no pose.
     const std::string text = error.what();
-    findings.add("no pose can be found", text.compare(0, file.size(), file) == 0 ? text.substr(file.size() + 2) : text);
+    findings.add("no pose can be found",
+                 text.compare(0, label.size(), label) == 0 ? text.substr(label.size() + 2) : text);
   }
 }
 
@@ -228,34 +225,22 @@ void checkPoses(const std::string& file, const BagOptions& options, Findings& fi
 
 std::vector<BagFinding> validateBag(const std::string& file, const BagOptions& options, const BagLimits& limits,
                                     const PoseProgress& progress) {
-  if (!std::filesystem::is_regular_file(file)) throw InputError(file + ": no such bag; give a file that exists");
-  rosbag::Bag bag;
-  try {
-    bag.open(file, rosbag::bagmode::Read);
-  } catch (const rosbag::BagUnindexedException&) {
-    throw InputError(file + ": bag has no index; run `rosbag reindex " + file + "` first");
-  } catch (const rosbag::BagException& error) {
-    throw InputError(file + ": cannot be read as a bag (" + error.what() + ")");
-  }
-
+  std::vector<std::string> files = {file};
+  files.insert(files.end(), options.further.begin(), options.further.end());
+  const BagSet bags(files);
   const std::string cubes_end = "radar/adc", config_end = "radar/config";
-  const auto prefixOf = [](const std::string& topic, const std::string& end) -> std::optional<std::string> {
-    const std::string name = withoutSlash(topic);
-    if (name.size() < end.size() || name.compare(name.size() - end.size(), end.size(), end) != 0) return std::nullopt;
-    return name.substr(0, name.size() - end.size());
-  };
-  std::map<std::string, RadarRecord> radars;  // by namespace, with a slash at its end
-  rosbag::View view(bag);
+  std::map<std::string, RadarRecord> radars;  // by namespace
+  const auto view = bags.view();
   bool session = false;
   Findings findings;
-  for (const rosbag::ConnectionInfo* connection : view.getConnections()) {
+  for (const rosbag::ConnectionInfo* connection : view->getConnections()) {
     session = session || connection->datatype == "mmradartwin_msgs/Session";
     if (connection->datatype != "mmradartwin_msgs/AdcCube") continue;
-    const auto prefix = prefixOf(connection->topic, cubes_end);
-    if (!prefix) {
+    const auto ns = namespaceOf(connection->topic, cubes_end);
+    if (!ns) {
       findings.add("topic(s) with frames that are not called radar/adc", connection->topic);
-    } else if (options.ns.empty() || *prefix == withoutSlash(options.ns) + "/") {
-      radars.emplace(*prefix, limits);
+    } else if (options.ns.empty() || *ns == normalNamespace(options.ns)) {
+      radars.emplace(*ns, limits);
     }
   }
   if (radars.empty()) {
@@ -264,12 +249,12 @@ std::vector<BagFinding> validateBag(const std::string& file, const BagOptions& o
   }
   TransformRecord tf;
   std::uint32_t done = 0;
-  for (const rosbag::MessageInstance& message : view) {
-    if (progress && ++done % 64 == 0) progress(static_cast<int>(done), static_cast<int>(view.size()));
+  for (const rosbag::MessageInstance& message : *view) {
+    if (progress && ++done % 64 == 0) progress(static_cast<int>(done), static_cast<int>(view->size()));
     const std::string topic = withoutSlash(message.getTopic());
     const auto record = [&](const std::string& end) -> RadarRecord* {
-      const auto prefix = prefixOf(topic, end);
-      const auto found = prefix ? radars.find(*prefix) : radars.end();
+      const auto ns = namespaceOf(topic, end);
+      const auto found = ns ? radars.find(*ns) : radars.end();
       return found == radars.end() ? nullptr : &found->second;
     };
     if (message.getDataType() == "tf2_msgs/TFMessage") {
@@ -287,19 +272,20 @@ std::vector<BagFinding> validateBag(const std::string& file, const BagOptions& o
     }
   }
   if (radars.size() > 1) {
-    std::string names;
-    for (const auto& [prefix, radar] : radars) names += (names.empty() ? "" : ", ") + ("/" + prefix + cubes_end);
-    findings.add("several radars: programs need --ns to tell them apart", names, radars.size());
+    std::vector<std::string> names;
+    for (const auto& [ns, radar] : radars) names.push_back((ns == "/" ? "" : ns) + "/" + cubes_end);
+    findings.add("several radars: programs need --radar to tell them apart", join(names, ", "), radars.size());
   }
-  for (auto& [prefix, radar] : radars) {
+  for (auto& [ns, radar] : radars) {
     radar.finish();
-    checkTransforms(tf, options, limits, session, radar.stamps_ns, radar.findings);
     BagOptions own = options;
-    if (radars.size() > 1) own.ns = prefix.empty() ? "" : prefix.substr(0, prefix.size() - 1);
-    checkPoses(file, own, radar.findings);
+    own.ns = ns;
+    own.radar_frame = radarFrame(bags, (ns == "/" ? "" : ns) + "/" + cubes_end, options.radar_frame);
+    checkTransforms(tf, own, limits, session, radar.stamps_ns, radar.findings);
+    checkPoses(file, bags.label(), own, radar.findings);
     for (const BagFinding& finding : radar.findings.all) {
       findings.all.push_back(finding);
-      if (radars.size() > 1) findings.all.back().what = "/" + prefix + ": " + finding.what;
+      if (radars.size() > 1) findings.all.back().what = ns + ": " + finding.what;
     }
   }
   return findings.all;

@@ -10,6 +10,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/bag.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/transform_record.h"
 #include "mmradartwin_dsp/stationary_poses.h"
 
 namespace mmradartwin {
@@ -31,7 +32,7 @@ tf2_msgs::TFMessage transformOf(const Eigen::Isometry3d& T_map_radar, const ros:
   T = tf2::eigenToTransform(T_map_radar);
   T.header.stamp = stamp;
   T.header.frame_id = BagOptions().map_frame;
-  T.child_frame_id = BagOptions().radar_frame;
+  T.child_frame_id = kRadarFrame;
   return tf;
 }
 
@@ -187,6 +188,7 @@ Recording FrameSpool::recording(double pose_lag_s) {
   }
   BagOptions options;
   options.seen_only = true;
+  options.radar_frame = kRadarFrame;
   options.pose_lag_s = pose_lag_s;
   // Closed, the bag has an index; a reader takes that in when it opens the file, and the chunks that it points to stay
   // where they are when more are appended behind them.

@@ -15,6 +15,7 @@
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/session_files.h"
 #include "mmradartwin_dsp/sha256.h"
+#include "ros/bag_set.h"
 
 namespace mmradartwin {
 namespace {
@@ -104,11 +105,16 @@ class SessionBagWriter {
 
 namespace {
 
-boost::shared_ptr<mmradartwin_msgs::Session> readSessionMessage(const std::string& bag_file) {
-  const rosbag::Bag bag(bag_file, rosbag::bagmode::Read);
-  rosbag::View view(bag, rosbag::TypeQuery("mmradartwin_msgs/Session"));
+boost::shared_ptr<mmradartwin_msgs::Session> readSessionMessage(const BagSet& bags) {
+  const auto view = bags.view();
+  std::vector<std::string> topics;
+  for (const rosbag::ConnectionInfo* connection : view->getConnections()) {
+    if (connection->datatype == "mmradartwin_msgs/Session") topics.push_back(connection->topic);
+  }
   boost::shared_ptr<mmradartwin_msgs::Session> session;
-  for (const rosbag::MessageInstance& message : view) session = message.instantiate<mmradartwin_msgs::Session>();
+  if (topics.empty()) return session;
+  const auto messages = bags.view(topics);
+  for (const rosbag::MessageInstance& message : *messages) session = message.instantiate<mmradartwin_msgs::Session>();
   return session;
 }
 
@@ -128,7 +134,7 @@ std::string writeFrames(const Recording& recording, const Pose& pose, const std:
 }
 
 void restoreSession(const mmradartwin_msgs::Session& message, const std::string& bag, const std::string& directory,
-                    const PoseProgress& progress) {
+                    const PoseProgress& progress, BagOptions options) {
   const std::vector<StoredFile> files = storedFiles(message);
   const auto has_file = [&files](const std::string& name) {
     return std::any_of(files.begin(), files.end(), [&](const StoredFile& file) { return file.name == name; });
@@ -137,7 +143,6 @@ void restoreSession(const mmradartwin_msgs::Session& message, const std::string&
   const auto session_yaml =
       std::find_if(files.begin(), files.end(), [](const StoredFile& f) { return f.name == "session.yaml"; });
   const std::string pattern = storedCapturePattern(session_yaml->bytes);
-  BagOptions options;
   options.exclude_duplicates = false;
   const Recording recording = openBag(bag, options);
   const std::size_t total = recording.pose_names.size();
@@ -169,8 +174,8 @@ void restoreSession(const mmradartwin_msgs::Session& message, const std::string&
                    directory);
 }
 
-void writeFoundSession(const std::string& bag, const std::string& directory, const PoseProgress& progress) {
-  BagOptions options;
+void writeFoundSession(const std::string& bag, const std::string& directory, const PoseProgress& progress,
+                       BagOptions options) {
   options.exclude_duplicates = false;
   options.unpack_to = directory;
   const Recording recording = openBag(bag, options);
@@ -190,21 +195,20 @@ void writeFoundSession(const std::string& bag, const std::string& directory, con
 
 }  // namespace
 
-void bagToSession(const std::string& bag, const std::string& directory, const PoseProgress& progress) {
+void bagToSession(const std::string& bag, const std::string& directory, const PoseProgress& progress,
+                  const BagOptions& options) {
   if (fs::exists(fs::path(directory) / "session.yaml")) {
     throw InputError(directory + ": holds a session already; give a new folder");
   }
-  if (!fs::is_regular_file(bag)) throw InputError(bag + ": no such bag; give a file that exists");
-  boost::shared_ptr<mmradartwin_msgs::Session> message;
-  try {
-    message = readSessionMessage(bag);
-  } catch (const rosbag::BagException&) {  // openBag says what is wrong with it
-  }
+  std::vector<std::string> files = {bag};
+  files.insert(files.end(), options.further.begin(), options.further.end());
+  const auto message = readSessionMessage(BagSet(files));
   std::error_code error;
   fs::create_directories(directory, error);
   if (error)
     throw InputError(directory + ": folder cannot be made (" + error.message() + "); give one that can be written");
-  message ? restoreSession(*message, bag, directory, progress) : writeFoundSession(bag, directory, progress);
+  message ? restoreSession(*message, bag, directory, progress, options)
+          : writeFoundSession(bag, directory, progress, options);
 }
 
 void sessionToBag(const std::string& session, const std::string& bag_file, const PoseProgress& progress) {

@@ -6,6 +6,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/stationary_poses.h"
 
@@ -20,6 +21,7 @@ constexpr std::size_t kLongestQueue = 1000;
 
 SignalChainNode::SignalChainNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   readParameters(private_nh);
+  countTfWarningsOfProcess();
   // A pose that comes late lets all frames go that waited for it; the answers to none of them may be pushed out.
   grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("radar/grid", kLongestQueue);
   map_publisher_ = nh.advertise<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", kLongestQueue);
@@ -28,10 +30,14 @@ SignalChainNode::SignalChainNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   cube_subscriber_ = nh.subscribe("radar/adc", 200, &SignalChainNode::onCube, this);
   twin_subscriber_ = nh.subscribe("twin/grid", 50, &SignalChainNode::onTwinGrid, this);
   // Not tf2_ros::TransformListener: buffer and record have to know the same transforms at any time.
-  tf_subscriber_ = nh.subscribe<tf2_msgs::TFMessage>(
-      "/tf", 100, [this](const tf2_msgs::TFMessage::ConstPtr& message) { onTransforms(*message, false); });
-  tf_static_subscriber_ = nh.subscribe<tf2_msgs::TFMessage>(
-      "/tf_static", 100, [this](const tf2_msgs::TFMessage::ConstPtr& message) { onTransforms(*message, true); });
+  using Transforms = ros::MessageEvent<tf2_msgs::TFMessage const>;
+  const auto onEvent = [this](bool fixed) -> boost::function<void(const Transforms&)> {
+    return [this, fixed](const Transforms& event) {
+      onTransforms(*event.getConstMessage(), fixed, event.getPublisherName());
+    };
+  };
+  tf_subscriber_ = nh.subscribe<tf2_msgs::TFMessage>("/tf", 100, onEvent(false));
+  tf_static_subscriber_ = nh.subscribe<tf2_msgs::TFMessage>("/tf_static", 100, onEvent(true));
   timer_ = nh.createWallTimer(ros::WallDuration(0.01), [this](const ros::WallTimerEvent&) { drain(); });
 }
 
@@ -107,14 +113,17 @@ void SignalChainNode::forgetTransforms() {
   tf_record_.clearMoving();
 }
 
-void SignalChainNode::onTransforms(const tf2_msgs::TFMessage& message, bool fixed) {
+void SignalChainNode::onTransforms(const tf2_msgs::TFMessage& message, bool fixed, const std::string& publisher) {
   const ros::Time now = ros::Time::now();
   if (now < tf_heard_) forgetTransforms();
   tf_heard_ = now;
   tf_record_.add(message, fixed);
   tf_record_.keep(tf_buffer_.getCacheLength().toSec());
   for (const geometry_msgs::TransformStamped& transform : message.transforms) {
-    tf_buffer_.setTransform(transform, "tf", fixed);  // says itself what is wrong with one that it does not take
+    tf_buffer_.setTransform(transform, publisher, fixed);  // says itself what is wrong with one that it does not take
+  }
+  for (const std::string& contradiction : tf_sources_.add(message, fixed, publisher)) {
+    ROS_WARN("tf contradicts itself: %s", contradiction.c_str());
   }
 }
 

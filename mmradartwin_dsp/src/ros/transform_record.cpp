@@ -10,13 +10,13 @@
 namespace mmradartwin {
 namespace {
 
-std::string withoutSlash(const std::string& name) {
-  return name.substr(std::min(name.find_first_not_of('/'), name.size()));
-}
-
 bool earlier(const TransformRecord::Stamped& a, const TransformRecord::Stamped& b) { return a.stamp_ns < b.stamp_ns; }
 
 }  // namespace
+
+std::string withoutSlash(const std::string& name) {
+  return name.substr(std::min(name.find_first_not_of('/'), name.size()));
+}
 
 void TransformRecord::add(const tf2_msgs::TFMessage& message, bool fixed) {
   for (const geometry_msgs::TransformStamped& transform : message.transforms) {

@@ -13,6 +13,7 @@
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
+#include "mmradartwin_dsp/ros/transform_sources.h"
 
 namespace mmradartwin {
 
@@ -41,7 +42,7 @@ class SignalChainNode {
   void onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& config);
   void onCube(const mmradartwin_msgs::AdcCube::ConstPtr& cube);
   void forgetTransforms();
-  void onTransforms(const tf2_msgs::TFMessage& message, bool fixed);
+  void onTransforms(const tf2_msgs::TFMessage& message, bool fixed, const std::string& publisher);
   void onTwinGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid);
   /// Takes all frames from the queue whose pose is known or will not come.
   void drain();
@@ -60,6 +61,7 @@ class SignalChainNode {
 
   tf2_ros::Buffer tf_buffer_;
   TransformRecord tf_record_;
+  TransformSources tf_sources_;
   ros::Time tf_heard_;
   ros::Publisher grid_publisher_, map_publisher_, twin_map_publisher_;
   ros::Subscriber config_subscriber_, cube_subscriber_, twin_subscriber_, tf_subscriber_, tf_static_subscriber_;

@@ -55,6 +55,12 @@ class TransformRecord {
   std::uint64_t unusable_ = 0;
 };
 
+/// tf frame of the radar where nobody says otherwise.
+inline constexpr char kRadarFrame[] = "radar_link";
+
+/// A name of a frame or topic without the slash at its front.
+std::string withoutSlash(const std::string& name);
+
 /// True where the radar cannot have moved from one to the other.
 bool isJump(const TransformRecord::Stamped& from, const TransformRecord::Stamped& to, const TransformLimits& limits);
 
