@@ -30,6 +30,7 @@
 #include "mmradartwin_dsp/ros/frame_spool.h"
 #include "mmradartwin_dsp/ros/master_watch.h"
 #include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_sim/plugin.h"
 
 namespace {
@@ -107,6 +108,7 @@ class DiagnosisNode {
         updater_(nh_, ros::NodeHandle("~")),
         server_(
             nh_, "attribution/diagnose", [this](const Goal& goal) { execute(goal); }, false) {
+    countTfWarningsOfProcess();
     if (!settings_.config_file.empty()) config_ = loadAttributionConfig(settings_.config_file);
     if (!settings_.diagnosis_config_file.empty()) accuracy_ = loadStatedAccuracy(settings_.diagnosis_config_file);
     findings_ = nh_.advertise<mmradartwin_msgs::Findings>("attribution/findings", 1, true);

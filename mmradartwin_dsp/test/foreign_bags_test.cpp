@@ -1,14 +1,16 @@
-// Bags as others record them: parts of a split one, several radars, clocks that differ, stamps that say nothing, tf that
-// contradicts itself. Each is read or refused with its very cause.
+// Bags as others record them: parts of a split one, several radars, clocks that differ, stamps that say nothing, tf
+// that contradicts itself. Each is read or refused with its very cause.
 #include <gtest/gtest.h>
 #include <ros/time.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
+#include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include "mmradartwin_dsp/ros/bag.h"
 #include "mmradartwin_dsp/ros/bag_validation.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "test_session_folder.h"
 
 namespace mmradartwin {
@@ -60,8 +62,8 @@ class Recorder {
 
 /// A radar on a cart: it stands for 3 s, is pushed by 2 m in 1 s, and stands again.
 struct Drive {
-  std::vector<std::string> radars = {""};                            ///< namespaces
-  std::vector<std::string> radar_frames = {"radar_link"};            ///< of each
+  std::vector<std::string> radars = {""};                                  ///< namespaces
+  std::vector<std::string> radar_frames = {"radar_link"};                  ///< of each
   std::function<double(double)> frame_stamp = [](double t) { return t; };  ///< of what was taken at t
   std::function<double(double)> tf_stamp = [](double t) { return t; };
   std::function<void(Recorder&, double t, double x)> also = [](Recorder&, double, double) {};  ///< at each frame
@@ -75,7 +77,8 @@ struct Drive {
     const RadarConfig radar = paperRadar();
     for (std::size_t i = 0; i < radars.size(); ++i) {
       recorder.write(radars[i] + "/radar/config", 0, toMsg(radar), "/radar_driver");
-      recorder.write("/tf_static", 0, message(transform("cart", radar_frames[i], 0.1 + static_cast<double>(i))), "/mount");
+      recorder.write("/tf_static", 0, message(transform("cart", radar_frames[i], 0.1 + static_cast<double>(i))),
+                     "/mount");
     }
     at_first(recorder);
     for (int i = 0; i < kFrames; ++i) {
@@ -138,7 +141,8 @@ TEST(ForeignBags, ABagIsKnownByItsBytes) {
 TEST(ForeignBags, OtherRecordingsAreNamed) {
   const TestFolder folder;
   writeBytes(folder / "a.mcap", "\x89MCAP0\r\n....");
-  EXPECT_TRUE(saysInOneLine(inputError([&] { openRecording(folder / "a.mcap"); }), "a.mcap", "ROS 2", "rosbags-convert"));
+  EXPECT_TRUE(
+      saysInOneLine(inputError([&] { openRecording(folder / "a.mcap"); }), "a.mcap", "ROS 2", "rosbags-convert"));
   writeBytes(folder / "two/a_0.db3", std::string("SQLite format 3\0....", 20));
   EXPECT_TRUE(saysInOneLine(inputError([&] { openRecording(folder / "two/a_0.db3"); }), "a_0.db3", "ROS 2"));
   writeBytes(folder / "two/metadata.yaml", "rosbag2_bagfile_information:\n");
@@ -200,6 +204,11 @@ TEST(ForeignBags, PartsOfASplitBagAreReadTogether) {
   EXPECT_EQ(openBag(files[0], options).poses.size(), 1u);
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_TRUE(saysInOneLine(notes[0], files[1], "not read"));
+  // A recorder that begins anew leaves bags of such names, too, each a recording of its own.
+  Drive().write(folder / "day_0.bag");
+  Drive().write(folder / "day_1.bag");
+  openBag(folder / "day_0.bag", options);
+  EXPECT_EQ(notes.size(), 1u);
 }
 
 TEST(ForeignBags, BagsThatAreNotOneRecording) {
@@ -258,6 +267,9 @@ TEST(ForeignBags, ClocksThatDifferAreMeasured) {
     const std::string error = errorOf(folder / "clocks.bag");
     EXPECT_TRUE(saysInOneLine(error, "clocks", offset_s > 0 ? "s later than" : "s earlier than", "map -> cart", "/slam",
                               "ntp"));
+    if (offset_s == 112) {
+      EXPECT_TRUE(contains(error, "112 s later")) << error;
+    }
     EXPECT_TRUE(contains(error, option)) << error;
     BagOptions options;
     options.clock_offset_s = offset_s;
@@ -297,7 +309,7 @@ TEST(ForeignBags, FramesAndTransformsOfDifferentTimes) {
       }
     }
   }
-  EXPECT_TRUE(saysInOneLine(errorOf(folder / "apart.bag"), "no time in common", "112.0 s later", "1700000112.",
+  EXPECT_TRUE(saysInOneLine(errorOf(folder / "apart.bag"), "no time in common", "112 s later", "1700000112.",
                             "--clock-offset 112.0"));
   BagOptions options;
   options.clock_offset_s = 112;
@@ -425,7 +437,8 @@ TEST(ForeignBags, TwoMountsAreBothNamed) {
     recorder.write("/tf_static", 4, message(T), "/mount");
   };
   drive.write(folder / "turned.bag");
-  EXPECT_TRUE(saysInOneLine(errorOf(folder / "turned.bag"), "0.000 m and 30.0 deg apart", "yaw pitch roll 30.0 0.0 0.0"));
+  EXPECT_TRUE(
+      saysInOneLine(errorOf(folder / "turned.bag"), "0.000 m and 30.0 deg apart", "yaw pitch roll 30.0 0.0 0.0"));
   // Static and moving at once.
   drive = Drive();
   drive.also = [](Recorder& recorder, double t, double) {
@@ -474,6 +487,20 @@ TEST(ForeignBags, WarningsOfTf2AreCountedInOneLine) {
   Drive().write(folder / "once.bag");
   openBag(folder / "once.bag", options);
   EXPECT_TRUE(notes.empty());
+}
+
+TEST(ForeignBags, WarningsOfAListenerAreOneLineToo) {
+  countTfWarningsOfProcess(3600);
+  tf2::BufferCore buffer;
+  testing::internal::CaptureStderr();
+  for (int i = 0; i < 200; ++i) {
+    auto T = transform("map", "cart", 1);
+    T.header.stamp = ros::Time(5);
+    buffer.setTransform(T, "/slam", false);
+  }
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_TRUE(contains(said, "tf2 left out 1 transform(s)")) << said;
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
 }
 
 }  // namespace

@@ -333,6 +333,25 @@ TEST_F(SignalChainNodeTest, TwinGridsGoThroughTheSameChain) {
   EXPECT_EQ(map.axes.azimuth_rad, SignalChain(radar_).axes().azimuth_rad);
 }
 
+TEST_F(SignalChainNodeTest, SaysWhereTransformsContradictEachOther) {
+  ASSERT_TRUE(hearsTheLog());
+  // In turn, as two publishers say it; again and again, since what is sent before a subscriber is connected is lost.
+  double x = 0;
+  const auto contradict = [&] {
+    for (const char* parent : {"map", "odom"}) {
+      geometry_msgs::TransformStamped T;
+      T.header.stamp = stamp(x += 0.1);
+      T.header.frame_id = parent;
+      T.child_frame_id = "trolley";
+      T.transform.rotation.w = 1;
+      broadcaster_.sendTransform(T);
+    }
+    return waitFor([this] { return hasSaid("frame trolley has 2 parents"); }, 0.2);
+  };
+  EXPECT_TRUE(waitFor(contradict));
+  EXPECT_TRUE(hasSaid("published by " + ros::this_node::getName()));
+}
+
 }  // namespace
 }  // namespace mmradartwin
 

@@ -8,6 +8,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_dsp/session.h"
 
 namespace mmradartwin {
@@ -56,6 +57,7 @@ RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& priva
   if (options_.radar) updater_.add("radar device", this, &RadarDriver::diagnoseDevice);
   if (!map_frame_.empty()) {
     updater_.add("radar pose", this, &RadarDriver::diagnosePose);
+    countTfWarningsOfProcess();
     tf_buffer_ = std::make_unique<tf2_ros::Buffer>();
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(*tf_buffer_, handle);
     pose_timer_ =

@@ -31,6 +31,20 @@ std::optional<PartName> partName(const std::string& file) {
   return PartName{found[1], found[3], std::stoi(found[2])};
 }
 
+/// Not so a later part of a split recording; what recorders begin anew is a recording of its own.
+bool standsAlone(const std::string& file) {
+  try {
+    const rosbag::Bag bag(file, rosbag::bagmode::Read);
+    rosbag::View view(bag);
+    const auto connections = view.getConnections();
+    return std::any_of(connections.begin(), connections.end(), [](const rosbag::ConnectionInfo* connection) {
+      return connection->datatype == "mmradartwin_msgs/RadarConfig";
+    });
+  } catch (const rosbag::BagException&) {
+    return true;  // what cannot be read is no part of anything
+  }
+}
+
 }  // namespace
 
 std::optional<std::string> namespaceOf(const std::string& topic, const std::string& ending) {
@@ -128,8 +142,8 @@ std::string BagSet::noteOnNextPart() const {
     const auto name = partName(file);
     if (!name) continue;
     const std::string next = name->of(name->part + 1);
-    if (std::find(files_.begin(), files_.end(), next) != files_.end() || !isBag(next)) continue;
-    return next + " stands beside " + file + " and is not read: give both, where they are parts of one recording";
+    if (std::find(files_.begin(), files_.end(), next) != files_.end() || !isBag(next) || standsAlone(next)) continue;
+    return next + " stands beside " + file + ", is a later part of the same recording and is not read: give both";
   }
   return "";
 }

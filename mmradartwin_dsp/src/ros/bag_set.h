@@ -20,13 +20,14 @@ class BagSet {
   /// For errors: the first file, and how many more.
   const std::string& label() const { return label_; }
   /// Messages of some topics, or of all.
-  std::unique_ptr<rosbag::View> view(const std::vector<std::string>& topics = {}, const ros::Time& first = ros::TIME_MIN,
+  std::unique_ptr<rosbag::View> view(const std::vector<std::string>& topics = {},
+                                     const ros::Time& first = ros::TIME_MIN,
                                      const ros::Time& last = ros::TIME_MAX) const;
   bool holds(const std::string& topic) const;
   /// What to add to an error about messages that are missing and that are latched: a split recording holds them in its
   /// first part only. "" where the first part is there.
   std::string adviceForLatched() const;
-  /// What stands beside the bags and seems to belong to them: the part that follows. "" where nothing does.
+  /// What stands beside the bags and belongs to them: the part that follows. "" where nothing does.
   std::string noteOnNextPart() const;
 
  private:
@@ -40,8 +41,8 @@ class BagSet {
 std::optional<std::string> namespaceOf(const std::string& topic, const std::string& ending);
 /// A namespace as a user writes it, "robot1/", as namespaceOf() returns it; "" stays.
 std::string normalNamespace(const std::string& ns);
-/// tf frame of the radar: the one that is `wanted`; without that the one that the frames on a topic name, where tf knows
-/// it, else radar_link.
+/// tf frame of the radar: the one that is `wanted`; without that the one that the frames on a topic name, where tf
+/// knows it, else radar_link.
 std::string radarFrame(const BagSet& bags, const std::string& cube_topic, const std::string& wanted);
 
 }  // namespace mmradartwin

@@ -59,7 +59,9 @@ std::string RecordedTf::clocksApart(const std::string& edge, const StampRecord& 
   const auto offset = StampRecord::between(frames, transforms);
   if (!offset || std::abs(offset->later_s - clock_offset_s) <= kClocksApart_s) return "";
   char apart[60], option[60];
-  std::snprintf(apart, sizeof apart, "%.1f s %s", std::abs(offset->later_s), offset->later_s > 0 ? "later" : "earlier");
+  // What messages take from their stamp to the recorder, a tenth of a second or so, is in it.
+  std::snprintf(apart, sizeof apart, "%.*f s %s", std::abs(offset->later_s) < 20 ? 1 : 0, std::abs(offset->later_s),
+                offset->later_s > 0 ? "later" : "earlier");
   std::snprintf(option, sizeof option, "--clock-offset %.1f", offset->later_s);
   if (offset->measured) {
     return "frames are stamped " + std::string(apart) + " than tf's " + edge +

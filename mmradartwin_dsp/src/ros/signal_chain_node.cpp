@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
@@ -14,6 +15,8 @@ namespace mmradartwin {
 namespace {
 
 constexpr double kWarnEvery_s = 5;
+/// Beyond it a frame's stamp and those of tf are of different clocks.
+constexpr double kClocksApart_s = 5;
 /// Frames that may wait for tf; a second at the fastest frame rates.
 constexpr std::size_t kLongestQueue = 1000;
 
@@ -120,6 +123,7 @@ void SignalChainNode::onTransforms(const tf2_msgs::TFMessage& message, bool fixe
   tf_record_.add(message, fixed);
   tf_record_.keep(tf_buffer_.getCacheLength().toSec());
   for (const geometry_msgs::TransformStamped& transform : message.transforms) {
+    if (!fixed) newest_transform_ = transform.header.stamp;
     tf_buffer_.setTransform(transform, publisher, fixed);  // says itself what is wrong with one that it does not take
   }
   for (const std::string& contradiction : tf_sources_.add(message, fixed, publisher)) {
@@ -144,12 +148,25 @@ void SignalChainNode::drain() {
       const double waited_s = (ros::Time::now() - front.since).toSec();
       // Time that went back while the frame waited counts as waited out.
       if (waited_s >= 0 && waited_s < pose_timeout_s_ && queue_.size() < kLongestQueue) return;
-      ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f goes on without a pose: %s", stamp.toSec(), error.what());
+      ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f goes on without a pose: %s", stamp.toSec(),
+                        whyNoPose(stamp, error.what()).c_str());
     }
     const mmradartwin_msgs::AdcCube::ConstPtr cube = front.cube;
     queue_.pop_front();
     process(*cube, T_map_radar);
   }
+}
+
+std::string SignalChainNode::whyNoPose(const ros::Time& stamp, const std::string& said) const {
+  if (stamp.isZero()) return "its stamp is zero, the driver did not stamp it";
+  const double later_s = (stamp - newest_transform_).toSec();
+  if (newest_transform_.isZero() || std::abs(later_s) < kClocksApart_s) return said;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "it is stamped %.1f s %s than the newest transform; where tf goes on, clocks of two computers differ: "
+                "synchronise them (ntp, chrony)",
+                std::abs(later_s), later_s > 0 ? "later" : "earlier");
+  return text;
 }
 
 void SignalChainNode::process(const mmradartwin_msgs::AdcCube& msg,

@@ -84,8 +84,8 @@ std::string TfWarningCount::text() const {
   std::string text = "tf2 left out " + std::to_string(count()) + " transform(s): ";
   std::string separator;
   for (const auto& [name, kind] : kinds_) {
-    text += separator + std::to_string(kind.count) + " by " + name + " (first: " + kind.first.substr(std::min(kind.first.find_first_not_of(": ", name.size()), kind.first.size())) +
-            ")";
+    text += separator + std::to_string(kind.count) + " by " + name + " (first: " +
+            kind.first.substr(std::min(kind.first.find_first_not_of(": ", name.size()), kind.first.size())) + ")";
     separator = ", ";
   }
   for (char& c : text) c = c == '\n' ? ' ' : c;

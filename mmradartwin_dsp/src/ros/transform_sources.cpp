@@ -44,8 +44,7 @@ std::string mountText(const Eigen::Isometry3d& T) {
   const Eigen::Matrix3d& R = T.linear();
   // Rounded here, since printf writes what is a little less than zero as -0.0.
   const auto degrees = [](double rad) { return std::round(rad * 1800 / M_PI) / 10 + 0.0; };
-  const double yaw = degrees(std::atan2(R(1, 0), R(0, 0))),
-               pitch = degrees(std::asin(std::clamp(-R(2, 0), -1.0, 1.0))),
+  const double yaw = degrees(std::atan2(R(1, 0), R(0, 0))), pitch = degrees(std::asin(std::clamp(-R(2, 0), -1.0, 1.0))),
                roll = degrees(std::atan2(R(2, 1), R(2, 2)));
   char text[160];
   std::snprintf(text, sizeof text, "x y z %.3f %.3f %.3f m, yaw pitch roll %.1f %.1f %.1f deg", T.translation().x(),
@@ -145,9 +144,8 @@ std::string TransformSources::contradictionOf(const std::string& child, const Fr
       if (a.fixed != b.fixed && !sameMount(a.T, b.T)) {
         const Source& mount = a.fixed ? a : b;
         const Source& moving = a.fixed ? b : a;
-        return edge + " is in tf_static" + publishedBy(mount.publisher) + " and in tf" +
-               publishedBy(moving.publisher) + ", " + apart(a.T, b.T) + "; let one of them alone say where " + child +
-               " is";
+        return edge + " is in tf_static" + publishedBy(mount.publisher) + " and in tf" + publishedBy(moving.publisher) +
+               ", " + apart(a.T, b.T) + "; let one of them alone say where " + child + " is";
       }
     }
   }

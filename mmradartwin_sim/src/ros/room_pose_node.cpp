@@ -10,6 +10,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_dsp/session.h"
 
 namespace mmradartwin {
@@ -36,6 +37,7 @@ RoomPoseNode::RoomPoseNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   readParameters(private_nh);
   scene_.emplace(loadScene(resolvePath(scene_file_, "/"), kFrequency_hz));
   registration_.emplace(*scene_, options_);
+  countTfWarningsOfProcess();
   tf_listener_.emplace(tf_buffer_, nh);
   pose_publisher_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("room_pose", 10);
   updater_ = std::make_unique<diagnostic_updater::Updater>(nh, private_nh);

@@ -26,6 +26,7 @@ constexpr double kMeasuredFor_s = 1;  // without a grid for so long the twin goe
 TwinNode::TwinNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   readParameters(private_nh);
   tf_listener_.emplace(tf_buffer_, nh);
+  tf_watch_.emplace(nh);
   grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("twin/grid", 100);  // as many as may wait
   paths_publisher_ = nh.advertise<mmradartwin_msgs::PathRecords>("twin/paths", 1, true);
   scene_publisher_ = nh.advertise<mmradartwin_msgs::Scene>("twin/scene", 1, true);

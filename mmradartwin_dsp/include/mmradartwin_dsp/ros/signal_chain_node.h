@@ -44,6 +44,8 @@ class SignalChainNode {
   void forgetTransforms();
   void onTransforms(const tf2_msgs::TFMessage& message, bool fixed, const std::string& publisher);
   void onTwinGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid);
+  /// In words; `said` is tf2's own.
+  std::string whyNoPose(const ros::Time& stamp, const std::string& said) const;
   /// Takes all frames from the queue whose pose is known or will not come.
   void drain();
   void process(const mmradartwin_msgs::AdcCube& cube, const std::optional<Eigen::Isometry3d>& T_map_radar);
@@ -62,7 +64,7 @@ class SignalChainNode {
   tf2_ros::Buffer tf_buffer_;
   TransformRecord tf_record_;
   TransformSources tf_sources_;
-  ros::Time tf_heard_;
+  ros::Time tf_heard_, newest_transform_;
   ros::Publisher grid_publisher_, map_publisher_, twin_map_publisher_;
   ros::Subscriber config_subscriber_, cube_subscriber_, twin_subscriber_, tf_subscriber_, tf_static_subscriber_;
   ros::WallTimer timer_;

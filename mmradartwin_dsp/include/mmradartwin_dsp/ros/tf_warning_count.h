@@ -17,7 +17,8 @@ class TfWarningCount {
   TfWarningCount& operator=(const TfWarningCount&) = delete;
 
   std::uint64_t count() const;
-  /// All of it in one line: "tf2 left out 241 transforms: 240 by TF_REPEATED_DATA (first: ...)"; "" where it said nothing.
+  /// All of it in one line: "tf2 left out 241 transforms: 240 by TF_REPEATED_DATA (first: ...)"; "" where it said
+  /// nothing.
   std::string text() const;
 
  private:

@@ -33,10 +33,10 @@ class TransformSources {
   };
   struct Frame {
     std::vector<Source> sources;
-    std::size_t last = 0;       ///< which source spoke last
-    int parents_in_turn = 0;    ///< how often a parent was named again soon after another one
-    int places_in_turn = 0;     ///< how often two publishers put the frame at different places at one time
-    bool reported = false;      ///< by add()
+    std::size_t last = 0;     ///< which source spoke last
+    int parents_in_turn = 0;  ///< how often a parent was named again soon after another one
+    int places_in_turn = 0;   ///< how often two publishers put the frame at different places at one time
+    bool reported = false;    ///< by add()
   };
 
   /// Takes in what was said; true where that may contradict what others said.

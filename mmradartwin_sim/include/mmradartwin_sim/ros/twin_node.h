@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "mmradartwin_dsp/ros/transform_watch.h"
 #include "mmradartwin_dsp/temporary_folder.h"
 #include "mmradartwin_sim/cell_records.h"
 #include "mmradartwin_sim/moving_twin.h"
@@ -97,6 +98,7 @@ class TwinNode {
 
   tf2_ros::Buffer tf_buffer_;
   std::optional<tf2_ros::TransformListener> tf_listener_;
+  std::optional<TransformWatch> tf_watch_;
   ros::Publisher grid_publisher_, paths_publisher_, scene_publisher_;
   ros::Subscriber config_subscriber_, session_subscriber_, grid_subscriber_;
   ros::ServiceServer apply_service_;
