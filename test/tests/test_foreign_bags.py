@@ -45,13 +45,21 @@ class Writer:
     """Messages with the names of their publishers, into one bag or, by their time, into parts of one."""
 
     def __init__(self, files, part_s=1e9):
-        self.bags, self.part_s = [rosbag.Bag(file, "w") for file in files], part_s
+        # Small chunks: what stands in a chunk that was begun is lost with a recorder that is cut off.
+        self.bags, self.part_s = [rosbag.Bag(file, "w", chunk_threshold=50_000) for file in files], part_s
+        self.connections = {}
 
     def write(self, topic, t, message, publisher):
         header = {"callerid": publisher, "topic": topic, "type": message._type, "md5sum": message._md5sum,
                   "message_definition": message._full_text}
         part = min(len(self.bags) - 1, int(max(t, 0) / self.part_s))
+        # A recorder keeps a connection for each publisher; rosbag in Python keeps one for each topic.
+        known, key = self.bags[part]._topic_connections, (part, topic, publisher)
+        known.pop(topic, None)
+        if key in self.connections:
+            known[topic] = self.connections[key]
         self.bags[part].write(topic, message, time_of(t), connection_header=header)
+        self.connections[key] = known[topic]
 
     def close(self):
         for bag in self.bags:
