@@ -256,6 +256,47 @@ TEST(ForeignBags, OneOfSeveralRadarsIsChosen) {
   EXPECT_TRUE(contains(found[0].what, "several radars"));
 }
 
+TEST(ForeignBags, TwoRadarsOnOneTopicAreNotAveraged) {
+  const TestFolder folder;
+  // Two drivers without a namespace: the same mount's name, or each its own.
+  for (const char* frame : {"radar_link", "radar_2"}) {
+    Drive drive;
+    drive.also = [frame](Recorder& recorder, double t, double) {
+      AdcCube cube;
+      cube.chirps = 2, cube.samples = 64, cube.receivers = 4;
+      cube.data.assign(2 * 64 * 4 * 2, 90);
+      cube.chirp_valid.assign(2, 1);
+      auto msg = toMsg(cube, radarHash(paperRadar()));
+      msg.header.frame_id = frame;
+      msg.header.stamp = Drive::time(t + 0.02);
+      recorder.write("/radar/adc", t + 0.08, msg, "/radar_driver_2");
+    };
+    drive.write(folder / "mixed.bag");
+    EXPECT_TRUE(saysInOneLine(errorOf(folder / "mixed.bag"), "/radar/adc are of several radars",
+                              "radar_link (published by /radar_driver)",
+                              std::string(frame) + " (published by /radar_driver_2)"));
+  }
+  // A driver that was started anew is the same radar.
+  {
+    const std::vector<std::string> parts = {folder / "before_0.bag", folder / "before_1.bag"};
+    Recorder recorder(parts, 3.5);
+    Drive().record(recorder);
+  }
+  {
+    const rosbag::Bag before(folder / "before_0.bag", rosbag::bagmode::Read);
+    const rosbag::Bag after(folder / "before_1.bag", rosbag::bagmode::Read);
+    rosbag::Bag to(folder / "anew.bag", rosbag::bagmode::Write);
+    rosbag::View first(before), second(after);
+    for (const rosbag::MessageInstance& m : first) to.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader());
+    for (const rosbag::MessageInstance& m : second) {
+      const auto header = boost::make_shared<ros::M_string>(*m.getConnectionHeader());
+      (*header)["callerid"] += "_restarted";
+      to.write(m.getTopic(), m.getTime(), m, header);
+    }
+  }
+  expectTheTwoPlaces(openBag(folder / "anew.bag"));
+}
+
 TEST(ForeignBags, ClocksThatDifferAreMeasured) {
   const TestFolder folder;
   for (const double offset_s : {112.0, -40.0, 3.0e6}) {

@@ -25,6 +25,7 @@
 #include "mmradartwin_dsp/temporary_folder.h"
 #include "mmradartwin_dsp/text.h"
 #include "ros/bag_set.h"
+#include "ros/frame_sources.h"
 #include "ros/recorded_tf.h"
 
 namespace mmradartwin {
@@ -218,6 +219,7 @@ class BagContents {
       const auto cube = message.instantiate<mmradartwin_msgs::AdcCube>();
       if (!cube) refuseVersion(message);
       waiting.push_back({toNanoseconds(cube->header.stamp), message.getTime(), std::nullopt, false});
+      sources_.add(cube->header.frame_id, message.getCallerId());
       frames_.add(waiting.back().stamp_ns, toNanoseconds(message.getTime()));
     }
     settle(tf, waiting, true);
@@ -231,6 +233,7 @@ class BagContents {
     };
     if (cubes.empty()) refuse("bag holds no frames on topic " + topic(kCubes));
     refuse(frames_.whyNoTime("frames on " + topic(kCubes), "the driver"));
+    refuse(sources_.whyNotOne(topic(kCubes)));
     refuseFramesTwice();
     if (tf.empty()) {
       refuse("bag holds no tf; record /tf and /tf_static too, with " + options_.map_frame + " -> " + radar_frame_ +
@@ -277,6 +280,7 @@ class BagContents {
   std::mutex mutex_;
   std::string prefix_, radar_frame_;
   StampRecord frames_;
+  FrameSources sources_;
   std::vector<std::string> notes_;
 };
 
