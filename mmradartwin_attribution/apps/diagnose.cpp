@@ -32,7 +32,7 @@ void requireSameScene(const TwinDescription& other, const TwinDescription& twin)
 }
 
 int run(const Arguments& arguments, const std::vector<std::string>& command) {
-  const Recording recording = arguments.input.open();
+  const Recording recording = arguments.input.open(true);
   const std::optional<std::string> scene = arguments.input.sceneFile(recording);
   const std::string twin_file = arguments.input.twinFile(recording);
 

@@ -1,8 +1,10 @@
 #include "recording_arguments.h"
 
 #include <CLI/CLI.hpp>
+#include <iostream>
 
 #include "mmradartwin_dsp/bag_kind.h"
+#include "mmradartwin_dsp/capture_check.h"
 #include "mmradartwin_dsp/ros/bag_arguments.h"
 
 namespace mmradartwin {
@@ -18,6 +20,7 @@ void RecordingArguments::addTo(CLI::App& app) {
   app.add_option("--layout", layout, "byte layout of the captures, instead of radar.yaml's")
       ->check(CLI::IsMember({"4lane", "2lane"}));
   addBagArguments(app, bag);
+  app.add_flag("--align", align, "read captures that begin within a frame from their first whole chirp on");
 }
 
 void RecordingArguments::addChannelsTo(CLI::App& app) {
@@ -27,17 +30,31 @@ void RecordingArguments::addChannelsTo(CLI::App& app) {
 
 std::string RecordingArguments::radarFile() const { return isBag(recording()) ? "" : radar; }
 
-Recording RecordingArguments::open() const {
+Recording RecordingArguments::open(bool misaligned_is_finding) const {
   std::optional<CaptureLayout> lanes;
   if (!layout.empty()) lanes = layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
   BagOptions together = bag;
   together.further.assign(recordings.begin() + 1, recordings.end());
   Recording opened = openRecording(recording(), radar, lanes, together);
   if (!channels.empty()) opened.channels = loadChannelCorrection(channels, opened.radar);
+  check(misaligned_is_finding, opened);
   return opened;
 }
 
 Recording RecordingArguments::open(const std::string& path) const {
+  Recording opened = openUnchecked(path);
+  check(false, opened);
+  return opened;
+}
+
+void RecordingArguments::check(bool misaligned_is_finding, Recording& opened) const {
+  using Misaligned = CaptureCheckOptions::Misaligned;
+  CaptureCheckOptions options;
+  options.misaligned = align ? Misaligned::kAligned : misaligned_is_finding ? Misaligned::kFound : Misaligned::kRefused;
+  for (const std::string& note : checkCaptures(opened, options)) std::cerr << "note: " << note << "\n";
+}
+
+Recording RecordingArguments::openUnchecked(const std::string& path) const {
   std::optional<CaptureLayout> lanes;
   if (!layout.empty()) lanes = layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
   return openRecording(path, radarFile(), lanes, bag);
@@ -57,6 +74,7 @@ TwinDescription RecordingArguments::loadTwinOf(const Recording& opened) const {
 
 TwinDescription RecordingArguments::loadTwinOf(const Recording& opened, const std::string& file) const {
   TwinDescription description = loadTwin(file, sceneFile(opened), opened.radar);
+  leaveOutReceivers(opened.radar, description.radar);
   if (opened.channels) refuseSameChannelError(description, *opened.channels);
   return description;
 }

@@ -18,8 +18,9 @@ struct RecordingArguments {
   std::string twin, scene, radar, layout, channels;
   std::vector<std::string> recordings;  ///< several bags are read as one
   BagOptions bag;
+  bool align = false;
 
-  /// Adds the argument `recording`, --twin, --scene, --radar and --layout, and what is taken of bags.
+  /// Adds the argument `recording`, --twin, --scene, --radar, --layout and --align, and what is taken of bags.
   void addTo(CLI::App& app);
   /// Adds --channels.
   void addChannelsTo(CLI::App& app);
@@ -27,8 +28,8 @@ struct RecordingArguments {
   const std::string& recording() const { return recordings.front(); }
   /// "" where --radar is the namespace of one of a bag's radars.
   std::string radarFile() const;
-  /// Throws InputError.
-  Recording open() const;
+  /// Asks whether its captures are what radar.yaml says (checkCaptures) and prints the notes. Throws InputError.
+  Recording open(bool misaligned_is_finding = false) const;
   /// Another recording of the same radar and layout, without `channels`.
   Recording open(const std::string& path) const;
   /// The one given, else the recording's; nothing and "" where there is none.
@@ -37,6 +38,10 @@ struct RecordingArguments {
   /// loadTwin() with these. Throws InputError, also for a twin with the channel errors that `channels` takes out.
   TwinDescription loadTwinOf(const Recording& recording) const;
   TwinDescription loadTwinOf(const Recording& recording, const std::string& file) const;  ///< another one
+
+ private:
+  Recording openUnchecked(const std::string& path) const;
+  void check(bool misaligned_is_finding, Recording& opened) const;
 };
 
 }  // namespace mmradartwin

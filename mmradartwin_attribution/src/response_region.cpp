@@ -264,7 +264,7 @@ void RegionModel::addImages(const Eigen::Isometry3d& T, std::vector<ResponseRegi
     for (int u = -kSteps; u <= kSteps; ++u) {
       std::complex<double> total = 0;
       for (int k = 0; k < channels; ++k) {
-        total += sum[k] * std::polar(1.0, 2 * M_PI * k * line.pitch_m * u / kSteps / wavelength_m_);
+        total += sum[k] * std::polar(1.0, 2 * M_PI * line.places[k] * line.pitch_m * u / kSteps / wavelength_m_);
       }
       beam[u + kSteps] = std::abs(total) / channels;
     }

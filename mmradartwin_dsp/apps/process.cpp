@@ -6,6 +6,7 @@
 
 #include "mmradartwin_dsp/array_file.h"
 #include "mmradartwin_dsp/average_pose.h"
+#include "mmradartwin_dsp/capture_check.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/map_picture.h"
 #include "mmradartwin_dsp/program.h"
@@ -23,6 +24,7 @@ struct Options {
   BagOptions bag;
   bool mat = false;
   bool cubes = false;
+  bool align = false;
 };
 
 /// cube: [frame][chirp][sample][rx] complex ADC counts; grid: [channel][sample]; map: [range][azimuth] dBFS.
@@ -59,6 +61,9 @@ int process(const Options& options) {
   bag.further.assign(options.inputs.begin() + 1, options.inputs.end());
   Recording recording = openRecording(options.inputs.front(), options.radar, layout, bag);
   if (!options.channels.empty()) recording.channels = loadChannelCorrection(options.channels, recording.radar);
+  CaptureCheckOptions check;
+  if (options.align) check.misaligned = CaptureCheckOptions::Misaligned::kAligned;
+  for (const std::string& note : checkCaptures(recording, check)) std::cerr << "note: " << note << "\n";
   const SignalChain chain = [&] {
     try {
       return SignalChain(recording.radar);
@@ -115,6 +120,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"4lane", "2lane"}));
   app.add_option("--channels", options.channels, "channels.yaml of calibrate: channel errors to take out of the grids");
   addBagArguments(app, options.bag);
+  app.add_flag("--align", options.align, "read captures that begin within a frame from their first whole chirp on");
   app.add_flag("--mat", options.mat,
                "also write grid and map of each pose as a MATLAB file (Octave and SciPy read it too)");
   app.add_flag("--cubes", options.cubes, "with --mat: the raw cubes too, [frame][chirp][sample][rx][I,Q]");

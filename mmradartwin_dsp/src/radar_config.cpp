@@ -36,6 +36,8 @@ LineFit fitLine(const RadarConfig& radar, const std::vector<int>& slots) {
                    [&radar](int a, int b) { return radar.virtual_element_m(a).y() < radar.virtual_element_m(b).y(); });
   const Eigen::Vector3d origin = radar.virtual_element_m(channels.front());
   const double length_m = (radar.virtual_element_m(channels.back()) - origin).y();
+  fit.line.places.resize(channels.size());
+  std::iota(fit.line.places.begin(), fit.line.places.end(), 0);
   const double pitch_m = fit.line.pitch_m = length_m / static_cast<double>(channels.size() - 1);
   for (std::size_t i = 1; i < channels.size(); ++i) {
     const Eigen::Vector3d off =
@@ -75,6 +77,25 @@ std::string describeOffLine(const RadarConfig& radar, int slot, const std::vecto
   }
   text << listOf(line);
   return text.str();
+}
+
+/// The line of a radar of which receivers were left out: the whole one without their elements.
+VirtualLine lineOfWhole(const RadarConfig& radar) {
+  RadarConfig whole = radar;
+  whole.rx_position_m = radar.whole_line_rx_m;
+  whole.whole_line_rx_m.clear();
+  const VirtualLine all = whole.virtualLine();
+  VirtualLine line;
+  line.pitch_m = all.pitch_m;
+  for (std::size_t i = 0; i < all.channels.size(); ++i) {
+    const Eigen::Vector3d& rx = whole.rx_position_m[static_cast<std::size_t>(all.channels[i] % whole.receivers())];
+    const auto kept = std::find(radar.rx_position_m.begin(), radar.rx_position_m.end(), rx);
+    if (kept == radar.rx_position_m.end()) continue;
+    line.channels.push_back(all.channels[i] / whole.receivers() * radar.receivers() +
+                            static_cast<int>(kept - radar.rx_position_m.begin()));
+    line.places.push_back(all.places[i]);
+  }
+  return line;
 }
 
 void writePositions(std::ostream& out, const std::string& key, const std::vector<Eigen::Vector3d>& positions) {
@@ -135,6 +156,7 @@ double RadarConfig::center_frequency_hz() const { return carrier_hz + slope_hz_p
 double RadarConfig::wavelength_m() const { return kSpeedOfLight_m_per_s / center_frequency_hz(); }
 
 VirtualLine RadarConfig::virtualLine() const {
+  if (!whole_line_rx_m.empty()) return lineOfWhole(*this);
   const std::vector<int> slots = angle_slots.empty() ? allSlots(*this) : angle_slots;
   if (static_cast<int>(slots.size()) * receivers() < 2) {
     throw InputError("tx_position_m, rx_position_m: the virtual array has " +
@@ -186,8 +208,9 @@ std::string toYaml(const RadarConfig& radar) {
   out << "device: " << yamlText(radar.device) << "\n";
   out << "carrier_hz: " << yamlNumber(radar.carrier_hz) << "\n";
   out << "slope_hz_per_s: " << yamlNumber(radar.slope_hz_per_s) << "\n";
-  out << "samples_per_chirp: " << radar.samples_per_chirp << "\n";
-  out << "sample_rate_hz: " << yamlNumber(radar.sample_rate_hz) << "\n";
+  const int halved = radar.real_samples ? 2 : 1;
+  out << "samples_per_chirp: " << halved * radar.samples_per_chirp << "\n";
+  out << "sample_rate_hz: " << yamlNumber(halved * radar.sample_rate_hz) << "\n";
   out << "adc_start_s: " << yamlNumber(radar.adc_start_s) << "\n";
   out << "loops_per_frame: " << radar.loops_per_frame << "\n";
   out << "frame_period_s: " << yamlNumber(radar.frame_period_s) << "\n";
@@ -195,6 +218,7 @@ std::string toYaml(const RadarConfig& radar) {
   writePositions(out, "rx_position_m", radar.rx_position_m);
   out << "layout: " << (radar.layout == CaptureLayout::kTwoLane ? "2lane" : "4lane") << "\n";
   out << "iq_order: " << (radar.iq_order == IqOrder::kQi ? "qi" : "iq") << "\n";
+  if (radar.real_samples) out << "samples: real\n";
   const auto optional = [&out](const char* key, double value) {
     if (!std::isnan(value)) out << key << ": " << yamlNumber(value) << "\n";
   };

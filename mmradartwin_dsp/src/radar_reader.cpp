@@ -37,6 +37,7 @@ RadarConfig read(YamlMap yaml) {
   if (yaml.has("iq_order")) {
     radar.iq_order = yaml.choice("iq_order", {"iq", "qi"}) == "qi" ? IqOrder::kQi : IqOrder::kIq;
   }
+  if (yaml.has("samples")) radar.real_samples = yaml.choice("samples", {"complex", "real"}) == "real";
   if (yaml.has("idle_s")) radar.idle_s = readRadarNumber(yaml, "idle_s");
   if (yaml.has("ramp_end_s")) radar.ramp_end_s = readRadarNumber(yaml, "ramp_end_s");
   if (yaml.has("rx_gain_db")) radar.rx_gain_db = yaml.number("rx_gain_db", 0, 120);
@@ -73,11 +74,20 @@ RadarConfig read(YamlMap yaml) {
   }
   yaml.rejectUnknownKeys();
 
-  if (radar.layout == CaptureLayout::kTwoLane && radar.samples_per_chirp % 2 != 0) {
+  if (radar.real_samples && (radar.samples_per_chirp % 2 != 0 || radar.samples_per_chirp < 4)) {
+    yaml.fail("samples_per_chirp",
+              "'" + std::to_string(radar.samples_per_chirp) +
+                  "' real samples do not pair up; with samples: real it must be even and at least 4");
+  }
+  if (!radar.real_samples && radar.layout == CaptureLayout::kTwoLane && radar.samples_per_chirp % 2 != 0) {
     yaml.fail("samples_per_chirp", "'" + std::to_string(radar.samples_per_chirp) +
                                        "' is odd; layout 2lane stores samples in pairs, so it must be even");
   }
   checkPlausibility(radar, yaml);
+  if (radar.real_samples) {
+    radar.samples_per_chirp /= 2;
+    radar.sample_rate_hz /= 2;
+  }
   return radar;
 }
 

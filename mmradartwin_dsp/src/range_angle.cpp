@@ -90,7 +90,8 @@ ComplexGrid SignalChain::spatialSpectra(const ComplexGrid& range_spectra) const 
     elements.fill(0);
     for (std::size_t k = 0; k < plan_->line.channels.size(); ++k) {
       const std::complex<double> x = range_spectra(plan_->line.channels[k], r);
-      k % 2 == 0 ? elements[k % kAngleBins] += x : elements[k % kAngleBins] -= x;
+      const auto place = static_cast<std::size_t>(plan_->line.places[k]);
+      place % 2 == 0 ? elements[place % kAngleBins] += x : elements[place % kAngleBins] -= x;
     }
     fft().inv(spectra.row(r).data(), elements.data(), kAngleBins);
   }

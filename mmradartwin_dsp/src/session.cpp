@@ -68,15 +68,26 @@ std::string captureFile(const std::string& pattern, const std::string& pose) {
   return file.replace(file.find("{pose}"), 6, pose);
 }
 
-/// Bytes of a capture; 0 where it is missing (reading it says so).
-std::uintmax_t captureBytes(const std::string& file) {
+/// Captures of poses are no parts of each other.
+OtherCaptures capturesOf(const std::vector<std::string>& poses, const std::string& pattern) {
+  auto files = std::make_shared<std::set<std::string>>();
+  for (const std::string& pose : poses) files->insert(fs::path(captureFile(pattern, pose)).lexically_normal().string());
+  return [files](const std::string& file) { return files->count(fs::path(file).lexically_normal().string()) > 0; };
+}
+
+/// Bytes of samples of a capture; 0 where it is missing (reading it says so).
+std::uintmax_t captureBytes(const RadarConfig& radar, const std::string& file, const OtherCaptures& others) {
   std::uintmax_t size = 0;
   try {
-    for (const std::string& part : captureParts(file)) {
+    for (const std::string& part : captureParts(file, others)) {
       std::error_code error;
       const std::uintmax_t bytes = fs::file_size(part, error);
       if (error) return 0;
       size += bytes;
+    }
+    // Heads of packets seldom fill whole frames.
+    if (size % radar.bytes_per_frame() != 0 && size > radar.bytes_per_frame()) {
+      return CaptureReader(radar, file, CaptureReader::Rest::kLeftOut, others).size();
     }
   } catch (const InputError&) {
     return 0;
@@ -85,14 +96,16 @@ std::uintmax_t captureBytes(const std::string& file) {
 }
 
 /// Where most captures hold no whole number of frames, they are of another radar.
-bool mostAreOfWholeFrames(const Recording& recording, const std::string& pattern) {
+bool mostAreOfWholeFrames(const Recording& recording, const std::string& pattern, const OtherCaptures& others) {
   const auto whole = std::count_if(recording.poses.begin(), recording.poses.end(), [&](const Pose& pose) {
-    return captureBytes(captureFile(pattern, pose.name)) % recording.radar.bytes_per_frame() == 0;
+    return captureBytes(recording.radar, captureFile(pattern, pose.name), others) % recording.radar.bytes_per_frame() ==
+           0;
   });
   return 2 * static_cast<std::size_t>(whole) > recording.poses.size();
 }
 
-void rejectOverlap(const Recording& recording, const std::string& pattern, const std::string& poses_file) {
+void rejectOverlap(const Recording& recording, const std::string& pattern, const OtherCaptures& others,
+                   const std::string& poses_file) {
   std::vector<const Pose*> by_time;
   for (const Pose& pose : recording.poses) by_time.push_back(&pose);
   std::stable_sort(by_time.begin(), by_time.end(),
@@ -100,8 +113,8 @@ void rejectOverlap(const Recording& recording, const std::string& pattern, const
   for (std::size_t i = 0; i + 1 < by_time.size(); ++i) {
     const Pose& pose = *by_time[i];
     const Pose& next = *by_time[i + 1];
-    const auto frames =
-        static_cast<std::int64_t>(captureBytes(captureFile(pattern, pose.name)) / recording.radar.bytes_per_frame());
+    const std::uintmax_t bytes = captureBytes(recording.radar, captureFile(pattern, pose.name), others);
+    const auto frames = static_cast<std::int64_t>(bytes / recording.radar.bytes_per_frame());
     const std::int64_t end_ns = pose.stamp_ns + recording.radar.frame_offset_ns(frames);
     if (next.stamp_ns < end_ns - kOverlapTolerance_ns) {
       throw InputError(poses_file + ": poses '" + pose.name + "' and '" + next.name +
@@ -110,6 +123,42 @@ void rejectOverlap(const Recording& recording, const std::string& pattern, const
                        "; correct the stamps or frame_period_s");
     }
   }
+}
+
+/// Lets a recording read its frames from capture files.
+void readFromFiles(Recording& recording, const std::string& pattern, const std::string& session,
+                   const OtherCaptures& others) {
+  const auto rest = !pattern.empty() && mostAreOfWholeFrames(recording, pattern, others)
+                        ? CaptureReader::Rest::kLeftOut
+                        : CaptureReader::Rest::kRefused;
+  recording.begins_within = std::make_shared<std::map<std::string, std::size_t>>();
+  const auto open = [radar = recording.radar, pattern, session, others](const Pose& pose, CaptureReader::Rest beyond) {
+    if (pattern.empty()) throw InputError(session + ": pose '" + pose.name + "': the session names no captures");
+    try {
+      return CaptureReader(radar, captureFile(pattern, pose.name), beyond, others);
+    } catch (const TruncatedCapture& error) {
+      throw TruncatedCapture("pose '" + pose.name + "': " + error.what());
+    } catch (const InputError& error) {
+      throw InputError("pose '" + pose.name + "': " + error.what());
+    }
+  };
+  if (!pattern.empty()) {
+    recording.captureOf = [open](const Pose& pose) { return open(pose, CaptureReader::Rest::kLeftOut); };
+  }
+  recording.forEachFrame = [open, begins = recording.begins_within, rest](
+                               const Pose& pose, const std::function<void(const AdcCube&)>& visit) {
+    const auto within = begins->find(pose.name);
+    CaptureReader reader = open(pose, within != begins->end() ? CaptureReader::Rest::kLeftOut : rest);
+    if (within != begins->end()) reader.beginWithin(within->second);
+    try {
+      for (int i = 0; i < reader.frames(); ++i) visit(reader.frame(i, pose.stamp_ns));
+      reader.requireWholeFrames();
+    } catch (const TruncatedCapture& error) {
+      throw TruncatedCapture("pose '" + pose.name + "': " + error.what());
+    } catch (const InputError& error) {
+      throw InputError("pose '" + pose.name + "': " + error.what());
+    }
+  };
 }
 
 }  // namespace
@@ -186,29 +235,17 @@ Recording openSession(const std::string& path, const SessionOptions& options) {
   recording.poses = std::move(table.poses);
   recording.problems = std::move(table.problems);
   recording.pose_names = std::move(table.names);
-  if (options.need_captures) rejectOverlap(recording, pattern, poses_file);
+  const OtherCaptures others = pattern.empty() ? OtherCaptures() : capturesOf(recording.pose_names, pattern);
+  if (options.need_captures) rejectOverlap(recording, pattern, others, poses_file);
   if (options.exclude_duplicates) excludeDuplicates(recording);
 
-  const auto rest = !pattern.empty() && mostAreOfWholeFrames(recording, pattern) ? CaptureReader::Rest::kLeftOut
-                                                                                 : CaptureReader::Rest::kRefused;
-  recording.forEachFrame = [radar = recording.radar, pattern, source = file.string(), rest](
-                               const Pose& pose, const std::function<void(const AdcCube&)>& visit) {
-    if (pattern.empty()) throw InputError(source + ": pose '" + pose.name + "': the session names no captures");
-    try {
-      const CaptureReader reader(radar, captureFile(pattern, pose.name), rest);
-      for (int i = 0; i < reader.frames(); ++i) visit(reader.frame(i, pose.stamp_ns));
-      reader.requireWholeFrames();
-    } catch (const TruncatedCapture& error) {
-      throw TruncatedCapture("pose '" + pose.name + "': " + error.what());
-    } catch (const InputError& error) {
-      throw InputError("pose '" + pose.name + "': " + error.what());
-    }
-  };
+  readFromFiles(recording, pattern, file.string(), others);
   return recording;
 }
 
 Recording openCapture(const std::string& file, const RadarConfig& radar) {
-  const CaptureReader reader(radar, file);
+  // Nobody has named another capture.
+  const OtherCaptures others = [](const std::string&) { return false; };
   Recording recording;
   recording.source = file;
   recording.name = fs::path(file).stem().string();
@@ -218,7 +255,17 @@ Recording openCapture(const std::string& file, const RadarConfig& radar) {
   pose.name = pose.location = recording.name;
   recording.pose_names.push_back(pose.name);
   recording.poses.push_back(pose);
-  recording.forEachFrame = [reader](const Pose& pose, const std::function<void(const AdcCube&)>& visit) {
+  recording.begins_within = std::make_shared<std::map<std::string, std::size_t>>();
+  // A rest is refused at once, unless the capture only begins and ends within a frame, which its bytes tell.
+  recording.captureOf = [radar, file, others](const Pose&) {
+    return CaptureReader(radar, file, CaptureReader::Rest::kLeftOut, others);
+  };
+  recording.captureOf(pose);
+  recording.forEachFrame = [open = recording.captureOf, begins = recording.begins_within](
+                               const Pose& pose, const std::function<void(const AdcCube&)>& visit) {
+    CaptureReader reader = open(pose);
+    const auto within = begins->find(pose.name);
+    within != begins->end() ? reader.beginWithin(within->second) : reader.requireWholeFrames();
     for (int i = 0; i < reader.frames(); ++i) visit(reader.frame(i, pose.stamp_ns));
   };
   return recording;

@@ -24,6 +24,7 @@ std::optional<CaptureLayout> captureLayoutOf(const std::string& device);
 /// The uniform line along y that the angle transform needs.
 struct VirtualLine {
   std::vector<int> channels;  ///< virtual elements k of the line, from right (-y) to left (+y)
+  std::vector<int> places;    ///< of each on the line, in pitches; those of receivers that were left out are missing
   double pitch_m = 0;
 };
 
@@ -41,12 +42,17 @@ struct RadarConfig {
   std::vector<Eigen::Vector3d> rx_position_m;
   CaptureLayout layout = CaptureLayout::kFourLane;
   IqOrder iq_order = IqOrder::kIq;
+  /// Captures hold real samples. Samples and rate above are then those of the complex signal that they are read as:
+  /// half of what radar.yaml says, over the same time, which gives the same range bins and half of the range.
+  bool real_samples = false;
   // Optional: NaN or empty where radar.yaml does not say.
   double idle_s, ramp_end_s, rx_gain_db, tx_backoff_db;
   std::vector<double> if_highpass_hz;
   std::vector<std::vector<int>> tx_enable;  ///< device's TX numbers, one list per slot
   std::vector<int> rx_enable;
   std::vector<int> angle_slots;  ///< slots that the angle transform takes; empty: all
+  /// Receivers of the whole line where some were left out of rx_position_m because they deliver nothing; else empty.
+  std::vector<Eigen::Vector3d> whole_line_rx_m;
 
   RadarConfig();
 

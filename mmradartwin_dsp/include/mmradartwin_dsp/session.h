@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,8 @@
 #include "mmradartwin_dsp/radar_config.h"
 
 namespace mmradartwin {
+
+class CaptureReader;
 
 struct Pose {
   std::string name;
@@ -59,6 +62,11 @@ struct Recording {
   /// Visits the frames of a pose in order. Throws InputError where its capture is missing or damaged; TruncatedCapture
   /// where it holds no whole number of frames, after the whole ones where most captures of the session are whole.
   std::function<void(const Pose&, const std::function<void(const AdcCube&)>&)> forEachFrame;
+  /// The capture of a pose, a rest beyond whole frames left out; throws InputError. Empty without files.
+  std::function<CaptureReader(const Pose&)> captureOf;
+  /// By pose, how many bytes into a frame its capture begins: what forEachFrame reads it by. Empty without files.
+  std::shared_ptr<std::map<std::string, std::size_t>> begins_within;
+  bool aligned_by_user = false;  ///< that is by the user's wish, and no finding
   /// Of a bag, of every frame in order of time, on the way from pose to pose, too; else empty, and so are the next two.
   std::vector<StampedTransform> track;
   /// Visits the frames stamped from first_ns to last_ns, on the way or not, in order.

@@ -413,6 +413,8 @@ Recording openBag(const std::string& file, const BagOptions& options) {
     for (const std::string& note : bag->notes()) options.on_note(file + ": " + note);
   }
   if (options.exclude_duplicates) excludeDuplicates(recording);
+  recording.captureOf = {};  // frames come as cubes
+  recording.begins_within.reset();
   recording.forEachFrame = [bag, temporary, assigned, from_files = recording.forEachFrame,
                             pattern = recording.capture_pattern](const Pose& pose,
                                                                  const std::function<void(const AdcCube&)>& visit) {

@@ -69,7 +69,7 @@ class SessionBagWriter {
   bool add(const Pose& pose) {
     try {
       const CaptureReader reader(recording_.radar, captureOf(recording_.capture_pattern, pose.name));
-      if (!survivesCubes(recording_.radar, reader)) return false;
+      if (!reader.plain() || !survivesCubes(recording_.radar, reader)) return false;
       const std::int64_t quarter = recording_.radar.frame_offset_ns(1) / 4;
       writePose(pose, pose.stamp_ns - quarter);
       for (int i = 0; i < reader.frames(); ++i) {

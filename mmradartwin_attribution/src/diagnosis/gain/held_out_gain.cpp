@@ -41,7 +41,7 @@ std::vector<CellPowers> cellPowers(const ChannelData& data, const std::vector<Po
     const auto elements = static_cast<double>(line.channels.size());
     for (std::size_t k = 0; k < line.channels.size(); ++k) {
       steering(line.channels[k], static_cast<Eigen::Index>(angles.size())) =
-          std::polar(1.0 / elements, wave * static_cast<double>(k) * std::sin(azimuth));
+          std::polar(1.0 / elements, wave * line.places[k] * std::sin(azimuth));
     }
     angles.push_back(a);
   }
