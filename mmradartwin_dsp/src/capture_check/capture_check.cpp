@@ -22,7 +22,7 @@ constexpr std::size_t kPosesForLayout = 4;  ///< layouts hold for a whole sessio
 /// Share by which the smoothness of two orders of the elements may differ by chance.
 constexpr double kAlikeOrders = 0.02;
 /// Probability that bytes which are what radar.yaml says are called anything else, over a whole session.
-constexpr double kFalseAlarmRate = 1e-3;
+constexpr double kFalseAlarmRate = 1e-6;
 
 /// Standard deviations that chance exceeds in one of `tries` with the false-alarm rate.
 double leastDeviations(double tries) {
@@ -314,6 +314,13 @@ std::vector<std::string> checkCaptures(Recording& recording, const CaptureCheckO
   alignCaptures(bytes, options, recording, notes);
   leaveOutSilentReceivers(bytes, recording, notes);
   return notes;
+}
+
+void leaveOutReceivers(const RadarConfig& recorded, RadarConfig& radar) {
+  if (recorded.whole_line_rx_m.empty() || radar.rx_position_m != recorded.whole_line_rx_m) return;
+  radar.rx_position_m = recorded.rx_position_m;
+  radar.rx_enable = recorded.rx_enable;
+  radar.whole_line_rx_m = recorded.whole_line_rx_m;
 }
 
 }  // namespace mmradartwin

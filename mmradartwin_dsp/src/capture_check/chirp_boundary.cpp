@@ -15,19 +15,19 @@ constexpr std::size_t kFewestChirps = 4;  ///< in which a boundary is searched f
 constexpr double kAlike = 0.02;
 /// Nats of one lane beyond which a first glance is not enough.
 constexpr double kGlanceNats = 3;
-constexpr double kFalseAlarmRate = 1e-3;
-constexpr std::size_t kGlancePeriods = 8;  ///< that a first glance takes
+constexpr double kFalseAlarmRate = 1e-6;
+constexpr std::size_t kGlancePeriods = 4;  ///< that a first glance takes
 constexpr double kRoundingVariance = 1.0 / 12;
 /// A word's error beyond three standard deviations is a break, not noise, and does not teach the prediction.
 constexpr double kBreak = 9;
 
 /// Squared errors of predicting each word from those before in its lane.
-std::vector<double> squaredErrors(const std::vector<std::int16_t>& words, std::size_t stride) {
+std::vector<double> squaredErrors(const std::vector<std::int16_t>& words, std::size_t stride, int rounds) {
   using Vector = Eigen::Matrix<double, static_cast<int>(kOrder), 1>;
   using Matrix = Eigen::Matrix<double, static_cast<int>(kOrder), static_cast<int>(kOrder)>;
   std::vector<double> error(words.size(), 0);
   double most = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < 3; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     Matrix normal = Matrix::Zero();
     Vector right = Vector::Zero(), before;
     for (std::size_t i = kOrder * stride; i < words.size(); ++i) {
@@ -44,6 +44,7 @@ std::vector<double> squaredErrors(const std::vector<std::int16_t>& words, std::s
         predicted += weights[static_cast<Eigen::Index>(p)] * words[i - (p + 1) * stride];
       error[i] = std::pow(words[i] - predicted, 2);
     }
+    if (round + 1 == rounds) break;
     std::vector<double> sorted(error.begin() + static_cast<std::ptrdiff_t>(kOrder * stride), error.end());
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
@@ -52,16 +53,17 @@ std::vector<double> squaredErrors(const std::vector<std::int16_t>& words, std::s
   return error;
 }
 
-/// Nats of one period by which the words of a run, from each word of a period on, break with those before.
-std::vector<double> breaks(const std::vector<std::int16_t>& words, std::size_t stride, std::size_t period) {
-  const std::vector<double> error = squaredErrors(words, stride);
+/// Nats of one period by which each of its words breaks with those before.
+std::vector<double> breaksOfWords(const std::vector<std::int16_t>& words, std::size_t stride, std::size_t period,
+                                  int rounds) {
+  const std::vector<double> error = squaredErrors(words, stride, rounds);
   // The first period has no words before it.
   std::vector<double> mean(period, 0);
-  std::size_t chirps = 0;
-  for (std::size_t begin = period; begin + period <= words.size(); begin += period, ++chirps) {
+  std::size_t periods = 0;
+  for (std::size_t begin = period; begin + period <= words.size(); begin += period, ++periods) {
     for (std::size_t i = 0; i < period; ++i) mean[i] += error[begin + i];
   }
-  for (double& value : mean) value = value / static_cast<double>(chirps) + kRoundingVariance;
+  for (double& value : mean) value = value / static_cast<double>(periods) + kRoundingVariance;
   std::vector<double> sorted = mean;
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(period / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());
@@ -70,10 +72,14 @@ std::vector<double> breaks(const std::vector<std::int16_t>& words, std::size_t s
     const double ratio = std::max(1.0, value / *middle);
     nats.push_back(0.5 * (ratio - 1 - std::log(ratio)));
   }
-  const std::size_t run = std::min(kOrder * stride, period);
-  std::vector<double> sum(period, 0);
-  for (std::size_t i = 0; i < period; ++i) {
-    for (std::size_t j = 0; j < run; ++j) sum[i] += nats[(i + j) % period];
+  return nats;
+}
+
+/// The same of the words of a run from each word on.
+std::vector<double> breaksOfRuns(const std::vector<double>& nats, std::size_t run) {
+  std::vector<double> sum(nats.size(), 0);
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    for (std::size_t j = 0; j < std::min(run, nats.size()); ++j) sum[i] += nats[(i + j) % nats.size()];
   }
   return sum;
 }
@@ -142,11 +148,11 @@ bool mayBeginWithin(const ByteReading& reading, const std::vector<std::int16_t>&
   const std::size_t period = rhythm.period / rhythm.stride, periods = kGlancePeriods;
   for (const std::size_t i : {lanes.front(), lanes.back()}) {
     const std::vector<std::int16_t> of_lane = lane(words, i, rhythm.stride, (periods + 1) * period);
-    const std::vector<double> sum = breaks(of_lane, 1, period);
+    const std::vector<double> nats = breaksOfWords(of_lane, 1, period, 2), sum = breaksOfRuns(nats, kOrder);
     const double most = *std::max_element(sum.begin(), sum.end());
     if (most > (1 + kAlike) * sum[0] + kGlanceNats) return true;
     // A run that begins a sample early holds the whole break as well.
-    if (sum[0] > kGlanceNats && sum[1] > (1 - kAlike) * sum[0]) return true;
+    if (sum[0] > kGlanceNats && nats[0] < kAlike * sum[0]) return true;
   }
   return false;
 }
@@ -156,16 +162,17 @@ std::optional<ChirpBoundary> findChirpBoundary(const ByteReading& reading, std::
   const std::size_t chirp = reading.words();
   if (words.size() < kFewestChirps * chirp) return std::nullopt;
   const auto [stride, period] = rhythmOf(reading);
-  const std::vector<double> sum = breaks(words, stride, period);
+  const std::vector<double> sum = breaksOfRuns(breaksOfWords(words, stride, period, 3), kOrder * stride);
   const auto peak = static_cast<std::size_t>(std::max_element(sum.begin(), sum.end()) - sum.begin());
   const std::size_t used = (words.size() / chirp - 1) * chirp;
   const auto at = [&](std::size_t word) { return concentrationOf(reading, slots, words.data() + word, used); };
   // A shift by a whole sample hardly changes the spectra, so that they tell the word within a sample, and the break
   // tells the sample.
+  const std::size_t glance = std::min(used, 2 * slots * chirp);
   std::vector<std::pair<std::size_t, Concentration>> near;
   for (std::size_t i = 0; i < 2 * stride + 1; ++i) {
     const std::size_t word = (peak + period + i - stride) % period;
-    near.emplace_back(word, at(word));
+    near.emplace_back(word, concentrationOf(reading, slots, words.data() + word, glance));
   }
   double most = -std::numeric_limits<double>::infinity();
   for (const auto& [word, there] : near) most = std::max(most, there.nats);
@@ -180,7 +187,7 @@ std::optional<ChirpBoundary> findChirpBoundary(const ByteReading& reading, std::
     if (alike(candidate.second) && sum[candidate.first] >= (1 - kAlike) * most_alike) best = &candidate;
   }
   if (best->first == 0) return std::nullopt;
-  ChirpBoundary found{best->first, period, best->second, at(0), sum[best->first], sum[0], {}};
+  ChirpBoundary found{best->first, period, at(best->first), at(0), sum[best->first], sum[0], {}};
   // Which receiver and slot begins there, the array tells.
   const std::size_t loop = slots * chirp, loops = words.size() / loop;
   for (std::size_t begin = found.word; begin < loop && loops > 1; begin += period) {

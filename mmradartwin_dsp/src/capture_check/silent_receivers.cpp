@@ -4,8 +4,6 @@
 #include <optional>
 #include <utility>
 
-#include "mmradartwin_dsp/capture_check.h"
-
 namespace mmradartwin {
 namespace {
 
@@ -123,13 +121,6 @@ void leaveOut(const SilentReceivers& silent, Recording& recording) {
       return later;
     };
   }
-}
-
-void leaveOutReceivers(const RadarConfig& recorded, RadarConfig& radar) {
-  if (recorded.whole_line_rx_m.empty() || radar.rx_position_m != recorded.whole_line_rx_m) return;
-  radar.rx_position_m = recorded.rx_position_m;
-  radar.rx_enable = recorded.rx_enable;
-  radar.whole_line_rx_m = recorded.whole_line_rx_m;
 }
 
 }  // namespace mmradartwin

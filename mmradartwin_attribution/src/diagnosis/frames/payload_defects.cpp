@@ -185,6 +185,9 @@ class PacketBlocks {
 }  // namespace
 
 std::vector<int> payloadOrder(const RadarConfig& radar) {
+  // Pairs of real samples stand where I and Q of the complex ones do that they are read as.
+  RadarConfig complex = radar;
+  complex.real_samples = false;
   const std::size_t cube =
       static_cast<std::size_t>(radar.chirps_per_frame()) * radar.samples_per_chirp * radar.receivers() * 2;
   // The encoder maps the index of every value, seven bits at a time, with one bit that marks it as a value.
@@ -192,7 +195,7 @@ std::vector<int> payloadOrder(const RadarConfig& radar) {
   std::vector<std::int16_t> digits(cube);
   for (int shift = 0; shift < 28; shift += 7) {
     for (std::size_t i = 0; i < cube; ++i) digits[i] = static_cast<std::int16_t>(128 + ((i >> shift) & 127));
-    const std::vector<std::uint8_t> bytes = encodeFrame(radar, digits);
+    const std::vector<std::uint8_t> bytes = encodeFrame(complex, digits);
     for (std::size_t i = 0; i < order.size(); ++i) {
       const int digit = bytes[2 * i] + 256 * bytes[2 * i + 1];
       order[i] = digit & 128 ? order[i] + ((digit & 127) << shift) : -1;
