@@ -239,10 +239,16 @@ void requireStatedReading(const SessionBytes& bytes, const Recording& recording)
 struct AlikeCaptures {
   std::vector<std::string> poses;
   std::vector<double> smoothness;  ///< sum over poses, see ChirpBoundary
+  std::vector<double> breaks;      ///< the same
   double nats = 0, variance = 0;   ///< by which the spectra become more concentrated
-  bool breaks = false;             ///< at one pose at least
-  std::size_t period = 0;
+  bool clear = false;              ///< at one pose at least
+  std::size_t period = 0, stride = 0;
 };
+
+void addTo(std::vector<double>& sum, const std::vector<double>& values) {
+  sum.resize(std::max(sum.size(), values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i) sum[i] += values[i];
+}
 
 /// Captures whose words break elsewhere than where they begin, by the word.
 std::map<std::size_t, AlikeCaptures> capturesByBoundary(const SessionBytes& bytes) {
@@ -254,22 +260,70 @@ std::map<std::size_t, AlikeCaptures> capturesByBoundary(const SessionBytes& byte
     if (!found) continue;
     AlikeCaptures& group = groups[found->word];
     group.period = found->period;
+    group.stride = found->stride;
     group.nats += found->from_there.nats - found->from_the_start.nats;
     group.variance += found->from_there.variance + found->from_the_start.variance;
-    group.breaks = group.breaks || found->breaksThere(tries);
+    group.clear = group.clear || found->breaksThere(tries);
     group.poses.push_back(pose.pose);
-    group.smoothness.resize(std::max(group.smoothness.size(), found->smoothness.size()));
-    for (std::size_t i = 0; i < found->smoothness.size(); ++i) group.smoothness[i] += found->smoothness[i];
+    addTo(group.smoothness, found->smoothness);
+    addTo(group.breaks, found->breaks);
   }
   return groups;
+}
+
+constexpr std::size_t kNearSamples = 4;  ///< by which noise may displace a boundary
+
+void merge(const AlikeCaptures& part, AlikeCaptures& group) {
+  group.poses.insert(group.poses.end(), part.poses.begin(), part.poses.end());
+  addTo(group.smoothness, part.smoothness);
+  addTo(group.breaks, part.breaks);
+  group.nats += part.nats;
+  group.variance += part.variance;
+  group.clear = group.clear || part.clear;
+}
+
+/// The word, a whole number of samples from `word`, at which the words of all captures together break most.
+std::size_t commonWord(std::size_t word, const AlikeCaptures& group) {
+  if (group.poses.size() < 2) return word;
+  const std::size_t period = group.period, first = (word + period - kNearSamples * group.stride % period) % period;
+  std::size_t best = word;
+  for (std::size_t i = 0; i <= 2 * kNearSamples; ++i) {
+    const std::size_t there = (first + i * group.stride) % period;
+    if (group.breaks[there] > group.breaks[best]) best = there;
+  }
+  return best;
+}
+
+/// Noise displaces boundaries by some samples: these captures begin where most of their neighbours do.
+std::map<std::size_t, AlikeCaptures> withoutStrays(std::map<std::size_t, AlikeCaptures> groups) {
+  std::map<std::size_t, AlikeCaptures> kept;
+  while (!groups.empty()) {
+    const auto most = std::max_element(groups.begin(), groups.end(), [](const auto& a, const auto& b) {
+      return a.second.poses.size() < b.second.poses.size();
+    });
+    const std::size_t word = most->first;
+    AlikeCaptures group = std::move(most->second);
+    groups.erase(most);
+    for (auto other = groups.begin(); other != groups.end();) {
+      const std::size_t apart = std::max(word, other->first) - std::min(word, other->first);
+      const bool stray = apart <= kNearSamples * group.stride && apart % group.stride == 0 &&
+                         other->second.poses.size() < group.poses.size();
+      if (stray) merge(other->second, group);
+      other = stray ? groups.erase(other) : std::next(other);
+    }
+    const std::size_t common = commonWord(word, group);
+    AlikeCaptures& place = kept[common];
+    place.poses.empty() ? (void)(place = std::move(group)) : merge(group, place);
+  }
+  return kept;
 }
 
 /// Captures that begin within a frame: by how many bytes, and of which poses.
 std::map<std::string, std::size_t> findMisaligned(const SessionBytes& bytes) {
   std::map<std::string, std::size_t> misaligned;
   const double least = leastDeviations(static_cast<double>(std::max<std::size_t>(1, bytes.poses().size())));
-  for (const auto& [word, group] : capturesByBoundary(bytes)) {
-    if (!group.breaks && !(group.nats > least * std::sqrt(group.variance))) continue;
+  for (const auto& [word, group] : withoutStrays(capturesByBoundary(bytes))) {
+    if (!group.clear && !(group.nats > least * std::sqrt(group.variance))) continue;
     // Where the array does not tell, the fewest bytes are missing.
     const std::size_t loop = bytes.slots() * bytes.stated().words();
     std::size_t begin = word + (loop - 1 - word) / group.period * group.period;

@@ -187,7 +187,7 @@ std::optional<ChirpBoundary> findChirpBoundary(const ByteReading& reading, std::
     if (alike(candidate.second) && sum[candidate.first] >= (1 - kAlike) * most_alike) best = &candidate;
   }
   if (best->first == 0) return std::nullopt;
-  ChirpBoundary found{best->first, period, at(best->first), at(0), sum[best->first], sum[0], {}};
+  ChirpBoundary found{best->first, period, stride, at(best->first), at(0), sum[best->first], sum[0], sum, {}};
   // Which receiver and slot begins there, the array tells.
   const std::size_t loop = slots * chirp, loops = words.size() / loop;
   for (std::size_t begin = found.word; begin < loop && loops > 1; begin += period) {

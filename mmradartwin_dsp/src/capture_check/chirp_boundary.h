@@ -14,9 +14,11 @@ struct ChirpBoundary {
   /// First word of a chirp or, in two lanes, of a receiver's part of one: from 0 to below the period after which the
   /// next begins.
   std::size_t word = 0, period = 0;
+  std::size_t stride = 0;              ///< words from one sample of a lane to the next
   Concentration from_there;            ///< of the words from there on
   Concentration from_the_start;        ///< of as many words as they stand
   double nats = 0, nats_at_start = 0;  ///< of one period, by which the words break there and where they begin
+  std::vector<double> breaks;          ///< [period] the same nats from each word on
   /// How smooth the virtual line is where the frame's first chirp begins with that word, or so many periods later:
   /// mean over range bins of the share of the power that one phase step between neighbours explains.
   std::vector<double> smoothness;
