@@ -124,6 +124,30 @@ std::vector<ByteReading> otherReadings(const RadarConfig& radar) {
   return others;
 }
 
+std::vector<std::int16_t> quietLoops(const std::vector<std::int16_t>& words, std::size_t loop) {
+  const std::size_t loops = words.size() / loop;
+  if (loops < 3) return words;
+  const auto differs = [&](std::size_t a, std::size_t b) {
+    double sum = 0;
+    for (std::size_t i = 0; i < loop; ++i) sum += std::pow(words[a * loop + i] - words[b * loop + i], 2);
+    return sum;
+  };
+  std::vector<double> to_next;
+  for (std::size_t i = 0; i + 1 < loops; ++i) to_next.push_back(differs(i, i + 1));
+  std::vector<std::pair<double, std::size_t>> least;
+  for (std::size_t i = 0; i < loops; ++i) {
+    const double before = to_next[i > 0 ? i - 1 : 0], behind = to_next[i + 1 < loops ? i : i - 1];
+    least.emplace_back(std::min(before, behind), i);
+  }
+  std::sort(least.begin(), least.end());
+  std::vector<std::int16_t> quiet;
+  for (std::size_t i = 0; i < (loops + 1) / 2; ++i) {
+    const auto begin = words.begin() + static_cast<std::ptrdiff_t>(least[i].second * loop);
+    quiet.insert(quiet.end(), begin, begin + static_cast<std::ptrdiff_t>(loop));
+  }
+  return quiet;
+}
+
 Concentration concentrationOf(const ByteReading& reading, std::size_t slots, const std::int16_t* words,
                               std::size_t count) {
   const std::size_t N = reading.samples, groups = slots * reading.receivers;

@@ -31,6 +31,10 @@ struct ByteReading {
 ByteReading statedReading(const RadarConfig& radar);
 std::vector<ByteReading> otherReadings(const RadarConfig& radar);
 
+/// Words of the loops that differ least from the one before or behind, half of them: a burst in a few chirps says
+/// nothing of layouts. The choice is the same for all readings.
+std::vector<std::int16_t> quietLoops(const std::vector<std::int16_t>& words, std::size_t loop);
+
 /// How concentrated the range spectra of words are in a reading. Readings only permute the words, so that the numbers
 /// of two of them for the same words differ by the log-likelihood ratio of Gaussian spectra, per bin.
 struct Concentration {

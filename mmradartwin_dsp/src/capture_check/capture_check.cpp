@@ -170,10 +170,11 @@ struct ReadingEvidence {
   double nats = 0, variance = 0;  ///< of the mean over poses
 };
 
-ReadingEvidence evidenceOf(const ByteReading& reading, std::size_t slots, const std::vector<const PoseWords*>& poses) {
+ReadingEvidence evidenceOf(const ByteReading& reading, std::size_t slots,
+                           const std::vector<std::vector<std::int16_t>>& poses) {
   ReadingEvidence evidence{reading, 0, 0};
-  for (const PoseWords* pose : poses) {
-    const Concentration c = concentrationOf(reading, slots, pose->words.data(), pose->words.size());
+  for (const std::vector<std::int16_t>& words : poses) {
+    const Concentration c = concentrationOf(reading, slots, words.data(), words.size());
     evidence.nats += c.nats / static_cast<double>(poses.size());
     evidence.variance += c.variance / static_cast<double>(poses.size() * poses.size());
   }
@@ -206,13 +207,15 @@ void requireStatedReading(const SessionBytes& bytes, const Recording& recording)
   const std::size_t count = std::min(kPosesForLayout, usable.size());
   for (std::size_t i = 0; i < count; ++i) poses.push_back(usable[i * usable.size() / count]);
   if (poses.empty()) return;
-  const ReadingEvidence stated = evidenceOf(bytes.stated(), bytes.slots(), poses);
+  std::vector<std::vector<std::int16_t>> quiet;
+  for (const PoseWords* pose : poses) quiet.push_back(quietLoops(pose->words, bytes.slots() * bytes.stated().words()));
+  const ReadingEvidence stated = evidenceOf(bytes.stated(), bytes.slots(), quiet);
   std::vector<ReadingEvidence> others;
   for (const ByteReading& reading : otherReadings(recording.radar)) {
     const bool fits = std::all_of(poses.begin(), poses.end(), [&](const PoseWords* pose) {
       return pose->words.size() >= reading.words() && pose->words.size() % bytes.stated().words() == 0;
     });
-    if (fits) others.push_back(evidenceOf(reading, bytes.slots(), poses));
+    if (fits) others.push_back(evidenceOf(reading, bytes.slots(), quiet));
   }
   if (others.empty()) return;
   std::sort(others.begin(), others.end(), [](const auto& a, const auto& b) { return a.nats > b.nats; });

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 namespace mmradartwin {
@@ -53,24 +54,38 @@ std::vector<double> squaredErrors(const std::vector<std::int16_t>& words, std::s
   return error;
 }
 
-/// Nats of one period by which each of its words breaks with those before.
-std::vector<double> breaksOfWords(const std::vector<std::int16_t>& words, std::size_t stride, std::size_t period,
-                                  int rounds) {
-  const std::vector<double> error = squaredErrors(words, stride, rounds);
-  // The first period has no words before it.
-  std::vector<double> mean(period, 0);
-  std::size_t periods = 0;
-  for (std::size_t begin = period; begin + period <= words.size(); begin += period, ++periods) {
-    for (std::size_t i = 0; i < period; ++i) mean[i] += error[begin + i];
+/// Mean squared error of each word of a period over some periods, without the larger half of them: bursts are in
+/// few.
+std::vector<double> trimmedMeans(const std::vector<double>& error, std::size_t period, std::size_t first,
+                                 std::size_t last) {
+  std::vector<double> means(period), values(last - first);
+  const std::size_t dropped = values.size() / 2, kept = values.size() - dropped;
+  for (std::size_t i = 0; i < period; ++i) {
+    for (std::size_t p = first; p < last; ++p) values[p - first] = error[p * period + i];
+    if (dropped > 0) std::sort(values.begin(), values.end());
+    means[i] = std::accumulate(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(kept), 0.0) /
+                   static_cast<double>(kept) +
+               kRoundingVariance;
   }
-  for (double& value : mean) value = value / static_cast<double>(periods) + kRoundingVariance;
-  std::vector<double> sorted = mean;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(period / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  std::vector<double> nats;
-  for (const double value : mean) {
-    const double ratio = std::max(1.0, value / *middle);
-    nats.push_back(0.5 * (ratio - 1 - std::log(ratio)));
+  return means;
+}
+
+/// Nats of one period by which each of its words breaks with those before, in either half of the periods.
+std::vector<double> breaksOfWords(const std::vector<double>& error, std::size_t period) {
+  const std::size_t periods = error.size() / period, half = (periods + 1) / 2;
+  // The first period has no words before it. What breaks in one half alone is a lost packet, not the beginning.
+  std::vector<std::pair<std::size_t, std::size_t>> halves = {{1, periods}};
+  if (periods >= 5) halves = {{1, half}, {half, periods}};
+  std::vector<double> nats(period, std::numeric_limits<double>::infinity());
+  for (const auto& [first, last] : halves) {
+    const std::vector<double> mean = trimmedMeans(error, period, first, last);
+    std::vector<double> sorted = mean;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(period / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    for (std::size_t i = 0; i < period; ++i) {
+      const double ratio = std::max(1.0, mean[i] / *middle);
+      nats[i] = std::min(nats[i], 0.5 * (ratio - 1 - std::log(ratio)));
+    }
   }
   return nats;
 }
@@ -121,6 +136,22 @@ std::vector<std::int16_t> lane(const std::vector<std::int16_t>& words, std::size
 
 namespace {
 
+/// True where the first period breaks where it begins, too: the words begin with a chirp and slip later, by a lost
+/// packet.
+bool slipsLater(const std::vector<double>& error, std::size_t period, std::size_t run, std::size_t word) {
+  constexpr double kShare = 0.25;  ///< of the break there; noise alone makes less
+  if (std::min(word, period - word) < run || error.size() < 2 * period + run) return false;
+  std::vector<double> sorted(error.begin() + static_cast<std::ptrdiff_t>(period), error.end());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double noise = static_cast<double>(run) * *middle / 0.455;
+  const auto of_run = [&](std::size_t begin) {
+    const auto first = error.begin() + static_cast<std::ptrdiff_t>(period + begin);
+    return std::accumulate(first, first + static_cast<std::ptrdiff_t>(run), 0.0) - noise;
+  };
+  return of_run(0) > kShare * of_run(word);
+}
+
 /// How the words of a reading repeat.
 struct Rhythm {
   std::size_t stride;  ///< from a word to the next of its lane
@@ -148,7 +179,8 @@ bool mayBeginWithin(const ByteReading& reading, const std::vector<std::int16_t>&
   const std::size_t period = rhythm.period / rhythm.stride, periods = kGlancePeriods;
   for (const std::size_t i : {lanes.front(), lanes.back()}) {
     const std::vector<std::int16_t> of_lane = lane(words, i, rhythm.stride, (periods + 1) * period);
-    const std::vector<double> nats = breaksOfWords(of_lane, 1, period, 2), sum = breaksOfRuns(nats, kOrder);
+    const std::vector<double> nats = breaksOfWords(squaredErrors(of_lane, 1, 2), period),
+                              sum = breaksOfRuns(nats, kOrder);
     const double most = *std::max_element(sum.begin(), sum.end());
     if (most > (1 + kAlike) * sum[0] + kGlanceNats) return true;
     // A run that begins a sample early holds the whole break as well.
@@ -162,10 +194,16 @@ std::optional<ChirpBoundary> findChirpBoundary(const ByteReading& reading, std::
   const std::size_t chirp = reading.words();
   if (words.size() < kFewestChirps * chirp) return std::nullopt;
   const auto [stride, period] = rhythmOf(reading);
-  const std::vector<double> sum = breaksOfRuns(breaksOfWords(words, stride, period, 3), kOrder * stride);
+  const std::vector<double> error = squaredErrors(words, stride, 3);
+  const std::vector<double> sum = breaksOfRuns(breaksOfWords(error, period), kOrder * stride);
   const auto peak = static_cast<std::size_t>(std::max_element(sum.begin(), sum.end()) - sum.begin());
-  const std::size_t used = (words.size() / chirp - 1) * chirp;
-  const auto at = [&](std::size_t word) { return concentrationOf(reading, slots, words.data() + word, used); };
+  const std::size_t used = (words.size() / chirp - 1) / slots * slots * chirp;
+  const auto at = [&](std::size_t word) {
+    const auto begin = words.begin() + static_cast<std::ptrdiff_t>(word);
+    const std::vector<std::int16_t> quiet =
+        quietLoops({begin, begin + static_cast<std::ptrdiff_t>(used)}, slots * chirp);
+    return concentrationOf(reading, slots, quiet.data(), quiet.size());
+  };
   // A shift by a whole sample hardly changes the spectra, so that they tell the word within a sample, and the break
   // tells the sample.
   const std::size_t glance = std::min(used, 2 * slots * chirp);
@@ -187,6 +225,7 @@ std::optional<ChirpBoundary> findChirpBoundary(const ByteReading& reading, std::
     if (alike(candidate.second) && sum[candidate.first] >= (1 - kAlike) * most_alike) best = &candidate;
   }
   if (best->first == 0) return std::nullopt;
+  if (slipsLater(error, period, kOrder * stride, best->first)) return std::nullopt;
   ChirpBoundary found{best->first, period, stride, at(best->first), at(0), sum[best->first], sum[0], sum, {}};
   // Which receiver and slot begins there, the array tells.
   const std::size_t loop = slots * chirp, loops = words.size() / loop;
