@@ -321,24 +321,70 @@ std::map<std::size_t, AlikeCaptures> withoutStrays(std::map<std::size_t, AlikeCa
   return kept;
 }
 
+/// Bytes of a frame that are missing where captures begin with a word. Where the array does not tell, the fewest.
+std::size_t missingBytes(const SessionBytes& bytes, std::size_t word, const AlikeCaptures& group) {
+  const std::size_t loop = bytes.slots() * bytes.stated().words();
+  std::size_t begin = word + (loop - 1 - word) / group.period * group.period;
+  if (!group.smoothness.empty()) {
+    const double most = *std::max_element(group.smoothness.begin(), group.smoothness.end());
+    for (std::size_t i = 0; i < group.smoothness.size(); ++i) {
+      if (group.smoothness[i] > most * (1 - kAlikeOrders)) begin = word + i * group.period;
+    }
+  }
+  return 2 * (loop - begin);
+}
+
+/// True where the spectra of a capture speak for beginning with `word` rather than with `other`.
+bool beginsRatherAt(const SessionBytes& bytes, const PoseWords& pose, std::size_t word, std::size_t other) {
+  const std::size_t loop = bytes.slots() * bytes.stated().words();
+  if (pose.words.size() < 2 * loop) return false;
+  const std::size_t used = (pose.words.size() / loop - 1) * loop;
+  const auto at = [&](std::size_t begin) {
+    return concentrationOf(bytes.stated(), bytes.slots(), pose.words.data() + begin, used).nats;
+  };
+  return at(word) > at(other);
+}
+
 /// Captures that begin within a frame: by how many bytes, and of which poses.
 std::map<std::string, std::size_t> findMisaligned(const SessionBytes& bytes) {
-  std::map<std::string, std::size_t> misaligned;
-  const double least = leastDeviations(static_cast<double>(std::max<std::size_t>(1, bytes.poses().size())));
-  for (const auto& [word, group] : withoutStrays(capturesByBoundary(bytes))) {
+  const std::size_t poses = bytes.poses().size();
+  const double least = leastDeviations(static_cast<double>(std::max<std::size_t>(1, poses)));
+  std::map<std::size_t, AlikeCaptures> groups = withoutStrays(capturesByBoundary(bytes));
+  const AlikeCaptures* most = nullptr;
+  std::size_t most_word = 0;
+  std::map<std::string, std::pair<std::size_t, std::size_t>> found;  // word and missing bytes, by pose
+  for (const auto& [word, group] : groups) {
+    const bool common = 2 * group.poses.size() >= poses;
+    // Spectra hardly tell a whole sample from the next: a session tells by most of its captures, or not at all.
+    if (!common && std::min(word, group.period - word) <= kNearSamples * group.stride) continue;
     if (!group.clear && !(group.nats > least * std::sqrt(group.variance))) continue;
-    // Where the array does not tell, the fewest bytes are missing.
-    const std::size_t loop = bytes.slots() * bytes.stated().words();
-    std::size_t begin = word + (loop - 1 - word) / group.period * group.period;
-    if (!group.smoothness.empty()) {
-      const double most = *std::max_element(group.smoothness.begin(), group.smoothness.end());
-      for (std::size_t i = 0; i < group.smoothness.size(); ++i) {
-        if (group.smoothness[i] > most * (1 - kAlikeOrders)) begin = word + i * group.period;
-      }
-    }
-    for (const std::string& pose : group.poses) misaligned[pose] = 2 * (loop - begin);
+    for (const std::string& pose : group.poses) found[pose] = {word, missingBytes(bytes, word, group)};
+    if (common) most = &group, most_word = word;
+  }
+  std::map<std::string, std::size_t> misaligned;
+  for (const auto& [pose, begins] : found) misaligned[pose] = begins.second;
+  if (most == nullptr) return misaligned;
+  // What most captures do, the others do as well unless their spectra speak against it.
+  for (const PoseWords& pose : bytes.poses()) {
+    const auto known = found.find(pose.pose);
+    const std::size_t own = known == found.end() ? 0 : known->second.first;
+    if (bytes.allSilent(pose) || own == most_word || !beginsRatherAt(bytes, pose, most_word, own)) continue;
+    misaligned[pose.pose] = missingBytes(bytes, most_word, *most);
   }
   return misaligned;
+}
+
+/// "pose '1': its capture begins 8 bytes into a frame", and how many others do.
+std::string inWords(const std::map<std::string, std::size_t>& misaligned) {
+  std::map<std::size_t, std::vector<std::string>> by_bytes;
+  for (const auto& [pose, bytes] : misaligned) by_bytes[bytes].push_back(pose);
+  const auto most = std::max_element(by_bytes.begin(), by_bytes.end(),
+                                     [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+  const std::size_t alike = most->second.size() - 1, unlike = misaligned.size() - most->second.size();
+  return "pose '" + most->second.front() + "': its capture begins " + std::to_string(most->first) +
+         " bytes into a frame (packet_misalignment)" +
+         (alike > 0 ? ", and so do those of " + std::to_string(alike) + " other pose(s)" : "") +
+         (unlike > 0 ? ", elsewhere within one those of " + std::to_string(unlike) + " more" : "");
 }
 
 void alignCaptures(const SessionBytes& bytes, const CaptureCheckOptions& options, Recording& recording,
@@ -346,19 +392,15 @@ void alignCaptures(const SessionBytes& bytes, const CaptureCheckOptions& options
   if (!recording.begins_within || !recording.captureOf) return;
   const std::map<std::string, std::size_t> misaligned = findMisaligned(bytes);
   if (misaligned.empty()) return;
-  const auto& [pose, missing] = *misaligned.begin();
-  const std::string what =
-      "pose '" + pose + "': its capture begins " + std::to_string(missing) +
-      " bytes into a frame (packet_misalignment)" +
-      (misaligned.size() > 1 ? ", and so do those of " + std::to_string(misaligned.size() - 1) + " other pose(s)" : "");
+  const std::string what = recording.source + ": " + inWords(misaligned);
   if (options.misaligned == CaptureCheckOptions::Misaligned::kRefused) {
-    throw InputError(recording.source + ": " + what +
+    throw InputError(what +
                      "; give --align to read it from its first whole chirp on, or record it again (start the card "
                      "before the radar)");
   }
   recording.aligned_by_user = options.misaligned == CaptureCheckOptions::Misaligned::kAligned;
   *recording.begins_within = misaligned;
-  notes.push_back(recording.source + ": " + what + "; it is read from its first whole chirp on");
+  notes.push_back(what + "; it is read from its first whole chirp on");
 }
 
 }  // namespace

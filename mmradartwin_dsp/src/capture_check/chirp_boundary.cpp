@@ -14,6 +14,8 @@ constexpr std::size_t kOrder = 4;         ///< words of a lane that predict the 
 constexpr std::size_t kFewestChirps = 4;  ///< in which a boundary is searched for
 /// Share by which the nats of two breaks may differ because errors of the prediction are no Gaussian noise.
 constexpr double kAlike = 0.02;
+/// The same of runs that overlap: twice as much as in the sessions of another simulator.
+constexpr double kAlikeOverlap = 0.3;
 /// Nats of one lane beyond which a first glance is not enough.
 constexpr double kGlanceNats = 3;
 constexpr double kFalseAlarmRate = 1e-6;
@@ -238,7 +240,10 @@ std::optional<ChirpBoundary> findChirpBoundary(const ByteReading& reading, std::
 bool ChirpBoundary::breaksThere(double tries) const {
   const double least = std::log(tries * static_cast<double>(period) / kFalseAlarmRate);
   const double chance = std::sqrt(from_there.variance + from_the_start.variance);
-  return nats > (1 + kAlike) * nats_at_start + least && from_there.nats > from_the_start.nats - chance;
+  // Runs that overlap share most of the break, and errors of the prediction fill the rest.
+  const bool overlap = std::min(word, period - word) < kOrder * stride;
+  return nats > (1 + (overlap ? kAlikeOverlap : kAlike)) * nats_at_start + least &&
+         from_there.nats > from_the_start.nats - chance;
 }
 
 }  // namespace mmradartwin
