@@ -16,6 +16,12 @@ bool finite(const Parameters::Value& value) {
   return true;
 }
 
+/// True for a speed that a recording leaves open: NaN here, null in files.
+bool mayBeUntold(const FindingParameter& parameter) {
+  const double* number = std::get_if<double>(&parameter.value);
+  return number && std::isnan(*number) && parameter.ci95.empty() && parameter.unit == "m/s";
+}
+
 std::string kindName(ParameterKind kind) {
   switch (kind) {
     case ParameterKind::kText:
@@ -62,7 +68,7 @@ std::string problemOfGiven(const Finding& finding) {
   for (const FindingParameter& parameter : finding.parameters) {
     const std::string key = "parameters/" + parameter.name;
     if (!seen.insert(parameter.name).second) return key + ": is given twice";
-    if (!finite(parameter.value)) return key + ": is not finite";
+    if (!finite(parameter.value) && !mayBeUntold(parameter)) return key + ": is not finite";
     const auto* list = std::get_if<std::vector<double>>(&parameter.value);
     const std::size_t elements = list ? list->size() : kindOf(parameter.value) == ParameterKind::kNumber ? 1 : 0;
     if (!parameter.ci95.empty() && parameter.ci95.size() != elements) return key + ": needs one interval per number";

@@ -27,7 +27,8 @@ Json json(const Parameters::Value& value) {
 
 Json json(const FindingParameter& parameter) {
   Json j;
-  j["value"] = json(parameter.value);
+  const double* value = std::get_if<double>(&parameter.value);
+  j["value"] = value ? number(*value) : json(parameter.value);
   if (!parameter.unit.empty()) j["unit"] = parameter.unit;
   if (!parameter.ci95.empty()) {
     const bool single = kindOf(parameter.value) == ParameterKind::kNumber;

@@ -1,4 +1,5 @@
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
@@ -73,6 +74,7 @@ class Entry {
     return {ends[0].number(), ends[1].number()};
   }
   Parameters::Value value() const {
+    if (value_.is_null()) return std::numeric_limits<double>::quiet_NaN();  // told where it may be: problemOf()
     if (value_.is_number()) return value_.get<double>();
     if (value_.is_string()) return value_.get<std::string>();
     if (!value_.is_array()) fail("must be a number, a text or a list of either");

@@ -169,7 +169,8 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   state.poses.push_back(std::move(result));
   const std::vector<double>& noise = state.poses.back().noise_variance;
   state.motion.push_back({pose, stack.frames, std::move(residuals.evidence), std::move(residuals.echoes),
-                          std::accumulate(noise.begin(), noise.end(), 0.0) / static_cast<double>(noise.size())});
+                          std::accumulate(noise.begin(), noise.end(), 0.0) / static_cast<double>(noise.size()),
+                          std::move(residuals.tracks)});
   state.judged.push_back(std::move(judged));
   state.located.reset();
 }

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "diagnosis/catalogue/bounds.h"
+#include "diagnosis/frames/walker_findings.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_dsp/statistics.h"
 
@@ -109,7 +110,11 @@ class Search {
 
   LocatedMotion run() {
     LocatedMotion motion;
+    const bool tracked = std::any_of(poses_.begin(), poses_.end(),
+                                     [&](const PoseMotion& p) { return canTrackWalkers(radar_, p.frames); });
+    if (tracked) motion.walkers = trackedWalkers();
     for (const PoseMotion& p : poses_) {
+      if (tracked) break;
       for (const MovingEcho& e : p.echoes) {
         if (std::isfinite(e.radial_m_per_s)) return dopplerWalkers();
       }
@@ -129,6 +134,7 @@ class Search {
         for (PoseMotion& p : poses_) clear(p, bin * radar_.range_bin_m(), 2.5 * radar_.range_bin_m());
         continue;
       }
+      if (tracked) break;
       const double log_chance = tries + logChance(bounds::kTrustInMotion * place.evidence, poses_.size());
       if (log_chance >= kLogFalseAlarm || motion.walkers.size() == kMostWalkers) break;
       motion.walkers.push_back(walker(place, std::exp(log_chance)));
@@ -137,6 +143,12 @@ class Search {
   }
 
  private:
+  std::vector<FrameFinding> trackedWalkers() const {
+    std::vector<PoseTracks> tracks;
+    for (const PoseMotion& p : poses_) tracks.push_back({&p.pose, &p.tracks});
+    return walkerFindings(radar_, tracks);
+  }
+
   /// Place in the map of highest evidence over all poses.
   Place strongestPlace() const {
     std::vector<float> sum(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), 0);

@@ -18,6 +18,7 @@ struct PoseMotion {
   std::vector<MovingEcho> echoes;
   double noise_variance =
       1.0 / 6;  ///< of one complex sample of one shot, mean over channels, counts^2; rounding by default
+  std::vector<WalkTrack> tracks;
 };
 
 /// Motion of a session: walkers with their places in the map, and tones of the radar.

@@ -53,13 +53,6 @@ Eigen::FFT<float>& fft() {
   return fft;
 }
 
-/// Time from one chirp's start to the next: as radar.yaml states, else the shortest that its samples allow.
-double chirpPeriod_s(const RadarConfig& radar) {
-  const double sampled_s = radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
-  return (std::isfinite(radar.ramp_end_s) ? radar.ramp_end_s : sampled_s) +
-         (std::isfinite(radar.idle_s) ? radar.idle_s : 0);
-}
-
 /// Offset of a peak from the middle of three levels, by a parabola through their logarithms; at most 1/2 in magnitude.
 double peakOffset(double left, double middle, double right) {
   if (!(left > 0 && middle > 0 && right > 0)) return 0;
@@ -581,6 +574,7 @@ ShotStatistics ShotExaminer::examine(const FrameStack& stack, const std::vector<
   readTurn(stack, s, result);
   readUnsteadiness(s, result);
   readEvidence(s, result);
+  result.tracks = trackWalkers(radar_, {s.channels, s.bins, stack.loops, stack.frames, s.shot, &s.residual});
   if (stack.loops >= kLeastLoops) {
     readDopplerEchoes(s, result);
   } else {

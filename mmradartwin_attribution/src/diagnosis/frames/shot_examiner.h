@@ -7,6 +7,7 @@
 
 #include "diagnosis/frames/frame_stack.h"
 #include "diagnosis/frames/moving_cell.h"
+#include "diagnosis/frames/walk_tracker.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_dsp/range_angle.h"
 
@@ -30,6 +31,7 @@ struct ShotStatistics {
   Eigen::ArrayXXf evidence;
   std::vector<MovingEcho> echoes;
   std::vector<MovingCell> cells;
+  std::vector<WalkTrack> tracks;  ///< empty where frames have too few loops
   /// Phase per frame that the cells share, beyond the phase that was removed before, and its variance: infinite where
   /// no cell exceeds the noise.
   double turn_rad_per_frame = 0, turn_variance = 0;

@@ -37,6 +37,8 @@ Finding findingOf(const FrameFinding& frames) {
   if (finding.cause == "unknown") return finding;
   NamedParameters m = defaultMechanism(finding.cause);
   for (const FindingParameter& p : finding.parameters) {
+    const double* number = std::get_if<double>(&p.value);
+    if (number && std::isnan(*number)) continue;
     if (m.values.has(p.name)) m.values.set(p.name, p.value);
   }
   finding.mechanism = m;
