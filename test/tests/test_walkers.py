@@ -6,11 +6,37 @@ import numpy as np
 
 from diagnose_program import PROGRAM, diagnose
 from in_folder import InFolder
-from walking_points import Recording, write_session
+from walking_points import Recording, polar, write_session
+
+WAVELENGTH_M = 299792458.0 / 77.93e9    # at the middle of the samples
+
+WALL = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+element face 2
+property list uchar int vertex_indices
+end_header
+5.22 -3 0
+5.22 3 0
+5.22 3 2.6
+5.22 -3 2.6
+3 0 2 1
+3 0 3 2
+"""
+SCENE = """meshes:
+  - {file: wall.ply}
+materials: materials.yaml
+actors: {wall: {material: Concrete}}
+"""
+MATERIALS = """materials:
+  Concrete: {model: dielectric, relative_permittivity: 5.24, conductivity_s_per_m: 1.38}
+"""
 
 
-@unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
-class Walkers(InFolder):
+class MadeRecordings(InFolder):
     sessions = 0
 
     def found(self, recordings, poses=None, scene_files=None):
@@ -30,6 +56,9 @@ class Walkers(InFolder):
             for low, high in [ci95] if ci95 and not isinstance(ci95[0], list) else ci95:
                 self.assertLess(low, high, msg=f"{finding['cause']}: {name}")
 
+
+@unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
+class Walkers(MadeRecordings):
     def walkers(self, recordings, count, poses=None):
         """Parameters of the walkers, who are all that is found."""
         findings = self.found(recordings, poses)
@@ -114,9 +143,150 @@ class Walkers(InFolder):
         low, high = walker["speed_m_per_s"]["ci95"]
         self.assertTrue(low <= 0.8 <= high, msg=f"{low} to {high}")
 
+    def test_whole_turns_between_loops_are_told_by_the_way_or_not_at_all(self):
+        # Loops of 0.8 ms: speeds 2.4 m/s apart look alike in each of them.
+        for number, (frames, speed) in enumerate(((30, 1.5), (6, -1.3), (2, 1.0))):
+            recording = Recording(frames, 16, seed=number + 50, chirp_s=400e-6)
+            recording.stands(5.0, -10, 400).stands(2.0, 30, 300).walks(3.0, -25, speed, 30)
+            walker, = self.walkers([recording], 1)
+            with self.subTest(frames=frames, speed=speed):
+                # Two frames 50 ms apart do not show a way across the view, and maybe none along it.
+                told = walker["speed_m_per_s"]["value"] is not None
+                self.assertEqual(told, frames > 2)
+                self.assertEqual(told, "ci95" in walker["speed_m_per_s"])
+                if walker["radial_m_per_s"]["value"] is None:
+                    self.assertEqual(frames, 2)
+                    continue
+                low, high = walker["radial_m_per_s"]["ci95"]
+                self.assertTrue(low <= speed <= high, msg=f"{low} to {high}")
+
+    def test_frames_of_few_loops_show_who_crosses_the_room(self):
+        for number, (frames, loops) in enumerate(((60, 1), (60, 3), (100, 2))):
+            recording = Recording(frames, loops, seed=number + 60)
+            recording.stands(7.5, 0, 400).stands(1.0, 30, 300)
+            recording.walks(2.5, -25, 0.9, 60).walks(5.5, 15, -0.8, 50)
+            with self.subTest(frames=frames, loops=loops):
+                for walker in self.walkers([recording], 2):
+                    self.check_speed(walker, 0.9 if walker["y_m"]["value"] < 0 else -0.8)
+
+    def test_nobody_walks_behind_a_wall(self):
+        # A sheet across x = 5.22 m; from the same bytes, with and without a scene.
+        files = {"wall.ply": WALL, "scene.yaml": SCENE, "materials.yaml": MATERIALS}
+        for range_m, in_room in ((3.0, True), (6.6, False)):
+            recording = Recording(20, 16, seed=70).stands(5.22, 0, 400).walks(range_m, 5, 0.6, 60)
+            findings = self.found([recording], scene_files=files)
+            causes = [f["cause"] for f in findings["findings"]]
+            with self.subTest(range_m=range_m):
+                self.assertEqual(causes.count("moving_target"), int(in_room), msg=f"{findings}")
+                if not in_room:
+                    self.assertIn("hides", findings["findings"][-1]["description"])
+        walker, = self.walkers([Recording(20, 16, seed=70).stands(5.22, 0, 400).walks(6.6, 5, 0.6, 60)], 1)
+        self.check_speed(walker, 0.6)
+
     def test_where_nobody_walks_nobody_is_found(self):
         for frames, loops in ((6, 48), (60, 16)):
             self.walkers([Recording(frames, loops, seed=9).stands(5.0, -10, 4000).stands(2.0, 30, 3000)], 0)
+
+
+@unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
+class FrameLaws(MadeRecordings):
+    """What stands changes from frame to frame by a law: nobody walks."""
+    ROOM = ((1.3, 35, 300), (2.2, -40, 250), (3.1, 10, 200), (4.0, -20, 220), (6.3, 25, 150), (7.6, -5, 180))
+
+    def room(self, frames, loops, seed, common=None, wall=1.0, x_m=0.0):
+        """Points of a room and a wall across x = 5 m, seen from (x_m, 0); common: factor of all echoes by range."""
+        common = common or (lambda range_m: 1.0)
+        recording = Recording(frames, loops, seed=seed)
+        for range_m, azimuth_deg, amplitude in self.ROOM:
+            x, y, _ = polar(range_m, azimuth_deg) - [x_m, 0, 0]
+            recording.stands(math.hypot(x, y), math.degrees(math.atan2(y, x)), amplitude, common(math.hypot(x, y)))
+        return recording.stands(5.0 - x_m, 0, 600, wall * common(5.0 - x_m))
+
+    def law(self, make, frames, loops, count):
+        """Parameters of the one law that is found at `count` poses; make: frames of a pose by number and x_m."""
+        recordings = [make(i, 0.25 * i) for i in range(count)]
+        poses = [(f"{i:02d}", 0.25 * i, 0.0, 0.0, 1760000000.0 + 10 * i) for i in range(count)]
+        findings = self.found(recordings, poses)
+        self.assertEqual(findings["verdict"], "unknown", msg=f"{findings}")
+        finding, = findings["findings"]
+        return finding
+
+    def each_shape(self, check, *arguments):
+        """Frames, loops and poses."""
+        for shape in ((60, 1, 1), (24, 16, 1), (40, 2, 3)):
+            with self.subTest(shape=shape):
+                check(*shape, *arguments)
+
+    def check_rms(self, finding, name, true):
+        low, high = finding["parameters"][name]["ci95"]
+        self.assertTrue(0.85 * low <= true <= 1.15 * high, msg=f"{name}: {low} to {high}, not {true}")
+
+    def check_law(self, finding, law):
+        self.assertEqual(finding["parameters"]["law"]["value"], law, msg=f"{finding}")
+
+    def check_vibrating(self, frames, loops, count):
+        t = np.arange(frames)[:, None, None] * 0.05
+
+        def make(i, x_m):
+            way_m = 2e-4 * np.sin(2 * math.pi * 3.1 * t + i)
+            return self.room(frames, loops, i, wall=np.exp(4j * math.pi / WAVELENGTH_M * way_m), x_m=x_m)
+        finding = self.law(make, frames, loops, count)
+        self.check_law(finding, "phase_over_frames_of_one_echo")
+        self.check_rms(finding, "phase_rms_rad", 4 * math.pi / WAVELENGTH_M * 2e-4 / math.sqrt(2))
+        self.assertEqual(len(finding["where"]), count)
+        for place in finding["where"]:
+            self.assertAlmostEqual(place["x_m"], 5.0, delta=0.15)
+
+    def test_a_wall_that_vibrates(self):
+        self.each_shape(self.check_vibrating)
+
+    def check_trigger(self, frames, loops, count):
+        rng = np.random.default_rng(frames + count)
+        per_m_s = 2 * math.pi * 75e12 * 2 / 299792458.0
+
+        def make(i, x_m):
+            late_s = rng.normal(0, 8e-9, frames)[:, None, None]
+            return self.room(frames, loops, i, lambda range_m: np.exp(1j * per_m_s * range_m * late_s), x_m=x_m)
+        finding = self.law(make, frames, loops, count)
+        self.check_law(finding, "phase_over_frames_growing_with_range")
+        self.check_rms(finding, "phase_rms_rad_per_m", per_m_s * 8e-9)
+
+    def test_a_trigger_that_jitters(self):
+        self.each_shape(self.check_trigger)
+
+    def check_phase(self, frames, loops, count):
+        rng = np.random.default_rng(frames + count)
+
+        def make(i, x_m):
+            phase = rng.normal(0, 0.4, frames)[:, None, None]
+            return self.room(frames, loops, i, lambda range_m: np.exp(1j * phase), x_m=x_m)
+        finding = self.law(make, frames, loops, count)
+        self.check_law(finding, "phase_over_frames_of_all_echoes")
+        self.check_rms(finding, "phase_rms_rad", 0.4)
+
+    def test_a_phase_that_all_echoes_share(self):
+        self.each_shape(self.check_phase)
+
+    def check_level(self, frames, loops, count, law):
+        rng = np.random.default_rng(frames + count)
+
+        def make(i, x_m):
+            level = 10**(rng.normal(0, 1.0, frames)[:, None, None] / 20)
+            if law.endswith("one_echo"):
+                return self.room(frames, loops, i, wall=level, x_m=x_m)
+            return self.room(frames, loops, i, lambda range_m: level, x_m=x_m)
+        finding = self.law(make, frames, loops, count)
+        if law.endswith("all_echoes") and "law" not in finding["parameters"]:    # frame by frame, of all poses
+            self.assertIn("common level of frames", finding["description"])
+            return
+        self.check_law(finding, law)
+        self.check_rms(finding, "level_rms_db", 1.0)
+
+    def test_a_level_that_all_echoes_share(self):
+        self.each_shape(self.check_level, "level_over_frames_of_all_echoes")
+
+    def test_a_level_that_one_echo_has(self):
+        self.each_shape(self.check_level, "level_over_frames_of_one_echo")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ import numpy as np
 
 LIGHT_M_PER_S = 299792458.0
 CARRIER_HZ, SLOPE_HZ_PER_S, RATE_HZ, ADC_START_S = 77.0e9, 75.0e12, 5.0e6, 6.0e-6
-SAMPLES, CHIRP_S = 64, 27.0e-6
+SAMPLES, CHIRP_S, RAMP_S = 64, 27.0e-6, 20.0e-6
 TX_M = (0.0, 0.0077867)
 RX_M = (0.0, 0.0019467, 0.0038934, 0.0058401)
 
@@ -20,15 +20,15 @@ frame_period_s: {frame_period_s}
 tx_position_m: [[0, 0, 0], [0, 0.0077867, 0]]
 rx_position_m: [[0, 0, 0], [0, 0.0019467, 0], [0, 0.0038934, 0], [0, 0.0058401, 0]]
 layout: 4lane
-idle_s: 7.0e-6
+idle_s: {idle_s:.9f}
 ramp_end_s: 20.0e-6
 """
 
 
-def chirp_times_s(frames, loops, frame_period_s):
+def chirp_times_s(frames, loops, frame_period_s, chirp_s):
     """Start of every chirp [frame, loop, slot]."""
     return (np.arange(frames)[:, None, None] * frame_period_s +
-            np.arange(loops)[None, :, None] * len(TX_M) * CHIRP_S + np.arange(len(TX_M)) * CHIRP_S)
+            np.arange(loops)[None, :, None] * len(TX_M) * chirp_s + np.arange(len(TX_M)) * chirp_s)
 
 
 def polar(range_m, azimuth_deg):
@@ -55,10 +55,11 @@ def echo(places_m, amplitudes):
 class Recording:
     """One pose: a radar at T_map_radar = (position, yaw), frames of loops of two chirps."""
 
-    def __init__(self, frames, loops, frame_period_s=0.05, noise=3.0, seed=1):
+    def __init__(self, frames, loops, frame_period_s=0.05, noise=3.0, seed=1, chirp_s=CHIRP_S):
         self.frames, self.loops, self.frame_period_s = frames, loops, frame_period_s
+        self.chirp_s = chirp_s
         self.noise, self.rng = noise, np.random.default_rng(seed)
-        self.times_s = chirp_times_s(frames, loops, frame_period_s)
+        self.times_s = chirp_times_s(frames, loops, frame_period_s, chirp_s)
         self.x = np.zeros((frames, loops, len(TX_M), SAMPLES, len(RX_M)), complex)
 
     def stands(self, range_m, azimuth_deg, amplitude, changes=1.0):
@@ -99,7 +100,8 @@ def write_session(folder, recordings, poses=None, scene_files=None):
     session = "format: mmradartwin_session/1\nradar: radar.yaml\nposes: poses.csv\ncaptures: captures/{pose}.bin\n"
     if scene_files:
         session += "scene: scene.yaml\n"
-    files = {"radar.yaml": RADAR.format(loops=first.loops, frame_period_s=first.frame_period_s),
+    files = {"radar.yaml": RADAR.format(loops=first.loops, frame_period_s=first.frame_period_s,
+                                          idle_s=first.chirp_s - RAMP_S),
              "poses.csv": "\n".join(lines) + "\n", "session.yaml": session, **(scene_files or {})}
     for name, text in files.items():
         with open(os.path.join(folder, name), "w", encoding="ascii") as out:

@@ -6,6 +6,7 @@
 
 #include "diagnosis/gain/changed_records.h"
 #include "diagnosis/gain/held_out_gain.h"
+#include "diagnosis/hidden_walkers.h"
 #include "diagnosis/receiver/body_fixed_tone.h"
 #include "diagnosis/receiver/channel_errors.h"
 #include "diagnosis/receiver/receiver_findings.h"
@@ -46,6 +47,7 @@ void DiagnosisRun::add(Finding finding, const std::map<std::string, double>& nat
 
 void DiagnosisRun::judgeFrames() {
   if (lag_) add(findingOf(*lag_));
+  judgeHiddenWalkers(twin_, data_, session_.received.frames, session_.received.unexplained);
   for (const FrameFinding& frames : session_.received.frames) add(findingOf(frames), frames.nats_by_pose);
   measureFrameGain();
 }

@@ -12,6 +12,7 @@
 
 #include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/frames/frame_stack.h"
+#include "diagnosis/frames/law_findings.h"
 #include "diagnosis/frames/motion_locator.h"
 #include "diagnosis/frames/payload_defects.h"
 #include "diagnosis/frames/shot_examiner.h"
@@ -51,6 +52,7 @@ struct PoseJudgement {
   int turn_cells = 0, frames = 0;
   std::vector<double> frame_gain_db;  ///< common to all channels and samples
   double unsteady_share = 0, unsteady_nats = 0;
+  std::vector<FrameLaw> laws;
 };
 
 }  // namespace
@@ -150,6 +152,7 @@ void FrameExaminer::addPose(const Pose& pose, const std::vector<AdcCube>& frames
   judged.turn_cells = residuals.turn_cells;
   judged.unsteady_share = residuals.unsteady_share;
   judged.unsteady_nats = residuals.unsteady_nats;
+  judged.laws = std::move(residuals.laws);
   for (double level : residuals.frame_level) judged.frame_gain_db.push_back(20 * std::log10(std::max(level, 1e-6)));
 
   PoseFrames result;
@@ -464,7 +467,13 @@ std::vector<FrameFinding> FrameExaminer::unexplained() const {
                      [&](const FrameFinding& f) { return 2 * f.poses.size() < hit.size() && standsWithin(f, hit); }),
       all.end());
   FrameFinding gain = state_->frameGain();
-  if (gain.log_likelihood_gain > 0) all.push_back(std::move(gain));
+  const bool gained = gain.log_likelihood_gain > 0;
+  std::vector<PoseLaws> laws;
+  for (std::size_t i = 0; i < state_->judged.size(); ++i) {
+    laws.push_back({&state_->motion[i].pose, &state_->judged[i].laws});
+  }
+  for (FrameFinding& law : lawFindings(laws, gained)) all.push_back(std::move(law));
+  if (gained) all.push_back(std::move(gain));
   return all;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <set>
 #include <sstream>
 
@@ -112,7 +113,8 @@ class Search {
     LocatedMotion motion;
     const bool tracked = std::any_of(poses_.begin(), poses_.end(),
                                      [&](const PoseMotion& p) { return canTrackWalkers(radar_, p.frames); });
-    if (tracked) motion.walkers = trackedWalkers();
+    motion.walkers = trackedWalkers();
+    for (PoseMotion& p : poses_) clearTracks(p);
     for (const PoseMotion& p : poses_) {
       if (tracked) break;
       for (const MovingEcho& e : p.echoes) {
@@ -235,6 +237,15 @@ class Search {
     tone.values.set("level_db", power.empty() ? 0.0 : 10 * std::log10(quantile(power, 0.5)));
     tone.values.set("azimuth_deg", sine.empty() ? 0.0 : degrees(std::asin(quantile(sine, 0.5))));
     return tone;
+  }
+
+  /// Removes the evidence and echoes of walkers with tracks.
+  void clearTracks(PoseMotion& pose) const {
+    for (const WalkTrack& t : pose.tracks) {
+      const double begin_m = t.at(t.first_frame * radar_.frame_period_s)[0],
+                   end_m = t.at(t.last_frame * radar_.frame_period_s)[0];
+      clear(pose, 0.5 * (begin_m + end_m), 0.5 * std::abs(end_m - begin_m) + kReach_m);
+    }
   }
 
   /// Removes the evidence and echoes of an interval of ranges from a pose.
@@ -472,10 +483,17 @@ class Search {
     return best;
   }
 
-  /// Speed with its interval by a jackknife over poses.
-  Speed speed(const std::vector<Track>& tracks) const {
+  /// Speed with its interval by a jackknife over poses, and by what errors of range hide over the longest track.
+  /// Nothing where no track tells a speed.
+  std::optional<Speed> speed(const std::vector<Track>& tracks) const {
     std::vector<const Track*> all;
-    for (const Track& t : tracks) all.push_back(&t);
+    double longest_s = 0;
+    for (const Track& t : tracks) {
+      all.push_back(&t);
+      if (t.frame.size() > 1)
+        longest_s = std::max(longest_s, (t.frame.back() - t.frame.front()) * radar_.frame_period_s);
+    }
+    if (!(longest_s > 0)) return std::nullopt;
     Speed speed;
     speed.value = speedOf(all);
     // One or two poses determine a speed to a factor of two.
@@ -485,9 +503,10 @@ class Search {
       rest.erase(rest.begin() + static_cast<long>(i));
       variance += std::pow(speedOf(rest) - speed.value, 2);
     }
-    const double half = all.size() > 2 ? 1.96 * std::hypot(std::sqrt(variance * (all.size() - 1.0) / all.size()),
-                                                           bounds::kWalkSpeedError * speed.value)
-                                       : speed.value;
+    const double spread = all.size() > 2 ? 1.96 * std::hypot(std::sqrt(variance * (all.size() - 1.0) / all.size()),
+                                                             bounds::kWalkSpeedError * speed.value)
+                                         : speed.value;
+    const double half = std::hypot(spread, 1.96 * kRangeError_m / longest_s);
     speed.low = std::max(0.0, speed.value - half);
     speed.high = speed.value + half;
     return speed;
@@ -525,14 +544,18 @@ class Search {
     finding.false_alarm_rate = std::min(1.0, false_alarm_rate);
     const Walk walk = walkAbout(found);
     const Eigen::Vector2d& center = walk.center;
-    const Speed walking_speed = speed(walk.tracks);
+    const std::optional<Speed> walking_speed = speed(walk.tracks);
     const auto interval = [](double value, double variance) {
       const double half = 1.96 * std::sqrt(variance);
       return std::vector<std::array<double, 2>>{{value - half, value + half}};
     };
     finding.parameters = {{"x_m", "m", center.x(), interval(center.x(), walk.covariance(0, 0))},
                           {"y_m", "m", center.y(), interval(center.y(), walk.covariance(1, 1))},
-                          {"speed_m_per_s", "m/s", walking_speed.value, {{walking_speed.low, walking_speed.high}}}};
+                          {"speed_m_per_s", "m/s", std::numeric_limits<double>::quiet_NaN(), {}}};
+    if (walking_speed) {
+      finding.parameters.back().value = walking_speed->value;
+      finding.parameters.back().ci95 = {{walking_speed->low, walking_speed->high}};
+    }
     for (std::size_t i = 0; i < poses_.size(); ++i) {
       PoseMotion& pose = poses_[i];
       const Eigen::Vector3d d =
@@ -559,8 +582,13 @@ class Search {
     }
     finding.log_likelihood_gain = std::max(finding.log_likelihood_gain, found.evidence);
     std::ostringstream text;
-    text << "something moves about (" << center.x() << ", " << center.y() << ") m in the map at " << walking_speed.value
-         << " m/s; seen at " << finding.poses.size() << " of " << poses_.size() << " poses";
+    text << "something moves about (" << center.x() << ", " << center.y() << ") m in the map";
+    if (walking_speed) {
+      text << " at " << walking_speed->value << " m/s";
+    } else {
+      text << "; its speed is not told";
+    }
+    text << "; seen at " << finding.poses.size() << " of " << poses_.size() << " poses";
     finding.description = text.str();
     return finding;
   }

@@ -17,6 +17,7 @@ using Complex = std::complex<float>;
 
 constexpr int kLeastLoops = 16;             ///< loops of a Doppler spectrum: static echoes fill three of its bins
 constexpr std::size_t kEchoesPerFrame = 3;  ///< moving echoes that are kept, the strongest
+constexpr float kRemainderOfLaws = 0.01f;   ///< share of its power, by which what stands still varies beside laws
 constexpr double kLimb_m = 0.75;            ///< between parts of a body
 constexpr double kGhostBefore_m = 1;        ///< distance by which an echo over a wall may seem nearer than its body
 constexpr double kAlike = 2;  ///< frames over which a body's echo is correlated, by which its average scatters more
@@ -47,6 +48,9 @@ double errorOfMedian(std::vector<T> values, double median) {
   for (T& v : values) v = std::abs(v - median);
   return 1.25 * 1.48 * medianOf(values) / std::sqrt(static_cast<double>(values.size()));
 }
+
+/// Variance of the slope over frames through independent errors.
+double slopeVariance(double rms, int frames) { return 12 * rms * rms / std::pow(static_cast<double>(frames), 3); }
 
 Eigen::FFT<float>& fft() {
   thread_local Eigen::FFT<float> fft(Eigen::FFT<float>::impl_type(), Eigen::FFT<float>::Unscaled);
@@ -366,6 +370,20 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& spectra, Sho
   }
 }
 
+void ShotExaminer::takeLaws(const FrameStack& stack, Spectra& s, ShotStatistics& result) const {
+  FrameLaws taken =
+      takeFrameLaws(radar_, {s.channels, s.bins, stack.loops, stack.frames, s.shot, &s.gain, &s.average, &s.residual});
+  result.laws = std::move(taken.laws);
+  if (result.laws.empty()) return;
+  std::fill(result.frame_level.begin(), result.frame_level.end(), 1.0);
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < s.shot.size() && !taken.level_db.empty(); ++i) {
+    const int frame = s.shot[i] / s.per_frame;
+    if (i > 0 && s.shot[i - 1] / s.per_frame == frame) continue;
+    result.frame_level[static_cast<std::size_t>(frame)] = std::pow(10, taken.level_db[at++] / 20);
+  }
+}
+
 void ShotExaminer::readSteadiness(const Spectra& spectra, ShotStatistics& result) const {
   const double freedom = static_cast<double>(spectra.shot.size()) - 1;
   if (freedom < 4) return;
@@ -461,10 +479,14 @@ void ShotExaminer::readEvidence(const Spectra& spectra, ShotStatistics& result) 
       beams -= still * (still.adjoint() * beams_) / standing;
     }
     const Eigen::MatrixXcf varied = c * beams;
+    // Laws of the frames are taken out up to a remainder.
+    const float remainder = result.laws.empty() ? 0 : kRemainderOfLaws;
     for (int a = 0; a < kAngleBins; ++a) {
       const float size = beams.col(a).squaredNorm();
       ratio(b, a) =
-          size > 0.2f * static_cast<float>(spectra.channels) ? beams.col(a).dot(varied.col(a)).real() / size : 1.0f;
+          size > 0.2f * static_cast<float>(spectra.channels)
+              ? (beams.col(a).dot(varied.col(a)).real() - remainder * std::norm(beams.col(a).dot(still))) / size
+              : 1.0f;
     }
   }
   // Skirts of strong echoes reach over many bins. A moving echo also exceeds its surroundings in range.
@@ -568,13 +590,22 @@ ShotStatistics ShotExaminer::examine(const FrameStack& stack, const std::vector<
   ShotStatistics result;
   Spectra s = spectra(stack, average);
   takeCommonGain(stack, s, result);
+  takeLaws(stack, s, result);
   result.shots = static_cast<int>(s.shot.size());
   readSteadiness(s, result);
   readNoise(s, result);
   readTurn(stack, s, result);
+  for (const FrameLaw& law : result.laws) {
+    // A slope through phases that scatter together is theirs, not that of the cells alone.
+    const double far = law.kind == FrameLawKind::kPhaseRange ? radar_.max_range_m() : 1;
+    if (!law.common || law.kind == FrameLawKind::kLevel) continue;
+    result.turn_rad_per_frame += law.slope;
+    result.turn_variance += slopeVariance(law.rms * far, law.frames);
+  }
   readUnsteadiness(s, result);
   readEvidence(s, result);
-  result.tracks = trackWalkers(radar_, {s.channels, s.bins, stack.loops, stack.frames, s.shot, &s.residual});
+  result.tracks = trackWalkers(
+      radar_, {s.channels, s.bins, stack.loops, stack.frames, s.shot, &s.residual, &s.average, !result.laws.empty()});
   if (stack.loops >= kLeastLoops) {
     readDopplerEchoes(s, result);
   } else {

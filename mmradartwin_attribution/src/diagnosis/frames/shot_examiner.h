@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "diagnosis/frames/frame_laws.h"
 #include "diagnosis/frames/frame_stack.h"
 #include "diagnosis/frames/moving_cell.h"
 #include "diagnosis/frames/walk_tracker.h"
@@ -31,6 +32,7 @@ struct ShotStatistics {
   Eigen::ArrayXXf evidence;
   std::vector<MovingEcho> echoes;
   std::vector<MovingCell> cells;
+  std::vector<FrameLaw> laws;     ///< of what stands; taken out of all that follows
   std::vector<WalkTrack> tracks;  ///< empty where frames have too few loops
   /// Phase per frame that the cells share, beyond the phase that was removed before, and its variance: infinite where
   /// no cell exceeds the noise.
@@ -60,6 +62,7 @@ class ShotExaminer {
   class DopplerFrame;
   Spectra spectra(const FrameStack& stack, const std::vector<std::complex<float>>& average) const;
   void takeCommonGain(const FrameStack& stack, Spectra& spectra, ShotStatistics& result) const;
+  void takeLaws(const FrameStack& stack, Spectra& spectra, ShotStatistics& result) const;
   void readSteadiness(const Spectra& spectra, ShotStatistics& result) const;
   void readNoise(Spectra& spectra, ShotStatistics& result) const;
   void readUnsteadiness(const Spectra& spectra, ShotStatistics& result) const;

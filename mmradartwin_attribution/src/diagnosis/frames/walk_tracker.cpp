@@ -15,6 +15,8 @@ namespace {
 using Complex = std::complex<float>;
 
 constexpr int kLeastLoopsOfTracks = 8;        ///< loops that tell a walker's phase slope within a frame
+constexpr int kFewestFramesOfWays = 16;       ///< that show a walk through range bins without loops
+constexpr double kLongWay_m = 1.0;            ///< of such a walk; a shorter one is found about its place
 constexpr double kFastest_m_per_s = 8;        ///< of a person who runs
 constexpr double kMostAcross_m_per_s = 3;     ///< with which the search across the view begins
 constexpr int kBeams = 32;                    ///< of the search, over all sines
@@ -34,6 +36,8 @@ constexpr double kHannCorrelation = 1.94;     ///< by which neighbouring bins of
 constexpr int kMostSearches = 16;             ///< of a window
 constexpr double kBody_m = 0.5;               ///< least distance of two walkers in one frame
 constexpr double kLeastEnd = 0.15;            ///< share of a walker's usual power in the first and last frame of a run
+constexpr double kFlicker = 1e-3;             ///< share of its power, by which what stands may flicker
+constexpr double kFlickerOfLaws = 1e-2;       ///< the same where a law of frames was taken out
 constexpr double kRidge = 1e-3;               ///< share of a standing echo that frames can never tell
 
 /// Straight walk in the plane: range and sine of azimuth at a reference time, speeds along and across the view there.
@@ -90,7 +94,7 @@ class Tracker {
     for (int first = 0; first < s_.frames; first += kFramesOfSearch) {
       const Run window{first, std::min(s_.frames, first + kFramesOfSearch) - 1};
       if (window.size() < 2) continue;
-      spent_.assign(static_cast<std::size_t>(window.size()), Eigen::ArrayXf::Zero(s_.bins));
+      spent_.assign(static_cast<std::size_t>(window.size()), standing());
       for (int search = 0; search < kMostSearches && tracks.size() < kMostTracks; ++search) {
         readCells(window);
         std::optional<WalkTrack> track = next(window);
@@ -176,6 +180,20 @@ class Tracker {
         &x_[i * static_cast<std::size_t>(s_.bins) * static_cast<std::size_t>(s_.channels)], s_.channels, s_.bins);
   }
 
+  /// Level down to which what stands flickers, by the bin: log(1 + power over noise) of a frame.
+  Eigen::ArrayXf standing() const {
+    const double share = s_.has_laws ? kFlickerOfLaws : kFlicker;
+    Eigen::ArrayXf level(s_.bins);
+    for (int b = 0; b < s_.bins; ++b) {
+      double power = 0;
+      for (int k = 0; k < s_.channels; ++k) {
+        power += std::norm((*s_.average)[static_cast<std::size_t>(b * s_.channels + k)]);
+      }
+      level[b] = static_cast<float>(std::log(1 + share * power * s_.loops));
+    }
+    return level;
+  }
+
   /// Straight line in range with the run of frames that hold it.
   struct Line {
     double range_m = 0, radial_m_per_s = 0, score = 0;  ///< range at the middle of the window
@@ -187,7 +205,8 @@ class Tracker {
     const double bin_m = radar_.range_bin_m(), duration_s = (window.size() - 1) * radar_.frame_period_s;
     const double middle_s = 0.5 * (frame_s(window.first) + frame_s(window.last));
     const double step = std::min(0.5 * step_m_per_s_, 0.5 * bin_m / duration_s);
-    const int side = static_cast<int>(std::ceil(kFastest_m_per_s / step));
+    const double fastest = s_.loops < kLeastLoopsOfTracks ? kMostAcross_m_per_s : kFastest_m_per_s;
+    const int side = static_cast<int>(std::ceil(fastest / step));
     const auto usual = static_cast<float>(std::log(1 + kUsualPower));
     Line best;
     for (int i = -side; i <= side; ++i) {
@@ -291,8 +310,23 @@ class Tracker {
     }
   }
 
+  /// True where two frames have a cell that is neither noise nor flicker.
+  bool exceedsNoise() const {
+    int frames = 0;
+    for (std::size_t f = 0; f < level_.size(); ++f) {
+      bool exceeds = false;
+      for (int b = 1; b + 1 < s_.bins && !exceeds; ++b) {
+        const float most = level_[f].col(b).maxCoeff();
+        exceeds = most > spent_[f][b] && most > std::log(1 + kUsualPower);
+      }
+      frames += exceeds;
+    }
+    return frames >= 2;
+  }
+
   /// Next walker of a window; nats are 0 where what was found stands. Nothing where only noise is left.
   std::optional<WalkTrack> next(const Run& window) {
+    if (!exceedsNoise()) return std::nullopt;
     Line line = strongestLine(window);
     if (line.run.size() < 2 || line.score < kLeastScore) return std::nullopt;
     Run run = line.run;
@@ -300,7 +334,11 @@ class Tracker {
     Path path{line.range_m, 0, line.radial_m_per_s, 0};
     path.azimuth_rad = directionOf(path, run, middle_s);
     path.across_m_per_s = acrossOf(path, run, middle_s);
-    improve(path, run, middle_s);
+    const double power = improve(path, run, middle_s);
+    // The first direction came with a rough speed, which passes for one between slots.
+    Path other = path;
+    other.azimuth_rad = directionOf(path, run, middle_s);
+    if (improve(other, run, middle_s) > power) path = other;
     Fit fit = fitOf(path, run, middle_s);
     if (const Run kept = keptOf(run, fit.snr); kept.size() < run.size()) {
       const double moved_s = 0.5 * (frame_s(kept.first) + frame_s(kept.last)) - middle_s;
@@ -617,10 +655,22 @@ bool canTrackWalkers(const RadarConfig& radar, int frames) {
   return radar.loops_per_frame >= kLeastLoopsOfTracks && frames >= 2;
 }
 
+bool canTrackLongWays(int frames) { return frames >= kFewestFramesOfWays; }
+
 std::vector<WalkTrack> trackWalkers(const RadarConfig& radar, const ShotSpectra& spectra) {
-  if (!canTrackWalkers(radar, spectra.frames)) return {};
-  if (spectra.shot.size() < 2 * static_cast<std::size_t>(kLeastLoopsOfTracks)) return {};
-  return Tracker(radar, spectra).run();
+  const bool by_loops = canTrackWalkers(radar, spectra.frames);
+  if (!by_loops && !canTrackLongWays(spectra.frames)) return {};
+  if (spectra.shot.size() < static_cast<std::size_t>(kFewestFramesOfWays)) return {};
+  std::vector<WalkTrack> tracks = Tracker(radar, spectra).run();
+  if (by_loops) return tracks;
+  // Without loops only the way through range bins shows a walk.
+  const auto is_short = [&](const WalkTrack& t) {
+    const double begin_m = t.at(t.first_frame * radar.frame_period_s)[0],
+                 end_m = t.at(t.last_frame * radar.frame_period_s)[0];
+    return std::abs(end_m - begin_m) < kLongWay_m || t.last_frame - t.first_frame < kFewestFramesOfWays / 2;
+  };
+  tracks.erase(std::remove_if(tracks.begin(), tracks.end(), is_short), tracks.end());
+  return tracks;
 }
 
 }  // namespace mmradartwin::diagnosis::frames

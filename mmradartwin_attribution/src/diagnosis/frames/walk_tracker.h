@@ -13,8 +13,10 @@ namespace mmradartwin::diagnosis::frames {
 /// Range spectra of the shots of one pose about their mean over all shots, in units of the noise.
 struct ShotSpectra {
   int channels = 0, bins = 0, loops = 0, frames = 0;
-  std::vector<int> shot;                                ///< indices of the shots: frame x loops + loop
-  const std::vector<std::complex<float>>* values = {};  ///< [shot][bin][channel]
+  std::vector<int> shot;                                 ///< indices of the shots: frame x loops + loop
+  const std::vector<std::complex<float>>* values = {};   ///< [shot][bin][channel]
+  const std::vector<std::complex<float>>* average = {};  ///< [bin][channel] what stands
+  bool has_laws = false;                                 ///< frames' laws were taken out, up to a remainder
 };
 
 /// Number with its 95 % interval.
@@ -40,7 +42,10 @@ struct WalkTrack {
 
 /// True where frames have enough loops, and are enough, to show how a walker moves.
 bool canTrackWalkers(const RadarConfig& radar, int frames);
-/// Walkers that cross the frames of one pose, strongest first. Empty where canTrackWalkers() is false.
+/// True where frames are enough to show a walk through range bins, whatever their loops.
+bool canTrackLongWays(int frames);
+/// Walkers that cross the frames of one pose, strongest first. Where
+/// canTrackWalkers() is false only those whose way through range bins is long.
 std::vector<WalkTrack> trackWalkers(const RadarConfig& radar, const ShotSpectra& spectra);
 
 /// Time from one chirp's start to the next: as radar.yaml states, else the shortest that its samples allow.

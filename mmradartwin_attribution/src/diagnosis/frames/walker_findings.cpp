@@ -14,8 +14,9 @@ namespace {
 
 constexpr double kSameBody_m = 0.6;          ///< between the end of a track and the beginning of its continuation
 constexpr double kUsualSpeed_m_per_s = 2.0;  ///< of people in rooms, unseen
-constexpr double kOverlap = 0.34;  ///< share of the shorter of two stretches of one way, in which both are seen
-constexpr double kAround_m = 0.5;  ///< about a track, in a finding's place
+constexpr double kOverlap = 0.34;          ///< share of the shorter of two stretches of one way, in which both are seen
+constexpr double kMostAcross_m_per_s = 3;  ///< of people; an interval beyond it tells nothing
+constexpr double kAround_m = 0.5;          ///< about a track, in a finding's place
 constexpr double kAround_deg = 10;
 constexpr double kRangeError_m = 0.1;      ///< standard error along the view, about a range bin
 constexpr double kAngleError_rad = 0.035;  ///< standard error across the view: 2 degrees, the array's errors
@@ -92,6 +93,7 @@ std::optional<Bounded> speedOf(const WalkTrack& t) {
   if (!t.radial) return std::nullopt;
   const Bounded& radial = *t.radial;
   const double across = std::abs(t.across_m_per_s), half = 1.96 * t.across_error_m_per_s;
+  if (half > kMostAcross_m_per_s) return std::nullopt;
   const double told = across > half ? across : 0;
   Bounded speed;
   speed.value = std::hypot(radial.value, told);
