@@ -3,9 +3,38 @@
 #include <iostream>
 #include <optional>
 
+#include "mmradartwin_dsp/capture_check.h"
+#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
 #include "mmradartwin_dsp/ros/bag_arguments.h"
 #include "mmradartwin_dsp/ros/bag_validation.h"
+
+namespace {
+
+/// What the bag's samples look like beside what its radar configuration says.
+void addSamples(const std::string& bag, const mmradartwin::BagOptions& options,
+                std::vector<mmradartwin::BagFinding>& findings) {
+  using namespace mmradartwin;
+  Recording recording;
+  try {
+    recording = openBag(bag, options);
+  } catch (const InputError&) {  // what is missing in it was found already
+    return;
+  }
+  const auto add = [&](const std::string& line) {
+    const std::string source = recording.source + ": ";
+    findings.push_back({line.rfind(source, 0) == 0 ? line.substr(source.size()) : line, 1, ""});
+  };
+  const std::size_t known = recording.problems.size();
+  try {
+    for (const std::string& note : checkCaptures(recording)) add(note);
+  } catch (const InputError& error) {
+    add(error.what());
+  }
+  for (std::size_t i = known; i < recording.problems.size(); ++i) add(recording.problems[i].message);
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace mmradartwin;
@@ -38,6 +67,7 @@ int main(int argc, char** argv) {
         progress->show(done);
       });
     }
+    addSamples(bag, options, findings);
     for (const BagFinding& finding : findings) {
       std::cout << bag << ": ";
       if (!finding.first.empty() || finding.count > 1) std::cout << finding.count << " ";
