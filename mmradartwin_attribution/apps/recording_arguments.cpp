@@ -5,6 +5,7 @@
 
 #include "mmradartwin_dsp/bag_kind.h"
 #include "mmradartwin_dsp/capture_check.h"
+#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/bag_arguments.h"
 
 namespace mmradartwin {
@@ -48,6 +49,11 @@ Recording RecordingArguments::open(const std::string& path) const {
 }
 
 void RecordingArguments::check(bool misaligned_is_finding, Recording& opened) const {
+  try {
+    opened.radar.virtualLine();
+  } catch (const InputError& error) {
+    throw InputError(opened.radar_file + ": " + error.what());
+  }
   using Misaligned = CaptureCheckOptions::Misaligned;
   CaptureCheckOptions options;
   options.misaligned = align ? Misaligned::kAligned : misaligned_is_finding ? Misaligned::kFound : Misaligned::kRefused;

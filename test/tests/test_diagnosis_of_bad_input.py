@@ -37,6 +37,25 @@ class BadInput(InFolder):
         self.assertIsNone(findings)
         self.assertIn("metres", errors)
 
+    def test_radars_that_cannot_be(self):
+        file = os.path.join(self.session, "radar.yaml")
+        with open(file, encoding="ascii") as text:
+            true = yaml.safe_load(text)
+        half_m = 0.0019467
+        for change, parts in (
+                ({"sample_rate_hz": 5000.0}, ("key sample_rate_hz", "ksps")),
+                ({"frame_period_s": 50.0}, ("key frame_period_s", "ms")),
+                ({"tx_position_m": [[0, 0, 0], [0, 4, 0]]}, ("key tx_position_m", "half wavelengths")),
+                ({"tx_position_m": [[0, 0, 0], [0, 4 * half_m, half_m]]}, ("slot 1", "above", "angle_slots: [0]"))):
+            with self.subTest(change=change):
+                with open(file, "w", encoding="ascii") as text:
+                    yaml.safe_dump({**true, **change}, text)
+                status, findings, errors = diagnose(self.session, self.output)
+                self.assertEqual(status, 2, msg=errors)
+                self.assertIsNone(findings)
+                for part in (file, *parts):
+                    self.assertIn(part, errors)
+
     def test_constant_zeros(self):
         with open(os.path.join(self.session, "poses.csv"), encoding="ascii") as text:
             names = [line.split(",")[0] for line in text.read().splitlines()[1:]]
