@@ -13,6 +13,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_sim/mesh_frame.h"
 #include "mmradartwin_sim/scene.h"
 
 namespace fs = std::filesystem;
@@ -25,6 +26,7 @@ struct Options {
   std::string output, material = "Concrete";
   double scale = 1;
   bool y_up = false;
+  std::string unit;
 };
 
 struct Preset {
@@ -102,6 +104,29 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
+/// What the options state of a mesh that does not declare it itself: its frame, and as keys of its entry.
+struct StatedFrame {
+  MeshFrame frame;
+  std::string keys;
+};
+
+StatedFrame statedFrame(const Options& options, const std::string& mesh) {
+  StatedFrame stated;
+  const std::string extension = lower(fs::path(mesh).extension().string());
+  for (const char* declaring : {".gltf", ".glb", ".dae", ".zae", ".fbx"}) {
+    if (extension == declaring) return stated;
+  }
+  if (options.y_up) {
+    stated.frame.y_up = true;
+    stated.keys += ", up: y";
+  }
+  if (!options.unit.empty()) {
+    stated.frame.unit_m = options.unit == "mm" ? 1e-3 : options.unit == "cm" ? 1e-2 : 1.0;
+    stated.keys += ", unit: " + options.unit;
+  }
+  return stated;
+}
+
 int makeScene(const Options& options) {
   const Preset& fallback = find(options.material);
   const fs::path scene_file = fs::path(options.output) / "scene.yaml",
@@ -117,14 +142,13 @@ int makeScene(const Options& options) {
   fs::create_directories(options.output);
   for (const std::string& mesh : options.meshes) {
     std::string path = fs::proximate(fs::weakly_canonical(mesh), fs::weakly_canonical(options.output)).string();
-    meshes << "  - {file: " << quoted(path) << ", xyz_m: [0, 0, 0], rpy_deg: [" << (options.y_up ? 90 : 0)
-           << ", 0, 0], scale: " << options.scale << "}\n";
-    for (const Actor& actor : loadMesh(mesh)) {
+    const StatedFrame stated = statedFrame(options, mesh);
+    meshes << "  - {file: " << quoted(path) << stated.keys
+           << ", xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0], scale: " << options.scale << "}\n";
+    for (const Actor& actor : loadMesh(mesh, stated.frame)) {
       if (!actors.insert(actor.name).second)
         throw InputError(mesh + ": a second actor is named " + actor.name + "; rename the object or the file");
-      for (const auto& v : actor.vertices) {
-        bounds.extend(options.scale * (options.y_up ? Eigen::Vector3d(v.x(), -v.z(), v.y()) : v));
-      }
+      for (const auto& v : actor.vertices) bounds.extend(options.scale * v);
       triangles += actor.triangles.size();
       const Preset* by_tag = guess(actor.material_tag);
       const Preset* by_name = by_tag ? by_tag : guess(actor.name);
@@ -164,7 +188,7 @@ int makeScene(const Options& options) {
   std::cerr << actors.size() << " actor(s), " << triangles << " triangles: edit " << scene_file.string() << " and "
             << materials_file.string() << "\n";
   if (bounds.sizes().maxCoeff() > 200 || bounds.sizes().maxCoeff() < 0.5) {
-    std::cerr << "warning: the scene is " << bounds.sizes().maxCoeff() << " m across; is --scale right?\n";
+    std::cerr << "warning: the scene is " << bounds.sizes().maxCoeff() << " m across; is --unit or --scale right?\n";
   }
   return 0;
 }
@@ -174,12 +198,14 @@ int makeScene(const Options& options) {
 int main(int argc, char** argv) {
   Options options;
   CLI::App app("Begins a scene from your own meshes: writes scene.yaml and materials.yaml to edit.");
-  app.add_option("MESH", options.meshes, "OBJ, PLY, STL or glTF files")->required();
+  app.add_option("MESH", options.meshes, "OBJ, PLY, STL, glTF, Collada or FBX files")->required();
   app.add_option("--output", options.output, "folder for scene.yaml and materials.yaml")->required();
-  app.add_option("--scale", options.scale, "metres per unit of the meshes")
+  app.add_option("--unit", options.unit, "of meshes that declare none: m, mm or cm")
+      ->check(CLI::IsMember({"m", "mm", "cm"}));
+  app.add_option("--scale", options.scale, "factor on the meshes, beyond their unit")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--material", options.material, "of actors that neither tag nor name explains")->capture_default_str();
-  app.add_flag("--y-up", options.y_up, "the meshes are y-up (glTF is turned without this)");
+  app.add_flag("--y-up", options.y_up, "meshes that declare no axes are y-up (glTF, Collada and FBX declare them)");
   return runProgram(app, argc, argv, [&options] { return makeScene(options); });
 }

@@ -95,9 +95,9 @@ void addActor(Scene& scene, Actor actor);
 void moveActor(Scene& scene, int actor, const Eigen::Isometry3d& T_map_map);
 /// Takes an actor out of paths and occlusion; indices stay.
 void removeActor(Scene& scene, int actor);
-/// Reads one mesh file into actors in file coordinates (glTF's y-up turned to z-up), without material look-up or
-/// facets: OBJ object or group name = actor, glTF node name = actor (the second of a name becomes NAME_2),
-/// otherwise the file's stem. Throws InputError.
+/// Reads one mesh file into actors, upright and in metres by what it declares (mesh_frame.h), without materials or
+/// facets: OBJ object or group name = actor, glTF node name = actor (the second of a name becomes NAME_2), otherwise
+/// the file's stem. Throws InputError.
 std::vector<Actor> loadMesh(const std::string& file);
 
 }  // namespace mmradartwin

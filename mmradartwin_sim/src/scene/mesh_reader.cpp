@@ -11,12 +11,17 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <unordered_map>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/session.h"
+#include "mmradartwin_sim/mesh_frame.h"
 #include "mmradartwin_sim/scene.h"
+#include "scene/declared_frame.h"
+#include "scene/far_vertices.h"
 #include "scene/obj_numbers.h"
 #include "scene/ply_reader.h"
 
@@ -44,24 +49,46 @@ void keep(const Eigen::Vector3d& v, FullPrecision& exact) {
   exact.emplace(std::array<float, 3>{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])}, v);
 }
 
-FullPrecision readObjVertices(const std::string& file) {
+/// The vertex of an OBJ file's line, where it holds one; rest: what stands behind it.
+std::optional<Eigen::Vector3d> objVertex(const std::string& line, std::string* rest = nullptr) {
+  if (line.size() < 2 || line[0] != 'v' || (line[1] != ' ' && line[1] != '\t')) return std::nullopt;
+  const char* at = line.c_str() + 1;
+  Eigen::Vector3d v;
+  for (int i = 0; i < 3; ++i) {
+    char* end = nullptr;
+    v[i] = std::strtod(at, &end);
+    if (end == at) return std::nullopt;
+    at = end;
+  }
+  if (rest) *rest = at;
+  return v;
+}
+
+FullPrecision readObjVertices(std::istream& in) {
   FullPrecision exact;
-  std::ifstream in(file);
   std::string line;
   while (std::getline(in, line)) {
-    if (line.size() < 2 || line[0] != 'v' || (line[1] != ' ' && line[1] != '\t')) continue;
-    const char* at = line.c_str() + 1;
-    Eigen::Vector3d v;
-    bool good = true;
-    for (int i = 0; i < 3 && good; ++i) {
-      char* end = nullptr;
-      v[i] = std::strtod(at, &end);
-      good = end != at;
-      at = end;
-    }
-    if (good) keep(v, exact);
+    if (const auto v = objVertex(line)) keep(*v, exact);
   }
   return exact;
+}
+
+/// An OBJ file's text with an origin, in its own coordinates, taken off its vertices. Names of materials stay; what
+/// its material library says of them is not needed.
+std::string objWithoutOrigin(const std::string& file, const Eigen::Vector3d& origin) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  std::string line, rest;
+  while (std::getline(in, line)) {
+    if (const auto v = objVertex(line, &rest)) {
+      const Eigen::Vector3d near = *v - origin;
+      text << "v " << formatExact(near.x()) << ' ' << formatExact(near.y()) << ' ' << formatExact(near.z()) << rest
+           << '\n';
+    } else {
+      text << line << '\n';
+    }
+  }
+  return text.str();
 }
 
 /// assimp's own reading of digits may differ by an ulp from the nearest float, so neighbours are tried too.
@@ -127,12 +154,16 @@ void numberNames(std::vector<Actor>& actors) {
 
 class Collector {
  public:
-  Collector(const std::string& file, const aiScene& scene, FullPrecision exact)
-      : file_(file), scene_(scene), extension_(lowerExtension(file)), exact_(std::move(exact)) {
+  /// to_map: linear map of assimp's coordinates to metres with z up; origin: taken off them.
+  Collector(const std::string& file, const aiScene& scene, FullPrecision exact, const Eigen::Matrix3d& to_map,
+            const Eigen::Vector3d& origin)
+      : file_(file),
+        scene_(scene),
+        extension_(lowerExtension(file)),
+        exact_(std::move(exact)),
+        to_map_(to_map),
+        origin_(origin) {
     stem_ = std::filesystem::path(file).stem().string();
-    // glTF is y-up by its specification; the others are taken as they are.
-    if (extension_ == ".gltf" || extension_ == ".glb")
-      up_ = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
   }
 
   std::vector<Actor> collect() {
@@ -195,9 +226,10 @@ class Collector {
                               : Eigen::Vector3d(double(T.a1) * p.x + double(T.a2) * p.y + double(T.a3) * p.z + T.a4,
                                                 double(T.b1) * p.x + double(T.b2) * p.y + double(T.b3) * p.z + T.b4,
                                                 double(T.c1) * p.x + double(T.c2) * p.y + double(T.c3) * p.z + T.c4);
-      v = up_ * v;
+      v = to_map_ * v - origin_;
       if (!v.allFinite() || v.cwiseAbs().maxCoeff() > kHuge_m) {
-        throw InputError(file_ + ": object " + name + ": a vertex is not a finite number within 1e6; repair the mesh");
+        throw InputError(file_ + ": object " + name + ": a vertex is not a finite number within 1e6; repair the mesh" +
+                         (v.allFinite() ? ", or take an origin off" + originAdvice(v) : ""));
       }
       actor->vertices.push_back(v);
     }
@@ -217,31 +249,64 @@ class Collector {
   const aiScene& scene_;
   std::string extension_, stem_;
   FullPrecision exact_;
-  Eigen::Matrix3d up_ = Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d to_map_;
+  const Eigen::Vector3d origin_;
   std::vector<Actor> actors_;
   std::map<std::pair<const aiNode*, std::string>, std::size_t> index_;
   std::map<std::string, std::size_t> by_name_;
 };
 
+Eigen::Matrix3d statedFrame(const MeshFrame& stated) {
+  const Eigen::Matrix3d turn = stated.y_up.value_or(false) ? uprightFromYUp() : Eigen::Matrix3d::Identity();
+  return stated.unit_m.value_or(1) * turn;
+}
+
+void refuseStatedTwice(const std::string& file, const MeshFrame& stated, const DeclaredFrame& declared) {
+  if (declared.upright && stated.y_up) {
+    throw InputError(file +
+                     ": declares its axes itself, so that scene.yaml's up cannot be given for it; where the file "
+                     "is wrong, turn it by rpy_deg");
+  }
+  if (declared.unit_m && stated.unit_m) {
+    throw InputError(file +
+                     ": declares its unit itself, so that scene.yaml's unit cannot be given for it; where the "
+                     "file is wrong, give a scale");
+  }
+}
+
 }  // namespace
 
-std::vector<Actor> loadMesh(const std::string& file) {
+std::vector<Actor> loadMesh(const std::string& file) { return loadMesh(file, MeshFrame()); }
+
+std::vector<Actor> loadMesh(const std::string& file, const MeshFrame& stated) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) throw InputError(file + ": no such mesh file");
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_LINE | aiPrimitiveType_POINT);
   const unsigned steps = aiProcess_Triangulate | aiProcess_SortByPType;
   const std::string extension = lowerExtension(file);
+  // The digits of these files are read here, so that a far origin is taken off before single precision.
+  const bool digits = extension == ".ply" || extension == ".obj";
+  const Eigen::Matrix3d stated_frame = statedFrame(stated);
+  const Eigen::Vector3d off =
+      digits ? Eigen::Vector3d(stated_frame.inverse() * stated.origin) : Eigen::Vector3d::Zero();
   FullPrecision exact;
   const aiScene* scene = nullptr;
   if (extension == ".ply") {
-    const PlyMesh mesh = readPly(file);
-    for (const Eigen::Vector3d& v : mesh.vertices) keep(v, exact);
+    PlyMesh mesh = readPly(file);
+    for (Eigen::Vector3d& v : mesh.vertices) keep(v -= off, exact);
     const std::string text = mesh.toObj();
+    scene = importer.ReadFileFromMemory(text.data(), text.size(), steps, "obj");
+  } else if (extension == ".obj" && !off.isZero(0)) {
+    std::string text = objWithoutOrigin(file, off);
+    text = withDigitsAroundPoints(text).value_or(text);
+    std::istringstream in(text);
+    exact = readObjVertices(in);
     scene = importer.ReadFileFromMemory(text.data(), text.size(), steps, "obj");
   } else {
     if (extension == ".obj") {
-      exact = readObjVertices(file);
+      std::ifstream in(file);
+      exact = readObjVertices(in);
       mendNumbers(file, importer);
     }
     scene = importer.ReadFile(file, steps);
@@ -251,11 +316,17 @@ std::vector<Actor> loadMesh(const std::string& file) {
     std::replace(why.begin(), why.end(), '\n', ' ');
     throw InputError(file + ": cannot be read as a mesh (" + why + "); OBJ, PLY, STL and glTF are known");
   }
-  std::vector<Actor> actors = Collector(file, *scene, std::move(exact)).collect();
+  const DeclaredFrame declared = declaredFrame(extension, *scene);
+  refuseStatedTwice(file, stated, declared);
+  const Eigen::Matrix3d to_map =
+      declared.upright.value_or(Eigen::Matrix3d::Identity()) * declared.unit_m.value_or(1) * stated_frame;
+  std::vector<Actor> actors =
+      Collector(file, *scene, std::move(exact), to_map, digits ? Eigen::Vector3d::Zero() : stated.origin).collect();
   actors.erase(std::remove_if(actors.begin(), actors.end(), [](const Actor& a) { return a.triangles.empty(); }),
                actors.end());
   if (actors.empty()) throw InputError(file + ": holds no triangles; export the surfaces as a triangle mesh");
   numberNames(actors);
+  refuseFarVertices(file, actors, digits ? Eigen::Vector3d::Zero() : stated.origin);
   return actors;
 }
 

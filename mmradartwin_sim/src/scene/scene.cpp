@@ -8,6 +8,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/strict_yaml.h"
+#include "mmradartwin_sim/mesh_frame.h"
 
 namespace mmradartwin {
 namespace {
@@ -16,6 +17,17 @@ Eigen::Vector3d triple(YamlMap& yaml, const std::string& key, double limit) {
   const std::vector<double> v = yaml.numbers(key, -limit, limit);
   if (v.size() != 3) yaml.fail(key, "needs three numbers");
   return {v[0], v[1], v[2]};
+}
+
+/// Keys up, unit and origin of an entry of meshes.
+MeshFrame statedFrame(YamlMap& entry) {
+  static const std::map<std::string, double> kUnits_m = {
+      {"m", 1}, {"mm", 1e-3}, {"cm", 1e-2}, {"in", 0.0254}, {"ft", 0.3048}};
+  MeshFrame frame;
+  if (entry.has("up")) frame.y_up = entry.choice("up", {"z", "y"}) == "y";
+  if (entry.has("unit")) frame.unit_m = kUnits_m.at(entry.choice("unit", {"m", "mm", "cm", "in", "ft"}));
+  if (entry.has("origin")) frame.origin = triple(entry, "origin", 1e8);
+  return frame;
 }
 
 std::string joined(const std::map<std::string, Material>& materials) {
@@ -77,13 +89,14 @@ Scene loadScene(const std::string& scene_yaml, double frequency_hz) {
     const Eigen::Vector3d xyz_m = entry.has("xyz_m") ? triple(entry, "xyz_m", 1e6) : Eigen::Vector3d::Zero();
     const Eigen::Vector3d rpy_deg = entry.has("rpy_deg") ? triple(entry, "rpy_deg", 360) : Eigen::Vector3d::Zero();
     const double scale = entry.has("scale") ? entry.number("scale", 1e-6, 1e6) : 1.0;
+    const MeshFrame frame = statedFrame(entry);
     entry.rejectUnknownKeys();
     const Eigen::Vector3d rpy = rpy_deg * M_PI / 180;
     const Eigen::Matrix3d R =
         (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
          Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
             .toRotationMatrix();
-    for (Actor& actor : loadMesh(file)) {
+    for (Actor& actor : loadMesh(file, frame)) {
       if (actor.name.find_first_of(",;\n\"") != std::string::npos) {
         throw InputError(file + ": object name '" + actor.name + "' holds a comma, semicolon or quote; rename it");
       }
