@@ -256,11 +256,6 @@ class Collector {
   std::map<std::string, std::size_t> by_name_;
 };
 
-Eigen::Matrix3d statedFrame(const MeshFrame& stated) {
-  const Eigen::Matrix3d turn = stated.y_up.value_or(false) ? uprightFromYUp() : Eigen::Matrix3d::Identity();
-  return stated.unit_m.value_or(1) * turn;
-}
-
 void refuseStatedTwice(const std::string& file, const MeshFrame& stated, const DeclaredFrame& declared) {
   if (declared.upright && stated.y_up) {
     throw InputError(file +
@@ -287,7 +282,7 @@ std::vector<Actor> loadMesh(const std::string& file, const MeshFrame& stated) {
   const std::string extension = lowerExtension(file);
   // The digits of these files are read here, so that a far origin is taken off before single precision.
   const bool digits = extension == ".ply" || extension == ".obj";
-  const Eigen::Matrix3d stated_frame = statedFrame(stated);
+  const Eigen::Matrix3d stated_frame = stated.toUpright();
   const Eigen::Vector3d off =
       digits ? Eigen::Vector3d(stated_frame.inverse() * stated.origin) : Eigen::Vector3d::Zero();
   FullPrecision exact;
