@@ -11,6 +11,7 @@
 #include "mmradartwin_dsp/program.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_sim/mesh_notes.h"
+#include "mmradartwin_sim/pose_placement.h"
 #include "recording_arguments.h"
 
 namespace {
@@ -55,7 +56,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
       std::cerr << "the recording names no scene: only its frames and channels are judged\n";
       diagnosis = diagnoseReceiver(recording, options);
     } else {
-      Twin twin(arguments.input.loadTwinOf(recording));
+      Twin twin = placedTwin(arguments.input.loadTwinOf(recording), recording.poses, recording.source);
       for (const std::string& note : meshNotes(twin.scene())) std::cerr << "note: " << note << "\n";
       for (const std::string& file : arguments.compared) {
         options.compared.push_back(arguments.input.loadTwinOf(recording, file));

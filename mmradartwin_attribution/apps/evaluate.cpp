@@ -10,8 +10,10 @@
 #include "mmradartwin_attribution/pose_picture.h"
 #include "mmradartwin_attribution/report.h"
 #include "mmradartwin_attribution/ros/results_bag.h"
+#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/map_picture.h"
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_sim/pose_placement.h"
 #include "recording_arguments.h"
 
 namespace {
@@ -31,15 +33,15 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   const bool from_twin = arguments.simulated.empty();
   // The twin also brings the scene that the expected regions come from; beside a simulated session it is that of the
   // base mechanisms.
-  Twin twin(from_twin ? arguments.input.loadTwinOf(recording)
-                      : loadTwin("", arguments.input.sceneFile(recording), recording.radar));
+  Twin twin = placedTwin(from_twin ? arguments.input.loadTwinOf(recording)
+                                   : loadTwin("", arguments.input.sceneFile(recording), recording.radar),
+                         recording.poses, recording.source);
   Recording other;
   SimulatedBranch simulated;
   if (from_twin) {
     std::vector<Eigen::Isometry3d> poses;
     for (const Pose& pose : recording.poses) poses.push_back(pose.T_map_radar);
     twin.prepare(poses);
-    twin.setSession(recording.poses);
     simulated = simulatedByTwin(twin, diffuseRecordsFrom(arguments.diffuse_records, "--diffuse-records"));
   } else {
     other = arguments.input.open(arguments.simulated);
@@ -63,11 +65,15 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
     if (!progress) progress = std::make_unique<boost::timer::progress_display>(all, std::cerr, "poses\n");
     ++*progress;
   };
-  const Evaluation evaluation = evaluate(recording, simulated, twin.scene(), twin.rays(), options);
+  const Evaluation evaluation = evaluate(recording, refusingEmpty(simulated), twin.scene(), twin.rays(), options);
+  progress.reset();
 
   std::vector<Pose> used;
   for (const PoseResult& pose : evaluation.poses) {
     if (pose.used) used.push_back(pose.pose);
+  }
+  if (used.empty() && !evaluation.problems.empty()) {
+    throw InputError(recording.source + ": no pose can be compared; the first: " + evaluation.problems.front().message);
   }
   writePicture(drawCoverage(twin.scene(), used), arguments.output + "/coverage.png");
   if (bag) bag->finish(evaluation);

@@ -32,6 +32,7 @@
 #include "mmradartwin_dsp/ros/strict_parameters.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_sim/plugin.h"
+#include "mmradartwin_sim/pose_placement.h"
 
 namespace {
 
@@ -237,7 +238,7 @@ class DiagnosisNode {
     const std::optional<ChosenTwin> chosen = chooseTwin(asked_twin, recording);
     if (!chosen) return diagnoseReceiver(recording, options);
     if (recording.channels) refuseSameChannelError(chosen->description, *recording.channels);
-    Twin twin(chosen->description);
+    Twin twin = placedTwin(chosen->description, recording.poses, recording.source);
     Diagnosis diagnosis = diagnose(recording, twin, options);
     if (chosen->scene_of_session) diagnosis.extended.scene_file.clear();
     return diagnosis;

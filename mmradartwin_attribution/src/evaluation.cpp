@@ -5,7 +5,9 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <mutex>
+#include <utility>
 
 #include "mmradartwin_dsp/average_pose.h"
 #include "mmradartwin_dsp/input_error.h"
@@ -36,6 +38,18 @@ SimulatedBranch simulatedBySession(const Recording& session) {
     }
     throw InputError("pose '" + pose.name + "': the simulated session " + session.source +
                      " has no usable pose of that name");
+  };
+}
+
+SimulatedBranch refusingEmpty(SimulatedBranch branch) {
+  constexpr double kNothing_db = -390;  // a map has -400 dB where nothing is
+  return [branch = std::move(branch)](const Pose& pose) {
+    SimulatedPose simulated = branch(pose);
+    const RealGrid& map = simulated.map.power_db;
+    const auto anything = [&](double level_db) { return level_db > kNothing_db; };
+    if (std::any_of(map.data(), map.data() + map.size(), anything)) return simulated;
+    throw InputError(
+        "the simulation has no echo here, so that there is nothing to compare; correct the pose or the scene");
   };
 }
 

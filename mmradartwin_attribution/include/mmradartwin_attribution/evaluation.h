@@ -32,6 +32,8 @@ using SimulatedBranch = std::function<SimulatedPose(const Pose&)>;
 SimulatedBranch simulatedByTwin(const Twin& twin, DiffuseRecords diffuse_records = DiffuseRecords::kPoints);
 /// Takes another session's averaged captures, by pose name. Keeps a reference to it.
 SimulatedBranch simulatedBySession(const Recording& session);
+/// The same branch, which throws InputError for a map without any echo: no figure of it would mean anything.
+SimulatedBranch refusingEmpty(SimulatedBranch branch);
 
 /// Coherent average of all frames of a pose through the signal chain. Throws InputError (missing or damaged capture).
 RangeAngleMap averagedMap(const Recording& recording, const SignalChain& chain, const Pose& pose);

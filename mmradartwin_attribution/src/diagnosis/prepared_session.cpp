@@ -9,6 +9,7 @@
 #include "diagnosis/likelihood/clutter_field.h"
 #include "diagnosis/scene_match.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/pose_placement.h"
 
 namespace mmradartwin::diagnosis {
 namespace {
@@ -47,7 +48,7 @@ PreparedSession prepareSession(const Recording& recording, Twin& twin, const Dia
                      ", record with fewer transmitters or receivers");
   }
   requireSameGrid(twin, data.radar);
-  requirePlacesNear(twin.scene(), data, recording.source);
+  requirePlaced(twin, recording.poses, recording.source);
   session.strongest_amplitude = keepUsablePoses(twin, data);
   if (data.poses.empty()) throw InputError(recording.source + ": " + data.problems.back().message);
   numberLocations(data);

@@ -6,7 +6,6 @@
 #include "diagnosis/gain/held_out_gain.h"
 #include "diagnosis/numbers/number_text.h"
 #include "mmradartwin_dsp/input_error.h"
-#include "mmradartwin_sim/scene.h"
 
 namespace mmradartwin::diagnosis {
 namespace {
@@ -45,20 +44,6 @@ void requireSameGrid(const Twin& twin, const RadarConfig& recorded) {
   throw InputError((description.radar_file.empty() ? description.file : description.radar_file) + ": has " +
                    grid(simulated) + ", the recording has " + grid(recorded) +
                    "; give the twin the radar that was recorded");
-}
-
-void requirePlacesNear(const Scene& scene, const ChannelData& data, const std::string& source) {
-  Eigen::AlignedBox3d room;
-  for (const Actor& actor : scene.actors) room.extend(actor.bounds);
-  const double reach_m = 2 * room.diagonal().norm();
-  for (const PoseChannels& pose : data.poses) {
-    const double outside_m = room.exteriorDistance(pose.pose.T_map_radar.translation());
-    if (outside_m > reach_m) {
-      throw InputError(source + ": pose '" + pose.pose.name + "' stands " + number(outside_m) +
-                       " m outside the scene, whose diagonal is " + number(reach_m / 2) +
-                       " m; poses are in metres in the scene's map: check units and origin");
-    }
-  }
 }
 
 std::optional<Finding> nothingMatches(const ChannelData& data, const std::vector<PoseEchoes>& echoes,

@@ -18,10 +18,6 @@ namespace mmradartwin::diagnosis {
 /// Carrier, slope and antenna positions may differ: they may be what is wrong with the twin.
 void requireSameGrid(const Twin& twin, const RadarConfig& recorded);
 
-/// Throws InputError where a pose stands so far outside the scene that its units or origin must differ from the
-/// scene's. source: file or bag of the poses, for the message.
-void requirePlacesNear(const Scene& scene, const ChannelData& data, const std::string& source);
-
 /// Finding that scene and recording do not belong together: the twin's expected echoes explain no more of the measured
 /// power (explained_power) than they do after an exchange of poses. Nothing where they explain more, and nothing where
 /// all poses see the same, so that an exchange shows nothing.

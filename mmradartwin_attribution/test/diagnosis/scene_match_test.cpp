@@ -38,17 +38,6 @@ TEST(SameGrid, IsAskedOfChannelsAndSamplesAlone) {
   EXPECT_TRUE(contains(inputError([&] { requireSameGrid(twin, recorded); }), "4 virtual channels"));
 }
 
-// The cabinet's box is 1 x 1 x 4 m: twice its diagonal is 8.49 m.
-TEST(PlacesNear, MayBeTwoDiagonalsOutsideTheScene) {
-  const Twin twin = CabinetTwin().with({});
-  EXPECT_EQ(inputError([&] { requirePlacesNear(twin.scene(), channelsAt({facingEastAt(3 - 8.4, 0)}), "poses.csv"); }),
-            "");
-  const std::string error = inputError([&] {
-    requirePlacesNear(twin.scene(), channelsAt({facingEastAt(0, 0), facingEastAt(3 - 8.6, 0)}), "poses.csv");
-  });
-  EXPECT_TRUE(contains(error, "poses.csv: pose '1' stands 8.6 m outside the scene")) << error;
-}
-
 /// Radars that see the cabinet at ranges of their own.
 class SceneMatch : public ::testing::Test {
  protected:

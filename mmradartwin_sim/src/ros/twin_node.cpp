@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
@@ -13,6 +14,7 @@
 #include "mmradartwin_dsp/session_files.h"
 #include "mmradartwin_sim/mesh_notes.h"
 #include "mmradartwin_sim/plugin.h"
+#include "mmradartwin_sim/pose_placement.h"
 #include "mmradartwin_sim/ros/conversions.h"
 
 namespace mmradartwin {
@@ -118,6 +120,7 @@ std::unique_ptr<Twin> TwinNode::makeTwin(const std::string& twin_file) const {
 
 void TwinNode::forgetSimulations() {
   last_ = nullptr;
+  advice_.reset();
   moving_.reset();
   actors_.clear();
 }
@@ -294,6 +297,18 @@ bool TwinNode::placeActors(std::int64_t stamp_ns) {
   return moved;
 }
 
+std::string TwinNode::noEchoAt(const Eigen::Isometry3d& T_map_radar) {
+  if (!advice_) {
+    advice_ = placementAdvice(twin_->scene(), twin_->radar(), {T_map_radar})
+                  .value_or("check units, axes and origin, and where the radar looks");
+  }
+  const Eigen::Vector3d p = T_map_radar.translation();
+  std::ostringstream text;
+  text << "the twin has no echo at the radar's pose (" << p.x() << ", " << p.y() << ", " << p.z() << ") m; poses in "
+       << map_frame_ << " and scene " << twin_->scene().file << " share one map, in metres, z up: " << *advice_;
+  return text.str();
+}
+
 void TwinNode::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns) {
   const bool moved = placeActors(stamp_ns);
   const bool stands = last_ && alike(last_->T_map_radar, T_map_radar);
@@ -318,7 +333,8 @@ void TwinNode::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp
       ROS_WARN_THROTTLE(kWarnEvery_s, "pose at %.6f not simulated: %s", toRosTime(stamp_ns).toSec(), error.what());
       return;
     }
-    problem_.clear();
+    problem_ = last_->records.empty() ? noEchoAt(at) : "";
+    if (!problem_.empty()) ROS_WARN_THROTTLE(kWarnEvery_s, "%s", problem_.c_str());
     ++simulated_;
     simulate_ms_ = (ros::WallTime::now() - begin).toSec() * 1e3;
     if (!last_->check.ok()) {

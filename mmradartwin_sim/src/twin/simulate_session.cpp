@@ -12,6 +12,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/mesh_notes.h"
+#include "mmradartwin_sim/pose_placement.h"
 #include "mmradartwin_sim/twin.h"
 
 namespace mmradartwin {
@@ -120,10 +121,10 @@ Recording openInput(const SimulateOptions& options) {
 
 Twin makeTwin(const SimulateOptions& options, const Recording& recording) {
   const std::string twin_file = options.twin_file.empty() ? recording.twin_file.value_or("") : options.twin_file;
-  Twin twin(loadTwin(twin_file, recording.scene_file, recording.radar), options.seed);
+  Twin twin = placedTwin(loadTwin(twin_file, recording.scene_file, recording.radar), recording.poses, recording.source,
+                         options.seed);
   std::vector<Eigen::Isometry3d> poses;
   for (const Pose& p : recording.poses) poses.push_back(p.T_map_radar);
-  twin.setSession(recording.poses);
   twin.prepare(poses);
   return twin;
 }
@@ -145,6 +146,7 @@ std::vector<Simulation> simulatePoses(const Job& job, const std::function<void(i
   const int count = job.poses();
   std::vector<Simulation> simulated(job.recording.poses.size());
   std::vector<std::string> failures(job.recording.poses.size());
+  std::vector<char> silent(job.recording.poses.size(), 0);
   std::atomic<int> done{0};
   std::mutex mutex;
   tbb::parallel_for(0, count, [&](int i) {
@@ -154,6 +156,7 @@ std::vector<Simulation> simulatePoses(const Job& job, const std::function<void(i
       writePathsCsv(exportedRecords(job.twin.radar(), s.records, job.options.diffuse_records), job.twin.scene(),
                     (paths / (pose.name + ".csv")).string());
       addLevels(job, s, levels);
+      silent[i] = s.grid.x.isZero(0);
       {
         const std::lock_guard<std::mutex> lock(mutex);
         result.worst_amplitude_error = std::max(result.worst_amplitude_error, s.check.worst_amplitude_error);
@@ -170,6 +173,9 @@ std::vector<Simulation> simulatePoses(const Job& job, const std::function<void(i
   for (int i = 0; i < count; ++i) {
     if (failures[i].empty()) continue;
     result.problems.push_back({job.pose(i).name, "pose " + job.pose(i).name + ": " + failures[i]});
+  }
+  for (int i = 0; i < count; ++i) {
+    if (silent[i]) result.notes.push_back("pose " + job.pose(i).name + ": the twin has no echo, all samples are zero");
   }
   return simulated;
 }
@@ -297,7 +303,7 @@ SimulateResult simulateSession(const SimulateOptions& options, const std::functi
   }
   const Job written{options, recording, noisy ? *noisy : twin};
   writeSession(written, simulated, result);
-  result.notes = twin.notes();
+  for (std::string& note : twin.notes()) result.notes.push_back(std::move(note));
   for (std::string& note : meshNotes(twin.scene())) result.notes.push_back(std::move(note));
   writeResolvedTwin(written);
   return result;

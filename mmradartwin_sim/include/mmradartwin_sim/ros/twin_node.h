@@ -60,6 +60,8 @@ class TwinNode {
   void use(std::unique_ptr<Twin> twin);
   void rebuild();
   void forgetSimulations();  ///< those of a twin that goes
+  /// What to say of a pose without any path; what may help is looked for once a twin.
+  std::string noEchoAt(const Eigen::Isometry3d& T_map_radar);
   void simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns);
   /// Where tf has the radar at a stamp; beyond its end, as if it went on as it did as long before.
   std::optional<Eigen::Isometry3d> reportedPose(std::int64_t stamp_ns) const;
@@ -82,8 +84,9 @@ class TwinNode {
   std::optional<std::string> session_scene_, session_twin_;
   std::optional<std::string> applied_twin_;  ///< file that twin/apply named
   std::unique_ptr<Twin> twin_;
-  std::string problem_;               ///< why there is no twin, or the last pose gave nothing
-  std::optional<MovingTwin> moving_;  ///< of twin_, where tf has actors of it
+  std::string problem_;                ///< why there is no twin, or the last pose gave nothing
+  std::optional<std::string> advice_;  ///< for poses without any path
+  std::optional<MovingTwin> moving_;   ///< of twin_, where tf has actors of it
   std::vector<std::pair<std::string, Eigen::Isometry3d>> actors_;  ///< those, and where they were placed
   std::optional<Simulation> still_;                                ///< last simulation where no actor moves
   const Simulation* last_ = nullptr;                               ///< still_, or that of moving_
