@@ -22,6 +22,7 @@
 #include "mmradartwin_sim/scene.h"
 #include "scene/declared_frame.h"
 #include "scene/far_vertices.h"
+#include "scene/gltf_extensions.h"
 #include "scene/obj_numbers.h"
 #include "scene/ply_reader.h"
 
@@ -276,10 +277,11 @@ std::vector<Actor> loadMesh(const std::string& file) { return loadMesh(file, Mes
 std::vector<Actor> loadMesh(const std::string& file, const MeshFrame& stated) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) throw InputError(file + ": no such mesh file");
+  const std::string extension = lowerExtension(file);
+  if (extension == ".gltf" || extension == ".glb") refuseUnreadExtensions(file);
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_LINE | aiPrimitiveType_POINT);
   const unsigned steps = aiProcess_Triangulate | aiProcess_SortByPType;
-  const std::string extension = lowerExtension(file);
   // The digits of these files are read here, so that a far origin is taken off before single precision.
   const bool digits = extension == ".ply" || extension == ".obj";
   const Eigen::Matrix3d stated_frame = stated.toUpright();
