@@ -56,7 +56,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
       std::cerr << "the recording names no scene: only its frames and channels are judged\n";
       diagnosis = diagnoseReceiver(recording, options);
     } else {
-      Twin twin = placedTwin(arguments.input.loadTwinOf(recording), recording.poses, recording.source);
+      Twin twin = twinAt(arguments.input.loadTwinOf(recording), recording.poses, recording.source);
       for (const std::string& note : meshNotes(twin.scene())) std::cerr << "note: " << note << "\n";
       for (const std::string& file : arguments.compared) {
         options.compared.push_back(arguments.input.loadTwinOf(recording, file));

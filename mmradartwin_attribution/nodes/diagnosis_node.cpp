@@ -238,7 +238,7 @@ class DiagnosisNode {
     const std::optional<ChosenTwin> chosen = chooseTwin(asked_twin, recording);
     if (!chosen) return diagnoseReceiver(recording, options);
     if (recording.channels) refuseSameChannelError(chosen->description, *recording.channels);
-    Twin twin = placedTwin(chosen->description, recording.poses, recording.source);
+    Twin twin = twinAt(chosen->description, recording.poses, recording.source);
     Diagnosis diagnosis = diagnose(recording, twin, options);
     if (chosen->scene_of_session) diagnosis.extended.scene_file.clear();
     return diagnosis;

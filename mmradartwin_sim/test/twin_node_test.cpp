@@ -49,6 +49,7 @@ class TwinNodeTest : public SceneFiles {
           for (const auto& s : a->status) {
             if (s.name.find("twin") == std::string::npos) continue;
             for (const auto& v : s.values) status_[v.key] = v.value;
+            summary_ = s.message;
           }
         });
     paths_in_ = nh_.subscribe<mmradartwin_msgs::PathRecords>(
@@ -110,6 +111,7 @@ class TwinNodeTest : public SceneFiles {
   mmradartwin_msgs::PathRecords::ConstPtr paths_;
   std::vector<mmradartwin_msgs::ReceiveGrid::ConstPtr> grids_;
   std::map<std::string, std::string> status_;
+  std::string summary_;
 };
 
 TEST_F(TwinNodeTest, TakesTheNewestAndCountsTheRest) {
@@ -185,6 +187,14 @@ TEST_F(TwinNodeTest, ActorsMoveWithTheirFrames) {
   status_.clear();
   ASSERT_TRUE(waitFor([&] { return counted("actors that move with tf") == 1; }));
   EXPECT_GE(counted("grids with a moved actor"), 3);
+}
+
+TEST_F(TwinNodeTest, SaysThatTheTwinHasNoEcho) {
+  send(400, radarPose(1000, 200, 100));  // in millimetres
+  ASSERT_TRUE(waitFor([&] { return summary_.find("the twin has no echo") != std::string::npos; }));
+  EXPECT_NE(summary_.find("the poses are in mm"), std::string::npos) << summary_;
+  send(401, radarPose(1, 0.2, 0.1));
+  EXPECT_TRUE(waitFor([&] { return summary_ == "simulating"; })) << summary_;
 }
 
 /// A node that is given a twin, and scene and radar by none yet; with what it logs.

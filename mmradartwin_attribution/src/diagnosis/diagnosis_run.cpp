@@ -7,6 +7,7 @@
 #include "diagnosis/gain/changed_records.h"
 #include "diagnosis/gain/held_out_gain.h"
 #include "diagnosis/hidden_walkers.h"
+#include "diagnosis/pose_convention.h"
 #include "diagnosis/receiver/body_fixed_tone.h"
 #include "diagnosis/receiver/channel_errors.h"
 #include "diagnosis/receiver/receiver_findings.h"
@@ -87,6 +88,7 @@ void DiagnosisRun::judgeConventions() {
   addGainInNats(data_, {}, finding);
   extended_.push_back(*finding.mechanism);
   convention_ = finding.cause;
+  as_recorded_ = recorded;
   result_.findings.findings.push_back(std::move(finding));
 }
 
@@ -167,6 +169,10 @@ bool DiagnosisRun::sceneMatches() {
   std::optional<Finding> mismatch;
   if (!session_.few) mismatch = nothingMatches(data_, echoes, result_.explained_power);
   if (!mismatch) return true;
+  context_.report("conventions of poses", 0);
+  if (const auto reading = matchingPoseReading(twin_, as_recorded_ ? *as_recorded_ : data_)) {
+    *mismatch->description += ". " + *reading;
+  }
   // A convention that was found where nothing matches is none: one of several does best by chance.
   std::string alone;
   for (const Finding& other : findings.findings) {

@@ -64,6 +64,7 @@ class DiagnosisRun {
   std::vector<NamedParameters> mechanisms_;  ///< as the engine simulates them
   std::vector<NamedParameters> extended_;    ///< the same with what was taken out of the data
   std::optional<std::string> convention_;    ///< cause of the convention that was found against the twin
+  std::optional<ChannelData> as_recorded_;   ///< the data before that convention was undone
   ModelState state_;                         ///< of the twin as given
 };
 

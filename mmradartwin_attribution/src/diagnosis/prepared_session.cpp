@@ -1,12 +1,14 @@
 #include "diagnosis/prepared_session.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/likelihood/clutter_field.h"
+#include "diagnosis/pose_convention.h"
 #include "diagnosis/scene_match.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/pose_placement.h"
@@ -34,6 +36,17 @@ double keepUsablePoses(const Twin& twin, ChannelData& data) {
   return strongest_amplitude;
 }
 
+/// requirePlaced(), whose error also names the convention of poses under which the recording matches.
+void requireInScene(const Recording& recording, const Twin& twin, const ChannelData& data, bool few) {
+  try {
+    requirePlaced(twin, recording.poses, recording.source);
+  } catch (const InputError& error) {
+    const std::optional<std::string> reading = few ? std::nullopt : matchingPoseReading(twin, data);
+    if (!reading) throw;
+    throw InputError(std::string(error.what()) + "; " + *reading);
+  }
+}
+
 }  // namespace
 
 PreparedSession prepareSession(const Recording& recording, Twin& twin, const DiagnosisOptions& options) {
@@ -48,7 +61,7 @@ PreparedSession prepareSession(const Recording& recording, Twin& twin, const Dia
                      ", record with fewer transmitters or receivers");
   }
   requireSameGrid(twin, data.radar);
-  requirePlaced(twin, recording.poses, recording.source);
+  requireInScene(recording, twin, data, session.few);
   session.strongest_amplitude = keepUsablePoses(twin, data);
   if (data.poses.empty()) throw InputError(recording.source + ": " + data.problems.back().message);
   numberLocations(data);

@@ -13,8 +13,8 @@ namespace {
 /// A pose that stands this far away, or looks this far aside, sees other echoes.
 constexpr double kElsewhere_m = 0.3, kElsewhere_rad = 20 * M_PI / 180;
 
-/// Share of the measured power that chance explains: each pose's expected echoes are compared with the data of a pose
-/// that stands or looks elsewhere. Nothing where all poses see the same.
+}  // namespace
+
 std::optional<double> explainedByChance(const ChannelData& data, const std::vector<PoseEchoes>& echoes) {
   const std::size_t n = echoes.size();
   std::vector<PoseEchoes> elsewhere(n);
@@ -30,8 +30,6 @@ std::optional<double> explainedByChance(const ChannelData& data, const std::vect
   }
   return explainedPower(cellPowers(data, elsewhere));
 }
-
-}  // namespace
 
 void requireSameGrid(const Twin& twin, const RadarConfig& recorded) {
   const RadarConfig& simulated = twin.radar();

@@ -22,9 +22,13 @@ std::optional<std::string> placementAdvice(const Scene& scene, const RadarConfig
 /// pose. source: file or bag of the poses, for the message. Traces poses until one has a path.
 void requirePlaced(const Twin& twin, const std::vector<Pose>& poses, const std::string& source);
 
-/// The twin of a recording, told of its poses (Twin::setSession()), which requirePlaced(). Where the twin cannot be made of a scene that is not placed, the
-/// error says the latter.
+/// The twin of a recording, told of its poses (Twin::setSession()), which requirePlaced() holds for. Where the twin
+/// cannot be made of a scene that is not placed, the error says the latter.
 Twin placedTwin(const TwinDescription& description, const std::vector<Pose>& poses, const std::string& source,
                 std::uint64_t seed = 1);
+
+/// placedTwin() for a caller of requirePlaced().
+Twin twinAt(const TwinDescription& description, const std::vector<Pose>& poses, const std::string& source,
+            std::uint64_t seed = 1);
 
 }  // namespace mmradartwin

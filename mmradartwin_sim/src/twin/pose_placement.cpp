@@ -221,21 +221,24 @@ void requirePlaced(const Twin& twin, const std::vector<Pose>& poses, const std::
                        .value_or("check units, axes and origin, and where the radar looks"));
 }
 
+Twin twinAt(const TwinDescription& description, const std::vector<Pose>& poses, const std::string& source,
+            std::uint64_t seed) {
+  try {
+    Twin twin(description, seed);
+    twin.setSession(poses);
+    return twin;
+  } catch (const InputError&) {
+    // A scene in millimetres has too many scatter points, say. The scene's own errors come again here.
+    const Scene scene = loadScene(description.scene_file, description.radar.center_frequency_hz());
+    const std::string wrong = misplaced(scene, description.radar, poses);
+    if (!wrong.empty()) throw InputError(source + ": " + wrong);
+    throw;
+  }
+}
+
 Twin placedTwin(const TwinDescription& description, const std::vector<Pose>& poses, const std::string& source,
                 std::uint64_t seed) {
-  const auto make = [&] {
-    try {
-      return Twin(description, seed);
-    } catch (const InputError&) {
-      // A scene in millimetres has too many scatter points, say.
-      const Scene scene = loadScene(description.scene_file, description.radar.center_frequency_hz());
-      const std::string wrong = misplaced(scene, description.radar, poses);
-      if (!wrong.empty()) throw InputError(source + ": " + wrong);
-      throw;
-    }
-  };
-  Twin twin = make();
-  twin.setSession(poses);
+  Twin twin = twinAt(description, poses, source, seed);
   requirePlaced(twin, poses, source);
   return twin;
 }
