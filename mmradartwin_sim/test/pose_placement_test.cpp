@@ -108,6 +108,19 @@ TEST_F(PosePlacement, RefusesARadarThatSeesNothing) {
   EXPECT_TRUE(contains(error, "where the radar looks")) << error;
 }
 
+TEST_F(PosePlacement, GuessesNoUnitForARadarOutside) {
+  for (const double away_m : {25.0, 90.0, 150.0}) {
+    const std::string error = refusal(room("Metal", 1), poses(1, {away_m, 0, 0}));
+    EXPECT_TRUE(contains(error, "m outside the scene")) << error;
+    EXPECT_TRUE(contains(error, "check units, axes and origin")) << error;
+  }
+}
+
+TEST_F(PosePlacement, NamesASceneInKilometres) {
+  const std::string error = refusal(room("Metal", 0.001), poses());
+  EXPECT_TRUE(contains(error, "the scene is in km")) << error;
+}
+
 TEST_F(PosePlacement, LeavesLargeHallsAlone) {
   addRectangle("wall", "Metal", {3, -200, 0}, {0, 400, 0}, {0, 0, 110});
   addRectangle("floor", "Metal", {-200, -200, 0}, {400, 0, 0}, {0, 400, 0});

@@ -14,6 +14,7 @@ namespace {
 constexpr double kShareOfPoses = 0.9;    ///< some may look out of an open side
 constexpr double kBeside_m = 0.3;        ///< a pose may stand so far outside the bounds of a room that it is in
 constexpr double kFarOrigin_m = 200;     ///< from the map's origin: a room is modelled about its own
+constexpr double kLargestInKm = 0.3;     ///< diagonal of a hall in kilometres
 constexpr double kLeastRoom_m = 1.5;     ///< least side of a room
 constexpr double kLeastHeight_m = 0.05;  ///< of a radar over the floor, where a wrong unit puts all poses
 /// Rays of a look: the field of view of the base mechanisms, by what a room's furniture takes up at its far end.
@@ -53,6 +54,8 @@ const std::vector<Placement>& guesses() {
   }();
   return all;
 }
+
+bool isMetric(const Placement& guess) { return guess.scene_scale == 1e-3 || guess.scene_scale == 1e-2; }
 
 Eigen::AlignedBox3d boundsOf(const Scene& scene) {
   Eigen::AlignedBox3d bounds;
@@ -153,8 +156,7 @@ std::optional<std::string> originOf(const Scene& scene, const std::vector<Eigen:
 std::string sizeDoubt(const Scene& scene, const RadarConfig& radar, const std::vector<Eigen::Isometry3d>& poses) {
   const Eigen::AlignedBox3d bounds = boundsOf(scene);
   for (const Placement& guess : guesses()) {
-    const bool metric = guess.scene_scale == 1e-3 || guess.scene_scale == 1e-2;
-    if (!metric || guess.scene_scale * bounds.sizes().minCoeff() < kLeastRoom_m) continue;
+    if (!isMetric(guess) || guess.scene_scale * bounds.sizes().minCoeff() < kLeastRoom_m) continue;
     const auto [seeing, within] = Views(scene, radar, poses).shares(guess);
     if (within < 1 || seeing < kShareOfPoses) continue;
     return "the scene is " + sizeText(bounds) + ", the poses lie within " + number(spread_m(poses)) +
@@ -194,7 +196,10 @@ std::optional<std::string> placementAdvice(const Scene& scene, const RadarConfig
   for (const Placement& guess : guesses()) {
     const auto [seeing, within] = views.shares(guess);
     if (seeing < kShareOfPoses || within <= best_within) continue;
-    if (guess.pose_scale != 1 && within < kShareOfPoses) continue;  // any poses come near by a scale
+    // Any poses come near by some scale. A part of a room may be in mm or cm, with the radars outside of it.
+    const bool part = guess.pose_scale == 1 && (guess.scene_scale == 1 || isMetric(guess));
+    if (!part && within < kShareOfPoses) continue;
+    if (guess.scene_scale > 1 && boundsOf(scene).diagonal().norm() > kLargestInKm) continue;
     best = &guess;
     best_within = within;
   }
