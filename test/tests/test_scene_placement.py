@@ -163,6 +163,20 @@ class PoseConventions(PlacedSession):
         self.assertEqual([f["cause"] for f in findings["findings"]], ["unknown"], msg=errors)
         return findings["findings"][0]["description"]
 
+    def test_captures_of_other_places_match_under_no_convention(self):
+        folder = os.path.join(self.session, "captures")
+        files = [os.path.join(folder, name) for name in sorted(os.listdir(folder))]
+        contents = []
+        for file in files:
+            with open(file, "rb") as capture:
+                contents.append(capture.read())
+        for file, content in zip(files, contents[5:] + contents[:5], strict=True):
+            with open(file, "wb") as capture:
+                capture.write(content)
+        text = self.description()
+        self.assertIn("nothing matches", text)
+        self.assertNotIn("the poses match", text)
+
     def test_w_first(self):
         self.change_poses(lambda p, q: (p, [q[3], q[0], q[1], q[2]]))
         self.assertIn("if their quaternions are w, x, y, z;", self.description())
