@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "fresnel_aperture.h"
+#include "mmradartwin_sim/seen_sides.h"
 
 namespace mmradartwin {
 namespace {
@@ -72,6 +73,7 @@ std::vector<MirrorImage> MirrorSearch::find(const Eigen::Isometry3d& T_map_radar
     ahead.push_back((T_radar_map.linear().row(0) * (m.corners.colwise() - radar)).maxCoeff() > 0);
   }
   std::vector<MirrorImage> found;
+  const SeenSides sides(scene_, radar);
   // Finds the vertices from the last mirror to the first, then checks that each leg is free.
   const auto solve = [&](const std::vector<const Facet*>& sequence, const std::vector<Eigen::Vector3d>& images) {
     const int order = static_cast<int>(sequence.size());
@@ -86,6 +88,13 @@ std::vector<MirrorImage> MirrorSearch::find(const Eigen::Isometry3d& T_map_radar
       at = path.vertices[i];
     }
     if (!inView(path.vertices.front()) || !inView(path.vertices.back())) return;
+    for (int i = 0; i < order; ++i) {
+      const Eigen::Vector3d& v = path.vertices[i];
+      if (!sides.isOpen(*sequence[i], v, i == 0 ? radar : path.vertices[i - 1]) ||
+          !sides.isOpen(*sequence[i], v, i + 1 == order ? radar : path.vertices[i + 1])) {
+        return;
+      }
+    }
     path.length_m = (images.back() - radar).norm();
     path.aperture = 1;
     double before = 0;

@@ -11,6 +11,7 @@
 
 #include "fresnel_aperture.h"
 #include "mirror_image.h"
+#include "mmradartwin_sim/seen_sides.h"
 
 namespace mmradartwin {
 namespace {
@@ -98,10 +99,10 @@ void RegionModel::findCorners() {
   }
   for (std::size_t i = 0; i < scene_.facets.size(); ++i) {
     const Facet& a = scene_.facets[i];
-    if (!a.reflects) continue;
+    if (!a.reflects || !a.present) continue;
     for (std::size_t j = i + 1; j < scene_.facets.size(); ++j) {
       const Facet& b = scene_.facets[j];
-      if (!b.reflects || std::abs(a.normal.dot(b.normal)) > sine) continue;
+      if (!b.reflects || !b.present || std::abs(a.normal.dot(b.normal)) > sine) continue;
       if (boxes[i].exteriorDistance(boxes[j]) > 2 * gap) continue;
       const Eigen::Vector3d axis = a.normal.cross(b.normal).normalized();
       // The point of both planes nearest to a's origin.
@@ -136,7 +137,7 @@ void RegionModel::placeProbes() {
   constexpr double kMaxProbesPerFacet = 600;
   probes_.resize(scene_.actors.size());
   for (const Facet& f : scene_.facets) {
-    if (!f.reflects || f.actor < 0) continue;
+    if (!f.reflects || !f.present || f.actor < 0) continue;
     std::vector<Probe>& probes = probes_[f.actor];
     const double spacing =
         std::max(field_.config().regions.extent_spacing_m, std::sqrt(f.size1_m * f.size2_m / kMaxProbesPerFacet));
@@ -175,8 +176,9 @@ bool RegionModel::place(const Eigen::Isometry3d& T_map_radar, const Eigen::Vecto
 
 void RegionModel::addFacets(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const {
   const Eigen::Vector3d radar = T.translation();
+  const SeenSides sides(scene_, radar);
   for (const Facet& f : scene_.facets) {
-    if (!f.reflects || f.actor < 0) continue;
+    if (!f.reflects || !f.present || f.actor < 0) continue;
     const double distance = f.planeDistance(radar);
     const double R = std::abs(distance);
     if (R < 1e-3 || R >= max_range_m_) continue;
@@ -190,6 +192,7 @@ void RegionModel::addFacets(const Eigen::Isometry3d& T, std::vector<ResponseRegi
     const bool inside = f.contains(foot, 1e-6);
     region.kind = inside ? RegionKind::kFacing : RegionKind::kEdge;
     if (!place(T, inside ? foot : f.nearest(foot, 0.01), region)) continue;
+    if (!sides.isOpen(f, region.point, radar)) continue;
     if (!seen(radar, region.point, (distance > 0 ? 1.0 : -1.0) * f.normal)) continue;
     region.actors = {f.actor};
     out.push_back(region);
@@ -198,6 +201,7 @@ void RegionModel::addFacets(const Eigen::Isometry3d& T, std::vector<ResponseRegi
 
 void RegionModel::addCorners(const Eigen::Isometry3d& T, std::vector<ResponseRegion>& out) const {
   const Eigen::Vector3d radar = T.translation();
+  const SeenSides sides(scene_, radar);
   for (const Corner& c : corners_) {
     const Facet &a = scene_.facets[c.first], &b = scene_.facets[c.second];
     if (a.planeDistance(radar) * c.toward_second <= 0 || b.planeDistance(radar) * c.toward_first <= 0) continue;
@@ -220,6 +224,7 @@ void RegionModel::addCorners(const Eigen::Isometry3d& T, std::vector<ResponseReg
     region.support_db = level_db(wavelength_m_ / (8 * M_PI * R) * aperture);
     region.kind = RegionKind::kCorner;
     if (!place(T, point, region)) continue;
+    if (!sides.isOpen(a, region.point, radar) || !sides.isOpen(b, region.point, radar)) continue;
     const Eigen::Vector3d inward = c.toward_second * a.normal + c.toward_first * b.normal;
     if (!seen(radar, region.point, 5 * inward)) continue;  // 1 cm off either face
     region.actors = {a.actor};
@@ -302,6 +307,7 @@ void RegionModel::addExtentsOf(int actor, const Eigen::Isometry3d& T, double flo
     Field field;
   };
   const Eigen::Vector3d radar = T.translation();
+  const SeenSides sides(scene_, radar);
   const double S = field_.config().regions.extent_scattering;
   const double scale = wavelength_m_ / (4 * M_PI) * S;
   std::vector<Visible> visible;
@@ -310,6 +316,7 @@ void RegionModel::addExtentsOf(int actor, const Eigen::Isometry3d& T, double flo
     if (!place(T, probe.point, place_of)) continue;
     const Facet& f = scene_.facets[probe.facet];
     const double r = place_of.range_m, cosine = f.normal.dot(radar - probe.point) / r;
+    if (!sides.isOpen(f, probe.point, radar)) continue;
     if (!seen(radar, probe.point, (cosine > 0 ? 1.0 : -1.0) * f.normal)) continue;
     // Lambertian backscatter of a patch, power: (lambda/(4 pi r^2) S cos)^2 dA/pi.
     visible.push_back({r, place_of.azimuth_rad,

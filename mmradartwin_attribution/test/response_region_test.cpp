@@ -106,6 +106,31 @@ TEST_F(RoomTest, FeetAndCornersOfAnEmptyRoom) {
   }
 }
 
+// A closed plate of any thickness is its front; a copy of it changes nothing.
+TEST_F(RoomTest, NothingWithinAThinBodyIsARegion) {
+  for (double t_mm : {0.5, 2.0, 5.0, 9.0}) {
+    const std::size_t room = scene_.actors.size();
+    for (const std::string& name : {"plate", "plate_001"}) {
+      addBox(name, {4, 1.5, 0.6}, {4 + t_mm * 1e-3, 2.5, 1.4});
+      const auto regions = regionsAt(2, 2, 0);
+      int of_plate = 0;
+      for (const ResponseRegion& r : regions) {
+        if (r.actor.find("plate") == std::string::npos || r.kind == RegionKind::kExtent) continue;
+        ++of_plate;
+        EXPECT_TRUE(r.kind == RegionKind::kFacing || r.kind == RegionKind::kImage) << t_mm << " mm";
+        EXPECT_EQ(r.actor.find("plate_001"), std::string::npos) << t_mm << " mm";
+        if (r.kind == RegionKind::kImage) {
+          EXPECT_NE(r.actor.find(';'), std::string::npos) << t_mm << " mm: no mirrors face each other in a plate";
+        } else {
+          EXPECT_NEAR(r.range_m, 2, 1e-9);
+        }
+      }
+      EXPECT_GE(of_plate, 1) << t_mm << " mm";
+    }
+    scene_.actors.resize(room);
+  }
+}
+
 TEST_F(RoomTest, TheHeadingTurnsRegions) {
   const auto regions = regionsAt(2, 2, 45);
   EXPECT_NE(find(regions, RegionKind::kFacing, 4, -45), nullptr);

@@ -250,9 +250,10 @@ TEST_F(SceneTest, TracesOpenAndSelfIntersectingSurfaces) {
   addBox("whole", "Concrete", V(7, -1, 0), V(7.5, -0.5, 1));
   Twin twin = makeTwin(writeScene(), "  specular: {}\n  corner: {}\n  diffuse: {}\n  edge_diffraction: {level: 1}\n");
   const std::vector<std::string> notes = meshNotes(twin.scene());
-  ASSERT_EQ(notes.size(), 2u);
+  ASSERT_EQ(notes.size(), 3u);
   EXPECT_NE(notes[0].find("open_box (5 open edges)"), std::string::npos) << notes[0];
   EXPECT_NE(notes[1].find("crossed (at 3, "), std::string::npos) << notes[1];
+  EXPECT_NE(notes[2].find(": folded_back with itself (1 m2)"), std::string::npos) << notes[2];
   for (const std::string& note : notes) EXPECT_EQ(note.find("whole"), std::string::npos) << note;
   for (double y : {-1.5, 0.0, 0.3}) {
     const Simulation s = twin.simulate(radarPose(0, y, 0.2));

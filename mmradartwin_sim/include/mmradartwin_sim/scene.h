@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -20,9 +21,13 @@ struct Facet {
   bool rectangle = false;                           ///< fills its bounding rectangle
   std::vector<std::vector<Eigen::Vector2d>> loops;  ///< boundary loops in (e1, e2), outer ones and holes
   bool reflects = true;   ///< false where the normal lies within 45 deg of the vertical: it only occludes
-  bool present = true;    ///< false where a mechanism took the actor away; ids stay
+  bool present = true;    ///< false where a mechanism took the actor away, or where others cover all of it; ids stay
   double flatness_m = 0;  ///< largest distance of a merged vertex from the plane
   int curved = -1;        ///< index into Scene::curved of the surface that it is a chord of, -1 where it is a plane
+  int body = -1;          ///< index into Scene::bodies, -1 where its surface is open
+  int outside = 0;        ///< of a body's facet: 1 where the normal points out of the body, -1 where it points into it
+  /// Facets that lie over this one at a few millimetres: a ray that ends short of this one misses them.
+  std::vector<int> layers;
 
   double planeDistance(const Eigen::Vector3d& p) const { return normal.dot(p - origin); }
   bool contains(const Eigen::Vector3d& p_on_plane, double tolerance_m = 0) const;
@@ -45,6 +50,7 @@ struct Actor {
   bool present = true;   ///< false where a mechanism took it away: no paths, no occlusion
   bool occludes = true;  ///< false where rays pass through it; its own faces stay hidden behind each other
   Eigen::AlignedBox3d bounds;
+  double repeated_m2 = 0;  ///< area of triangles that lie on others of the actor and are left out
 };
 
 /// A sphere or straight circular cylinder that a tessellated part of an actor stands for. Its facets scatter and
@@ -60,6 +66,25 @@ struct CurvedSurface {
   double sagitta_m = 0;  ///< how far the facets lie within the surface
 };
 
+/// A closed part of an actor's surface: each edge joins two of its triangles.
+struct ClosedBody {
+  int actor = -1;
+  std::vector<std::array<int, 3>> triangles;  ///< vertices of the actor, counter-clockwise as seen from outside
+};
+
+/// What is a facet's shape but for its place.
+struct FacetShape {
+  std::vector<std::vector<Eigen::Vector2d>> loops;
+  double area_m2 = 0;
+  bool rectangle = false;
+};
+
+/// Two facets in one plane that claim the same area; it belongs to `kept` alone.
+struct FaceOverlap {
+  int kept = -1, cut = -1;  ///< facet ids
+  double area_m2 = 0;
+};
+
 /// When neighbouring triangles are one facet: drawings, and meshes whose vertices are a few millimetres off at
 /// triangles of some decimetres. Scans need wider limits.
 struct FacetTolerance {
@@ -73,6 +98,9 @@ struct Scene {
   std::vector<Actor> actors;
   std::vector<Facet> facets;
   std::vector<CurvedSurface> curved;
+  std::vector<ClosedBody> bodies;
+  std::vector<FaceOverlap> overlaps;  ///< of facets that are seen from the same side
+  std::map<int, FacetShape> uncut;    ///< facet id -> shape before others were cut out of it
   std::vector<Actor> occluders_only;  ///< what mechanisms put into the room: they occlude, nothing else
 
   int actorIndex(const std::string& name) const;  ///< -1 where absent
@@ -91,7 +119,7 @@ Scene loadScene(const std::string& scene_yaml, double frequency_hz);
 void rebuildFacets(Scene& scene);
 /// One more actor behind the others, with its facets, whatever was done to the others since. Throws as rebuildFacets().
 void addActor(Scene& scene, Actor actor);
-/// Moves an actor with its facets; indices and facet-local coordinates stay.
+/// Moves an actor with its facets; indices and facet-local coordinates stay, but for what coincides with others.
 void moveActor(Scene& scene, int actor, const Eigen::Isometry3d& T_map_map);
 /// Takes an actor out of paths and occlusion; indices stay.
 void removeActor(Scene& scene, int actor);

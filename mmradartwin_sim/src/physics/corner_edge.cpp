@@ -138,10 +138,11 @@ void addCornerPath(const PoseContext& context, const ElementsInMap& elements, co
   const std::complex<double> factor =
       apertureAxis(-across_a * unit, across_b * unit) * apertureAxis(-foot_at * unit, (edge.length_m - foot_at) * unit);
   if (std::abs(factor) < kSmallestFactor) return;
+  const Facet &a = context.scene.facets[edge.a], &b = context.scene.facets[edge.b];
+  if (!elements.sides.isOpen(a, vertex, elements.p) || !elements.sides.isOpen(b, vertex, elements.p)) return;
   const Eigen::Vector3d lifted = vertex + 2 * kFacesMeet_m * (edge.into_a + edge.into_b);
   if (!context.rays.visible(elements.p, lifted, 1e-3)) return;
 
-  const Facet &a = context.scene.facets[edge.a], &b = context.scene.facets[edge.b];
   const Material &ma = context.scene.actors[a.actor].material, &mb = context.scene.actors[b.actor].material;
   const Eigen::Vector3d out = (foot - elements.p).normalized();
   const Eigen::Vector3d e = verticalField(elements.up, out);

@@ -3,7 +3,7 @@
 namespace mmradartwin {
 
 ElementsInMap::ElementsInMap(const PoseContext& context)
-    : p(context.T_map_radar.translation()), up(context.T_map_radar.linear().col(2)) {
+    : p(context.T_map_radar.translation()), up(context.T_map_radar.linear().col(2)), sides(context.scene, p) {
   for (const auto& t : context.radar.tx_position_m) tx.push_back(context.T_map_radar * t);
   for (const auto& r : context.radar.rx_position_m) rx.push_back(context.T_map_radar * r);
 }

@@ -5,6 +5,7 @@
 
 #include "mmradartwin_sim/path_record.h"
 #include "mmradartwin_sim/pose_context.h"
+#include "mmradartwin_sim/seen_sides.h"
 
 namespace mmradartwin {
 
@@ -14,6 +15,7 @@ struct ElementsInMap {
   std::vector<Eigen::Vector3d> tx, rx;
   Eigen::Vector3d p;   ///< origin of radar_link
   Eigen::Vector3d up;  ///< axis of the vertical antennas
+  SeenSides sides;     ///< of the scene's facets, from p
 
   /// Full lengths by way of one point, per virtual element.
   PerChannel<double> lengthsVia(const Eigen::Vector3d& point) const;

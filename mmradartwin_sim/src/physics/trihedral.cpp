@@ -136,6 +136,9 @@ void addTrihedralPath(const PoseContext& context, const ElementsInMap& elements,
   }
   const std::complex<double> factor = aperturePolygon(parts);
   if (std::abs(factor) < kSmallestFactor) return;
+  for (int id : trihedral.facets) {
+    if (!elements.sides.isOpen(context.scene.facets[id], trihedral.apex, elements.p)) return;
+  }
   const Eigen::Vector3d lifted =
       trihedral.apex + 2 * kFacesMeet_m * (trihedral.edge[0] + trihedral.edge[1] + trihedral.edge[2]);
   if (!context.rays.visible(elements.p, lifted, 1e-3)) return;

@@ -122,6 +122,11 @@ bool ImageSearch::faces(int a, bool positive_side, int b) const {
 
 bool ImageSearch::solve(const Eigen::Vector3d& p, const PerInteraction<int>& sequence, const RayCaster& rays,
                         const Limits& limits, ImagePath& path) const {
+  return solve(p, sequence, rays, limits, SeenSides(scene_, p), path);
+}
+
+bool ImageSearch::solve(const Eigen::Vector3d& p, const PerInteraction<int>& sequence, const RayCaster& rays,
+                        const Limits& limits, const SeenSides& sides, ImagePath& path) const {
   const int order = static_cast<int>(sequence.size());
   if (order < 1 || order > 8) return false;
   std::array<Eigen::Vector3d, 8> image;
@@ -142,6 +147,13 @@ bool ImageSearch::solve(const Eigen::Vector3d& p, const PerInteraction<int>& seq
   if (limits.in_view &&
       (!limits.in_view((vertex[0] - p).normalized()) || !limits.in_view((vertex[order - 1] - p).normalized()))) {
     return false;
+  }
+  for (int i = 0; i < order; ++i) {
+    const Facet& f = scene_.facets[sequence[i]];
+    if (!sides.isOpen(f, vertex[i], i == 0 ? p : vertex[i - 1]) ||
+        !sides.isOpen(f, vertex[i], i + 1 == order ? p : vertex[i + 1])) {
+      return false;
+    }
   }
   for (int i = 0; i <= order; ++i) {
     const Eigen::Vector3d& a = i == 0 ? p : vertex[i - 1];
@@ -169,6 +181,7 @@ class ImageSearch::Finder {
         p_(p),
         rays_(rays),
         limits_(limits),
+        sides_(search.scene_, p),
         min_order_(min_order),
         in_front_(search.reflectors_.size(), 1),
         wanted_(search.reflectors_.size(), 1),
@@ -225,7 +238,7 @@ class ImageSearch::Finder {
   }
 
   void addSolved(const PerInteraction<int>& sequence) {
-    if (search_.solve(p_, sequence, rays_, limits_, path_)) found_.push_back(path_);
+    if (search_.solve(p_, sequence, rays_, limits_, sides_, path_)) found_.push_back(path_);
   }
 
   /// Adds paths of one and two bounces whose first facet is a, and keeps the ways over it for those of three.
@@ -294,6 +307,7 @@ class ImageSearch::Finder {
   const Eigen::Vector3d& p_;
   const RayCaster& rays_;
   const Limits& limits_;
+  const SeenSides sides_;
   const int min_order_;
   std::vector<char> in_front_;  // can be first or last: some of the facet lies in front of the radar
   std::vector<char> wanted_;    // of Limits::only_actor
@@ -309,6 +323,15 @@ class ImageSearch::Finder {
 std::vector<ImagePath> ImageSearch::find(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
                                          int min_order) const {
   return Finder(*this, p, rays, limits, min_order).find();
+}
+
+/// The facet that a place belongs to where several coincide.
+const Facet& ImageSearch::ownerOf(const RayCaster::Hit& hit) const {
+  for (const FaceOverlap& o : scene_.overlaps) {
+    const Facet& kept = scene_.facets[static_cast<std::size_t>(o.kept)];
+    if (o.cut == hit.facet && kept.contains(hit.point)) return kept;
+  }
+  return scene_.facets[static_cast<std::size_t>(hit.facet)];
 }
 
 std::vector<ImageSearch::Seed> ImageSearch::seeds(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,
@@ -327,7 +350,7 @@ std::vector<ImageSearch::Seed> ImageSearch::seeds(const Eigen::Vector3d& p, cons
     while (static_cast<int>(sequence.size()) < limits.max_order) {
       const auto hit = rays.firstHit(from, d, limits.max_length_m - length);
       if (!hit || hit->facet < 0) break;
-      const Facet& f = scene_.facets[hit->facet];
+      const Facet& f = ownerOf(*hit);
       if (!f.reflects || !f.present || f.curved >= 0) break;
       sequence.push_back(f.id);
       bool& even = sequences[sequence];

@@ -8,6 +8,7 @@
 #include "mmradartwin_sim/path_record.h"
 #include "mmradartwin_sim/ray_caster.h"
 #include "mmradartwin_sim/scene.h"
+#include "mmradartwin_sim/seen_sides.h"
 
 namespace mmradartwin {
 
@@ -62,12 +63,15 @@ class ImageSearch {
 
  private:
   class Finder;
+  bool solve(const Eigen::Vector3d& p, const PerInteraction<int>& sequence, const RayCaster& rays, const Limits& limits,
+             const SeenSides& sides, ImagePath& path) const;
   struct Corners {
     Eigen::Matrix<double, 3, 4> point;
   };
   bool faces(int a, bool positive_side, int b) const;  // b has a part on that side of a
 
   void build();
+  const Facet& ownerOf(const RayCaster::Hit& hit) const;
   bool takesPart(const Facet& facet) const;
   void place(std::size_t reflector);
   /// Which facets have a part on which side of which others, as far as one of each two is marked.

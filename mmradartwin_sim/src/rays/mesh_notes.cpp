@@ -17,6 +17,7 @@ namespace {
 constexpr std::size_t kMostNamed = 5;
 constexpr std::size_t kBody = 3;         ///< facets: fewer are sheets, a folded one among them
 constexpr std::size_t kFragments = 20;   ///< facets that gentle folds join, on no sphere nor cylinder
+constexpr double kFolded = 0.01;         ///< of an actor's area: what of a scan lies on itself by its noise
 constexpr double kInset = 0.02;          ///< of a triangle: its rim may touch its neighbours
 constexpr double kLeastLength_m = 2e-3;  ///< of a ray within a triangle: shorter ones see rounding
 
@@ -71,6 +72,36 @@ std::size_t fragments(const Scene& scene, const Actor& actor, const std::vector<
   return most;
 }
 
+/// "poster in wall (0.5 m2)": actors whose faces are left out where those of the other lie.
+std::vector<std::string> coinciding(const Scene& scene) {
+  std::map<std::pair<int, int>, double> area;  // actor kept, actor cut
+  for (const FaceOverlap& o : scene.overlaps) {
+    const auto owner = [&](int facet) { return scene.facets[static_cast<std::size_t>(facet)].actor; };
+    area[{owner(o.kept), owner(o.cut)}] += o.area_m2;
+  }
+  for (std::size_t a = 0; a < scene.actors.size(); ++a) {
+    const double repeated = scene.actors[a].repeated_m2;
+    if (repeated > 0) area[{static_cast<int>(a), static_cast<int>(a)}] += repeated;
+  }
+  std::vector<std::string> found;
+  for (const auto& [pair, area_m2] : area) {
+    double whole_m2 = 0;
+    for (int id : scene.actorOf(pair.second).facets) whole_m2 += scene.facets[static_cast<std::size_t>(id)].area_m2;
+    if (pair.first == pair.second && area_m2 < kFolded * whole_m2) continue;
+    std::ostringstream text;
+    text.precision(3);
+    text << scene.actorOf(pair.second).name;
+    if (pair.first == pair.second) {
+      text << " with itself";
+    } else {
+      text << " in " << scene.actorOf(pair.first).name;
+    }
+    text << " (" << area_m2 << " m2)";
+    found.push_back(text.str());
+  }
+  return found;
+}
+
 std::string listed(const std::vector<std::string>& names) {
   std::ostringstream out;
   for (std::size_t i = 0; i < std::min(kMostNamed, names.size()); ++i) out << (i ? ", " : "") << names[i];
@@ -119,6 +150,12 @@ std::vector<std::string> meshNotes(const Scene& scene) {
          << "flat, widen scene.yaml's facets: {angle_deg: " << scene.tolerance.angle_deg
          << ", offset_m: " << scene.tolerance.offset_m << "}: " << listed(broken);
     notes.push_back(text.str());
+  }
+  if (const std::vector<std::string> pairs = coinciding(scene); !pairs.empty()) {
+    notes.push_back(scene.file +
+                    ": faces that coincide return once; each of these lies in the plane of the other, which keeps the "
+                    "area; remove what was exported twice: " +
+                    listed(pairs));
   }
   return notes;
 }

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstring>
 #include <limits>
+#include <set>
 #include <stdexcept>
 
 namespace mmradartwin {
@@ -78,7 +79,9 @@ void fill(RTCRay& ray, const Eigen::Vector3d& origin, const Eigen::Vector3d& dir
   ray.flags = 0;
 }
 
-void attach(RTCDevice device, RTCScene scene, const Actor& actor, const Eigen::Vector3d& center, unsigned id) {
+/// gone: facets that others cover; rays are to meet those.
+void attach(RTCDevice device, RTCScene scene, const Actor& actor, const std::set<int>& gone,
+            const Eigen::Vector3d& center, unsigned id) {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                                3 * sizeof(float), actor.vertices.size()));
@@ -90,7 +93,8 @@ void attach(RTCDevice device, RTCScene scene, const Actor& actor, const Eigen::V
     std::memcpy(vertices + 3 * i, v.data(), 3 * sizeof(float));
   }
   for (std::size_t i = 0; i < actor.triangles.size(); ++i) {
-    for (int k = 0; k < 3; ++k) triangles[3 * i + k] = static_cast<unsigned>(actor.triangles[i][k]);
+    const bool covered = !gone.empty() && gone.count(actor.triangle_facet[i]) > 0;
+    for (int k = 0; k < 3; ++k) triangles[3 * i + k] = static_cast<unsigned>(actor.triangles[i][covered ? 0 : k]);
   }
   rtcSetGeometryMask(geometry, static_cast<unsigned>(-1));
   rtcCommitGeometry(geometry);
@@ -160,10 +164,16 @@ RayCaster::RayCaster(const Scene& scene, const std::vector<int>& movable) : embr
       target = e.passed_actors;
       for (int id : actor.facets) e.passed_facets[a].push_back(scene.facets[id]);
     }
-    attach(e.device, target, actor, e.center, static_cast<unsigned>(a));
+    std::set<int> gone;
+    if (!scene.uncut.empty() && target == standing) {
+      for (int id : actor.facets) {
+        if (!scene.facets[static_cast<std::size_t>(id)].present) gone.insert(id);
+      }
+    }
+    attach(e.device, target, actor, gone, e.center, static_cast<unsigned>(a));
   }
   for (std::size_t i = 0; i < scene.occluders_only.size(); ++i) {
-    attach(e.device, standing, scene.occluders_only[i], e.center, static_cast<unsigned>(scene.actors.size() + i));
+    attach(e.device, standing, scene.occluders_only[i], {}, e.center, static_cast<unsigned>(scene.actors.size() + i));
   }
   if (e.passed_actors) commitAlone(e.passed_actors);
   if (e.still) {

@@ -8,7 +8,10 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/scene.h"
+#include "scene/closed_body.h"
 #include "scene/curved_surface.h"
+#include "scene/facet_relations.h"
+#include "scene/repeated_triangles.h"
 #include "scene/vertex_weld.h"
 
 namespace mmradartwin {
@@ -116,10 +119,11 @@ struct ActorMesh {
   std::vector<Index3> triangles;        // welded indices
   std::vector<Eigen::Vector3d> normal;  // zero where the triangle has no area or repeats another
   std::vector<double> area;
+  double repeated_m2 = 0;  // of triangles with the corners of another
 };
 
 ActorMesh prepare(const Actor& actor) {
-  ActorMesh mesh{actor, weldVertices(actor.vertices), {}, {}, {}};
+  ActorMesh mesh{actor, weldVertices(actor.vertices), {}, {}, {}, 0};
   std::set<Index3> seen;
   for (const Index3& t : actor.triangles) {
     const Index3 w = {mesh.weld[t[0]], mesh.weld[t[1]], mesh.weld[t[2]]};
@@ -128,7 +132,9 @@ ActorMesh prepare(const Actor& actor) {
     Index3 key = w;
     std::sort(key.begin(), key.end());
     const double area = 0.5 * n.norm();
-    const bool usable = area > kSmallestArea_m2 && key[0] != key[1] && key[1] != key[2] && seen.insert(key).second;
+    const bool whole = area > kSmallestArea_m2 && key[0] != key[1] && key[1] != key[2];
+    const bool usable = whole && seen.insert(key).second;
+    if (whole && !usable) mesh.repeated_m2 += area;
     mesh.triangles.push_back(w);
     mesh.area.push_back(usable ? area : 0);
     mesh.normal.push_back(usable ? Eigen::Vector3d(n.normalized()) : Eigen::Vector3d::Zero());
@@ -288,6 +294,34 @@ std::vector<std::vector<int>> growRegions(const ActorMesh& mesh, const FacetTole
   return regions;
 }
 
+/// Takes triangles out of a region that lie on others of it; returns their area.
+double dropRepeated(const ActorMesh& mesh, std::vector<int>& members) {
+  if (members.size() < 2) return 0;
+  const MeanPlane plane = meanPlane(mesh, members);
+  const Eigen::Vector3d a = plane.normal.unitOrthogonal(), b = plane.normal.cross(a);
+  std::vector<PlaneTriangle> flat;
+  for (int t : members) {
+    PlaneTriangle f;
+    f.corner = mesh.triangles[t];
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d p = mesh.actor.vertices[f.corner[k]] - plane.centroid;
+      f.place[k] = {p.dot(a), p.dot(b), p.dot(plane.normal)};
+    }
+    if ((f.place[1] - f.place[0]).cross(f.place[2] - f.place[0]).z() < 0) {
+      std::swap(f.corner[1], f.corner[2]);
+      std::swap(f.place[1], f.place[2]);
+    }
+    flat.push_back(f);
+  }
+  double area = 0;
+  const std::vector<std::size_t> repeated = repeatedTriangles(flat, kSamePlane_m);
+  for (auto i = repeated.rbegin(); i != repeated.rend(); ++i) {
+    area += mesh.area[members[*i]];
+    members.erase(members.begin() + static_cast<long>(*i));
+  }
+  return area;
+}
+
 /// Facets of one actor, behind those that are there.
 void buildFacets(Scene& scene, int index) {
   Actor& actor = scene.actors[static_cast<std::size_t>(index)];
@@ -296,7 +330,10 @@ void buildFacets(Scene& scene, int index) {
   for (const auto& p : actor.vertices) actor.bounds.extend(p);
   actor.triangle_facet.assign(actor.triangles.size(), -1);
   const ActorMesh mesh = prepare(actor);
-  for (const std::vector<int>& members : growRegions(mesh, scene.tolerance)) {
+  actor.repeated_m2 = mesh.repeated_m2;
+  std::vector<std::vector<int>> regions = growRegions(mesh, scene.tolerance);
+  for (std::vector<int>& members : regions) {
+    actor.repeated_m2 += dropRepeated(mesh, members);
     Facet facet = makeFacet(mesh, members);
     if (facet.loops.empty()) continue;
     facet.actor = index;
@@ -310,6 +347,7 @@ void buildFacets(Scene& scene, int index) {
     throw InputError(scene.file + ": actor " + actor.name + " has no triangle with an area; remove or repair it");
   }
   findCurvedSurfaces(scene, index, mesh.weld);
+  findClosedBodies(scene, index, mesh.weld);
 }
 
 }  // namespace
@@ -317,12 +355,16 @@ void buildFacets(Scene& scene, int index) {
 void rebuildFacets(Scene& scene) {
   scene.facets.clear();
   scene.curved.clear();
+  scene.bodies.clear();
+  scene.uncut.clear();
   for (std::size_t a = 0; a < scene.actors.size(); ++a) buildFacets(scene, static_cast<int>(a));
+  relateFacets(scene);
 }
 
 void addActor(Scene& scene, Actor actor) {
   scene.actors.push_back(std::move(actor));
   buildFacets(scene, static_cast<int>(scene.actors.size()) - 1);
+  relateFacets(scene);
 }
 
 void moveActor(Scene& scene, int index, const Eigen::Isometry3d& T) {
@@ -345,11 +387,13 @@ void moveActor(Scene& scene, int index, const Eigen::Isometry3d& T) {
     s.center = T * s.center;
     s.axis = T.linear() * s.axis;
   }
+  relateFacets(scene);
 }
 
 void removeActor(Scene& scene, int index) {
   scene.actors.at(index).present = false;
   for (int id : scene.actors[index].facets) scene.facets[id].present = false;
+  relateFacets(scene);
 }
 
 }  // namespace mmradartwin

@@ -58,6 +58,7 @@ SceneChange MovingTwin::moveActors() {
   Scene& scene = *m.edited;
   SceneChange change;
   bool rebuild = false;
+  const std::map<int, FacetShape> uncut_before = scene.uncut;
   for (Mover& mover : movers_) {
     if (mover.wanted.matrix() == mover.moved.matrix()) continue;
     const auto a = static_cast<std::size_t>(mover.actor);
@@ -67,8 +68,11 @@ SceneChange MovingTwin::moveActors() {
     // From where it was at rest, so that roundings do not add up.
     const Actor& at_rest = rest_.actors[a];
     actor.vertices = at_rest.vertices;
-    for (int id : at_rest.facets)
+    for (int id : at_rest.facets) {
       scene.facets[static_cast<std::size_t>(id)] = rest_.facets[static_cast<std::size_t>(id)];
+      const auto shape = rest_.uncut.find(id);
+      if (shape != rest_.uncut.end()) scene.uncut[id] = shape->second;
+    }
     for (std::size_t i = 0; i < scene.curved.size(); ++i) {
       if (scene.curved[i].actor == mover.actor) scene.curved[i] = rest_.curved[i];
     }
@@ -83,6 +87,18 @@ SceneChange MovingTwin::moveActors() {
     }
   }
   placed_ = false;
+  // What a mover covered, or covers now, has another shape.
+  for (const std::map<int, FacetShape>* uncut :
+       std::initializer_list<const std::map<int, FacetShape>*>{&uncut_before, &scene.uncut}) {
+    if (change.actors.empty()) break;
+    for (const auto& [id, shape] : *uncut) {
+      const int owner = scene.facets[static_cast<std::size_t>(id)].actor;
+      if (change.moved(owner)) continue;
+      change.actors.push_back(owner);
+      change.addBounds(scene.actors[static_cast<std::size_t>(owner)].bounds);
+      rebuild = true;
+    }
+  }
   if (rebuild) {
     std::vector<int> movable;
     for (Mover& mover : movers_) {

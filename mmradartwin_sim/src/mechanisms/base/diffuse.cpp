@@ -111,6 +111,7 @@ class Diffuse : public Mechanism, public PathStage {
                   : change && !touches(point)) {
         continue;
       }
+      if (!elements.sides.isOpen(facet, point.position, elements.p)) continue;
       const Eigen::Vector3d in = way / r;
       const double cosine = std::min(1.0, std::abs(in.dot(facet.normal)));
       const Material& material = context.scene.actors[facet.actor].material;

@@ -134,6 +134,7 @@ class Specular : public Mechanism, public PathStage {
     const Eigen::Vector3d direction = way / distance;
     const Eigen::Vector3d direction_radar = context.T_map_radar.linear().transpose() * direction;
     if (!context.inFieldOfView(direction_radar)) return;
+    if (!elements.sides.isOpen(facet, vertex, elements.p)) return;
     const double gap = std::max(1e-3, 2 * facet.flatness_m / std::max(0.1, std::abs(direction.dot(facet.normal))));
     if (!context.rays.visible(elements.p, vertex, gap)) return;
     const Eigen::Vector3d straight =

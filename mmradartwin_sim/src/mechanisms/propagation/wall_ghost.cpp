@@ -109,8 +109,11 @@ class WallGhost : public Mechanism, public PathStage {
     return context.inFieldOfView(to_radar * b.out) && context.inFieldOfView(to_radar * (x - p).normalized());
   }
 
-  static bool free(const PoseContext& context, const Eigen::Vector3d& p, const Facet& wall, const Bounce& b,
-                   const Eigen::Vector3d& x, double gap_m) {
+  static bool free(const PoseContext& context, const ElementsInMap& elements, const Bounce& b, const Eigen::Vector3d& x,
+                   double gap_m) {
+    const Facet& wall = *b.wall;
+    const Eigen::Vector3d& p = elements.p;
+    if (!elements.sides.isOpen(wall, b.q, p) || !elements.sides.isOpen(wall, b.q, x)) return false;
     const double gap = std::max({1e-3, gap_m, 2 * wall.flatness_m / std::max(0.1, b.cosine)});
     return context.rays.visible(p, x, std::max(1e-3, gap_m)) && context.rays.visible(p, b.q, gap) &&
            context.rays.visible(b.q, x, gap);
@@ -136,7 +139,8 @@ class WallGhost : public Mechanism, public PathStage {
     const Eigen::Vector3d back = (elements.p - x) / r2;
     const double cos_in = -b.on.dot(facet.normal), cos_out = back.dot(facet.normal);
     if (!(cos_in * cos_out > 0)) return;  // the lit side is not the one seen
-    if (!free(context, elements.p, wall, b, x, 2 * facet.flatness_m / std::max(0.1, std::abs(cos_out)))) return;
+    if (!elements.sides.isOpen(facet, x, elements.p) || !elements.sides.isOpen(facet, x, b.q)) return;
+    if (!free(context, elements, b, x, 2 * facet.flatness_m / std::max(0.1, std::abs(cos_out)))) return;
     const Material& material = context.scene.actors[facet.actor].material;
     const auto law = [&](const Eigen::Vector3d& direction, double cosine) {
       const double te = verticalField(elements.up, direction).dot(transverse(direction, facet.normal));
@@ -166,7 +170,7 @@ class WallGhost : public Mechanism, public PathStage {
     if (!bounce(context, elements.p, wall, x, b)) return;
     const Facet &a = context.scene.facets[edge.a], &other = context.scene.facets[edge.b];
     const double lift = std::max(1e-3, a.flatness_m + other.flatness_m);
-    if (!free(context, elements.p, wall, b, x + lift * edge.outward, 0)) return;
+    if (!free(context, elements, b, x + lift * edge.outward, 0)) return;
     const std::complex<double> coefficient = edge_level_ * context.radar.wavelength_m() / (4 * M_PI) * found->factor;
     addPair(
         context, elements, b, {x, a.actor, a.id, std::conj(coefficient)},
