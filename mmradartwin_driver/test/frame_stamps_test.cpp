@@ -84,8 +84,8 @@ Jitter measure(unsigned seed) {
   return {rms_us(stamp_errors_us), rms_us(arrival_errors_us), own_late_us};
 }
 
-// What is asked of the clock's stamps: on a machine that plays the card as it was told to, 100 us; on one that is late by
-// itself, so that the packets' noise is not the one asked for, a fourth of the noise of the arrivals that it made.
+// What is asked of the clock's stamps: on a machine that plays the card as it was told to, 100 us; on one that is late
+// by itself, so that the packets' noise is not the one asked for, a fourth of the noise of the arrivals that it made.
 TEST(FrameStamps, JitterBelow100usWhileArrivalsAreMillisecondsLate) {
   constexpr double kQuiet_us = 1e3;  // an eighth of the longest delay asked for
   constexpr int kTries = 6;
