@@ -624,7 +624,8 @@ void ShotExaminer::readDopplerEchoes(const Spectra& s, ShotStatistics& result) c
     begin = end;
     std::vector<MovingEcho> echoes;
     std::vector<MovingCell> cells;
-    for (const DopplerCell& peak : frame.movingPeaks()) {
+    for (DopplerCell peak : frame.movingPeaks()) {
+      if (!unwrap(result.tracks, number, peak)) continue;
       cells.push_back(movingCell(frame, peak, result.noise_variance));
       if (std::optional<MovingEcho> echo = dopplerEcho(frame, peak)) {
         echo->frame = number;
@@ -639,6 +640,21 @@ void ShotExaminer::readDopplerEchoes(const Spectra& s, ShotStatistics& result) c
     const std::vector<MovingEcho> bodies = bodiesOf(std::move(echoes));
     result.echoes.insert(result.echoes.end(), bodies.begin(), bodies.end());
   }
+}
+
+bool ShotExaminer::unwrap(const std::vector<WalkTrack>& tracks, int frame, DopplerCell& peak) const {
+  const double frame_s = frame * radar_.frame_period_s, bin_m = radar_.range_bin_m();
+  const double per_turn_m_per_s =
+      0.5 * radar_.wavelength_m() / (radar_.loops_per_frame * radar_.slots() * chirpPeriod_s(radar_));
+  for (const WalkTrack& t : tracks) {
+    if (frame < t.first_frame || frame > t.last_frame) continue;
+    if (std::abs(t.at(frame_s)[0] - peak.bin * bin_m) > 2 * bin_m) continue;
+    if (!t.radial) return false;
+    const double whole = (t.radial->value / per_turn_m_per_s - peak.turns) / radar_.loops_per_frame;
+    peak.turns += radar_.loops_per_frame * static_cast<int>(std::lround(whole));
+    return true;
+  }
+  return true;
 }
 
 MovingCell ShotExaminer::movingCell(const DopplerFrame& frame, const DopplerCell& peak,

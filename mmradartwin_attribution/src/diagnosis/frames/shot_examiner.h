@@ -70,6 +70,8 @@ class ShotExaminer {
   void readEchoes(const Spectra& spectra, ShotStatistics& result) const;
   void readDopplerEchoes(const Spectra& spectra, ShotStatistics& result) const;
   void readTurn(const FrameStack& stack, const Spectra& spectra, ShotStatistics& result) const;
+  /// Adds the whole turns between loops that the track of a walker tells; false where it leaves them open.
+  bool unwrap(const std::vector<WalkTrack>& tracks, int frame, DopplerCell& peak) const;
   MovingCell movingCell(const DopplerFrame& frame, const DopplerCell& peak,
                         const std::vector<double>& noise_variance) const;
   /// Echo of a peak. Nothing where no direction holds most of its power, as in a sum of other echoes' sidelobes.

@@ -16,6 +16,7 @@ using Complex = std::complex<float>;
 
 constexpr int kLeastLoopsOfTracks = 8;        ///< loops that tell a walker's phase slope within a frame
 constexpr int kFewestFramesOfWays = 16;       ///< that show a walk through range bins without loops
+constexpr int kFewestFramesOfTrack = 4;       ///< of a recording that has twice as many
 constexpr double kLongWay_m = 1.0;            ///< of such a walk; a shorter one is found about its place
 constexpr double kFastest_m_per_s = 8;        ///< of a person who runs
 constexpr double kMostAcross_m_per_s = 3;     ///< with which the search across the view begins
@@ -356,6 +357,8 @@ class Tracker {
     spend(window, path, run, middle_s, fit.snr);
     const Path walked = judge(path, run, middle_s, fit, track);
     subtract(walked, run, middle_s, fitOf(walked, run, middle_s));
+    // Where a walker crosses a strong echo, the gain of all cells errs for a moment.
+    if (run.size() < kFewestFramesOfTrack && s_.frames >= 2 * kFewestFramesOfTrack) track.nats = 0;
     return track;
   }
 
