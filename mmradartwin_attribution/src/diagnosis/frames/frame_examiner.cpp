@@ -472,8 +472,8 @@ std::vector<FrameFinding> FrameExaminer::unexplained() const {
   for (std::size_t i = 0; i < state_->judged.size(); ++i) {
     laws.push_back({&state_->motion[i].pose, &state_->judged[i].laws});
   }
-  for (FrameFinding& law : lawFindings(laws, gained)) all.push_back(std::move(law));
   if (gained) all.push_back(std::move(gain));
+  for (FrameFinding& law : lawFindings(laws, gained)) all.push_back(std::move(law));
   return all;
 }
 

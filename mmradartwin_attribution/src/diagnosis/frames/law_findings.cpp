@@ -87,7 +87,7 @@ std::vector<FrameFinding> lawFindings(const std::vector<PoseLaws>& poses, bool l
   std::vector<FrameFinding> findings;
   for (const bool common : {true, false}) {
     for (const FrameLawKind kind : {FrameLawKind::kPhase, FrameLawKind::kPhaseRange, FrameLawKind::kLevel}) {
-      if (common && kind == FrameLawKind::kLevel && level_told) continue;
+      if (kind == FrameLawKind::kLevel && level_told) continue;
       FrameFinding finding;
       std::vector<const FrameLaw*> laws;
       std::ostringstream places;
