@@ -320,7 +320,10 @@ class Laws {
     best.common = false;
     double most = 0;
     Peak found;
-    for (const Peak& peak : peaks()) {
+    const std::vector<Peak> all = peaks();
+    // Beside fewer echoes nobody knows whether it is the one or the radar.
+    if (all.size() < kFewestEchoes) return best;
+    for (const Peak& peak : all) {
       const std::vector<double> phase = phases(peak), level_db = levels_db(peak);
       const double turn = std::sqrt(meanSquare(phase)),
                    amplitude = std::sqrt(meanSquare(level_db)) * std::log(10.0) / 20;
