@@ -274,7 +274,7 @@ class RealRecording(InFolder):
 
     def test_real_part_alone(self):
         words = np.frombuffer(self.data, "<i2").reshape(-1, 2, 4)[:, 0]    # I of each sample; twice, to fill the frame
-        self.check_refused(np.concatenate([words, words]).tobytes(), "samples look real, not complex")
+        self.check_refused(np.concatenate([words, words]).tobytes(), "real samples in 4lane", "nothing was judged")
 
     def test_beginning_within_a_frame(self):
         shifted = self.data[1096:] + self.data[:1096]

@@ -22,11 +22,11 @@ constexpr std::size_t kPosesForLayout = 4;  ///< layouts hold for a whole sessio
 /// Share by which the smoothness of two orders of the elements may differ by chance.
 constexpr double kAlikeOrders = 0.02;
 /// Probability that bytes which are what radar.yaml says are called anything else, over a whole session.
-constexpr double kFalseAlarmRate = 1e-6;
+constexpr double kOtherReadingRate = 1e-4, kMisalignedRate = 1e-6;
 
 /// Standard deviations that chance exceeds in one of `tries` with the false-alarm rate.
-double leastDeviations(double tries) {
-  return boost::math::quantile(boost::math::complement(boost::math::normal(), kFalseAlarmRate / tries));
+double leastDeviations(double rate, double tries) {
+  return boost::math::quantile(boost::math::complement(boost::math::normal(), rate / tries));
 }
 
 struct PoseWords {
@@ -220,7 +220,7 @@ void requireStatedReading(const SessionBytes& bytes, const Recording& recording)
   if (others.empty()) return;
   std::sort(others.begin(), others.end(), [](const auto& a, const auto& b) { return a.nats > b.nats; });
   const ReadingEvidence& best = others.front();
-  const double least = leastDeviations(static_cast<double>(others.size()));
+  const double least = leastDeviations(kOtherReadingRate, static_cast<double>(others.size()));
   if (!(deviations(best, stated) > least) || isMerelyMisaligned(bytes, poses, best)) return;
   std::string names = best.reading.name(), advice = best.reading.advice();
   for (std::size_t i = 1; i < others.size(); ++i) {
@@ -348,7 +348,7 @@ bool beginsRatherAt(const SessionBytes& bytes, const PoseWords& pose, std::size_
 /// Captures that begin within a frame: by how many bytes, and of which poses.
 std::map<std::string, std::size_t> findMisaligned(const SessionBytes& bytes) {
   const std::size_t poses = bytes.poses().size();
-  const double least = leastDeviations(static_cast<double>(std::max<std::size_t>(1, poses)));
+  const double least = leastDeviations(kMisalignedRate, static_cast<double>(std::max<std::size_t>(1, poses)));
   std::map<std::size_t, AlikeCaptures> groups = withoutStrays(capturesByBoundary(bytes));
   const AlikeCaptures* most = nullptr;
   std::size_t most_word = 0;
