@@ -59,6 +59,7 @@ std::string writeBag(const TestFolder& folder, const Scene& scene) {
       cube.stamp_ns = kStart_ns + i * period_ns;
       cube.sequence = static_cast<std::uint32_t>(i);
       cube.data.assign(2 * 64 * 4 * 2, 5);
+      for (std::size_t j = 0; j < cube.data.size(); j += 3) cube.data[j] = 6;  // no lane is constant
       cube.chirp_valid.assign(2, 1);
       mmradartwin_msgs::AdcCube message = toMsg(cube, radarHash(radar));
       scene.change_cube(i, message);
