@@ -51,7 +51,7 @@ class OtherSimulator(InFolder):
     def test_a_box_is_found_that_few_poses_face(self):
         first, *rest = self.findings_of("H_obj_40")
         self.assertEqual((first["cause"], rest), ("actor_unmodelled", []))
-        self.assertEqual(first["parameters"]["shape"]["value"], "box")
+        self.assertEqual(first["mechanism"]["actor_unmodelled"]["shape"], "box")
         for name, truth in (("x_m", 1.15), ("y_m", 3.35), ("size_m", 0.3)):
             self.assert_holds(first, name, truth)
 
