@@ -47,7 +47,8 @@ class Simulated:
         measurement = Measurement(Settings(output=at("_session"), seed=cls.seed, poses=12 if tier == "exact" else 24,
                                            frames=1, tier=tier, paths_csv=at("_true")))
         measurement.run()
-        run = subprocess.run([PROGRAM, at("_session"), "--output", at("_sim"), "--diffuse-records", "points"],
+        run = subprocess.run([PROGRAM, at("_session"), "--output", at("_sim"), "--diffuse-records", "points",
+                              "--noise", "none"],
                              capture_output=True, text=True, check=False)
         if run.returncode != 0:
             raise RuntimeError(f"simulate ended with {run.returncode}: {run.stderr}")
@@ -120,8 +121,8 @@ class Simulated:
         twin = os.path.join(session, "smooth.yaml")
         with open(twin, "w", encoding="ascii") as out:
             out.write("scene: scene.yaml\nradar: radar.yaml\nmechanisms:\n  specular: {max_bounces: 3}\n  corner: {}\n")
-        run = subprocess.run([PROGRAM, session, "--twin", twin, "--output", other], capture_output=True, text=True,
-                             check=False)
+        run = subprocess.run([PROGRAM, session, "--twin", twin, "--output", other, "--noise", "none"], capture_output=True,
+                             text=True, check=False)
         self.assertEqual(run.returncode, 0, msg=run.stderr)
         with open(os.path.join(other, "session.yaml"), encoding="ascii") as file:
             gain_db = float(re.search(r"gain_db: *(\S+)", file.read()).group(1))
