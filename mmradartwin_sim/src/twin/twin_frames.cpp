@@ -2,19 +2,13 @@
 #include <cmath>
 
 #include "mmradartwin_dsp/capture.h"
+#include "mmradartwin_dsp/chirp_period.h"
 #include "mmradartwin_sim/twin.h"
 #include "stages/random_draw.h"
 #include "twin/assembled_twin.h"
 
 namespace mmradartwin {
 namespace {
-
-/// From one chirp's start to the next: as radar.yaml says, else as short as its samples allow.
-double chirpPeriod_s(const RadarConfig& radar) {
-  const double sampled_s = radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
-  return (std::isfinite(radar.ramp_end_s) ? radar.ramp_end_s : sampled_s) +
-         (std::isfinite(radar.idle_s) ? radar.idle_s : 0);
-}
 
 std::int16_t count(double full_scales) {
   return static_cast<std::int16_t>(std::lround(std::min(32767.0, std::max(-32768.0, full_scales * 32768))));

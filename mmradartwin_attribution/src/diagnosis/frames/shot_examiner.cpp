@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "diagnosis/catalogue/bounds.h"
+#include "mmradartwin_dsp/chirp_period.h"
 
 namespace mmradartwin::diagnosis::frames {
 namespace {

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "diagnosis/catalogue/bounds.h"
+#include "mmradartwin_dsp/chirp_period.h"
 #include "mmradartwin_dsp/range_angle.h"
 
 namespace mmradartwin::diagnosis::frames {
@@ -646,12 +647,6 @@ Eigen::Vector2d WalkTrack::at(double time_s) const {
   const double since_s = time_s - middle_s;
   const double along = range_m + radial_m_per_s * since_s, across = across_m_per_s * since_s;
   return {std::hypot(along, across), azimuth_rad + std::atan2(across, along)};
-}
-
-double chirpPeriod_s(const RadarConfig& radar) {
-  const double sampled_s = radar.adc_start_s + radar.samples_per_chirp / radar.sample_rate_hz;
-  return (std::isfinite(radar.ramp_end_s) ? radar.ramp_end_s : sampled_s) +
-         (std::isfinite(radar.idle_s) ? radar.idle_s : 0);
 }
 
 bool canTrackWalkers(const RadarConfig& radar, int frames) {

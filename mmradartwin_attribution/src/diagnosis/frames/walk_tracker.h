@@ -48,7 +48,4 @@ bool canTrackLongWays(int frames);
 /// canTrackWalkers() is false only those whose way through range bins is long.
 std::vector<WalkTrack> trackWalkers(const RadarConfig& radar, const ShotSpectra& spectra);
 
-/// Time from one chirp's start to the next: as radar.yaml states, else the shortest that its samples allow.
-double chirpPeriod_s(const RadarConfig& radar);
-
 }  // namespace mmradartwin::diagnosis::frames
