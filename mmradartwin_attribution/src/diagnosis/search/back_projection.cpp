@@ -7,6 +7,8 @@
 #include <iomanip>
 #include <sstream>
 
+#include "diagnosis/search/places_apart.h"
+
 namespace mmradartwin::diagnosis::search {
 namespace {
 
@@ -20,7 +22,6 @@ constexpr double kFacing = 0.1;                        ///< share of poses that 
 constexpr std::size_t kMostFaced = 5;                  ///< poses that are kept of them
 constexpr double kLeastRcs_dbsm = -25;                 ///< unlisted small things have less
 constexpr double kWide_m[] = {0.12, 0.25};             ///< radii of a wide object
-constexpr double kApart_m = 0.5;                       ///< least distance between places that are kept
 constexpr std::size_t kMostPlaces = 4;                 ///< places that are kept
 constexpr double kMostCells = 1e6;                     ///< cells of a room that is searched
 constexpr double kNearby_m = 0.6;                      ///< distance of an actor that may have been moved to a place
@@ -140,16 +141,7 @@ std::vector<ProjectedPlace> apart(const std::vector<ProjectedPlace>& places, con
   for (const NamedParameters& m : null.mechanisms) {
     if (m.mechanism == mechanism) known.push_back({m.values.number("x_m"), m.values.number("y_m")});
   }
-  std::vector<ProjectedPlace> best;
-  for (const ProjectedPlace& p : places) {
-    if (best.size() == kMostPlaces || !(p.screened_nats > 0)) break;
-    const auto near = [&](const ProjectedPlace& other) {
-      return std::hypot(p.x_m - other.x_m, p.y_m - other.y_m) < kApart_m;
-    };
-    const bool taken = std::any_of(best.begin(), best.end(), near) || std::any_of(known.begin(), known.end(), near);
-    if (!taken) best.push_back(p);
-  }
-  return best;
+  return placesApart(places, known, kMostPlaces);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/search/places_apart.h"
+
 namespace mmradartwin::diagnosis::search {
 namespace {
 
@@ -14,7 +16,6 @@ constexpr double kWidths_m[] = {0.2, 0.35, 0.6};
 constexpr double kBesideRadar_m = 0.1;  ///< nothing stands nearer to where the radar stood
 constexpr int kBinsOfEcho = 2;          ///< bins to each side that an echo fills
 constexpr double kHolds = 0.7;          ///< share of an echo's power, of a path that stands for it
-constexpr double kApart_m = 0.5;        ///< least distance between places that are kept
 constexpr std::size_t kKept = 2;        ///< places that are kept
 
 /// Echo that stands out where it is expected, or would.
@@ -101,15 +102,7 @@ std::vector<HidingPlace> hidingPlaces(const Scene& scene, const ChannelLikelihoo
   });
   std::stable_sort(places.begin(), places.end(),
                    [](const HidingPlace& a, const HidingPlace& b) { return a.screened_nats > b.screened_nats; });
-  std::vector<HidingPlace> best;
-  for (const HidingPlace& place : places) {
-    if (best.size() == kKept || !(place.screened_nats > 0)) break;
-    const auto near = [&](const HidingPlace& other) {
-      return std::hypot(place.x_m - other.x_m, place.y_m - other.y_m) < kApart_m;
-    };
-    if (std::none_of(best.begin(), best.end(), near)) best.push_back(place);
-  }
-  return best;
+  return placesApart(places, {}, kKept);
 }
 
 }  // namespace mmradartwin::diagnosis::search
