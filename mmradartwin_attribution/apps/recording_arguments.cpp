@@ -32,18 +32,16 @@ void RecordingArguments::addChannelsTo(CLI::App& app) {
 std::string RecordingArguments::radarFile() const { return isBag(recording()) ? "" : radar; }
 
 Recording RecordingArguments::open(bool misaligned_is_finding) const {
-  std::optional<CaptureLayout> lanes;
-  if (!layout.empty()) lanes = layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
   BagOptions together = bag;
   together.further.assign(recordings.begin() + 1, recordings.end());
-  Recording opened = openRecording(recording(), radar, lanes, together);
+  Recording opened = openUnchecked(recording(), radar, together);
   if (!channels.empty()) opened.channels = loadChannelCorrection(channels, opened.radar);
   check(misaligned_is_finding, opened);
   return opened;
 }
 
 Recording RecordingArguments::open(const std::string& path) const {
-  Recording opened = openUnchecked(path);
+  Recording opened = openUnchecked(path, radarFile(), bag);
   check(false, opened);
   return opened;
 }
@@ -60,10 +58,11 @@ void RecordingArguments::check(bool misaligned_is_finding, Recording& opened) co
   for (const std::string& note : checkCaptures(opened, options)) std::cerr << "note: " << note << "\n";
 }
 
-Recording RecordingArguments::openUnchecked(const std::string& path) const {
+Recording RecordingArguments::openUnchecked(const std::string& path, const std::string& radar_file,
+                                            const BagOptions& bag_options) const {
   std::optional<CaptureLayout> lanes;
   if (!layout.empty()) lanes = layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
-  return openRecording(path, radarFile(), lanes, bag);
+  return openRecording(path, radar_file, lanes, bag_options);
 }
 
 std::optional<std::string> RecordingArguments::sceneFile(const Recording& opened) const {

@@ -40,7 +40,7 @@ struct RecordingArguments {
   TwinDescription loadTwinOf(const Recording& recording, const std::string& file) const;  ///< another one
 
  private:
-  Recording openUnchecked(const std::string& path) const;
+  Recording openUnchecked(const std::string& path, const std::string& radar_file, const BagOptions& bag_options) const;
   void check(bool misaligned_is_finding, Recording& opened) const;
 };
 

@@ -134,10 +134,6 @@ std::vector<std::int16_t> lane(const std::vector<std::int16_t>& words, std::size
   return result;
 }
 
-}  // namespace
-
-namespace {
-
 /// True where the first period breaks where it begins, too: the words begin with a chirp and slip later, by a lost
 /// packet.
 bool slipsLater(const std::vector<double>& error, std::size_t period, std::size_t run, std::size_t word) {
