@@ -11,23 +11,7 @@ from mmradartwin_tests import effects
 from mmradartwin_tests.blind import recordings
 from mmradartwin_tests.session import Measurement, Settings
 from diagnose_program import PROGRAM, diagnose
-
-WALL = """ply
-format ascii 1.0
-element vertex 4
-property float x
-property float y
-property float z
-element face 2
-property list uchar int vertex_indices
-end_header
-5.22 -3 0
-5.22 3 0
-5.22 3 2.6
-5.22 -3 2.6
-3 0 2 1
-3 0 3 2
-"""
+from made_wall import WALL
 
 
 def causes(findings):

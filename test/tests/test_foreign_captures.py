@@ -15,20 +15,11 @@ import numpy as np
 from mmradartwin_tests.blind import recordings
 from mmradartwin_tests.installed_programs import find_program
 from diagnose_program import PROGRAM, diagnose
+from paper_radar import PAPER_RADAR
 
 PROCESS = find_program("mmradartwin_dsp", "process")
 EVALUATE = find_program("mmradartwin_attribution", "evaluate")
-RADAR = """device: awr2243
-carrier_hz: 77.0e+9
-slope_hz_per_s: 75.0e+12
-samples_per_chirp: 64
-sample_rate_hz: 5.0e+6
-adc_start_s: 6.0e-6
-loops_per_frame: 1
-frame_period_s: 0.05
-tx_position_m: [[0, 0, 0], [0, 0.0077867, 0]]
-rx_position_m: [[0, 0, 0], [0, 0.0019467, 0], [0, 0.0038934, 0], [0, 0.0058401, 0]]
-"""
+RADAR = PAPER_RADAR.format(loops=1, frame_period_s=0.05)
 SHEET = "v 3 -0.5 0.6\nv 3 0.5 0.6\nv 3 0.5 1.4\nv 3 -0.5 1.4\nf 1 2 3 4\n"
 
 

@@ -6,26 +6,11 @@ import numpy as np
 
 from diagnose_program import PROGRAM, diagnose
 from in_folder import InFolder
+from made_wall import WALL
 from walking_points import Recording, polar, write_session
 
 WAVELENGTH_M = 299792458.0 / 77.93e9    # at the middle of the samples
 
-WALL = """ply
-format ascii 1.0
-element vertex 4
-property float x
-property float y
-property float z
-element face 2
-property list uchar int vertex_indices
-end_header
-5.22 -3 0
-5.22 3 0
-5.22 3 2.6
-5.22 -3 2.6
-3 0 2 1
-3 0 3 2
-"""
 SCENE = """meshes:
   - {file: wall.ply}
 materials: materials.yaml

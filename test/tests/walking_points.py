@@ -3,23 +3,15 @@ import os
 
 import numpy as np
 
+from paper_radar import PAPER_RADAR
+
 LIGHT_M_PER_S = 299792458.0
 CARRIER_HZ, SLOPE_HZ_PER_S, RATE_HZ, ADC_START_S = 77.0e9, 75.0e12, 5.0e6, 6.0e-6
 SAMPLES, CHIRP_S, RAMP_S = 64, 27.0e-6, 20.0e-6
 TX_M = (0.0, 0.0077867)
 RX_M = (0.0, 0.0019467, 0.0038934, 0.0058401)
 
-RADAR = """device: awr2243
-carrier_hz: 77.0e+9
-slope_hz_per_s: 75.0e+12
-samples_per_chirp: 64
-sample_rate_hz: 5.0e+6
-adc_start_s: 6.0e-6
-loops_per_frame: {loops}
-frame_period_s: {frame_period_s}
-tx_position_m: [[0, 0, 0], [0, 0.0077867, 0]]
-rx_position_m: [[0, 0, 0], [0, 0.0019467, 0], [0, 0.0038934, 0], [0, 0.0058401, 0]]
-layout: 4lane
+RADAR = PAPER_RADAR + """layout: 4lane
 idle_s: {idle_s:.9f}
 ramp_end_s: 20.0e-6
 """
