@@ -591,9 +591,10 @@ ShotStatistics ShotExaminer::examine(const FrameStack& stack, const std::vector<
   ShotStatistics result;
   Spectra s = spectra(stack, average);
   takeCommonGain(stack, s, result);
+  // Before laws are taken: what they leave of a radar that changes looks like walkers and bursts.
+  readSteadiness(s, result);
   takeLaws(stack, s, result);
   result.shots = static_cast<int>(s.shot.size());
-  readSteadiness(s, result);
   readNoise(s, result);
   readTurn(stack, s, result);
   for (const FrameLaw& law : result.laws) {
