@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# mmradartwin's commands: ./run.sh demo | test | setup | build | bench | fuzz | tsan | core | lint | exec CMD...
+# mmradartwin's commands: ./run.sh demo | test | setup | build | bench | fuzz | tsan | core | lint | docs | exec CMD...
 set -euo pipefail
 
 root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
@@ -34,14 +34,16 @@ usage: ./run.sh VERB
                `test` takes the libraries and one small test of each package
   lint [all]   format, includes, errors and names of C++, Python, shell scripts, packages; clang-tidy takes the newest
                sources for three minutes, with `all` every one
+  docs [OUT]   a site of README.md and docs/ in OUT (.ws/docs/site), by mkdocs, which is installed for that
   exec CMD...  run CMD in the sourced workspace, e.g. ./run.sh exec rosrun mmradartwin_attribution evaluate --help
 U
   exit 2
 }
 
-setup() {
+# install PACKAGE...: those that are missing
+install() {
   local missing=() package
-  for package in "${packages[@]}"; do
+  for package in "$@"; do
     dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
   done
   [ ${#missing[@]} -eq 0 ] && return
@@ -54,6 +56,8 @@ setup() {
   "${sudo[@]}" apt-get update -qq
   "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >&2
 }
+
+setup() { install "${packages[@]}"; }
 
 workspace() {
   mkdir -p "$ws/src"
@@ -232,6 +236,7 @@ case $verb in
   tsan) setup; run_tsan ;;
   core) setup; core all "$@" ;;
   lint) setup; lint "$@" ;;
+  docs) install mkdocs; "$root/docs/build.sh" "$@" ;;
   exec) [ $# -gt 0 ] || usage; source_workspace; data_folder; exec "$@" ;;
   *) usage ;;
 esac
