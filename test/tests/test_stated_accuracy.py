@@ -25,7 +25,8 @@ class StatedAccuracy(InFolder):
         status, as_shipped, errors = self.diagnosed("", "shipped")
         self.assertEqual(status, 0, msg=errors)
         self.assertEqual([f["cause"] for f in as_shipped["findings"]], ["actor_moved"])
-        self.assertEqual(as_shipped["accuracy"]["scene_m"], {"stated": 0.02, "estimated": None})
+        self.assertEqual(as_shipped["accuracy"]["scene_m"]["stated"], 0.02)
+        self.assertIsNone(as_shipped["accuracy"]["pose_m"]["estimated"], msg="no echo shows it")
 
         status, rough, errors = self.diagnosed("accuracy: {scene_m: 0.1, level_db: 3}\n", "rough")
         self.assertEqual(status, 0, msg=errors)
@@ -37,3 +38,32 @@ class StatedAccuracy(InFolder):
         self.assertEqual((status, nothing), (2, None))
         for part in ("session.yaml", "scene_m", "7", "0.5"):
             self.assertIn(part, errors)
+
+    def made(self, seed, scene_m, level_db):
+        """Findings, and what the program tells, of a session without effects whose actors err by this much."""
+        Measurement(Settings(output=self.at("session"), seed=seed, poses=24, locations=8, headings=4, frames=10,
+                             tier="office", duplicates=0, actor_range_m=scene_m, actor_gain_db=level_db)).run()
+        status, found, errors = diagnose(self.at("session"), self.at("diagnosis"))
+        self.assertEqual(status, 0, msg=errors)
+        with open(self.at("diagnosis", "index.html"), encoding="utf-8") as page:
+            return found, page.read()
+
+    def test_errors_as_stated_are_found_as_stated(self):
+        found, page = self.made(61, 0.02, 1.5)
+        self.assertEqual(found["findings"], [])
+        for key, true in (("scene_m", 0.02), ("level_db", 1.5), ("heading_deg", 0.3)):
+            self.assertTrue(true / 1.6 < found["accuracy"][key]["estimated"] < 1.6 * true, msg=f"{key} {found['accuracy']}")
+        self.assertNotIn("is stated", page)
+
+    def test_a_scene_far_worse_than_stated_is_told_and_names_no_cause(self):
+        found, page = self.made(62, 0.06, 1.5)
+        self.assertEqual(found["findings"], [])
+        self.assertEqual(found["accuracy"]["scene_m"]["stated"], 0.02)
+        self.assertTrue(0.03 < found["accuracy"]["scene_m"]["estimated"] < 0.09, msg=found["accuracy"])
+        self.assertIn("where 0.02 m is stated (scene_m)", page)
+
+    def test_levels_better_than_stated_are_found_so(self):
+        found, _ = self.made(63, 0.006, 0.3)
+        self.assertEqual(found["findings"], [])
+        self.assertLess(found["accuracy"]["level_db"]["estimated"], 0.8)
+        self.assertLess(found["accuracy"]["scene_m"]["estimated"], 0.01)

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -130,11 +131,20 @@ struct Finding {
   std::array<double, 2> placeError_m() const;
 };
 
+/// Spread (1 sigma) of errors as a session shows it, with its 95 % interval.
+struct SpreadEstimate {
+  double value = 0, low = 0, high = 0;
+};
+
 /// findings.json.
 struct Findings {
   int poses = 0, locations = 0;
   std::string held_out;     ///< how, in words
-  StatedAccuracy accuracy;  ///< by which the session was judged
+  StatedAccuracy accuracy;  ///< as the user states it
+  /// What the session shows instead, by the keys of the accuracy; keys of which it shows nothing are missing.
+  std::map<std::string, SpreadEstimate> estimated;
+  /// True of an accuracy that the session shows to be far worse than stated. It is then judged by the estimate.
+  bool isFarWorse(const std::string& key) const;
   /// Verdict on the session: "none" without findings, "unknown" where the first finding is unknown, else "named".
   std::string verdict() const;
   std::vector<Finding> findings;             ///< by gain

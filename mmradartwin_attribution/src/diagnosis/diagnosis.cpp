@@ -2,7 +2,11 @@
 
 #include <tbb/global_control.h>
 
+#include <algorithm>
+#include <map>
 #include <memory>
+#include <string>
+#include <utility>
 
 #include "diagnosis/channels/pose_time_lag.h"
 #include "diagnosis/diagnosis_run.h"
@@ -12,15 +16,11 @@ namespace mmradartwin {
 
 using namespace diagnosis;
 
-Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOptions& options) {
-  std::unique_ptr<tbb::global_control> limit;
-  if (options.jobs > 0) {
-    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
-                                                  static_cast<std::size_t>(options.jobs));
-  }
-  const TimedRecording timed =
-      inTime(recording, twin.description().mechanisms, readingProgress(options, "frames on the way"));
-  DiagnosisRun run(timed, twin, options);
+namespace {
+
+Diagnosis diagnosed(const TimedRecording& timed, Twin& twin, const DiagnosisOptions& options,
+                    const std::map<std::string, double>& estimated) {
+  DiagnosisRun run(timed, twin, options, estimated);
   run.judgeFrames();
   run.judgeConventions();
   run.judgeOwnEcho();
@@ -29,11 +29,38 @@ Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOption
   run.compareTwins();
   if (run.sceneMatches()) {
     run.findCauses();
+    run.estimateAccuracy();
     run.judgeRest();
     run.addUnexplained();
   }
   run.recordChangedPaths();
   return run.result();
+}
+
+}  // namespace
+
+Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOptions& options) {
+  std::unique_ptr<tbb::global_control> limit;
+  if (options.jobs > 0) {
+    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                  static_cast<std::size_t>(options.jobs));
+  }
+  const TimedRecording timed =
+      inTime(recording, twin.description().mechanisms, readingProgress(options, "frames on the way"));
+  Diagnosis by_stated = diagnosed(timed, twin, options, {});
+  std::map<std::string, double> far_worse;
+  for (const AccuracyKey& key : accuracyKeys()) {
+    if (!by_stated.findings.isFarWorse(key.name)) continue;
+    far_worse[key.name] = std::min(key.max, by_stated.findings.estimated.at(key.name).value);
+  }
+  if (far_worse.empty()) return by_stated;
+  // By too small an accuracy, errors of the ground are taken for causes.
+  Diagnosis by_estimate = diagnosed(timed, twin, options, far_worse);
+  for (const auto& item : far_worse) {
+    if (by_estimate.findings.isFarWorse(item.first)) continue;
+    by_estimate.findings.estimated[item.first] = by_stated.findings.estimated.at(item.first);
+  }
+  return by_estimate;
 }
 
 }  // namespace mmradartwin

@@ -7,6 +7,7 @@
 #include "diagnosis/gain/changed_records.h"
 #include "diagnosis/gain/held_out_gain.h"
 #include "diagnosis/hidden_walkers.h"
+#include "diagnosis/likelihood/error_spread.h"
 #include "diagnosis/pose_convention.h"
 #include "diagnosis/receiver/body_fixed_tone.h"
 #include "diagnosis/receiver/channel_errors.h"
@@ -24,16 +25,19 @@ namespace mmradartwin::diagnosis {
 namespace {
 
 constexpr int kFolds = 5;
+constexpr double kLeastShareOfStated = 0.2;  ///< of the stated error of levels that is believed
 
 }  // namespace
 
-DiagnosisRun::DiagnosisRun(const TimedRecording& timed, Twin& twin, const DiagnosisOptions& options)
+DiagnosisRun::DiagnosisRun(const TimedRecording& timed, Twin& twin, const DiagnosisOptions& options,
+                           const std::map<std::string, double>& estimated)
     : recording_(timed.recording),
       lag_(timed.finding),
       twin_(twin),
       session_(prepareSession(recording_, twin, options)),
       data_(session_.received.data),
-      context_(recording_, twin, data_, options, kFolds),
+      stated_(with(options.accuracy, recording_.accuracy)),
+      context_(recording_, twin, data_, options, with(stated_, estimated), kFolds),
       gains_(context_),
       rounds_(context_, gains_, session_.received.frames, result_),
       mechanisms_(twin.description().mechanisms),
@@ -131,6 +135,7 @@ void DiagnosisRun::fitTwinAsGiven() {
   context_.echoes.pointBeams(data_, mechanisms_, context_.likelihood.firstBin());
   context_.echoes.setBaseline(mechanisms_);
   state_ = context_.fitter.state(mechanisms_, nullptr);
+  if (!session_.few) takeSmallerErrors();
   for (Finding& finding : result_.findings.findings) {
     if (traitsOf(finding.cause).form != MechanismForm::kBodyFixedTone) continue;
     referToStrongestEcho(twin_.changed(mechanisms_), data_, finding);
@@ -160,7 +165,7 @@ bool DiagnosisRun::sceneMatches() {
   const std::vector<PoseEchoes> echoes = context_.echoes.echoes(mechanisms_);
   result_.explained_power = explainedPower(cellPowers(data_, echoes));
   Findings& findings = result_.findings;
-  findings.accuracy = context_.accuracy;
+  findings.accuracy = stated_;
   findings.poses = static_cast<int>(data_.poses.size());
   findings.locations = static_cast<int>(data_.locations.size());
   findings.held_out = session_.few ? "nothing: of fewer than 3 poses only frames and channels are judged"
@@ -199,6 +204,41 @@ void DiagnosisRun::findCauses() {
 void DiagnosisRun::addUnexplained() {
   diagnosis::addUnexplained(session_.received.unexplained, data_, twin_.description().mechanisms, result_.findings,
                             extended_);
+}
+
+std::map<std::string, SpreadEstimate> DiagnosisRun::spreadsUnder(const ModelState& state,
+                                                                 const std::vector<RangeShift>& elsewhere) const {
+  SessionEvidence evidence = errorEvidence(context_.likelihood, state.echoes, state.latents);
+  for (const RangeShift& shift : elsewhere) evidence.actor_range_m.replace(shift.actor, shift.shift_m, shift.nats);
+  std::map<std::string, SpreadEstimate> spreads;
+  const auto estimate = [&](const char* key, const ErrorEvidence& errors, double unit, double stated) {
+    const std::optional<SpreadEstimate> found = estimatedSpread(errors, stated / unit);
+    if (found) spreads[key] = {unit * found->value, unit * found->low, unit * found->high};
+  };
+  estimate("scene_m", evidence.actor_range_m, 1, stated_.scene_m);
+  estimate("level_db", evidence.actor_gain, 10 / std::log(10), stated_.level_db);
+  estimate("heading_deg", evidence.yaw_rad, 180 / M_PI, stated_.heading_deg);
+  return spreads;
+}
+
+void DiagnosisRun::takeSmallerErrors() {
+  std::map<std::string, SpreadEstimate> spreads = spreadsUnder(state_, {});
+  StatedAccuracy smaller = context_.accuracy;
+  const auto take = [&](const char* key, double least, double& value) {
+    const auto found = spreads.find(key);
+    // The upper end of the interval: larger errors are not excluded.
+    if (found != spreads.end()) value = std::min(value, std::max(found->second.high, least));
+  };
+  take("scene_m", stated_.path_range_m, smaller.scene_m);
+  take("level_db", kLeastShareOfStated * stated_.level_db, smaller.level_db);
+  if (smaller.scene_m == context_.accuracy.scene_m && smaller.level_db == context_.accuracy.level_db) return;
+  context_.judgeActorsBy(smaller);
+  const SessionLatents latents = state_.latents;
+  state_ = context_.fitter.state(mechanisms_, &latents);
+}
+
+void DiagnosisRun::estimateAccuracy() {
+  if (!session_.few) result_.findings.estimated = spreadsUnder(rounds_.state(), rounds_.elsewhere());
 }
 
 void DiagnosisRun::judgeRest() {

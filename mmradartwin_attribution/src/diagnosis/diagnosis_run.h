@@ -19,8 +19,10 @@ namespace mmradartwin::diagnosis {
 /// mechanisms to the extended twin.
 class DiagnosisRun {
  public:
-  /// Reads the recording. Keeps references. Throws InputError where recording and twin cannot belong together.
-  DiagnosisRun(const TimedRecording& timed, Twin& twin, const DiagnosisOptions& options);
+  /// Reads the recording. Keeps references. estimated: accuracies by which the session is judged in place of those that
+  /// its user states. Throws InputError where recording and twin cannot belong together.
+  DiagnosisRun(const TimedRecording& timed, Twin& twin, const DiagnosisOptions& options,
+               const std::map<std::string, double>& estimated = {});
 
   /// Damage and motion that frames show, and the lag of the poses.
   void judgeFrames();
@@ -38,6 +40,8 @@ class DiagnosisRun {
   bool sceneMatches();
   /// Rounds of hypotheses.
   void findCauses();
+  /// How far actors and headings err by the session's own echoes.
+  void estimateAccuracy();
   /// What the twin with all that was found leaves unexplained, beside what a right one would.
   void judgeRest();
   /// What frames show and no cause explains.
@@ -50,6 +54,12 @@ class DiagnosisRun {
   /// Adds a finding unless the twin states the same already.
   void add(Finding finding, const std::map<std::string, double>& nats_by_pose = {});
   void measureFrameGain();
+  /// Errors by the session's own echoes under a state of the model, by the keys of the accuracy.
+  /// elsewhere: actors whose range errors the slopes of the likelihood do not show.
+  std::map<std::string, SpreadEstimate> spreadsUnder(const ModelState& state,
+                                                     const std::vector<RangeShift>& elsewhere) const;
+  /// Takes the actors' errors as they are where the twin as given shows them to be smaller than stated.
+  void takeSmallerErrors();
   void insertBeforeUnknown(Finding finding);
 
   const Recording& recording_;
@@ -58,6 +68,7 @@ class DiagnosisRun {
   PreparedSession session_;
   ChannelData& data_;
   Diagnosis result_;
+  const StatedAccuracy stated_;  ///< the recording's where it states one, else that of the options
   DiagnosisContext context_;
   GainMeasurement gains_;
   HypothesisRounds rounds_;

@@ -40,6 +40,8 @@ class Settings:
     truth: str = None
     paths_csv: str = None
     jobs: int = None
+    actor_range_m: float = 0.02    # errors of the actors, 1 sigma, in the tier "office"
+    actor_gain_db: float = 1.5
     at_reported: bool = False   # measure where the poses say: what a twin without any error could know
 
 
@@ -115,8 +117,8 @@ class Measurement:
         rng = self.rng(2)
         office_like = self.settings.tier == "office"
         count = len(self.room.actors)
-        self.actor_range_m = rng.normal(0, 0.02, count) * office_like
-        self.actor_gain_db = rng.normal(0, 1.5, count) * office_like
+        self.actor_range_m = rng.normal(0, self.settings.actor_range_m, count) * office_like
+        self.actor_gain_db = rng.normal(0, self.settings.actor_gain_db, count) * office_like
         self.clutter = None
         if office_like:
             points = rng.uniform([0.2, 0.2, 0.2], [office.LENGTH_M - 0.2, office.WIDTH_M - 0.2, 2.0], (200, 3))

@@ -112,8 +112,10 @@ std::string toJson(const Findings& findings) {
   j["format"] = kFindingsFormat;
   j["poses"] = {{"count", findings.poses}, {"locations", findings.locations}, {"held_out", findings.held_out}};
   for (const AccuracyKey& key : accuracyKeys()) {
-    // No estimate is made yet.
-    j["accuracy"][key.name] = {{"stated", findings.accuracy.*key.member}, {"estimated", nullptr}};
+    const auto estimate = findings.estimated.find(key.name);
+    j["accuracy"][key.name] = {
+        {"stated", findings.accuracy.*key.member},
+        {"estimated", estimate == findings.estimated.end() ? Json(nullptr) : Json(estimate->second.value)}};
   }
   j["verdict"] = findings.verdict();
   j["findings"] = Json::array();

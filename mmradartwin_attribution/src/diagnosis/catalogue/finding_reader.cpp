@@ -1,3 +1,4 @@
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -224,17 +225,16 @@ Finding readFinding(Entry e) {
   return finding;
 }
 
-/// Stated accuracies; an older file has none.
-StatedAccuracy readAccuracy(Entry e) {
-  StatedAccuracy accuracy;
+/// Accuracies; an older file has none. The intervals of the estimates are not in the file.
+void readAccuracy(Entry e, Findings& to) {
   for (const AccuracyKey& key : accuracyKeys()) {
     Entry value = e.at(key.name);
-    accuracy.*key.member = value.at("stated").number();
-    value.at("estimated").numberOrNaN();
+    to.accuracy.*key.member = value.at("stated").number();
+    const double estimated = value.at("estimated").numberOrNaN();
+    if (!std::isnan(estimated)) to.estimated[key.name] = {estimated, estimated, estimated};
     value.finish();
   }
   e.finish();
-  return accuracy;
 }
 
 }  // namespace
@@ -255,7 +255,7 @@ Findings parseFindings(const std::string& json_text, const std::string& name) {
   all.locations = poses.at("locations").count();
   all.held_out = poses.at("held_out").text();
   poses.finish();
-  if (e.has("accuracy")) all.accuracy = readAccuracy(e.at("accuracy"));
+  if (e.has("accuracy")) readAccuracy(e.at("accuracy"), all);
   for (const Entry& finding : e.at("findings").items()) all.findings.push_back(readFinding(finding));
   all.extended_twin = e.optionalText("extended_twin");
   const Entry verdict = e.at("verdict");

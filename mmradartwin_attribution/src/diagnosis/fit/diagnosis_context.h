@@ -16,10 +16,13 @@ namespace mmradartwin::diagnosis::fit {
 
 /// Objects that the steps of a diagnosis share; made once per session.
 struct DiagnosisContext {
-  /// Keeps references. folds: number of parts of the locations, each held out in turn. Throws InputError where scene
-  /// and radar do not fit together.
+  /// Keeps references. accuracy: by which the session is judged. folds: number of parts of the locations, each held out
+  /// in turn. Throws InputError where scene and radar do not fit together.
   DiagnosisContext(const Recording& recording, Twin& twin, ChannelData& data, const DiagnosisOptions& options,
-                   int folds);
+                   const StatedAccuracy& accuracy, int folds);
+
+  /// Judges actors by other errors from now on; those of poses and single paths stay.
+  void judgeActorsBy(const StatedAccuracy& other);
 
   /// Reports a stage and the share of it that is done to options.on_progress. Throws DiagnosisCancelled where the user
   /// has cancelled.
@@ -29,7 +32,7 @@ struct DiagnosisContext {
   Twin& twin;
   ChannelData& data;
   const DiagnosisOptions& options;
-  StatedAccuracy accuracy;  ///< the recording's where it states one, else that of the options
+  StatedAccuracy accuracy;
   PoseAccuracy pose_accuracy;
   ExpectedEchoes echoes;
   ChannelLikelihood likelihood;

@@ -36,6 +36,7 @@ class HypothesisFitter {
   HypothesisFitter(ExpectedEchoes& source, const ChannelLikelihood& model, int folds,
                    StatedBounds stated = StatedBounds());
 
+  void setStated(StatedBounds stated) { stated_ = stated; }
   /// State of these mechanisms with all latents fitted. The fit starts from `start`, or from the data where that is
   /// null.
   ModelState state(const std::vector<NamedParameters>& mechanisms, const SessionLatents* start);

@@ -42,7 +42,7 @@ Limits limitsOf(int global, int errors, const LatentSpread& spread) {
   if (global >= kActors + errors) {
     return {-spread.most_range_error_m, spread.most_range_error_m, spread.actor_range_m};
   }
-  if (global >= kActors) return {-2, 2, 0.5};
+  if (global >= kActors) return {-spread.most_gain_error, spread.most_gain_error, 0.5};
   if (global >= kShape) return {-8, 8, 1};
   switch (global) {
     case kRelative:  // below -11.5 single precision would not keep every matrix definite
@@ -551,6 +551,13 @@ void ChannelLikelihood::holdAtLimits(const SessionLatents& latents, Scores& scor
 
 Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
                                  const std::vector<int>& poses) const {
+  Scores scores = freeScores(basis, directions, poses);
+  holdAtLimits(basis.latents, scores);
+  return scores;
+}
+
+Scores ChannelLikelihood::freeScores(const Basis& basis, const std::vector<SessionCovariance>& directions,
+                                     const std::vector<int>& poses) const {
   const SessionLatents& latents = basis.latents;
   const Eigen::Index all = latents.globals() + static_cast<Eigen::Index>(directions.size());
   std::vector<PoseScores> each(poses.size());
@@ -571,7 +578,6 @@ Scores ChannelLikelihood::scores(const Basis& basis, const std::vector<SessionCo
   }
   scores.total = scores.by_location.colwise().sum().transpose();
   addPriors(latents, scores);
-  holdAtLimits(latents, scores);
   scores.log_likelihood += prior(latents);
   return scores;
 }

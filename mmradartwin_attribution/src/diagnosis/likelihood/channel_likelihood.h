@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <complex>
 #include <optional>
@@ -42,10 +43,12 @@ struct LatentSpread {
   explicit LatentSpread(const StatedAccuracy& stated = {})
       : actor_gain(stated.level_db / 4.343),
         actor_range_m(stated.scene_m),
+        most_gain_error(std::max(2.0, 4 * actor_gain)),
         most_range_error_m(StatedBounds(stated).mostRangeError_m()) {}
 
   double actor_gain;          ///< natural logarithm of power, per interaction
   double actor_range_m;       ///< one-way, per interaction
+  double most_gain_error;     ///< limit of an actor's gain error
   double most_range_error_m;  ///< limit of an actor's range error
 };
 
@@ -125,6 +128,9 @@ class ChannelLikelihood {
   /// Other poses do not count.
   Scores scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
                 const std::vector<int>& poses) const;
+  /// The same with numbers at their limits left free.
+  Scores freeScores(const Basis& basis, const std::vector<SessionCovariance>& directions,
+                    const std::vector<int>& poses) const;
   /// Fisher scoring of the latents from their present values. Returns the log-likelihood.
   double fit(const std::vector<PoseEchoes>& echoes, SessionLatents& latents, int iterations) const;
   /// Latents after a share of a step of the globals, with each heading's best response to whole_step. Values and steps
@@ -164,6 +170,7 @@ class ChannelLikelihood {
 
   const ChannelData& data() const { return data_; }
   const LatentSpread& spread() const { return spread_; }
+  void setSpread(const LatentSpread& spread) { spread_ = spread; }
   int firstBin() const { return 2; }     ///< nearer bins hold the radar's own leakage and are judged separately
   double weight() const { return 0.5; }  ///< of a cell in the composite likelihood
 

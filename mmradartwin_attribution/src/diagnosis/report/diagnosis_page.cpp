@@ -53,14 +53,19 @@ std::vector<GainRow> gainRows(const FindingGain& gain) {
           {"C5", &gain.classes[4]}};
 }
 
-void writeAccuracy(const StatedAccuracy& accuracy, std::ostream& html) {
+void writeAccuracy(const Findings& findings, std::ostream& html) {
   html << "<p>Stated accuracy of the ground (1 sigma), by which the session is judged:";
   const char* separator = " ";
   for (const AccuracyKey& key : accuracyKeys()) {
-    html << separator << key.name << " " << shownNumber(accuracy.*key.member);
+    html << separator << key.name << " " << shownNumber(findings.accuracy.*key.member);
+    const auto estimate = findings.estimated.find(key.name);
+    if (estimate != findings.estimated.end()) {
+      html << " (the session shows " << shownNumber(estimate->second.value) << ")";
+    }
     separator = ", ";
   }
   html << ".</p>";
+  for (const std::string& sentence : shownFarWorse(findings)) html << "<p><b>" << escaped(sentence) << "</b></p>";
 }
 
 void writeHead(const Diagnosis& diagnosis, std::ostream& html) {
@@ -77,7 +82,7 @@ void writeHead(const Diagnosis& diagnosis, std::ostream& html) {
          << "<a href=\"twin.extended.yaml\">twin.extended.yaml</a>, ";
   }
   html << "<a href=\"findings.json\">findings.json</a></p>";
-  if (diagnosis.has_twin) writeAccuracy(diagnosis.findings.accuracy, html);
+  if (diagnosis.has_twin) writeAccuracy(diagnosis.findings, html);
   if (diagnosis.problems.empty()) return;
   html << "<p>Left out:</p><ul>";
   for (const PoseProblem& problem : diagnosis.problems) html << "<li>" << escaped(problem.message) << "</li>";

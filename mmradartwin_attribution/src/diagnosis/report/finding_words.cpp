@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
+#include <map>
 #include <sstream>
 
 #include "diagnosis/catalogue/default_mechanism.h"
@@ -33,6 +34,24 @@ std::string shownParameter(const FindingParameter& parameter) {
     for (std::size_t i = 0; i < texts->size(); ++i) out << (i ? ", " : "") << (*texts)[i];
   }
   return out.str();
+}
+
+std::vector<std::string> shownFarWorse(const Findings& findings) {
+  const std::map<std::string, std::string> of = {{"scene_m", "places of the actors"},
+                                                 {"level_db", "levels of the actors' echoes"},
+                                                 {"heading_deg", "headings of the poses"}};
+  std::vector<std::string> sentences;
+  for (const AccuracyKey& key : accuracyKeys()) {
+    if (!findings.isFarWorse(key.name)) continue;
+    const SpreadEstimate& found = findings.estimated.at(key.name);
+    std::ostringstream out;
+    out << "The " << of.at(key.name) << " err by " << shownNumber(found.value) << " " << key.unit << " ("
+        << shownNumber(found.low) << " to " << shownNumber(found.high) << "), 1 sigma, where "
+        << shownNumber(findings.accuracy.*key.member) << " " << key.unit << " is stated (" << key.name
+        << "); the session was judged by the former.";
+    sentences.push_back(out.str());
+  }
+  return sentences;
 }
 
 std::string shownCandidate(const CauseProbability& candidate) {

@@ -13,6 +13,8 @@ namespace mmradartwin::diagnosis::report {
 std::string shownNumber(double value, int significant_digits = 3);
 /// "name = value unit (low to high)".
 std::string shownParameter(const FindingParameter& parameter);
+/// A sentence for each accuracy that the session shows to be far worse than stated.
+std::vector<std::string> shownFarWorse(const Findings& findings);
 /// "cause (probability)" of a candidate, with what tells it from others of the same cause.
 std::string shownCandidate(const CauseProbability& candidate);
 /// Parameters of a finding's mechanism beyond those of its cause, in words: the shape of an object, the time of a step

@@ -40,8 +40,11 @@ std::vector<RangeShift> HypothesisRounds::takeRangeErrors(ModelState& state) {
     if (better) state = std::move(*better);
     return better.has_value();
   };
+  elsewhere_.assign(shifted.begin() + static_cast<std::ptrdiff_t>(std::min(kMostRangeErrors, shifted.size())),
+                    shifted.end());
   shifted.resize(std::min(kMostRangeErrors, shifted.size()));
   shifted.erase(std::remove_if(shifted.begin(), shifted.end(), is_error), shifted.end());
+  elsewhere_.insert(elsewhere_.begin(), shifted.begin(), shifted.end());
   return shifted;
 }
 

@@ -34,6 +34,8 @@ class HypothesisRounds {
   const std::vector<NamedParameters>& extended() const { return selection_.extended(); }
   const SessionLatents& latents() { return selection_.state().latents; }
   const ModelState& state() { return selection_.state(); }
+  /// Actors whose echoes are likelier at other ranges, in the last round, and whose latents do not say so.
+  const std::vector<RangeShift>& elsewhere() const { return elsewhere_; }
 
  private:
   /// Runs one round; true where it found something.
@@ -48,6 +50,7 @@ class HypothesisRounds {
   Diagnosis& result_;
   HypothesisRanking ranking_;
   Selection selection_;
+  std::vector<RangeShift> elsewhere_;
   std::size_t family_ = 1;  ///< number of hypotheses of a round
 };
 

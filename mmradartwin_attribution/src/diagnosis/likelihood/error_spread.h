@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "diagnosis/likelihood/channel_likelihood.h"
+#include "diagnosis/rooms.h"
+#include "mmradartwin_attribution/finding.h"
+
+namespace mmradartwin::diagnosis::likelihood {
+
+/// What the data say of errors of one kind, without the prior of these errors; everything else is refitted to first
+/// order.
+struct ErrorEvidence {
+  Eigen::MatrixXd information;  ///< [errors][errors]
+  Eigen::VectorXd weighted;     ///< [errors] information times the errors of greatest likelihood
+
+  /// Replaces what the slopes at the fit say of one error, where the likelihood is higher by `nats` far away.
+  void replace(int error, double value, double nats);
+};
+
+/// Standard deviation of errors that are normally distributed about zero, by empirical Bayes: the likelihood of the
+/// spread s with all errors integrated out (Laplace) is
+///   log L(s) = sum_i 1/2 [ g_i^2 s^2 / (1 + s^2 l_i) - log(1 + s^2 l_i) ]
+/// over the eigenvalues l_i of the information and the components g_i of `weighted` along its eigenvectors (restricted
+/// maximum likelihood; Harville 1977, J. Am. Stat. Assoc. 72, 320). One error in twenty may be an outlier of five times
+/// the spread, so that one actor that stands elsewhere does not stretch the spread of all. The stated spread is a prior:
+/// log-normal, a factor of e wide. Nothing where the data say little.
+std::optional<SpreadEstimate> estimatedSpread(const ErrorEvidence& evidence, double stated);
+
+/// Evidence of the actors' levels and of their ranges, and of the poses' headings, at fitted latents.
+struct SessionEvidence {
+  ErrorEvidence actor_gain, actor_range_m, yaw_rad;
+};
+SessionEvidence errorEvidence(const ChannelLikelihood& likelihood, const std::vector<PoseEchoes>& echoes,
+                              const SessionLatents& latents);
+
+}  // namespace mmradartwin::diagnosis::likelihood
