@@ -24,8 +24,8 @@ struct ErrorEvidence {
 ///   log L(s) = sum_i 1/2 [ g_i^2 s^2 / (1 + s^2 l_i) - log(1 + s^2 l_i) ]
 /// over the eigenvalues l_i of the information and the components g_i of `weighted` along its eigenvectors (restricted
 /// maximum likelihood; Harville 1977, J. Am. Stat. Assoc. 72, 320). One error in twenty may be an outlier of five times
-/// the spread, so that one actor that stands elsewhere does not stretch the spread of all. The stated spread is a prior:
-/// log-normal, a factor of e wide. Nothing where the data say little.
+/// the spread, so that one actor that stands elsewhere does not stretch the spread of all. The stated spread is a
+/// prior: log-normal, a factor of e wide. Nothing where the data say little.
 std::optional<SpreadEstimate> estimatedSpread(const ErrorEvidence& evidence, double stated);
 
 /// Evidence of the actors' levels and of their ranges, and of the poses' headings, at fitted latents.

@@ -17,6 +17,7 @@ namespace mmradartwin::diagnosis::rounds {
 namespace {
 
 constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is searched for in a round
+constexpr std::size_t kMostClutter = 4;      ///< things that stand out of the clutter, beside which a fit is judged
 
 }  // namespace
 
@@ -78,6 +79,26 @@ std::string HypothesisRounds::rejectionByLikelihood(const HypothesisFit& fit) co
   return rejectionReason(fit, frames_);
 }
 
+bool HypothesisRounds::isClutter(const HypothesisFit& fit) const {
+  return fit.hypothesis.form() == MechanismForm::kUnmodelledObject && fit.size_m() <= bounds::kLeastSize_m &&
+         fit.ranking() > 0 && fit.false_alarm_rate <= bounds::kFalseAlarmRateOfRound && fit.held_out_gain > 0;
+}
+
+bool HypothesisRounds::standsBeside(const std::vector<HypothesisFit>& clutter, const HypothesisFit& fit) {
+  context_.report(fit.hypothesis.label() + " beside clutter that stands out", 0);
+  const ModelState& state = selection_.state();
+  std::vector<NamedParameters> mechanisms = state.mechanisms;
+  for (const HypothesisFit& thing : clutter) {
+    replaceOrAppend(thing.hypothesis.at(thing.scaled_values), mechanisms);
+  }
+  context_.echoes.setBaseline(mechanisms);
+  const ModelState beside = context_.fitter.state(mechanisms, &state.latents);
+  HypothesisFit again = context_.fitter.fit(beside, fit.hypothesis, {fit.scaled_values});
+  context_.fitter.judge(again, family_);
+  context_.echoes.setBaseline(state.mechanisms);
+  return rejectionByLikelihood(again).empty();
+}
+
 bool HypothesisRounds::findOne(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
   const ModelState& state = selection_.state();
@@ -85,10 +106,17 @@ bool HypothesisRounds::findOne(int round) {
   preferMoves(fits, context_.twin.scene());
   preferBetterNames(fits, state);
   MapEvidence maps(context_, state);
+  std::vector<HypothesisFit> clutter;  // likelier than the fits that follow
   for (HypothesisFit& fit : fits) {
     std::string& verdict = triedAs(fit, round, result_.tried).verdict;
     verdict = rejectionByLikelihood(fit);
+    if (isClutter(fit) && clutter.size() < kMostClutter) clutter.push_back(fit);
     if (!verdict.empty()) continue;
+    const bool placed = placeOf(fit.hypothesis.at(fit.scaled_values), context_.twin.scene()).has_value();
+    if (!clutter.empty() && !placed && !standsBeside(clutter, fit)) {
+      verdict = "clutter that stands out explains it";
+      continue;
+    }
     Finding finding = findingOf(fit, fits, state, context_.twin.scene(), context_.data);
     if (context_.data.locations.size() > 1) {
       context_.report("gain on held-out places", 0);

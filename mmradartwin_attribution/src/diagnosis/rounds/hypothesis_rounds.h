@@ -43,6 +43,10 @@ class HypothesisRounds {
   std::vector<HypothesisFit> fitBest(int round);
   /// Reason why a fit is no finding by its likelihood alone, "" where it may be one.
   std::string rejectionByLikelihood(const HypothesisFit& fit) const;
+  /// True of an object with all the evidence that one needs, but no larger than clutter is.
+  bool isClutter(const HypothesisFit& fit) const;
+  /// True of a fit that would also be one where the twin has this clutter.
+  bool standsBeside(const std::vector<HypothesisFit>& clutter, const HypothesisFit& fit);
 
   DiagnosisContext& context_;
   GainMeasurement& gains_;
