@@ -9,6 +9,7 @@
 #include "mmradartwin_dsp/capture_check.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/map_picture.h"
+#include "mmradartwin_dsp/npz_file.h"
 #include "mmradartwin_dsp/program.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_dsp/ros/bag_arguments.h"
@@ -23,14 +24,14 @@ struct Options {
   std::string output, radar, layout, channels;
   BagOptions bag;
   bool mat = false;
+  bool npz = false;
   bool cubes = false;
   bool align = false;
 };
 
-/// cube: [frame][chirp][sample][rx] complex ADC counts; grid: [channel][sample]; map: [range][azimuth] dBFS.
-void writeMat(const Options& options, const Recording& recording, const Pose& pose, const ReceiveGrid& grid,
-              const RangeAngleMap& map) {
-  MatFile file((fs::path(options.output) / "mat" / (pose.name + ".mat")).string());
+/// cube: [frame][chirp][sample][rx][I, Q] ADC counts; grid: [channel][sample]; power_db: [range][azimuth] dBFS.
+void writeArrays(ArrayFile& file, const Options& options, const Recording& recording, const Pose& pose,
+                 const ReceiveGrid& grid, const RangeAngleMap& map) {
   const auto size = [](Eigen::Index n) { return static_cast<std::size_t>(n); };
   file.write("grid", {size(grid.x.rows()), size(grid.x.cols())}, grid.x.data());
   file.write("full_scale", grid.full_scale);
@@ -38,10 +39,10 @@ void writeMat(const Options& options, const Recording& recording, const Pose& po
   file.write("stamp_s", static_cast<double>(pose.stamp_ns) * 1e-9);
   const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> T = pose.T_map_radar.matrix();
   file.write("T_map_radar", {4, 4}, T.data());
-  file.write("range_m", {map.axes.range_m.size(), 1}, map.axes.range_m.data());
-  file.write("azimuth_rad", {map.axes.azimuth_rad.size(), 1}, map.axes.azimuth_rad.data());
+  file.write("range_m", {map.axes.range_m.size()}, map.axes.range_m.data());
+  file.write("azimuth_rad", {map.axes.azimuth_rad.size()}, map.axes.azimuth_rad.data());
   file.write("power_db", {size(map.power_db.rows()), size(map.power_db.cols())}, map.power_db.data());
-  if (!options.cubes) return;
+  if (!options.cubes) return file.close();
   std::vector<std::int16_t> samples;
   std::size_t frames = 0;
   AdcCube last;
@@ -52,6 +53,7 @@ void writeMat(const Options& options, const Recording& recording, const Pose& po
   });
   const auto extent = [](int n) { return static_cast<std::size_t>(n); };
   file.write("cube", {frames, extent(last.chirps), extent(last.samples), extent(last.receivers), 2}, samples.data());
+  file.close();
 }
 
 int process(const Options& options) {
@@ -72,7 +74,11 @@ int process(const Options& options) {
     }
   }();
   for (const char* folder : {"maps", "pictures"}) fs::create_directories(fs::path(options.output) / folder);
+  const auto arrays = [&options](const std::string& ending, const std::string& pose) {
+    return (fs::path(options.output) / ending / (pose + "." + ending)).string();
+  };
   if (options.mat) fs::create_directories(fs::path(options.output) / "mat");
+  if (options.npz) fs::create_directories(fs::path(options.output) / "npz");
 
   std::vector<std::string> problems;
   for (const PoseProblem& problem : recording.problems) problems.push_back(problem.message);
@@ -88,7 +94,14 @@ int process(const Options& options) {
       style.title = recording.name + ", pose " + pose.name + ", " + std::to_string(grid.frames) + " frames";
       writePicture(drawFan(map.axes, map.power_db, style),
                    (fs::path(options.output) / "pictures" / (pose.name + ".png")).string());
-      if (options.mat) writeMat(options, recording, pose, grid, map);
+      if (options.mat) {
+        MatFile file(arrays("mat", pose.name));
+        writeArrays(file, options, recording, pose, grid, map);
+      }
+      if (options.npz) {
+        NpzFile file(arrays("npz", pose.name));
+        writeArrays(file, options, recording, pose, grid, map);
+      }
     } catch (const InputError& error) {
       problems.push_back(error.what());
     }
@@ -111,7 +124,7 @@ int main(int argc, char** argv) {
   app.add_option("INPUT", options.inputs,
                  "session directory, .bin capture, or bag; several bags, the parts of one recording, are read as one")
       ->required();
-  app.add_option("--output", options.output, "folder for maps/, pictures/ and mat/")->required();
+  app.add_option("--output", options.output, "folder for maps/, pictures/, mat/ and npz/")->required();
   app.add_option(
       "--radar", options.radar,
       "radar.yaml; needed for a bare capture, else instead of the session's; of a bag with several radars the "
@@ -123,9 +136,12 @@ int main(int argc, char** argv) {
   app.add_flag("--align", options.align, "read captures that begin within a frame from their first whole chirp on");
   app.add_flag("--mat", options.mat,
                "also write grid and map of each pose as a MATLAB file (Octave and SciPy read it too)");
-  app.add_flag("--cubes", options.cubes, "with --mat: the raw cubes too, [frame][chirp][sample][rx][I,Q]");
+  app.add_flag("--npz", options.npz, "also write the same as a NumPy archive");
+  app.add_flag("--cubes", options.cubes, "with --mat or --npz: the raw cubes too, [frame][chirp][sample][rx][I,Q]");
   return runProgram(app, argc, argv, [&options] {
-    if (options.cubes && !options.mat) throw InputError("--cubes says what --mat writes; give --mat too");
+    if (options.cubes && !options.mat && !options.npz) {
+      throw InputError("--cubes says what --mat and --npz write; give one of them too");
+    }
     return process(options);
   });
 }

@@ -2,6 +2,7 @@
 
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 
 #include "mmradartwin_dsp/input_error.h"
 
@@ -34,6 +35,7 @@ struct MatFile::Handle {
 
   void write(const std::string& name, matio_classes type, matio_types stored, std::vector<std::size_t> shape,
              void* data, int flags) {
+    while (shape.size() < 2) shape.push_back(1);  // MATLAB knows no fewer
     const std::unique_ptr<matvar_t, decltype(&Mat_VarFree)> variable(
         Mat_VarCreate(name.c_str(), type, stored, static_cast<int>(shape.size()), shape.data(), data,
                       flags | MAT_F_DONT_COPY_DATA),
@@ -52,6 +54,11 @@ MatFile::MatFile(const std::string& file) : handle_(std::make_unique<Handle>()) 
 
 MatFile::~MatFile() {
   if (handle_->mat) Mat_Close(handle_->mat);
+}
+
+void MatFile::close() {
+  if (Mat_Close(std::exchange(handle_->mat, nullptr)) == 0) return;
+  throw std::runtime_error(handle_->file + ": cannot be written; check folder, rights and free space");
 }
 
 void MatFile::write(const std::string& name, const std::vector<std::size_t>& shape, const double* values) {
@@ -86,6 +93,7 @@ MatFile::~MatFile() = default;
 void MatFile::write(const std::string&, const std::vector<std::size_t>&, const double*) {}
 void MatFile::write(const std::string&, const std::vector<std::size_t>&, const std::complex<double>*) {}
 void MatFile::write(const std::string&, const std::vector<std::size_t>&, const std::int16_t*) {}
+void MatFile::close() {}
 
 }  // namespace mmradartwin
 

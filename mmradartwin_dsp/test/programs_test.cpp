@@ -32,13 +32,14 @@ const std::string kProcess = MMRADARTWIN_PROCESS;
 TEST(Process, WritesAMapAndAPicturePerPose) {
   const TestFolder folder;
   writeSession(folder / "lab");
-  const Outcome done = run(kProcess + " " + folder / "lab" + " --output " + folder / "out --mat --cubes");
+  const Outcome done = run(kProcess + " " + folder / "lab" + " --output " + folder / "out --mat --npz --cubes");
   EXPECT_EQ(done.status, 0) << done.errors;
   for (const char* pose : {"000", "001", "002"}) {
     EXPECT_TRUE(contains(readBytes(folder / ("out/maps/" + std::string(pose) + ".csv")),
                          "range_m,azimuth_deg,power_db\n0.000000,-81."));
     EXPECT_EQ(readBytes(folder / ("out/pictures/" + std::string(pose) + ".png")).substr(1, 3), "PNG");
     EXPECT_EQ(readBytes(folder / ("out/mat/" + std::string(pose) + ".mat")).substr(0, 10), "MATLAB 5.0");
+    EXPECT_EQ(readBytes(folder / ("out/npz/" + std::string(pose) + ".npz")).substr(0, 2), "PK");
   }
 }
 
