@@ -173,7 +173,9 @@ def _decode_real(words, radar):
         real = words.reshape(len(words), receivers, 2 * samples).transpose(0, 2, 1)
     spectrum = np.fft.fft(real, axis=1)[:, :samples] / (2 * samples)
     spectrum[:, 1:] *= 2    # A cos p becomes A exp(jp)
-    analytic = np.fft.ifft(spectrum, axis=1) * samples
-    parts = np.stack([analytic.real, analytic.imag], axis=-1)
+    quadrature = (np.fft.ifft(spectrum, axis=1) * samples).imag
+    # Without the highest frequency, which has no partner: exactly, so that no rounding hangs on the transform's last bit.
+    highest = (real[:, ::2].sum(axis=1, dtype=float) - real[:, 1::2].sum(axis=1, dtype=float)) / (2 * samples)
+    parts = np.stack([real[:, ::2] - highest[:, None], quadrature], axis=-1)
     halves_away_from_zero = np.trunc(parts + np.copysign(0.5, parts))
     return np.clip(halves_away_from_zero, -32768, 32767).astype(np.int16)

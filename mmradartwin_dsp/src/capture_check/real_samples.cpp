@@ -35,17 +35,22 @@ void decodeRealChirp(const RadarConfig& radar, const std::uint8_t* bytes, std::i
   const auto receivers = static_cast<std::size_t>(radar.receivers());
   std::vector<Complex> time(2 * N), spectrum(2 * N), analytic(N);
   for (std::size_t rx = 0; rx < receivers; ++rx) {
+    double highest = 0;
     for (std::size_t n = 0; n < 2 * N; ++n) {
       std::int16_t value;
       std::memcpy(&value, bytes + place(radar, rx, n), 2);
       time[n] = value;
+      highest += n % 2 == 0 ? value : -value;
     }
+    highest /= static_cast<double>(2 * N);
     fft().fwd(spectrum.data(), time.data(), static_cast<Eigen::Index>(2 * N));
     // A cos p becomes A exp(jp): the half of positive frequencies counts twice.
     for (std::size_t r = 0; r < N; ++r) spectrum[r] *= (r == 0 ? 1.0 : 2.0) / static_cast<double>(2 * N);
     fft().inv(analytic.data(), spectrum.data(), static_cast<Eigen::Index>(N));
     for (std::size_t n = 0; n < N; ++n) {
-      samples[2 * (n * receivers + rx)] = rounded(analytic[n].real());
+      // Without the highest frequency, which has no partner: the analytic signal's real part, and exactly, so that no
+      // rounding hangs on the transform's last bit.
+      samples[2 * (n * receivers + rx)] = rounded(time[2 * n].real() - highest);
       samples[2 * (n * receivers + rx) + 1] = rounded(analytic[n].imag());
     }
   }
