@@ -11,8 +11,8 @@ unset PYTHONHOME
 packages=(
   build-essential cmake clang-format clang-tidy shellcheck ros-desktop-full-dev catkin catkin-lint python3-rostest librviz-dev rosbash rospack-tools
   libactionlib-dev python3-actionlib libdiagnostic-updater-dev libtf2-eigen-dev libembree-dev libpcl-dev libassimp-dev libyaml-cpp-dev libtinyxml2-dev nlohmann-json3-dev libtbb-dev
-  libssl-dev liblua5.4-dev libmatio-dev libpcap-dev libusb-1.0-0-dev zlib1g-dev libumockdev-dev umockdev libcli11-dev libgtest-dev libbenchmark-dev libopencv-dev libnlopt-dev
-  ccache xvfb xauth x11-apps x11-utils imagemagick procps iproute2 python3-numpy python3-scipy python3-yaml)
+  libssl-dev liblua5.4-dev libmatio-dev libpcap-dev libusb-1.0-0-dev zlib1g-dev libumockdev-dev umockdev libcli11-dev libgtest-dev libbenchmark-dev pybind11-dev python3-dev libopencv-dev libnlopt-dev
+  ccache xvfb xauth x11-apps x11-utils imagemagick procps iproute2 python3-matplotlib python3-numpy python3-scipy python3-yaml)
 
 say() { printf '== %s\n' "$*" >&2; }
 die() { printf 'error: %s\n' "$*" >&2; exit 2; }

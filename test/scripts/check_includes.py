@@ -101,7 +101,7 @@ class Sources:
         self.root = Path(root)
         self.includes = {}  # path from the root: names as written
         for package in PACKAGES:
-            for part in ("include", "src", "apps", "nodes", "emulator", "benchmark", "test"):
+            for part in ("include", "src", "apps", "nodes", "python", "emulator", "benchmark", "test"):
                 for file in sorted((self.root / package / part).rglob("*")):
                     if file.suffix in (".h", ".cpp"):
                         text = file.read_text(encoding="utf-8")

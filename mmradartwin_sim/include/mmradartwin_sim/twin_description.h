@@ -7,6 +7,7 @@
 #include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_dsp/strict_yaml.h"
 #include "mmradartwin_sim/parameters.h"
 
 namespace mmradartwin {
@@ -42,6 +43,9 @@ class MissingScene : public InputError {
 /// Throws InputError (unknown mechanism or parameter, value out of range), MissingScene.
 TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::string>& default_scene,
                          const RadarConfig& default_radar);
+
+/// What stands under key mechanisms of a twin.yaml. Throws InputError as loadTwin() does.
+std::vector<NamedParameters> readMechanisms(YamlMap& mechanisms);
 
 /// Throws InputError where the twin's channel_phase_error is the error that `correction` takes out of the measurement:
 /// it would count twice. Tells by likeness: a smaller error that was found in corrected data may stand in a twin.

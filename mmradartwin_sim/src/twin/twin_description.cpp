@@ -178,6 +178,38 @@ bool excludeEachOther(const NamedParameters& a, const NamedParameters& b) {
          (!subject.empty() && subject == subjectOf(b));
 }
 
+std::vector<NamedParameters> readMechanisms(YamlMap& mechanisms) {
+  std::vector<NamedParameters> read;
+  for (const std::string& name : mechanisms.keys()) {
+    std::vector<ParameterSpec> specs;
+    try {
+      specs = MechanismRegistry::instance().create(name)->parameters();
+    } catch (const InputError& e) {
+      mechanisms.fail(name, e.what());
+    }
+    // One mapping, or a list of them where it stands several times.
+    std::vector<YamlMap> entries;
+    if (mechanisms.isList(name)) {
+      entries = mechanisms.maps(name);
+      if (entries.empty()) mechanisms.fail(name, "is an empty list; write {} for its defaults or leave the key out");
+    } else {
+      entries.push_back(mechanisms.map(name));
+    }
+    for (YamlMap& parameters : entries) {
+      NamedParameters named{name, readParameters(parameters, specs, name)};
+      parameters.rejectUnknownKeys();
+      for (const NamedParameters& m : read) {
+        if (!excludeEachOther(m, named)) continue;
+        const std::string subject = subjectOf(named);
+        mechanisms.fail(name, subject.empty() ? "stands once in a twin, not in a list"
+                                              : "names " + subject + " twice; leave one of the two out");
+      }
+      read.push_back(std::move(named));
+    }
+  }
+  return read;
+}
+
 TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::string>& default_scene,
                          const RadarConfig& default_radar) {
   loadMechanismPluginsOfEnvironment();
@@ -202,33 +234,7 @@ TwinDescription loadTwin(const std::string& twin_file, const std::optional<std::
     twin.mechanisms = baseMechanisms();
   } else {
     YamlMap mechanisms = yaml.map("mechanisms");
-    for (const std::string& name : mechanisms.keys()) {
-      std::vector<ParameterSpec> specs;
-      try {
-        specs = MechanismRegistry::instance().create(name)->parameters();
-      } catch (const InputError& e) {
-        mechanisms.fail(name, e.what());
-      }
-      // One mapping, or a list of them where it stands several times.
-      std::vector<YamlMap> entries;
-      if (mechanisms.isList(name)) {
-        entries = mechanisms.maps(name);
-        if (entries.empty()) mechanisms.fail(name, "is an empty list; write {} for its defaults or leave the key out");
-      } else {
-        entries.push_back(mechanisms.map(name));
-      }
-      for (YamlMap& parameters : entries) {
-        NamedParameters named{name, readParameters(parameters, specs, name)};
-        parameters.rejectUnknownKeys();
-        for (const NamedParameters& m : twin.mechanisms) {
-          if (!excludeEachOther(m, named)) continue;
-          const std::string subject = subjectOf(named);
-          mechanisms.fail(name, subject.empty() ? "stands once in a twin, not in a list"
-                                                : "names " + subject + " twice; leave one of the two out");
-        }
-        twin.mechanisms.push_back(std::move(named));
-      }
-    }
+    twin.mechanisms = readMechanisms(mechanisms);
   }
   yaml.rejectUnknownKeys();
   if (twin.scene_file.empty()) {
