@@ -8,6 +8,13 @@ import unittest
 import numpy as np
 
 import mmradartwin
+
+try:
+    import genpy
+    import rosbag
+    from mmradartwin_msgs import msg as messages
+except ImportError:
+    messages = None
 from mmradartwin_tests.session import Measurement, Settings
 from in_folder import InFolder
 from paper_radar import PAPER_RADAR
@@ -123,7 +130,8 @@ class Captures(Reading):
                 part = data[at:at + 1456]
                 head = struct.pack("<II", number + 1, len(part)) if with_size else struct.pack("<I", number + 1)
                 parts.append(head + struct.pack("<Q", at)[:6] + part)
-            self.refused(lambda data=b"".join(parts): self.read(data), "packet heads of " + ("14" if with_size else "10"),
+            headed = b"".join(parts)
+            self.refused(lambda headed=headed: self.read(headed), "packet heads of " + ("14" if with_size else "10"),
                          "process --npz --cubes")
         self.refused(lambda: mmradartwin.read_capture(self.at("none.bin"), self.radar()), "none.bin", "cannot be opened")
 
@@ -287,6 +295,84 @@ class Results(Reading):
         np.save(self.at("one.npy"), np.zeros(3))
         self.refused(lambda: mmradartwin.read_npz(self.at("one.npy")), "one.npy: is one array")
         self.refused(lambda: mmradartwin.read_npz(self.write("text.npz", "no zip")), "text.npz")
+
+
+@unittest.skipIf(messages is None, "rosbag or mmradartwin_msgs is not here")
+class Bags(Reading):
+    def radar_message(self, tx_y_m=0.0077867):
+        config = messages.RadarConfig(device="awr2243", carrier_hz=77e9, slope_hz_per_s=75e12, samples_per_chirp=2,
+                                      sample_rate_hz=5e6, adc_start_s=6e-6, loops_per_frame=1, frame_period_s=0.05,
+                                      layout="4lane", iq_order="iq", tx_enable=[1, 4])
+        for target, y in ((config.tx_position_m, 0.0), (config.tx_position_m, tx_y_m), (config.rx_position_m, 0.0)):
+            target.append(messages.ReceiveGrid().T_map_radar.position.__class__(0, y, 0))
+        return config
+
+    def bag(self, *of_topics, name="a.bag"):
+        with rosbag.Bag(self.at(name), "w") as out:
+            for topic, message in of_topics:
+                out.write(topic, message, genpy.Time(5))
+        return self.at(name)
+
+    def stamped(self, message, stamp_ns):
+        message.header.stamp = genpy.Time(*divmod(stamp_ns, 10**9))
+        if hasattr(message, "T_map_radar"):
+            message.T_map_radar.position.x = 1.5
+            message.T_map_radar.orientation.z = message.T_map_radar.orientation.w = 0.5**0.5
+        return message
+
+    def test_every_kind_of_message(self):
+        counts = np.arange(-4, 4).reshape(2, 2, 1, 2)
+        path = messages.PathRecord(event="specular", actors=["wall", "tv"], materials=["Concrete", "Glass"], bounces=2,
+                                   amplitude=1e-3, length_m=[6.5, 6.25], c_re=[0.0, 1e-3], c_im=[1e-3, 0.0])
+        path.vertices = [self.radar_message().tx_position_m[0].__class__(x, 2, 1) for x in (3, 4)]
+        path.departure.x, path.departure.y = 0.6, 0.8
+        path.arrival.x, path.arrival.z = 0.8, -0.6
+        stamp_ns = 1700000000250000001
+        file = self.bag(
+            ("/left/radar/config", self.radar_message()),
+            ("/left/radar/adc", self.stamped(messages.AdcCube(
+                sequence=3, chirps=2, samples_per_chirp=2, receivers=1, samples=counts.ravel().tolist(),
+                chirp_valid=bytes([1, 0])), stamp_ns)),
+            ("/left/radar/grid", self.stamped(messages.ReceiveGrid(
+                channels=2, samples=2, data=list(range(8)), full_scale=32768.0, frames=4, pose_valid=True), stamp_ns)),
+            ("/left/radar/range_angle", self.stamped(messages.RangeAngleMap(
+                range_m=[0.0, 0.5], azimuth_rad=[-1.0, 0.0, 1.0], power_db=[-1, -2, -3, -4, -5, -6.5], frames=4), stamp_ns)),
+            ("/left/twin/paths", self.stamped(messages.PathRecords(records=[path]), stamp_ns)),
+            ("/left/attribution/findings", messages.Findings(json=json.dumps(
+                {"format": "mmradartwin_findings/1", "poses": {"count": 3, "locations": 2}, "verdict": "none", "findings": []}))))
+        bag = mmradartwin.open_bag(file)
+        self.assertEqual((bag.namespace, bag.radar.tx_enable, bag.radar.samples_per_chirp), ("left", [[0], [2]], 2))
+        frames = bag.frames()
+        np.testing.assert_array_equal(frames.counts, counts[None])
+        self.assertEqual((frames.stamp_ns.tolist(), frames.chirp_valid.tolist()), ([stamp_ns], [[True, False]]))
+        self.assertEqual(len(bag.frames(first_ns=stamp_ns + 1).counts), 0)
+        grid, = bag.grids()
+        self.assertEqual(grid.x.tolist(), [[1j, 2 + 3j], [4 + 5j, 6 + 7j]])
+        np.testing.assert_allclose(grid.T_map_radar, [[0, -1, 0, 1.5], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], atol=1e-15)
+        found, = bag.maps()
+        self.assertEqual((found.power_db[1].tolist(), found.frames, found.stamp_ns), ([-4, -5, -6.5], 4, stamp_ns))
+        self.assertIsNone(found.T_map_radar)
+        (when, T_map_radar, paths), = bag.paths()
+        self.assertEqual((when, T_map_radar[0, 3], paths.actors), (stamp_ns, 1.5, [("wall", "tv")]))
+        self.assertAlmostEqual(paths.azimuth_dep_deg[0], 53.130102, places=6)
+        self.assertAlmostEqual(paths.elevation_arr_deg[0], -36.869898, places=6)
+        self.assertAlmostEqual(paths.amplitude_db[0], -60, places=12)
+        self.assertAlmostEqual(paths.phase_rad[0], np.pi / 2, places=12)
+        self.assertEqual((paths.length_m.tolist(), paths.channel_length_m.tolist()), ([6.5], [[6.5, 6.25]]))
+        self.assertEqual(paths.vertices_m[0].tolist(), [[3, 2, 1], [4, 2, 1]])
+        findings, = bag.findings()
+        self.assertEqual((findings.verdict, findings.poses), ("none", 3))
+
+    def test_errors(self):
+        cube = messages.AdcCube(chirps=1, samples_per_chirp=2, receivers=1, samples=[1, 2, 3, 4], chirp_valid=bytes([1]))
+        bag = mmradartwin.open_bag(self.bag(("radar/config", self.radar_message()), ("radar/adc", cube)))
+        self.refused(bag.frames, "a.bag: frame 0 has another shape than radar/config says")
+        self.refused(lambda: bag.pose_frames("1"), "has no pose '1'", "bag_to_session")
+        self.refused(lambda: mmradartwin.open_bag(self.bag(("radar/adc", cube), name="b.bag")),
+                     "b.bag: bag holds no radar configuration on topic radar/config (it has radar/adc)")
+        file = self.bag(("/a/radar/adc", cube), ("/b/radar/adc", cube), ("/b/radar/config", self.radar_message()), name="c.bag")
+        self.refused(lambda: mmradartwin.open_bag(file), "frames of 2 radars", "a, b")
+        self.assertEqual(mmradartwin.open_bag(file, "/b").namespace, "b")
 
 
 if __name__ == "__main__":
