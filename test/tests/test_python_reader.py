@@ -133,7 +133,8 @@ class Captures(Reading):
             headed = b"".join(parts)
             self.refused(lambda headed=headed: self.read(headed), "packet heads of " + ("14" if with_size else "10"),
                          "process --npz --cubes")
-        self.refused(lambda: mmradartwin.read_capture(self.at("none.bin"), self.radar()), "none.bin", "cannot be opened")
+        for name in ("none.bin", "none/a_0.bin"):
+            self.refused(lambda name=name: mmradartwin.read_capture(self.at(name), self.radar()), name, "cannot be opened")
 
     def test_average(self):
         counts = words_of()

@@ -80,8 +80,8 @@ def capture_parts(file, other_captures=()):
     folder, name = os.path.split(file)
     raw, plain = re.fullmatch(r"(?is)(.*_raw_)0(\.bin)", name), re.fullmatch(r"(?is)(.*_)0(\.bin)", name)
     match = raw or plain
-    if not match:
-        return [file]
+    if not match or not os.path.exists(file):
+        return [file]    # reading a file that is missing says so
     others = set() if raw else {os.path.normpath(other) for other in other_captures}
     head, tail = match.groups()
     numbers = sorted(int(found[1]) for found in (re.fullmatch(re.escape(head) + r"(\d{1,6})" + re.escape(tail), other)
