@@ -5,6 +5,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include <mutex>
+#include <optional>
 
 #include "mmradartwin_attribution/ros/conversions.h"
 #include "mmradartwin_attribution/ros/markers.h"
@@ -44,6 +45,8 @@ struct ResultsBag::Impl {
   EvaluationField field;
   rosbag::Bag bag;
   std::mutex mutex;
+  std::size_t last_pose = 0;
+  std::optional<tf2_msgs::TFMessage> last_tf;  ///< of that pose
 };
 
 ResultsBag::ResultsBag(const std::string& file, const EvaluationField& field, const Scene& scene)
@@ -66,6 +69,10 @@ void ResultsBag::add(const PoseResult& pose) {
   transform.child_frame_id = "radar_link";
 
   const std::lock_guard<std::mutex> lock(impl_->mutex);
+  if (!impl_->last_tf || pose.index >= impl_->last_pose) {
+    impl_->last_pose = pose.index;
+    impl_->last_tf.emplace().transforms.push_back(transform);
+  }
   for (double after_s = 0; after_s < kSecondsPerPose; after_s += 0.5) {
     const ros::Time time = impl_->time(pose.index, after_s);
     transform.header.stamp = time;
@@ -82,6 +89,12 @@ void ResultsBag::finish(const Evaluation& evaluation) {
   ledger.header.frame_id = "radar_link";
   ledger.header.stamp = impl_->time(0);
   impl_->bag.write("attribution/ledger", impl_->time(0), ledger, latched<mmradartwin_msgs::Ledger>());
+  // The end of the last pose's time, in the file's last chunk: from there readers take the bag's end.
+  if (impl_->last_tf) {
+    const ros::Time end = impl_->time(impl_->last_pose + 1);
+    impl_->last_tf->transforms.front().header.stamp = end;
+    impl_->bag.write("/tf", end, *impl_->last_tf);
+  }
   impl_->bag.close();
 }
 
