@@ -2,19 +2,15 @@
 
 #include <ros/ros.h>
 
-#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/master_watch.h"
+#include "mmradartwin_dsp/ros/node_program.h"
 
 int main(int argc, char** argv) {
-  ros::init(argc, argv, "attribution");
-  const ros::NodeHandle nh;  // outlives the node: with the last handle gone, roscpp prints nothing any more
-  try {
-    const mmradartwin::AttributionNode node{nh, ros::NodeHandle("~")};
+  using mmradartwin::AttributionNode;
+  return mmradartwin::runNode(argc, argv, AttributionNode::description(), [] {
+    const AttributionNode node{ros::NodeHandle(), ros::NodeHandle("~")};
     const mmradartwin::MasterWatch master_watch;
     ros::spin();
-  } catch (const mmradartwin::InputError& error) {
-    ROS_FATAL("%s", error.what());
-    return 2;
-  }
-  return 0;
+    return 0;
+  });
 }

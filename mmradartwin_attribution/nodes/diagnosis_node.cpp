@@ -17,6 +17,7 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <sstream>
 
@@ -29,7 +30,7 @@
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/frame_spool.h"
 #include "mmradartwin_dsp/ros/master_watch.h"
-#include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/ros/node_program.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_sim/plugin.h"
 #include "mmradartwin_sim/pose_placement.h"
@@ -45,31 +46,54 @@ constexpr double kFeedbackEvery_s = 0.2;
 constexpr std::uint32_t kLongestQueue = 1000;
 
 struct Settings {
+  explicit Settings(StrictParameters& parameters);
+
   FrameSpoolLimits limits;
-  std::string map_frame, output_folder, config_file, diagnosis_config_file;
-  std::optional<ChannelCorrection> channels;  ///< errors to take out, as the signal chain does
-  int jobs = 0;
+  std::string plugins, map_frame, output_folder, config_file, diagnosis_config_file, channels_file;
+  int jobs;
 };
 
-Settings readSettings(const ros::NodeHandle& private_nh) {
-  StrictParameters parameters(private_nh);
-  Settings s;
-  loadMechanismPlugins(parameters.text("plugins", ""), "parameter plugins");
-  s.config_file = parameters.text("config", "");
-  s.diagnosis_config_file = parameters.text("diagnosis_config", "");
-  s.map_frame = parameters.text("map_frame", "map");
-  s.output_folder = parameters.text("output", "");
-  const std::string channels = parameters.text("channels", "");
-  if (!channels.empty()) s.channels = loadChannelCorrection(resolvePath(channels, "/"));
-  s.jobs = parameters.integer("jobs", 0, 0, 1024);
-  s.limits.folder = parameters.text("spool_folder", "");
-  s.limits.frames_per_pose = parameters.integer("frames_per_pose", s.limits.frames_per_pose, 1, 1000000);
-  s.limits.max_bytes = static_cast<std::uint64_t>(1e6 * parameters.number("max_mb", 2000, 1, 1e6));
-  s.limits.min_free_bytes = static_cast<std::uint64_t>(1e6 * parameters.number("min_free_mb", 1000, 0, 1e6));
-  parameters.number("diagnostic_period", 1.0, 0.01, 3600);  // read by diagnostic_updater
-  parameters.boolean("diagnostic_updater_use_fqn", false);
-  parameters.rejectUnknown();
-  return s;
+Settings::Settings(StrictParameters& parameters) {
+  plugins = parameters.text("plugins", "", "libraries with further mechanisms, with colons between");
+  config_file = parameters.existingPath("config", "attribution.yaml: thresholds and windows; empty: the defaults");
+  diagnosis_config_file = parameters.existingPath(
+      "diagnosis_config", "diagnosis.yaml: stated accuracy of scene, levels and poses; empty: the defaults");
+  map_frame = parameters.text("map_frame", "map", "tf frame of the scene");
+  output_folder = parameters.path("output", "folder of the reports; empty: mmradartwin in ROS_HOME");
+  channels_file =
+      parameters.existingPath("channels", "channels.yaml of calibrate, by which frames are corrected; empty: none");
+  jobs = parameters.integer("jobs", 0, 0, 1024, "cores of a diagnosis; 0: all");
+  limits.folder = parameters.path("spool_folder", "where frames are kept; empty: the system's temporary folder");
+  limits.frames_per_pose = parameters.integer("frames_per_pose", limits.frames_per_pose, 1, 1000000,
+                                              "frames kept while the radar stands, the first so many");
+  limits.max_bytes =
+      static_cast<std::uint64_t>(1e6 * parameters.number("max_mb", 2000, 1, 1e6, "frames kept in all, MB"));
+  limits.min_free_bytes = static_cast<std::uint64_t>(
+      1e6 * parameters.number("min_free_mb", 1000, 0, 1e6, "space that is left free on the disk, MB"));
+  parameters.ofDiagnosticUpdater();
+}
+
+NodeDescription description() {
+  return {"diagnosis_node",
+          "diagnosis",
+          "Keeps the frames of the poses seen so far and finds, when asked, what the twin gets wrong about them "
+          "(request_diagnosis asks).",
+          {topic<mmradartwin_msgs::RadarConfig>("radar/config", "the radar; latched"),
+           topic<mmradartwin_msgs::Session>("session", "files of the recorded session; latched"),
+           topic<mmradartwin_msgs::Scene>("twin/scene", "scene and twin that are simulated; latched"),
+           topic<mmradartwin_msgs::AdcCube>("radar/adc", "raw samples, a message per frame"),
+           topic<mmradartwin_msgs::DiagnoseActionGoal>("attribution/diagnose/goal", "action: asks for a diagnosis"),
+           topic<actionlib_msgs::GoalID>("attribution/diagnose/cancel", "action: ends it early"),
+           topic<tf2_msgs::TFMessage>("/tf", "where the radar is in the scene"),
+           topic<tf2_msgs::TFMessage>("/tf_static", "the same of what does not move")},
+          {topic<mmradartwin_msgs::Findings>("attribution/findings", "of the last diagnosis; latched"),
+           topic<visualization_msgs::MarkerArray>("attribution/finding_markers", "their places for rviz; latched"),
+           topic<mmradartwin_msgs::DiagnoseActionFeedback>("attribution/diagnose/feedback", "action: how far it is"),
+           topic<mmradartwin_msgs::DiagnoseActionResult>("attribution/diagnose/result", "action: what was found"),
+           topic<actionlib_msgs::GoalStatusArray>("attribution/diagnose/status", "action: whether it runs"),
+           topic<diagnostic_msgs::DiagnosticArray>("/diagnostics", "whether frames are kept, and why not")},
+          {service<std_srvs::Trigger>("attribution/forget_poses", "forget all frames: poses begin anew")},
+          [](StrictParameters& parameters) { const Settings settings(parameters); }};
 }
 
 /// Where ROS keeps what nodes leave behind.
@@ -110,6 +134,8 @@ class DiagnosisNode {
         server_(
             nh_, "attribution/diagnose", [this](const Goal& goal) { execute(goal); }, false) {
     countTfWarningsOfProcess();
+    loadMechanismPlugins(settings_.plugins, "parameter plugins");
+    if (!settings_.channels_file.empty()) channels_ = loadChannelCorrection(settings_.channels_file);
     if (!settings_.config_file.empty()) config_ = loadAttributionConfig(settings_.config_file);
     if (!settings_.diagnosis_config_file.empty()) accuracy_ = loadStatedAccuracy(settings_.diagnosis_config_file);
     findings_ = nh_.advertise<mmradartwin_msgs::Findings>("attribution/findings", 1, true);
@@ -136,11 +162,29 @@ class DiagnosisNode {
   }
 
  private:
-  void onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg) { spool_.setRadar(*msg); }
-  void onSession(const mmradartwin_msgs::Session::ConstPtr& msg) { spool_.setSession(*msg); }
-  void onScene(const mmradartwin_msgs::Scene::ConstPtr& msg) { spool_.setScene(*msg); }
+  /// What cannot be kept is told; the node goes on.
+  static void guarded(const char* what, const std::function<void()>& action) {
+    try {
+      action();
+    } catch (const std::exception& error) {
+      ROS_ERROR_THROTTLE(kWarnEvery_s, "%s left out: %s", what, error.what());
+    }
+  }
+  void onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg) {
+    guarded("radar/config", [&] { spool_.setRadar(*msg); });
+  }
+  void onSession(const mmradartwin_msgs::Session::ConstPtr& msg) {
+    guarded("session", [&] { spool_.setSession(*msg); });
+  }
+  void onScene(const mmradartwin_msgs::Scene::ConstPtr& msg) {
+    guarded("twin/scene", [&] { spool_.setScene(*msg); });
+  }
 
   void onCube(const Cube::ConstPtr& cube) {
+    if (!usableStamp(cube->header.stamp)) {
+      ROS_WARN_THROTTLE(kWarnEvery_s, "frame left out: its stamp, %u s, is no time", cube->header.stamp.sec);
+      return;
+    }
     // With simulated time the listener clears tf by itself when time goes back.
     if (cube->header.stamp < newest_ && !ros::Time::isSimTime()) tf_buffer_.clear();
     newest_ = cube->header.stamp;
@@ -152,7 +196,7 @@ class DiagnosisNode {
       const geometry_msgs::TransformStamped T =
           tf_buffer_.lookupTransform(settings_.map_frame, cube->header.frame_id, cube->header.stamp);
       spool_.add(cube, fromMsg(T.transform));
-    } catch (const tf2::TransformException& error) {  // forgotten by tf in between
+    } catch (const std::exception& error) {  // forgotten by tf in between, or not to be written
       ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f left out: %s", cube->header.stamp.toSec(), error.what());
     }
   }
@@ -259,8 +303,8 @@ class DiagnosisNode {
       const std::string output = outputFolder(goal->output);
       tell("collecting poses", 0);
       Recording recording = spool_.recording();
-      if (settings_.channels) requireChannelsOf(recording.radar, *settings_.channels);
-      recording.channels = settings_.channels;
+      if (channels_) requireChannelsOf(recording.radar, *channels_);
+      recording.channels = channels_;
       const Diagnosis diagnosis = diagnosePoses(recording, goal->twin);
       DiagnosisReport(output).write(diagnosis, {"attribution/diagnose", output, goal->twin});
       result.findings_file = output + "/findings.json";
@@ -292,6 +336,7 @@ class DiagnosisNode {
   const Settings settings_;
   AttributionConfig config_;
   StatedAccuracy accuracy_;
+  std::optional<ChannelCorrection> channels_;  ///< errors to take out, as the signal chain does
   ros::NodeHandle nh_;
   FrameSpool spool_;
   ros::CallbackQueue spool_queue_;
@@ -313,14 +358,10 @@ class DiagnosisNode {
 }  // namespace
 
 int main(int argc, char** argv) {
-  ros::init(argc, argv, "diagnosis");
-  try {
-    DiagnosisNode node(readSettings(ros::NodeHandle("~")));
+  return runNode(argc, argv, description(), [] {
+    DiagnosisNode node(readSettings<Settings>(ros::NodeHandle("~")));
     const MasterWatch master_watch;
     ros::spin();
-  } catch (const InputError& error) {
-    ROS_FATAL("%s", error.what());
-    return 2;
-  }
-  return 0;
+    return 0;
+  });
 }

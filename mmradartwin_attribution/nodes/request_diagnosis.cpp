@@ -45,11 +45,26 @@ int apply(const std::string& twin_file) {
   return call.response.success ? 0 : 2;
 }
 
+/// roscpp waits for a master without end.
+bool startWithin(double wait_s) {
+  const ros::WallTime begin = ros::WallTime::now();
+  while (!ros::master::check()) {
+    if (interrupted || (ros::WallTime::now() - begin).toSec() > wait_s) return false;
+    std::this_thread::sleep_for(kLook);
+  }
+  ros::start();
+  return true;
+}
+
 int run(const Arguments& arguments) {
+  if (!startWithin(arguments.wait_s)) {
+    std::cerr << "error: no ROS master answers at " << ros::master::getURI()
+              << ": start live.launch or replay.launch first, or set ROS_MASTER_URI\n";
+    return 2;
+  }
   // actionlib waits for a clock without end. Other times are the wall's: a replay's clock ends with the bag.
   if (!ros::Time::waitForValid(ros::WallDuration(arguments.wait_s))) {
-    std::cerr
-        << "error: /use_sim_time is set and no /clock comes: ask while the bag plays, or replay with stay:=true\n";
+    std::cerr << "error: /use_sim_time is set and no /clock comes: does the replay still run?\n";
     return 2;
   }
   mmradartwin::ProgressLine progress;  // outlives the client, whose callbacks show it
@@ -107,6 +122,7 @@ int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app("Asks what the twin gets wrong about the poses seen so far.");
   app.name("request_diagnosis");
+  app.set_version_flag("--version", "request_diagnosis " MMRADARTWIN_VERSION);
   app.add_option("--output", arguments.output, "folder for findings.json, report and extended twin");
   app.add_option("--twin", arguments.twin, "twin.yaml to judge (default: the one that is simulated)");
   app.add_flag("--apply", arguments.apply, "simulate with the extended twin from then on");
@@ -117,6 +133,5 @@ int main(int argc, char** argv) {
     return app.exit(error, std::cout, std::cerr) == 0 ? 0 : 2;
   }
   std::signal(SIGINT, [](int) { interrupted = 1; });
-  ros::start();
   return run(arguments);
 }

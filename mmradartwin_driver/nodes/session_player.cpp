@@ -19,35 +19,61 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/master_watch.h"
-#include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/ros/node_program.h"
 
 namespace mmradartwin {
 namespace {
 
+struct Settings {
+  explicit Settings(StrictParameters& parameters);
+
+  std::string session_path, card_ip, host_ip, map_frame, radar_frame, camera_frame, emulator_options, viewer_topic;
+  int config_port, data_port;
+  double start_delay_s, tf_lead_s;
+  bool whole_rig, publish_poses, exit_when_done;
+  PlayedSelection selection;
+};
+
+Settings::Settings(StrictParameters& parameters) {
+  session_path = parameters.requiredPath("session", "a session directory");
+  card_ip = parameters.text("card_ip", "127.0.0.2", "address of the emulated card");
+  host_ip = parameters.text("host_ip", "127.0.0.1", "address that it sends to");
+  config_port = parameters.integer("config_port", 4096, 1, 65535, "UDP port of the card's commands");
+  data_port = parameters.integer("data_port", 4098, 1, 65535, "UDP port of the card's samples");
+  start_delay_s = parameters.number("start_delay_s", 1.0, 0.0, 60.0, "from the card's start to the first frame, s");
+  selection.first = parameters.integer("first", 0, 0, 1 << 20, "index of the first pose that is played");
+  selection.every = parameters.integer("every", 1, 1, 1 << 20, "then every so-manieth pose");
+  selection.count = parameters.integer("count", 0, 0, 1 << 20, "poses that are played at most; 0: all");
+  map_frame = parameters.text("map_frame", "map", "tf frame of the scene");
+  radar_frame = parameters.text("radar_frame", "radar_link", "tf frame of the radar");
+  camera_frame =
+      parameters.text("camera_frame", "",
+                      "tf frame whose pose is published, joined to the radar by a static transform; empty: the radar");
+  tf_lead_s = parameters.number("tf_lead_s", 0.1, 0.0, 1.0, "poses are published so long before their frames, s");
+  emulator_options = parameters.text("emulator_options", "", "further options of dca1000_emulator or emulated_rig");
+  whole_rig = parameters.boolean("whole_rig", false, "true: emulate radar and card, else the card alone");
+  publish_poses = parameters.boolean("publish_poses", true, "false: another node publishes them");
+  exit_when_done = parameters.boolean("exit_when_done", false, "true: end with the session");
+  viewer_topic = parameters.text("viewer_topic", "", "wait until somebody listens to this topic; empty: do not wait");
+}
+
+NodeDescription description() {
+  return {"session_player",
+          "session_player",
+          "Plays a session as if it were being measured: starts an emulator on its captures, and publishes its poses.",
+          {topic<tf2_msgs::TFMessage>("/tf", "with camera_frame: where the radar is on the camera"),
+           topic<tf2_msgs::TFMessage>("/tf_static", "the same of what does not move")},
+          {topic<mmradartwin_msgs::Session>("session", "files of the session, with poses as they are played; latched"),
+           topic<std_msgs::Float32>("~progress", "share of the session that has been played, 0 to 1; latched"),
+           topic<tf2_msgs::TFMessage>("/tf", "poses of the radar, or of the camera")},
+          {},
+          [](StrictParameters& parameters) { const Settings settings(parameters); }};
+}
+
 class SessionPlayer {
  public:
-  SessionPlayer() {
-    StrictParameters parameters(ros::NodeHandle("~"));
-    session_path_ = parameters.requiredText("session", "a session directory");
-    card_ip_ = parameters.text("card_ip", "127.0.0.2");
-    host_ip_ = parameters.text("host_ip", "127.0.0.1");
-    config_port_ = parameters.integer("config_port", 4096, 1, 65535);
-    data_port_ = parameters.integer("data_port", 4098, 1, 65535);
-    start_delay_s_ = parameters.number("start_delay_s", 1.0, 0.0, 60.0);
-    selection_.first = parameters.integer("first", 0, 0, 1 << 20);
-    selection_.every = parameters.integer("every", 1, 1, 1 << 20);
-    selection_.count = parameters.integer("count", 0, 0, 1 << 20);
-    map_frame_ = parameters.text("map_frame", "map");
-    radar_frame_ = parameters.text("radar_frame", "radar_link");
-    camera_frame_ = parameters.text("camera_frame", "");
-    tf_lead_s_ = parameters.number("tf_lead_s", 0.1, 0.0, 1.0);
-    emulator_options_ = parameters.text("emulator_options", "");
-    whole_rig_ = parameters.boolean("whole_rig", false);
-    publish_poses_ = parameters.boolean("publish_poses", true);
-    exit_when_done_ = parameters.boolean("exit_when_done", false);
-    viewer_topic_ = parameters.text("viewer_topic", "");
-    parameters.rejectUnknown();
-    session_ = openPlayedSession(session_path_, "", selection_);
+  SessionPlayer() : settings_(readSettings<Settings>(ros::NodeHandle("~"))) {
+    session_ = openPlayedSession(settings_.session_path, "", settings_.selection);
     for (const PoseProblem& problem : session_.problems) {
       ROS_ERROR_STREAM("pose " << problem.pose << " is left out: " << problem.message);
     }
@@ -58,16 +84,16 @@ class SessionPlayer {
   /// Plays the session; returns the exit status of the program.
   int play() {
     findMount();
-    if (!viewer_topic_.empty()) waitForViewer(nh_.resolveName(viewer_topic_));
+    if (!settings_.viewer_topic.empty()) waitForViewer(nh_.resolveName(settings_.viewer_topic));
     startEmulator();
-    if (whole_rig_) return followRig();
+    if (settings_.whole_rig) return followRig();
     const std::optional<std::int64_t> start_ns = waitUntilArmed();
     if (!start_ns) return ros::ok() ? 1 : 0;
     publishSession(*start_ns);
     if (!followSchedule(*start_ns) || !waitForEnd()) return ros::ok() ? 1 : 0;
     publishProgress(1.0);
     ROS_INFO("the session has been played");
-    if (!exit_when_done_) ros::waitForShutdown();  // the spinner of main() continues
+    if (!settings_.exit_when_done) ros::waitForShutdown();  // the spinner of main() continues
     return session_.problems.empty() ? 0 : 2;
   }
 
@@ -97,38 +123,40 @@ class SessionPlayer {
 
   /// Sets T_radar_camera from the static transform of the mount.
   void findMount() {
-    if (camera_frame_.empty() || !publish_poses_) return;
+    if (settings_.camera_frame.empty() || !settings_.publish_poses) return;
     tf2_ros::Buffer buffer;
     const tf2_ros::TransformListener listener(buffer);
     constexpr double kWait_s = 20;
     try {
-      T_radar_child_ =
-          fromMsg(buffer.lookupTransform(radar_frame_, camera_frame_, ros::Time(0), ros::Duration(kWait_s)).transform);
+      T_radar_child_ = fromMsg(
+          buffer.lookupTransform(settings_.radar_frame, settings_.camera_frame, ros::Time(0), ros::Duration(kWait_s))
+              .transform);
     } catch (const tf2::TransformException& error) {
-      throw InputError("no transform between " + camera_frame_ + " and " + radar_frame_ + " in tf (" + error.what() +
+      throw InputError("no transform between " + settings_.camera_frame + " and " + settings_.radar_frame + " in tf (" +
+                       error.what() +
                        "): start a static_transform_publisher for the camera's mount, or leave camera_frame empty");
     }
   }
 
   void startEmulator() {
-    std::vector<std::string> arguments = {session_path_, "--end-with-parent"};
+    std::vector<std::string> arguments = {settings_.session_path, "--end-with-parent"};
     const auto add = [&arguments](const std::string& option, const std::string& value) {
       arguments.insert(arguments.end(), {option, value});
     };
-    add("--first", std::to_string(selection_.first));
-    add("--every", std::to_string(selection_.every));
-    add("--count", std::to_string(selection_.count));
-    add("--card-ip", card_ip_);
-    add("--host-ip", host_ip_);
-    if (!whole_rig_) {
-      add("--config-port", std::to_string(config_port_));
-      add("--data-port", std::to_string(data_port_));
-      add("--start-delay-s", std::to_string(start_delay_s_));
+    add("--first", std::to_string(settings_.selection.first));
+    add("--every", std::to_string(settings_.selection.every));
+    add("--count", std::to_string(settings_.selection.count));
+    add("--card-ip", settings_.card_ip);
+    add("--host-ip", settings_.host_ip);
+    if (!settings_.whole_rig) {
+      add("--config-port", std::to_string(settings_.config_port));
+      add("--data-port", std::to_string(settings_.data_port));
+      add("--start-delay-s", std::to_string(settings_.start_delay_s));
       arguments.push_back("--once");
     }
-    std::istringstream more(emulator_options_);
+    std::istringstream more(settings_.emulator_options);
     for (std::string word; more >> word;) arguments.push_back(word);
-    const std::string program = programBeside(whole_rig_ ? "emulated_rig" : "dca1000_emulator");
+    const std::string program = programBeside(settings_.whole_rig ? "emulated_rig" : "dca1000_emulator");
     emulator_ = std::make_unique<ChildProcess>(program, arguments);
   }
 
@@ -137,7 +165,7 @@ class SessionPlayer {
   /// Returns the exit status.
   int followRig() {
     constexpr std::int64_t kHold_ns = 50'000'000;
-    const auto lead_ns = static_cast<std::int64_t>(tf_lead_s_ * 1e9);
+    const auto lead_ns = static_cast<std::int64_t>(settings_.tf_lead_s * 1e9);
     std::int64_t start_ns = 0, period_ns = 0, first = 0, sent = 0, last_stamp_ns = 0;
     bool run = false;
     const auto send = [&](std::int64_t frame, std::int64_t stamp_ns) {
@@ -199,9 +227,9 @@ class SessionPlayer {
       }
       if (!emulatorRuns()) return std::nullopt;
       if ((ros::WallTime::now() - since).toSec() > 5) {
-        ROS_WARN_STREAM_THROTTLE(10, "the emulated card at " << card_ip_
-                                                             << " waits to be armed: start driver_node with card_ip "
-                                                             << card_ip_ << " and host_ip " << host_ip_);
+        ROS_WARN_STREAM_THROTTLE(10, "the emulated card at "
+                                         << settings_.card_ip << " waits to be armed: start driver_node with card_ip "
+                                         << settings_.card_ip << " and host_ip " << settings_.host_ip);
       }
     }
     return std::nullopt;
@@ -219,8 +247,8 @@ class SessionPlayer {
     for (std::size_t i = 0; i < session_.poses.size(); ++i) {
       poses.push_back({session_.poses[i].pose.name, poseStart_ns(session_, i, start_ns), session_.poses[i].capture});
     }
-    auto message = liveSessionMessage(session_path_, poses);
-    message.header.frame_id = map_frame_;
+    auto message = liveSessionMessage(settings_.session_path, poses);
+    message.header.frame_id = settings_.map_frame;
     session_publisher_.publish(message);
   }
 
@@ -228,7 +256,7 @@ class SessionPlayer {
     std::optional<std::size_t> current;
     for (const ScheduledPose& due : schedulePoses(session_, start_ns)) {
       const ros::Time at = toRosTime(due.stamp_ns);
-      const ros::WallTime send_at = ros::WallTime(at.sec, at.nsec) - ros::WallDuration(tf_lead_s_);
+      const ros::WallTime send_at = ros::WallTime(at.sec, at.nsec) - ros::WallDuration(settings_.tf_lead_s);
       while (ros::ok() && ros::WallTime::now() < send_at) {
         const double wait_s = std::min((send_at - ros::WallTime::now()).toSec(), 0.1);
         if (wait_s > 0) ros::WallDuration(wait_s).sleep();
@@ -268,11 +296,11 @@ class SessionPlayer {
   }
 
   void sendPose(const Eigen::Isometry3d& T_map_radar, const ros::Time& stamp) {
-    if (!publish_poses_) return;  // another node publishes them
+    if (!settings_.publish_poses) return;  // another node publishes them
     geometry_msgs::TransformStamped message = tf2::eigenToTransform(T_map_radar * T_radar_child_);
     message.header.stamp = stamp;
-    message.header.frame_id = map_frame_;
-    message.child_frame_id = camera_frame_.empty() ? radar_frame_ : camera_frame_;
+    message.header.frame_id = settings_.map_frame;
+    message.child_frame_id = settings_.camera_frame.empty() ? settings_.radar_frame : settings_.camera_frame;
     broadcaster_.sendTransform(message);
   }
 
@@ -287,12 +315,8 @@ class SessionPlayer {
     return completed_;
   }
 
-  std::string session_path_, card_ip_, host_ip_, map_frame_, radar_frame_, camera_frame_, emulator_options_,
-      viewer_topic_;
-  int config_port_ = 0, data_port_ = 0;
-  double start_delay_s_ = 0, tf_lead_s_ = 0;
-  bool exit_when_done_ = false, completed_ = false, whole_rig_ = false, publish_poses_ = true;
-  PlayedSelection selection_;
+  const Settings settings_;
+  bool completed_ = false;
   PlayedSession session_;
   Eigen::Isometry3d T_radar_child_ = Eigen::Isometry3d::Identity();  ///< child: what is published below map
   ros::NodeHandle nh_;
@@ -305,20 +329,12 @@ class SessionPlayer {
 }  // namespace mmradartwin
 
 int main(int argc, char** argv) {
-  ros::init(argc, argv, "session_player");
-  const ros::NodeHandle keep_alive;  // outlives the player: roscpp stops printing with the last handle
-  // The spinner serves tf while this thread keeps the schedule.
-  ros::AsyncSpinner spinner(1);
-  spinner.start();
-  try {
+  return mmradartwin::runNode(argc, argv, mmradartwin::description(), [] {
+    // The spinner serves tf while this thread keeps the schedule.
+    ros::AsyncSpinner spinner(1);
+    spinner.start();
     mmradartwin::SessionPlayer player;
     const mmradartwin::MasterWatch master_watch;
     return player.play();
-  } catch (const mmradartwin::InputError& error) {
-    ROS_FATAL_STREAM(error.what());
-    return 2;
-  } catch (const std::exception& error) {
-    ROS_FATAL_STREAM(error.what());
-    return 1;
-  }
+  });
 }

@@ -333,6 +333,36 @@ TEST_F(SignalChainNodeTest, TwinGridsGoThroughTheSameChain) {
   EXPECT_EQ(map.axes.azimuth_rad, SignalChain(radar_).axes().azimuth_rad);
 }
 
+TEST_F(SignalChainNodeTest, LeavesTransformsOfTheFutureOutAndSaysWhoseTheyAre) {
+  ASSERT_TRUE(hearsTheLog());
+  const auto ahead = [this] {
+    sendPose(ros::Time::now() + ros::Duration(3600), 7.0);
+    return waitFor([this] { return hasSaid("ahead of this computer's clock"); }, 0.2);
+  };
+  ASSERT_TRUE(waitFor(ahead));
+  EXPECT_TRUE(hasSaid("of " + ros::this_node::getName() + " is left out"));
+  sendPose(stamp(-0.5), 1.0);
+  sendPose(stamp(10), 1.0);
+  send(0);
+  ASSERT_TRUE(grids_.wait(1));
+  EXPECT_TRUE(grids_.messages[0]->pose_valid);
+  EXPECT_NEAR(grids_.messages[0]->T_map_radar.position.x, 1.0, 1e-12);
+}
+
+TEST_F(SignalChainNodeTest, RefusesStampsThatNoClockHasAndGoesOn) {
+  sendPose(stamp(-0.5), 1.0);
+  sendPose(stamp(10), 1.0);
+  mmradartwin_msgs::AdcCube cube = toMsg(frame(0), hash_);
+  cube.header.frame_id = "radar_link";
+  for (const std::uint32_t seconds : {4000000000u, 4294967295u}) {
+    cube.header.stamp = ros::Time(seconds, 0);
+    cubes_.publish(cube);
+  }
+  send(0);
+  ASSERT_TRUE(grids_.wait(1));
+  EXPECT_EQ(grids_.messages[0]->header.stamp, stamp(0));
+}
+
 TEST_F(SignalChainNodeTest, SaysWhereTransformsContradictEachOther) {
   ASSERT_TRUE(hearsTheLog());
   // In turn, as two publishers say it; again and again, since what is sent before a subscriber is connected is lost.

@@ -1,19 +1,15 @@
 #include <ros/ros.h>
 
-#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/master_watch.h"
+#include "mmradartwin_dsp/ros/node_program.h"
 #include "mmradartwin_sim/ros/room_pose_node.h"
 
 int main(int argc, char** argv) {
-  ros::init(argc, argv, "room_pose");
-  const ros::NodeHandle nh;  // outlives the node: with the last handle gone, roscpp prints nothing any more
-  try {
-    const mmradartwin::RoomPoseNode node{nh, ros::NodeHandle("~")};
+  using mmradartwin::RoomPoseNode;
+  return mmradartwin::runNode(argc, argv, RoomPoseNode::description(), [] {
+    const RoomPoseNode node{ros::NodeHandle(), ros::NodeHandle("~")};
     const mmradartwin::MasterWatch master_watch;
     ros::spin();
-  } catch (const mmradartwin::InputError& error) {
-    ROS_FATAL("%s", error.what());
-    return 2;
-  }
-  return 0;
+    return 0;
+  });
 }

@@ -4,18 +4,20 @@
 #include <mmradartwin_msgs/Residuals.h>
 #include <visualization_msgs/MarkerArray.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "mmradartwin_attribution/residual.h"
 #include "mmradartwin_attribution/ros/conversions.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
-#include "mmradartwin_dsp/ros/strict_parameters.h"
 #include "mmradartwin_dsp/session.h"
 
 namespace mmradartwin {
 namespace {
 
+constexpr double kSlow_s = 2;  // what takes longer is told
+constexpr std::int64_t kWentBack_ns = 1'000'000'000;
 constexpr std::size_t kMaxWaiting = 64;  // maps that wait for their counterpart
 
 // Names of a session's poses by the stamp at which each begins.
@@ -32,8 +34,9 @@ std::map<std::int64_t, std::string> posesByStamp(const mmradartwin_msgs::Session
 
 }  // namespace
 
-AttributionNode::AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh) : nh_(std::move(nh)) {
-  readParameters(private_nh);
+AttributionNode::AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
+    : nh_(std::move(nh)), settings_(readSettings<Settings>(private_nh)) {
+  if (!settings_.config_file.empty()) config_ = loadAttributionConfig(settings_.config_file);
   residuals_ = nh_.advertise<mmradartwin_msgs::Residuals>("attribution/residuals", 10);
   ledger_ = nh_.advertise<mmradartwin_msgs::Ledger>("attribution/ledger", 1, true);
   markers_ = nh_.advertise<visualization_msgs::MarkerArray>("attribution/markers", 2);
@@ -43,32 +46,57 @@ AttributionNode::AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& priv
   subscribers_.push_back(nh_.subscribe("radar/config", 1, &AttributionNode::onRadar, this));
   subscribers_.push_back(nh_.subscribe("session", 1, &AttributionNode::onSession, this));
   subscribers_.push_back(nh_.subscribe("twin/paths", 10, &AttributionNode::onPaths, this));
-  subscribers_.push_back(nh_.subscribe("radar/range_angle", 50, &AttributionNode::onMeasured, this));
-  subscribers_.push_back(nh_.subscribe("twin/range_angle", 50, &AttributionNode::onSimulated, this));
+  measured_subscriber_ = nh_.subscribe("radar/range_angle", 50, &AttributionNode::onMeasured, this);
+  simulated_subscriber_ = nh_.subscribe("twin/range_angle", 50, &AttributionNode::onSimulated, this);
   subscribers_.push_back(nh_.subscribe("twin/scene", 1, &AttributionNode::onScene, this));
+  subscribers_.push_back(nh_.subscribe("twin/moved_scene", 1, &AttributionNode::onMovedScene, this));
+  updater_ = std::make_unique<diagnostic_updater::Updater>(nh_, private_nh, ros::this_node::getName());
+  updater_->setHardwareID("none");
+  updater_->add("attribution", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnose(status); });
+  diagnostics_timer_ =
+      nh_.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
   watchdog_ = nh_.createWallTimer(ros::WallDuration(5), &AttributionNode::watch, this);
 }
 
-void AttributionNode::readParameters(const ros::NodeHandle& private_nh) {
-  StrictParameters parameters(private_nh);
-  const std::string config_file = parameters.text("config", "");
-  scene_file_ = parameters.text("scene", "");
-  radar_frame_ = parameters.text("radar_frame", radar_frame_);
-  frames_.map = parameters.text("map_frame", frames_.map);
-  frames_.measured = parameters.text("measured_view_frame", frames_.measured);
-  frames_.simulated = parameters.text("simulated_view_frame", frames_.simulated);
-  frames_.residual = parameters.text("residual_view_frame", frames_.residual);
-  markers_hz_ = parameters.number("markers_hz", markers_hz_, 1e-3, 100);
-  max_paths_ = parameters.integer("max_paths", max_paths_, 0, 2000);
-  parameters.rejectUnknown();
-  if (!config_file.empty()) config_ = loadAttributionConfig(config_file);
+AttributionNode::Settings::Settings(StrictParameters& parameters) {
+  config_file = parameters.existingPath("config", "attribution.yaml: thresholds and windows; empty: the defaults");
+  scene_file = parameters.existingPath("scene", "scene.yaml; empty: the scene of twin/scene");
+  radar_frame = parameters.text("radar_frame", "radar_link", "tf frame of the radar");
+  frames.map = parameters.text("map_frame", frames.map, "tf frame of the scene");
+  frames.measured = parameters.text("measured_view_frame", frames.measured, "tf frame of the measured fan");
+  frames.simulated = parameters.text("simulated_view_frame", frames.simulated, "tf frame of the simulated fan");
+  frames.residual = parameters.text("residual_view_frame", frames.residual, "tf frame of the residual fan");
+  markers_hz = parameters.number("markers_hz", 2, 1e-3, 100, "markers and ledgers come so often at most, Hz");
+  max_paths = parameters.integer("max_paths", 200, 0, 2000, "strongest paths that are shown");
+  parameters.ofDiagnosticUpdater();
+}
+
+NodeDescription AttributionNode::description() {
+  return {
+      "attribution_node",
+      "attribution",
+      "Compares measured and simulated maps of one stamp, and names what lies behind each difference.",
+      {topic<mmradartwin_msgs::RadarConfig>("radar/config", "the radar; latched"),
+       topic<mmradartwin_msgs::Session>("session", "names of the recorded poses; latched"),
+       topic<mmradartwin_msgs::Scene>("twin/scene", "scene and twin that are simulated; latched"),
+       topic<mmradartwin_msgs::Scene>("twin/moved_scene", "the scene with actors where they are simulated; latched"),
+       topic<mmradartwin_msgs::PathRecords>("twin/paths", "paths of the simulation"),
+       topic<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", "measured map"),
+       topic<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", "simulated map")},
+      {topic<mmradartwin_msgs::Residuals>("attribution/residuals", "what differs in a pair of maps"),
+       topic<mmradartwin_msgs::Ledger>("attribution/ledger", "metrics over all poses so far; latched"),
+       topic<visualization_msgs::MarkerArray>("attribution/markers", "maps, boxes, labels and paths for rviz"),
+       topic<visualization_msgs::MarkerArray>("attribution/scene_markers", "the scene for rviz; latched"),
+       topic<diagnostic_msgs::DiagnosticArray>("/diagnostics", "whether maps come and are compared, and why not")},
+      {},
+      [](StrictParameters& parameters) { const Settings settings(parameters); }};
 }
 
 void AttributionNode::onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg) {
   try {
     radar_ = std::make_unique<RadarConfig>(fromMsg(*msg));
     radar_hash_ = radarHash(*msg);
-    if (!scene_file_.empty()) setScene(loadScene(scene_file_, radar_->center_frequency_hz()));
+    if (!settings_.scene_file.empty()) setScene(loadScene(settings_.scene_file, radar_->center_frequency_hz()));
     rebuild();
   } catch (const std::exception& error) {
     ROS_ERROR("radar/config: %s", error.what());
@@ -77,9 +105,13 @@ void AttributionNode::onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg
 
 void AttributionNode::onScene(const mmradartwin_msgs::Scene::ConstPtr& msg) {
   try {
-    if (scene_file_.empty()) {
+    if (settings_.scene_file.empty()) {
+      const ros::WallTime begin = ros::WallTime::now();
+      announce("reading the scene of " + msg->scene_file);
+      scene_stamp_ = msg->header.stamp;
       setScene(sceneFromMsg(*msg));
       rebuild();
+      announceEnd(begin);
     }
     if (!twin_yaml_.empty() && msg->twin_yaml != twin_yaml_) beginAnew();
     twin_yaml_ = msg->twin_yaml;
@@ -88,10 +120,21 @@ void AttributionNode::onScene(const mmradartwin_msgs::Scene::ConstPtr& msg) {
   }
 }
 
+void AttributionNode::onMovedScene(const mmradartwin_msgs::Scene::ConstPtr& msg) {
+  try {
+    moved_scene_ = std::make_unique<Scene>(sceneFromMsg(*msg));
+    moved_scene_stamp_ = msg->header.stamp;
+    scene_due_ = true;
+    publishScene();
+  } catch (const std::exception& error) {
+    ROS_ERROR("twin/moved_scene: %s", error.what());
+  }
+}
+
 void AttributionNode::onSession(const mmradartwin_msgs::Session::ConstPtr& msg) {
   try {
     pose_names_ = posesByStamp(*msg);
-  } catch (const InputError& error) {
+  } catch (const std::exception& error) {
     pose_names_.clear();
     ROS_WARN("session: %s", error.what());
   }
@@ -105,8 +148,25 @@ void AttributionNode::onSimulated(const MapMsg::ConstPtr& msg) { onMap(msg, simu
 
 void AttributionNode::onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, MapMsg::ConstPtr>& own,
                             std::map<std::int64_t, MapMsg::ConstPtr>& other, bool measured) {
+  (measured ? measured_heard_ : simulated_heard_).heard();
+  if (!usableStamp(msg->header.stamp)) {
+    ROS_WARN_THROTTLE(5, "map refused: its stamp, %u s, is no time", msg->header.stamp.sec);
+    return;
+  }
   if (measured) ++received_;  // of a stream that has paused the twin goes on by itself
   const std::int64_t stamp = toNanoseconds(msg->header.stamp);
+  if (measured && newest_ns_ && stamp < *newest_ns_ - kWentBack_ns) {
+    ROS_INFO("stamps went back by %.1f s: waiting maps are forgotten, the ledger begins anew",
+             static_cast<double>(*newest_ns_ - stamp) * 1e-9);
+    measured_.clear();
+    simulated_.clear();
+    last_measured_.reset();
+    live_ledger_ = LiveLedger();
+    newest_ns_.reset();
+  }
+  if (measured) newest_ns_ = std::max(stamp, newest_ns_.value_or(stamp));
+  // What is still on its way from before a jump back would stand before all that comes, and push it out.
+  if (!measured && newest_ns_ && stamp > *newest_ns_ + kWentBack_ns) return;
   const auto match = other.find(stamp);
   if (match == other.end()) {
     own[stamp] = msg;
@@ -117,8 +177,10 @@ void AttributionNode::onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, 
   other.erase(other.begin(), std::next(match));  // older ones will find no partner any more
   last_measured_ = measured ? msg : sameInOtherList;
   try {
+    problem_.clear();
     compare(measured ? *msg : *sameInOtherList, measured ? *sameInOtherList : *msg);
   } catch (const std::exception& error) {
+    problem_ = error.what();
     ROS_WARN_THROTTLE(5, "maps of %s: %s", formatStamp(stamp).c_str(), error.what());
   }
 }
@@ -139,7 +201,8 @@ void AttributionNode::onSceneViewer() { scene_viewer_since_ = ros::WallTime::now
 void AttributionNode::publishScene() {
   const ros::WallTime now = ros::WallTime::now();
   if (!scene_ || !scene_due_ || (now - scene_published_).toSec() < 2) return;
-  scene_markers_.publish(sceneMarkers(*scene_, frames_.map));
+  const bool moved = moved_scene_ && moved_scene_stamp_ >= scene_stamp_;
+  scene_markers_.publish(sceneMarkers(moved ? *moved_scene_ : *scene_, settings_.frames.map));
   scene_published_ = now;
   scene_due_ = false;
 }
@@ -149,7 +212,8 @@ void AttributionNode::rebuild() {
   if (!radar_) return;
   const SignalChain chain(*radar_);
   field_ = std::make_unique<EvaluationField>(config_, *radar_, chain.axes());
-  builder_ = std::make_unique<MarkerBuilder>(*field_, frames_, max_paths_);
+  builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.frames, settings_.max_paths);
+  slow_ = true;  // until it is known
   if (scene_) regions_ = std::make_unique<RegionModel>(*scene_, *rays_, *field_, *radar_);
   regions_of_pose_.clear();
   regions_valid_ = false;
@@ -168,7 +232,7 @@ void AttributionNode::beginAnew() {
 void AttributionNode::publishLedger(const ros::Time& stamp) {
   mmradartwin_msgs::Ledger ledger = toMsg(live_ledger_.summary(), live_ledger_.duplicates());
   ledger.header.stamp = stamp;
-  ledger.header.frame_id = radar_frame_;
+  ledger.header.frame_id = settings_.radar_frame;
   ledger_.publish(ledger);
 }
 
@@ -177,7 +241,11 @@ const std::vector<ResponseRegion>& AttributionNode::regionsAt(const Eigen::Isome
   const bool same = regions_valid_ && (T.translation() - regions_T_.translation()).norm() < 1e-3 &&
                     (T.linear() - regions_T_.linear()).norm() < 1e-3;
   if (!same) {
+    const ros::WallTime begin = ros::WallTime::now();
+    if (slow_) announce("looking for the regions that the scene is expected to answer from");
     regions_of_pose_ = regions_->regions(T);
+    slow_ = (ros::WallTime::now() - begin).toSec() > kSlow_s;
+    announceEnd(begin);
     regions_T_ = T;
     regions_valid_ = true;
   }
@@ -186,14 +254,18 @@ const std::vector<ResponseRegion>& AttributionNode::regionsAt(const Eigen::Isome
 
 void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulated_msg) {
   if (!field_ || !regions_) {
-    ROS_WARN_THROTTLE(5, "waiting for %s", field_ ? "twin/scene" : "radar/config");
+    problem_ =
+        std::string("waiting for ") + (field_ ? "twin/scene: look at the twin" : "radar/config: look at the driver");
+    ROS_WARN_THROTTLE(5, "%s", problem_.c_str());
     return;
   }
   if (measured_msg.radar_hash != radar_hash_) {
-    ROS_WARN_THROTTLE(5, "radar/range_angle was made with another radar configuration than radar/config; left out");
+    problem_ = "radar/range_angle was made with another radar configuration than radar/config; left out";
+    ROS_WARN_THROTTLE(5, "%s", problem_.c_str());
     return;
   }
   if (!measured_msg.pose_valid && !simulated_msg.pose_valid) {
+    problem_ = "maps have no pose: is the radar's tf published?";
     ROS_WARN_THROTTLE(5, "no pose at %f; is the radar's tf published?", measured_msg.header.stamp.toSec());
     return;
   }
@@ -215,16 +287,17 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
 
   mmradartwin_msgs::Residuals residuals = toMsg(*field_, pose, name, T);
   residuals.header.stamp = measured_msg.header.stamp;
-  residuals.header.frame_id = radar_frame_;
+  residuals.header.frame_id = settings_.radar_frame;
   residuals_.publish(residuals);
 
   live_ledger_.add(measured.stamp_ns, T, name, measured.frames, pose.central);
   const ros::WallTime now = ros::WallTime::now();
-  if ((now - last_markers_).toSec() >= 1 / markers_hz_) {
+  if ((now - last_markers_).toSec() >= 1 / settings_.markers_hz) {
     last_markers_ = now;
     publishLedger(residuals.header.stamp);
     if (markers_.getNumSubscribers() > 0) {
-      if (had_subscribers_ == 0) builder_ = std::make_unique<MarkerBuilder>(*field_, frames_, max_paths_);
+      if (had_subscribers_ == 0)
+        builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.frames, settings_.max_paths);
       markers_.publish(builder_->build(pose, records_, T, name));
     }
     had_subscribers_ = markers_.getNumSubscribers();
@@ -250,6 +323,42 @@ void AttributionNode::watch(const ros::WallTimerEvent&) {
   }
   pairs_before_ = pairs_;
   received_before_ = received_;
+}
+
+void AttributionNode::announce(const std::string& work) {
+  work_ = work;
+  updater_->force_update();
+}
+
+void AttributionNode::announceEnd(const ros::WallTime& begin) {
+  const double took_s = (ros::WallTime::now() - begin).toSec();
+  if (!work_.empty() && took_s > kSlow_s) {
+    ROS_INFO("%s took %.1f s; maps that came meanwhile are skipped", work_.c_str(), took_s);
+  }
+  work_.clear();
+}
+
+void AttributionNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  const std::string no_measured = measured_heard_.silence(measured_subscriber_);
+  const std::string no_simulated = simulated_heard_.silence(simulated_subscriber_);
+  if (!work_.empty()) {
+    status.summary(Level::WARN, "busy: " + work_);
+  } else if (!no_measured.empty()) {
+    status.summary(Level::ERROR, no_measured);
+  } else if (!no_simulated.empty()) {
+    status.summary(Level::ERROR, no_simulated);
+  } else if (!problem_.empty()) {
+    status.summary(Level::WARN, problem_);
+  } else if (pairs_ == 0) {
+    status.summary(Level::WARN, "no measured and simulated map of one stamp yet");
+  } else {
+    status.summary(Level::OK, "comparing");
+  }
+  status.add("pairs compared", pairs_);
+  status.add("measured maps that wait", measured_.size());
+  status.add("simulated maps that wait", simulated_.size());
+  status.add("actors of the scene", scene_ ? scene_->actors.size() : 0);
 }
 
 }  // namespace mmradartwin

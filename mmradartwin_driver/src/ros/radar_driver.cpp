@@ -7,9 +7,8 @@
 #include "mmradartwin_driver/link_budget.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
-#include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/ros/frame_limit.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
-#include "mmradartwin_dsp/session.h"
 
 namespace mmradartwin {
 namespace {
@@ -39,12 +38,15 @@ std::string seconds(double value_s) {
 }  // namespace
 
 RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
-    : updater_(nh, private_nh, ros::this_node::getName()), diagnosed_at_(ros::WallTime::now()) {
-  readParameters(private_nh);
+    : settings_(readSettings<Settings>(private_nh)),
+      updater_(nh, private_nh, ros::this_node::getName()),
+      pose_watch_(settings_.pose),
+      diagnosed_at_(ros::WallTime::now()) {
+  loadRadar();
   mmradartwin_msgs::RadarConfig config = toMsg(radar_);
   radar_hash_ = radarHash(config);
   config.header.stamp = ros::Time::now();
-  config.header.frame_id = frame_id_;
+  config.header.frame_id = settings_.frame_id;
 
   ros::NodeHandle handle(nh);
   config_publisher_ = handle.advertise<mmradartwin_msgs::RadarConfig>("radar/config", 1, true);
@@ -55,7 +57,7 @@ RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& priva
   updater_.add("radar stream", this, &RadarDriver::diagnose);
   updater_.add("capture card", this, &RadarDriver::diagnoseCard);
   if (options_.radar) updater_.add("radar device", this, &RadarDriver::diagnoseDevice);
-  if (!map_frame_.empty()) {
+  if (!settings_.map_frame.empty()) {
     updater_.add("radar pose", this, &RadarDriver::diagnosePose);
     countTfWarningsOfProcess();
     tf_buffer_ = std::make_unique<tf2_ros::Buffer>();
@@ -69,36 +71,56 @@ RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& priva
   timer_ = handle.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.update(); });
 }
 
-void RadarDriver::readParameters(const ros::NodeHandle& private_nh) {
-  StrictParameters parameters(private_nh);
-  const std::string radar_file = parameters.requiredText("radar", "the path of the device's radar.yaml");
-  options_.host_ip = parameters.text("host_ip", options_.host_ip);
-  options_.card_ip = parameters.text("card_ip", options_.card_ip);
-  options_.config_port = parameters.integer("config_port", options_.config_port, 1, 65535);
-  options_.data_port = parameters.integer("data_port", options_.data_port, 1, 65535);
-  options_.packet_delay_us = parameters.number("packet_delay_us", options_.packet_delay_us, 0, 524.28);
-  options_.record_pcap = parameters.text("record_pcap", "");
-  options_.configure_card = parameters.boolean("configure_card", options_.configure_card);
-  const bool configure_radar = parameters.boolean("configure_radar", false);
-  options_.radar_firmware = parameters.text("radar_firmware", "");
-  frame_id_ = parameters.text("frame_id", "radar_link");
-  map_frame_ = parameters.text("map_frame", "map");
-  PoseWatch::Options pose;
-  pose.age_limit_s = parameters.number("pose_age_limit_s", pose.age_limit_s, 0.05, 3600);
-  pose_watch_ = PoseWatch(pose);
-  parameters.rejectUnknown();
+RadarDriver::Settings::Settings(StrictParameters& parameters) {
+  radar_file = parameters.requiredPath("radar", "the path of the device's radar.yaml");
+  rig.host_ip = parameters.text("host_ip", rig.host_ip, "address of this host that the card sends to");
+  rig.card_ip = parameters.text("card_ip", rig.card_ip, "address of the DCA1000EVM");
+  rig.config_port = parameters.integer("config_port", rig.config_port, 1, 65535, "UDP port of the card's commands");
+  rig.data_port = parameters.integer("data_port", rig.data_port, 1, 65535, "UDP port of the card's samples");
+  rig.packet_delay_us =
+      parameters.number("packet_delay_us", rig.packet_delay_us, 0, 524.28, "pause of the card between two packets, us");
+  rig.record_pcap = parameters.path("record_pcap", "pcap file for everything between card and host; empty: none");
+  rig.configure_card =
+      parameters.boolean("configure_card", rig.configure_card, "false: another program configures and arms the card");
+  configure_radar = parameters.boolean("configure_radar", false, "true: bring the radar up over USB by radar.yaml");
+  rig.radar_firmware = parameters.existingPath(
+      "radar_firmware", "TI's meta image, for a radar that is configured here and whose flash is empty");
+  frame_id = parameters.text("frame_id", "radar_link", "tf frame of the radar");
+  map_frame = parameters.text("map_frame", "map", "tf frame of the scene, in which the radar's pose is watched");
+  pose.age_limit_s = parameters.number("pose_age_limit_s", pose.age_limit_s, 0.05, 3600,
+                                       "an older pose is reported in diagnostics, s");
+  max_frame_mb = readFrameLimit_mb(parameters);
+  parameters.ofDiagnosticUpdater();
+}
 
-  const std::string file = resolvePath(radar_file, "./");
-  radar_ = loadRadarConfig(file);
-  if (configure_radar) {
+NodeDescription RadarDriver::description() {
+  return {"driver_node",
+          "radar_driver",
+          "Receives the samples of a DCA1000EVM, and where it is told to configures card and radar.",
+          {topic<tf2_msgs::TFMessage>("/tf", "where the radar is in the scene: watched for age, gaps and jumps"),
+           topic<tf2_msgs::TFMessage>("/tf_static", "the same of what does not move")},
+          {topic<mmradartwin_msgs::RadarConfig>("radar/config", "the radar; latched"),
+           topic<mmradartwin_msgs::AdcCube>("radar/adc", "raw samples, a message per frame"),
+           topic<diagnostic_msgs::DiagnosticArray>("/diagnostics", "stream, card, radar and the radar's pose")},
+          {},
+          [](StrictParameters& parameters) { const Settings settings(parameters); }};
+}
+
+void RadarDriver::loadRadar() {
+  options_ = settings_.rig;
+  radar_ = loadRadarConfig(settings_.radar_file);
+  requireFrameBelow(radar_, settings_.max_frame_mb, settings_.radar_file);
+  if (settings_.configure_radar) {
     if (!options_.configure_card) {
-      throw InputError(private_nh.resolveName("configure_radar") +
-                       ": true needs configure_card: true, since the radar is started when the card has been armed");
+      throw InputError(
+          "parameter configure_radar: true needs configure_card: true, since the radar is started when the card has "
+          "been "
+          "armed");
     }
-    options_.radar = radarDevice(radar_, file);
-    radar_ = options_.radar->quantised(radar_, file);
+    options_.radar = radarDevice(radar_, settings_.radar_file);
+    radar_ = options_.radar->quantised(radar_, settings_.radar_file);
   } else if (!options_.radar_firmware.empty()) {
-    throw InputError(private_nh.resolveName("radar_firmware") + ": " + options_.radar_firmware +
+    throw InputError("parameter radar_firmware: " + options_.radar_firmware +
                      ": is used with configure_radar: true only");
   }
   // The packet delay of another program is unknown here.
@@ -106,7 +128,7 @@ void RadarDriver::readParameters(const ros::NodeHandle& private_nh) {
     try {
       checkLinkBudget(radar_, options_.packet_delay_us);
     } catch (const InputError& error) {
-      throw InputError(radar_file + ": " + error.what());
+      throw InputError(settings_.radar_file + ": " + error.what());
     }
   }
 }
@@ -119,7 +141,7 @@ RadarDriver::~RadarDriver() {
 
 void RadarDriver::publish(AdcCube&& cube) {
   const auto message = boost::make_shared<mmradartwin_msgs::AdcCube>(toMsg(cube, radar_hash_));
-  message->header.frame_id = frame_id_;
+  message->header.frame_id = settings_.frame_id;
   adc_publisher_.publish(boost::shared_ptr<const mmradartwin_msgs::AdcCube>(message));
 }
 
@@ -234,7 +256,8 @@ void RadarDriver::diagnoseDevice(diagnostic_updater::DiagnosticStatusWrapper& st
 /// Reads the latest pose, often enough that no pose of a usual source stays unseen for long.
 void RadarDriver::observePose() {
   try {
-    const geometry_msgs::TransformStamped T = tf_buffer_->lookupTransform(map_frame_, frame_id_, ros::Time(0));
+    const geometry_msgs::TransformStamped T =
+        tf_buffer_->lookupTransform(settings_.map_frame, settings_.frame_id, ros::Time(0));
     pose_watch_.observe(toNanoseconds(T.header.stamp), fromMsg(T.transform));
   } catch (const tf2::TransformException&) {
     // There is no pose yet, or its frames are not connected: the report states its age.
@@ -247,7 +270,7 @@ void RadarDriver::diagnosePose(diagnostic_updater::DiagnosticStatusWrapper& stat
                  : report.level == PoseWatch::Level::kWarning ? DiagnosticStatus::WARN
                                                               : DiagnosticStatus::ERROR,
                  report.text);
-  status.add("transform", map_frame_ + " -> " + frame_id_);
+  status.add("transform", settings_.map_frame + " -> " + settings_.frame_id);
   status.add("age [s]", report.age_s ? seconds(*report.age_s) : "unknown");
   status.add("gaps", report.gaps);
   status.add("jumps", report.jumps);

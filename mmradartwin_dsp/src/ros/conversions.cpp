@@ -54,6 +54,8 @@ ros::Time toRosTime(std::int64_t stamp_ns) {
   return time;
 }
 
+bool usableStamp(const ros::Time& stamp) { return stamp.sec < (1u << 31); }
+
 std::int64_t toNanoseconds(const ros::Time& stamp) { return static_cast<std::int64_t>(stamp.toNSec()); }
 
 geometry_msgs::Pose toMsg(const Eigen::Isometry3d& T) {

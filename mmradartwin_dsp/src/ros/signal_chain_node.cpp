@@ -6,9 +6,8 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
-#include "mmradartwin_dsp/ros/strict_parameters.h"
+#include "mmradartwin_dsp/ros/frame_limit.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
-#include "mmradartwin_dsp/session.h"
 #include "mmradartwin_dsp/stationary_poses.h"
 
 namespace mmradartwin {
@@ -17,13 +16,16 @@ namespace {
 constexpr double kWarnEvery_s = 5;
 /// Beyond it a frame's stamp and those of tf are of different clocks.
 constexpr double kClocksApart_s = 5;
+/// Transforms that are stamped later than this are of a wrong clock.
+constexpr std::int64_t kFuture_ns = 10'000'000'000;
 /// Frames that may wait for tf; a second at the fastest frame rates.
 constexpr std::size_t kLongestQueue = 1000;
 
 }  // namespace
 
-SignalChainNode::SignalChainNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
-  readParameters(private_nh);
+SignalChainNode::SignalChainNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
+    : settings_(readSettings<Settings>(private_nh)) {
+  if (!settings_.channels_file.empty()) channels_ = loadChannelCorrection(settings_.channels_file);
   countTfWarningsOfProcess();
   // A pose that comes late lets all frames go that waited for it; the answers to none of them may be pushed out.
   grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("radar/grid", kLongestQueue);
@@ -42,21 +44,50 @@ SignalChainNode::SignalChainNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   tf_subscriber_ = nh.subscribe<tf2_msgs::TFMessage>("/tf", 100, onEvent(false));
   tf_static_subscriber_ = nh.subscribe<tf2_msgs::TFMessage>("/tf_static", 100, onEvent(true));
   timer_ = nh.createWallTimer(ros::WallDuration(0.01), [this](const ros::WallTimerEvent&) { drain(); });
+  updater_ = std::make_unique<diagnostic_updater::Updater>(nh, private_nh, ros::this_node::getName());
+  updater_->setHardwareID("none");
+  updater_->add("signal chain", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnose(status); });
+  diagnostics_timer_ =
+      nh.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
 }
 
-void SignalChainNode::readParameters(const ros::NodeHandle& private_nh) {
-  StrictParameters parameters(private_nh);
-  average_frames_ = parameters.integer("average_frames", average_frames_, 1, 1000000);
-  publish_every_ = parameters.integer("publish_every", publish_every_, 1, 1000000);
-  moved_m_ = parameters.number("moved_m", moved_m_, 1e-4, 1e3);
-  moved_rad_ = parameters.number("moved_deg", 1.0, 1e-2, 180) * M_PI / 180;
-  pose_timeout_s_ = parameters.number("pose_timeout_s", pose_timeout_s_, 0, 60);
-  tf_limits_.gap_s = parameters.number("tf_gap_s", tf_limits_.gap_s, 0, 60);
-  map_frame_ = parameters.text("map_frame", map_frame_);
-  radar_frame_ = parameters.text("radar_frame", radar_frame_);
-  const std::string channels = parameters.text("channels", "");
-  if (!channels.empty()) channels_ = loadChannelCorrection(resolvePath(channels, "/"));
-  parameters.rejectUnknown();
+SignalChainNode::Settings::Settings(StrictParameters& parameters) {
+  average_frames = parameters.integer("average_frames", 100, 1, 1000000, "frames of the sliding coherent average");
+  publish_every = parameters.integer("publish_every", 1, 1, 1000000, "so many frames for one grid and one map");
+  moved_m =
+      parameters.number("moved_m", 0.02, 1e-4, 1e3, "the average begins anew where the radar has moved by more, m");
+  moved_rad = parameters.number("moved_deg", 1.0, 1e-2, 180,
+                                "the average begins anew where the radar has turned by more, deg") *
+              M_PI / 180;
+  pose_timeout_s = parameters.number("pose_timeout_s", 0.5, 0, 60, "a frame waits so long for its pose in tf, s");
+  tf_limits.gap_s =
+      parameters.number("tf_gap_s", tf_limits.gap_s, 0, 60,
+                        "in a longer gap of tf, at whose ends the radar stands elsewhere, frames have no pose, s");
+  map_frame = parameters.text("map_frame", "map", "tf frame of the scene");
+  radar_frame = parameters.text("radar_frame", kRadarFrame, "tf frame of the radar");
+  channels_file = parameters.existingPath(
+      "channels", "channels.yaml of calibrate, by which the measured branch is corrected; empty: none");
+  max_frame_mb = readFrameLimit_mb(parameters);
+  parameters.ofDiagnosticUpdater();
+}
+
+NodeDescription SignalChainNode::description() {
+  return {
+      "dsp_node",
+      "signal_chain",
+      "Makes a grid of channels and a range-angle map of each frame, averaged coherently while the radar stands, and a "
+      "map of each simulated grid.",
+      {topic<mmradartwin_msgs::RadarConfig>("radar/config", "the radar; latched"),
+       topic<mmradartwin_msgs::AdcCube>("radar/adc", "raw samples, a message per frame"),
+       topic<mmradartwin_msgs::ReceiveGrid>("twin/grid", "what the twin receives"),
+       topic<tf2_msgs::TFMessage>("/tf", "where the radar is in the scene"),
+       topic<tf2_msgs::TFMessage>("/tf_static", "the same of what does not move")},
+      {topic<mmradartwin_msgs::ReceiveGrid>("radar/grid", "averaged channels, with the radar's pose where it is known"),
+       topic<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", "map of radar/grid"),
+       topic<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", "map of twin/grid"),
+       topic<diagnostic_msgs::DiagnosticArray>("/diagnostics", "whether frames and poses come, and why not")},
+      {},
+      [](StrictParameters& parameters) { const Settings settings(parameters); }};
 }
 
 void SignalChainNode::onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& config) {
@@ -64,13 +95,14 @@ void SignalChainNode::onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& co
   if (chain_ && hash == radar_hash_) return;
   try {
     const RadarConfig radar = fromMsg(*config);
+    requireFrameBelow(radar, settings_.max_frame_mb, "radar/config");
     SignalChain chain(radar);
     if (channels_) requireChannelsOf(radar, *channels_);
     chain_.emplace(std::move(chain));
-    average_.emplace(radar, average_frames_);
+    average_.emplace(radar, settings_.average_frames);
     radar_hash_ = hash;
     restart();
-  } catch (const InputError& error) {
+  } catch (const std::exception& error) {
     ROS_ERROR("radar/config refused: %s", error.what());
   }
 }
@@ -84,11 +116,19 @@ void SignalChainNode::restart() {
 }
 
 void SignalChainNode::onCube(const mmradartwin_msgs::AdcCube::ConstPtr& cube) {
+  cubes_.heard();
   if (!average_) {
     ROS_WARN_THROTTLE(kWarnEvery_s, "frames come, but no radar/config: they are left out until it does");
     return;
   }
+  if (!usableStamp(cube->header.stamp)) {
+    ++refused_;
+    ROS_WARN_THROTTLE(kWarnEvery_s, "frame %u refused: its stamp, %u s, is no time", cube->sequence,
+                      cube->header.stamp.sec);
+    return;
+  }
   if (cube->radar_hash != radar_hash_) {
+    ++refused_;
     ROS_WARN_THROTTLE(
         kWarnEvery_s,
         "frame %u refused: it was taken with another radar configuration (%016lx) than radar/config's (%016lx)",
@@ -120,13 +160,27 @@ void SignalChainNode::onTransforms(const tf2_msgs::TFMessage& message, bool fixe
   const ros::Time now = ros::Time::now();
   if (now < tf_heard_) forgetTransforms();
   tf_heard_ = now;
-  tf_record_.add(message, fixed);
-  tf_record_.keep(tf_buffer_.getCacheLength().toSec());
+  tf2_msgs::TFMessage kept;
   for (const geometry_msgs::TransformStamped& transform : message.transforms) {
+    const std::int64_t ahead_ns = toNanoseconds(transform.header.stamp) - toNanoseconds(std::max(now, newest_));
+    if (!fixed && !now.isZero() && ahead_ns > kFuture_ns) {
+      // tf2 would take nothing older of this frame any more, for as long as that.
+      ++future_transforms_;
+      ROS_WARN_THROTTLE(
+          kWarnEvery_s,
+          "%s -> %s of %s is left out: its stamp is %.1f s ahead of this computer's clock; synchronise the "
+          "clocks (ntp, chrony)",
+          transform.header.frame_id.c_str(), transform.child_frame_id.c_str(), publisher.c_str(),
+          static_cast<double>(ahead_ns) * 1e-9);
+      continue;
+    }
+    kept.transforms.push_back(transform);
     if (!fixed) newest_transform_ = transform.header.stamp;
     tf_buffer_.setTransform(transform, publisher, fixed);  // says itself what is wrong with one that it does not take
   }
-  for (const std::string& contradiction : tf_sources_.add(message, fixed, publisher)) {
+  tf_record_.add(kept, fixed);
+  tf_record_.keep(tf_buffer_.getCacheLength().toSec());
+  for (const std::string& contradiction : tf_sources_.add(kept, fixed, publisher)) {
     ROS_WARN("tf contradicts itself: %s", contradiction.c_str());
   }
 }
@@ -137,22 +191,31 @@ void SignalChainNode::drain() {
     const ros::Time stamp = front.cube->header.stamp;
     std::optional<Eigen::Isometry3d> T_map_radar;
     try {
-      const geometry_msgs::Transform T = tf_buffer_.lookupTransform(map_frame_, radar_frame_, stamp).transform;
-      const std::string why = tf_record_.whyNotBetween(toNanoseconds(stamp), map_frame_, radar_frame_, tf_limits_);
+      const geometry_msgs::Transform T =
+          tf_buffer_.lookupTransform(settings_.map_frame, settings_.radar_frame, stamp).transform;
+      const std::string why = tf_record_.whyNotBetween(toNanoseconds(stamp), settings_.map_frame, settings_.radar_frame,
+                                                       settings_.tf_limits);
       if (why.empty()) {
         T_map_radar = fromMsg(T);
       } else {
+        no_pose_ = why;
         ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f goes on without a pose: %s", stamp.toSec(), why.c_str());
       }
     } catch (const tf2::TransformException& error) {
       const double waited_s = (ros::Time::now() - front.since).toSec();
       // Time that went back while the frame waited counts as waited out.
-      if (waited_s >= 0 && waited_s < pose_timeout_s_ && queue_.size() < kLongestQueue) return;
-      ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f goes on without a pose: %s", stamp.toSec(),
-                        whyNoPose(stamp, error.what()).c_str());
+      if (waited_s >= 0 && waited_s < settings_.pose_timeout_s && queue_.size() < kLongestQueue) return;
+      no_pose_ = whyNoPose(stamp, error.what());
+      ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f goes on without a pose: %s", stamp.toSec(), no_pose_.c_str());
     }
     const mmradartwin_msgs::AdcCube::ConstPtr cube = front.cube;
     queue_.pop_front();
+    ++frames_;
+    if (T_map_radar) {
+      no_pose_.clear();
+    } else {
+      ++without_pose_;
+    }
     process(*cube, T_map_radar);
   }
 }
@@ -173,14 +236,15 @@ void SignalChainNode::process(const mmradartwin_msgs::AdcCube& msg,
                               const std::optional<Eigen::Isometry3d>& T_map_radar) {
   try {
     const AdcCube cube = fromMsg(msg);
-    const bool moved = T_map_radar && window_pose_ && !standsStill(*T_map_radar, *window_pose_, moved_m_, moved_rad_);
+    const bool moved = T_map_radar && window_pose_ &&
+                       !standsStill(*T_map_radar, *window_pose_, settings_.moved_m, settings_.moved_rad);
     if (moved || T_map_radar.has_value() != window_pose_.has_value()) {
       average_->reset();
       window_pose_.reset();
     }
     if (T_map_radar && !window_pose_) window_pose_ = T_map_radar;
     average_->add(cube);
-    if (++since_published_ < publish_every_) return;
+    if (++since_published_ < settings_.publish_every) return;
     since_published_ = 0;
     if (!average_->complete()) {
       ROS_WARN_THROTTLE(kWarnEvery_s, "no map: a TDM slot has no valid chirp in the last %d frame(s)",
@@ -188,7 +252,8 @@ void SignalChainNode::process(const mmradartwin_msgs::AdcCube& msg,
       return;
     }
     publish(T_map_radar);
-  } catch (const InputError& error) {
+  } catch (const std::exception& error) {
+    ++refused_;
     ROS_WARN_THROTTLE(kWarnEvery_s, "frame refused: %s", error.what());
   }
 }
@@ -200,12 +265,12 @@ void SignalChainNode::publish(const std::optional<Eigen::Isometry3d>& T_map_rada
   if (T_map_radar) grid.T_map_radar = *T_map_radar;
   if (grid_publisher_.getNumSubscribers() > 0) {
     const auto msg = boost::make_shared<mmradartwin_msgs::ReceiveGrid>(toMsg(grid, radar_hash_));
-    msg->header.frame_id = radar_frame_;
+    msg->header.frame_id = settings_.radar_frame;
     grid_publisher_.publish(msg);
   }
   if (map_publisher_.getNumSubscribers() > 0) {
     const auto msg = boost::make_shared<mmradartwin_msgs::RangeAngleMap>(toMsg(chain_->map(grid), radar_hash_));
-    msg->header.frame_id = radar_frame_;
+    msg->header.frame_id = settings_.radar_frame;
     map_publisher_.publish(msg);
   }
 }
@@ -224,11 +289,30 @@ void SignalChainNode::onTwinGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& 
   try {
     const auto map =
         boost::make_shared<mmradartwin_msgs::RangeAngleMap>(toMsg(chain_->map(fromMsg(*msg)), msg->radar_hash));
-    map->header.frame_id = radar_frame_;
+    map->header.frame_id = settings_.radar_frame;
     twin_map_publisher_.publish(map);
-  } catch (const InputError& error) {
+  } catch (const std::exception& error) {
     ROS_WARN_THROTTLE(kWarnEvery_s, "twin/grid refused: %s", error.what());
   }
+}
+
+void SignalChainNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  const std::string silence = cubes_.silence(cube_subscriber_);
+  if (!silence.empty()) {
+    status.summary(Level::ERROR, silence);
+  } else if (!chain_) {
+    status.summary(Level::ERROR, "no " + config_subscriber_.getTopic() + ": look at the driver (or the bag's player)");
+  } else if (!no_pose_.empty()) {
+    status.summary(Level::WARN, "frames have no pose: " + no_pose_);
+  } else {
+    status.summary(Level::OK, "making maps");
+  }
+  status.add("frames", frames_);
+  status.add("frames without a pose", without_pose_);
+  status.add("frames refused", refused_);
+  status.add("frames that wait for tf", queue_.size());
+  status.add("transforms of the future left out", future_transforms_);
 }
 
 }  // namespace mmradartwin

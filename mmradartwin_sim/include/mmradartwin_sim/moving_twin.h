@@ -34,6 +34,9 @@ class MovingTwin {
   /// is NaN or inside an actor; the next call traces in full then.
   const Simulation& simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp_ns = 0);
 
+  /// With the actors where the last simulate() had them.
+  const Scene& scene() const { return twin_->tracedScene(); }
+
   struct Counts {
     std::uint64_t traced = 0;   ///< poses traced in full
     std::uint64_t updated = 0;  ///< where actors alone had moved

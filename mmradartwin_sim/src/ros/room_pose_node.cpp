@@ -9,9 +9,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
-#include "mmradartwin_dsp/ros/strict_parameters.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
-#include "mmradartwin_dsp/session.h"
 
 namespace mmradartwin {
 namespace {
@@ -33,10 +31,11 @@ std::vector<Eigen::Vector3d> readPoints(const sensor_msgs::PointCloud2& cloud, c
 
 }  // namespace
 
-RoomPoseNode::RoomPoseNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
-  readParameters(private_nh);
-  scene_.emplace(loadScene(resolvePath(scene_file_, "/"), kFrequency_hz));
-  registration_.emplace(*scene_, options_);
+RoomPoseNode::RoomPoseNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
+    : settings_(readSettings<Settings>(private_nh)) {
+  person_ = settings_.initial_pose;
+  scene_.emplace(loadScene(settings_.scene_file, kFrequency_hz));
+  registration_.emplace(*scene_, settings_.registration);
   countTfWarningsOfProcess();
   tf_listener_.emplace(tf_buffer_, nh);
   pose_publisher_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("room_pose", 10);
@@ -51,45 +50,69 @@ RoomPoseNode::RoomPoseNode(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   cloud_at_ = ros::WallTime::now();
 }
 
-void RoomPoseNode::readParameters(const ros::NodeHandle& private_nh) {
-  StrictParameters parameters(private_nh);
-  scene_file_ = parameters.text("scene", "");
-  map_frame_ = parameters.text("map_frame", map_frame_);
-  camera_frame_ = parameters.text("camera_frame", camera_frame_);
-  camera_height_m_ = parameters.number("camera_height_m", camera_height_m_, -100, 100);
-  lost_after_s_ = parameters.number("lost_after_s", lost_after_s_, 0, 3600);
-  silence_s_ = parameters.number("silence_s", silence_s_, 0.1, 3600);
-  options_.max_depth_m = parameters.number("max_depth_m", options_.max_depth_m, 1, 20);
-  options_.depth_noise_per_m = parameters.number("depth_noise_per_m", options_.depth_noise_per_m, 0, 0.1);
-  options_.scene_error_m = parameters.number("scene_error_m", options_.scene_error_m, 0.001, 0.2);
-  options_.min_agreement = parameters.number("min_agreement", options_.min_agreement, 0, 1);
-  options_.search_m = parameters.number("search_m", options_.search_m, 0.05, 5);
-  options_.search_rad = parameters.number("search_deg", options_.search_rad * 180 / M_PI, 1, 90) * M_PI / 180;
+RoomPoseNode::Settings::Settings(StrictParameters& parameters) {
+  scene_file = parameters.requiredPath("scene", "scene.yaml of the room");
+  map_frame = parameters.text("map_frame", "map", "tf frame of the scene");
+  camera_frame = parameters.text("camera_frame", "camera_link", "tf frame of the camera");
+  odom_frame = parameters.text("odom_frame", "",
+                               "of a robot whose tf has this frame to the camera: its place in map_frame is published "
+                               "instead of the camera's; empty: the camera has no other parent");
+  publish_tf = parameters.boolean("publish_tf", true, "false: the pose comes on the topic room_pose alone");
+  camera_height_m =
+      parameters.number("camera_height_m", 1.2, -100, 100, "height of the camera over map's floor, for a first fix, m");
+  lost_after_s = parameters.number("lost_after_s", 2, 0, 3600,
+                                   "after so long without a trusted pose it is looked for in a wider circle, s");
+  silence_s = parameters.number("silence_s", 2, 0.1, 3600, "without a cloud for so long diagnostics say so, s");
+  RegistrationOptions& r = registration;
+  r.max_depth_m = parameters.number("max_depth_m", r.max_depth_m, 1, 20, "points beyond are left out, m");
+  r.depth_noise_per_m = parameters.number("depth_noise_per_m", r.depth_noise_per_m, 0, 0.1,
+                                          "standard deviation of a depth, by depth squared, 1/m");
+  r.scene_error_m =
+      parameters.number("scene_error_m", r.scene_error_m, 0.001, 0.2, "standard deviation of the scene's surfaces, m");
+  r.min_agreement = parameters.number("min_agreement", r.min_agreement, 0, 1,
+                                      "least share of the cloud at the scene's surfaces for a trusted pose");
+  r.search_m = parameters.number("search_m", r.search_m, 0.05, 5, "how far from a person's guess is looked, m");
+  r.search_rad = parameters.number("search_deg", r.search_rad * 180 / M_PI, 1, 90,
+                                   "how far from a person's guess is looked, deg") *
+                 M_PI / 180;
   // "x y yaw": a text, so that a launch file can hand it through.
-  const std::string initial = parameters.text("initial_pose", "");
-  parameters.number("diagnostic_period", 1.0, 0.01, 3600);  // read by diagnostic_updater
-  parameters.boolean("diagnostic_updater_use_fqn", false);
-  parameters.rejectUnknown();
-  if (scene_file_.empty()) {
-    throw InputError("parameter " + private_nh.getNamespace() + "/scene: is missing; give the room's scene.yaml");
-  }
+  const std::string initial = parameters.text(
+      "initial_pose", "", "x [m] y [m] yaw [deg] of the camera in map; empty: wait for a 2D Pose Estimate");
+  parameters.ofDiagnosticUpdater();
   if (initial.empty()) return;
   double x = 0, y = 0, yaw_deg = 0;
   int used = 0;
   if (std::sscanf(initial.c_str(), "%lf %lf %lf %n", &x, &y, &yaw_deg, &used) != 3 ||
       used != static_cast<int>(initial.size()) || !std::isfinite(x + y + yaw_deg)) {
-    throw InputError("parameter " + private_nh.getNamespace() + "/initial_pose: '" + initial +
+    throw InputError("parameter initial_pose: '" + initial +
                      "' must be x [m], y [m] and yaw [deg] of the camera in map, apart by blanks");
   }
-  person_ =
-      Eigen::Translation3d(x, y, camera_height_m_) * Eigen::AngleAxisd(yaw_deg * M_PI / 180, Eigen::Vector3d::UnitZ());
+  initial_pose =
+      Eigen::Translation3d(x, y, camera_height_m) * Eigen::AngleAxisd(yaw_deg * M_PI / 180, Eigen::Vector3d::UnitZ());
+}
+
+NodeDescription RoomPoseNode::description() {
+  return {"room_pose",
+          "room_pose",
+          "Finds where the camera is in the room, by its cloud and the scene, and says it in tf.",
+          {topic<sensor_msgs::PointCloud2>("cloud", "the camera's points"),
+           topic<sensor_msgs::Imu>("imu", "the camera's accelerations and turns, for gravity"),
+           topic<geometry_msgs::PoseWithCovarianceStamped>("initialpose", "rviz's 2D Pose Estimate: about where it is"),
+           topic<tf2_msgs::TFMessage>("/tf", "frames of the camera's sensors"),
+           topic<tf2_msgs::TFMessage>("/tf_static", "the same of what does not move")},
+          {topic<tf2_msgs::TFMessage>("/tf", "pose of the camera, or of odom_frame, while it is trusted"),
+           topic<geometry_msgs::PoseWithCovarianceStamped>("room_pose", "the same pose with its covariance"),
+           topic<diagnostic_msgs::DiagnosticArray>("/diagnostics", "whether a pose is found, and why not")},
+          {},
+          [](StrictParameters& parameters) { const Settings settings(parameters); }};
 }
 
 void RoomPoseNode::onImu(const sensor_msgs::Imu::ConstPtr& imu) {
   if (imu->linear_acceleration_covariance[0] == -1) return;  // sensor_msgs/Imu: not measured
   try {
     const Eigen::Matrix3d R =
-        fromMsg(tf_buffer_.lookupTransform(camera_frame_, imu->header.frame_id, ros::Time(0)).transform).linear();
+        fromMsg(tf_buffer_.lookupTransform(settings_.camera_frame, imu->header.frame_id, ros::Time(0)).transform)
+            .linear();
     const auto& a = imu->linear_acceleration;
     const auto& w = imu->angular_velocity;
     gravity_.add(imu->header.stamp.toSec(), R * Eigen::Vector3d(a.x, a.y, a.z), R * Eigen::Vector3d(w.x, w.y, w.z));
@@ -99,16 +122,16 @@ void RoomPoseNode::onImu(const sensor_msgs::Imu::ConstPtr& imu) {
 }
 
 void RoomPoseNode::onInitialPose(const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& pose) {
-  if (pose->header.frame_id != map_frame_) {
+  if (pose->header.frame_id != settings_.map_frame) {
     ROS_ERROR("initialpose is in frame '%s', not '%s': set rviz's fixed frame to it", pose->header.frame_id.c_str(),
-              map_frame_.c_str());
+              settings_.map_frame.c_str());
     return;
   }
   const auto& p = pose->pose.pose.position;
   const auto& q = pose->pose.pose.orientation;
   const Eigen::Vector3d forward = Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized() * Eigen::Vector3d::UnitX();
   // An arrow in rviz lies on the floor; the camera does not.
-  person_ = Eigen::Translation3d(p.x, p.y, camera_height_m_) *
+  person_ = Eigen::Translation3d(p.x, p.y, settings_.camera_height_m) *
             Eigen::AngleAxisd(std::atan2(forward.y(), forward.x()), Eigen::Vector3d::UnitZ());
   last_.reset();
   problem_ = "waiting for a cloud";
@@ -123,7 +146,7 @@ void RoomPoseNode::refuse(const std::string& why) {
 void RoomPoseNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {
   cloud_at_ = ros::WallTime::now();
   const ros::Time stamp = cloud->header.stamp;
-  if (last_ && (stamp < trusted_at_ || (stamp - trusted_at_).toSec() > lost_after_s_)) {
+  if (last_ && (stamp < trusted_at_ || (stamp - trusted_at_).toSec() > settings_.lost_after_s)) {
     person_ = last_;  // looked for in a wider circle
     last_.reset();
   }
@@ -134,9 +157,10 @@ void RoomPoseNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {
   }
   Eigen::Isometry3d T_camera_cloud;
   try {
-    T_camera_cloud = fromMsg(tf_buffer_.lookupTransform(camera_frame_, cloud->header.frame_id, ros::Time(0)).transform);
+    T_camera_cloud =
+        fromMsg(tf_buffer_.lookupTransform(settings_.camera_frame, cloud->header.frame_id, ros::Time(0)).transform);
   } catch (const tf2::TransformException& error) {
-    return refuse("tf does not know " + camera_frame_ + " -> " + cloud->header.frame_id +
+    return refuse("tf does not know " + settings_.camera_frame + " -> " + cloud->header.frame_id +
                   ", which the camera's driver should publish: " + error.what());
   }
   std::vector<Eigen::Vector3d> points;
@@ -155,20 +179,50 @@ void RoomPoseNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {
   publish(*fit_, stamp);
 }
 
+geometry_msgs::TransformStamped RoomPoseNode::transformFor(const Eigen::Isometry3d& T_map_camera,
+                                                           const ros::Time& stamp) const {
+  Eigen::Isometry3d T_map_child = T_map_camera;
+  if (settings_.odom_frame.empty()) {
+    std::string parent;
+    if (tf_buffer_._getParent(settings_.camera_frame, ros::Time(0), parent) && parent != settings_.map_frame) {
+      throw InputError(settings_.camera_frame + " has the parent " + parent +
+                       " in tf already: give odom_frame, the robot's frame below " + settings_.map_frame +
+                       ", or publish_tf: false");
+    }
+  } else {
+    try {
+      T_map_child =
+          T_map_camera *
+          fromMsg(tf_buffer_.lookupTransform(settings_.camera_frame, settings_.odom_frame, stamp, ros::Duration(0.1))
+                      .transform);
+    } catch (const tf2::TransformException& error) {
+      throw InputError("tf does not know " + settings_.odom_frame + " -> " + settings_.camera_frame +
+                       " at the cloud's time, which the robot should publish: " + error.what());
+    }
+  }
+  geometry_msgs::TransformStamped T = tf2::eigenToTransform(T_map_child);
+  T.header.stamp = stamp;
+  T.header.frame_id = settings_.map_frame;
+  T.child_frame_id = settings_.odom_frame.empty() ? settings_.camera_frame : settings_.odom_frame;
+  return T;
+}
+
 void RoomPoseNode::publish(const Registration& fit, const ros::Time& stamp) {
   ++published_;
   problem_.clear();
   last_ = fit.T_map_camera;
   trusted_at_ = stamp;
-  geometry_msgs::TransformStamped T = tf2::eigenToTransform(fit.T_map_camera);
-  T.header.stamp = stamp;
-  T.header.frame_id = map_frame_;
-  T.child_frame_id = camera_frame_;
-  tf_broadcaster_.sendTransform(T);
+  if (settings_.publish_tf) {
+    try {
+      tf_broadcaster_.sendTransform(transformFor(fit.T_map_camera, stamp));
+    } catch (const InputError& error) {
+      refuse(error.what());
+    }
+  }
   geometry_msgs::PoseWithCovarianceStamped pose;
-  pose.header = T.header;
-  pose.pose.pose.position = tf2::toMsg(Eigen::Vector3d(fit.T_map_camera.translation()));
-  pose.pose.pose.orientation = T.transform.rotation;
+  pose.header.stamp = stamp;
+  pose.header.frame_id = settings_.map_frame;
+  pose.pose.pose = mmradartwin::toMsg(fit.T_map_camera);
   for (int i = 0; i < 36; ++i) pose.pose.covariance[static_cast<std::size_t>(i)] = fit.covariance(i / 6, i % 6);
   pose_publisher_.publish(pose);
 }
@@ -176,7 +230,7 @@ void RoomPoseNode::publish(const Registration& fit, const ros::Time& stamp) {
 void RoomPoseNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const {
   using Level = diagnostic_msgs::DiagnosticStatus;
   const double silent_s = (ros::WallTime::now() - cloud_at_).toSec();
-  if (silent_s > silence_s_) {
+  if (silent_s > settings_.silence_s) {
     status.summaryf(Level::ERROR, "no cloud on %s for %.0f s; does the camera's driver run?",
                     cloud_subscriber_.getTopic().c_str(), silent_s);
   } else if (!problem_.empty()) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diagnostic_updater/diagnostic_updater.h>
 #include <mmradartwin_msgs/PathRecords.h>
 #include <mmradartwin_msgs/RadarConfig.h>
 #include <mmradartwin_msgs/RangeAngleMap.h>
@@ -11,6 +12,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,29 +22,42 @@
 #include "mmradartwin_attribution/response_region.h"
 #include "mmradartwin_attribution/ros/markers.h"
 #include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_dsp/ros/node_program.h"
+#include "mmradartwin_dsp/ros/topic_watch.h"
 #include "mmradartwin_sim/path_record.h"
 #include "mmradartwin_sim/scene.h"
 
 namespace mmradartwin {
 
-/// radar/config, session, twin/scene, twin/paths, radar/range_angle, twin/range_angle -> attribution/residuals,
-/// attribution/ledger, attribution/markers, attribution/scene_markers.
+/// radar/config, session, twin/scene, twin/moved_scene, twin/paths, radar/range_angle, twin/range_angle ->
+/// attribution/residuals, attribution/ledger, attribution/markers, attribution/scene_markers.
 ///
 /// Matches measured and simulated maps by stamp and attributes what differs. Poses are named after the session's
 /// poses.csv, else after their stamp. The scene is that of the parameter `scene`, else of twin/scene; where twin/scene
-/// brings another twin the ledger begins anew. Markers and ledger come `markers_hz` times a second at most, with up to
-/// `max_paths` paths. Callbacks must come one at a time.
+/// brings another twin the ledger begins anew, and where stamps go back by more than a second (a bag that loops).
+/// Markers and ledger come `markers_hz` times a second at most, with up to `max_paths` paths. Callbacks must come one
+/// at a time.
 class AttributionNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
   AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
+  static NodeDescription description();
 
  private:
   using MapMsg = mmradartwin_msgs::RangeAngleMap;
 
-  void readParameters(const ros::NodeHandle& private_nh);
+  struct Settings {
+    explicit Settings(StrictParameters& parameters);
+
+    std::string config_file, scene_file, radar_frame;
+    MarkerFrames frames;
+    double markers_hz;
+    int max_paths;
+  };
+
   void onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg);
   void onScene(const mmradartwin_msgs::Scene::ConstPtr& msg);
+  void onMovedScene(const mmradartwin_msgs::Scene::ConstPtr& msg);
   void onSession(const mmradartwin_msgs::Session::ConstPtr& msg);
   void onPaths(const mmradartwin_msgs::PathRecords::ConstPtr& msg);
   void onMeasured(const MapMsg::ConstPtr& msg);
@@ -59,15 +74,23 @@ class AttributionNode {
   void compare(const MapMsg& measured_msg, const MapMsg& simulated_msg);
   std::string nameAt(std::int64_t stamp_ns) const;
   void watch(const ros::WallTimerEvent&);
+  /// What takes seconds with a large scene: said before and after, here and in diagnostics.
+  void announce(const std::string& work);
+  void announceEnd(const ros::WallTime& begin);
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
   ros::NodeHandle nh_;
+  const Settings settings_;
   AttributionConfig config_;
-  MarkerFrames frames_;
-  std::string radar_frame_ = "radar_link", scene_file_, twin_yaml_;
-  double markers_hz_ = 2;
-  int max_paths_ = 200;
+  std::string twin_yaml_;
   ros::Publisher residuals_, ledger_, markers_, scene_markers_;
   std::vector<ros::Subscriber> subscribers_;
+  ros::Subscriber measured_subscriber_, simulated_subscriber_;
+  TopicWatch measured_heard_{"the signal chain"}, simulated_heard_{"the twin, and the signal chain"};
+  std::unique_ptr<diagnostic_updater::Updater> updater_;
+  ros::WallTimer diagnostics_timer_;
+  bool slow_ = true;            ///< expected regions took long, or were not found yet
+  std::string work_, problem_;  ///< what it is busy with; why the last pair was not compared
   ros::WallTimer watchdog_;
   ros::WallTime last_markers_, scene_published_, scene_viewer_since_;  // zero: never, nobody new
   bool scene_due_ = false;
@@ -75,6 +98,7 @@ class AttributionNode {
   std::size_t pairs_ = 0, pairs_before_ = 0, received_ = 0, received_before_ = 0;
 
   std::map<std::int64_t, MapMsg::ConstPtr> measured_, simulated_;  // waiting, by stamp
+  std::optional<std::int64_t> newest_ns_;                          // of the measured maps
   MapMsg::ConstPtr last_measured_;                                 // of the last pair
   mmradartwin_msgs::PathRecords::ConstPtr paths_, records_of_;
   std::vector<PathRecord> records_;
@@ -83,6 +107,8 @@ class AttributionNode {
   std::unique_ptr<RadarConfig> radar_;
   std::uint64_t radar_hash_ = 0;
   std::unique_ptr<Scene> scene_;
+  std::unique_ptr<Scene> moved_scene_;  ///< as it is simulated, where actors stand elsewhere than in scene_
+  ros::Time scene_stamp_, moved_scene_stamp_;
   std::unique_ptr<RayCaster> rays_;
   std::unique_ptr<EvaluationField> field_;
   std::unique_ptr<RegionModel> regions_;

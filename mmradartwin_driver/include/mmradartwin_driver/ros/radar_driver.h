@@ -10,34 +10,44 @@
 
 #include "mmradartwin_driver/pose_watch.h"
 #include "mmradartwin_driver/rig.h"
+#include "mmradartwin_dsp/ros/node_program.h"
 
 namespace mmradartwin {
 
 /// The rig as a node: publishes `radar/config` (latched), `radar/adc` (one message per frame) and diagnostics: "radar
 /// stream" (rate, loss, drops of this host), "capture card" (status, version), "radar device" (events, temperature)
 /// and "radar pose" (age, gaps and jumps of tf).
-/// Private parameters: radar (path of radar.yaml, required), host_ip, card_ip, config_port, data_port, packet_delay_us,
-/// configure_card, configure_radar (bring the radar up over USB; radar/config then says the values as the chip rounds
-/// them), radar_firmware (image for an empty flash), record_pcap (a pcap file to record all packets to), frame_id,
-/// map_frame (empty: poses are not watched), pose_age_limit_s.
+/// With `configure_radar` radar/config says the values as the chip rounds them.
 class RadarDriver {
  public:
   /// Throws InputError for unusable parameters. Problems of the rig are reported, and the rig tries again.
   RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh);
   ~RadarDriver();
+  static NodeDescription description();
 
  private:
+  struct Settings {
+    explicit Settings(StrictParameters& parameters);
+
+    RigOptions rig;
+    PoseWatch::Options pose;
+    std::string radar_file, frame_id, map_frame;
+    bool configure_radar;
+    double max_frame_mb;
+  };
+
   void publish(AdcCube&& cube);
-  void readParameters(const ros::NodeHandle& private_nh);
+  /// radar_ and options_ of the settings.
+  void loadRadar();
   void observePose();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
   void diagnoseCard(diagnostic_updater::DiagnosticStatusWrapper& status);
   void diagnoseDevice(diagnostic_updater::DiagnosticStatusWrapper& status);
   void diagnosePose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
+  const Settings settings_;
   RadarConfig radar_;
   std::uint64_t radar_hash_ = 0;
-  std::string frame_id_, map_frame_;
   RigOptions options_;
   ros::Publisher config_publisher_, adc_publisher_;
   diagnostic_updater::Updater updater_;

@@ -21,6 +21,8 @@ namespace mmradartwin {
 
 ros::Time toRosTime(std::int64_t stamp_ns);
 std::int64_t toNanoseconds(const ros::Time& stamp);
+/// False for what no clock says and ros::Duration cannot hold: stamps from 2^31 s on, which damaged messages have.
+bool usableStamp(const ros::Time& stamp);
 geometry_msgs::Pose toMsg(const Eigen::Isometry3d& T);
 Eigen::Isometry3d fromMsg(const geometry_msgs::Pose& pose);
 /// tf takes quaternions whose length is not quite 1, and tf2::transformToEigen would stretch by them.

@@ -1,17 +1,23 @@
 #pragma once
 
+#include <diagnostic_updater/diagnostic_updater.h>
 #include <mmradartwin_msgs/AdcCube.h>
 #include <mmradartwin_msgs/RadarConfig.h>
 #include <mmradartwin_msgs/ReceiveGrid.h>
 #include <ros/ros.h>
 #include <tf2_ros/buffer.h>
 
+#include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
+#include <string>
 
 #include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/ros/node_program.h"
+#include "mmradartwin_dsp/ros/topic_watch.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
 #include "mmradartwin_dsp/ros/transform_sources.h"
 
@@ -30,15 +36,24 @@ namespace mmradartwin {
 class SignalChainNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
-  SignalChainNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  SignalChainNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
+  static NodeDescription description();
 
  private:
+  struct Settings {
+    explicit Settings(StrictParameters& parameters);
+
+    int average_frames, publish_every;
+    double moved_m, moved_rad, pose_timeout_s, max_frame_mb;
+    TransformLimits tf_limits;
+    std::string map_frame, radar_frame, channels_file;
+  };
+
   struct Waiting {
     mmradartwin_msgs::AdcCube::ConstPtr cube;
     ros::Time since;
   };
 
-  void readParameters(const ros::NodeHandle& private_nh);
   void onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& config);
   void onCube(const mmradartwin_msgs::AdcCube::ConstPtr& cube);
   void forgetTransforms();
@@ -51,16 +66,9 @@ class SignalChainNode {
   void process(const mmradartwin_msgs::AdcCube& cube, const std::optional<Eigen::Isometry3d>& T_map_radar);
   void publish(const std::optional<Eigen::Isometry3d>& T_map_radar);
   void restart();
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
-  int average_frames_ = 100;
-  int publish_every_ = 1;
-  double moved_m_ = 0.02;
-  double moved_rad_ = 0;
-  double pose_timeout_s_ = 0.5;
-  TransformLimits tf_limits_;
-  std::string map_frame_ = "map";
-  std::string radar_frame_ = "radar_link";
-
+  const Settings settings_;
   tf2_ros::Buffer tf_buffer_;
   TransformRecord tf_record_;
   TransformSources tf_sources_;
@@ -77,6 +85,12 @@ class SignalChainNode {
   std::deque<Waiting> queue_;
   ros::Time newest_;
   int since_published_ = 0;
+
+  TopicWatch cubes_{"the driver (or the bag's player)"};
+  std::uint64_t frames_ = 0, without_pose_ = 0, refused_ = 0, future_transforms_ = 0;
+  std::string no_pose_;  ///< why the last frame had none; "" where it had one
+  std::unique_ptr<diagnostic_updater::Updater> updater_;
+  ros::WallTimer diagnostics_timer_;
 };
 
 }  // namespace mmradartwin

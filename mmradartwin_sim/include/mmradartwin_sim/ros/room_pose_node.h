@@ -14,6 +14,7 @@
 #include <optional>
 #include <string>
 
+#include "mmradartwin_dsp/ros/node_program.h"
 #include "mmradartwin_sim/room_registration.h"
 
 namespace mmradartwin {
@@ -27,20 +28,31 @@ namespace mmradartwin {
 class RoomPoseNode {
  public:
   /// Throws InputError for unknown or unusable parameters and an unusable scene.
-  RoomPoseNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  RoomPoseNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
+  static NodeDescription description();
 
  private:
-  void readParameters(const ros::NodeHandle& private_nh);
+  struct Settings {
+    explicit Settings(StrictParameters& parameters);
+
+    std::string scene_file, map_frame, camera_frame, odom_frame;
+    bool publish_tf;
+    double camera_height_m, lost_after_s, silence_s;
+    std::optional<Eigen::Isometry3d> initial_pose;
+    RegistrationOptions registration;
+  };
+
   void onCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud);
   void onImu(const sensor_msgs::Imu::ConstPtr& imu);
   void onInitialPose(const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& pose);
   void refuse(const std::string& why);
   void publish(const Registration& fit, const ros::Time& stamp);
+  /// The transform that says where the camera is without taking a frame from its parent in tf. Throws InputError, in
+  /// words, where there is none.
+  geometry_msgs::TransformStamped transformFor(const Eigen::Isometry3d& T_map_camera, const ros::Time& stamp) const;
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
-  std::string scene_file_, map_frame_ = "map", camera_frame_ = "camera_link";
-  double camera_height_m_ = 1.2, lost_after_s_ = 2, silence_s_ = 2;
-  RegistrationOptions options_;
+  const Settings settings_;
   std::optional<Scene> scene_;
   std::optional<RoomRegistration> registration_;
   GravityEstimate gravity_;

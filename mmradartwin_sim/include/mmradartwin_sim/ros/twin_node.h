@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "mmradartwin_dsp/ros/node_program.h"
 #include "mmradartwin_dsp/ros/transform_watch.h"
 #include "mmradartwin_dsp/temporary_folder.h"
 #include "mmradartwin_sim/cell_records.h"
@@ -35,17 +36,28 @@ namespace mmradartwin {
 ///
 /// The scene is that of the parameter `scene`, else of the latched session message, whose files are unpacked into a
 /// temporary folder. twin/apply puts another twin in the place of the one simulated, from the last measured grid on;
-/// twin/scene says which. It stays until another is applied, or a session with other files comes.
-/// `diffuse_records` says whether twin/paths holds scatter points summed by cells of a facet (`cells`) or all
+/// twin/scene says which, and twin/moved_scene where its actors stand if elsewhere. It stays until another is applied,
+/// or a session with other files comes. `diffuse_records` says whether twin/paths holds scatter points summed by cells
+/// of a facet (`cells`) or all
 /// (`points`). `channels` names what the measured branch is corrected by: a twin with the same channel errors is
 /// refused.
 class TwinNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
-  TwinNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  TwinNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
+  static NodeDescription description();
 
  private:
-  void readParameters(const ros::NodeHandle& private_nh);
+  struct Settings {
+    explicit Settings(StrictParameters& parameters);
+
+    std::string plugins, scene_file, twin_file, radar_file, channels_file, map_frame, radar_frame, actor_frame_prefix;
+    std::string base_folder, apply_folder;
+    double rate_hz, reuse_m, reuse_rad;
+    std::uint64_t seed;
+    DiffuseRecords diffuse_records;
+  };
+
   void onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& config);
   void onSession(const mmradartwin_msgs::Session::ConstPtr& session);
   void onGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid);
@@ -57,7 +69,10 @@ class TwinNode {
   std::string startingTwin() const;
   /// Throws InputError where it cannot be simulated.
   std::unique_ptr<Twin> makeTwin(const std::string& twin_file) const;
+  /// The file of a request. Throws InputError, with nothing of the file in it, where twin/apply may not read it.
+  std::string allowedTwin(const std::string& file) const;
   void use(std::unique_ptr<Twin> twin);
+  void publishMovedScene(const Scene& scene);
   void rebuild();
   void forgetSimulations();  ///< those of a twin that goes
   /// What to say of a pose without any path; what may help is looked for once a twin.
@@ -70,11 +85,7 @@ class TwinNode {
   bool alike(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const;  ///< within reuse_m and reuse_deg
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
-  std::string scene_file_, twin_file_, radar_file_, map_frame_ = "map", radar_frame_ = "radar_link";
-  std::string actor_frame_prefix_;
-  double rate_hz_ = 10, reuse_m_ = 1e-4, reuse_rad_ = 0;
-  std::uint64_t seed_ = 1;
-  DiffuseRecords diffuse_records_ = DiffuseRecords::kCells;
+  const Settings settings_;
   std::optional<ChannelCorrection> channels_;
 
   std::optional<RadarConfig> radar_;
@@ -95,14 +106,15 @@ class TwinNode {
   /// Where and when the last measured grid was simulated.
   std::optional<std::pair<Eigen::Isometry3d, std::int64_t>> measured_;
   mmradartwin_msgs::ReceiveGrid::ConstPtr pending_;
-  ros::WallTime measured_at_, published_at_;
+  ros::WallTime measured_at_, published_at_, moved_scene_at_;
+  bool moved_scene_due_ = false;  ///< actors were placed since it was published
   std::uint64_t simulated_ = 0, reused_ = 0, skipped_ = 0, without_pose_ = 0, actor_moves_ = 0;
   double simulate_ms_ = 0;
 
   tf2_ros::Buffer tf_buffer_;
   std::optional<tf2_ros::TransformListener> tf_listener_;
   std::optional<TransformWatch> tf_watch_;
-  ros::Publisher grid_publisher_, paths_publisher_, scene_publisher_;
+  ros::Publisher grid_publisher_, paths_publisher_, scene_publisher_, moved_scene_publisher_;
   ros::Subscriber config_subscriber_, session_subscriber_, grid_subscriber_;
   ros::ServiceServer apply_service_;
   ros::WallTimer pending_timer_, rate_timer_, diagnostics_timer_;
