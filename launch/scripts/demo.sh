@@ -1,9 +1,14 @@
 #!/usr/bin/env bash
 # The demo: generate a session that hides an effect, play it over UDP through the live loop, evaluate what was recorded,
 # find the effect, replay and evaluate again with the twin that knows it.
-# usage: demo.sh OUTPUT [POSES]
+# usage: demo.sh OUTPUT
 set -euo pipefail
 
+case ${1:-} in
+  --help | -h) sed -n '2,4s/^# //p' "${BASH_SOURCE[0]}"; exit 0 ;;
+  --version) echo "demo.sh $(rosversion mmradartwin_launch)"; exit 0 ;;
+  '' | -*) echo 'error: usage: demo.sh OUTPUT' >&2; exit 2 ;;
+esac
 out=$1
 locations=${DEMO_LOCATIONS:-10}
 headings=${DEMO_HEADINGS:-2}
@@ -68,7 +73,7 @@ roslaunch -p "$port" mmradartwin_launch demo.launch session:="$out/session" bag:
   average_frames:="$frames" ${DEMO_ARGS:-} &
 launch=$!
 watch session_player "$out/rviz.png"
-say "the session was played to its end (roslaunch calls that the death of session_player; all is well)"
+say "the session was played to its end"
 
 bag=$out/demo.bag
 [ -f "$bag" ] || { printf 'error: %s was not recorded; the messages above say why\n' "$bag" >&2; exit 1; }
@@ -84,7 +89,7 @@ say "5/5 the recording again, with the extended twin: rviz, then the report"
 extended=$out/diagnosis/twin.extended.yaml
 # shellcheck disable=SC2086 # several arguments
 roslaunch -p "$port" mmradartwin_launch replay.launch bag:="$bag" twin:="$extended" average_frames:="$frames" \
-  diagnosis:=false ${DEMO_ARGS:-} &
+  diagnosis:=false stay:=false ${DEMO_ARGS:-} &
 launch=$!
 watch player "$out/rviz_extended.png"
 if [ -f "$out/rviz.png" ] && [ -f "$out/rviz_extended.png" ]; then

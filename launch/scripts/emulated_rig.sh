@@ -1,9 +1,17 @@
 #!/usr/bin/env bash
 # The emulated rig as a node of live.launch: generates a session where none is given, then plays it behind an emulated
 # AWR2243 and an emulated DCA1000, with its poses in tf. Needs root for the card's network.
-# usage: emulated_rig.sh SESSION|"" [NODE_ARGUMENTS...]
+# usage: emulated_rig.sh SESSION|generate [NODE_ARGUMENTS...]
 set -euo pipefail
 
+case ${1:-} in
+  --help | -h)
+    sed -n '2,4s/^# //p' "${BASH_SOURCE[0]}"
+    printf 'Topics and parameters are those of session_player, with whole_rig true:\n\n'
+    exec rosrun mmradartwin_driver session_player --help
+    ;;
+  --version) echo "emulated_rig.sh $(rosversion mmradartwin_launch)"; exit 0 ;;
+esac
 session=${1:-}
 shift || true
 say() { printf '== %s\n' "$*" >&2; }

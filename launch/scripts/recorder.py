@@ -2,8 +2,13 @@
 """rosbag record that a full disk does not surprise: it looks at the free space twice a second (rosbag itself every
 20 s), closes the bag while there is room for its index, says so, and begins a new one when there is room again.
 
-usage: recorder.py --min-free SIZE --output-prefix PREFIX [ROSBAG_RECORD_ARGUMENTS...]      SIZE as in 500M, 2G
+usage: recorder.py --min-free SIZE [--folder FOLDER] --output-prefix PREFIX [ROSBAG_RECORD_ARGUMENTS...]
+
+  SIZE      as in 500M, 2G
+  FOLDER    a relative PREFIX is seen from here; else from the folder in which this runs
+  PREFIX    of the bags' names; date and time follow
 """
+import argparse
 import glob
 import os
 import re
@@ -12,6 +17,7 @@ import subprocess
 import sys
 import time
 
+import rospkg
 from roslib.packages import find_node
 
 UNITS = {"": 1, "k": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
@@ -46,11 +52,11 @@ class Recorder:
 
     def __init__(self, min_free, prefix, arguments):
         self.min_free_bytes = bytes_of(min_free)
-        self.prefix = os.path.abspath(prefix)
+        self.prefix = prefix
         self.folder = os.path.dirname(self.prefix)
         self.record_program = find_node("rosbag", "record")[:1]
         self.command = [*self.record_program, "--output-prefix", self.prefix, "--min-space", min_free, *arguments]
-        self.child, self.stopping, self.known = None, False, set()
+        self.child, self.stopping, self.known, self.told = None, False, set(), set()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self.stop)
 
@@ -69,6 +75,14 @@ class Recorder:
         self.known |= fresh
         return sorted(fresh)
 
+    def tell_bags(self):
+        """Says each bag's name once, as replay.launch takes it."""
+        for path in sorted(glob.glob(glob.escape(self.prefix) + "*.bag*")):
+            bag = path[:-len(".active")] if path.endswith(".active") else path
+            if bag not in self.told and bag not in self.known and path not in self.known:
+                self.told.add(bag)
+                say(f"recording to {bag} (later: roslaunch mmradartwin_launch replay.launch bag:={bag})")
+
     def record(self):
         """One run of rosbag record. Returns its exit status, and whether the disk ended it."""
         with subprocess.Popen(self.command) as self.child:
@@ -76,6 +90,7 @@ class Recorder:
             if self.stopping:
                 self.child.send_signal(signal.SIGINT)
             while self.child.poll() is None:
+                self.tell_bags()
                 if not full and self.free_bytes() < self.min_free_bytes:
                     full = True
                     self.child.send_signal(signal.SIGINT)
@@ -83,6 +98,7 @@ class Recorder:
                     self.child.wait(LOOK_EVERY_S)
                 except subprocess.TimeoutExpired:
                     pass
+        self.tell_bags()
         return self.child.returncode, full or (self.child.returncode != 0 and self.free_bytes() < self.min_free_bytes)
 
     def wait_for_room(self):
@@ -131,11 +147,16 @@ class Recorder:
 
 
 def main():
-    arguments = sys.argv[1:]
-    if len(arguments) < 4 or arguments[0] != "--min-free" or arguments[2] != "--output-prefix":
-        print(__doc__, file=sys.stderr)
-        return 2
-    return Recorder(arguments[1], arguments[3], arguments[4:]).run()
+    parser = argparse.ArgumentParser(usage=__doc__.split("usage: ")[1].split("\n")[0], description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False)
+    parser.add_argument("--min-free", required=True, metavar="SIZE", help=argparse.SUPPRESS)
+    parser.add_argument("--folder", default="", help=argparse.SUPPRESS)
+    parser.add_argument("--output-prefix", required=True, metavar="PREFIX", help=argparse.SUPPRESS)
+    parser.add_argument("--version", action="version",
+                        version="recorder.py " + rospkg.RosPack().get_manifest("mmradartwin_launch").version)
+    options, arguments = parser.parse_known_args()
+    prefix = os.path.normpath(os.path.join(options.folder or os.getcwd(), options.output_prefix))
+    return Recorder(options.min_free, prefix, arguments).run()
 
 
 if __name__ == "__main__":
