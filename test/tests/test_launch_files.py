@@ -13,6 +13,8 @@ import xmlrpc.client
 import numpy
 import rosbag
 import rosgraph
+import rospkg
+import yaml
 
 from mmradartwin_tests.installed_programs import find_program
 from wait_for import PATIENCE_S, wait_for
@@ -181,9 +183,20 @@ class LaunchFiles(unittest.TestCase):
             nodes = launched.wait_for_nodes({"/driver", "/signal_chain", "/twin", "/attribution", "/diagnosis"})
             launched.wait_for_text("no answer from the DCA1000 at 127.77.1.2")
             # Once a second from each node: they go on after that.
-            launched.record({"/diagnostics": 4}, self.path("without_card.bag"))
+            launched.record({"/diagnostics": 6}, self.path("without_card.bag"))
             self.assertNotIn("has died", launched.text())
             self.assertLessEqual(nodes, launched.state()[1])
+        with rosbag.Bag(self.path("without_card.bag")) as bag:
+            said = {status.name: status.message for _, message, _ in bag.read_messages() for status in message.status}
+        self.assertIn("nothing comes on /radar/adc", said["signal_chain: signal chain"])
+        self.assertIn("look at the driver", said["signal_chain: signal chain"])
+        self.assertIn("look at the signal chain", said["attribution: attribution"])
+        # Each has one place among the groups for diagnostic_aggregator.
+        with open(os.path.join(rospkg.RosPack().get_path("mmradartwin_config"), "diagnostic_aggregator.yaml"),
+                  encoding="ascii") as file:
+            groups = yaml.safe_load(file)["analyzers"].values()
+        for name in said:
+            self.assertEqual(sum(any(part in name for part in group["contains"]) for group in groups), 1, name)
 
     def test_replay_runs_the_chain_on_the_bags_clock_without_the_driver(self):
         with Launched("replay.launch", "bag:=" + self.bag, "rviz:=false", "rate:=0.5") as launched:
@@ -227,6 +240,12 @@ class LaunchFiles(unittest.TestCase):
             self.assertLess(numpy.linalg.norm(published - rebuilt), 1e-6 * numpy.linalg.norm(rebuilt))
             compared += 1
         self.assertGreater(compared, 0)
+
+    def test_stored_results_last_two_seconds_a_pose(self):
+        with rosbag.Bag(os.path.join(self.results, "results.bag")) as bag:
+            poses = bag.get_message_count("attribution/residuals")
+            self.assertGreater(poses, 1)
+            self.assertAlmostEqual(bag.get_end_time() - bag.get_start_time(), 2 * poses, delta=0.01)
 
     def test_inspect_shows_stored_results(self):
         with Launched("inspect.launch", "results:=" + self.results, "rviz:=false") as launched:

@@ -78,7 +78,7 @@ class LiveDiagnosis(unittest.TestCase):
         os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1", ROS_HOME=cls.at("ros_home"))
         with open(cls.at("log"), "w", encoding="utf-8") as log:
             cls.launch = subprocess.Popen(["roslaunch", "-p", str(port), "mmradartwin_launch", "twin_chain.launch",
-                                           "rviz:=false", "channels:=" + cls.at("channels.yaml")],
+                                           "rviz:=false", "folder:=" + cls.folder, "channels:=channels.yaml"],
                                           stdout=log, stderr=subprocess.STDOUT,
                                           stdin=subprocess.DEVNULL, start_new_session=True)
         cls.addClassCleanup(cls.end_launch)

@@ -67,5 +67,26 @@ class Nodelets(unittest.TestCase):
         self.assertGreater(sum(sent["/radar/grid"]), FRAMES // 2 * 8 * 64 * 16)  # complex128 of every channel's samples
 
 
+class BadParameters(unittest.TestCase):
+    def test_nodelets_say_once_what_is_wrong_and_are_not_loaded(self):
+        launch = """<launch>
+          <node name="manager" pkg="nodelet" type="nodelet" args="manager" output="screen" />
+          <node name="{name}" pkg="nodelet" type="nodelet" args="load {kind} manager" output="screen">
+            <param name="{parameter}" value="{value}" />
+          </node>
+        </launch>"""
+        for name, kind, parameter, value in (
+                ("driver", "mmradartwin_driver/DriverNodelet", "radar", "/nowhere/radar.yaml"),
+                ("signal_chain", "mmradartwin_dsp/SignalChainNodelet", "average_frames", "0")):
+            with self.subTest(name=name), tempfile.NamedTemporaryFile("w", suffix=".launch") as file:
+                file.write(launch.format(name=name, kind=kind, parameter=parameter, value=value))
+                file.flush()
+                with Launched(file.name, package=None) as launched:
+                    launched.wait_for_text(f"[{name}-2] process has died")
+                    said = [line for line in launched.text().split("\n") if f"/{name}/{parameter}" in line]
+                    self.assertEqual(len(said), 1, launched.text())
+                    self.assertIn("/manager", launched.state()[1])
+
+
 if __name__ == "__main__":
     unittest.main()
