@@ -91,8 +91,8 @@ class World:
             keep = cell < found.shape[1] - 1
             for shift, share in ((0, 1 - part), (1, part)):
                 w, at = (c * share)[keep], cell[keep] + shift
-                found[4 * t + r] += np.bincount(at, w.real, found.shape[1]) + 1j * np.bincount(at, w.imag,
-                                                                                            found.shape[1])
+                found[4 * t + r].real += np.bincount(at, w.real, found.shape[1])
+                found[4 * t + r].imag += np.bincount(at, w.imag, found.shape[1])
 
     def _adding_area(self, index, size, ways, nearness):
         """Area of patches [P, 2] of faces [P] as it adds up; ways: direction there plus direction back [P, 3], nearness:
@@ -128,7 +128,8 @@ class World:
         use, index, ray, cosine, local, distance = (a[keep] for a in (use, index, ray, cosine, local, distance))
         scattering = np.array([f.matter.scattering for f in self.faces])[index]
         gamma, size = self._gamma(index, cosine) * self.patch_level[use], self.patch_size[use]
-        weight = -1j / (4 * math.pi) * cosine * self._adding_area(index, size, 2 * ray, 2 / distance) * gamma * np.sqrt(1 - scattering**2)
+        weight = (-1j / (4 * math.pi) * cosine * self._adding_area(index, size, 2 * ray, 2 / distance) * gamma *
+                  np.sqrt(1 - scattering**2))
         area = size[:, 0] * size[:, 1]
         weight += (self.front.wavelength_m / (4 * math.pi)**1.5 * self.patch_scatter[use] * np.abs(gamma) *
                    scattering * 2 * cosine * np.sqrt(area))
