@@ -2,13 +2,12 @@
 """Diagnoses sessions of the third world: rooms of rough patches, computed by physical optics, and a radar with faults.
 
 Results stand in OUTPUT/results.jsonl, and a finished session does not run again. The table is printed at the end and
-written to OUTPUT/table.md. Sessions whose answer is wrong stay in OUTPUT/wrong.
+written to OUTPUT/table.md. Sessions and what was said of them stay in OUTPUT/sessions, and a session that is there is not
+measured again.
 """
 import argparse
 import os
-import shutil
 import sys
-import tempfile
 import time
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -63,15 +62,9 @@ def run(arguments):
                     continue
                 if arguments.budget is not None and time.monotonic() - start > 60 * arguments.budget:
                     break
-                with tempfile.TemporaryDirectory(prefix="third_world") as folder:
-                    place = os.path.join(folder, f"{row}-{seed}")
-                    record = campaign.run_trial(seed, row, program, place, arguments.jobs, without,
-                                                told=not arguments.no_told)
-                    figures = campaign.figures(record)
-                    if figures["wrong"] or figures.get("first") is False:
-                        kept = os.path.join(arguments.output, "wrong", f"{row}-{seed}")
-                        shutil.rmtree(kept, ignore_errors=True)
-                        shutil.copytree(place, kept)
+                place = os.path.join(arguments.output, "sessions", f"{row}-{seed}")
+                record = campaign.run_trial(seed, row, program, place, arguments.jobs, without,
+                                            told=not arguments.no_told)
                 results.add(record)
                 print(campaign.text_of(record), flush=True)
     text = campaign.table_of(list(results.records.values()))

@@ -32,19 +32,20 @@ def absent(seed, plan):
                "carrier_scale": {"scale": rng.uniform(-0.005, 0.005)},
                "material_reflectivity": {"material": plan.walls["wall_south"], "delta_db": rng.uniform(-1.5, 1.5)},
                "tx_imbalance": {"phase_deg": rng.uniform(-4, 4), "gain_db": rng.uniform(-0.3, 0.3)}}
-    return [{"cause": name, "parameters": {k: v if isinstance(v, str) else float(v) for k, v in choices[name].items()}}
+    return [{"cause": str(name), "parameters": {k: v if isinstance(v, str) else float(v) for k, v in choices[name].items()}}
             for name in rng.choice(list(choices), 4, replace=False)]
 
 
 def run_trial(seed, what, program, folder, jobs, without=(), limit_s=3600.0, told=True):
-    """One record; the session and the diagnosis's output stand in the folder afterwards."""
-    shutil.rmtree(folder, ignore_errors=True)
-    os.makedirs(folder)
+    """One record. The session stands in the folder, with what a diagnosis said; one that was measured is not measured
+    again."""
     cause, kind = drawn(seed, what)
     start, session = time.monotonic(), os.path.join(folder, "session")
     # A row's sessions have rooms and campaigns of their own.
     world = ThirdWorld(seed + (0 if what == "clean" else 100000), cause, kind, without)
-    world.write(session)
+    if not os.path.exists(os.path.join(session, "session.yaml")):     # the file that is written last
+        shutil.rmtree(folder, ignore_errors=True)
+        world.write(session)
     made_s = time.monotonic() - start
     truths = world.truth()
     record = trials.answer(program, session, folder, limit_s, jobs)
