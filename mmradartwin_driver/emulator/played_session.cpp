@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 
 namespace mmradartwin {
 namespace {
@@ -11,6 +12,7 @@ namespace fs = std::filesystem;
 
 /// Whole frames in a capture; throws InputError where there are none.
 std::int64_t countFrames(const RadarConfig& radar, const std::string& file) {
+  requireRegularFile(file);
   std::error_code error;
   const std::uintmax_t size = fs::file_size(file, error);
   if (error) throw InputError(file + ": capture cannot be read: " + error.message());

@@ -9,6 +9,7 @@
 
 #include "mmradartwin_driver/udp_socket.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 #include "mmradartwin_dsp/text.h"
 
 namespace mmradartwin {
@@ -130,6 +131,7 @@ class CardTraffic {
 }  // namespace
 
 PcapCounters readPcap(const std::string& file, const PcapVisitor& visitor, const PcapSource& source) {
+  requireRegularFile(file);
   CardTraffic traffic(visitor, source);
   char error[PCAP_ERRBUF_SIZE] = "";
   const std::unique_ptr<pcap_t, decltype(&pcap_close)> capture(

@@ -15,6 +15,7 @@
 #include "capture_check/packet_heads.h"
 #include "capture_check/real_samples.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 
 namespace mmradartwin {
 namespace {
@@ -155,6 +156,7 @@ class JoinedFiles {
  public:
   explicit JoinedFiles(const std::vector<std::string>& files) {
     for (const std::string& file : files) {
+      requireRegularFile(file);
       const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
       if (descriptor < 0) {
         throw InputError(file + ": capture cannot be opened (" + std::strerror(errno) +

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 #include "mmradartwin_dsp/session.h"
 #include "yaml_document.h"
 
@@ -20,6 +21,7 @@ namespace fs = std::filesystem;
 const std::string kPackageScheme = "package://";
 
 std::string readFile(const fs::path& file) {
+  requireRegularFile(file.string());
   std::ifstream in(file, std::ios::binary);
   if (!in || fs::is_directory(file))
     throw InputError(file.string() + ": cannot be read; put the file there or correct the name");

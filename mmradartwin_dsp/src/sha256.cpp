@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 
 namespace mmradartwin {
 
@@ -43,6 +44,7 @@ std::string sha256OfBytes(const std::string& bytes) {
 }
 
 std::string sha256OfFile(const std::string& file) {
+  requireRegularFile(file);
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(file + ": cannot be read; check the path and its rights");
   Sha256 hash;

@@ -4,10 +4,12 @@
 #include <fstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 
 namespace mmradartwin {
 
 std::string readTextFile(const std::string& file, const std::string& advice) {
+  requireRegularFile(file);
   std::ifstream in(file, std::ios::binary);
   std::error_code error;
   if (!in || std::filesystem::is_directory(file, error)) throw InputError(file + ": cannot be read; " + advice);

@@ -15,6 +15,7 @@
 #include "mmradartwin_dsp/average_pose.h"
 #include "mmradartwin_dsp/csv_reader.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 #include "target_echo.h"
 
 namespace mmradartwin {
@@ -416,6 +417,7 @@ void fillErrors(const Residuals& residuals, const VectorXd& p, int after, const 
 }  // namespace
 
 std::vector<LaserDistance> readLaserDistances(const std::string& file) {
+  requireRegularFile(file);
   std::ifstream in(file);
   if (!in) throw InputError(file + ": cannot be read; give a CSV file pose,distance_m");
   std::ostringstream text;

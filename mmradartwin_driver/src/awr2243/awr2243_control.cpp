@@ -7,6 +7,7 @@
 
 #include "mmradartwin_driver/rig_error.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 
 namespace mmradartwin {
 namespace {
@@ -285,6 +286,7 @@ void Awr2243Control::disableTestSource() {
 }
 
 std::vector<std::uint8_t> loadFirmwareImage(const std::string& file) {
+  requireRegularFile(file);
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw InputError(file + ": the firmware image cannot be read; give the path of TI's meta image");
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};

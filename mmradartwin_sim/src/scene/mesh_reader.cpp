@@ -17,6 +17,7 @@
 #include <unordered_map>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_sim/mesh_frame.h"
 #include "mmradartwin_sim/scene.h"
@@ -275,6 +276,7 @@ void refuseStatedTwice(const std::string& file, const MeshFrame& stated, const D
 std::vector<Actor> loadMesh(const std::string& file) { return loadMesh(file, MeshFrame()); }
 
 std::vector<Actor> loadMesh(const std::string& file, const MeshFrame& stated) {
+  requireRegularFile(file);
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) throw InputError(file + ": no such mesh file");
   const std::string extension = lowerExtension(file);

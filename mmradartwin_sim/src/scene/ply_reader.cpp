@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 
 namespace mmradartwin {
 namespace {
@@ -41,6 +42,7 @@ std::size_t bytesOf(const std::string& type) {
 class PlyReader {
  public:
   explicit PlyReader(const std::string& file) : file_(file) {
+    requireRegularFile(file);
     std::ifstream in(file, std::ios::binary);
     bytes_.assign(std::istreambuf_iterator<char>(in), {});
   }

@@ -8,6 +8,7 @@
 #include "diagnosis/catalogue/finding_format.h"
 #include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 
 namespace mmradartwin {
 
@@ -272,6 +273,7 @@ Findings parseFindings(const std::string& json_text, const std::string& name) {
 }
 
 Findings readFindings(const std::string& file) {
+  requireRegularFile(file);
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(file + ": cannot be read; give a findings.json that exists");
   std::ostringstream text;
