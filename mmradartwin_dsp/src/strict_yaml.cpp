@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/text.h"
 #include "text_file.h"
 #include "yaml_document.h"
 
@@ -64,33 +65,10 @@ std::optional<double> parseNumber(const std::string& text) {
   return value;
 }
 
-std::size_t editDistance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      diagonal = above;
-    }
-  }
-  return row[b.size()];
-}
-
 std::string join(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
   return text;
-}
-
-std::string didYouMean(const std::string& word, const std::vector<std::string>& known) {
-  const auto closest = std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
-    return editDistance(word, a) < editDistance(word, b);
-  });
-  if (closest == known.end() || editDistance(word, *closest) > std::max<std::size_t>(1, word.size() / 3)) return "";
-  return "did you mean '" + *closest + "'? ";
 }
 
 /// Mapping keys must be plain words and stand once; yaml-cpp itself lets the last of two equal keys win or lose

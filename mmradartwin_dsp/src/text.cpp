@@ -1,10 +1,25 @@
 #include "mmradartwin_dsp/text.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iomanip>
 #include <sstream>
 
 namespace mmradartwin {
+std::size_t editDistance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t above = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      diagonal = above;
+    }
+  }
+  return row[b.size()];
+}
 
 std::string fixedNumber(double value, int digits, const std::string& missing) {
   if (!std::isfinite(value)) return missing;
@@ -56,6 +71,14 @@ std::string htmlEscape(const std::string& text) {
     }
   }
   return out;
+}
+
+std::string didYouMean(const std::string& word, const std::vector<std::string>& known) {
+  const auto closest = std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
+    return editDistance(word, a) < editDistance(word, b);
+  });
+  if (closest == known.end() || editDistance(word, *closest) > std::max<std::size_t>(1, word.size() / 3)) return "";
+  return "did you mean '" + *closest + "'? ";
 }
 
 }  // namespace mmradartwin

@@ -16,4 +16,9 @@ std::string csvField(const std::string& text);
 /// `text` as the content of an HTML element or a quoted attribute.
 std::string htmlEscape(const std::string& text);
 
+/// Letters to add, take out or change until one word is the other.
+std::size_t editDistance(const std::string& a, const std::string& b);
+/// "did you mean '...'? " with the known word that is closest, or "" where none is close.
+std::string didYouMean(const std::string& word, const std::vector<std::string>& known);
+
 }  // namespace mmradartwin
