@@ -13,6 +13,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/map_picture.h"
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/progress_line.h"
 #include "mmradartwin_sim/twin.h"
 #include "recording_arguments.h"
 
@@ -23,7 +24,8 @@ using namespace mmradartwin;
 
 struct Arguments {
   RecordingArguments input;
-  std::string output, wall, lasers;
+  OutputArguments output;
+  std::string wall, lasers;
   std::string channels_to = "twin";
   std::vector<double> reflector_m, mount;
   MountCalibrationOptions options;
@@ -100,6 +102,9 @@ int run(const Arguments& arguments) {
   if (arguments.reflector_m.empty() == arguments.wall.empty()) {
     throw InputError("give what the radar was held in front of: either --reflector X Y Z (map, m) or --wall ACTOR");
   }
+  std::vector<std::string> inputs = arguments.input.inputs();
+  inputs.push_back(arguments.lasers);
+  Output output = Output::folder(arguments.output, inputs, "calibration.yaml");
   const Recording recording = arguments.input.open();
   TwinDescription twin = arguments.input.loadTwinOf(recording);
   if (!twin.scene_file.empty()) twin.scene_file = fs::absolute(twin.scene_file).lexically_normal().string();
@@ -118,16 +123,16 @@ int run(const Arguments& arguments) {
       arguments.lasers.empty() ? std::vector<LaserDistance>() : readLaserDistances(arguments.lasers);
   MountCalibration calibration;
   {
-    ProgressBar progress(static_cast<int>(recording.poses.size()));
-    calibration = calibrateMount(recording, target, lasers, arguments.options, room ? &*room : nullptr,
-                                 [&](int done) { progress.show(done); });
+    ProgressLine progress;
+    calibration = calibrateMount(recording, target, lasers, arguments.options, room ? &*room : nullptr, [&](int done) {
+      progress.count(static_cast<std::size_t>(done), recording.poses.size(), "poses");
+    });
   }
 
-  fs::create_directories(arguments.output);
-  const fs::path folder(arguments.output);
+  const fs::path folder(output.path()), named(output.name());
   calibrate(twin, calibration, arguments.channels_to);
+  RecordingArguments::leaveOutTemporary(twin);
   write(folder / "twin.yaml", twin.toYaml());
-  fs::remove(folder / "channels.yaml");  // an earlier run's would correct what this twin may have
   const bool measured_channels = arguments.channels_to == "measured" && calibration.phase_deg.back().observable;
   if (measured_channels) {
     write(folder / "channels.yaml",
@@ -135,9 +140,10 @@ int run(const Arguments& arguments) {
   }
   write(folder / "calibration.yaml", toYaml(calibration));
   writePicture(drawCalibration(calibration), (folder / "calibration.png").string());
+  output.complete();
 
   for (const PoseProblem& problem : calibration.problems) std::cerr << "error: " << problem.message << '\n';
-  for (const std::string& note : calibration.notes) std::cerr << "note: " << note << '\n';
+  for (const std::string& line : calibration.notes) note(line);
   if (!calibration.undetermined.empty()) std::cerr << "error: " << calibration.undetermined << '\n';
   print(calibration.yaw_deg, "yaw");
   print(calibration.forward_m, "forward");
@@ -159,10 +165,10 @@ int run(const Arguments& arguments) {
         better.translation().x(), better.translation().y(), better.translation().z(), std::atan2(R(1, 0), R(0, 0)),
         std::atan2(-R(2, 0), std::hypot(R(2, 1), R(2, 2))), std::atan2(R(2, 1), R(2, 2)));
   }
-  std::cout << "Twin: " << (folder / "twin.yaml").string() << ", picture: " << (folder / "calibration.png").string()
+  std::cout << "Twin: " << (named / "twin.yaml").string() << ", picture: " << (named / "calibration.png").string()
             << '\n';
   if (measured_channels) {
-    std::cout << "Channels: " << (folder / "channels.yaml").string()
+    std::cout << "Channels: " << (named / "channels.yaml").string()
               << "; give it as --channels to process, evaluate and diagnose, and as channels:= to live.launch\n";
   }
   return calibration.problems.empty() && calibration.undetermined.empty() ? 0 : 2;
@@ -173,9 +179,8 @@ int run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app("Finds the radar's mount, range bias and channel errors from poses in front of a known target.");
-  app.name("calibrate");
   arguments.input.addTo(app);
-  app.add_option("--output", arguments.output, "folder for twin.yaml, calibration.yaml, calibration.png")->required();
+  addOutputArguments(app, arguments.output, "folder for twin.yaml, calibration.yaml, calibration.png");
   app.add_option("--reflector", arguments.reflector_m, "corner reflector's apex in map: X Y Z [m]")->expected(3);
   app.add_option("--wall", arguments.wall, "actor of the scene that the radar was held in front of");
   app.add_option("--laser", arguments.lasers, "CSV pose,distance_m: radar to target as a laser meter gave it");
@@ -192,5 +197,6 @@ int main(int argc, char** argv) {
   app.add_option("--search", arguments.options.search_m, "the echo is looked for within this of its place [m]")
       ->check(CLI::Range(0.05, 2.0))
       ->capture_default_str();
+  app.footer("Example: calibrate lab.bag --reflector 3.2 1.0 1.1 --output calibrated");
   return runProgram(app, argc, argv, [&arguments] { return run(arguments); });
 }

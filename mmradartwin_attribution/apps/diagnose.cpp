@@ -6,9 +6,9 @@
 
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/diagnosis_report.h"
-#include "mmradartwin_attribution/progress_line.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/progress_line.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_sim/mesh_notes.h"
 #include "mmradartwin_sim/pose_placement.h"
@@ -20,7 +20,8 @@ using namespace mmradartwin;
 
 struct Arguments {
   RecordingArguments input;
-  std::string output, config, diagnosis_config;
+  OutputArguments output;
+  std::string config, diagnosis_config;
   std::vector<std::string> compared;
   int jobs = 0, findings = DiagnosisOptions().most_findings;
 };
@@ -33,11 +34,15 @@ void requireSameScene(const TwinDescription& other, const TwinDescription& twin)
 }
 
 int run(const Arguments& arguments, const std::vector<std::string>& command) {
+  std::vector<std::string> inputs = arguments.input.inputs();
+  inputs.insert(inputs.end(), arguments.compared.begin(), arguments.compared.end());
+  inputs.insert(inputs.end(), {arguments.config, arguments.diagnosis_config});
+  Output output = Output::folder(arguments.output, inputs, "findings.json");
   const Recording recording = arguments.input.open(true);
   const std::optional<std::string> scene = arguments.input.sceneFile(recording);
   const std::string twin_file = arguments.input.twinFile(recording);
 
-  const DiagnosisReport report(arguments.output);
+  const DiagnosisReport report(output.path());
   DiagnosisOptions options;
   options.jobs = arguments.jobs;
   options.most_findings = arguments.findings;
@@ -53,11 +58,11 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
                          ": names no scene that twins could be compared in; leave --compare out, or "
                          "add a line scene: to session.yaml");
       }
-      std::cerr << "the recording names no scene: only its frames and channels are judged\n";
+      note("the recording names no scene: only its frames and channels are judged");
       diagnosis = diagnoseReceiver(recording, options);
     } else {
       Twin twin = twinAt(arguments.input.loadTwinOf(recording), recording.poses, recording.source);
-      for (const std::string& note : meshNotes(twin.scene())) std::cerr << "note: " << note << "\n";
+      for (const std::string& line : meshNotes(twin.scene())) note(line);
       for (const std::string& file : arguments.compared) {
         options.compared.push_back(arguments.input.loadTwinOf(recording, file));
         requireSameScene(options.compared.back(), twin.description());
@@ -72,10 +77,12 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
     extended.scene_file.clear();
   }
   if (radarHash(extended.radar) == radarHash(recording.radar)) extended.radar_file.clear();
+  RecordingArguments::leaveOutTemporary(extended);
   report.write(diagnosis, command);
+  output.complete();
   for (const PoseProblem& problem : diagnosis.problems) std::cerr << "error: " << problem.message << '\n';
-  std::cout << diagnosisText(diagnosis) << "Findings: " << arguments.output << "/findings.json\n"
-            << "Report: " << arguments.output << "/index.html\n";
+  std::cout << diagnosisText(diagnosis) << "Findings: " << output.name() << "/findings.json\n"
+            << "Report: " << output.name() << "/index.html\n";
   return diagnosis.problems.empty() ? 0 : 2;
 }
 
@@ -84,10 +91,9 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
 int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app("Finds what a twin gets wrong about a recording, and why.");
-  app.name("diagnose");
   arguments.input.addTo(app);
   arguments.input.addChannelsTo(app);
-  app.add_option("--output", arguments.output, "folder for findings.json, report and extended twin")->required();
+  addOutputArguments(app, arguments.output, "folder for findings.json, report and extended twin");
   app.add_option("--config", arguments.config, "attribution.yaml of the paper's metrics (default: as shipped)");
   app.add_option("--diagnosis-config", arguments.diagnosis_config,
                  "diagnosis.yaml with the stated accuracy of scene, levels and poses (default: as shipped; what the "
@@ -95,11 +101,12 @@ int main(int argc, char** argv) {
   app.add_option("--compare", arguments.compared,
                  "other twin.yaml of the same scene: how much likelier or less likely each makes the same channels")
       ->allow_extra_args(false);
-  app.add_option("--jobs", arguments.jobs, "threads (default: one per core)")->check(CLI::Range(1, 1024));
+  addJobsArgument(app, arguments.jobs);
   app.add_option(
          "--findings", arguments.findings,
          "most causes to look for among echoes (default 6; 0: how much of the measured power the twin explains)")
       ->check(CLI::Range(0, 16));
+  app.footer("Example: diagnose lab.bag --output diagnosis");
   const std::vector<std::string> command(argv, argv + argc);
   return runProgram(app, argc, argv, [&] { return run(arguments, command); });
 }

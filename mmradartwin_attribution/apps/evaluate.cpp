@@ -2,7 +2,6 @@
 // report.
 
 #include <CLI/CLI.hpp>
-#include <boost/timer/progress_display.hpp>
 #include <iostream>
 #include <memory>
 
@@ -13,6 +12,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/map_picture.h"
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/progress_line.h"
 #include "mmradartwin_sim/pose_placement.h"
 #include "recording_arguments.h"
 
@@ -22,13 +22,17 @@ using namespace mmradartwin;
 
 struct Arguments {
   RecordingArguments input;
-  std::string output, simulated, config;
+  OutputArguments output;
+  std::string simulated, config;
   int jobs = 0;
   std::string diffuse_records = "cells";
   bool no_pictures = false, no_bag = false;
 };
 
 int run(const Arguments& arguments, const std::vector<std::string>& command) {
+  std::vector<std::string> inputs = arguments.input.inputs();
+  inputs.insert(inputs.end(), {arguments.simulated, arguments.config});
+  Output output = Output::folder(arguments.output, inputs, "index.html");
   const Recording recording = arguments.input.open();
   const bool from_twin = arguments.simulated.empty();
   // The twin also brings the scene that the expected regions come from; beside a simulated session it is that of the
@@ -48,25 +52,22 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
     simulated = simulatedBySession(other);
   }
 
-  const ReportWriter report(arguments.output);
+  const ReportWriter report(output.path());
   EvaluationOptions options;
   if (!arguments.config.empty()) options.config = loadAttributionConfig(arguments.config);
   options.jobs = arguments.jobs;
   const SignalChain chain(recording.radar);
   const EvaluationField field(options.config, recording.radar, chain.axes());
   std::unique_ptr<ResultsBag> bag;
-  if (!arguments.no_bag) bag = std::make_unique<ResultsBag>(arguments.output + "/results.bag", field, twin.scene());
+  if (!arguments.no_bag) bag = std::make_unique<ResultsBag>(output.path() + "/results.bag", field, twin.scene());
   options.on_pose = [&](const PoseResult& pose) {
     if (!arguments.no_pictures) writePicture(drawPose(field, pose), report.pictureFile(pose.pose.name));
     if (bag) bag->add(pose);
   };
-  std::unique_ptr<boost::timer::progress_display> progress;
-  options.on_progress = [&](std::size_t, std::size_t all) {
-    if (!progress) progress = std::make_unique<boost::timer::progress_display>(all, std::cerr, "poses\n");
-    ++*progress;
-  };
+  ProgressLine progress;
+  options.on_progress = [&](std::size_t done, std::size_t all) { progress.count(done, all, "poses"); };
   const Evaluation evaluation = evaluate(recording, refusingEmpty(simulated), twin.scene(), twin.rays(), options);
-  progress.reset();
+  progress.clear();
 
   std::vector<Pose> used;
   for (const PoseResult& pose : evaluation.poses) {
@@ -75,7 +76,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   if (used.empty() && !evaluation.problems.empty()) {
     throw InputError(recording.source + ": no pose can be compared; the first: " + evaluation.problems.front().message);
   }
-  writePicture(drawCoverage(twin.scene(), used), arguments.output + "/coverage.png");
+  writePicture(drawCoverage(twin.scene(), used), output.path() + "/coverage.png");
   if (bag) bag->finish(evaluation);
 
   RunDescription description;
@@ -89,16 +90,19 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
                                    twin.description().file, twin.description().scene_file};
   more.insert(more.end(), arguments.input.recordings.begin() + 1, arguments.input.recordings.end());
   if (from_twin) {
-    description.twin_yaml = twin.description().toYaml();
+    TwinDescription written = twin.description();
+    RecordingArguments::leaveOutTemporary(written);
+    description.twin_yaml = written.toYaml();
   } else {
     const std::vector<std::string> files = inputFiles(arguments.simulated, other, {});
     more.insert(more.end(), files.begin(), files.end());
   }
   description.inputs = hashFiles(inputFiles(arguments.input.recording(), recording, more));
   report.write(evaluation, options.config, description);
+  output.complete();
 
   for (const PoseProblem& problem : evaluation.problems) std::cerr << "error: " << problem.message << '\n';
-  std::cout << reportText(evaluation, options.config) << "Report: " << arguments.output << "/index.html\n";
+  std::cout << reportText(evaluation, options.config) << "Report: " << output.name() << "/index.html\n";
   return evaluation.problems.empty() ? 0 : 2;
 }
 
@@ -107,19 +111,19 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
 int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app("Compares a recorded session with its twin and attributes what differs.");
-  app.name("evaluate");
   arguments.input.addTo(app);
   arguments.input.addChannelsTo(app);
-  app.add_option("--output", arguments.output, "folder for table, CSV, pictures and report")->required();
+  addOutputArguments(app, arguments.output, "folder for table, CSV, pictures and report");
   app.add_option("--simulated", arguments.simulated, "take the simulated maps from this session instead of a twin");
   app.add_option("--config", arguments.config, "attribution.yaml (default: the built-in values, as shipped)");
   app.add_option("--diffuse-records", arguments.diffuse_records,
                  "records of rough surfaces: summed by cells of a facet, or all points")
       ->check(CLI::IsMember({"cells", "points"}))
       ->capture_default_str();
-  app.add_option("--jobs", arguments.jobs, "threads (default: one per core)")->check(CLI::Range(1, 1024));
+  addJobsArgument(app, arguments.jobs);
   app.add_flag("--no-pictures", arguments.no_pictures, "leave the per-pose pictures out");
   app.add_flag("--no-bag", arguments.no_bag, "leave results.bag (for rviz) out");
+  app.footer("Example: evaluate lab.bag --output report");
   const std::vector<std::string> command(argv, argv + argc);
   return runProgram(app, argc, argv, [&] { return run(arguments, command); });
 }

@@ -12,6 +12,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/sha256.h"
 #include "mmradartwin_dsp/strict_yaml.h"
+#include "mmradartwin_dsp/temporary_folder.h"
 
 namespace mmradartwin {
 namespace {
@@ -64,7 +65,7 @@ std::vector<std::string> inputFiles(const std::string& recording_path, const Rec
   std::vector<std::string> result;
   std::set<std::string> seen;
   for (const std::string& file : files) {
-    if (file.empty() || !fs::is_regular_file(file, error)) continue;
+    if (file.empty() || !fs::is_regular_file(file, error) || TemporaryFolder::holds(file)) continue;
     if (seen.insert(fs::weakly_canonical(file, error).string()).second) result.push_back(file);
   }
   return result;

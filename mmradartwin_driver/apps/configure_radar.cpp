@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
   app.add_option("--firmware", firmware, "TI's meta image, for a radar with an empty flash");
   app.add_option("--duration-s", duration_s, "ends after so many seconds; 0: at Ctrl-C")->check(CLI::Range(0.0, 1e6));
   app.add_flag("--check", check_only, "prints the values, and leaves the radar alone");
+  app.footer("Example: configure_radar radar.yaml --check");
   return runProgram(app, argc, argv, [&] {
     const RadarConfig radar = loadRadarConfig(radar_file);
     const RadarDevice device = radarDevice(radar, radar_file);

@@ -66,6 +66,7 @@ int main(int argc, char** argv) {
   app.add_option("--restart-at", options.restart_at_frame, "both counts begin anew with that frame");
   app.add_option("--silence-at", silence_at, "FRAME:FRAMES: nothing leaves for so many frames, and the counts go on");
   app.add_flag("--once", once, "end when the last frame was played");
+  app.footer("Example: dca1000_emulator lab --card-ip 127.0.0.2 --host-ip 127.0.0.1 --once");
   return program.run(argc, argv, [&] {
     for (const std::string& text : status_at) options.status_at_frame.insert(parseStatusAt(text));
     for (const std::string& text : silence_at) options.silence_at_frame.insert(parseSilenceAt(text));

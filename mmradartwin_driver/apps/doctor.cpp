@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
   app.add_option("--firmware", options.radar_firmware,
                  "TI's meta image, for --self-test of a radar with an empty flash");
   app.add_flag("--no-usb", no_usb, "do not look for the radar's USB port");
+  app.footer("Example: doctor --radar radar.yaml");
   return runProgram(app, argc, argv, [&] {
     if (!radar.empty()) options.radar = loadRadarConfig(radar);
     options.usb = !no_usb;

@@ -87,6 +87,7 @@ int main(int argc, char** argv) {
   app.add_flag("--no-firmware", no_firmware, "the radar's flash is empty");
   app.add_flag("--lanes-reversed", options.lanes.lanes_reversed, "wiring fault: lane k carries receiver 3 - k");
   app.add_flag("--iq-swapped", options.lanes.iq_swapped, "wiring fault: Q comes before I");
+  app.footer("Example: emulated_rig lab --loopback");
   return program.run(argc, argv, [&] {
     options.firmware_in_flash = !no_firmware;
     signal(SIGPIPE, SIG_IGN);

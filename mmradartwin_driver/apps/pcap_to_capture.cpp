@@ -3,28 +3,36 @@
 #include <iostream>
 
 #include "mmradartwin_driver/pcap_capture.h"
+#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
 #include "mmradartwin_dsp/session.h"
 
 int main(int argc, char** argv) {
   using namespace mmradartwin;
-  std::string input, radar, output;
+  std::string input, radar;
+  OutputArguments output;
   PcapSource source;
   CLI::App app("Makes a capture from recorded packets (tcpdump, Wireshark, or the driver's record_pcap).");
   app.add_option("PCAP", input, "pcap or pcapng file")->required();
   app.add_option("--radar", radar, "radar.yaml of the radar that was recorded")->required();
-  app.add_option("--output", output, "capture to write")->required();
+  addOutputArguments(app, output, "capture to write");
   app.add_option("--data-port", source.data, "UDP port of the samples")->capture_default_str();
   app.add_option("--config-port", source.config, "UDP port of the card's answers")->capture_default_str();
   app.add_option("--card-ip", source.card_ip, "address of the card whose samples are wanted, where several sent some");
+  app.footer("Example: pcap_to_capture lab.pcap --radar radar.yaml --output lab.bin");
   return runProgram(app, argc, argv, [&] {
-    const PcapCapture capture = pcapToCapture(input, loadRadarConfig(radar), output, source);
+    Output file = Output::file(output, {input, radar});
+    const PcapCapture capture = pcapToCapture(input, loadRadarConfig(radar), file.path(), source);
+    if (capture.frames == 0) {
+      throw InputError(input + ": holds no whole frame of this radar; is --radar the one that was recorded?");
+    }
+    file.complete();
     if (capture.before_file > 0) {
-      std::cerr << "note: the file begins within a recording: " << capture.before_file
-                << " frame(s) came before it and are left out\n";
+      note("the file begins within a recording: " + std::to_string(capture.before_file) +
+           " frame(s) came before it and are left out");
     }
     for (std::size_t i = 1; i < capture.recordings.size(); ++i) {
-      std::cerr << "note: frame " << capture.recordings[i] << " begins another recording: the card was armed anew\n";
+      note("frame " + std::to_string(capture.recordings[i]) + " begins another recording: the card was armed anew");
     }
     for (const CaptureFlaw& flaw : capture.flaws) {
       std::cerr << "error: frame " << flaw.frame << ": " << flaw.lost_bytes << " bytes lost (zeros in the capture), "
@@ -33,10 +41,10 @@ int main(int argc, char** argv) {
     for (const std::uint64_t bytes : capture.cut_off) {
       std::cerr << "error: a last frame was cut off after " << bytes << " bytes and left out\n";
     }
-    std::cerr << output << ": " << capture.frames << " frame(s), the first at " << formatStamp(capture.first_stamp_ns)
-              << " s, " << capture.flaws.size() << " with losses";
-    if (capture.lost_packets > 0) std::cerr << "; " << capture.lost_packets << " packets lost";
-    std::cerr << "\n";
+    std::cout << file.name() << ": " << capture.frames << " frame(s), the first at "
+              << formatStamp(capture.first_stamp_ns) << " s, " << capture.flaws.size() << " with losses";
+    if (capture.lost_packets > 0) std::cout << "; " << capture.lost_packets << " packets lost";
+    std::cout << "\n";
     return capture.flaws.empty() && capture.cut_off.empty() ? 0 : 2;
   });
 }

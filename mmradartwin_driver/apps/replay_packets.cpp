@@ -24,8 +24,9 @@ int main(int argc, char** argv) {
   app.add_option("--rate", options.rate, "times the recorded pace")
       ->capture_default_str()
       ->check(CLI::Range(1e-3, 1e3));
+  app.footer("Example: replay_packets lab.pcap --host-ip 127.0.0.1 --card-ip 127.0.0.2");
   return runProgram(app, argc, argv, [&] {
-    std::cerr << replayPackets(input, options) << " packets sent\n";
+    std::cout << replayPackets(input, options) << " packets sent\n";
     return 0;
   });
 }

@@ -1,31 +1,39 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
-#include <optional>
 
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/progress_line.h"
 #include "mmradartwin_dsp/ros/bag_arguments.h"
 
 int main(int argc, char** argv) {
+  using namespace mmradartwin;
   std::vector<std::string> paths;
-  mmradartwin::BagOptions options;
+  BagOptions options;
+  OutputArguments output;
   CLI::App app("Writes a rosbag as a session directory: the one it was made from, or one of the poses found in tf.");
   app.add_option("BAG... SESSION", paths,
                  "bag with radar/adc, radar/config and tf (several, the parts of one recording, are read as one), and "
                  "the folder to write")
       ->required()
       ->expected(2, 10000);
-  mmradartwin::addBagArguments(app, options);
-  app.add_option("--radar", options.ns, "namespace of one of several radars");
-  return mmradartwin::runProgram(app, argc, argv, [&] {
-    std::optional<mmradartwin::ProgressBar> progress;
-    const std::string& session = paths.back();
-    options.further.assign(paths.begin() + 1, paths.end() - 1);
+  addForceArgument(app, output);
+  addBagArguments(app, options);
+  app.add_option("--radar", options.ns, "namespace of one of several radars; the same as --ns");
+  app.footer("Example: bag_to_session lab.bag lab");
+  return runProgram(app, argc, argv, [&] {
+    output.path = paths.back();
+    paths.pop_back();
+    options.further.assign(paths.begin() + 1, paths.end());
+    Output session = Output::folder(output, paths, "session.yaml");
+    ProgressLine progress;
     const auto show = [&progress](int done, int total) {
-      if (!progress) progress.emplace(total);
-      progress->show(done);
+      progress.count(static_cast<std::size_t>(done), static_cast<std::size_t>(total), "poses");
     };
-    mmradartwin::bagToSession(paths.front(), session, show, options);
-    std::cerr << session << " written\n";
-    return 0;
+    const std::vector<PoseProblem> problems = bagToSession(paths.front(), session.path(), show, options);
+    session.complete();
+    progress.clear();
+    for (const PoseProblem& problem : problems) std::cerr << "error: " << problem.message << "\n";
+    std::cout << session.name() << " written\n";
+    return problems.empty() ? 0 : 2;
   });
 }

@@ -11,6 +11,7 @@
 #include "mmradartwin_dsp/map_picture.h"
 #include "mmradartwin_dsp/npz_file.h"
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/progress_line.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_dsp/ros/bag_arguments.h"
 
@@ -21,7 +22,8 @@ namespace {
 
 struct Options {
   std::vector<std::string> inputs;
-  std::string output, radar, layout, channels;
+  std::string radar, layout, channels;
+  OutputArguments output;
   BagOptions bag;
   bool mat = false;
   bool npz = false;
@@ -57,6 +59,10 @@ void writeArrays(ArrayFile& file, const Options& options, const Recording& recor
 }
 
 int process(const Options& options) {
+  std::vector<std::string> inputs = options.inputs;
+  inputs.insert(inputs.end(), {options.radar, options.channels});
+  Output output = Output::folder(options.output, inputs, "maps");
+  const fs::path folder(output.path());
   std::optional<CaptureLayout> layout;
   if (!options.layout.empty()) layout = options.layout == "2lane" ? CaptureLayout::kTwoLane : CaptureLayout::kFourLane;
   BagOptions bag = options.bag;
@@ -65,7 +71,7 @@ int process(const Options& options) {
   if (!options.channels.empty()) recording.channels = loadChannelCorrection(options.channels, recording.radar);
   CaptureCheckOptions check;
   if (options.align) check.misaligned = CaptureCheckOptions::Misaligned::kAligned;
-  for (const std::string& note : checkCaptures(recording, check)) std::cerr << "note: " << note << "\n";
+  for (const std::string& line : checkCaptures(recording, check)) note(line);
   const SignalChain chain = [&] {
     try {
       return SignalChain(recording.radar);
@@ -73,27 +79,26 @@ int process(const Options& options) {
       throw InputError(recording.radar_file + ": " + error.what());
     }
   }();
-  for (const char* folder : {"maps", "pictures"}) fs::create_directories(fs::path(options.output) / folder);
-  const auto arrays = [&options](const std::string& ending, const std::string& pose) {
-    return (fs::path(options.output) / ending / (pose + "." + ending)).string();
+  for (const char* part : {"maps", "pictures"}) fs::create_directories(folder / part);
+  const auto arrays = [&folder](const std::string& ending, const std::string& pose) {
+    return (folder / ending / (pose + "." + ending)).string();
   };
-  if (options.mat) fs::create_directories(fs::path(options.output) / "mat");
-  if (options.npz) fs::create_directories(fs::path(options.output) / "npz");
+  if (options.mat) fs::create_directories(folder / "mat");
+  if (options.npz) fs::create_directories(folder / "npz");
 
   std::vector<std::string> problems;
   for (const PoseProblem& problem : recording.problems) problems.push_back(problem.message);
-  ProgressBar progress(static_cast<int>(recording.poses.size()));
-  int done = 0;
+  ProgressLine progress;
+  std::size_t done = 0;
   for (const Pose& pose : recording.poses) {
     try {
       const ReceiveGrid grid = averagePose(recording, pose);
       const RangeAngleMap map = chain.map(grid);
-      writeMapCsv(map, (fs::path(options.output) / "maps" / (pose.name + ".csv")).string());
+      writeMapCsv(map, (folder / "maps" / (pose.name + ".csv")).string());
       FanStyle style;
       style.max_range_m = recording.radar.max_range_m() - recording.radar.range_bin_m() / 2;  // edge of the last bin
       style.title = recording.name + ", pose " + pose.name + ", " + std::to_string(grid.frames) + " frames";
-      writePicture(drawFan(map.axes, map.power_db, style),
-                   (fs::path(options.output) / "pictures" / (pose.name + ".png")).string());
+      writePicture(drawFan(map.axes, map.power_db, style), (folder / "pictures" / (pose.name + ".png")).string());
       if (options.mat) {
         MatFile file(arrays("mat", pose.name));
         writeArrays(file, options, recording, pose, grid, map);
@@ -105,14 +110,19 @@ int process(const Options& options) {
     } catch (const InputError& error) {
       problems.push_back(error.what());
     }
-    progress.show(++done);
+    progress.count(++done, recording.poses.size(), "poses");
   }
-  for (const std::string& name : recording.duplicates) {
-    std::cerr << "note: pose '" << name << "' is a duplicate of an earlier one and was left out\n";
+  progress.clear();
+  noteDuplicates(recording);
+  const std::size_t maps = recording.poses.size() + recording.problems.size() - problems.size();
+  if (maps == 0) {
+    throw InputError(recording.source +
+                     ": no pose gives a map; the first: " + (problems.empty() ? "it has none" : problems.front()));
   }
+  output.complete();
   for (const std::string& problem : problems) std::cerr << "error: " << problem << "\n";
-  std::cerr << recording.poses.size() + recording.problems.size() - problems.size() << " map(s) in "
-            << (fs::path(options.output) / "maps").string() << ", " << problems.size() << " pose(s) skipped\n";
+  std::cout << maps << " map(s) in " << (fs::path(output.name()) / "maps").string() << ", " << problems.size()
+            << " pose(s) skipped\n";
   return problems.empty() ? 0 : 2;
 }
 
@@ -121,10 +131,10 @@ int process(const Options& options) {
 int main(int argc, char** argv) {
   Options options;
   CLI::App app("Turns a session directory, a rosbag or a bare DCA1000 capture into range-angle maps.");
-  app.add_option("INPUT", options.inputs,
-                 "session directory, .bin capture, or bag; several bags, the parts of one recording, are read as one")
+  app.add_option("RECORDING", options.inputs,
+                 "session directory, session.yaml, bag or capture; several bags, the parts of one, are read as one")
       ->required();
-  app.add_option("--output", options.output, "folder for maps/, pictures/, mat/ and npz/")->required();
+  addOutputArguments(app, options.output, "folder for maps/, pictures/, mat/ and npz/");
   app.add_option(
       "--radar", options.radar,
       "radar.yaml; needed for a bare capture, else instead of the session's; of a bag with several radars the "
@@ -133,11 +143,13 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"4lane", "2lane"}));
   app.add_option("--channels", options.channels, "channels.yaml of calibrate: channel errors to take out of the grids");
   addBagArguments(app, options.bag);
+  addDuplicatesArgument(app, options.bag);
   app.add_flag("--align", options.align, "read captures that begin within a frame from their first whole chirp on");
   app.add_flag("--mat", options.mat,
                "also write grid and map of each pose as a MATLAB file (Octave and SciPy read it too)");
   app.add_flag("--npz", options.npz, "also write the same as a NumPy archive");
   app.add_flag("--cubes", options.cubes, "with --mat or --npz: the raw cubes too, [frame][chirp][sample][rx][I,Q]");
+  app.footer("Example: process lab.bag --output maps --mat");
   return runProgram(app, argc, argv, [&options] {
     if (options.cubes && !options.mat && !options.npz) {
       throw InputError("--cubes says what --mat and --npz write; give one of them too");

@@ -1,11 +1,11 @@
 // validate: says what is missing or odd in a bag before anyone depends on it.
 #include <CLI/CLI.hpp>
 #include <iostream>
-#include <optional>
 
 #include "mmradartwin_dsp/capture_check.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/progress_line.h"
 #include "mmradartwin_dsp/ros/bag_arguments.h"
 #include "mmradartwin_dsp/ros/bag_validation.h"
 
@@ -55,16 +55,16 @@ int main(int argc, char** argv) {
          "--tf-silence-s", limits.tf_silence_s,
          "the same where it stands at the same place, and from a recording's first or last transform to a frame")
       ->capture_default_str();
+  app.footer("Example: validate lab.bag");
   return runProgram(app, argc, argv, [&] {
     limits.stamp_tolerance_s = stamp_tolerance_ms * 1e-3;
     options.further.assign(bags.begin() + 1, bags.end());
     const std::string& bag = bags.front();
     std::vector<BagFinding> findings;
     {
-      std::optional<ProgressBar> progress;
+      ProgressLine progress;
       findings = validateBag(bag, options, limits, [&progress](int done, int total) {
-        if (!progress) progress.emplace(total);
-        progress->show(done);
+        progress.count(static_cast<std::size_t>(done), static_cast<std::size_t>(total), "messages");
       });
     }
     addSamples(bag, options, findings);

@@ -23,7 +23,8 @@ namespace {
 
 struct Options {
   std::vector<std::string> meshes;
-  std::string output, material = "Concrete";
+  OutputArguments output;
+  std::string material = "Concrete";
   double scale = 1;
   bool y_up = false;
   std::string unit;
@@ -129,19 +130,15 @@ StatedFrame statedFrame(const Options& options, const std::string& mesh) {
 
 int makeScene(const Options& options) {
   const Preset& fallback = find(options.material);
-  const fs::path scene_file = fs::path(options.output) / "scene.yaml",
-                 materials_file = fs::path(options.output) / "materials.yaml";
-  for (const fs::path& f : {scene_file, materials_file}) {
-    if (fs::exists(f)) throw InputError(f.string() + ": is there already; choose another --output or remove it");
-  }
+  Output output = Output::folder(options.output, options.meshes, "scene.yaml");
+  const fs::path folder(output.path()), scene_file = folder / "scene.yaml", materials_file = folder / "materials.yaml";
   std::map<std::string, std::string> overrides;  // actor -> tag
   std::set<std::string> used, actors;
   std::ostringstream meshes;
   Eigen::AlignedBox3d bounds;
   std::size_t triangles = 0;
-  fs::create_directories(options.output);
   for (const std::string& mesh : options.meshes) {
-    std::string path = fs::proximate(fs::weakly_canonical(mesh), fs::weakly_canonical(options.output)).string();
+    std::string path = fs::proximate(fs::weakly_canonical(mesh), output.place()).string();
     const StatedFrame stated = statedFrame(options, mesh);
     meshes << "  - {file: " << quoted(path) << stated.keys
            << ", xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0], scale: " << options.scale << "}\n";
@@ -155,12 +152,12 @@ int makeScene(const Options& options) {
       const Preset& preset = by_name ? *by_name : fallback;
       used.insert(preset.tag);
       if (actor.material_tag != preset.tag) overrides[actor.name] = preset.tag;
-      std::cerr << (by_name ? "note" : "warning") << ": actor " << actor.name << ", material tag '"
-                << actor.material_tag << "' -> " << preset.tag
-                << (by_tag    ? ""
-                    : by_name ? " (by the actor's name)"
-                              : " (nothing tells: edit scene.yaml)")
-                << "\n";
+      const std::string choice = "actor " + actor.name + ", material tag '" + actor.material_tag + "' -> " + preset.tag;
+      if (by_name) {
+        note(choice + (by_tag ? "" : " (by the actor's name)"));
+      } else {
+        std::cerr << "warning: " << choice << " (nothing tells: edit scene.yaml)\n";
+      }
     }
   }
   std::ofstream scene(scene_file);
@@ -184,9 +181,11 @@ int makeScene(const Options& options) {
   for (const std::string& tag : used) materials << "  " << tag << ": " << find(tag).yaml << "\n";
   scene.close();
   materials.close();
-  if (!scene || !materials) throw std::runtime_error(options.output + ": cannot be written");
-  std::cerr << actors.size() << " actor(s), " << triangles << " triangles: edit " << scene_file.string() << " and "
-            << materials_file.string() << "\n";
+  if (!scene || !materials) throw std::runtime_error(output.name() + ": cannot be written; check the free space");
+  output.complete();
+  const fs::path named(output.name());
+  std::cout << actors.size() << " actor(s), " << triangles << " triangles: edit " << (named / "scene.yaml").string()
+            << " and " << (named / "materials.yaml").string() << "\n";
   if (bounds.sizes().maxCoeff() > 200 || bounds.sizes().maxCoeff() < 0.5) {
     std::cerr << "warning: the scene is " << bounds.sizes().maxCoeff() << " m across; is --unit or --scale right?\n";
   }
@@ -199,7 +198,7 @@ int main(int argc, char** argv) {
   Options options;
   CLI::App app("Begins a scene from your own meshes: writes scene.yaml and materials.yaml to edit.");
   app.add_option("MESH", options.meshes, "OBJ, PLY, STL, glTF, Collada or FBX files")->required();
-  app.add_option("--output", options.output, "folder for scene.yaml and materials.yaml")->required();
+  addOutputArguments(app, options.output, "folder for scene.yaml and materials.yaml");
   app.add_option("--unit", options.unit, "of meshes that declare none: m, mm or cm")
       ->check(CLI::IsMember({"m", "mm", "cm"}));
   app.add_option("--scale", options.scale, "factor on the meshes, beyond their unit")
@@ -207,5 +206,6 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--material", options.material, "of actors that neither tag nor name explains")->capture_default_str();
   app.add_flag("--y-up", options.y_up, "meshes that declare no axes are y-up (glTF, Collada and FBX declare them)");
+  app.footer("Example: make_scene room.obj --output my_room --unit mm");
   return runProgram(app, argc, argv, [&options] { return makeScene(options); });
 }

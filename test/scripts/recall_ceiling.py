@@ -42,7 +42,7 @@ def main():
             Measurement(Settings(output=at(BRANCHES[1]), speckle_seed=seed + 1, **common)).run()
             Measurement(Settings(output=at(BRANCHES[2]), speckle_seed=seed + 1, at_reported=True, **common)).run()
             for branch in BRANCHES:
-                command = [program, at("measured"), "--output", at("out"), "--no-pictures", "--no-bag"]
+                command = [program, at("measured"), "--output", at("out"), "--force", "--no-pictures", "--no-bag"]
                 command += [] if branch == "twin" else ["--simulated", at(branch)]
                 subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
                 with open(os.path.join(at("out"), "summary.json"), encoding="ascii") as file:

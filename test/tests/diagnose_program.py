@@ -9,8 +9,9 @@ PROGRAM = find_program("mmradartwin_attribution", "diagnose")
 
 
 def diagnose(session, output, *options):
-    """Runs the program; returns (exit status, findings or None, standard error)."""
-    run = subprocess.run([PROGRAM, session, "--output", output, *options], capture_output=True, text=True, check=False)
+    """Runs the program, in place of an earlier run; returns (exit status, findings or None, standard error)."""
+    run = subprocess.run([PROGRAM, session, "--output", output, "--force", *options], capture_output=True, text=True,
+                         check=False)
     file = os.path.join(output, "findings.json")
     findings = None
     if os.path.exists(file):

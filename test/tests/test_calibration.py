@@ -281,7 +281,7 @@ class Calibrated(unittest.TestCase):
             if expected == 2:
                 self.assertIn("would count twice", run.stderr)
         # A later run that puts them into the twin leaves no correction behind.
-        run = subprocess.run([PROGRAM, hidden.settings.output, "--output", self.output, *map(
+        run = subprocess.run([PROGRAM, hidden.settings.output, "--output", self.output, "--force", *map(
             str, self.REFLECTOR_OPTIONS)], capture_output=True, text=True, check=False)
         self.assertEqual(run.returncode, 0, msg=run.stderr)
         self.assertFalse(os.path.exists(channels))

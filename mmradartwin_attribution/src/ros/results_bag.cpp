@@ -9,6 +9,7 @@
 
 #include "mmradartwin_attribution/ros/conversions.h"
 #include "mmradartwin_attribution/ros/markers.h"
+#include "mmradartwin_dsp/ros/bag_writer.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 
 namespace mmradartwin {
@@ -30,12 +31,7 @@ boost::shared_ptr<ros::M_string> latched() {
 }  // namespace
 
 struct ResultsBag::Impl {
-  Impl(const std::string& file, const EvaluationField& f) : field(f) {
-    try {
-      bag.open(file, rosbag::bagmode::Write);
-    } catch (const rosbag::BagException& error) {
-      throw std::runtime_error(file + ": cannot be written (" + error.what() + ")");
-    }
+  Impl(const std::string& file, const EvaluationField& f) : field(f), writer(file), bag(writer.bag()) {
     bag.setCompression(rosbag::compression::LZ4);
   }
   ros::Time time(std::size_t pose, double after_s = 0) const {
@@ -43,7 +39,8 @@ struct ResultsBag::Impl {
   }
 
   EvaluationField field;
-  rosbag::Bag bag;
+  BagWriter writer;
+  rosbag::Bag& bag;
   std::mutex mutex;
   std::size_t last_pose = 0;
   std::optional<tf2_msgs::TFMessage> last_tf;  ///< of that pose
@@ -95,7 +92,7 @@ void ResultsBag::finish(const Evaluation& evaluation) {
     impl_->last_tf->transforms.front().header.stamp = end;
     impl_->bag.write("/tf", end, *impl_->last_tf);
   }
-  impl_->bag.close();
+  impl_->writer.close();
 }
 
 }  // namespace mmradartwin

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <functional>
-#include <memory>
+#include <string>
+
+#include "mmradartwin_dsp/output.h"
 
 namespace CLI {
 class App;
@@ -11,18 +13,22 @@ namespace mmradartwin {
 
 /// Runs an offline program: parses the command line, calls `run`, and turns what goes wrong into one line on stderr and
 /// the exit status (0 done, 2 bad input or use, 1 failed). `run` returns the status itself where it came to an end.
+/// Adds
+/// --version and --quiet; an unknown option is told first, with the one that was meant. A program that is interrupted
+/// leaves no temporary folder and no unfinished output.
 int runProgram(CLI::App& app, int argc, char** argv, const std::function<int()>& run);
 
-/// A bar on stderr. Counts up to `total`; may be told the same count twice.
-class ProgressBar {
- public:
-  explicit ProgressBar(int total);
-  ~ProgressBar();
-  void show(int done);
+/// Says on stderr what a user may want to know and need not act on; not in a quiet program.
+void note(const std::string& text);
 
- private:
-  struct Display;
-  std::unique_ptr<Display> display_;
-};
+/// Adds --output and --force.
+void addOutputArguments(CLI::App& app, OutputArguments& output, const std::string& description);
+/// Adds --force alone, for programs whose output is a positional argument.
+void addForceArgument(CLI::App& app, OutputArguments& output);
+/// Adds --jobs; 0 stands for all cores.
+void addJobsArgument(CLI::App& app, int& jobs);
+
+/// The version of the package, with git's word where it was built from a checkout.
+std::string programVersion();
 
 }  // namespace mmradartwin

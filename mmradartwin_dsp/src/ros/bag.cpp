@@ -8,6 +8,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <deque>
 #include <filesystem>
@@ -16,8 +17,10 @@
 #include <mutex>
 #include <set>
 
+#include "capture_check/file_kind.h"
 #include "mmradartwin_dsp/bag_kind.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_dsp/session_files.h"
@@ -70,7 +73,7 @@ class BagContents {
 
   /// Visits the cubes of a stretch of time. rosbag is not thread-safe: one visitor at a time.
   void forEachFrame(const std::string& pose, const std::vector<CubeIndex>& cubes,
-                    const std::function<void(const AdcCube&)>& visit) {
+                    const std::function<void(const AdcCube&)>& visit) try {
     const std::lock_guard<std::mutex> lock(mutex_);
     ros::Time first = cubes.front().recorded, last = cubes.front().recorded;
     std::set<std::int64_t> stamps;
@@ -92,6 +95,8 @@ class BagContents {
       checkShape(pose, frame);
       visit(frame);
     }
+  } catch (const ros::Exception& error) {
+    throw damagedBag(file(), error);
   }
 
   const std::string& file() const { return bags_.label(); }
@@ -390,7 +395,7 @@ void leaveOutUnseen(Recording& recording, const CubesByPose& assigned) {
 
 }  // namespace
 
-Recording openBag(const std::string& file, const BagOptions& options) {
+Recording openBag(const std::string& file, const BagOptions& options) try {
   const auto bag = std::make_shared<BagContents>(file, options);
   std::shared_ptr<TemporaryFolder> temporary;
   std::string folder = options.unpack_to;
@@ -440,6 +445,8 @@ Recording openBag(const std::string& file, const BagOptions& options) {
     return openBag(file, later);
   };
   return recording;
+} catch (const ros::Exception& error) {
+  throw damagedBag(file, error);
 }
 
 namespace {
@@ -466,6 +473,37 @@ Recording openBagOf(const std::string& path, const std::string& radar, BagOption
   return openBag(path, options);
 }
 
+std::string firstBytes(const std::string& file) {
+  constexpr std::size_t kEnough = 4096;
+  std::string bytes(kEnough, '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(in.gcount()));
+  return bytes;
+}
+
+/// By its name or by its bytes, which are no text's.
+bool meansCapture(const std::string& path) {
+  if (fs::is_directory(path)) return false;
+  if (fs::path(path).extension() == ".bin") return true;
+  const std::string bytes = firstBytes(path);
+  const bool binary =
+      std::any_of(bytes.begin(), bytes.end(), [](unsigned char c) { return c < 0x20 && !std::isspace(c); });
+  if (!binary) return false;
+  const std::string kind = foreignKind(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+  if (!kind.empty()) throw InputError(path + ": is " + kind);
+  return true;
+}
+
+/// A text under another name than session.yaml shall say that it is one.
+void refuseOtherText(const std::string& path) {
+  if (fs::is_directory(path) || fs::path(path).filename() == "session.yaml") return;
+  if (firstBytes(path).find("mmradartwin_session") != std::string::npos) return;
+  throw InputError(path +
+                   ": is a text and no session.yaml, which has a line format: mmradartwin_session/1; give a "
+                   "session directory, a bag or a capture");
+}
+
 [[noreturn]] void refuseFolderOfBags(const std::string& folder) {
   std::vector<std::string> bags;
   for (const auto& entry : fs::directory_iterator(folder)) {
@@ -483,10 +521,10 @@ Recording openBagOf(const std::string& path, const std::string& radar, BagOption
 
 Recording openRecording(const std::string& path, const std::string& radar_file,
                         const std::optional<CaptureLayout>& layout, const BagOptions& bag_options) {
-  const std::string extension = fs::path(path).extension().string();
   if (!fs::exists(path)) {
-    throw InputError(path + ": no such file or folder; give a session directory, a .bag or a .bin capture");
+    throw InputError(path + ": no such file or folder; give a session directory, a bag or a capture");
   }
+  requireRegularFile(path);
   if (meansBag(path)) {
     if (layout) throw InputError(path + ": a bag holds cubes, not captures; leave --layout out");
     return openBagOf(path, radar_file, bag_options);
@@ -495,16 +533,19 @@ Recording openRecording(const std::string& path, const std::string& radar_file,
     throw InputError(path + ": is no bag, and only bags are read together; give one session or capture");
   }
   if (fs::is_directory(path) && !fs::exists(fs::path(path) / "session.yaml")) refuseFolderOfBags(path);
-  if (extension == ".bin") {
+  if (meansCapture(path)) {
     if (radar_file.empty())
       throw InputError(path + ": a bare capture needs a radar description; give --radar radar.yaml");
     RadarConfig radar = loadRadarConfig(radar_file);
     if (layout) radar.layout = *layout;
     return openCapture(path, radar);
   }
+  refuseOtherText(path);
   SessionOptions options;
   options.radar_file = radar_file;
   options.layout = layout;
+  options.exclude_duplicates = bag_options.exclude_duplicates;
+  options.need_captures = bag_options.need_captures;
   return openSession(path, options);
 }
 

@@ -10,6 +10,7 @@
 
 #include "mmradartwin_dsp/bag_kind.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
 
 namespace mmradartwin {
@@ -47,6 +48,10 @@ bool standsAlone(const std::string& file) {
 
 }  // namespace
 
+InputError damagedBag(const std::string& file, const ros::Exception& error) {
+  return InputError(file + ": bag is damaged (" + error.what() + "); record it again, or try rosbag reindex");
+}
+
 std::optional<std::string> namespaceOf(const std::string& topic, const std::string& ending) {
   const std::string name = "/" + withoutSlash(topic), end = "/" + ending;
   if (name.size() < end.size() || name.compare(name.size() - end.size(), end.size(), end) != 0) return std::nullopt;
@@ -81,6 +86,7 @@ std::string radarFrame(const BagSet& bags, const std::string& cube_topic, const 
 
 BagSet::BagSet(const std::vector<std::string>& files) : files_(files), label_(files.front()) {
   for (const std::string& file : files) {
+    requireRegularFile(file);
     if (!fs::is_regular_file(file)) throw InputError(file + ": no such bag; give a file that exists");
     const auto same = std::find_if(files.begin(), files.end(), [&](const std::string& other) {
       std::error_code ignored;

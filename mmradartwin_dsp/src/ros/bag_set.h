@@ -1,5 +1,6 @@
 #pragma once
 
+#include <ros/exception.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 
@@ -8,7 +9,12 @@
 #include <string>
 #include <vector>
 
+#include "mmradartwin_dsp/input_error.h"
+
 namespace mmradartwin {
+
+/// What to say of a bag whose bytes rosbag or a message's reader could make nothing of.
+InputError damagedBag(const std::string& file, const ros::Exception& error);
 
 /// Bags that are read as one, by the time at which messages were recorded: the parts of a split recording, or what two
 /// computers recorded.

@@ -224,7 +224,7 @@ void checkPoses(const std::string& file, const std::string& label, BagOptions op
 }  // namespace
 
 std::vector<BagFinding> validateBag(const std::string& file, const BagOptions& options, const BagLimits& limits,
-                                    const PoseProgress& progress) {
+                                    const PoseProgress& progress) try {
   std::vector<std::string> files = {file};
   files.insert(files.end(), options.further.begin(), options.further.end());
   const BagSet bags(files);
@@ -289,6 +289,8 @@ std::vector<BagFinding> validateBag(const std::string& file, const BagOptions& o
     }
   }
   return findings.all;
+} catch (const ros::Exception& error) {
+  throw damagedBag(file, error);
 }
 
 }  // namespace mmradartwin

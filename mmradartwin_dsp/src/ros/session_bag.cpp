@@ -7,11 +7,14 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
 
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/input_file.h"
 #include "mmradartwin_dsp/ros/bag.h"
+#include "mmradartwin_dsp/ros/bag_writer.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/session_files.h"
 #include "mmradartwin_dsp/sha256.h"
@@ -65,8 +68,8 @@ class SessionBagWriter {
   SessionBagWriter(const Recording& recording, rosbag::Bag& bag)
       : recording_(recording), bag_(bag), hash_(radarHash(recording.radar)) {}
 
-  /// Returns true where the pose's capture went into the bag as cubes.
-  bool add(const Pose& pose) {
+  /// Returns true where the pose's capture went into the bag as cubes; `problem` says what is wrong with it.
+  bool add(const Pose& pose, std::string& problem) {
     try {
       const CaptureReader reader(recording_.radar, captureOf(recording_.capture_pattern, pose.name));
       if (!reader.plain() || !survivesCubes(recording_.radar, reader)) return false;
@@ -79,7 +82,8 @@ class SessionBagWriter {
         writePose(pose, pose.stamp_ns + recording_.radar.frame_offset_ns(i) + quarter);
       }
       return true;
-    } catch (const InputError&) {  // missing or truncated: reading the bag will say so, as reading the session does
+    } catch (const InputError& error) {  // reading the bag will say so too
+      problem = error.what();
       return false;
     }
   }
@@ -133,8 +137,9 @@ std::string writeFrames(const Recording& recording, const Pose& pose, const std:
   return hash.hex();
 }
 
-void restoreSession(const mmradartwin_msgs::Session& message, const std::string& bag, const std::string& directory,
-                    const PoseProgress& progress, BagOptions options) {
+std::vector<PoseProblem> restoreSession(const mmradartwin_msgs::Session& message, const std::string& bag,
+                                        const std::string& directory, const PoseProgress& progress,
+                                        BagOptions options) {
   const std::vector<StoredFile> files = storedFiles(message);
   const auto has_file = [&files](const std::string& name) {
     return std::any_of(files.begin(), files.end(), [&](const StoredFile& file) { return file.name == name; });
@@ -146,7 +151,7 @@ void restoreSession(const mmradartwin_msgs::Session& message, const std::string&
   options.exclude_duplicates = false;
   const Recording recording = openBag(bag, options);
   const std::size_t total = recording.pose_names.size();
-  std::vector<std::string> different;
+  std::vector<PoseProblem> different;
   for (std::size_t i = 0; i < total; ++i) {
     const std::string& name = recording.pose_names[i];
     const std::string expected = i < message.capture_sha256.size() ? message.capture_sha256[i] : "";
@@ -161,17 +166,15 @@ void restoreSession(const mmradartwin_msgs::Session& message, const std::string&
       } catch (const InputError&) {  // no frames: counted below, as any other difference
         fs::remove(fs::path(directory) / captureOf(pattern, name));
       }
-      if (found != expected) different.push_back(name);
+      if (found != expected) {
+        different.push_back({name, bag + ": pose '" + name +
+                                       "': the bag's frames are not the whole capture (lost on the way, or cut out)"});
+      }
     }
     if (progress) progress(static_cast<int>(i) + 1, static_cast<int>(total));
   }
   restoreSessionFiles(files, directory);
-  if (different.empty()) return;
-  throw InputError(bag + ": pose '" + different.front() + "'" +
-                   (different.size() > 1 ? " and " + std::to_string(different.size() - 1) + " more" : "") +
-                   ": the bag's frames are not the whole capture (lost on the way, or cut out); the rest of the "
-                   "session was written to " +
-                   directory);
+  return different;
 }
 
 void writeFoundSession(const std::string& bag, const std::string& directory, const PoseProgress& progress,
@@ -195,8 +198,8 @@ void writeFoundSession(const std::string& bag, const std::string& directory, con
 
 }  // namespace
 
-void bagToSession(const std::string& bag, const std::string& directory, const PoseProgress& progress,
-                  const BagOptions& options) {
+std::vector<PoseProblem> bagToSession(const std::string& bag, const std::string& directory,
+                                      const PoseProgress& progress, const BagOptions& options) try {
   if (fs::exists(fs::path(directory) / "session.yaml")) {
     throw InputError(directory + ": holds a session already; give a new folder");
   }
@@ -207,11 +210,15 @@ void bagToSession(const std::string& bag, const std::string& directory, const Po
   fs::create_directories(directory, error);
   if (error)
     throw InputError(directory + ": folder cannot be made (" + error.message() + "); give one that can be written");
-  message ? restoreSession(*message, bag, directory, progress, options)
-          : writeFoundSession(bag, directory, progress, options);
+  if (message) return restoreSession(*message, bag, directory, progress, options);
+  writeFoundSession(bag, directory, progress, options);
+  return {};
+} catch (const ros::Exception& error) {
+  throw damagedBag(bag, error);
 }
 
-void sessionToBag(const std::string& session, const std::string& bag_file, const PoseProgress& progress) {
+std::vector<PoseProblem> sessionToBag(const std::string& session, const std::string& bag_file,
+                                      const PoseProgress& progress) try {
   SessionOptions options;
   options.exclude_duplicates = false;
   const Recording recording = openSession(session, options);
@@ -222,14 +229,8 @@ void sessionToBag(const std::string& session, const std::string& bag_file, const
   const std::string stored_pattern = storedCapturePattern(files.front().bytes);
   for (const StoredFile& file : files) message.files.push_back(toMsg(file));
 
-  const std::string unfinished = bag_file + ".active";
-  rosbag::Bag bag;
-  try {
-    bag.open(unfinished, rosbag::bagmode::Write);
-  } catch (const rosbag::BagException& error) {
-    throw InputError(bag_file + ": bag cannot be written (" + error.what() +
-                     "); give a file in a folder that can be written");
-  }
+  BagWriter bag_writer(bag_file);
+  rosbag::Bag& bag = bag_writer.bag();
   std::int64_t start_ns = std::numeric_limits<std::int64_t>::max();
   for (const Pose& pose : recording.poses) start_ns = std::min(start_ns, pose.stamp_ns);
   if (recording.poses.empty()) start_ns = 0;
@@ -237,10 +238,14 @@ void sessionToBag(const std::string& session, const std::string& bag_file, const
   message.header.stamp = start;
 
   SessionBagWriter writer(recording, bag);
+  std::map<std::string, const Pose*> poses;
+  for (const Pose& pose : recording.poses) poses[pose.name] = &pose;
+  std::vector<PoseProblem> problems = recording.problems;
   const int total = static_cast<int>(recording.pose_names.size());
   for (int i = 0; i < total; ++i) {
     const std::string& name = recording.pose_names[static_cast<std::size_t>(i)];
     const std::string capture = captureOf(recording.capture_pattern, name);
+    requireRegularFile(capture);
     const bool exists = fs::is_regular_file(capture);
     std::string bytes;  // a capture in several parts comes back as one file
     if (exists) {
@@ -251,9 +256,10 @@ void sessionToBag(const std::string& session, const std::string& bag_file, const
       }
     }
     message.capture_sha256.push_back(exists ? sha256OfBytes(bytes) : "");
-    const auto pose =
-        std::find_if(recording.poses.begin(), recording.poses.end(), [&](const Pose& p) { return p.name == name; });
-    const bool in_cubes = exists && pose != recording.poses.end() && writer.add(*pose);
+    const auto pose = poses.find(name);
+    std::string problem;
+    const bool in_cubes = pose != poses.end() && writer.add(*pose->second, problem);
+    if (!problem.empty()) problems.push_back({name, "pose '" + name + "': " + problem});
     if (exists && !in_cubes) {
       message.files.emplace_back();
       message.files.back().name = captureOf(stored_pattern, name);
@@ -266,8 +272,10 @@ void sessionToBag(const std::string& session, const std::string& bag_file, const
   config.header.frame_id = "radar_link";
   writeLatched(bag, "/radar/config", start, config);
   writeLatched(bag, "/session", start, message);
-  bag.close();
-  fs::rename(unfinished, bag_file);
+  bag_writer.close();
+  return problems;
+} catch (const rosbag::BagException& error) {
+  throw std::runtime_error(bag_file + ": cannot be written to its end (" + error.what() + "); check the free space");
 }
 
 }  // namespace mmradartwin

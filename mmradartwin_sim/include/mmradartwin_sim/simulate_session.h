@@ -25,6 +25,7 @@ double thermalNoise_db(double sample_rate_hz);
 struct SimulateOptions {
   std::string session;                                      ///< session directory; its captures are not needed
   std::string output;                                       ///< session directory to write
+  std::string written_as;                                   ///< folder that becomes `output` at last; "" = output
   std::string twin_file;                                    ///< "" = the session's, or the base
   int frames = 1;                                           ///< per pose; alike but for mechanisms of frames
   std::uint64_t seed = 1;                                   ///< of the scatter points' phases
@@ -48,5 +49,8 @@ struct SimulateResult {
 /// paths/{pose}.csv. Throws InputError where nothing can be simulated. `progress` is told poses done of poses in all,
 /// from any thread.
 SimulateResult simulateSession(const SimulateOptions& options, const std::function<void(int, int)>& progress = {});
+/// Likewise, of the poses of any recording instead of options.session; what it was read from must outlive the call.
+SimulateResult simulateRecording(const Recording& recording, const SimulateOptions& options,
+                                 const std::function<void(int, int)>& progress = {});
 
 }  // namespace mmradartwin

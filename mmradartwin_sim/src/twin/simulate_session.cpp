@@ -24,10 +24,18 @@ constexpr double kStrongest_dbfs = -6;
 const std::string kNoise = "noise_floor";
 constexpr double kLowestNoise_dbfs = -200;  // that noise_floor takes
 
-/// A path as it is to stand in a session of `folder`: relative, so that both may be moved together.
-std::string relativeTo(const std::string& folder, const std::string& file) {
+/// The folder that is written.
+fs::path folderOf(const SimulateOptions& options) {
+  return options.written_as.empty() ? options.output : options.written_as;
+}
+
+/// A path as it is to stand in the session: relative, so that both may be moved together.
+std::string relativeTo(const SimulateOptions& options, const std::string& file) {
   if (file.rfind("package://", 0) == 0) return file;
-  return fs::proximate(fs::weakly_canonical(file), fs::weakly_canonical(folder)).string();
+  const fs::path path = fs::weakly_canonical(file), written = fs::weakly_canonical(folderOf(options));
+  const fs::path inside = path.lexically_relative(written);
+  if (!inside.empty() && *inside.begin() != "..") return inside.string();
+  return fs::proximate(path, fs::weakly_canonical(options.output)).string();
 }
 
 /// One frame: every loop repeats the grid's samples, slot by slot.
@@ -141,7 +149,7 @@ void addLevels(const Job& job, const Simulation& s, SampleLevels& levels) {
 /// problems. Writes the paths' files.
 std::vector<Simulation> simulatePoses(const Job& job, const std::function<void(int, int)>& progress,
                                       SampleLevels& levels, SimulateResult& result) {
-  const fs::path paths = fs::path(job.options.output) / "paths";
+  const fs::path paths = folderOf(job.options) / "paths";
   fs::create_directories(paths);
   const int count = job.poses();
   std::vector<Simulation> simulated(job.recording.poses.size());
@@ -184,7 +192,7 @@ void refuseNothing(const Job& job, const std::vector<Simulation>& simulated, con
   const bool any =
       std::any_of(simulated.begin(), simulated.end(), [](const Simulation& s) { return s.grid.x.size() > 0; });
   if (any) return;
-  throw InputError(job.options.session + ": no pose can be simulated" +
+  throw InputError(job.recording.source + ": no pose can be simulated" +
                    (result.problems.empty() ? std::string("; poses.csv has none")
                                             : "; the first: " + result.problems.front().message));
 }
@@ -220,13 +228,12 @@ std::vector<AdcCube> framesOf(const Job& job, const Pose& pose, const Simulation
 /// Writes the session and its captures.
 void writeSession(const Job& job, std::vector<Simulation>& simulated, SimulateResult& result) {
   const RadarConfig& radar = job.twin.radar();
-  const std::string& output = job.options.output;
   SessionWriter::Files files;
   files.radar_yaml = toYaml(radar);
-  files.scene = relativeTo(output, job.twin.description().scene_file);
-  if (job.recording.twin_file) files.twin = relativeTo(output, *job.recording.twin_file);
+  files.scene = relativeTo(job.options, job.twin.description().scene_file);
+  if (job.recording.twin_file) files.twin = relativeTo(job.options, *job.recording.twin_file);
   files.gain_db = result.gain_db;
-  SessionWriter writer(output, radar, files);
+  SessionWriter writer(folderOf(job.options).string(), radar, files);
   // Frames of some poses at once, written in order; bounded by what they take.
   const double bytes_per_pose = static_cast<double>(radar.bytes_per_frame()) * job.options.frames;
   const int at_once = static_cast<int>(std::min(16.0, std::max(1.0, 64e6 / bytes_per_pose)));
@@ -267,9 +274,18 @@ Twin withNoise(const Twin& twin, const std::vector<Pose>& poses, double level_db
 }
 
 void writeResolvedTwin(const Job& job) {
-  std::ofstream resolved(fs::path(job.options.output) / "twin.resolved.yaml");
-  resolved << "# The twin that made this session, with all its parameters.\n" << job.twin.description().toYaml();
-  if (!resolved) throw std::runtime_error(job.options.output + "/twin.resolved.yaml: cannot be written");
+  // What a bag brought stands in the session itself, which will have another name.
+  TwinDescription twin = job.twin.description();
+  const std::string written = fs::weakly_canonical(folderOf(job.options)).string() + "/";
+  for (std::string* file : {&twin.scene_file, &twin.radar_file}) {
+    if (fs::weakly_canonical(*file).string().compare(0, written.size(), written) == 0)
+      *file = relativeTo(job.options, *file);
+  }
+  const std::string file = (folderOf(job.options) / "twin.resolved.yaml").string();
+  std::ofstream resolved(file);
+  resolved << "# The twin that made this session, with all its parameters.\n" << twin.toYaml();
+  resolved.close();
+  if (!resolved) throw std::runtime_error(file + ": cannot be written; check folder, rights and free space");
 }
 
 }  // namespace
@@ -282,7 +298,11 @@ double thermalNoise_db(double sample_rate_hz) {
 }
 
 SimulateResult simulateSession(const SimulateOptions& options, const std::function<void(int, int)>& progress) {
-  const Recording recording = openInput(options);
+  return simulateRecording(openInput(options), options, progress);
+}
+
+SimulateResult simulateRecording(const Recording& recording, const SimulateOptions& options,
+                                 const std::function<void(int, int)>& progress) {
   std::optional<tbb::global_control> limit;
   if (options.jobs > 0)
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.jobs));

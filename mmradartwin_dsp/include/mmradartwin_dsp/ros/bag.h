@@ -19,6 +19,7 @@ struct BagOptions {
   /// Recording.
   std::string unpack_to;
   bool exclude_duplicates = true;
+  bool need_captures = true;  ///< of a session that is no bag; false to simulate its poses
   /// Of the session message's poses only those of which the bag holds frames; the others are otherwise errors where
   /// they are read.
   bool seen_only = false;
@@ -41,9 +42,9 @@ struct BagOptions {
 /// found in tf take the names of the session's poses at those places.
 Recording openBag(const std::string& file, const BagOptions& options = {});
 
-/// Opens whatever PATH is: session directory or session.yaml, a bag (by its first bytes), or (with `radar_file`) a bare
-/// *.bin capture. `radar_file` and `layout` replace what a session says. A bag brings its radar: of it, `radar_file` is
-/// the namespace of one of several radars, as bag_options.ns; it takes no layout.
+/// Opens whatever PATH is: session directory or session.yaml, a bag, or (with `radar_file`) a bare capture; files are
+/// known by their first bytes. `radar_file` and `layout` replace what a session says. A bag brings its radar: of it,
+/// `radar_file` is the namespace of one of several radars, as bag_options.ns; it takes no layout.
 Recording openRecording(const std::string& path, const std::string& radar_file = "",
                         const std::optional<CaptureLayout>& layout = std::nullopt, const BagOptions& bag_options = {});
 
@@ -54,14 +55,15 @@ using PoseProgress = std::function<void(int done, int total)>;
 /// from outside of the directory fare), latched `radar/config`, one `radar/adc` message per frame, and T_map_radar in
 /// /tf a quarter of a period before the first frame and after every frame of a pose, so that a replay need not wait for
 /// the pose's end. All poses are written, duplicates too; captures that cubes cannot carry (truncated ones, those of
-/// unusable poses) travel as files in the session message. Messages are recorded at their stamps. The bag appears under
-/// its name when it is complete.
-void sessionToBag(const std::string& session, const std::string& bag, const PoseProgress& progress = {});
+/// unusable poses) travel as files in the session message. Messages are recorded at their stamps. Returns the poses
+/// that are unusable, or whose captures are missing or truncated.
+std::vector<PoseProblem> sessionToBag(const std::string& session, const std::string& bag,
+                                      const PoseProgress& progress = {});
 
 /// Inverse of sessionToBag, byte for byte; from any other bag, a session with the poses found in it. Throws InputError
-/// where the directory holds a session already, and, after writing the rest, where captures are not what the session
-/// message says (its frames were lost or cut out of the bag).
-void bagToSession(const std::string& bag, const std::string& directory, const PoseProgress& progress = {},
-                  const BagOptions& options = {});
+/// where the directory holds a session already. Returns the poses whose captures are not what the session message says
+/// (frames were lost or cut out of the bag).
+std::vector<PoseProblem> bagToSession(const std::string& bag, const std::string& directory,
+                                      const PoseProgress& progress = {}, const BagOptions& options = {});
 
 }  // namespace mmradartwin

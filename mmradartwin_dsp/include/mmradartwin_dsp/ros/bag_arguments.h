@@ -12,4 +12,9 @@ namespace mmradartwin {
 /// bag go to stderr.
 void addBagArguments(CLI::App& app, BagOptions& options);
 
+/// Adds --keep-duplicates.
+void addDuplicatesArgument(CLI::App& app, BagOptions& options);
+/// Notes on stderr which poses were left out as duplicates, and by what rule.
+void noteDuplicates(const Recording& recording);
+
 }  // namespace mmradartwin
