@@ -401,6 +401,7 @@ TEST_F(FramesTest, EveryMechanismCanBeSwitchedOn) {
       {"range_bias", "range_m: 0.03"},
       {"range_scale", "scale: 0.01"},
       {"scene_registration", "x_m: 0.05, y_m: 0.02, yaw_deg: 1"},
+      {"scene_scale", "scale: 0.005"},
       {"second_harmonic", "level_db: -15"},
       {"surface_roughness", "material: Metal, roughness_rms_m: 0.0002"},
       {"transmission", "actor: pane, one_way_db: -3"},

@@ -399,6 +399,41 @@ TEST_F(Propagation, RoomAndMountStandWhereTheCausesSay) {
   EXPECT_NEAR(db(look("  excess_attenuation: {db_per_m: 0.8}\n").amplitude / look("").amplitude), -2.4, 1e-9);
 }
 
+// A scan that is 1 % too small: a wall at distance d of map's origin stands at 1.01 d, the radar where it stood.
+TEST_F(Propagation, AScaledSceneIsLargerAboutTheOrigin) {
+  addWall("wall", "Metal", {3, -10}, {3, 10}, -5, 5);
+  writeScene();
+  const auto range = [&](const std::string& m, double x) {
+    return makeTwin(path("scene.yaml"), "  specular: {}\n" + m).simulate(radarPose(x, 0, 0)).records.at(0).length_m[0] /
+           2;
+  };
+  for (double x : {0.0, 1.0, -2.0}) {
+    EXPECT_NEAR(range("  scene_scale: {scale: 0.01}\n", x), 3.03 - x, 1e-9);
+    EXPECT_NEAR(range("  scene_scale: {scale: -0.2}\n", x), 2.4 - x, 1e-9);
+    // The scale comes first, the shift is in true metres.
+    EXPECT_NEAR(range("  scene_scale: {scale: 0.01}\n  scene_registration: {x_m: 0.1}\n", x), 3.13 - x, 1e-9);
+  }
+}
+
+// The echo of a square plate follows from its size over the Fresnel zone: a scaled plate is a larger plate farther
+// away.
+TEST_F(Propagation, AScaledSceneEqualsOneDrawnLarger) {
+  addWall("plate", "Metal", {2, -0.03}, {2, 0.03}, -0.03, 0.03);
+  addBox("cabinet", "Metal", V(1.5, 1, -2), V(2.5, 2, 2));
+  writeScene();
+  const Simulation scaled = run("  specular: {}\n  corner: {}\n  scene_scale: {scale: 0.25}\n");
+  addWall("plate", "Metal", {2.5, -0.0375}, {2.5, 0.0375}, -0.0375, 0.0375);
+  addBox("cabinet", "Metal", V(1.875, 1.25, -2.5), V(3.125, 2.5, 2.5));
+  writeScene();
+  const Simulation drawn = run("  specular: {}\n  corner: {}\n");
+  ASSERT_EQ(scaled.records.size(), drawn.records.size());
+  ASSERT_FALSE(drawn.records.empty());
+  for (std::size_t i = 0; i < drawn.records.size(); ++i) {
+    EXPECT_NEAR(scaled.records[i].length_m[0], drawn.records[i].length_m[0], 1e-9);
+    EXPECT_NEAR(scaled.records[i].amplitude / drawn.records[i].amplitude, 1, 1e-9);
+  }
+}
+
 // A radar that goes at v and turns at w while its poses are stamped late by L is ahead of them by vL and wL.
 TEST_F(Propagation, PosesThatAreStampedLateShiftAMovingRadar) {
   addWall("wall", "Metal", {5, -20}, {5, 20}, -5, 5);

@@ -18,9 +18,10 @@ from mmradartwin_tests.blind import draws, ledger, recordings, table, trials
 from mmradartwin_tests.installed_programs import find_program
 
 # Of rows with several effects, this many of each; of the other rows, this many in all.
-TRIALS = {"clean": 100, "single": 8, "faint": 6, "pair": 40, "twice": 2, "outside": 3, "decoy": 5, "recording": 3}
-EFFECTS = {"clean": 1, "single": len(draws.SINGLE), "faint": len(draws.FAINT), "pair": 1, "twice": len(draws.TWICE),
-           "outside": len(draws.OUTSIDE), "decoy": len(draws.DECOYS), "recording": len(recordings.INJECTIONS)}
+TRIALS = {"clean": 100, "single": 8, "later": 8, "faint": 6, "pair": 40, "twice": 2, "outside": 3, "decoy": 5,
+          "recording": 3}
+EFFECTS = {"clean": 1, "single": len(draws.SINGLE), "later": len(draws.LATER), "faint": len(draws.FAINT), "pair": 1,
+           "twice": len(draws.TWICE), "outside": len(draws.OUTSIDE), "decoy": len(draws.DECOYS), "recording": len(recordings.INJECTIONS)}
 
 
 def parse():

@@ -10,6 +10,10 @@ from in_folder import InFolder
 from stated_error import assert_told
 
 ELSEWHERE = {"pose_time_lag"}   # of a radar that is carried: test_moving_bag
+# Further sessions: what a cause looks like besides.
+FURTHER = {
+    "a_scan_too_small": ("scene_scale", {"scale": 0.01}),
+}
 SEED = 61
 
 
@@ -17,30 +21,42 @@ SEED = 61
 class EveryCause(InFolder):
     """12 poses at six places, six frames each. Every number that a finding states is right within its own interval."""
 
-    def check(self, cause):
-        """One session with the cause in it."""
+    def first_of(self, cause, values):
+        """(measurement, first finding) of one session with the cause in it."""
         measurement = Measurement(Settings(output=self.at("session"), seed=SEED, poses=12, headings=2,
                                            frames=6, tier="default", duplicates=0,
-                                           effects=[effects.make_effect(cause, effects.EFFECTS[cause].plain, None)]))
+                                           effects=[effects.make_effect(cause, values, None)]))
         measurement.run()
         status, findings, errors = diagnose(self.at("session"), self.at("out"), "--findings", "1")
         self.assertEqual(status, 0, msg=errors)
         self.assertTrue(findings["findings"], msg="nothing is found")
-        first = findings["findings"][0]
+        return measurement, findings["findings"][0]
+
+    def check(self, cause, values, told_names=()):
+        """One session. told_names: of parameters that the finding has to state."""
+        measurement, first = self.first_of(cause, values)
         self.assertEqual(first["cause"], cause, msg=str(first))
         truth, = measurement.truth()["effects"]
         for name, told in first["parameters"].items():
             if told.get("ci95") and name in truth["parameters"]:
                 assert_told(self, told, truth["parameters"][name], msg=f"{name} of {cause}")
+        for name in told_names:
+            told = first["parameters"].get(name, {}).get("value")
+            self.assertIsNotNone(told, msg=str(first))
+            self.assertEqual(isinstance(told, list), isinstance(values[name], list), msg=str(first))
+            if isinstance(values[name], (str, int)):
+                self.assertEqual(told, values[name])
 
 
-def test_of(cause):
+def test_of(cause, values, told_names=()):
     """A test's method."""
-    return lambda self: self.check(cause)
+    return lambda self: self.check(cause, values, told_names)
 
 
 for one in effects.EFFECTS:
-    setattr(EveryCause, f"test_{one}", test_of(one))
+    setattr(EveryCause, f"test_{one}", test_of(one, effects.EFFECTS[one].plain))
+for name, (one, values) in FURTHER.items():
+    setattr(EveryCause, f"test_{name}", test_of(one, values, values))
 
 
 @unittest.skipIf(catalogue.PROGRAM is None, "mmradartwin_sim simulate is not built in this workspace")

@@ -121,6 +121,9 @@ void rebuildFacets(Scene& scene);
 void addActor(Scene& scene, Actor actor);
 /// Moves an actor with its facets; indices and facet-local coordinates stay, but for what coincides with others.
 void moveActor(Scene& scene, int actor, const Eigen::Isometry3d& T_map_map);
+/// Makes all that is in the scene larger by a factor about map's origin; indices stay, and what was one facet stays
+/// one.
+void scaleScene(Scene& scene, double factor);
 /// Takes an actor out of paths and occlusion; indices stay.
 void removeActor(Scene& scene, int actor);
 /// Reads one mesh file into actors, upright and in metres by what it declares (mesh_frame.h), without materials or

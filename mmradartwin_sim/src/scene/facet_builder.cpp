@@ -390,6 +390,44 @@ void moveActor(Scene& scene, int index, const Eigen::Isometry3d& T) {
   relateFacets(scene);
 }
 
+void scaleScene(Scene& scene, double factor) {
+  for (std::vector<Actor>* list : {&scene.actors, &scene.occluders_only}) {
+    for (Actor& actor : *list) {
+      actor.bounds.setEmpty();
+      for (auto& v : actor.vertices) {
+        v *= factor;
+        actor.bounds.extend(v);
+      }
+      actor.T_map_mesh.translation() *= factor;
+      actor.repeated_m2 *= factor * factor;
+    }
+  }
+  const auto scaleLoops = [factor](std::vector<std::vector<Eigen::Vector2d>>& loops) {
+    for (auto& loop : loops) {
+      for (Eigen::Vector2d& p : loop) p *= factor;
+    }
+  };
+  for (Facet& f : scene.facets) {
+    f.origin *= factor;
+    f.size1_m *= factor;
+    f.size2_m *= factor;
+    f.area_m2 *= factor * factor;
+    f.flatness_m *= factor;
+    scaleLoops(f.loops);
+  }
+  for (auto& [id, shape] : scene.uncut) {
+    shape.area_m2 *= factor * factor;
+    scaleLoops(shape.loops);
+  }
+  for (CurvedSurface& s : scene.curved) {
+    s.center *= factor;
+    s.length_m *= factor;
+    s.radius_m *= factor;
+    s.sagitta_m *= factor;
+  }
+  relateFacets(scene);
+}
+
 void removeActor(Scene& scene, int index) {
   scene.actors.at(index).present = false;
   for (int id : scene.actors[index].facets) scene.facets[id].present = false;

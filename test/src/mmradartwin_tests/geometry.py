@@ -128,6 +128,18 @@ class Actor:
                 parts.append(Rectangle(place(part.origin), rotation @ part.e1, rotation @ part.e2, part.s1, part.s2))
         return dataclasses.replace(self, parts=parts)
 
+    def scaled(self, factor):
+        """The same thing larger by a factor about the origin."""
+        parts = []
+        for part in self.parts:
+            if isinstance(part, Box):
+                parts.append(Box(factor * part.center, factor * part.size, part.rotation))
+            elif isinstance(part, Cylinder):
+                parts.append(Cylinder(factor * part.center, factor * part.radius, factor * part.height))
+            else:
+                parts.append(Rectangle(factor * part.origin, part.e1, part.e2, factor * part.s1, factor * part.s2))
+        return dataclasses.replace(self, parts=parts)
+
 
 def box(center, size, yaw_deg=0.0):
     """Box by its centre and size, turned about z."""

@@ -47,6 +47,7 @@ std::vector<CauseDescription> builtInCauses() {
            kC4,
            {{"x_m", "m"}, {"y_m", "m"}, {"yaw_deg", "deg"}},
            {Form::kSceneOffset, Experiment::kTurnAndMeasure}},
+          {"scene_scale", kC4, {{"scale", "1"}}, {Form::kOrdinary, Experiment::kTurnAndMeasure}},
           {"radar_pitch_offset", kC4, {{"pitch_deg", "deg"}}, {Form::kOrdinary, Experiment::kRaise}},
           {"pose_time_lag", kC4, {{"lag_s", "s"}}},
           {"channel_phase_error",

@@ -15,7 +15,8 @@
 namespace mmradartwin::diagnosis::rounds {
 namespace {
 
-constexpr std::size_t kMostNames = 5;  ///< named causes fitted in a round
+constexpr std::size_t kMostNames = 5;       ///< named causes fitted in a round
+constexpr std::size_t kMostGeometries = 6;  ///< errors of all ranges or directions
 constexpr std::size_t kMostLaws = 4;
 constexpr double kMostFits = 20;         ///< of a round, for the progress display
 constexpr double kLeastForFit_nats = 4;  ///< screened gain
@@ -97,8 +98,8 @@ std::vector<HypothesisFit> FitRound::fit(std::vector<Screened> screened, std::si
     // docs/calibration_of_bounds.md#screened-gain-of-a-geometry.
     const bool law = !isCatalogued(screened.hypothesis.mechanism.mechanism);
     const bool object = isObject(screened.hypothesis), geometry = screened.hypothesis.isGeometry();
-    std::size_t& fitted = law ? laws_fitted : object ? objects_fitted : geometry ? geometries_fitted : names_fitted;
     const bool moved = screened.hypothesis.isMove();
+    std::size_t& fitted = law ? laws_fitted : object ? objects_fitted : geometry ? geometries_fitted : names_fitted;
     const bool box = isUnmodelledBox(screened.hypothesis);
     const double rival = kLeastShareOfRound * best_overwhelming_name_;
     const double least_nats = box      ? (fits_.empty() ? kLeastForBox_nats : kLeastShareForBox * fits_.front().gain)
@@ -107,10 +108,11 @@ std::vector<HypothesisFit> FitRound::fit(std::vector<Screened> screened, std::si
                               : geometry || moved ? kLeastForFitOfGeometry_nats
                                                   : std::max(kLeastForFit_nats, rival);
     // Only a fit knows where an actor went: its screened gain does not rank it.
-    const std::size_t most = law      ? kMostLaws
-                             : object ? kMostObjects
-                             : moved  ? kMostNames + kMostOutOfPlace
-                                      : kMostNames;
+    const std::size_t most = law        ? kMostLaws
+                             : object   ? kMostObjects
+                             : geometry ? kMostGeometries
+                             : moved    ? kMostNames + kMostOutOfPlace
+                                        : kMostNames;
     if (screened.screened_nats > least_nats && (box || fitted < most)) {
       ++fitted;
       fitOne(std::move(screened));

@@ -19,14 +19,17 @@ constexpr double kEdges[] = {0.8, 1.0, 1.3};             ///< values that put a 
 constexpr double kMaterialValues[] = {0.7, 1, 1.5};
 constexpr double kLeastAbsorbed_nats = 1;                              ///< least nats of those latents
 constexpr double kShifts_m[] = {-0.3, -0.14, -0.06, 0.06, 0.14, 0.3};  ///< shifts of all echoes of an actor, one-way
-constexpr double kRadii[] = {1, 2, 4, 7};               ///< scaled radii about the place where an actor stood
-constexpr double kRefinementFactors[] = {0.35, 0.18};   ///< shares of the best place's distance
-constexpr int kDirections = 8;                          ///< directions at each radius
-constexpr double kTurns_deg[] = {-8, -5, -3, 3, 5, 8};  ///< turns of an actor about itself
-constexpr std::size_t kLookedAtFirst = 3;               ///< every third pose is evaluated first
-constexpr double kHopeless_nats = 60;                   ///< loss over all poses by which a value is then given up
-constexpr std::size_t kStartsKept = 6;                  ///< starts that are kept
-constexpr double kMostLossOfStart_nats = 10;            ///< loss up to which a place is judged with refitted latents
+constexpr double kRadii[] = {1, 2, 4, 7};                 ///< scaled radii about the place where an actor stood
+constexpr double kRefinementFactors[] = {0.35, 0.18};     ///< shares of the best place's distance
+constexpr int kDirections = 8;                            ///< directions at each radius
+constexpr double kTurns_deg[] = {-8, -5, -3, 3, 5, 8};    ///< turns of an actor about itself
+constexpr std::size_t kRatioPoses = 12, kRatiosKept = 3;  ///< poses of a scan over ratios, and starts that it gives
+constexpr int kRatioSteps = 16;                           ///< values to either side of none
+constexpr double kRatioStep = 0.5;                        ///< between them, scaled: 2 cm at 8 m of a room's scale
+constexpr std::size_t kLookedAtFirst = 3;                 ///< every third pose is evaluated first
+constexpr double kHopeless_nats = 60;                     ///< loss over all poses by which a value is then given up
+constexpr std::size_t kStartsKept = 6;                    ///< starts that are kept
+constexpr double kMostLossOfStart_nats = 10;              ///< loss up to which a place is judged with refitted latents
 constexpr double kMostStart = 8, kLeastOneSidedStart = 0.02;  ///< limits of a start
 
 /// Latents without the gains of a material's actors, and the nats that the prior charged for these gains. spread: prior
@@ -283,6 +286,25 @@ Screened HypothesisScreen::directly(const ModelState& null, const Hypothesis& hy
   return {hypothesis, best, {start}};
 }
 
+void HypothesisScreen::scanRatio(const ModelState& null, const std::vector<int>& poses, Screened& of) {
+  SessionLatents free = null.latents;  // errors of ranges and headings have absorbed a part of it
+  std::fill(free.actor_range_m.begin(), free.actor_range_m.end(), 0.0);
+  std::fill(free.yaw_rad.begin(), free.yaw_rad.end(), 0.0);
+  std::vector<int> few;
+  const std::size_t wanted = std::min(kRatioPoses, poses.size());
+  for (std::size_t i = 0; i < wanted; ++i) few.push_back(poses[i * poses.size() / wanted]);
+  std::vector<std::pair<double, double>> values;  // gain and scaled value
+  for (int i = -kRatioSteps; i <= kRatioSteps; ++i) {
+    if (i == 0) continue;
+    const double at = kRatioStep * i;
+    const double beside = values.empty() ? 0 : std::max_element(values.begin(), values.end())->first;
+    values.emplace_back(valueAt(null, of.hypothesis, {at}, few, free, beside).first, at);
+    source_.setBaseline(null.mechanisms);
+  }
+  std::sort(values.rbegin(), values.rend());
+  for (std::size_t i = 0; i < kRatiosKept; ++i) of.starts.push_back({values[i].second});
+}
+
 Screened HypothesisScreen::screen(const ModelState& null, const Hypothesis& hypothesis, const std::vector<int>& poses) {
   if (hypothesis.isOneSided()) return directly(null, hypothesis, poses);
   Screened result{hypothesis, 0, {std::vector<double>(hypothesis.coordinates.size(), 1.0)}};
@@ -327,6 +349,7 @@ Screened HypothesisScreen::screen(const ModelState& null, const Hypothesis& hypo
       result.screened_nats = screened_nats;
       result.starts.push_back({scaled_values});
     }
+    if (hypothesis.coordinates[0].unit == "1" && result.screened_nats > 0) scanRatio(null, poses, result);
   }
   return result;
 }

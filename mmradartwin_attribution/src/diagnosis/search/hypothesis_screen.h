@@ -36,6 +36,9 @@ class HypothesisScreen {
   Screened around(const ModelState& null, const Hypothesis& hypothesis, int actor, const std::vector<int>& poses);
 
  private:
+  /// Adds starts of a ratio that edits the scene, the likeliest of a scan over its range. The likelihood's optimum is a
+  /// centimetre wide, and a far wall moves by many.
+  void scanRatio(const ModelState& null, const std::vector<int>& poses, Screened& of);
   /// Gain in nats over these poses, and the screened gain. Most values are wrong: where a third of the poses loses far
   /// more than `beside` nats, the other poses are skipped.
   std::pair<double, double> valueAt(const ModelState& null, const Hypothesis& hypothesis,

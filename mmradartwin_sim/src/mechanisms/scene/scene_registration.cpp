@@ -20,7 +20,7 @@ class SceneRegistration : public Mechanism, public SceneStage {
     T_ = Eigen::Translation3d(values.number("x_m"), values.number("y_m"), 0) *
          Eigen::AngleAxisd(values.number("yaw_deg") * M_PI / 180, Eigen::Vector3d::UnitZ());
   }
-  int rank() const override { return 1; }  // after mechanisms that place actors in the twin's room
+  int rank() const override { return 2; }  // after mechanisms that place actors in the twin's room, and its scale
   void editScene(Scene& scene) const override {
     for (std::size_t i = 0; i < scene.actors.size(); ++i) moveActor(scene, static_cast<int>(i), T_);
     for (Actor& screen : scene.occluders_only) {

@@ -193,6 +193,10 @@ SINGLE = {
     "packet_loss": logarithmic("lost_fraction", 0.01, 0.06),
     "packet_misalignment": nothing,
 }
+# Effects that the catalogue got later. They have a row of their own, so that the other rows' seeds draw what they drew.
+LATER = {
+    "scene_scale": uniform("scale", 0.006, 0.015, either_sign=True),
+}
 
 # Things that look like a material and are none.
 DECOYS = {
@@ -203,7 +207,7 @@ DECOYS = {
 }
 OUTSIDE = tuple(name for name in UNCATALOGUED if name not in DECOYS)
 
-ROWS = ("clean", "single", "faint", "pair", "twice", "outside", "decoy", "recording")
+ROWS = ("clean", "single", "later", "faint", "pair", "twice", "outside", "decoy", "recording")
 # Effects of any strength, with what their strength multiplies.
 FAINT = {"range_bias": ("range_m",), "range_scale": ("scale",), "carrier_scale": ("scale",),
          "excess_attenuation": ("db_per_m",), "radar_yaw_offset": ("yaw_deg",), "radar_pitch_offset": ("pitch_deg",),
@@ -256,6 +260,9 @@ def draw(trial):
     if trial.row == "single":
         name = shuffled(SINGLE, trial)
         return [(name, SINGLE[name](rng, trial), None)]
+    if trial.row == "later":
+        name = shuffled(LATER, trial)
+        return [(name, LATER[name](rng, trial), None)]
     if trial.row == "decoy":
         name = shuffled(DECOYS, trial)
         return [(name, DECOYS[name](rng, trial), None)]

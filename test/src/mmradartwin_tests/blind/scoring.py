@@ -177,7 +177,7 @@ def score(row, truths, findings):
     if row == "twice":
         result["told_apart"] = all(m is not None and subject_right(t, m) is not False
                                    and (place_error_m(t, m) or 0) <= PLACE_M for t, m in zip(truths, matched))
-    if row in ("single", "faint", "recording"):
+    if row in ("single", "later", "faint", "recording"):
         first = findings[0] if findings else None
         names = group(first) if first else {}
         result["first"] = first is not None and same_cause(truths[0], first["cause"])

@@ -90,7 +90,8 @@ class Scores:
             truths = ledger.open(record["key"])["effects"]
             if record["status"] != "ok":
                 self.silent += 1
-            self.rows[record["row"]].append((record, truths, score(record["row"], truths, record["findings"])))
+            row = "single" if record["row"] == "later" else record["row"]
+            self.rows[row].append((record, truths, score(record["row"], truths, record["findings"])))
 
     def each(self, row, figure, answered=False):
         """A figure of all trials of a row that have it; `answered`: of those only where the program gave an answer."""
@@ -226,7 +227,7 @@ MATCHED_NATS = -math.log(MATCHED_LEVEL)   # chance brings as large a ratio as of
 # What moves echoes lets paths come and go, and gains by it where it is not there; each kind has its own limit by chance.
 KINDS = ("what moves echoes", "what does not")
 MOVES_ECHOES = {"actor_moved", "carrier_scale", "radar_pitch_offset", "radar_position_offset", "radar_yaw_offset",
-                "range_bias", "range_scale", "scene_registration"}
+                "range_bias", "range_scale", "scene_registration", "scene_scale"}
 LEAST_TRUE_GAIN = 0.01   # of explained power: less is lost in the figures' rounding
 COLORS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#bcbd22", "#17becf")
 SIDE = 400    # of the plot's square, pixels

@@ -193,7 +193,7 @@ def run_trial(trial, ledger, program, limit_s=600.0, jobs=1):
         if trial.row == "clean" and os.path.exists(tried):
             record["most_nats"] = most_nats(tried)
             record["told_absent"] = told_absent(program, session, trial, folder, limit_s, jobs)
-        if trial.row in ("single", "faint") and truths[0]["cause"] not in UNTOLD:
+        if trial.row in ("single", "later", "faint") and truths[0]["cause"] not in UNTOLD:
             record["told"], = told(program, session, truths[:1], folder, limit_s, jobs)
         if trial.row == "recording":
             plain = os.path.join(folder, "plain")

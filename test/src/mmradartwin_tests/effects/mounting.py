@@ -58,3 +58,14 @@ class SceneRegistration(Effect):
     def room(self, measurement, actors, materials):
         turn = rotation_z(math.radians(self.p["yaw_deg"]))
         return [a.moved(turn, np.array([self.p["x_m"], self.p["y_m"], 0.0])) for a in actors], materials
+
+
+@effect
+class SceneScale(Effect):
+    """The scan was made too large or too small: the true room is 1 + scale times it, about map's origin."""
+    name, main = "scene_scale", "scale"
+    defaults = {"scale": -0.01}
+    plain = {"scale": -0.02}
+
+    def room(self, measurement, actors, materials):
+        return [a.scaled(1 + self.p["scale"]) for a in actors], materials
