@@ -183,6 +183,25 @@ TEST_F(ReceiverTest, ImbalanceMakesAnImage) {
   }
 }
 
+TEST_F(ReceiverTest, EveryReceiverMayHaveAnImageOfItsOwn) {
+  addPlate();
+  writeScene();
+  const double level_db[] = {-36.5, -34.7, -28.5, -37.7}, phase_deg[] = {10, 100, -60, 170};
+  const Simulation base = look(""), s = look(
+                                        "  iq_imbalance: {image_db: [-36.5, -34.7, -28.5, -37.7], phase_deg: [10, 100, "
+                                        "-60, 170]}\n");
+  for (int k = 0; k < 8; ++k) {
+    for (int n : {0, 17, 63}) {
+      const Complex beta = (s.grid.x(k, n) - base.grid.x(k, n)) / std::conj(base.grid.x(k, n));
+      EXPECT_NEAR(db(std::abs(beta)), level_db[k % 4], 1e-6);
+      EXPECT_NEAR(std::arg(beta) * 180 / M_PI, phase_deg[k % 4], 1e-6);
+    }
+  }
+  EXPECT_NE(errorOf([&] { look("  iq_imbalance: {image_db: [-20, -30]}\n"); }).find("4 receivers"), std::string::npos);
+  EXPECT_NE(errorOf([&] { look("  iq_imbalance: {image_db: [-20, -30, 1, -30]}\n"); }).find("image_db"),
+            std::string::npos);
+}
+
 TEST_F(ReceiverTest, OffsetIsAConstantOverTheStrongestEcho) {
   addPlate();
   writeScene();

@@ -13,6 +13,7 @@ ELSEWHERE = {"pose_time_lag"}   # of a radar that is carried: test_moving_bag
 # Further sessions: what a cause looks like besides.
 FURTHER = {
     "a_scan_too_small": ("scene_scale", {"scale": 0.01}),
+    "images_of_receivers": ("iq_imbalance", {"image_db": [-36.5, -34.7, -28.5, -37.7]}),
 }
 SEED = 61
 

@@ -141,6 +141,14 @@ class Receiver(WithBaseline):
             np.testing.assert_allclose(np.abs(x - y), 0.1 * np.abs(y), rtol=1e-9)
             np.testing.assert_allclose((x - y) / np.conj(y), ((x - y) / np.conj(y))[0, 0], rtol=1e-6)
 
+    def test_every_receiver_may_have_an_image_of_its_own(self):
+        level_db, phase_deg = [-36.5, -34.7, -28.5, -37.7], [10.0, 100.0, -60.0, 170.0]
+        made, measurement, received = self.pair("iq_imbalance", image_db=level_db, phase_deg=phase_deg)
+        self.assertEqual(made.truth(measurement), {"image_db": level_db, "phase_deg": phase_deg})
+        for k in range(8):
+            beta = 10**(level_db[k % 4] / 20) * np.exp(1j * math.radians(phase_deg[k % 4]))
+            np.testing.assert_allclose(received[1][k] - self.clean[1][k], beta * np.conj(self.clean[1][k]), rtol=1e-6)
+
     def test_dc_sits_in_bin_zero(self):
         made, measurement, received = self.pair("dc_offset", level_db=0.0)
         added = np.fft.fft(received[2] - self.clean[2], axis=1)

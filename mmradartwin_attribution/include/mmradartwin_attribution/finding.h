@@ -26,13 +26,15 @@ struct FindingParameter {
   std::vector<std::array<double, 2>> ci95;
 };
 
-/// A named parameter that every finding of a cause has to carry.
+/// A named parameter that findings of a cause carry.
 struct CauseParameter {
   std::string name;
   std::string unit;  ///< "" for texts
   ParameterKind kind = ParameterKind::kNumber;
   /// Group of parameters of which one is enough, 0 for a parameter that is always required.
   int one_of = 0;
+  bool optional = false;  ///< given where the data show it
+  bool or_list = false;   ///< of a number: a list may stand in its place, one number per receiver
 };
 
 /// A cause that a finding may name, with the residual class and the parameters that follow from it.

@@ -43,7 +43,11 @@ Parameters readParameters(YamlMap& yaml, const std::vector<ParameterSpec>& specs
     }
     switch (s.kind) {
       case ParameterKind::kNumber:
-        values.set(s.name, yaml.number(s.name, s.min, s.max));
+        if (s.or_list && yaml.isList(s.name)) {
+          values.set(s.name, yaml.numbers(s.name, s.min, s.max));
+        } else {
+          values.set(s.name, yaml.number(s.name, s.min, s.max));
+        }
         break;
       case ParameterKind::kInteger:
         values.set(s.name, static_cast<double>(

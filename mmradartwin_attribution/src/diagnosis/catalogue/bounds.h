@@ -234,6 +234,9 @@ inline constexpr double kMostConstantRange_m = 0.01;
 /// Multiple of the power beside its image, of a cell whose image is read; see
 /// docs/calibration_of_bounds.md#kleasthostoverimage
 inline constexpr double kLeastHostOverImage = 10.0;
+/// Probability by chance below which receivers' images differ: one in a hundred images is told receiver by receiver
+/// without need.
+inline constexpr double kReceiversDiffer = 0.01;
 /// Least standard error of an image's level, dB; see docs/calibration_of_bounds.md#kimageerror_db
 inline constexpr double kImageError_db = 0.03;
 /// Difference between the noise and what the twin states, from which on it is told, dB; see

@@ -43,13 +43,15 @@ std::string problemOfDemanded(const Finding& finding) {
     const std::string key = "parameters/" + wanted.name;
     if (wanted.one_of) groups.insert(wanted.one_of);
     const FindingParameter* parameter = finding.parameter(wanted.name);
-    if (!parameter && !wanted.one_of) return key + ": is missing";
+    if (!parameter && !wanted.one_of && !wanted.optional) return key + ": is missing";
     if (!parameter) continue;
     given.insert(wanted.one_of);
     if (parameter->unit != wanted.unit) {
       return key + ": has the unit '" + parameter->unit + "'; it must be '" + wanted.unit + "'";
     }
-    if (kindOf(parameter->value) != wanted.kind) return key + ": must be " + kindName(wanted.kind);
+    const ParameterKind kind = kindOf(parameter->value);
+    if (kind != wanted.kind && !(wanted.or_list && kind == ParameterKind::kNumbers))
+      return key + ": must be " + kindName(wanted.kind);
   }
   for (int group : groups) {
     if (given.count(group)) continue;

@@ -33,7 +33,7 @@ std::vector<FindingParameter> fittedParameters(const Hypothesis& hypothesis, con
         parameter.ci95 = {
             {std::max(c.min, *value - t * standard_error[j]), std::min(c.max, *value + t * standard_error[j])}};
       }
-      if (parameter.ci95.empty() && wanted.one_of > 0) continue;
+      if (parameter.ci95.empty() && (wanted.one_of > 0 || wanted.optional)) continue;
     } else if (list != nullptr) {
       parameter.ci95.assign(list->size(), {0, 0});
       for (std::size_t k = 0; k < list->size(); ++k) parameter.ci95[k] = {(*list)[k], (*list)[k]};

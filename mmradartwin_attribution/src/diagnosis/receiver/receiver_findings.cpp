@@ -61,6 +61,7 @@ bool differsFromStated(const Finding& finding, const std::vector<NamedParameters
     if (!excludeEachOther(mechanism, *finding.mechanism)) return false;
     return std::none_of(finding.parameters.begin(), finding.parameters.end(), [&](const FindingParameter& p) {
       if (p.ci95.empty() || !mechanism.values.has(p.name)) return false;
+      if (mechanism.values.all().at(p.name).index() != p.value.index()) return true;  // a number, and a list
       if (const double* is = std::get_if<double>(&p.value))
         return differs(*is, p.ci95[0], mechanism.values.number(p.name));
       const auto* list = std::get_if<std::vector<double>>(&p.value);

@@ -8,6 +8,7 @@
 #include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/likelihood/profiled_scores.h"
 #include "diagnosis/numbers/number_text.h"
+#include "diagnosis/receiver/receiver_image.h"
 #include "diagnosis/rounds/fit_round.h"
 #include "diagnosis/rounds/hypothesis_finding.h"
 #include "diagnosis/rounds/map_evidence.h"
@@ -18,6 +19,26 @@ namespace {
 
 constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is searched for in a round
 constexpr std::size_t kMostClutter = 4;      ///< things that stand out of the clutter, beside which a fit is judged
+
+/// Gives a receiver's image the pattern over the receivers that the data show, where they differ. One level is fitted.
+void setMeasuredImage(const ChannelData& data, std::vector<Hypothesis>& all) {
+  for (Hypothesis& h : all) {
+    if (h.form() != MechanismForm::kReceiverImage || h.stated || h.coordinates.size() != 1) continue;
+    const std::optional<receiver::MeasuredImage> image = receiver::readImage(data);
+    if (!image || !image->differ) return;
+    const double rms = std::sqrt(image->beta.squaredNorm() / static_cast<double>(image->beta.size()));
+    std::vector<double> level_db, phase_deg;
+    for (const std::complex<double>& beta : image->beta) {
+      level_db.push_back(20 * std::log10(std::abs(beta) / rms));
+      phase_deg.push_back(std::arg(beta) * 180 / M_PI);
+    }
+    h.coordinates.front().shape.assign(level_db.size(), 1.0);
+    h.mechanism.values.set(h.coordinates.front().parameter, std::move(level_db));
+    h.mechanism.values.set("phase_deg", std::move(phase_deg));
+    h.variant = "of each receiver";
+    h.searched = 2 * static_cast<int>(image->beta.size()) - 1;
+  }
+}
 
 }  // namespace
 
@@ -59,7 +80,8 @@ void HypothesisRounds::run(const std::vector<NamedParameters>& mechanisms, const
 }
 
 std::vector<HypothesisFit> HypothesisRounds::fitBest(int round) {
-  const std::vector<Hypothesis> all = allHypotheses(context_.twin, selection_.extended());
+  std::vector<Hypothesis> all = allHypotheses(context_.twin, selection_.extended());
+  setMeasuredImage(context_.data, all);
   const std::vector<RangeShift> shifted = takeRangeErrors(selection_.state());
   std::vector<Screened> screened = ranking_.rank(all, selection_.state(), shifted);
   if (selection_.unknownNats() > 0) {  // one unknown stands for all

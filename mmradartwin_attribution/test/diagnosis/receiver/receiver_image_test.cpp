@@ -13,6 +13,9 @@ class ReceiverImageTest : public ::testing::Test {
  protected:
   /// x + beta conj(x): strong echoes near, weak ones where images fall.
   ChannelData draw(int poses, std::complex<double> beta, double weak = 1e-6) {
+    return draw(poses, Eigen::Vector4cd::Constant(beta), weak);
+  }
+  ChannelData draw(int poses, const Eigen::Vector4cd& beta, double weak = 1e-6) {
     std::uniform_real_distribution<double> sine(-0.7, 0.7), phase(-M_PI, M_PI);
     std::vector<ComplexGrid> grids;
     for (int i = 0; i < poses; ++i) {
@@ -22,7 +25,9 @@ class ReceiverImageTest : public ::testing::Test {
         tones.push_back({radar_.max_range_m() - range_m, sine(random_), std::polar(weak, phase(random_))});
       }
       const ComplexGrid x = gridOf(radar_, tones);
-      grids.emplace_back(x + beta * x.conjugate());
+      ComplexGrid with = x;
+      for (int k = 0; k < 8; ++k) with.row(k) += beta[k % 4] * x.row(k).conjugate();
+      grids.push_back(with);
     }
     return sessionOf(radar_, grids, 1e-12);
   }
@@ -49,6 +54,27 @@ TEST_F(ReceiverImageTest, HasItsLevelAndPhase) {
     EXPECT_LT(f.parameters[0].ci95[0][0], image_db);
     EXPECT_GT(f.parameters[0].ci95[0][1], image_db);
   }
+}
+
+TEST_F(ReceiverImageTest, IsToldReceiverByReceiverWhereTheyDiffer) {
+  const double level_db[] = {-36.5, -34.7, -28.5, -37.7}, phase_rad[] = {0.2, -1.4, 2.8, 1};
+  Eigen::Vector4cd beta;
+  for (int r = 0; r < 4; ++r) beta[r] = std::polar(std::pow(10.0, level_db[r] / 20), phase_rad[r]);
+  Finding f = imbalance();
+  const ChannelData with = draw(8, beta, 1e-5);
+  ASSERT_TRUE(measureImage(with, f));
+  ASSERT_EQ(f.parameters.size(), 2u);
+  const FindingParameter &level = *f.parameter("image_db"), &phase = *f.parameter("phase_deg");
+  for (std::size_t r = 0; r < 4; ++r) {
+    EXPECT_NEAR(std::get<std::vector<double>>(level.value)[r], level_db[r], 0.3);
+    EXPECT_LE(level.ci95[r][0], level_db[r]);
+    EXPECT_GE(level.ci95[r][1], level_db[r]);
+    EXPECT_NEAR(std::get<std::vector<double>>(phase.value)[r], phase_rad[r] * 180 / M_PI, 2);
+  }
+  ChannelData rest = with;
+  subtractImage(*f.mechanism, rest);
+  EXPECT_FALSE(readImage(draw(8, std::polar(0.03, 1.0), 1e-5))->differ);
+  EXPECT_LT(readImage(rest)->beta.norm(), 0.05 * beta.norm());
 }
 
 TEST_F(ReceiverImageTest, EchoesAtTheMirroredPlaceWidenItsError) {

@@ -32,6 +32,12 @@ inline ParameterSpec tried(ParameterSpec spec, double neutral, double typical) {
   return spec;
 }
 
+/// Says that a list over receivers may stand in the number's place.
+inline ParameterSpec orPerReceiver(ParameterSpec spec) {
+  spec.or_list = true;
+  return spec;
+}
+
 /// Says that traced paths do not depend on the parameter.
 inline ParameterSpec weighing(ParameterSpec spec) {
   spec.weighs = true;

@@ -46,7 +46,8 @@ class Effect:
             raise ValueError(f"effect {self.name} has no strength; it is there or not")
         value = self.p[self.main]
         if self.main in ("level_db", "image_db"):
-            self.p[self.main] = value + 20 * math.log10(strength) if strength > 0 else -math.inf
+            by_db = 20 * math.log10(strength) if strength > 0 else -math.inf
+            self.p[self.main] = [v + by_db for v in value] if isinstance(value, list) else value + by_db
             return
         self.p[self.main] = [strength * v for v in value] if isinstance(value, list) else strength * value
 

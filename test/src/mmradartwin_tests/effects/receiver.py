@@ -136,15 +136,19 @@ class GainDrift(Effect):
 
 @effect
 class IqImbalance(Effect):
-    """An image at (R_max - R, -theta): x + beta conj(x)."""
+    """An image at (R_max - R, -theta): x + beta conj(x); beta is one number or, of lists, one per receiver."""
     name, main, rank = "iq_imbalance", "image_db", 2
-    defaults = {"image_db": -26.0}
+    defaults = {"image_db": -26.0, "phase_deg": None}
 
     def prepare(self, measurement):
-        self.turn = np.exp(2j * np.pi * measurement.rng(101).random())
+        if self.p["phase_deg"] is None:
+            drawn = 360 * measurement.rng(101).random(np.shape(self.p["image_db"]) or None)
+            self.p["phase_deg"] = drawn.tolist() if isinstance(self.p["image_db"], list) else float(drawn)
 
     def receive(self, measurement, index, station, x):
-        return x + self.turn * 10**(self.p["image_db"] / 20) * np.conj(x)
+        level = 10**(np.array(self.p["image_db"], float) / 20)
+        beta = np.broadcast_to(level * np.exp(1j * np.radians(self.p["phase_deg"])), (len(measurement.radar.rx),))
+        return x + np.tile(beta, len(measurement.radar.tx))[:, None] * np.conj(x)
 
 
 @effect
