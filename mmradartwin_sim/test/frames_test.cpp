@@ -405,6 +405,7 @@ TEST_F(FramesTest, EveryMechanismCanBeSwitchedOn) {
       {"second_harmonic", "level_db: -15"},
       {"surface_roughness", "material: Metal, roughness_rms_m: 0.0002"},
       {"transmission", "actor: pane, one_way_db: -3"},
+      {"tx_delay", "slot: 1, delay_m: 0.02"},
       {"tx_imbalance", "phase_deg: 25, gain_db: -1"},
       {"tx_rx_leakage", "range_m: 0.06, level_db: 3"},
       {"wall_ghost", "walls: [left]"}};

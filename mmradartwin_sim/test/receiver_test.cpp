@@ -183,6 +183,24 @@ TEST_F(ReceiverTest, ImbalanceMakesAnImage) {
   }
 }
 
+// A feed that is longer by d one-way: the beat of that slot's channels is that of a range longer by d, and their phase
+// at the window's centre is the stated one.
+TEST_F(ReceiverTest, ALateTransmitterRaisesTheBeatOfItsChannels) {
+  addPlate();
+  writeScene();
+  const Simulation base = look(""), s = look("  tx_delay: {slot: 1, delay_m: 0.07, phase_deg: 40}\n");
+  for (int k = 0; k < 8; ++k) {
+    const double late_hz = k < 4 ? 0 : beat(0.14);
+    for (int n : {0, 20, 63}) {
+      const double t_s = (n - 32) / 5e6, turn = k < 4 ? 0 : 40 * M_PI / 180 + 2 * M_PI * late_hz * t_s;
+      EXPECT_LT(std::abs(s.grid.x(k, n) / base.grid.x(k, n) - std::polar(1.0, turn)), 1e-9) << k << " " << n;
+    }
+  }
+  EXPECT_TRUE(s.check.ok());
+  EXPECT_NE(errorOf([&] { look("  tx_delay: {slot: 2, delay_m: 0.07}\n"); }).find("2 transmitters"), std::string::npos);
+  EXPECT_NE(errorOf([&] { look("  tx_delay: {slot: 0.5, delay_m: 0.07}\n"); }).find("slot"), std::string::npos);
+}
+
 TEST_F(ReceiverTest, EveryReceiverMayHaveAnImageOfItsOwn) {
   addPlate();
   writeScene();

@@ -20,6 +20,7 @@ enum class MechanismForm {
   kRadarOffset,       ///< the radar stands elsewhere: forward_m, left_m
   kSceneOffset,       ///< the scene stands elsewhere: x_m, y_m
   kMaterialLevel,     ///< level of a material's or an actor's echoes
+  kTransmitterDelay,  ///< one transmitter's channels come later: slot, delay_m, phase_deg
   kChannelErrors,     ///< a level and a phase per channel
   kReceiverImage,     ///< an image at the mirrored frequency, measured against its hosts
   kHarmonic,          ///< a level that refers to the strongest echo, fitted against its hosts

@@ -234,6 +234,9 @@ inline constexpr double kMostConstantRange_m = 0.01;
 /// Multiple of the power beside its image, of a cell whose image is read; see
 /// docs/calibration_of_bounds.md#kleasthostoverimage
 inline constexpr double kLeastHostOverImage = 10.0;
+/// Delay of a transmitter's channels below which, or within so many standard errors of which, it is no more than a
+/// phase: ways to two transmitters at 8 mm from each other differ by as much.
+inline constexpr double kLeastDelay_m = 0.003, kLeastDelay_sigmas = 5;
 /// Probability by chance below which receivers' images differ: one in a hundred images is told receiver by receiver
 /// without need.
 inline constexpr double kReceiversDiffer = 0.01;

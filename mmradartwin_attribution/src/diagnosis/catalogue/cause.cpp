@@ -58,6 +58,7 @@ std::vector<CauseDescription> builtInCauses() {
            {{"phase_deg", "deg", kNumbers}, {"gain_db", "dB", kNumbers}},
            {Form::kChannelErrors, Experiment::kReflector}},
           {"tx_imbalance", kC4, {{"phase_deg", "deg"}, {"gain_db", "dB"}}, {Form::kOrdinary, Experiment::kReflector}},
+          {"tx_delay", kC4, {{"slot", "1"}, {"delay_m", "m"}}, {Form::kTransmitterDelay, Experiment::kReflector}},
           {"iq_conjugation", kC4, {}},
           {"channel_conjugation", kC4, {}},
           {"channel_permutation", kC4, {{"order", "1", kNumbers}}},

@@ -96,7 +96,13 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
       }
     }
   }
-  if (!material && !actor && spec("walls") == specs.end() && spec("actors") == specs.end()) out.push_back(bare);
+  const bool slot = spec("slot") != specs.end();
+  for (int s = 0; slot && s < twin.radar().slots(); ++s) {
+    with("slot", static_cast<double>(s), "transmitter " + std::to_string(s));
+  }
+  if (!material && !actor && !slot && spec("walls") == specs.end() && spec("actors") == specs.end()) {
+    out.push_back(bare);
+  }
 }
 
 /// The hypothesis with the values that the twin states as neutral ones. Nothing where scale 0 would give other values.

@@ -97,6 +97,7 @@ void addToSignature(const PathRecord& record, std::size_t& signature) {
   const auto sign = [&](double v) { boost::hash_combine(signature, v); };
   for (double v : record.length_m) sign(v);
   for (const std::complex<double>& v : record.c) sign(v.real()), sign(v.imag());
+  sign(record.channels_apart);
   sign(record.departure.y());
   sign(record.arrival.y());
 }
@@ -226,6 +227,78 @@ std::shared_ptr<const EchoGroup> EchoCollector::addTones(const std::vector<const
   return groups_.back();
 }
 
+void EchoCollector::addApart(const PathRecord& record, int reach, EchoGroup& group) {
+  const double cosine = pathCosine(record);
+  const auto channels = static_cast<std::size_t>(channels_);
+  thread_local std::vector<double> place;
+  thread_local std::vector<std::complex<double>> response, slope, both;
+  thread_local std::vector<std::complex<float>> power, curvature, shift;
+  for (auto* v : {&response, &slope, &both}) v->resize(channels);
+  place.resize(channels);
+  for (std::size_t k = 0; k < channels; ++k) place[k] = (0.5 * record.length_m[k] + group.added_range_m) / bin_m_;
+  const auto respond = [&](double bin, std::size_t k) {
+    const auto [w, per_bin] = kHann.at(bin - place[k]);
+    return std::make_pair(w, -per_bin / bin_m_);
+  };
+  const auto [low, high] = std::minmax_element(place.begin(), place.end());
+  const int first = static_cast<int>(std::lround(*low)) - reach, last = static_cast<int>(std::lround(*high)) + reach;
+  const int around = first < 0 || last > samples_ - 1 ? samples_ : 0;
+  for (int r = first; r <= last; ++r) {
+    if (r - first >= samples_ || (reach < samples_ / 2 - 1 && (r < 0 || r > samples_ - 1))) continue;
+    double mean = 0;
+    for (std::size_t k = 0; k < channels; ++k) {
+      const auto [w, per_m] = respond(r, k);
+      response[k] = record.c[k] * w;
+      slope[k] = record.c[k] * per_m;
+      both[k] = response[k] + slope[k];
+      mean += std::norm(response[k]) / channels_;
+    }
+    outer(response.data(), cosine, power);
+    outer(slope.data(), cosine, curvature);
+    outer(both.data(), cosine, shift);  // (a + b)(a + b)^H - a a^H - b b^H = a b^H + b a^H
+    for (std::size_t i = 0; i < shift.size(); ++i) shift[i] -= power[i] + curvature[i];
+    const int bin = (r + around) % samples_;
+    open_fields.add(bin, power.data(), {1, 0, 0}, cosine, static_cast<float>(mean));
+    open_fields.add(bin, shift.data(), {0, 1, 0}, 0, 0);
+    open_fields.add(bin, curvature.data(), {0, 0, 1}, 0, 0);
+  }
+  // Beams: formed of channels that each have their own place.
+  for (std::size_t b = 0; b < beams_.size(); ++b) {
+    const EchoBeam& beam = beams_[b];
+    if (*high < beam.first_bin - kLobe_bins || *low > beam.first_bin + channels_ - 1 + kLobe_bins) continue;
+    for (std::size_t i = 0; i < channels; ++i) {
+      response[i] = slope[i] = 0;
+      for (std::size_t k = 0; k < channels; ++k) {
+        const auto [w, per_m] = respond(beam.first_bin + static_cast<double>(i), k);
+        const std::complex<double> formed = std::conj(beam.weights[static_cast<Eigen::Index>(k)]) * record.c[k];
+        response[i] += formed * w;
+        slope[i] += formed * per_m;
+      }
+    }
+    addBeam(static_cast<int>(b), response, slope, group.beams);
+  }
+}
+
+void EchoCollector::addBeam(int beam, const std::vector<std::complex<double>>& response,
+                            const std::vector<std::complex<double>>& slope, EchoGroup::Fields& beams) const {
+  std::complex<float>* to = cover(beams, beam, size_);
+  const auto add = [&](const auto& value) {
+    for (std::size_t i = 0; i < response.size(); ++i) {
+      for (std::size_t j = 0; j <= i; ++j) *to++ += std::complex<float>(value(i, j));
+    }
+  };
+  add([&](std::size_t i, std::size_t j) { return response[i] * std::conj(response[j]); });
+  add([&](std::size_t i, std::size_t j) {
+    return response[i] * std::conj(slope[j]) + slope[i] * std::conj(response[j]);
+  });
+  add([&](std::size_t i, std::size_t j) { return slope[i] * std::conj(slope[j]); });
+  double own = 0;
+  for (const std::complex<double>& v : response) own += std::norm(v) / channels_;
+  const auto at = static_cast<std::size_t>(beam - beams.first);
+  beams.mean[at] += static_cast<float>(own);
+  beams.squares[at] += static_cast<float>(own * own);
+}
+
 void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& group) {
   const bool weak = share < kWeakShare;
   const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + group.added_range_m) / bin_m_;
@@ -233,6 +306,10 @@ void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g
   outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error is negligible beside the others'
   const bool strong = share >= kStrongShare;
   const int reach = weak ? kLobe_bins : strong ? std::min(kFarSkirt_bins, samples_ / 2 - 1) : kSkirt_bins;
+  if (record.channels_apart && !weak) {
+    addApart(record, reach, group);
+    return;
+  }
   const int middle = static_cast<int>(std::lround(place));
   if (middle + reach < 0 || middle - reach > samples_ - 1) return;
   // Spectra are periodic: the skirt of an echo near the first bin continues in the last ones.

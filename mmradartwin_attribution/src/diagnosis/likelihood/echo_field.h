@@ -105,6 +105,11 @@ class EchoCollector {
  private:
   EchoGroup& group(const PathRecord& record);
   void addTone(const PathRecord& record, double share, EchoGroup& group);
+  /// The same where channels have ranges of their own. reach: bins to either side.
+  void addApart(const PathRecord& record, int reach, EchoGroup& group);
+  /// response, slope: [bins of the beam] of the formed channels, and their derivative by the range.
+  void addBeam(int beam, const std::vector<std::complex<double>>& response,
+               const std::vector<std::complex<double>>& slope, EchoGroup::Fields& beams) const;
   void outer(const std::complex<double>* c, double cosine, std::vector<std::complex<float>>& packed) const;
 
   /// Adds |b^H c|^2 times outer products of the responses over each beam's bins. Skips a beam that receives less than

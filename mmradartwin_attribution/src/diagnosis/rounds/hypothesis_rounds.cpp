@@ -20,6 +20,18 @@ namespace {
 constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is searched for in a round
 constexpr std::size_t kMostClutter = 4;      ///< things that stand out of the clutter, beside which a fit is judged
 
+/// True of a transmitter's delay that is no larger than its error: its phase alone is another cause's.
+bool isPhaseOnly(const HypothesisFit& fit) {
+  if (fit.hypothesis.form() != MechanismForm::kTransmitterDelay) return false;
+  for (std::size_t j = 0; j < fit.scaled_values.size(); ++j) {
+    const Coordinate& c = fit.hypothesis.coordinates[j];
+    if (c.unit != "m") continue;
+    return std::abs(c.value(fit.scaled_values[j])) <
+           std::max(bounds::kLeastDelay_m, bounds::kLeastDelay_sigmas * fit.standard_error[j]);
+  }
+  return false;
+}
+
 /// Gives a receiver's image the pattern over the receivers that the data show, where they differ. One level is fitted.
 void setMeasuredImage(const ChannelData& data, std::vector<Hypothesis>& all) {
   for (Hypothesis& h : all) {
@@ -98,6 +110,7 @@ std::string HypothesisRounds::rejectionByLikelihood(const HypothesisFit& fit) co
   if (fit.false_alarm_rate > bounds::kFalseAlarmRateOfRound) return "chance could do as well";
   if (!(fit.held_out_gain > 0)) return "loses on places not fitted";
   if (fit.gain < bounds::kShareBesideUnknown * selection_.unknownNats()) return "little beside what is unknown";
+  if (isPhaseOnly(fit)) return "no delay beyond its error, a phase alone";
   return rejectionReason(fit, frames_);
 }
 

@@ -10,6 +10,7 @@
 #include "diagnosis/search/law_screen.h"
 #include "diagnosis/search/object_search.h"
 #include "diagnosis/search/replica_screen.h"
+#include "diagnosis/search/transmitter_delay.h"
 
 namespace mmradartwin::diagnosis::search {
 namespace {
@@ -50,6 +51,7 @@ class Looks {
   void lookAgain();
   void addLaws();
   void addReplicas();
+  void addDelays();
   void addSharedLatents();
   void addPlaced();
   /// All hypotheses that were screened, highest screened gain first.
@@ -149,6 +151,7 @@ void Looks::takeOffChance(std::size_t poses, Screened& screened) const {
 void Looks::lookAtAll(std::set<std::string>& without_gain) {
   for (std::size_t i = 0; i < all_.size(); ++i) {
     const Hypothesis& hypothesis = all_[i];
+    if (hypothesis.form() == MechanismForm::kTransmitterDelay) continue;  // has starts of its own
     context_.report("trying " + hypothesis.label(), static_cast<double>(i) / static_cast<double>(all_.size()));
     const bool of_actor = context_.twin.scene().actorIndex(hypothesis.subject) >= 0;
     const std::vector<double> typical(hypothesis.coordinates.size(), 1.0);
@@ -230,6 +233,18 @@ void Looks::addReplicas() {
   }
 }
 
+void Looks::addDelays() {
+  context_.report("transmitters that come late", 0);
+  std::vector<double> delays_m;
+  for (const Hypothesis& h : all_) {
+    if (h.form() != MechanismForm::kTransmitterDelay) continue;
+    if (delays_m.empty()) delays_m = transmitterDelays_m(context_.data);
+    Screened s = screen_.amongStarts(state_, *delayed(h, delays_m), spread(kScreenPoses));
+    takeOffChance(std::min(kScreenPoses, context_.data.poses.size()), s);
+    screened_.push_back(std::move(s));
+  }
+}
+
 void Looks::addSharedLatents() {
   context_.report("errors that poses and actors share", 0);
   for (Screened& s : sharedLatents(context_.echoes, state_, context_.likelihood.spread(), context_.pose_accuracy, all_,
@@ -271,6 +286,7 @@ std::vector<Screened> HypothesisRanking::rank(const std::vector<Hypothesis>& all
   looks.lookAgain();
   looks.addLaws();
   looks.addReplicas();
+  looks.addDelays();
   looks.addSharedLatents();
   looks.addPlaced();
   return looks.ranked();

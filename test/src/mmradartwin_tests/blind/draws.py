@@ -196,6 +196,7 @@ SINGLE = {
 # Effects that the catalogue got later. They have a row of their own, so that the other rows' seeds draw what they drew.
 LATER = {
     "scene_scale": uniform("scale", 0.006, 0.015, either_sign=True),
+    "tx_delay": lambda rng, trial: {"slot": int(rng.integers(2)), "delay_m": float(rng.uniform(0.02, 0.15))},
 }
 
 # Things that look like a material and are none.

@@ -42,6 +42,20 @@ class TxImbalance(Effect):
 
 
 @effect
+class TxDelay(Effect):
+    """A longer feed to one transmitter: all its echoes travel delay_m farther, one-way."""
+    name, main = "tx_delay", "delay_m"
+    defaults = {"slot": 1, "delay_m": 0.05}
+
+    def echoes(self, measurement, station, echoes):
+        receivers = len(measurement.radar.rx)
+        late = np.zeros(measurement.radar.channels)
+        late[self.p["slot"] * receivers:(self.p["slot"] + 1) * receivers] = 2 * self.p["delay_m"]
+        echoes.lengths_m = echoes.lengths_m + late
+        echoes.scatter.lengths_m = echoes.scatter.lengths_m + late
+
+
+@effect
 class IqConjugation(Effect):
     """Q inverted."""
     name, rank = "iq_conjugation", 2
