@@ -592,7 +592,7 @@ TEST_F(Propagation, LawVariablesReadPathAndSession) {
   facet.origin = facet.e1 = facet.e2 = Eigen::Vector3d::Zero();
   facet.normal = Eigen::Vector3d::UnitX();
   scene.facets = {facet};
-  LawVariable::PathPlace where{scene, Eigen::Isometry3d::Identity(), 90, 0.5};
+  LawVariable::PathPlace where{scene, Eigen::Isometry3d::Identity(), 90, 0.5, 0.4};
   PathRecord record;
   record.amplitude = 0.05;
   record.bounces = 1;
@@ -603,6 +603,7 @@ TEST_F(Propagation, LawVariablesReadPathAndSession) {
   const auto value = [&](const char* name) { return LawVariable(name).of(where, record); };
   EXPECT_DOUBLE_EQ(value("time_s").value[0], 90);
   EXPECT_NEAR(value("amplitude_db").value[0], -20, 1e-12);
+  EXPECT_NEAR(value("total_power_db").value[0], 10 * std::log10(0.4) + 20 * std::log10(2.0), 1e-12);
   EXPECT_NEAR(value("incidence_deg").value[0], 45, 1e-9);  // of a scatter point
   ASSERT_EQ(value("azimuth_deg").count, 2);
   EXPECT_NEAR(value("azimuth_deg").value[0], 45, 1e-9);

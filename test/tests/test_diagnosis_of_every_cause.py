@@ -34,6 +34,15 @@ class EveryCause(InFolder):
         self.assertTrue(findings["findings"], msg="nothing is found")
         return measurement, findings["findings"][0]
 
+    def test_level_by_total_power(self):
+        """A law of poses that has a name and is no cause: dB of level for each dB of what the pose receives in all."""
+        measurement, first = self.first_of("level_by_total_power", {})
+        self.assertEqual(first["cause"], "unknown", msg=str(first))
+        self.assertEqual(first["parameters"]["law"]["value"], "level_by_total_power", msg=str(first))
+        law = first["mechanism"]["empirical_law"]
+        slope = (law["gain_db"][-1] - law["gain_db"][0]) / (law["at"][-1] - law["at"][0])
+        self.assertAlmostEqual(slope, measurement.truth()["effects"][0]["parameters"]["db_per_db"], delta=0.1)
+
     def check(self, cause, values, told_names=()):
         """One session. told_names: of parameters that the finding has to state."""
         measurement, first = self.first_of(cause, values)

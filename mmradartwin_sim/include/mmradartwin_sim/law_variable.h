@@ -34,6 +34,7 @@ class LawVariable {
     Eigen::Isometry3d T_map_radar;
     double session_s = 0;            ///< after the session's first pose
     double strongest_amplitude = 0;  ///< of the session's echoes
+    double paths_power = 0;          ///< sum of squared amplitudes of the pose's echoes
   };
   /// A law acts by its mean over these: departure and arrival may differ. count 0: the path has no such number.
   struct Values {

@@ -108,6 +108,11 @@ const std::vector<LawVariable::Row>& LawVariable::table() {
          if (!(where.strongest_amplitude > 0) || !(record.amplitude > 0)) return {};
          return {1, {20 * std::log10(record.amplitude / where.strongest_amplitude), 0}};
        }},
+      {"total_power_db", "of all of the pose's echoes together, 0 is the session's strongest echo", false,
+       [](Variable, Place where, Record) -> Values {
+         if (!(where.strongest_amplitude > 0) || !(where.paths_power > 0)) return {};
+         return {1, {10 * std::log10(where.paths_power) - 20 * std::log10(where.strongest_amplitude), 0}};
+       }},
       {"foot_m",
        "where the path meets the law's actor, or else its first face, if upright, along it, from the middle of the "
        "face's actor; other paths stay as they are",

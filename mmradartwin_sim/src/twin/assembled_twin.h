@@ -126,8 +126,11 @@ struct AssembledTwin {
   }
 
   void reweight(const PoseContext& c, std::vector<PathRecord>& records, std::size_t from) const {
+    if (stages.weights.empty()) return;
+    PoseContext of_pose = c;
+    for (const PathRecord& r : records) of_pose.paths_power += r.amplitude * r.amplitude;
     for (std::size_t i = from; i < records.size(); ++i) {
-      for (const WeightStage* m : stages.weights) m->reweight(c, records[i]);
+      for (const WeightStage* m : stages.weights) m->reweight(of_pose, records[i]);
     }
   }
 

@@ -46,6 +46,10 @@ std::vector<FindingParameter> fittedParameters(const Hypothesis& hypothesis, con
     }
     parameters.push_back(std::move(parameter));
   }
+  // The one law of poses that has a name.
+  if (hypothesis.form() == MechanismForm::kLaw && m.values.text("variable") == "total_power_db") {
+    parameters.push_back({"law", "", std::string("level_by_total_power"), {}});
+  }
   return parameters;
 }
 

@@ -10,6 +10,7 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
+const std::string kTotalPower = "total_power_db";
 constexpr double kDominant = 0.5;       ///< share of a path in the power expected in its direction
 constexpr double kAlone = 0.7;          ///< share in the power of all channels, for comparisons of channels
 constexpr double kLeastPower = 1e-5;    ///< power of a path over that of the pose's strongest one
@@ -52,11 +53,13 @@ std::vector<Observable> observables(const RadarConfig& radar) {
   const std::vector<std::string> of_pose = {"time_s", "heading_deg", "height_m"};  // equal for all paths of a pose
   std::vector<std::string> any, of_path;
   for (const std::string& name : LawVariable::names()) {
-    if (name == "standing_m" || LawVariable::isAboutPlace(name)) continue;
+    if (name == "standing_m" || name == kTotalPower || LawVariable::isAboutPlace(name)) continue;
     any.push_back(name);
     if (std::find(of_pose.begin(), of_pose.end(), name) == of_pose.end()) of_path.push_back(name);
   }
-  std::vector<Observable> all = {{Kind::kGain, "gain_db", "dB", 2.0, 60, 10, 0.5, false, any},
+  std::vector<std::string> of_gain = any;
+  of_gain.push_back(kTotalPower);  // what follows it is a level: of an amplifier that gives way, or is controlled
+  std::vector<Observable> all = {{Kind::kGain, "gain_db", "dB", 2.0, 60, 10, 0.5, false, of_gain},
                                  {Kind::kDelay, "delay_m", "m", 0.02, 1, 0.2, 0.003, true, any},
                                  {Kind::kAngle, "angle_deg", "deg", 1.0, 45, 10, 0.2, true, of_path},
                                  {Kind::kAngleOfPose, "angle_deg", "deg", 1.0, 45, 10, 0.1, true, of_pose}};
@@ -74,9 +77,12 @@ MeasuredPose measurePaths(const Twin& twin, const ChannelLikelihood& model, cons
   const RadarConfig& radar = twin.radar();
   const Eigen::Isometry3d& T = data.pose.T_map_radar;
   std::vector<PathRecord> records = twin.receivedPaths(T, twin.trace(T, data.pose.stamp_ns), data.pose.stamp_ns);
-  double most = 0;
-  for (const PathRecord& r : records) most = std::max(most, r.amplitude);
-  MeasuredPose result{data.location, {twin.tracedScene(), T, session_s, most}, {}};
+  double most = 0, power = 0;
+  for (const PathRecord& r : records) {
+    most = std::max(most, r.amplitude);
+    power += r.amplitude * r.amplitude;
+  }
+  MeasuredPose result{data.location, {twin.tracedScene(), T, session_s, most, power}, {}};
   const int channels = radar.channels(), samples = radar.samples_per_chirp;
   const double gain = std::exp(state.latents.log_gain), wave = 2 * M_PI / radar.wavelength_m();
   std::map<int, Eigen::MatrixXcd> expected;  // by bin

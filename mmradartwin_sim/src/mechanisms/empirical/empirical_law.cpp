@@ -41,7 +41,8 @@ class EmpiricalLaw : public Mechanism, public WeightStage {
     return all;
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig& radar) override {
-    by_amplitude_ = values.text("variable") == "amplitude_db";
+    const std::string& variable = values.text("variable");
+    by_amplitude_ = variable == "amplitude_db" || variable == "total_power_db";
     at_ = values.numbers("at");
     if (at_.empty() || std::adjacent_find(at_.begin(), at_.end(), std::greater_equal<double>()) != at_.end()) {
       throw InputError("mechanism empirical_law: key at: needs one ascending number or more");
@@ -89,9 +90,10 @@ class EmpiricalLaw : public Mechanism, public WeightStage {
         std::none_of(record.actors.begin(), record.actors.end(), [this](int a) { return a >= 0 && affected_[a]; })) {
       return;
     }
-    const LawVariable::Values x = variable_->of(
-        {context.scene, context.T_map_radar, context.session_s, by_amplitude_ ? context.strongest_amplitude() : 0},
-        record);
+    const LawVariable::Values x =
+        variable_->of({context.scene, context.T_map_radar, context.session_s,
+                       by_amplitude_ ? context.strongest_amplitude() : 0, context.paths_power},
+                      record);
     if (x.count == 0) return;
     if (!channels_.empty()) {
       const double gain_db = gain_db_.empty() ? 0 : look(gain_db_, x);

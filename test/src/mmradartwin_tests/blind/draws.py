@@ -206,7 +206,8 @@ DECOYS = {
     "channel_phase_error": channel_errors,
     "window_mismatch": uniform("depth", 0.3, 0.8),
 }
-OUTSIDE = tuple(name for name in UNCATALOGUED if name not in DECOYS)
+LATER_OUTSIDE = ("level_by_total_power",)     # as LATER
+OUTSIDE = tuple(name for name in UNCATALOGUED if name not in DECOYS and name not in LATER_OUTSIDE)
 
 ROWS = ("clean", "single", "later", "faint", "pair", "twice", "outside", "decoy", "recording")
 # Effects of any strength, with what their strength multiplies.

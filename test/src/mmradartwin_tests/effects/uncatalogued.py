@@ -119,6 +119,23 @@ class Compression(EchoLaw):
 
 
 @uncatalogued
+class LevelByTotalPower(EchoLaw):
+    """An amplifier gives way, or a control turns it down: a pose's level falls by so many dB for each dB of power that
+    the pose receives in all."""
+    name, main, variable = "level_by_total_power", "db_per_db", "total_power_db"
+    defaults = {"db_per_db": -0.4, "reference_db": -85.0}
+
+    def echoes(self, measurement, station, echoes):
+        power = np.sum(np.abs(echoes.coefficients)**2) + np.sum(np.abs(echoes.scatter_coefficients)**2)
+        above_db = 10 * math.log10(power) - self.p["reference_db"]
+        self.by = 10**(self.p["db_per_db"] * above_db / 20)
+        super().echoes(measurement, station, echoes)
+
+    def factor(self, measurement, station, departure, arrival, length_m, size):
+        return np.full(len(length_m), self.by)
+
+
+@uncatalogued
 class HeightGain(EchoLaw):
     """Level depends on the height of the radar."""
     name, main, variable = "height_gain", "db_per_m", "radar height"
