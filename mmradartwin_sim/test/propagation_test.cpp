@@ -415,6 +415,35 @@ TEST_F(Propagation, AScaledSceneIsLargerAboutTheOrigin) {
   }
 }
 
+// A wall through (4, 0, 0.5) that leans: its normal is Rz(yaw) Ry(pitch) Rx(roll) e, its distance that of its middle
+// along the normal.
+TEST_F(Propagation, AnActorLeansAboutItsMiddle) {
+  addWall("ahead", "Metal", {4, -3}, {4, 3}, -2.5, 3.5);
+  addWall("left", "Metal", {-3, 5}, {3, 5}, -2.5, 3.5);
+  writeScene();
+  const auto look = [&](const std::string& values, double heading_deg) {
+    const Simulation s =
+        run("  specular: {max_bounces: 1}\n  actor_moved: {" + values + "}\n", radarPose(0, 0, 0, heading_deg));
+    const int actor = heading_deg == 0 ? 0 : 1;
+    for (const PathRecord& r : s.records) {
+      if (r.actors[0] == actor) return r;
+    }
+    ADD_FAILURE() << values;
+    return PathRecord();
+  };
+  const double a = 5 * kDegree;
+  const PathRecord pitched = look("actor: ahead, dpitch_deg: 5, dz_m: 0.2, dx_m: 0.1", 0);
+  EXPECT_NEAR(pitched.length_m[0] / 2, 4.1 * std::cos(a) - 0.7 * std::sin(a), 1e-9);
+  EXPECT_NEAR(pitched.departure.z(), -std::sin(a), 1e-9);
+  const PathRecord rolled = look("actor: left, droll_deg: 5, dz_m: -0.1", 90);
+  EXPECT_NEAR(rolled.length_m[0] / 2, 5 * std::cos(a) + 0.4 * std::sin(a), 1e-9);
+  EXPECT_NEAR(rolled.departure.z(), std::sin(a), 1e-9);
+  const PathRecord turned = look("actor: ahead, dyaw_deg: 20, dpitch_deg: 5", 0);
+  EXPECT_NEAR(std::atan2(turned.departure.y(), turned.departure.x()) / kDegree, 20, 1e-9);
+  EXPECT_NEAR(std::asin(turned.departure.z()) / kDegree, -5, 1e-9);
+  EXPECT_NEAR(look("actor: ahead, droll_deg: 30", 0).length_m[0] / 2, 4, 1e-9) << "a turn in its own plane";
+}
+
 // The echo of a square plate follows from its size over the Fresnel zone: a scaled plate is a larger plate farther
 // away.
 TEST_F(Propagation, AScaledSceneEqualsOneDrawnLarger) {

@@ -339,6 +339,19 @@ class Objects(WithBaseline):
         np.testing.assert_allclose(find(measurement.room.actors).centroid()
                                    - find(measurement.described_actors).centroid(), [0.1, -0.05, 0], atol=1e-9)
 
+    def test_a_screen_leans_by_roll_then_pitch_then_yaw(self):
+        values = {"actor": "tv", "dx_m": 0.1, "dy_m": 0.0, "dz_m": -0.2, "dyaw_deg": 10.0, "dpitch_deg": 5.0,
+                  "droll_deg": 3.0}
+        measurement, _ = self.echoes_of(make_effect("actor_moved", values))
+        self.assertEqual(make_effect("actor_moved", values).truth(measurement), values)
+        before, after = (next(a for a in actors if a.name == "tv")
+                         for actors in (measurement.described_actors, measurement.room.actors))
+        np.testing.assert_allclose(after.centroid() - before.centroid(), [0.1, 0, -0.2], atol=1e-9)
+        turn = after.parts[0].rotation @ before.parts[0].rotation.T
+        self.assertAlmostEqual(math.degrees(math.atan2(turn[1, 0], turn[0, 0])), 10, places=9)
+        self.assertAlmostEqual(math.degrees(math.asin(-turn[2, 0])), 5, places=9)
+        self.assertAlmostEqual(math.degrees(math.atan2(turn[2, 1], turn[2, 2])), 3, places=9)
+
 
 class Propagation(WithBaseline):
     def added(self, name, **parameters):

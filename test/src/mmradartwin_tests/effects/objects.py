@@ -3,9 +3,10 @@ import math
 
 import numpy as np
 
+from mmradartwin_tests.campaign import rotation_from_vector
 from mmradartwin_tests.coefficients import aperture_axis, fresnel
 from mmradartwin_tests.effects.effect import Effect, effect
-from mmradartwin_tests.geometry import Actor, Cylinder, box, rotation_z
+from mmradartwin_tests.geometry import Actor, Cylinder, box
 from mmradartwin_tests.tracing import Path
 
 FURNITURE = ["cabinet_north", "cabinet_east", "wardrobe", "bookshelf", "pillar"]
@@ -122,9 +123,10 @@ class ActorAbsent(Effect):
 
 @effect
 class ActorMoved(Effect):
-    """In both, elsewhere: true minus twin, turned about its centroid."""
+    """In both, elsewhere: true minus twin, turned about its centroid: roll about x, then pitch about y, then yaw."""
     name = "actor_moved"
-    defaults = {"actor": None, "dx_m": None, "dy_m": None, "dyaw_deg": 0.0, "distance_m": 0.15}
+    defaults = {"actor": None, "dx_m": None, "dy_m": None, "dyaw_deg": 0.0, "dz_m": 0.0,
+                "dpitch_deg": 0.0, "droll_deg": 0.0, "distance_m": 0.15}
     plain = {"distance_m": 0.4}
     main = "distance_m"
 
@@ -140,9 +142,10 @@ class ActorMoved(Effect):
             self.p["dy_m"] = self.p["distance_m"] * math.sin(angle)
 
     def room(self, measurement, actors, materials):
-        shift = np.array([self.p["dx_m"], self.p["dy_m"], 0.0])
-        turn = rotation_z(math.radians(self.p["dyaw_deg"]))
+        shift = np.array([self.p["dx_m"], self.p["dy_m"], self.p["dz_m"]])
+        about = lambda key, axis: rotation_from_vector(math.radians(self.p[key]) * np.eye(3)[axis])
+        turn = about("dyaw_deg", 2) @ about("dpitch_deg", 1) @ about("droll_deg", 0)
         return [a.moved(turn, shift, a.centroid()) if a.name == self.p["actor"] else a for a in actors], materials
 
     def truth(self, measurement):
-        return {key: self.p[key] for key in ("actor", "dx_m", "dy_m", "dyaw_deg")}
+        return {key: self.p[key] for key in ("actor", "dx_m", "dy_m", "dyaw_deg", "dz_m", "dpitch_deg", "droll_deg")}
