@@ -14,7 +14,6 @@ ELSEWHERE = {"pose_time_lag"}   # of a radar that is carried: test_moving_bag
 FURTHER = {
     "a_scan_too_small": ("scene_scale", {"scale": 0.01}),
     "images_of_receivers": ("iq_imbalance", {"image_db": [-36.5, -34.7, -28.5, -37.7]}),
-    "a_first_transmitter_that_is_late": ("tx_delay", {"slot": 0, "delay_m": 0.03}),
 }
 SEED = 61
 
