@@ -1,4 +1,4 @@
-"""A near-field bench: what the radar does to its session is found and named, with its values."""
+"""The generator of near-field benches, against closed forms."""
 import dataclasses
 import unittest
 
@@ -8,9 +8,6 @@ from scipy.special import fresnel
 from mmradartwin_tests.geometry import sheet
 from mmradartwin_tests.near_field_bench import BUILT, Bench, Faults, PanelOptics, Station
 from mmradartwin_tests.radar import SPEED_OF_LIGHT
-from diagnose_program import PROGRAM, diagnose
-from in_folder import InFolder
-from stated_error import assert_told
 
 SAMPLES = 128   # a quarter of the real bench's, and of its ranges; the same range bin
 
@@ -44,30 +41,6 @@ class Echoes(unittest.TestCase):
         clean = Bench(Faults(), places=[Station(0.349, 0.0, "here")], samples=64)
         turned = told.grid(told.reported[0]) / clean.grid(clean.reported[0])
         np.testing.assert_allclose(np.degrees(np.angle(turned[:, 5])), BUILT.phase_deg, atol=1e-6)
-
-
-@unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
-class Diagnosis(InFolder):
-    def findings_of(self, faults, *options):
-        Bench(faults, samples=SAMPLES).write(self.at("session"))
-        status, findings, errors = diagnose(self.at("session"), self.at("out"), *options)
-        self.assertEqual(status, 0, msg=errors)
-        return {one["cause"]: one for one in findings["findings"]}
-
-    def test_nothing_is_named_where_nothing_is_wrong(self):
-        self.assertEqual(self.findings_of(Faults()), {})
-
-    def test_the_bias_is_found_to_a_fraction_of_a_bin(self):
-        found = self.findings_of(Faults(range_bias_m=BUILT.range_bias_m))
-        self.assertEqual(list(found), ["range_bias"])
-        assert_told(self, found["range_bias"]["parameters"]["range_m"], BUILT.range_bias_m)
-
-    def test_all_that_is_wrong_is_found_together(self):
-        found = self.findings_of(dataclasses.replace(BUILT))
-        self.assertIn("range_bias", found)
-        assert_told(self, found["range_bias"]["parameters"]["range_m"], BUILT.range_bias_m)
-        self.assertIn("tx_rx_leakage", found)
-        assert_told(self, found["tx_rx_leakage"]["parameters"]["range_m"], BUILT.leakage_range_m)
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ PEAK_DBFS = -6.0      # the strongest sample of the session
 HEIGHT_M = 1.0        # of radar and plate over the floor
 PLATE_X_M = 1.0       # the plate's plane, in map
 PLATE_SIZE_M = 0.20
+SCENE_M = 0.005   # to which the user measured the bench, 1 sigma
 RAIL_ERROR_M, HEADING_ERROR_DEG = 0.0005, 0.1   # 1 sigma, of what the user writes down
 BODY_M = 0.085        # amplitude of the radar's own echo: sqrt(RCS / 4 pi)
 
@@ -74,29 +75,26 @@ class Station:
 
 
 def stations(count=16):
-    """The rail's places, 11 cm apart from 0.35 m on, at each the radar turned by some degrees on its stand."""
+    """The rail's stops from 0.35 m on: four near each other, 11 cm on again four; the radar's stand is turned at each."""
     headings = (-3.0, 1.0, 3.0, -1.0)
-    return [Station(0.349 + 0.11 * (i // 4) + 0.012 * (i % 4), headings[i % 4], f"stop{i // 4}") for i in range(count)]
+    return [Station(0.349 + 0.11 * (i // 4) + 0.012 * (i % 4), headings[i % 4], f"stop{i}") for i in range(count)]
 
 
 def actors():
     """The plate and what stands behind it. The wall behind the plate is in its shadow where it would mirror."""
     y, z, half = 2.0, HEIGHT_M, PLATE_SIZE_M / 2
     cabinet = rotation_z(math.radians(40.0))
-    screen = rotation_z(math.radians(-38.0))
-    rail = np.array([0.45, y, z])   # about the middle of the rail; the sides behind face it
+    rail = np.array([0.45, y, z])   # about the middle of the rail; the cabinet faces it
     return [
         Actor("plate", "Metal", [sheet((PLATE_X_M, y - half, z - half), (0, 2 * half, 0), (0, 0, 2 * half))]),
         Actor("wall", "Concrete", [sheet((4.0, 0.5, 0), (0, 3.0, 0), (0, 0, 2.6))]),
         Actor("cabinet", "Metal", [sheet(rail + cabinet @ np.array([2.3, -0.5, -0.6]), cabinet @ np.array([0, 1.0, 0]),
                                          (0, 0, 1.2))]),
-        Actor("screen", "Wood", [sheet(rail + screen @ np.array([1.7, -0.45, -0.5]), screen @ np.array([0, 0.9, 0]),
-                                       (0, 0, 1.0))]),
     ]
 
 
-REFLECTS = {"plate": 1.0, "cabinet": 1.0, "screen": 0.1706}   # |Gamma| at normal incidence; the wall is in the shadow
-PANEL_STEP_M = {"plate": 0.0008, "cabinet": 0.002, "screen": 0.002}
+REFLECTS = {"plate": 1.0, "cabinet": 1.0}   # |Gamma| at normal incidence; the wall is in the plate's shadow
+PANEL_STEP_M = {"plate": 0.0008, "cabinet": 0.002}
 
 
 class PanelOptics:
@@ -232,9 +230,9 @@ class Bench:
             "radar.yaml": self.radar.yaml(),
             "scene.yaml": "meshes:\n  - {file: bench.obj}\nmaterials: materials.yaml\n",
             "materials.yaml": materials_yaml({t: dataclasses.replace(MATERIALS[t], scattering=0.0)
-                                              for t in ("Metal", "Concrete", "Wood")}),
+                                              for t in ("Metal", "Concrete")}),
             "session.yaml": "format: mmradartwin_session/1\nradar: radar.yaml\nscene: scene.yaml\nposes: poses.csv\n"
-                            "captures: captures/{pose}.bin\n",
+                            f"captures: captures/{{pose}}.bin\naccuracy: {{scene_m: {SCENE_M}, pose_m: {2 * RAIL_ERROR_M}}}\n",
             "poses.csv": "pose,location,stamp,x,y,z,qx,qy,qz,qw\n" + "".join(
                 ",".join([name, s.location, f"{START_S + 10 * i}.0", *(f"{v:.6f}" for v in s.position),
                           *(f"{v:.9f}" for v in quaternion(s.rotation))]) + "\n"
