@@ -1,8 +1,10 @@
 #include "mmradartwin_sim/twin_description.h"
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <iomanip>
+#include <iterator>
 #include <set>
 #include <sstream>
 
@@ -92,13 +94,13 @@ std::string quoted(const std::string& text) {
 
 /// A number that reads back as the same double; with a point or exponent's sign, so that PyYAML reads a number too.
 std::string formatNumber(double v) {
-  std::ostringstream out;
-  for (int digits = 6; digits <= 17; ++digits) {
-    out.str("");
-    out << std::setprecision(digits) << v;
-    if (std::stod(out.str()) == v) break;
-  }
-  std::string text = out.str();
+  char shortest[32], written[32];
+  char* const end = std::to_chars(std::begin(shortest), std::end(shortest), v, std::chars_format::scientific).ptr;
+  const auto digits = std::count_if(std::begin(shortest), std::find(std::begin(shortest), end, 'e'),
+                                    [](char c) { return c >= '0' && c <= '9'; });
+  std::string text(std::begin(written), std::to_chars(std::begin(written), std::end(written), v,
+                                                      std::chars_format::general, std::max(6, static_cast<int>(digits)))
+                                            .ptr);
   const std::size_t e = text.find('e');
   if (e != std::string::npos && text.find('.') == std::string::npos) text.insert(e, ".0");
   return text;
