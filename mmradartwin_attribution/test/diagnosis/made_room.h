@@ -44,8 +44,9 @@ inline std::vector<NamedParameters> firstOrder() { return {mechanismWith("specul
 /// A small room, a radar at several places in it, and channels that are made by the simulator with noise of their own.
 class MadeRoom {
  public:
-  explicit MadeRoom(int poses = 12, const std::vector<MadeBox>& boxes = threeCupboards()) {
-    data.radar = paperRadar();
+  explicit MadeRoom(int poses = 12, const std::vector<MadeBox>& boxes = threeCupboards(),
+                    const RadarConfig& radar = paperRadar()) {
+    data.radar = radar;
     std::ofstream(folder_.path() + "/materials.yaml")
         << "materials:\n  Metal: {model: conductor}\n  Plate: {model: conductor}\n";
     std::ofstream(folder_.path() + "/scene.yaml") << "meshes: [{file: room.obj}]\nmaterials: materials.yaml\n";

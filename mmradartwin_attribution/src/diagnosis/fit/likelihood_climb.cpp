@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 
 #include "diagnosis/likelihood/profiled_scores.h"
 
@@ -22,9 +23,11 @@ constexpr int kSearchPlaces = 12;                  ///< evaluations of that sear
 constexpr double kLongestStep = 3;                 ///< longest step, scaled
 constexpr double kStepShares[] = {1.0, 0.4, 0.1};  ///< shares of a step that are tried until one gains
 constexpr double kOneSidedFactors[] = {0.4, 2.0};  ///< factors on a one-sided start
-constexpr int kScanned = 12;                       ///< values over the range of a number
-constexpr int kMostScanned = 48;                   ///< the same of a range, half a bin apart
-constexpr int kScanSteps = 2;                      ///< Fisher steps of the latents at a scanned value
+constexpr int kScanned = 12;                       ///< values over the range of a number that is no range
+constexpr double kScanned_bins = 0.5;              ///< between scanned values of a range: its modes are a bin wide
+constexpr std::size_t kScanPoses = 8;              ///< poses by which scanned values are compared
+constexpr std::size_t kMostPeaks = 3;              ///< scanned values that are judged at all poses
+constexpr int kScanSteps = 2, kFirstSteps = 14;    ///< Fisher steps of the latents at such a value, from the data
 constexpr double kLeastForScan_nats = 3;           ///< gain over the null below which no other value is looked for
 constexpr double kLikelier_nats = 0.5;  ///< gain over the optimum for which a climb starts from a scanned value
 constexpr Eigen::Index kMostRough = 4;  ///< largest number of coordinates that are searched without slopes
@@ -207,26 +210,58 @@ double LikelihoodClimb::stepBy(const Eigen::VectorXd& step) {
   return 0;
 }
 
+bool LikelihoodClimb::spansBins(const Coordinate& c) const {
+  return c.unit == "m" && c.max - c.min > kScanned * kScanned_bins * model_.data().radar.range_bin_m();
+}
+
+std::vector<double> LikelihoodClimb::scannedValues(const Coordinate& c) const {
+  const double step_m = kScanned_bins * model_.data().radar.range_bin_m();
+  const int count = spansBins(c) ? static_cast<int>(std::ceil((c.max - c.min) / step_m)) : kScanned;
+  std::vector<double> values;
+  for (int i = 0; i <= count; ++i) values.push_back(c.scaled(c.min + (c.max - c.min) * i / count));
+  return values;
+}
+
+std::vector<double> LikelihoodClimb::peaks(const std::vector<double>& values, const SessionLatents& latents) const {
+  std::vector<int> poses;
+  const std::size_t all = everyone_.size(), wanted = std::min(all, kScanPoses);
+  for (std::size_t i = 0; i < wanted; ++i) poses.push_back(everyone_[i * all / wanted]);
+  std::vector<double> likelihoods;
+  for (double value : values) {
+    const auto echoes = source_.echoes(mechanismsAt({value}), poses, latents.actor_range_m);
+    const std::vector<double> each = model_.byPose(echoes, latents, poses);
+    likelihoods.push_back(std::accumulate(each.begin(), each.end(), 0.0));
+  }
+  std::vector<std::pair<double, double>> found;  // likelihood and value
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool above_last = i == 0 || likelihoods[i] >= likelihoods[i - 1];
+    const bool above_next = i + 1 == values.size() || likelihoods[i] > likelihoods[i + 1];
+    if (above_last && above_next) found.emplace_back(likelihoods[i], values[i]);
+  }
+  std::sort(found.rbegin(), found.rend());
+  found.resize(std::min(kMostPeaks, found.size()));
+  std::vector<double> highest;
+  for (const auto& [likelihood, value] : found) highest.push_back(value);
+  return highest;
+}
+
 void LikelihoodClimb::scan() {
   if (task_.parts.size() != 1 || coordinates_.size() != 1 || geometric_) return;
-  if (task_.null != nullptr && optimum_.state.log_likelihood < task_.null->log_likelihood + kLeastForScan_nats) {
+  const Coordinate& c = coordinates_.front();
+  const bool fresh = spansBins(c);
+  // Where the start lies in another mode, a range gains nothing at first.
+  if (!fresh && task_.null != nullptr &&
+      optimum_.state.log_likelihood < task_.null->log_likelihood + kLeastForScan_nats) {
     return;
   }
-  const Coordinate& c = coordinates_.front();
-  int count = kScanned;
-  if (c.unit == "m") {
-    const double half_bin_m = model_.data().radar.range_bin_m() / 2;
-    count = std::clamp(static_cast<int>(std::ceil((c.max - c.min) / half_bin_m)), kScanned, kMostScanned);
-  }
   const double reached = optimum_.state.log_likelihood;
-  const SessionLatents from = optimum_.state.latents;
-  for (int i = 0; i <= count; ++i) {
-    const std::vector<double> there = {c.scaled(c.min + (c.max - c.min) * i / count)};
-    ModelState state = stateAt(there, from);
+  // Latents have adapted to the mode of the optimum: where echoes stand beside their bins, the floor has taken them in.
+  const SessionLatents from = fresh ? model_.start(optimum_.state.echoes) : optimum_.state.latents;
+  for (double value : peaks(scannedValues(c), from)) {
+    ModelState state = stateAt({value}, from);
     // Latents stand in for a part of the cause: they follow before values are compared.
-    model_.fit(state.echoes, state.latents, kScanSteps);
-    state.log_likelihood = model_.logLikelihood(state.echoes, state.latents, &state.by_pose);
-    take(state, there);
+    model_.fit(state.echoes, state.latents, fresh ? kFirstSteps : kScanSteps);
+    take(stateAt({value}, state.latents), {value});
   }
   if (optimum_.state.log_likelihood > reached + kLikelier_nats) climb();
 }

@@ -60,7 +60,15 @@ class LikelihoodClimb {
   /// Takes the longest share of a step that gains. Returns the gain, 0 where no share gains.
   double stepBy(const Eigen::VectorXd& step);
   /// Tries values over the whole range of a single number, and climbs from one that is likelier than the optimum.
+  /// Values of a range lie half a bin apart.
   void scan();
+  /// True for a range that may be off by many bins.
+  bool spansBins(const Coordinate& c) const;
+  /// [values] scaled values over the whole range of a number.
+  std::vector<double> scannedValues(const Coordinate& c) const;
+  /// Those of a list of values of the only number that are likelier than their neighbours: the likeliest few, by some
+  /// of the poses, with these latents.
+  std::vector<double> peaks(const std::vector<double>& values, const SessionLatents& latents) const;
   bool needsSearch() const;
   /// Searches without slopes around the optimum; first_step is scaled.
   void search(double first_step);

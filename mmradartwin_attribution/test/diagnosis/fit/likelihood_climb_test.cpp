@@ -44,6 +44,24 @@ TEST_F(ClimbInARoom, FindsAPlaceToMillimetresWhereSlopesEndEarlier) {
   EXPECT_NEAR(0.05 * o.scaled_values[0], 0.15, 0.02);
 }
 
+// The likelihood of a bias has a mode for each range bin that an echo may be shifted to.
+TEST(Climb, LeavesAModeThatIsBinsAwayFromTheTruth) {
+  RadarConfig radar = paperRadar();
+  radar.samples_per_chirp = 256;
+  MadeRoom room(5, threeCupboards(), radar);
+  const double truth_m = 0.3, start_m = 0.1, bin_m = radar.range_bin_m();
+  ASSERT_GT(truth_m - start_m, 5 * bin_m);
+  room.measure({firstOrder()[0], mechanismWith("range_bias", {{"range_m", truth_m}})});
+  FittedRoom fitted(room, firstOrder());
+  const std::vector<NamedParameters> base = firstOrder();
+  const std::vector<Hypothesis> parts = {hypothesisOf("range_bias", {{"range_m", "m", -1, 0, 0.02, -5, 5, {}}})};
+  const std::vector<std::vector<double>> starts = {{start_m / 0.02}};
+  const Optimum o =
+      LikelihoodClimb(fitted.source, fitted.model, {base, fitted.null.latents, parts, starts, 4, &fitted.null}).run();
+  EXPECT_NEAR(0.02 * o.scaled_values[0], truth_m, 0.2 * bin_m);
+  EXPECT_GT(o.state.log_likelihood, fitted.null.log_likelihood + 20);
+}
+
 TEST(Gain, WithoutTheBestPlaceIsThatOfTheOthers) {
   ChannelData data;
   data.locations = {"a", "b", "c"};
