@@ -1,6 +1,6 @@
 // Image search in geometry of its own: expected regions come from scene and pose alone and share nothing with
 // the simulator but facets and occlusion, so that an error of the simulator's geometry shows as a residual
-// (docs/contracts.md section 6).
+// (docs/reference/contracts.md section 6).
 
 #include "mirror_image.h"
 

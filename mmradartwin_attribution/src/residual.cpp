@@ -10,7 +10,7 @@ namespace {
 
 double power(double level_db) { return std::pow(10.0, level_db / 10); }
 
-// Assigns each response that the branches do not share to one residual class (docs/contracts.md section 6).
+// Assigns each response that the branches do not share to one residual class (docs/reference/contracts.md section 6).
 class ResidualClassifier {
  public:
   ResidualClassifier(const EvaluationField& field, const std::vector<PathRecord>& records, PoseAttribution& pose)

@@ -1,6 +1,6 @@
 // Apertures, corners and edges in geometry of its own: expected regions come from scene and pose alone and share
 // nothing with the simulator but facets and occlusion, so that an error of the simulator's geometry shows as a residual
-// (docs/contracts.md section 6).
+// (docs/reference/contracts.md section 6).
 
 #include "mmradartwin_attribution/response_region.h"
 

@@ -15,7 +15,7 @@
 
 namespace mmradartwin {
 
-/// The paper's radar, as docs/contracts.md section 5 writes it.
+/// The paper's radar, as docs/reference/contracts.md section 5 writes it.
 inline const char* paperRadarYaml() {
   return "device: awr2243\n"
          "carrier_hz: 77.0e+9\n"
@@ -31,8 +31,8 @@ inline const char* paperRadarYaml() {
 
 inline RadarConfig paperRadar() { return parseRadarConfig(paperRadarYaml(), "radar.yaml"); }
 
-/// A point target at range and azimuth (z = 0): exact delay per element, from the signal model of docs/contracts.md
-/// section 3.
+/// A point target at range and azimuth (z = 0): exact delay per element, from the signal model of
+/// docs/reference/contracts.md section 3.
 inline ComplexGrid pointTarget(const RadarConfig& radar, double range_m, double azimuth_rad, double amplitude) {
   const Eigen::Vector3d target(range_m * std::cos(azimuth_rad), range_m * std::sin(azimuth_rad), 0);
   ComplexGrid x(radar.channels(), radar.samples_per_chirp);

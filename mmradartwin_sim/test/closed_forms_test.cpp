@@ -48,8 +48,8 @@ class ClosedForms : public SceneFiles {
   }
 };
 
-// Received power of 12 dBm through two antennas of 10 dBi: image in a plane, trihedral and sphere of simulation.md 4.1
-// by their cross-sections.
+// Received power of 12 dBm through two antennas of 10 dBi: image in a plane, trihedral and sphere of
+// docs/reference/closed_forms.md 4.1 by their cross-sections.
 TEST_F(ClosedForms, RadarEquation) {
   addWall("wall", "Metal", {5, -30}, {5, 30}, -30, 30);
   const Simulation s = look(makeTwin(writeScene(), "  specular: {}\n", radarAt77GHz()));
@@ -264,7 +264,7 @@ class TrihedralForms : public ClosedForms {
   }
 };
 
-// 4 pi a^4/(3 lambda^2) = 2.37 and 14.41 dBsm for 5 and 10 cm (simulation.md 4.2).
+// 4 pi a^4/(3 lambda^2) = 2.37 and 14.41 dBsm for 5 and 10 cm (docs/reference/closed_forms.md 4.2).
 TEST_F(TrihedralForms, FarOffTheTriangularOneHasItsCrossSection) {
   const OctantFaces faces = {{0, 0, 0}, tiltedAxes(), 0.05, false};
   addFaces(faces);
@@ -344,7 +344,8 @@ double physicalOptics(int n, int m, Surface point) {
 
 class CurvedForms : public ClosedForms {};
 
-// pi r^2 with the range's square taken between surface and centre: -21.05, -15.03 and -7.07 dBsm (simulation.md 4.2).
+// pi r^2 with the range's square taken between surface and centre: -21.05, -15.03 and -7.07 dBsm
+// (docs/reference/closed_forms.md 4.2).
 TEST_F(CurvedForms, SpheresHaveTheirCrossSectionHoweverTheyAreTessellated) {
   for (const auto& [r, expected] :
        std::vector<std::pair<double, double>>{{0.05, -21.05}, {0.1, -15.03}, {0.25, -7.07}}) {

@@ -104,7 +104,8 @@ class EdgeTest : public SceneFiles {
   }
 };
 
-// The whole mechanism on the box edge of simulation.md 4.6: the level of an infinite edge, vertical field along it.
+// The whole mechanism on the box edge of docs/reference/closed_forms.md 4.6: the level of an infinite edge, vertical
+// field along it.
 TEST_F(EdgeTest, OfABoxHasTheClosedFormsLevel) {
   for (const auto& [phi_deg, dbsm] : std::vector<std::pair<double, double>>{{100, -18.2}, {135, -25.3}}) {
     // The radar looks from 180 deg, one face lies at yaw + 90 deg: phi = 90 - yaw.

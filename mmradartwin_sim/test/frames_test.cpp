@@ -66,7 +66,7 @@ TEST_F(FramesTest, AreTheGridWhereNothingActsOnFrames) {
   }
 }
 
-// simulation.md 4.9: v = 1 m/s, T = 60 us, 77 GHz: 4 pi v T / lambda = 11.096 deg between slots.
+// docs/reference/closed_forms.md 4.9: v = 1 m/s, T = 60 us, 77 GHz: 4 pi v T / lambda = 11.096 deg between slots.
 TEST_F(FramesTest, WalkersTurnFromSlotToSlot) {
   RadarConfig radar = radarAt77GHz();
   radar.tx_position_m = {{0, 0, 0}, {0, 0, 0}};  // at one place, so that motion alone turns
@@ -231,7 +231,8 @@ TEST_F(FramesTest, InterferenceComesInBurstsOfSomeFrames) {
   EXPECT_LT(*std::min_element(starts.begin(), starts.end()), 10);
 }
 
-// causes.md A11: -95 dBc/Hz at 1 MHz leaves a skirt of -64 dBc a bin beside a host at 3 m, -54 dBc at 10 m.
+// docs/reference/causes.md A11: -95 dBc/Hz at 1 MHz leaves a skirt of -64 dBc a bin beside a host at 3 m, -54 dBc at 10
+// m.
 TEST_F(FramesTest, PhaseNoiseLeavesASkirtThatGrowsWithTheRange) {
   const auto skirt = [&](double range_m) {
     addWall("wall", "Metal", {range_m, -3}, {range_m, 3});

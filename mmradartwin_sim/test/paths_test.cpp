@@ -121,7 +121,7 @@ TEST_F(Paths, AreThoseOfAllSequencesThatExist) {
   EXPECT_GT(compared, 100u);
 }
 
-// simulation.md 4.3: exact monostatic 10 cm plate at normal incidence, near field included.
+// docs/reference/closed_forms.md 4.3: exact monostatic 10 cm plate at normal incidence, near field included.
 TEST_F(Paths, OfAPlateHoldItsNearAndFarField) {
   const double rows[][2] = {{1, 5.61}, {2, 15.96}, {3, 17.77}, {5, 18.68}, {9.9, 19.06}};
   for (const auto& row : rows) {
@@ -456,7 +456,8 @@ TEST_F(DiffuseTest, HasADirectiveLobe) {
         .amplitude;
   };
   EXPECT_NEAR(db(level("directive") / level("lambertian")), 10 * std::log10(M_PI / 2.4348), 0.02);
-  // F_alpha of simulation.md 4.8 at 0 and 45 deg: straight back the lobe has cos^(2 alpha) where Lambert's has cos.
+  // F_alpha of docs/reference/closed_forms.md 4.8 at 0 and 45 deg: straight back the lobe has cos^(2 alpha) where
+  // Lambert's has cos.
   const double rows[][3] = {{1, 4.7124, 4.2523}, {4, 2.4348, 2.1591}, {10, 1.1419, 1.0965}, {30, .4054, .4049}};
   const double s = std::sqrt(0.5);
   // So small that it is nothing where in it its one point lies.

@@ -57,7 +57,7 @@ TEST(SlabTest, IsTheHalfSpaceWhereItIsThickAndLossy) {
   EXPECT_LT(std::abs(thick.transmission.te), 1e-9);
 }
 
-// simulation.md 4.5, one way at normal incidence.
+// docs/reference/closed_forms.md 4.5, one way at normal incidence.
 TEST(SlabTest, HasTheLossesOfCommonPanels) {
   const Slab plasterboard = slab(dielectric(2.73, .503, .0125), 1, 77e9);
   expectForm("4.5 plasterboard 12.5 mm, abs(R)", "1", .2907, std::abs(plasterboard.reflection.te), 2e-3);
@@ -71,7 +71,7 @@ TEST(SlabTest, HasTheLossesOfCommonPanels) {
   expectForm("4.5 wood 40 mm, T", "dB", -23.2, loss(1.99, .494, .040), 0.1);
 }
 
-// simulation.md 4.5: |Gamma| at normal incidence of every material of both editions at 77 GHz.
+// docs/reference/closed_forms.md 4.5: |Gamma| at normal incidence of every material of both editions at 77 GHz.
 TEST(ItuMaterials, HaveTheTabulatedReflection) {
   const struct {
     const char *edition, *name;

@@ -151,7 +151,7 @@ TEST_F(ReceiverTest, AReplicaFollowsEveryEchoOrOneActors) {
     EXPECT_NEAR(db(replica.amplitude / echo.amplitude), -9, 1e-9);
     for (std::size_t k = 0; k < echo.length_m.size(); ++k) {
       EXPECT_NEAR(replica.length_m[k] - echo.length_m[k], 1.4, 1e-12);
-      // The way of a wave that is 1.4 m longer, at the window's centre (docs/contracts.md section 3).
+      // The way of a wave that is 1.4 m longer, at the window's centre (docs/reference/contracts.md section 3).
       const double tau = replica.length_m[k] / kSpeedOfLight_m_per_s, was = echo.length_m[k] / kSpeedOfLight_m_per_s;
       const RadarConfig radar = paperRadar();
       const double turns =
@@ -263,7 +263,7 @@ TEST_F(ReceiverTest, HarmonicsStandAtTwiceTheRangeAndFallWithTheSquare) {
   }
 }
 
-// causes.md A12: ripples of 20 kHz and 300 kHz leave paired echoes at -58 and -35 dBc of a host at 3 m.
+// docs/reference/causes.md A12: ripples of 20 kHz and 300 kHz leave paired echoes at -58 and -35 dBc of a host at 3 m.
 TEST_F(ReceiverTest, NonlinearChirpsPairEchoes) {
   addPlate(3, 0);
   writeScene();

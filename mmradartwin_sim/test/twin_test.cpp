@@ -49,7 +49,7 @@ TEST_F(TwinTest, LeavesRecordsThatAddUpToTheGrid) {
   ASSERT_GT(s.records.size(), 1000u);
   EXPECT_TRUE(s.propagation_only);
   EXPECT_TRUE(s.check.ok()) << s.check.worst_amplitude_error << " " << s.check.grid_error;
-  // Rebuilt here, sample by sample, from the sum over records of docs/contracts.md.
+  // Rebuilt here, sample by sample, from the sum over records of docs/reference/contracts.md.
   ComplexGrid rebuilt = ComplexGrid::Zero(radar.channels(), radar.samples_per_chirp);
   for (const PathRecord& r : s.records) {
     double power = 0;
@@ -68,7 +68,7 @@ TEST_F(TwinTest, LeavesRecordsThatAddUpToTheGrid) {
   expectForm("4.10 sum of records against the grid", "1", 0, worst(s.grid.x, rebuilt), 1e-12);
 }
 
-// The samples of docs/contracts.md section 3 for one exactly known delay, including the residual video phase.
+// The samples of docs/reference/contracts.md section 3 for one exactly known delay, including the residual video phase.
 TEST_F(TwinTest, MakesTheSamplesOfTheConvention) {
   addWall("wall", "Metal", {3, -10}, {3, 10}, -5, 5);
   const RadarConfig radar = paperRadar();

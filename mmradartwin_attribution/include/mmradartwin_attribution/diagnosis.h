@@ -8,8 +8,8 @@
 namespace mmradartwin {
 
 /// Finds what the twin gets wrong about a recording, names it and measures on held-out places what saying so gains
-/// (docs/contracts.md section 4, 5 and 7). Sets the twin's strongest amplitude and session. Throws InputError for a
-/// recording that cannot be judged at all, DiagnosisCancelled.
+/// (docs/reference/contracts.md section 4, 5 and 7). Sets the twin's strongest amplitude and session. Throws InputError
+/// for a recording that cannot be judged at all, DiagnosisCancelled.
 Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOptions& options);
 
 /// Diagnosis without a scene: it judges frames and channels only, and there is no extended twin.

@@ -17,7 +17,7 @@
 
 namespace mmradartwin {
 
-/// One number, text or list of a finding, under its binding name (causes.md).
+/// One number, text or list of a finding, under its binding name (docs/reference/causes.md).
 struct FindingParameter {
   std::string name;
   std::string unit;  ///< "" for texts
@@ -46,7 +46,7 @@ struct CauseDescription {
   const std::string& action() const { return classAction(residual_class); }
 };
 
-/// All catalogued causes in the order of causes.md, and last `unknown`.
+/// All catalogued causes in the order of docs/reference/causes.md, and last `unknown`.
 const std::vector<CauseDescription>& causeDescriptions();
 /// Adds a cause that a plug-in brings, behind the others. Its name is the mechanism's. Throws InputError for a name
 /// that the catalogue has already. Not to be called while a diagnosis runs.
@@ -113,7 +113,7 @@ struct ChangedRecord {
   double strongest_db() const;  ///< the larger amplitude of both
 };
 
-/// One entry of findings.json (docs/contracts.md section 5). Class and action follow from the cause.
+/// One entry of findings.json (docs/reference/contracts.md section 5). Class and action follow from the cause.
 struct Finding {
   std::string cause;  ///< a binding name or "unknown"
   std::vector<FindingParameter> parameters;

@@ -4,9 +4,9 @@
 
 namespace mmradartwin {
 
-/// The paper's deployment (docs/contracts.md section 3), two transmitters before four receivers with the pitch at
-/// exactly half the wavelength of 77 GHz: what tests and benchmarks of all packages measure with. 1024 bytes per chirp,
-/// 2048 per frame.
+/// The paper's deployment (docs/reference/contracts.md section 3), two transmitters before four receivers with the
+/// pitch at exactly half the wavelength of 77 GHz: what tests and benchmarks of all packages measure with. 1024 bytes
+/// per chirp, 2048 per frame.
 inline RadarConfig paperRadar() {
   RadarConfig radar;
   radar.device = "awr2243";

@@ -33,8 +33,9 @@ constexpr int kAngleBins = 64;
 /// Periodic Hann, w[n] = (1 - cos(2 pi n/N))/2.
 std::vector<double> hannWindow(int samples);
 
-/// The one signal chain of both branches: window, range FFT, spatial FFT, level (docs/contracts.md section 3). Const
-/// functions may be called from several threads at once (FFT plans and scratch space are per thread and kept).
+/// The one signal chain of both branches: window, range FFT, spatial FFT, level (docs/reference/contracts.md section
+/// 3). Const functions may be called from several threads at once (FFT plans and scratch space are per thread and
+/// kept).
 class SignalChain {
  public:
   /// Throws InputError where the virtual array is no uniform line along y.

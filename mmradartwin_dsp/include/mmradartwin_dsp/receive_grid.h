@@ -12,7 +12,7 @@ enum class Branch : std::uint8_t { kMeasured = 0, kSimulated = 1 };
 /// Channels x samples, row-major so that a channel's fast time is contiguous.
 using ComplexGrid = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Complex receive grid in the convention x = I + jQ (docs/contracts.md section 3).
+/// Complex receive grid in the convention x = I + jQ (docs/reference/contracts.md section 3).
 struct ReceiveGrid {
   std::int64_t stamp_ns = 0;
   Branch source = Branch::kMeasured;

@@ -95,7 +95,8 @@ PoseTable parsePoses(const std::string& csv, const std::string& file);
 /// A bare capture: one pose named after the file, at the origin.
 Recording openCapture(const std::string& file, const RadarConfig& radar);
 
-/// True within 10 cm horizontally, 2 cm in height and 1 deg in heading: a duplicate (docs/contracts.md section 5).
+/// True within 10 cm horizontally, 2 cm in height and 1 deg in heading: a duplicate (docs/reference/contracts.md
+/// section 5).
 bool sameView(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b);
 /// Moves the later of each such pair from poses to duplicates.
 void excludeDuplicates(Recording& recording);

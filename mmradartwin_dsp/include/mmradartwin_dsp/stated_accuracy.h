@@ -10,7 +10,7 @@ class YamlMap;
 
 /// Standard deviations (1 sigma) of what a session's ground is good for, as its user states them: scene, levels, poses
 /// and paths. The defaults are those of config/diagnosis.yaml; a session's `accuracy:` may state others
-/// (docs/contracts.md section 5).
+/// (docs/reference/contracts.md section 5).
 struct StatedAccuracy {
   double scene_m = 0.02;        ///< place of an actor of the scene, along a path
   double level_db = 1.5;        ///< level of an actor's echoes, per interaction

@@ -19,8 +19,8 @@ struct Stretch {
 };
 
 /// Finds the stretches of at least 1 s in which T_map_radar stays within 2 cm and 1 deg of its median
-/// (docs/contracts.md section 5). `frames` in order of time; a gap of more than 1 s ends a stretch. Poses are named
-/// 001, 002, ...; those within 10 cm horizontally of a location's first pose share it.
+/// (docs/reference/contracts.md section 5). `frames` in order of time; a gap of more than 1 s ends a stretch. Poses are
+/// named 001, 002, ...; those within 10 cm horizontally of a location's first pose share it.
 std::vector<Stretch> findStationaryPoses(const std::vector<StampedTransform>& frames, std::int64_t frame_period_ns);
 
 }  // namespace mmradartwin

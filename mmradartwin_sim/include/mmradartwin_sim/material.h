@@ -10,7 +10,7 @@ namespace mmradartwin {
 
 enum class MaterialModel { kDielectric, kConductor, kScalar };
 
-/// One material of materials.yaml (docs/contracts.md section 5). NaN = not given.
+/// One material of materials.yaml (docs/reference/contracts.md section 5). NaN = not given.
 struct Material {
   std::string name;
   MaterialModel model = MaterialModel::kDielectric;

@@ -112,8 +112,8 @@ class ReceiveStage {
 
 // Frames, run for every chirp by Twin::simulateFrames() alone: the grid of a pose is what stays the same.
 
-/// One chirp of one frame of a pose, for what differs from chirp to chirp (docs/contracts.md section 3: chirps come as
-/// loop * slots + slot).
+/// One chirp of one frame of a pose, for what differs from chirp to chirp (docs/reference/contracts.md section 3:
+/// chirps come as loop * slots + slot).
 struct ChirpContext {
   const PoseContext& pose;
   std::int64_t stamp_ns = 0;  ///< start of the pose's first frame

@@ -12,7 +12,7 @@ enum class ParameterKind { kNumber, kInteger, kText, kNumbers, kTexts };
 
 /// A parameter that a mechanism has. Ranges are checked before the mechanism sees a value.
 struct ParameterSpec {
-  std::string name;  ///< with its unit as in causes.md, e.g. yaw_deg
+  std::string name;  ///< with its unit as in docs/reference/causes.md, e.g. yaw_deg
   std::string unit;  ///< "deg", "m", "dB", "1", "" for texts
   ParameterKind kind = ParameterKind::kNumber;
   double min = 0, max = 0;

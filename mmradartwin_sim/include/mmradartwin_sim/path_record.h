@@ -17,7 +17,7 @@ using PerInteraction = boost::container::small_vector<T, 3>;
 template <typename T>
 using PerChannel = boost::container::small_vector<T, 8>;
 
-/// One propagation path (docs/contracts.md section 3 to 5).
+/// One propagation path (docs/reference/contracts.md section 3 to 5).
 struct PathRecord {
   const std::string* event = nullptr;        ///< name of the mechanism that made it (interned, never null in a result)
   PerInteraction<int> actors;                ///< Scene::actors index; -1: what the scene lacks
@@ -56,7 +56,7 @@ void scaleRecord(std::complex<double> factor, PathRecord& record);
 /// Nearest range bin of length/2, held within the grid.
 int rangeBin(const RadarConfig& radar, double length_m);
 
-/// Deviations of one pose from the invariants of records and grid (docs/contracts.md section 4).
+/// Deviations of one pose from the invariants of records and grid (docs/reference/contracts.md section 4).
 struct RecordCheck {
   double worst_amplitude_error = 0;  ///< max |sum|c|^2/(M A^2) - 1|
   double grid_error = 0;             ///< |grid - rebuilt| / |grid|
@@ -65,7 +65,7 @@ struct RecordCheck {
 /// Invariants of records and the grid that accumulate() made of them, by another arithmetic.
 RecordCheck checkRecords(const RadarConfig& radar, const std::vector<PathRecord>& records, const ComplexGrid& x);
 
-/// CSV header and rows of paths/{pose}.csv (docs/contracts.md: length_m,azimuth_dep_deg,...).
+/// CSV header and rows of paths/{pose}.csv (docs/reference/contracts.md: length_m,azimuth_dep_deg,...).
 struct Scene;
 void writePathsCsv(const std::vector<PathRecord>& records, const Scene& scene, const std::string& file);
 

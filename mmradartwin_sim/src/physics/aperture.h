@@ -16,9 +16,9 @@ std::complex<double> apertureAxis(double u1, double u2);
 /// clockwise.
 std::complex<double> aperturePolygon(const std::vector<std::vector<Eigen::Vector2d>>& loops);
 
-/// Fresnel aperture factor of a facet (docs/contracts.md section 4), in the exp(-jkL) convention: 1 for an infinite
-/// facet. point: where the image ray meets the facet's plane; ray: its unit direction before or after; before_m and
-/// after_m: path lengths on both sides of the point. Lengths on the facet are measured across the ray.
+/// Fresnel aperture factor of a facet (docs/reference/contracts.md section 4), in the exp(-jkL) convention: 1 for an
+/// infinite facet. point: where the image ray meets the facet's plane; ray: its unit direction before or after;
+/// before_m and after_m: path lengths on both sides of the point. Lengths on the facet are measured across the ray.
 std::complex<double> apertureFactor(const Facet& facet, const Eigen::Vector3d& point, const Eigen::Vector3d& ray,
                                     double before_m, double after_m, double wavelength_m);
 

@@ -29,7 +29,8 @@ std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
 
 /// The part of two faces across the ray that makes up a corner's aperture.
 enum class CornerAperture {
-  kBothFaces,     ///< from the far end of the one to the far end of the other (docs/contracts.md section 4, `corner`)
+  kBothFaces,     ///< from the far end of the one to the far end of the other (docs/reference/contracts.md section 4,
+                  ///< `corner`)
   kNarrowerFace,  ///< as far to both sides as the narrower reaches: what meets one face leaves as far on the other
 };
 

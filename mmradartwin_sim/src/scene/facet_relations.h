@@ -10,7 +10,8 @@ constexpr double kLayer_m = 0.012;
 constexpr double kSamePlane_m = 1e-4;
 
 /// Finds anew which facets of the scene lie over which (Facet::layers), and which claim the same area of one plane:
-/// that is cut out of all but one of them (Scene::overlaps, uncut), by the rule of docs/contracts.md section 4.
+/// that is cut out of all but one of them (Scene::overlaps, uncut), by the rule of docs/reference/contracts.md
+/// section 4.
 void relateFacets(Scene& scene);
 
 }  // namespace mmradartwin

@@ -14,14 +14,15 @@ class StatedBounds {
   /// four standard deviations.
   double mostRangeError_m() const { return 4 * scene_m_; }
   /// A smaller move is no likely cause and adapts to much that is another's; see
-  /// docs/calibration_of_bounds.md#least-move.
+  /// docs/verification/calibration_of_bounds.md#least-move.
   double leastMove_m() const { return 3 * scene_m_; }
-  /// A move beyond this is far away: no actor's error explains it; see docs/calibration_of_bounds.md#far-away.
+  /// A move beyond this is far away: no actor's error explains it; see
+  /// docs/verification/calibration_of_bounds.md#far-away.
   double farAway_m() const { return 6 * scene_m_; }
   /// Offset that the errors of sixteen actors make together.
   double commonOffset_m() const { return scene_m_ / 4; }
   /// An offset of radar or scene beyond this is no sum of the actors' errors; see
-  /// docs/calibration_of_bounds.md#sure-offset.
+  /// docs/verification/calibration_of_bounds.md#sure-offset.
   double sureOffset_m() const { return 1.75 * scene_m_; }
 
  private:

@@ -10,7 +10,7 @@ namespace mmradartwin::diagnosis::hypotheses {
 
 /// Least gain in nats, divided by the overdispersion, by which a hypothesis with these scaled values stands although no
 /// map gains by it. traces: the hypothesis moves echoes in the room. See
-/// docs/calibration_of_bounds.md#least-nats-by-kind.
+/// docs/verification/calibration_of_bounds.md#least-nats-by-kind.
 double leastNats(const Hypothesis& hypothesis, const std::vector<double>& scaled_values, bool traces,
                  std::size_t poses);
 

@@ -8,7 +8,7 @@ namespace mmradartwin::diagnosis::hypotheses {
 namespace {
 
 // Factor on standard errors by which 95 % intervals hold the truth as often as they state; see
-// docs/calibration_of_bounds.md#kcalibration.
+// docs/verification/calibration_of_bounds.md#kcalibration.
 constexpr double kCalibration = 1.3;
 
 }  // namespace

@@ -31,8 +31,8 @@ bool isPresence(const std::vector<ParameterSpec>& specs) {
   });
 }
 
-/// False for horizontal facets: floors, ceilings and table tops neither reflect nor scatter (docs/contracts.md, section
-/// 4).
+/// False for horizontal facets: floors, ceilings and table tops neither reflect nor scatter
+/// (docs/reference/contracts.md, section 4).
 bool takesPart(const Scene& scene, const Actor& actor) {
   return std::any_of(actor.facets.begin(), actor.facets.end(), [&](int id) {
     const Facet& f = scene.facets[static_cast<std::size_t>(id)];

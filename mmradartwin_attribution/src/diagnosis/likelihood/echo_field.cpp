@@ -16,7 +16,7 @@ constexpr int kSkirt_bins = 6;  ///< reach of other paths
 /// Reach of a strong path: -60 to -100 dB, above the noise where there is no clutter.
 constexpr int kFarSkirt_bins = 32;
 /// Power over that of the pose's strongest path, below which a path is weak and from which it is strong. The likelihood
-/// jumps where a path passes one of them: see docs/calibration_of_bounds.md, reach of paths.
+/// jumps where a path passes one of them: see docs/verification/calibration_of_bounds.md, reach of paths.
 constexpr double kWeakShare = 1e-6, kStrongShare = 0.003;
 /// Power over that of the strongest bin, below which a changed response is left out.
 constexpr double kLeastResponse = 1e-7;

@@ -27,7 +27,7 @@ struct CellEcho {
 /// Where one path stands alone, its level is normal in dB. Then it gives the information 1 / spread about the logarithm
 /// of its power; many paths give 1, as fading does. What of y is uncorrelated with b keeps the t distribution, of one
 /// dimension less, so that clutter of another level than expected does not move the level of an echo. A share of echoes
-/// follows no known level and fades. See docs/diagnosis.md.
+/// follows no known level and fades. See docs/reference/diagnosis.md.
 class CellLikelihood {
  public:
   /// z: [channels] L^-1 y, with Sigma = L L^H as factor has it.

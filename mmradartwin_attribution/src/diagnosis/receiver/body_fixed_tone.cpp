@@ -13,7 +13,7 @@
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-constexpr double kReach_m = 0.15;    ///< largest range of leakage (docs/causes.md, A1)
+constexpr double kReach_m = 0.15;    ///< largest range of leakage (docs/reference/causes.md, A1)
 constexpr double kReach_bins = 1.5;  ///< range that is searched at least
 constexpr double kStep_bins = 0.02;  ///< between ranges that are tried
 /// Steps about range 0 (a quarter of a bin) that count neither as before nor as behind the radar.

@@ -17,8 +17,9 @@
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-constexpr std::size_t kPoses = 8;     ///< poses that are tried: a convention shows at every one
-constexpr int kIterations = 30;       ///< Fisher steps of the latents; see docs/calibration_of_bounds.md#kiterations
+constexpr std::size_t kPoses = 8;  ///< poses that are tried: a convention shows at every one
+constexpr int kIterations =
+    30;  ///< Fisher steps of the latents; see docs/verification/calibration_of_bounds.md#kiterations
 constexpr double kBetter_nats = 1;    ///< gain from which a step to another order is taken
 constexpr int kMostReceivers = 4;     ///< receivers up to which all orders are tried
 constexpr int kMostTransmitters = 3;  ///< transmitters up to which all orders are tried

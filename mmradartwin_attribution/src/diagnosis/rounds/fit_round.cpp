@@ -95,7 +95,7 @@ std::vector<HypothesisFit> FitRound::fit(std::vector<Screened> screened, std::si
     looked_at.round = round;
     // The screened gain follows from a quadratic and is often far too small, most of all for geometries, places and
     // laws. Several named causes and four laws are therefore fitted. See
-    // docs/calibration_of_bounds.md#screened-gain-of-a-geometry.
+    // docs/verification/calibration_of_bounds.md#screened-gain-of-a-geometry.
     const bool law = !isCatalogued(screened.hypothesis.mechanism.mechanism);
     const bool object = isObject(screened.hypothesis), geometry = screened.hypothesis.isGeometry();
     const bool moved = screened.hypothesis.isMove();

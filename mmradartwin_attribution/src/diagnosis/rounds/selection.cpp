@@ -122,7 +122,8 @@ void Selection::withdraw(std::size_t i) {
 }
 
 /// Withdraws causes of all echoes that are no larger than their own errors where something is unknown: the residual of
-/// the unknown's law resembles a little of such a cause. See docs/calibration_of_bounds.md#causes-beside-an-unknown.
+/// the unknown's law resembles a little of such a cause. See
+/// docs/verification/calibration_of_bounds.md#causes-beside-an-unknown.
 void Selection::withdrawExplainedByUnknown() {
   const auto is_doubtful = [&](const Accepted& a) {
     const Hypothesis& h = a.hypothesis;
@@ -189,7 +190,7 @@ bool Selection::mayBeNothing(const Hypothesis& hypothesis) const {
 
 /// True of a geometry whose numbers are within the errors of actors and poses, and of a move within an actor's range
 /// error. The likelihood may gain much by either where paths appear and vanish with each millimetre. See
-/// docs/calibration_of_bounds.md#sure-offset.
+/// docs/verification/calibration_of_bounds.md#sure-offset.
 bool Selection::isWithinErrors(const HypothesisFit& fit) const {
   const Hypothesis& hypothesis = fit.hypothesis;
   const auto accepted = acceptedAs(hypothesis);

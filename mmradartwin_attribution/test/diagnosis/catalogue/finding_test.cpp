@@ -60,7 +60,7 @@ TEST(Cause, EveryOneHasItsClassAndOnlyReflectorsAdmitMaterialChanges) {
   EXPECT_THROW(causeDescription("magic"), InputError);
 }
 
-// What a twin can be extended by carries the cause's names and units (docs/contracts.md section 5).
+// What a twin can be extended by carries the cause's names and units (docs/reference/contracts.md section 5).
 TEST(Cause, MechanismsOfThatNameHaveTheParameters) {
   int compared = 0;
   const std::vector<std::string> mechanisms = MechanismRegistry::instance().names();

@@ -31,8 +31,8 @@ unsigned seedOfThisRun() {
   return seed ? static_cast<unsigned>(std::strtoul(seed, nullptr, 10)) : 20261122u;
 }
 
-/// A room of fixed points around six poses that look at its middle, measured by exact delays (docs/contracts.md section
-/// 3).
+/// A room of fixed points around six poses that look at its middle, measured by exact delays
+/// (docs/reference/contracts.md section 3).
 class FrameEvidenceTest : public ::testing::Test {
  protected:
   FrameEvidenceTest() : seed_(seedOfThisRun()), random_(seed_), radar_(paperRadar()) {

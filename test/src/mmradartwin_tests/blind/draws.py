@@ -1,6 +1,6 @@
 """What a trial hides: effects of one row of the protocol and their strengths, drawn from the trial's own seed.
 
-Strengths are those that physics allows (causes.md) and, where the catalogue tells how small an effect can be found, at
+Strengths are those that physics allows (docs/reference/causes.md) and, where the catalogue tells how small an effect can be found, at
 least twice that. Everything follows from (row, tier, seed, trial), so that a trial can be repeated.
 """
 import dataclasses
@@ -118,7 +118,7 @@ def permutation(rng, trial):
 
 
 def reflectivity(rng, trial):
-    """A material, which several actors have; single actors scatter too much for few poses (causes.md, section 6)."""
+    """A material, which several actors have; single actors scatter too much for few poses (docs/reference/causes.md, section 6)."""
     delta_db = float(rng.uniform(-12, -8)) if rng.random() < 0.6 else float(rng.uniform(6, 9))
     return {"material": str(rng.choice(MATERIALS)), "delta_db": delta_db}
 

@@ -37,7 +37,7 @@ def group(finding):
 
 
 def same_cause(truth, name):
-    """Whether a name is the truth's; the reversed order of channels has two names (causes.md)."""
+    """Whether a name is the truth's; the reversed order of channels has two names (docs/reference/causes.md)."""
     if truth["cause"] == name:
         return True
     reversed_order = truth["cause"] == "channel_conjugation" or (
