@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# mmradartwin's commands: ./run.sh demo | test | setup | build | bench | fuzz | tsan | core | lint | docs | exec CMD...
+# mmradartwin's commands: ./run.sh try | demo | test | setup | build | bench | fuzz | tsan | core | lint | docs | exec CMD...
 set -euo pipefail
 
 root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
@@ -14,12 +14,14 @@ packages=(
   libssl-dev liblua5.4-dev libmatio-dev libpcap-dev libusb-1.0-0-dev zlib1g-dev libumockdev-dev umockdev libcli11-dev libgtest-dev libbenchmark-dev pybind11-dev python3-dev libopencv-dev libnlopt-dev
   ccache xvfb xauth x11-apps x11-utils imagemagick procps iproute2 python3-matplotlib python3-numpy python3-scipy python3-yaml)
 
-say() { printf '== %s\n' "$*" >&2; }
-die() { printf 'error: %s\n' "$*" >&2; exit 2; }
+# shellcheck disable=SC1091
+source "$root/launch/scripts/stages.sh"
 
 usage() {
   cat >&2 <<'U'
 usage: ./run.sh VERB
+  try [OUT]    install, build, then a first finding in a minute or two: a small measurement that hides something, and its
+               diagnosis; results in OUT (default try_out)
   demo [OUT]   install, build, then play a generated session through the whole loop; results in OUT (default demo_out)
   test         install, build, run the tests; the last line is "N passed, N failed, N skipped"
   test long    the same with more sessions of the diagnosis, another third each day; test all takes every one
@@ -51,10 +53,15 @@ install() {
   if [ "$(id -u)" -ne 0 ]; then
     command -v sudo >/dev/null || die "these Debian packages are missing and sudo is not here to install them; as root: apt-get install ${missing[*]}"
     sudo=(sudo)
+    sudo -v
   fi
-  say "installing ${#missing[@]} Debian packages: ${missing[*]}"
-  "${sudo[@]}" apt-get update -qq
-  "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >&2
+  logged "$ws/log/apt_update.log" unknown "apt-get update" "${sudo[@]}" apt-get update
+  # Each is unpacked and set up.
+  apt_steps=$((2 * $(apt-get install --simulate --no-install-recommends "${missing[@]}" | grep -c '^Inst ')))
+  export apt_steps
+  say "Installing $((apt_steps / 2)) Debian packages (log: $ws/log/apt_install.log)"
+  logged "$ws/log/apt_install.log" of_apt "apt-get install" "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive \
+    apt-get install -y --no-install-recommends "${missing[@]}"
 }
 
 setup() { install "${packages[@]}"; }
@@ -75,7 +82,8 @@ jobs() {
 build() {
   workspace
   [ -d /usr/lib/ccache ] && export PATH=/usr/lib/ccache:$PATH
-  (cd "$ws" && catkin_make -j"$(jobs)" -DCMAKE_BUILD_TYPE=Release "$@")
+  say "Building the workspace${1:+: $1} (log: $ws/log/build.log)"
+  (cd "$ws" && logged "$ws/log/build.log" of_make "the build" catkin_make -j"$(jobs)" -DCMAKE_BUILD_TYPE=Release "$@")
 }
 
 source_workspace() {
@@ -148,13 +156,15 @@ separate_build() {
   local folder=$ws/$1 targets=$2
   shift 2
   workspace
-  [ -e "$ws/src/CMakeLists.txt" ] || catkin_init_workspace "$ws/src" >&2
+  mkdir -p "$ws/log"
+  [ -e "$ws/src/CMakeLists.txt" ] || catkin_init_workspace "$ws/src" >"$ws/log/init.log" 2>&1
   [ -d /usr/lib/ccache ] && export PATH=/usr/lib/ccache:$PATH
   export ROS_LANG_DISABLE=genpy:genlisp:geneus:gennodejs  # messages for C++ alone
-  cmake -S "$ws/src" -B "$folder/build" -DCATKIN_DEVEL_PREFIX="$folder/devel" -DCMAKE_INSTALL_PREFIX="$folder/install" \
-    -DCMAKE_BUILD_TYPE=RelWithDebInfo "$@" >&2
+  say "Building $targets (log: $ws/log/${folder##*/}_build.log)"
+  logged "$ws/log/${folder##*/}_configure.log" unknown "cmake" cmake -S "$ws/src" -B "$folder/build" -DCATKIN_DEVEL_PREFIX="$folder/devel" -DCMAKE_INSTALL_PREFIX="$folder/install" \
+    -DCMAKE_BUILD_TYPE=RelWithDebInfo "$@"
   # shellcheck disable=SC2086
-  cmake --build "$folder/build" -j"$(jobs)" --target $targets >&2
+  logged "$ws/log/${folder##*/}_build.log" of_make "the build" cmake --build "$folder/build" -j"$(jobs)" --target $targets
 }
 
 run_fuzz() {
@@ -202,8 +212,8 @@ core() (
   unset CMAKE_PREFIX_PATH ROS_PACKAGE_PATH LD_LIBRARY_PATH PYTHONPATH
   data_folder
   # shellcheck disable=SC2086
-  cmake -S "$ws/src/mmradartwin" -B "$folder" -DCMAKE_BUILD_TYPE=Release >&2 &&
-    cmake --build "$folder" -j"$(jobs)" --target $targets >&2 &&
+  logged "$ws/log/core_configure.log" unknown "cmake" cmake -S "$ws/src/mmradartwin" -B "$folder" -DCMAKE_BUILD_TYPE=Release &&
+    logged "$ws/log/core_build.log" of_make "the build" cmake --build "$folder" -j"$(jobs)" --target $targets &&
     ctest --test-dir "$folder" -j"$(jobs)" --output-on-failure --no-tests=error "$@" >&2
 )
 
@@ -212,7 +222,7 @@ core_sample() {
   local libraries="mmradartwin_dsp mmradartwin_driver mmradartwin_sim mmradartwin_sim_room mmradartwin_attribution"
   local tests="mmradartwin_dsp_units_test frame_clock_test mmradartwin_sim_plugin_test
     mmradartwin_attribution_packed_hermitian_test"
-  say "building and trying what needs no ROS by cmake alone"
+  say "Building and trying what needs no ROS by cmake alone (log: $ws/log/core_build.log)"
   # shellcheck disable=SC2086
   core "$libraries $tests" -R "^($(printf '%s|' $tests)none)$"
 }
@@ -227,7 +237,8 @@ lint() {
 verb=${1:-}
 [ -n "$verb" ] && shift
 case $verb in
-  demo) setup; build >&2; source_workspace; exec "$root/launch/scripts/demo.sh" "$(readlink -m "${1:-$root/demo_out}")" ;;
+  try) setup; build; source_workspace; exec "$root/launch/scripts/try.sh" "$(readlink -m "${1:-$root/try_out}")" ;;
+  demo) setup; build; source_workspace; exec "$root/launch/scripts/demo.sh" "$(readlink -m "${1:-$root/demo_out}")" ;;
   test) setup; run_tests "$@" ;;
   setup) setup ;;
   build) setup; build ;;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The demo: generate a session that hides an effect, play it over UDP through the live loop, evaluate what was recorded,
-# find the effect, replay and evaluate again with the twin that knows it.
+# find the effect, replay and evaluate again with the twin that knows it. Ends with 0 if the effect was found.
 # usage: demo.sh OUTPUT
 set -euo pipefail
 
@@ -9,19 +9,32 @@ case ${1:-} in
   --version) echo "demo.sh $(rosversion mmradartwin_launch)"; exit 0 ;;
   '' | -*) echo 'error: usage: demo.sh OUTPUT' >&2; exit 2 ;;
 esac
-out=$1
+here=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
+# shellcheck disable=SC1091
+source "$here/stages.sh"
+
+out=$(readlink -m "$1")
 locations=${DEMO_LOCATIONS:-10}
 headings=${DEMO_HEADINGS:-2}
 frames=${DEMO_FRAMES:-100}
-say() { printf '== %s\n' "$*" >&2; }
+effect=${DEMO_EFFECT:-element_pattern}
+log=$out/log
+started=$SECONDS
+# shellcheck disable=SC2034 # read by stage
+stages=6
 
 mkdir -p "$out"
 rm -rf "$out/session" "$out/report" "$out/diagnosis" "$out/report_extended" "$out/demo.bag" "$out/demo.bag.active" \
-  "$out/rviz.png" "$out/rviz_extended.png" "$out/rviz_before_after.png"
+  "$out/rviz.png" "$out/rviz_extended.png" "$out/rviz_before_after.png" "$log"
+mkdir -p "$log"
+export ROS_LOG_DIR=$log/ros
+say "What follows takes some minutes. All that the programs say goes to $log."
 
-say "1/5 generating a measured session: $locations places x $headings headings, $frames frames each"
-rosrun mmradartwin_tests make_session.py --output "$out/session" --locations "$locations" --headings "$headings" \
-  --frames "$frames" --seed "${DEMO_SEED:-$RANDOM}" --truth "$out/truth.json" --effect "${DEMO_EFFECT:-element_pattern}"
+stage "Measuring: the generator writes raw captures of an office at $locations places in $headings directions each. It hides an effect."
+logged "$log/1_generate.log" unknown "generating the session" rosrun mmradartwin_tests make_session.py \
+  --output "$out/session" --locations "$locations" --headings "$headings" --frames "$frames" \
+  --seed "${DEMO_SEED:-$RANDOM}" --truth "$out/truth.json" --effect "$effect"
+say "      $(find "$out/session/captures" -name '*.bin' | wc -l) captures, $(du -sh "$out/session" | cut -f 1)B in all."
 
 # A window where there is a display, a virtual one otherwise.
 xvfb=
@@ -30,7 +43,6 @@ if [ -z "${DISPLAY:-}" ]; then
   Xvfb ":$n" -screen 0 1600x960x24 +extension GLX >/dev/null 2>&1 &
   xvfb=$!
   export DISPLAY=:$n LIBGL_ALWAYS_SOFTWARE=1
-  say "no display: rviz runs on a virtual one (:$n)"
 fi
 # picture FILE: what rviz shows now; fails where there is no rviz yet.
 picture() {
@@ -41,19 +53,33 @@ picture() {
   import -window "$id" "$1" 2>/dev/null
 }
 
-# watch PLAYER FILE: waits for the launch. The last picture taken while its node PLAYER runs is the one that stays: that
-# node's end ends the launch, and what rviz shows then is on its way out.
-watch() {
+# launched NUMBER_NAME PLAYER PERCENT FILE LAUNCH...: roslaunch until its node PLAYER has ended, then Ctrl-C for the rest. The last
+# picture of rviz that was taken while PLAYER ran goes to FILE.
+launch=
+launched() {
+  local log_file=$log/$1.log player=$2 percent=$3 file=$4 follower seen=0
+  shift 4
+  : >"$log_file"
+  follow "$log_file" "$percent" &
+  follower=$!
+  roslaunch -p "$port" mmradartwin_launch "$@" >"$log_file" 2>&1 &
+  launch=$!
   while kill -0 "$launch" 2>/dev/null; do
     sleep 3
-    if picture "$out/.rviz.png" && pgrep -P "$launch" -f "__name:=$1" >/dev/null; then mv -f "$out/.rviz.png" "$2" || true; fi
+    if pgrep -P "$launch" -f "__name:=$player" >/dev/null; then
+      seen=1
+      if picture "$out/.rviz.png" && pgrep -P "$launch" -f "__name:=$player" >/dev/null; then mv -f "$out/.rviz.png" "$file"; fi
+    elif [ "$seen" -eq 1 ]; then
+      kill -INT "$launch" 2>/dev/null || true
+      break
+    fi
   done
   rm -f "$out/.rviz.png"
   wait "$launch" || true
   launch=
+  stop_following "$follower"
 }
 
-launch=
 # shellcheck disable=SC2317 # called by the trap
 cleanup() {
   [ -n "$launch" ] && kill -INT "$launch" 2>/dev/null && wait "$launch" 2>/dev/null
@@ -67,57 +93,50 @@ trap 'exit 130' INT TERM
 port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
 export ROS_MASTER_URI=http://127.0.0.1:$port ROS_IP=127.0.0.1
 
-say "2/5 playing it over UDP at the real pace: driver, signal chain, twin, attribution and rviz run live"
+where=''
+[ -z "$xvfb" ] || where=' There is no display, so rviz draws on a virtual one.'
+stage "Live: an emulated DCA1000 plays it over UDP at the radar's pace. Driver, signal chain, twin, attribution and rviz run.$where"
 # shellcheck disable=SC2086 # several arguments
-roslaunch -p "$port" mmradartwin_launch demo.launch session:="$out/session" bag:="$out/demo.bag" \
-  average_frames:="$frames" ${DEMO_ARGS:-} &
-launch=$!
-watch session_player "$out/rviz.png"
-say "the session was played to its end"
-
+launched 2_live session_player of_poses "$out/rviz.png" demo.launch session:="$out/session" bag:="$out/demo.bag" \
+  average_frames:="$frames" ${DEMO_ARGS:-}
 bag=$out/demo.bag
-[ -f "$bag" ] || { printf 'error: %s was not recorded; the messages above say why\n' "$bag" >&2; exit 1; }
+if [ ! -f "$bag" ]; then
+  show_failure "$log/2_live.log" 1 "recording $bag"
+  exit 1
+fi
+say "      recorded: $bag, $(du -sh "$bag" | cut -f 1)B."
 
-say "3/5 evaluating the recording"
-status=0
-rosrun mmradartwin_attribution evaluate "$bag" --output "$out/report" || status=$?
+stage "Before: the recording is compared with the twin as given."
+logged "$log/3_evaluate.log" unknown "evaluating" rosrun mmradartwin_attribution evaluate "$bag" --output "$out/report"
 
-say "4/5 what does the twin get wrong? (the answer is in $out/truth.json, which nothing before the end reads)"
-rosrun mmradartwin_attribution diagnose "$out/session" --output "$out/diagnosis" || status=$?
+stage "Diagnosis: what does the twin get wrong? Each mechanism of the simulator is tried; this takes about a minute."
+logged "$log/4_diagnose.log" unknown "the diagnosis" rosrun mmradartwin_attribution diagnose "$out/session" --output "$out/diagnosis"
 
-say "5/5 the recording again, with the extended twin: rviz, then the report"
+stage "Replay: the recording runs through the same chain, with the twin that knows what was found."
 extended=$out/diagnosis/twin.extended.yaml
 # shellcheck disable=SC2086 # several arguments
-roslaunch -p "$port" mmradartwin_launch replay.launch bag:="$bag" twin:="$extended" average_frames:="$frames" \
-  diagnosis:=false stay:=false ${DEMO_ARGS:-} &
-launch=$!
-watch player "$out/rviz_extended.png"
+launched 5_replay player unknown "$out/rviz_extended.png" replay.launch bag:="$bag" twin:="$extended" \
+  average_frames:="$frames" diagnosis:=false stay:=false ${DEMO_ARGS:-}
 if [ -f "$out/rviz.png" ] && [ -f "$out/rviz_extended.png" ]; then
   convert "$out/rviz.png" "$out/rviz_extended.png" -append "$out/rviz_before_after.png"
 fi
-rosrun mmradartwin_attribution evaluate "$bag" --twin "$extended" --output "$out/report_extended" --no-bag || status=$?
 
-answer=$(python3 - "$out/truth.json" "$out/diagnosis/findings.json" <<'PYTHON' || true
-import json, sys
+stage "After: the recording is compared with the extended twin."
+logged "$log/6_evaluate.log" unknown "evaluating" rosrun mmradartwin_attribution evaluate "$bag" --twin "$extended" \
+  --output "$out/report_extended" --no-bag
 
-def told(causes):
-    numbers = lambda v: f"{v:.3g}" if isinstance(v, float) else str(v)
-    return "; ".join(c["cause"] + "".join(f", {k} {numbers(v)}" for k, v in c["parameters"].items()) for c in causes) or "nothing"
+say ""
+status=0
+python3 "$here/tell_result.py" "$out/truth.json" "$out/diagnosis/findings.json" || status=$?
+cat <<TEXT
 
-hidden = json.load(open(sys.argv[1]))["effects"]
-found = json.load(open(sys.argv[2]))["findings"]
-for f in found:
-    f["parameters"] = {k: p["value"] for k, p in f["parameters"].items()}
-print(f"   hidden         {told(hidden)}\n   found          {told(found)}")
-PYTHON
-)
-cat >&2 <<TEXT
-$answer
-   report         $out/report/index.html
-   diagnosis      $out/diagnosis/index.html
-   after it       $out/report_extended/index.html
-   rviz           $out/rviz_before_after.png
-   recording      $bag        (replay: ./run.sh exec roslaunch mmradartwin_launch replay.launch bag:=$bag)
-   session        $out/session
+Open this page:  $out/diagnosis/index.html
+Beside it in $out:
+  rviz_before_after.png                 what rviz showed, before and after
+  report/ and report_extended/          every pose, before and after (index.html)
+  demo.bag                              the recording
+  session/, truth.json, log/            raw captures, what was hidden, what the programs said
+To see it again:  ./run.sh exec roslaunch mmradartwin_launch replay.launch bag:=$bag
+$(((SECONDS - started) / 60)) min $(((SECONDS - started) % 60)) s.
 TEXT
 exit "$status"

@@ -95,7 +95,16 @@ class DemoLoop(unittest.TestCase):
         with open(self.path("diagnosis", "findings.json")) as file:
             self.assertEqual(json.load(file)["poses"]["count"], POSES)
         self.assertTrue(os.path.exists(self.path("report_extended", "index.html")))
-        self.assertRegex(self.demo.stderr, r"hidden +element_pattern, cos_exponent [0-9.]+\n +found +[a-z]")
+        self.assertRegex(self.demo.stdout, r"Hidden: element_pattern .*: cos_exponent [0-9.]+\nFound: +element_pattern ")
+
+    def test_speaks_in_few_lines_and_names_a_page_that_is_there(self):
+        said = self.demo.stderr + self.demo.stdout
+        self.assertLessEqual(len(said.splitlines()), 40, said)
+        self.assertNotIn("\033", said)
+        page = re.search(r"^Open this page: +(.*)$", self.demo.stdout, re.MULTILINE).group(1)
+        self.assertTrue(os.path.isfile(page), page)
+        for name in ("1_generate", "2_live", "3_evaluate", "4_diagnose", "5_replay", "6_evaluate"):
+            self.assertTrue(os.path.isfile(self.path("log", name + ".log")), name)
 
     def test_every_frame_of_the_session_came_through_udp_bit_for_bit(self):
         with open(self.path("session", "poses.csv")) as file:

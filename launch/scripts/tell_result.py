@@ -1,0 +1,131 @@
+#!/usr/bin/env python3
+"""Says in plain sentences what a session hid, what diagnose found, and whether that is right.
+
+usage: tell_result.py TRUTH_JSON FINDINGS_JSON
+
+TRUTH_JSON is what make_session.py --truth wrote. Exit status: 0 every hidden cause was found, with each number inside its
+95 % interval or within the tolerance that is said; 1 not so; 2 a file that cannot be read.
+"""
+import json
+import sys
+
+# What a cause means for somebody who does not know the catalogue (docs/causes.md); others are told by their names.
+MEANINGS = {
+    "actor_moved": "an object stands elsewhere than the scene says",
+    "actor_unmodelled": "an object is in the room that the scene lacks",
+    "element_pattern": "the antennas' directivity is another than the twin assumes",
+    "tx_rx_leakage": "the radar hears its own transmitter",
+}
+# A number may lie outside its interval by chance, one time in twenty. So far beside the truth it still counts as found;
+# test_diagnosis.py holds the diagnosis to the same.
+TOLERANCES = {
+    ("actor_unmodelled", "x_m"): 0.1, ("actor_unmodelled", "y_m"): 0.1,
+    ("element_pattern", "cos_exponent"): 0.6,
+    ("tx_rx_leakage", "range_m"): 0.02, ("tx_rx_leakage", "level_db"): 1.2,
+}
+UNITS = {"_m": "m", "_db": "dB", "_deg": "deg"}
+
+
+def is_number(value):
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def text_of(value):
+    if isinstance(value, list):
+        return "[" + ", ".join(text_of(v) for v in value) + "]"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def named(name, value):
+    """"dx_m -0.137 m"."""
+    unit = next((u for ending, u in UNITS.items() if name.endswith(ending)), "") if is_number(value) else ""
+    return f"{name} {text_of(value)}{' ' + unit if unit else ''}"
+
+
+def cause_text(cause):
+    return f"{cause} ({MEANINGS[cause]})" if cause in MEANINGS else cause
+
+
+def hidden_text(effect):
+    parameters = "; ".join(named(name, value) for name, value in effect["parameters"].items())
+    return cause_text(effect["cause"]) + (f": {parameters}" if parameters else "")
+
+
+def found_text(finding):
+    told = []
+    for name, parameter in finding["parameters"].items():
+        text, interval = named(name, parameter["value"]), parameter.get("ci95")
+        if interval and is_number(parameter["value"]):
+            text += f" (95 %: {text_of(float(interval[0]))} to {text_of(float(interval[1]))})"
+        told.append(text)
+    return cause_text(finding["cause"]) + (": " + "; ".join(told) if told else "")
+
+
+def judge_parameter(cause, name, true, parameter):
+    """(whether it is right, a sentence or None where there is nothing to say)."""
+    if parameter is None:
+        return False, f"{name} is not told."
+    value, interval = parameter["value"], parameter.get("ci95")
+    if not is_number(true):
+        return value == true, None if value == true else f"{name} is {text_of(true)}, not {text_of(value)}."
+    if not is_number(value):
+        return False, f"{name} is no number."
+    if interval and interval[0] <= true <= interval[1]:
+        return True, f"{name}: the hidden {text_of(float(true))} lies inside the interval."
+    tolerance = TOLERANCES.get((cause, name))
+    if tolerance is None:
+        return False, f"{name}: the hidden {text_of(float(true))} lies outside the interval."
+    off = abs(value - true)
+    verdict = "is accepted" if off <= tolerance else "would be accepted"
+    return off <= tolerance, f"{name}: {off:.2g} beside the hidden {text_of(float(true))}; up to {tolerance:g} {verdict}."
+
+
+def judge(truth, findings):
+    """(whether all is found, lines of text)."""
+    right, lines, left = True, [], list(findings["findings"])
+    for effect in truth["effects"]:
+        lines.append(f"Hidden: {hidden_text(effect)}")
+        finding = next((f for f in left if f["cause"] == effect["cause"]), None)
+        if finding is None:
+            right = False
+            lines.append("Found:  not this")
+            continue
+        left.remove(finding)
+        lines.append(f"Found:  {found_text(finding)}")
+        for name, true in effect["parameters"].items():
+            good, sentence = judge_parameter(effect["cause"], name, true, finding["parameters"].get(name))
+            right = right and good
+            if sentence:
+                lines.append(f"        {sentence}")
+        power = (finding.get("gain") or {}).get("explained_power") or {}
+        if power.get("before") is not None and power.get("after") is not None:
+            lines.append(f"        At places that the fit did not see, the twin explains {100 * power['after']:.0f} % of "
+                         f"the measured power with it, {100 * power['before']:.0f} % without.")
+    lines += [f"Also said: {found_text(finding)}" for finding in left]
+    if not truth["effects"]:
+        right = not findings["findings"]
+        lines.insert(0, "Hidden: nothing")
+    lines.append("The diagnosis is right." if right else "The diagnosis is NOT right.")
+    return right, lines
+
+
+def read(file):
+    with open(file, encoding="utf-8") as text:
+        return json.load(text)
+
+
+def main():
+    if len(sys.argv) != 3 or sys.argv[1].startswith("-"):
+        print(__doc__, file=sys.stderr if sys.argv[1:] not in (["--help"], ["-h"]) else sys.stdout)
+        return 0 if sys.argv[1:] in (["--help"], ["-h"]) else 2
+    try:
+        right, lines = judge(read(sys.argv[1]), read(sys.argv[2]))
+    except (OSError, ValueError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    print("\n".join(lines))
+    return 0 if right else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
