@@ -8,11 +8,24 @@ ws=$root/.ws
 export PATH=/usr/bin:$PATH
 unset PYTHONHOME
 
+# All that is used, by name: Debian's ros-desktop-full-dev would bring some hundred more. Programs of ROS come first, then
+# ROS to build with, messages for rostopic and rosservice, libraries, tools, and what tests and the demo run.
 packages=(
-  build-essential cmake clang-format clang-tidy shellcheck ros-desktop-full-dev catkin catkin-lint python3-rostest librviz-dev rosbash rospack-tools
-  libactionlib-dev python3-actionlib libdiagnostic-updater-dev libtf2-eigen-dev libembree-dev libpcl-dev libassimp-dev libyaml-cpp-dev libtinyxml2-dev nlohmann-json3-dev libtbb-dev
-  libssl-dev liblua5.4-dev libmatio-dev libpcap-dev libusb-1.0-0-dev zlib1g-dev libumockdev-dev umockdev libcli11-dev libgtest-dev libbenchmark-dev pybind11-dev python3-dev libopencv-dev libnlopt-dev
-  ccache xvfb xauth x11-apps x11-utils imagemagick procps iproute2 python3-matplotlib python3-numpy python3-scipy python3-yaml)
+  rosbash rospack-tools rosout rviz tf2-tools libnodeletlib-tools python3-actionlib python3-rosbag python3-roslaunch
+  python3-rosmsg python3-rosnode python3-rosparam python3-rosservice python3-rostopic python3-rospy
+  catkin ros-message-generation libactionlib-dev libclass-loader-dev libdiagnostic-updater-dev libnodelet-dev librosbag-dev
+  libroscpp-dev librostest-dev libtf2-eigen-dev libtf2-ros-dev pluginlib-dev python3-rostest
+  libactionlib-msgs-dev libdiagnostic-msgs-dev libgeometry-msgs-dev libros-rosgraph-msgs-dev libsensor-msgs-dev libstd-msgs-dev
+  libstd-srvs-dev libtf2-msgs-dev libvisualization-msgs-dev python3-actionlib-msgs python3-diagnostic-msgs
+  python3-geometry-msgs python3-rosgraph-msgs python3-sensor-msgs python3-std-msgs python3-std-srvs python3-tf2-msgs
+  python3-tf2-ros python3-visualization-msgs
+  libassimp-dev libboost-dev libcli11-dev libconsole-bridge-dev libeigen3-dev libembree-dev liblua5.4-dev libmatio-dev
+  libnlopt-dev libopencv-dev libpcap-dev libpcl-dev libssl-dev libtbb-dev libtinyxml2-dev libumockdev-dev libusb-1.0-0-dev
+  libyaml-cpp-dev nlohmann-json3-dev pybind11-dev zlib1g-dev python3-dev python3-matplotlib python3-numpy python3-scipy
+  python3-setuptools python3-yaml
+  build-essential ccache cmake git pkg-config
+  catkin-lint clang-format clang-tidy shellcheck libbenchmark-dev libgtest-dev
+  imagemagick iproute2 procps umockdev x11-apps x11-utils xauth xvfb)
 
 # shellcheck disable=SC1091
 source "$root/launch/scripts/stages.sh"
