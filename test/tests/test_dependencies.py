@@ -1,0 +1,73 @@
+"""package.xml files name only what rosdep knows, and what it does not know is installed by run.sh."""
+import glob
+import os
+import re
+import unittest
+import xml.etree.ElementTree
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
+
+
+def known():
+    """{section: names} of rosdep_keys.txt."""
+    sections, names = {}, None
+    with open(os.path.join(ROOT, "test", "rosdep_keys.txt"), encoding="utf-8") as file:
+        for line in map(str.strip, file):
+            if line.startswith("["):
+                names = sections.setdefault(line.strip("[]"), [])
+            elif line and not line.startswith("#"):
+                names.append(line)
+    return sections
+
+
+def packages():
+    """{name: root element} of the repository's packages."""
+    roots = [xml.etree.ElementTree.parse(file).getroot() for file in glob.glob(os.path.join(ROOT, "*", "package.xml"))]
+    return {root.findtext("name"): root for root in roots}
+
+
+def dependencies(root):
+    return {(element.tag, element.text) for element in root if element.tag.endswith("depend")}
+
+
+def debian_packages():
+    """Names in run.sh's list."""
+    with open(os.path.join(ROOT, "run.sh"), encoding="utf-8") as file:
+        return re.search(r"^packages=\(\n(.*?)\)$", file.read(), re.MULTILINE | re.DOTALL).group(1).split()
+
+
+class Dependencies(unittest.TestCase):
+    def test_there_are_all_packages(self):
+        self.assertGreaterEqual(len(packages()), 8)
+
+    def test_every_name_is_known_to_rosdep(self):
+        sections, ours = known(), packages()
+        allowed = {*sections["ROS packages"], *sections["rosdep keys"], *ours}
+        for name, root in ours.items():
+            for tag, depended in dependencies(root):
+                self.assertIn(depended, allowed, f"{name}'s package.xml, {tag}: look it up as rosdep_keys.txt says")
+
+    def test_every_known_name_is_used(self):
+        sections = known()
+        used = {depended for root in packages().values() for _, depended in dependencies(root)}
+        self.assertEqual(sorted({*sections["ROS packages"], *sections["rosdep keys"]} - used), [])
+
+    def test_what_rosdep_does_not_know_is_installed_by_name(self):
+        for name in known()["no key"]:
+            self.assertIn(name, debian_packages())
+
+    def test_all_packages_bear_one_version_and_have_a_changelog_of_it(self):
+        versions = {name: root.findtext("version") for name, root in packages().items()}
+        self.assertEqual(len(set(versions.values())), 1, versions)
+        version = next(iter(versions.values()))
+        for file in glob.glob(os.path.join(ROOT, "*", "package.xml")):
+            changelog = os.path.join(os.path.dirname(file), "CHANGELOG.rst")
+            with open(changelog, encoding="utf-8") as text:
+                first = re.search(r"^(\d+\.\d+\.\d+) \(", text.read(), re.MULTILINE)
+            self.assertEqual(first and first.group(1), version, changelog)
+        with open(os.path.join(ROOT, "CITATION.cff"), encoding="utf-8") as text:
+            self.assertIn(f"version: {version}\n", text.read())
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,99 @@
+"""What `catkin_make install` would leave is whole: the built workspace is installed into a folder of its own, and programs
+run from there without sources and devel space."""
+import os
+import pkgutil
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
+DEVEL = os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep)[0]
+BUILD = os.path.join(os.path.dirname(DEVEL), "build")
+PACKAGES = ["attribution", "config", "driver", "dsp", "launch", "msgs", "sim", "tests"]
+
+
+def modules_below(folder):
+    """Names of the generator's modules in a folder with mmradartwin_tests."""
+    names = {m.name for m in pkgutil.walk_packages([os.path.join(folder, "mmradartwin_tests")], "mmradartwin_tests.",
+                                                   onerror=lambda _: None)}
+    # walk_packages imports packages from sys.path; files are looked at here alone.
+    for at, _, files in os.walk(os.path.join(folder, "mmradartwin_tests")):
+        inside = os.path.relpath(at, folder).replace(os.sep, ".")
+        names |= {f"{inside}.{file[:-3]}" for file in files if file.endswith(".py") and file != "__init__.py"}
+    return names
+
+
+@unittest.skipUnless(os.path.isfile(os.path.join(BUILD, "cmake_install.cmake")), "the workspace is not catkin_make's")
+class InstallSpace(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.stage = tempfile.mkdtemp(prefix="mmradartwin_install_")
+        cls.installed = subprocess.run(["cmake", "--install", BUILD], env=dict(os.environ, DESTDIR=cls.stage),
+                                       capture_output=True, text=True, timeout=600, check=False)
+        with open(os.path.join(BUILD, "CMakeCache.txt"), encoding="utf-8") as cache:
+            prefix = next(line.split("=", 1)[1].strip() for line in cache if line.startswith("CMAKE_INSTALL_PREFIX:"))
+        cls.prefix = cls.stage + prefix
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.stage, ignore_errors=True)
+
+    def run_there(self, command, timeout_s=120):
+        """Standard output of a command in the install space; nothing of this process' environment is seen."""
+        environment = {"HOME": self.stage, "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", "ROS_LOG_DIR": self.stage + "/log",
+                       "ROS_MASTER_URI": "http://127.0.0.1:1", "ROS_IP": "127.0.0.1"}
+        run = subprocess.run(["bash", "-c", f"source '{self.prefix}/setup.bash' && {command}"], env=environment,
+                             cwd=self.stage, capture_output=True, text=True, timeout=timeout_s, check=False)
+        self.assertEqual(run.returncode, 0, f"{command}\n{run.stdout[-2000:]}{run.stderr[-3000:]}")
+        return run.stdout
+
+    def test_installing_ends_well(self):
+        self.assertEqual(self.installed.returncode, 0, self.installed.stderr[-3000:])
+
+    def test_packages_and_libraries_are_found_there(self):
+        found = self.run_there("for p in " + " ".join(PACKAGES) + "; do rospack find mmradartwin_$p; done").split()
+        self.assertEqual(len(found), len(PACKAGES))
+        for folder in found:
+            self.assertTrue(folder.startswith(self.prefix), folder)
+        linked = self.run_there(f"ldd '{self.prefix}/lib/mmradartwin_attribution/diagnose'")
+        ours = [line for line in linked.splitlines() if "libmmradartwin" in line]
+        self.assertGreaterEqual(len(ours), 3)
+        for line in ours:
+            self.assertIn(self.prefix, line)
+
+    def test_every_module_of_the_generator_is_installed_and_can_be_imported(self):
+        source = modules_below(os.path.join(ROOT, "test", "src"))
+        self.assertGreater(len(source), 20)
+        there = os.path.join(self.prefix, "lib", "python3", "dist-packages")
+        self.assertEqual(modules_below(there), source)
+        self.run_there("python3 -c 'import " + ", ".join(sorted(source)) + "'")
+
+    def test_a_session_is_made_simulated_and_evaluated_there(self):
+        self.run_there("rosrun mmradartwin_tests make_session.py --output session --seed 3 --locations 1 --headings 1 "
+                       "--frames 4 --effect actor_moved --truth truth.json")
+        self.run_there("rosrun mmradartwin_sim simulate session --output simulated")
+        self.run_there("rosrun mmradartwin_attribution evaluate session --output report")
+        self.assertTrue(os.path.isfile(os.path.join(self.stage, "report", "index.html")))
+
+    def test_the_demos_scripts_stand_beside_what_they_call(self):
+        for script in ("demo.sh", "try.sh"):
+            self.assertIn("usage: " + script, self.run_there(f"rosrun mmradartwin_launch {script} --help"))
+        folder = os.path.join(self.prefix, "lib", "mmradartwin_launch")
+        for name in ("stages.sh", "tell_result.py", "emulated_rig.sh", "recorder.py"):
+            self.assertTrue(os.path.isfile(os.path.join(folder, name)), name)
+
+    def test_every_node_of_the_launch_files_is_found_there(self):
+        for launch in ("demo.launch session:=/s bag:=/b", "replay.launch bag:=/b", "live.launch rig:=emulated",
+                       "record.launch", "inspect.launch results:=/r"):
+            nodes = self.run_there(f"roslaunch --nodes mmradartwin_launch {launch}").split()
+            self.assertGreater(len(nodes), 0, launch)
+            for line in self.run_there("".join(f"roslaunch --args {node} mmradartwin_launch {launch} && " for node in nodes)
+                                       + "true").splitlines():
+                program = next((word for word in line.split() if "/mmradartwin_" in word), None)
+                if program and "/lib/mmradartwin_" in program:
+                    self.assertTrue(program.startswith(self.prefix), line)
+
+
+if __name__ == "__main__":
+    unittest.main()
