@@ -247,10 +247,17 @@ lint() {
   python3 "$root/test/scripts/lint.py" "${arguments[@]}" >&2
 }
 
+# try [OUT]: a release's sample is taken where it lies beside run.sh.
+try() {
+  local sample=()
+  [ ! -d "$root/mmradartwin_sample" ] || sample=("$root/mmradartwin_sample")
+  exec "$root/launch/scripts/try.sh" "$(readlink -m "${1:-$root/try_out}")" "${sample[@]}"
+}
+
 verb=${1:-}
 [ -n "$verb" ] && shift
 case $verb in
-  try) setup; build; source_workspace; exec "$root/launch/scripts/try.sh" "$(readlink -m "${1:-$root/try_out}")" ;;
+  try) setup; build; source_workspace; try "$@" ;;
   demo) setup; build; source_workspace; exec "$root/launch/scripts/demo.sh" "$(readlink -m "${1:-$root/demo_out}")" ;;
   test) setup; run_tests "$@" ;;
   setup) setup ;;

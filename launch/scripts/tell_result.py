@@ -9,7 +9,7 @@ TRUTH_JSON is what make_session.py --truth wrote. Exit status: 0 every hidden ca
 import json
 import sys
 
-# What a cause means for somebody who does not know the catalogue (docs/causes.md); others are told by their names.
+# What a cause means for somebody who does not know the catalogue (docs/reference/causes.md); others are told by their names.
 MEANINGS = {
     "actor_moved": "an object stands elsewhere than the scene says",
     "actor_unmodelled": "an object is in the room that the scene lacks",
