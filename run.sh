@@ -69,10 +69,8 @@ install() {
     sudo -v
   fi
   logged "$ws/log/apt_update.log" unknown "apt-get update" "${sudo[@]}" apt-get update
-  # Each is unpacked and set up.
-  apt_steps=$((2 * $(apt-get install --simulate --no-install-recommends "${missing[@]}" | grep -c '^Inst ')))
-  export apt_steps
-  say "Installing $((apt_steps / 2)) Debian packages (log: $ws/log/apt_install.log)"
+  apt_packages=$(apt-get install --simulate --no-install-recommends "${missing[@]}" 2>/dev/null | grep -c '^Inst ' || true)
+  say "Installing $apt_packages Debian packages (log: $ws/log/apt_install.log)"
   logged "$ws/log/apt_install.log" of_apt "apt-get install" "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive \
     apt-get install -y --no-install-recommends "${missing[@]}"
 }

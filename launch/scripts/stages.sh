@@ -11,18 +11,18 @@ stage() {
   say "[$stage_number/${stages:-$stage_number}] $*"
 }
 
-# follow LOG PERCENT: says how far it is while LOG grows: PERCENT, a command that gets the end of LOG, prints a number and
-# may print words behind it. A terminal shows each change in one line, a file a line at each quarter.
+# follow LOG PERCENT: says how far it is while LOG grows: PERCENT, a command that is given LOG, prints a number and may
+# print words behind it. A terminal shows each change in one line, a file a line at each quarter.
 follow() {
   local log=$1 percent=$2 told=-1 number words
   while kill -0 $$ 2>/dev/null; do
-    sleep 0.5
-    read -r number words < <(tail -c 20000 "$log" 2>/dev/null | "$percent") || continue
+    sleep 1
+    read -r number words < <("$percent" "$log" 2>/dev/null) || continue
     if [ -t 2 ]; then
-      [ "$number" -eq "$told" ] || printf '\r\033[K      %s %% %s' "$number" "$words" >&2
+      [ "$number" -eq "$told" ] || printf '\r\033[K      %s %%%s' "$number" "${words:+ $words}" >&2
       told=$number
     elif [ $((number / 25)) -gt $((told / 25)) ] && [ "$number" -ge 25 ]; then
-      say "      $number % $words"
+      say "      $number %${words:+ $words}"
       told=$number
     fi
   done
@@ -35,10 +35,15 @@ stop_following() {
   [ ! -t 2 ] || printf '\r\033[K' >&2
 }
 
-# of_make, of_poses, of_diagnosis, unknown: PERCENT of follow.
-of_make() { grep -o '^\[ *[0-9]*%\]' | tail -n 1 | tr -dc '0-9\n'; }
-of_poses() { grep -o 'pose [0-9]* of [0-9]*' | tail -n 1 | awk '{print int(100 * ($2 - 1) / $4), "(" $0 ")"}'; }
-of_apt() { awk '/^Unpacking/ {n++} /^Setting up/ {n++} END {if (ENVIRON["apt_steps"] > 0) print int(100 * n / ENVIRON["apt_steps"])}'; }
+# of_make, of_poses, of_apt, unknown: PERCENT of follow.
+of_make() { tail -c 20000 "$1" | grep -o '^\[ *[0-9]*%\]' | tail -n 1 | tr -dc '0-9\n'; }
+of_poses() {
+  tail -c 20000 "$1" | grep -o 'pose [0-9]* of [0-9]*' | tail -n 1 |
+    awk '{print int(100 * ($2 - 1) / $4), "(" $0 ")"}'
+}
+# Each of $apt_packages is unpacked and set up.
+apt_packages=0
+of_apt() { awk -v steps=$((2 * apt_packages)) '/^(Unpacking|Setting up)/ {n++} END {if (steps) print int(100 * n / steps)}' "$1"; }
 unknown() { :; }
 
 # show_failure LOG STATUS WHAT: the end of the log and where the rest is.
