@@ -1,7 +1,6 @@
 """What `catkin_make install` would leave is whole: the built workspace is installed into a folder of its own, and programs
 run from there without sources and devel space."""
 import os
-import pkgutil
 import shutil
 import subprocess
 import tempfile
@@ -14,13 +13,11 @@ PACKAGES = ["attribution", "config", "driver", "dsp", "launch", "msgs", "sim", "
 
 
 def modules_below(folder):
-    """Names of the generator's modules in a folder with mmradartwin_tests."""
-    names = {m.name for m in pkgutil.walk_packages([os.path.join(folder, "mmradartwin_tests")], "mmradartwin_tests.",
-                                                   onerror=lambda _: None)}
-    # walk_packages imports packages from sys.path; files are looked at here alone.
+    """Names of mmradartwin_tests' modules in a folder that holds it."""
+    names = set()
     for at, _, files in os.walk(os.path.join(folder, "mmradartwin_tests")):
-        inside = os.path.relpath(at, folder).replace(os.sep, ".")
-        names |= {f"{inside}.{file[:-3]}" for file in files if file.endswith(".py") and file != "__init__.py"}
+        package = os.path.relpath(at, folder).replace(os.sep, ".")
+        names |= {package if file == "__init__.py" else f"{package}.{file[:-3]}" for file in files if file.endswith(".py")}
     return names
 
 

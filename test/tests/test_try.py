@@ -53,7 +53,7 @@ class Try(unittest.TestCase):
         bag = os.path.join(self.out, "sample.bag")
         self.assertLess(size + os.path.getsize(bag), 5e6)
         with rosbag.Bag(bag) as messages:
-            cubes = [m for _, m, _ in messages.read_messages("radar/adc")]
+            cubes = [m for _, m, _ in messages.read_messages("/radar/adc")]
         self.assertEqual(sum(2 * len(m.samples) for m in cubes), size)
 
     def test_a_sample_that_is_no_sample_is_refused(self):
