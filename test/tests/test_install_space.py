@@ -2,6 +2,7 @@
 run from there without sources and devel space."""
 import os
 import shutil
+import socket
 import subprocess
 import tempfile
 import unittest
@@ -10,6 +11,19 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__
 DEVEL = os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep)[0]
 BUILD = os.path.join(os.path.dirname(DEVEL), "build")
 PACKAGES = ["attribution", "config", "driver", "dsp", "launch", "msgs", "sim", "tests"]
+
+# Prints "LAUNCH PACKAGE TYPE PROGRAM" of every node of launch files of mmradartwin_launch, each given with its arguments.
+NODES_OF = """
+import sys
+import roslaunch.config
+import roslaunch.rlutil
+import roslib.packages
+for text in sys.argv[1:]:
+    name, *arguments = text.split()
+    file = roslaunch.rlutil.resolve_launch_arguments(["mmradartwin_launch", name])[0]
+    for node in roslaunch.config.load_config_default([(file, arguments)], None).nodes:
+        print(name, node.package, node.type, *roslib.packages.find_node(node.package, node.type))
+"""
 
 
 def modules_below(folder):
@@ -66,12 +80,26 @@ class InstallSpace(unittest.TestCase):
         self.assertEqual(modules_below(there), source)
         self.run_there("python3 -c 'import " + ", ".join(sorted(source)) + "'")
 
-    def test_a_session_is_made_simulated_and_evaluated_there(self):
+    def make_session(self):
         self.run_there("rosrun mmradartwin_tests make_session.py --output session --seed 3 --locations 1 --headings 1 "
                        "--frames 4 --effect actor_moved --truth truth.json")
+
+    def test_a_session_is_made_simulated_and_evaluated_there(self):
+        self.make_session()
         self.run_there("rosrun mmradartwin_sim simulate session --output simulated")
         self.run_there("rosrun mmradartwin_attribution evaluate session --output report")
         self.assertTrue(os.path.isfile(os.path.join(self.stage, "report", "index.html")))
+
+    def test_a_bag_is_replayed_there(self):
+        self.make_session()
+        self.run_there("rosrun mmradartwin_dsp session_to_bag session replayed.bag")
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        said = self.run_there(f"export ROS_MASTER_URI=http://127.0.0.1:{port} && timeout -s INT 100 roslaunch -p {port} "
+                              "mmradartwin_launch replay.launch bag:=$PWD/replayed.bag rviz:=false diagnosis:=false "
+                              "stay:=false rate:=5")
+        self.assertRegex(said, r"twin of .*: \d+ actors, \d+ facets")
 
     def test_the_demos_scripts_stand_beside_what_they_call(self):
         for script in ("demo.sh", "try.sh"):
@@ -81,15 +109,21 @@ class InstallSpace(unittest.TestCase):
             self.assertTrue(os.path.isfile(os.path.join(folder, name)), name)
 
     def test_every_node_of_the_launch_files_is_found_there(self):
-        for launch in ("demo.launch session:=/s bag:=/b", "replay.launch bag:=/b", "live.launch rig:=emulated",
-                       "record.launch", "inspect.launch results:=/r"):
-            nodes = self.run_there(f"roslaunch --nodes mmradartwin_launch {launch}").split()
-            self.assertGreater(len(nodes), 0, launch)
-            for line in self.run_there("".join(f"roslaunch --args {node} mmradartwin_launch {launch} && " for node in nodes)
-                                       + "true").splitlines():
-                program = next((word for word in line.split() if "/mmradartwin_" in word), None)
-                if program and "/lib/mmradartwin_" in program:
-                    self.assertTrue(program.startswith(self.prefix), line)
+        program = os.path.join(self.stage, "nodes_of.py")
+        with open(program, "w", encoding="utf-8") as file:
+            file.write(NODES_OF)
+        launches = ["demo.launch session:=/s bag:=/b", "replay.launch bag:=/b", "live.launch rig:=emulated",
+                    "record.launch", "inspect.launch results:=/r"]
+        lines = self.run_there(f"python3 '{program}' " + " ".join(f"'{launch}'" for launch in launches)).splitlines()
+        self.assertGreater(len(lines), 20)
+        ours = 0
+        for line in lines:
+            launch, package, kind, *found = line.split()
+            self.assertTrue(found, f"{launch}: {package} {kind} is not installed")
+            if package.startswith("mmradartwin_"):
+                ours += 1
+                self.assertTrue(found[0].startswith(self.prefix), line)
+        self.assertGreater(ours, 10)
 
 
 if __name__ == "__main__":
