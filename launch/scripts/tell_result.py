@@ -9,12 +9,12 @@ TRUTH_JSON is what make_session.py --truth wrote. Exit status: 0 every hidden ca
 import json
 import sys
 
-# What a cause means for somebody who does not know the catalogue (docs/reference/causes.md); others are told by their names.
-MEANINGS = {
-    "actor_moved": "an object stands elsewhere than the scene says",
-    "actor_unmodelled": "an object is in the room that the scene lacks",
+# Causes in words, for somebody who does not know the catalogue (docs/reference/causes.md); others go by their names.
+SENTENCES = {
+    "actor_moved": "{actor} stands {dx_m:+.2f} m along x and {dy_m:+.2f} m along y from where the scene has it",
+    "actor_unmodelled": "at x {x_m:.2f} m, y {y_m:.2f} m stands an object that the scene lacks",
     "element_pattern": "the antennas' directivity is another than the twin assumes",
-    "tx_rx_leakage": "the radar hears its own transmitter",
+    "tx_rx_leakage": "the radar hears its own transmitter, as an echo at {range_m:.2f} m",
 }
 # A number may lie outside its interval by chance, one time in twenty. So far beside the truth it still counts as found;
 # test_diagnosis.py holds the diagnosis to the same.
@@ -42,23 +42,27 @@ def named(name, value):
     return f"{name} {text_of(value)}{' ' + unit if unit else ''}"
 
 
-def cause_text(cause):
-    return f"{cause} ({MEANINGS[cause]})" if cause in MEANINGS else cause
+def told(cause, values, details):
+    """The cause in words, and below them its name with the details of its parameters."""
+    exact = cause + (": " + "; ".join(details) if details else "")
+    try:
+        return f"{SENTENCES[cause].format(**values)}.\n        {exact}"
+    except (KeyError, ValueError, TypeError):
+        return exact
 
 
 def hidden_text(effect):
-    parameters = "; ".join(named(name, value) for name, value in effect["parameters"].items())
-    return cause_text(effect["cause"]) + (f": {parameters}" if parameters else "")
+    return told(effect["cause"], effect["parameters"], [named(*item) for item in effect["parameters"].items()])
 
 
 def found_text(finding):
-    told = []
+    details = []
     for name, parameter in finding["parameters"].items():
         text, interval = named(name, parameter["value"]), parameter.get("ci95")
         if interval and is_number(parameter["value"]):
             text += f" (95 %: {text_of(float(interval[0]))} to {text_of(float(interval[1]))})"
-        told.append(text)
-    return cause_text(finding["cause"]) + (": " + "; ".join(told) if told else "")
+        details.append(text)
+    return told(finding["cause"], {name: p["value"] for name, p in finding["parameters"].items()}, details)
 
 
 def judge_parameter(cause, name, true, parameter):

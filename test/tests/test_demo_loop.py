@@ -95,7 +95,7 @@ class DemoLoop(unittest.TestCase):
         with open(self.path("diagnosis", "findings.json")) as file:
             self.assertEqual(json.load(file)["poses"]["count"], POSES)
         self.assertTrue(os.path.exists(self.path("report_extended", "index.html")))
-        self.assertRegex(self.demo.stdout, r"Hidden: element_pattern .*: cos_exponent [0-9.]+\nFound: +element_pattern ")
+        self.assertRegex(self.demo.stdout, r"Hidden: the antennas.*\n +element_pattern: cos_exponent [0-9.]+\nFound: +\w")
 
     def test_speaks_in_few_lines_and_names_a_page_that_is_there(self):
         said = self.demo.stderr + self.demo.stdout

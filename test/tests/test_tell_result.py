@@ -74,6 +74,15 @@ class TellResult(unittest.TestCase):
         self.assertEqual(self.tell(truth, found)[0], 0)
         self.assertEqual(self.tell(truth, found[:1])[0], 1)
 
+    def test_a_known_cause_is_told_in_words(self):
+        moved = {"actor": "sofa", "dx_m": 0.1, "dy_m": -0.2}
+        found = finding("actor_moved", actor={"value": "sofa"}, dx_m=number(0.12, 0.0, 0.2), dy_m=number(-0.2, -0.3, -0.1))
+        status, said = self.tell([{"cause": "actor_moved", "parameters": moved}], [found])
+        self.assertEqual(status, 0)
+        self.assertIn("Hidden: sofa stands +0.10 m along x and -0.20 m along y from where the scene has it.\n", said)
+        self.assertIn("Found:  sofa stands +0.12 m along x and -0.20 m along y", said)
+        self.assertIn("\n        actor_moved: actor sofa; dx_m 0.12 m (95 %: 0 to 0.2); ", said)
+
     def test_nothing_hidden_and_nothing_found_is_right(self):
         self.assertEqual(self.tell([], [])[0], 0)
         self.assertEqual(self.tell([], [finding("actor_absent", actor={"value": "sofa"})])[0], 1)
