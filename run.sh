@@ -13,12 +13,13 @@ unset PYTHONHOME
 packages=(
   rosbash rospack-tools rosout rviz tf2-tools libnodeletlib-tools python3-actionlib python3-rosbag python3-roslaunch
   python3-rosmsg python3-rosnode python3-rosparam python3-rosservice python3-rostopic python3-rospy
-  catkin ros-message-generation libactionlib-dev libclass-loader-dev libdiagnostic-updater-dev libnodelet-dev librosbag-dev
+  catkin ros-message-generation libactionlib-dev libclass-loader-dev libdiagnostic-updater-dev libnodeletlib-dev librosbag-dev
   libroscpp-dev librostest-dev libtf2-eigen-dev libtf2-ros-dev pluginlib-dev python3-rostest
   libactionlib-msgs-dev libdiagnostic-msgs-dev libgeometry-msgs-dev libros-rosgraph-msgs-dev libsensor-msgs-dev libstd-msgs-dev
   libstd-srvs-dev libtf2-msgs-dev libvisualization-msgs-dev python3-actionlib-msgs python3-diagnostic-msgs
   python3-geometry-msgs python3-rosgraph-msgs python3-sensor-msgs python3-std-msgs python3-std-srvs python3-tf2-msgs
-  python3-tf2-ros python3-visualization-msgs
+  python3-tf2-ros python3-visualization-msgs ros-actionlib-msgs ros-diagnostic-msgs ros-geometry-msgs
+  ros-rosgraph-msgs ros-sensor-msgs ros-std-msgs ros-std-srvs ros-tf2-msgs ros-visualization-msgs
   libassimp-dev libboost-dev libcli11-dev libconsole-bridge-dev libeigen3-dev libembree-dev liblua5.4-dev libmatio-dev
   libnlopt-dev libopencv-dev libpcap-dev libpcl-dev libssl-dev libtbb-dev libtinyxml2-dev libumockdev-dev libusb-1.0-0-dev
   libyaml-cpp-dev nlohmann-json3-dev pybind11-dev zlib1g-dev python3-dev python3-matplotlib python3-numpy python3-scipy
