@@ -100,8 +100,9 @@ stage "Live: an emulated DCA1000 plays it over UDP at the radar's pace. Driver, 
 launched 2_live session_player of_poses "$out/rviz.png" demo.launch session:="$out/session" bag:="$out/demo.bag" \
   average_frames:="$frames" ${DEMO_ARGS:-}
 bag=$out/demo.bag
-if [ ! -f "$bag" ]; then
-  show_failure "$log/2_live.log" 1 "recording $bag"
+if [ ! -f "$bag" ] || ! grep -qa 'the session has been played' "$log/2_live.log"; then
+  grep -a -m 5 '\[FATAL\]' "$log/2_live.log" >&2 || true
+  show_failure "$log/2_live.log" 1 "playing the session to its end"
   exit 1
 fi
 say "      recorded: $bag, $(du -sh "$bag" | cut -f 1)B."
