@@ -210,6 +210,8 @@ std::map<std::string, SpreadEstimate> DiagnosisRun::spreadsUnder(const ModelStat
                                                                  const std::vector<RangeShift>& elsewhere) const {
   SessionEvidence evidence = errorEvidence(context_.likelihood, state.echoes, state.latents);
   for (const RangeShift& shift : elsewhere) evidence.actor_range_m.replace(shift.actor, shift.shift_m, shift.nats);
+  evidence.actor_range_m.leaveOutCommon();
+  evidence.yaw_rad.leaveOutCommon();
   std::map<std::string, SpreadEstimate> spreads;
   const auto estimate = [&](const char* key, const ErrorEvidence& errors, double unit, double stated) {
     const std::optional<SpreadEstimate> found = estimatedSpread(errors, stated / unit);

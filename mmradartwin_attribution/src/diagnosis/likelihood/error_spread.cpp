@@ -90,6 +90,14 @@ void ErrorEvidence::replace(int error, double value, double nats) {
   weighted[error] = information(error, error) * value;
 }
 
+void ErrorEvidence::leaveOutCommon() {
+  const Eigen::VectorXd common = information.rowwise().sum();
+  const double all = common.sum();
+  if (!(all > 0)) return;
+  weighted -= common * (weighted.sum() / all);
+  information -= common * common.transpose() / all;
+}
+
 std::optional<SpreadEstimate> estimatedSpread(const ErrorEvidence& evidence, double stated) {
   const Eigen::Index steps = static_cast<Eigen::Index>(2 * kGridSpan / kGridStep) + 1;
   const Eigen::VectorXd log_ratio = Eigen::VectorXd::LinSpaced(steps, -kGridSpan, kGridSpan);

@@ -17,6 +17,8 @@ struct ErrorEvidence {
 
   /// Replaces what the slopes at the fit say of one error, where the likelihood is higher by `nats` far away.
   void replace(int error, double value, double nats);
+  /// Leaves out what all errors share, as if it were one more unknown: a common shift has a cause of its own.
+  void leaveOutCommon();
 };
 
 /// Standard deviation of errors that are normally distributed about zero, by empirical Bayes: the likelihood of the

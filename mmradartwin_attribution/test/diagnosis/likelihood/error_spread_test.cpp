@@ -46,6 +46,14 @@ TEST(ErrorSpread, IsNotStretchedByOneOutlier) {
   EXPECT_NEAR(mean, 1.0, 0.2);
 }
 
+TEST(ErrorSpread, IsNotStretchedByWhatAllErrorsShare) {
+  ErrorEvidence evidence = measured(24, 0.5, 0.2, 7);
+  evidence.weighted += evidence.information * Eigen::VectorXd::Constant(24, 6.0);
+  EXPECT_GT(estimatedSpread(evidence, 0.5)->value, 3);
+  evidence.leaveOutCommon();
+  EXPECT_NEAR(estimatedSpread(evidence, 0.5)->value, 0.5, 0.15);
+}
+
 TEST(ErrorSpread, OfErrorsThatNothingMeasuresIsNotTold) {
   EXPECT_FALSE(estimatedSpread(measured(20, 1.0, 100.0, 1), 1.0));
   ErrorEvidence nothing;
