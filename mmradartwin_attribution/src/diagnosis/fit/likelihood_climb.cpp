@@ -27,6 +27,7 @@ constexpr int kScanned = 12;                       ///< values over the range of
 constexpr double kScanned_bins = 0.5;              ///< between scanned values of a range: its modes are a bin wide
 constexpr std::size_t kScanPoses = 8;              ///< poses by which scanned values are compared
 constexpr std::size_t kMostPeaks = 3;              ///< scanned values that are judged at all poses
+constexpr double kFinestScan = 0.05;               ///< accuracy of their places, over the step of the scan
 constexpr int kScanSteps = 2, kFirstSteps = 14;    ///< Fisher steps of the latents at such a value, from the data
 constexpr double kLeastForScan_nats = 3;           ///< gain over the null below which no other value is looked for
 constexpr double kLikelier_nats = 0.5;  ///< gain over the optimum for which a climb starts from a scanned value
@@ -226,12 +227,13 @@ std::vector<double> LikelihoodClimb::peaks(const std::vector<double>& values, co
   std::vector<int> poses;
   const std::size_t all = everyone_.size(), wanted = std::min(all, kScanPoses);
   for (std::size_t i = 0; i < wanted; ++i) poses.push_back(everyone_[i * all / wanted]);
-  std::vector<double> likelihoods;
-  for (double value : values) {
+  const auto likelihoodAt = [&](double value) {
     const auto echoes = source_.echoes(mechanismsAt({value}), poses, latents.actor_range_m);
     const std::vector<double> each = model_.byPose(echoes, latents, poses);
-    likelihoods.push_back(std::accumulate(each.begin(), each.end(), 0.0));
-  }
+    return std::accumulate(each.begin(), each.end(), 0.0);
+  };
+  std::vector<double> likelihoods;
+  for (double value : values) likelihoods.push_back(likelihoodAt(value));
   std::vector<std::pair<double, double>> found;  // likelihood and value
   for (std::size_t i = 0; i < values.size(); ++i) {
     const bool above_last = i == 0 || likelihoods[i] >= likelihoods[i - 1];
@@ -240,8 +242,21 @@ std::vector<double> LikelihoodClimb::peaks(const std::vector<double>& values, co
   }
   std::sort(found.rbegin(), found.rend());
   found.resize(std::min(kMostPeaks, found.size()));
+  // With fixed latents: once they follow, they hold a value where it stands.
+  const double apart = values.size() > 1 ? values[1] - values[0] : 0;
   std::vector<double> highest;
-  for (const auto& [likelihood, value] : found) highest.push_back(value);
+  for (auto [likelihood, value] : found) {
+    for (double step = apart / 2; std::abs(step) > kFinestScan * std::abs(apart); step /= 2) {
+      for (const double side : {-step, step}) {
+        const double there = likelihoodAt(value + side);
+        if (there <= likelihood) continue;
+        likelihood = there;
+        value += side;
+        break;
+      }
+    }
+    highest.push_back(value);
+  }
   return highest;
 }
 
@@ -261,9 +276,24 @@ void LikelihoodClimb::scan() {
     ModelState state = stateAt({value}, from);
     // Latents stand in for a part of the cause: they follow before values are compared.
     model_.fit(state.echoes, state.latents, fresh ? kFirstSteps : kScanSteps);
-    take(stateAt({value}, state.latents), {value});
+    state = stateAt({value}, state.latents);
+    if (fresh) {
+      climbFrom(std::move(state), {value});
+    } else {
+      take(state, {value});
+    }
   }
-  if (optimum_.state.log_likelihood > reached + kLikelier_nats) climb();
+  if (!fresh && optimum_.state.log_likelihood > reached + kLikelier_nats) climb();
+}
+
+void LikelihoodClimb::climbFrom(ModelState state, std::vector<double> scaled_values) {
+  if (task_.null != nullptr && state.log_likelihood < task_.null->log_likelihood + kLeastForScan_nats) return;
+  Optimum other = std::move(optimum_);
+  optimum_ = Optimum();
+  optimum_.state = std::move(state);
+  optimum_.scaled_values = std::move(scaled_values);
+  climb();
+  if (optimum_.state.log_likelihood <= other.state.log_likelihood) optimum_ = std::move(other);
 }
 
 bool LikelihoodClimb::needsSearch() const {

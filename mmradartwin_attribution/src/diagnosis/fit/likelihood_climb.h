@@ -62,6 +62,8 @@ class LikelihoodClimb {
   /// Tries values over the whole range of a single number, and climbs from one that is likelier than the optimum.
   /// Values of a range lie half a bin apart.
   void scan();
+  /// Climbs from another value, and keeps what it reaches where that is likelier than the optimum.
+  void climbFrom(ModelState state, std::vector<double> scaled_values);
   /// True for a range that may be off by many bins.
   bool spansBins(const Coordinate& c) const;
   /// [values] scaled values over the whole range of a number.

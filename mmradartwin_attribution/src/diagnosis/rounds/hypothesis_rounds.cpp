@@ -17,8 +17,9 @@
 namespace mmradartwin::diagnosis::rounds {
 namespace {
 
-constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is searched for in a round
-constexpr std::size_t kMostClutter = 4;      ///< things that stand out of the clutter, beside which a fit is judged
+constexpr std::size_t kMostRangeErrors = 4;    ///< actors whose range error is searched for in a round
+constexpr double kLeastShareOfRanking = 0.95;  ///< of the best fit, from which on another is about as likely
+constexpr std::size_t kMostClutter = 4;        ///< things that stand out of the clutter, beside which a fit is judged
 
 /// True of a transmitter's delay that is no larger than its error: its phase alone is another cause's.
 bool isPhaseOnly(const HypothesisFit& fit) {
@@ -134,6 +135,26 @@ bool HypothesisRounds::standsBeside(const std::vector<HypothesisFit>& clutter, c
   return rejectionByLikelihood(again).empty();
 }
 
+std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<HypothesisFit>& fits, std::size_t best,
+                                                          const GainMetric& explained) {
+  const ModelState& state = selection_.state();
+  std::optional<std::size_t> better;
+  double most = explained.after + bounds::kLeastExplainedMore;
+  for (std::size_t i = best + 1; i < fits.size(); ++i) {
+    HypothesisFit& rival = fits[i];
+    if (rival.ranking() < kLeastShareOfRanking * fits[best].ranking()) break;
+    if (!isCatalogued(rival.hypothesis.mechanism.mechanism) || !rejectionByLikelihood(rival).empty()) continue;
+    Finding finding = findingOf(rival, fits, state, context_.twin.scene(), context_.data);
+    gains_.ofFit(state, rival, finding);
+    const GainMetric& other = finding.gain->explained_power;
+    // The lower end of its interval: both are read from the same places.
+    if (other.before + (*other.difference_ci95)[0] <= most) continue;
+    better = i;
+    most = other.before + (*other.difference_ci95)[0];
+  }
+  return better;
+}
+
 bool HypothesisRounds::findOne(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
   const ModelState& state = selection_.state();
@@ -142,7 +163,8 @@ bool HypothesisRounds::findOne(int round) {
   preferBetterNames(fits, state);
   MapEvidence maps(context_, state);
   std::vector<HypothesisFit> clutter;  // likelier than the fits that follow
-  for (HypothesisFit& fit : fits) {
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    HypothesisFit& fit = fits[i];
     std::string& verdict = triedAs(fit, round, result_.tried).verdict;
     verdict = rejectionByLikelihood(fit);
     if (isClutter(fit) && clutter.size() < kMostClutter) clutter.push_back(fit);
@@ -158,6 +180,13 @@ bool HypothesisRounds::findOne(int round) {
       gains_.ofFit(state, fit, finding);
       verdict = maps.rejection(fit, *finding.gain);
       if (!verdict.empty()) continue;
+      if (const auto better = betterByMaps(fits, i, finding.gain->explained_power)) {
+        verdict = "no likelier than " + fits[*better].hypothesis.label() + ", which explains more";
+        const auto next = fits.begin() + static_cast<std::ptrdiff_t>(i) + 1;
+        std::rotate(next, fits.begin() + static_cast<std::ptrdiff_t>(*better),
+                    fits.begin() + static_cast<std::ptrdiff_t>(*better) + 1);
+        continue;
+      }
       gains_.addMetrics(selection_.extended(), fit, *finding.gain);
     }
     context_.report("found " + fit.hypothesis.label() + ", " + number(fit.gain, 4) + " nats", 1);
