@@ -21,7 +21,7 @@ class BiasedCabinet : public ::testing::Test {
   }
   Finding changeOf(ChannelData& data, const std::vector<NamedParameters>& before,
                    const std::vector<NamedParameters>& after) {
-    DiagnosisContext context(recording_, twin_, data, options_, 2);
+    DiagnosisContext context(recording_, twin_, data, options_, options_.accuracy, 2);
     GainMeasurement gain(context);
     Finding finding;
     finding.where.emplace_back();
@@ -59,7 +59,7 @@ TEST_F(BiasedCabinet, OnePlaceAloneHoldsNothingOut) {
 TEST_F(BiasedCabinet, ItsMapMetricsAreTheTwinsBeforeAndAfter) {
   for (PoseChannels& pose : data_.poses) pose.uncorrected_average = pose.grid;
   recording_.radar = data_.radar;
-  DiagnosisContext context(recording_, twin_, data_, options_, 2);
+  DiagnosisContext context(recording_, twin_, data_, options_, options_.accuracy, 2);
   const GainMeasurement measurement(context);
   FindingGain gain;
   measurement.addMetrics({specular_}, std::vector<NamedParameters>{specular_, bias_}, gain);
