@@ -121,7 +121,8 @@ class Layouts(InFolder):
                     out.write(np.ascontiguousarray(data).tobytes())
                 with open(self.at("radar.yaml"), "w", encoding="ascii") as out:
                     out.write(RADAR + more)
-                run(PROCESS, self.at("a.bin"), "--radar", self.at("radar.yaml"), "--output", self.at("out"), "--npz", "--cubes")
+                run(PROCESS, self.at("a.bin"), "--radar", self.at("radar.yaml"), "--output", self.at("out"), "--npz", "--cubes",
+                    "--force")
                 radar = mmradartwin.read_radar(self.at("radar.yaml"))
                 frames = mmradartwin.read_capture(self.at("a.bin"), radar)
                 arrays = mmradartwin.read_npz(self.at("out", "npz", "a.npz"))
