@@ -73,7 +73,6 @@ class Programs(InFolder):
             "simulate": (["session", "--output"], [], "session.yaml"),
             "evaluate": (["session", "--no-pictures", "--output"], [], "index.html"),
             "diagnose": (["session", "--findings", "0", "--output"], [], "findings.json"),
-            "calibrate": (["session", "--wall", "wall_south", "--output"], [], "calibration.yaml"),
             "bag_to_session": (["session.bag"], [], "session.yaml"),
             "make_scene": ([mesh, "--output"], [], "scene.yaml"),
             "session_to_bag": (["session"], [], None),
@@ -106,7 +105,7 @@ class Outputs(Programs):
         self.before = digest_of(self.folder)
         for name, (head, tail, mark) in self.commands().items():
             taken = ["session", "link", "session/session.yaml", "session/captures", "session/poses.csv",
-                     "session/captures/000.bin", ".", "session.bag", "hard.bag", "profile.cfg"]
+                     "session/captures/001.bin", ".", "session.bag", "hard.bag", "profile.cfg"]
             for output in taken:
                 for force in ([], ["--force"]):
                     if output == "." and mark is None:
@@ -156,12 +155,12 @@ class Outputs(Programs):
 
     def test_an_interrupted_program_leaves_nothing(self):
         chance = random.Random(11)
+        log_file = self.folder + ".log"
+        self.addCleanup(os.remove, log_file)
         for name, (head, tail, mark) in self.commands().items():
             for number in (signal.SIGINT, signal.SIGTERM):
                 with self.subTest(program=name, signal=number):
-                    log = open(self.at("..", os.path.basename(self.folder) + ".log"), "w", encoding="utf-8")
-                    self.addCleanup(os.remove, log.name)
-                    with log:
+                    with open(log_file, "w", encoding="utf-8") as log:
                         run = subprocess.Popen([PROGRAMS[name], *head, "out", *tail], cwd=self.folder,
                                                stdout=log, stderr=log, stdin=subprocess.DEVNULL)
                     time.sleep(chance.uniform(0, 1.5))
@@ -233,7 +232,7 @@ class Outputs(Programs):
 FREE = {("session_to_bag", "session.bag"), ("session_to_bag", "hard.bag"), ("session_to_bag", "profile.cfg"),
         ("import_settings", "session.bag"), ("import_settings", "hard.bag"),
         ("import_settings", "session/session.yaml"), ("import_settings", "session/poses.csv"),
-        ("import_settings", "session/captures/000.bin"),
+        ("import_settings", "session/captures/001.bin"),
         ("make_scene", "session"), ("bag_to_session", "session"), ("bag_to_session", "link")}
 
 
@@ -297,7 +296,7 @@ class Manner(Programs):
     def test_a_recording_is_known_by_its_bytes(self):
         shutil.copy(self.at("session.bag"), self.at("lab.bag.active"))
         shutil.copy(self.at("session.bag"), self.at("no_extension"))
-        shutil.copy(self.at("session", "captures", "000.bin"), self.at("capture.dat"))
+        shutil.copy(self.at("session", "captures", "001.bin"), self.at("capture.dat"))
         for number, recording in enumerate(("session", "session/session.yaml", "lab.bag.active", "no_extension")):
             for name in ("process", "simulate"):
                 with self.subTest(program=name, recording=recording):
