@@ -143,6 +143,7 @@ class IqImbalance(Effect):
     def prepare(self, measurement):
         if self.p["phase_deg"] is None:
             drawn = 360 * measurement.rng(101).random(np.shape(self.p["image_db"]) or None)
+            drawn = (drawn + 180) % 360 - 180   # as findings state it
             self.p["phase_deg"] = drawn.tolist() if isinstance(self.p["image_db"], list) else float(drawn)
 
     def receive(self, measurement, index, station, x):
