@@ -67,8 +67,8 @@ def found_text(finding):
 
 def judge_parameter(cause, name, true, parameter):
     """(whether it is right, a sentence or None where there is nothing to say)."""
-    if parameter is None:
-        return False, f"{name} is not told."
+    if parameter is None:   # 0 is what a finding leaves out
+        return (True, None) if is_number(true) and true == 0 else (False, f"{name} is not told.")
     value, interval = parameter["value"], parameter.get("ci95")
     if not is_number(true):
         return value == true, None if value == true else f"{name} is {text_of(true)}, not {text_of(value)}."

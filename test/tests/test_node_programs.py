@@ -105,20 +105,21 @@ class Graph(InFolder):
         return tuple({topic for topic, names in kind if node in names} for kind in (subscribers, publishers, services))
 
     def check_graph(self, program, arguments):
-        """Help and master agree about the node."""
+        """Help and master agree about the node. Each has a name of its own: a node's parameters outlive it."""
+        name_of = "/looked_at_" + program[1]
         text = sections(run(program, "--help").stdout)
         wanted = tuple({name if name[0] == "/" else "/" + name for name in text[section]} for section in SECTIONS[:3])
         with open(self.at(program[1] + ".log"), "w", encoding="utf-8") as log:
-            node = subprocess.Popen([find_program(*program), *arguments, "__name:=looked_at"], stdout=log, stderr=log,
+            node = subprocess.Popen([find_program(*program), *arguments, "__name:=" + name_of[1:]], stdout=log, stderr=log,
                                     env=self.environment)
 
         def there():
-            subscribed, published, services = self.topics_of("/looked_at")
-            own = {name for name in services if not name.startswith("/looked_at/")}
+            subscribed, published, services = self.topics_of(name_of)
+            own = {name for name in services if not name.startswith(name_of + "/")}
             return (subscribed, published - {"/rosout"}, own) == wanted
 
         try:
-            wait_for(there, lambda: f"{wanted}, but {self.topics_of('/looked_at')}")
+            wait_for(there, lambda: f"{wanted}, but {self.topics_of(name_of)}")
             types = dict(self.master.getTopicTypes())
             for name, (kind, _) in {**text["Subscribes"], **text["Publishes"]}.items():
                 self.assertIn(types[name if name[0] == "/" else "/" + name], (kind, "*"), name)
