@@ -21,7 +21,8 @@ from mmradartwin_tests.installed_programs import find_program
 TRIALS = {"clean": 100, "single": 8, "later": 8, "faint": 6, "pair": 40, "twice": 2, "outside": 3, "decoy": 5,
           "recording": 3}
 EFFECTS = {"clean": 1, "single": len(draws.SINGLE), "later": len(draws.LATER), "faint": len(draws.FAINT), "pair": 1,
-           "twice": len(draws.TWICE), "outside": len(draws.OUTSIDE), "decoy": len(draws.DECOYS), "recording": len(recordings.INJECTIONS)}
+           "twice": len(draws.TWICE), "outside": len(draws.OUTSIDE), "decoy": len(draws.DECOYS),
+           "recording": len(recordings.INJECTIONS)}
 
 
 def parse():

@@ -219,7 +219,7 @@ class Mounting(WithBaseline):
             shifts = []
             for (now, before), station in zip(pairs, measurement.stations):
                 index = measurement.room.actor_index(name)
-                first = lambda echoes: [p for p in echoes.paths if list(p.actors) == [index]]
+                first = lambda echoes, actor=index: [p for p in echoes.paths if list(p.actors) == [actor]]
                 if first(now) and first(before):
                     shifts.append(first(now)[0].lengths_m[0] / 2 - first(before)[0].lengths_m[0] / 2)
             np.testing.assert_allclose(shifts, -0.08 if name == "wall_east" else 0, atol=1e-9, err_msg=name)

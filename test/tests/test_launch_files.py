@@ -222,7 +222,7 @@ class LaunchFiles(unittest.TestCase):
         self.check_records(radar, paths, grids)
 
     def check_records(self, radar, paths, grids):
-        """The published grid is the sum of its records and sum|c|^2 = M A^2, within 1e-6 (docs/reference/contracts.md section 4)."""
+        """The published grid is the sum of its records and sum|c|^2 = M A^2, within 1e-6 (contracts, section 4)."""
         samples, rate = radar.samples_per_chirp, radar.sample_rate_hz
         from_center_s = numpy.arange(samples) / rate - samples / (2 * rate)
         compared = 0

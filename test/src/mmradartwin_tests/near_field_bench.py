@@ -135,7 +135,6 @@ def spectrum(lengths_m, weights, frequency_hz, step_m=1e-5):
     count = int(low.max()) + 2
     bins = np.bincount(low, weights * (1 - share), count) + np.bincount(low + 1, weights * share, count)
     k = 2 * np.pi * frequency_hz / SPEED_OF_LIGHT
-    out = np.zeros(len(frequency_hz), complex)
     # Sum over the grid as a product of a coarse and a fine turn.
     block = 64
     rows = -(-count // block)

@@ -1,7 +1,7 @@
 """What a trial hides: effects of one row of the protocol and their strengths, drawn from the trial's own seed.
 
-Strengths are those that physics allows (docs/reference/causes.md) and, where the catalogue tells how small an effect can be found, at
-least twice that. Everything follows from (row, tier, seed, trial), so that a trial can be repeated.
+Strengths are those that physics allows (docs/reference/causes.md) and, where the catalogue tells how small an effect can
+be found, at least twice that. Everything follows from (row, tier, seed, trial), so that a trial can be repeated.
 """
 import dataclasses
 import hashlib
