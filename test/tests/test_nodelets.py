@@ -83,7 +83,7 @@ class BadParameters(unittest.TestCase):
                 file.flush()
                 with Launched(file.name, package=None) as launched:
                     launched.wait_for_text(f"[{name}-2] process has died")
-                    said = [line for line in launched.text().split("\n") if f"/{name}/{parameter}" in line]
+                    said = [line for line in launched.text().split("\n") if "FATAL" in line and f"/{name}/{parameter}" in line]
                     self.assertEqual(len(said), 1, launched.text())
                     self.assertIn("/manager", launched.state()[1])
 
