@@ -9,13 +9,13 @@
 #include <set>
 #include <sstream>
 
+#include "files/text_file.h"
 #include "mmradartwin_dsp/bag_kind.h"
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/csv_reader.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/stated_accuracy.h"
 #include "mmradartwin_dsp/strict_yaml.h"
-#include "text_file.h"
 
 namespace mmradartwin {
 namespace {

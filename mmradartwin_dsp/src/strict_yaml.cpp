@@ -8,9 +8,9 @@
 #include <set>
 #include <sstream>
 
+#include "files/text_file.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/text.h"
-#include "text_file.h"
 #include "yaml_document.h"
 
 namespace mmradartwin {

@@ -1,4 +1,4 @@
-#include "lua_source.h"
+#include "settings/lua_source.h"
 
 #include <cctype>
 #include <cstring>

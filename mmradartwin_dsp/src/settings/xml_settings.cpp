@@ -6,7 +6,7 @@
 #include <map>
 
 #include "mmradartwin_dsp/input_error.h"
-#include "raw_settings.h"
+#include "settings/raw_settings.h"
 
 namespace mmradartwin {
 namespace {

@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "files/text_file.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/strict_yaml.h"
 #include "mmradartwin_dsp/text.h"
-#include "raw_settings.h"
-#include "text_file.h"
+#include "settings/raw_settings.h"
 
 namespace mmradartwin {
 namespace {

@@ -1,4 +1,4 @@
-#include "lua_script.h"
+#include "settings/lua_script.h"
 
 #include <algorithm>
 #include <cctype>
@@ -10,9 +10,9 @@
 #include <map>
 #include <memory>
 
-#include "lua_source.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/text.h"
+#include "settings/lua_source.h"
 
 // Functions of Lua that raise an error do not return, and no destructor runs: where one is called, no object that has
 // to be destroyed is alive.

@@ -4,10 +4,10 @@
 #include <map>
 #include <vector>
 
-#include "lua_script.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/strict_yaml.h"
-#include "raw_settings.h"
+#include "settings/lua_script.h"
+#include "settings/raw_settings.h"
 
 namespace mmradartwin {
 namespace {
