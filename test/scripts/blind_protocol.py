@@ -6,7 +6,6 @@ finished trial does not run again. The table is printed at the end and written t
 """
 import argparse
 import os
-import signal
 import sys
 import time
 
@@ -16,6 +15,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..
 
 from mmradartwin_tests.blind import draws, ledger, recordings, table, trials
 from mmradartwin_tests.installed_programs import find_program
+from mmradartwin_tests.resumable_program import run_resumable
 
 # Of rows with several effects, this many of each; of the other rows, this many in all.
 TRIALS = {"clean": 100, "single": 8, "later": 8, "faint": 6, "pair": 40, "twice": 2, "outside": 3, "decoy": 5,
@@ -138,27 +138,5 @@ def run(arguments):
     print_table(arguments.output, results, sealed)
 
 
-def stop(number, frame):
-    """Ends the trial that runs, with its diagnosis and its session, on SIGTERM too and in the background of a shell."""
-    raise KeyboardInterrupt
-
-
-def main():
-    """Entry point; returns the exit status."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, stop)
-    arguments = parse()
-    try:
-        os.makedirs(arguments.output, exist_ok=True)
-        run(arguments)
-    except (ValueError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("stopped; the same call goes on where this one ended", file=sys.stderr)
-        return 1
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_resumable(parse, run))

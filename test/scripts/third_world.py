@@ -16,6 +16,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..
 
 from mmradartwin_tests.blind.trials import Results
 from mmradartwin_tests.installed_programs import find_program
+from mmradartwin_tests.resumable_program import run_resumable
 from mmradartwin_tests.third_world import campaign, hidden
 from mmradartwin_tests.third_world.measured import PROPERTIES
 
@@ -73,20 +74,5 @@ def run(arguments):
     print(text)
 
 
-def main():
-    """Entry point; returns the exit status."""
-    arguments = parse()
-    try:
-        os.makedirs(arguments.output, exist_ok=True)
-        run(arguments)
-    except (ValueError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("stopped; the same call goes on where this one ended", file=sys.stderr)
-        return 1
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_resumable(parse, run))
