@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/gain/changed_records.h"
 #include "diagnosis/gain/held_out_gain.h"
 #include "diagnosis/hidden_walkers.h"
@@ -25,7 +26,6 @@ namespace mmradartwin::diagnosis {
 namespace {
 
 constexpr int kFolds = 5;
-constexpr double kLeastShareOfStated = 0.2;  ///< of the stated error of levels that is believed
 
 }  // namespace
 
@@ -232,7 +232,7 @@ void DiagnosisRun::takeSmallerErrors() {
     if (found != spreads.end()) value = std::min(value, std::max(found->second.high, least));
   };
   take("scene_m", stated_.path_range_m, smaller.scene_m);
-  take("level_db", kLeastShareOfStated * stated_.level_db, smaller.level_db);
+  take("level_db", bounds::kLeastShareOfStated * stated_.level_db, smaller.level_db);
   if (smaller.scene_m == context_.accuracy.scene_m && smaller.level_db == context_.accuracy.level_db) return;
   context_.judgeActorsBy(smaller);
   const SessionLatents latents = state_.latents;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/catalogue/bounds.h"
+
 namespace mmradartwin {
 
 std::array<double, 2> Finding::placeError_m() const {
@@ -26,13 +28,12 @@ const FindingParameter* Finding::parameter(const std::string& name) const {
 }
 
 bool Findings::isFarWorse(const std::string& key) const {
-  constexpr double kFar = 1.5;
   const auto estimate = estimated.find(key);
   const auto& keys = accuracyKeys();
   const auto stated = std::find_if(keys.begin(), keys.end(), [&](const AccuracyKey& k) { return k.name == key; });
   if (estimate == estimated.end() || stated == keys.end()) return false;
   const double stated_value = accuracy.*stated->member;
-  return estimate->second.low > stated_value && estimate->second.value > kFar * stated_value;
+  return estimate->second.low > stated_value && estimate->second.value > diagnosis::bounds::kFarWorse * stated_value;
 }
 
 std::string Findings::verdict() const {

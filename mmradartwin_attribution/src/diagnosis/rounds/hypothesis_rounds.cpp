@@ -17,9 +17,8 @@
 namespace mmradartwin::diagnosis::rounds {
 namespace {
 
-constexpr std::size_t kMostRangeErrors = 4;    ///< actors whose range error is searched for in a round
-constexpr double kLeastShareOfRanking = 0.95;  ///< of the best fit, from which on another is about as likely
-constexpr std::size_t kMostClutter = 4;        ///< things that stand out of the clutter, beside which a fit is judged
+constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is searched for in a round
+constexpr std::size_t kMostClutter = 4;      ///< things that stand out of the clutter, beside which a fit is judged
 
 /// True of a transmitter's delay that is no larger than its error: its phase alone is another cause's.
 bool isPhaseOnly(const HypothesisFit& fit) {
@@ -142,7 +141,7 @@ std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<Hypothesis
   double most = explained.after + bounds::kLeastExplainedMore;
   for (std::size_t i = best + 1; i < fits.size(); ++i) {
     HypothesisFit& rival = fits[i];
-    if (rival.ranking() < kLeastShareOfRanking * fits[best].ranking()) break;
+    if (rival.ranking() < bounds::kAboutAsLikely * fits[best].ranking()) break;
     if (!isCatalogued(rival.hypothesis.mechanism.mechanism) || !rejectionByLikelihood(rival).empty()) continue;
     Finding finding = findingOf(rival, fits, state, context_.twin.scene(), context_.data);
     gains_.ofFit(state, rival, finding);
