@@ -1,5 +1,6 @@
 // Every YAML file below config/ is read by the code that reads it for a user; a file of unknown kind fails the test.
 #include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -48,6 +49,14 @@ TEST_P(ShippedConfiguration, Loads) {
     const RadarConfig radar = loadRadarConfig((kConfig / "radar.yaml").string());
     const Twin twin(loadTwin("", file.string(), radar));
     EXPECT_GT(twin.scene().facets.size(), 10u);
+  } else if (name == "diagnostic_aggregator.yaml") {
+    // Read by diagnostic_aggregator; a group that takes no name would be left out without a word.
+    const YAML::Node analyzers = YAML::LoadFile(file.string())["analyzers"];
+    EXPECT_GE(analyzers.size(), 5u);
+    for (const auto& group : analyzers) {
+      EXPECT_EQ(group.second["type"].as<std::string>(), "diagnostic_aggregator/GenericAnalyzer");
+      EXPECT_FALSE(group.second["contains"].as<std::vector<std::string>>().empty()) << group.first.as<std::string>();
+    }
   } else if (name == "materials.yaml" || folder == "materials") {
     EXPECT_GE(loadMaterials(file.string()).size(), 7u);
   } else {

@@ -36,10 +36,6 @@ def digest_of(folder):
     return digests
 
 
-def temporary_folders():
-    return set(glob.glob(os.path.join(tempfile.gettempdir(), "mmradartwin_tmp_*")))
-
-
 @unittest.skipIf(None in PROGRAMS.values(), "the offline programs are not built in this workspace")
 class Programs(InFolder):
     @classmethod
@@ -59,11 +55,13 @@ class Programs(InFolder):
         super().setUp()
         shutil.copytree(self.made, self.folder, dirs_exist_ok=True)
         self.before = digest_of(self.folder)
-        self.temporary = temporary_folders()
+        # A place for temporary folders of its own: other tests run beside this one.
+        self.temporary = self.enterContext(tempfile.TemporaryDirectory())
+        self.environment = {**os.environ, "TMPDIR": self.temporary}
 
     def run_program(self, name, *arguments, **more):
         return subprocess.run([PROGRAMS[name], *arguments], cwd=self.folder, capture_output=True, text=True,
-                              check=False, timeout=PATIENCE_S, stdin=subprocess.DEVNULL, **more)
+                              check=False, timeout=PATIENCE_S, stdin=subprocess.DEVNULL, env=self.environment, **more)
 
     def commands(self):
         """{program: (arguments before the output, after it, a file or folder that its result has)}."""
@@ -81,7 +79,7 @@ class Programs(InFolder):
 
     def assert_nothing_changed(self):
         self.assertEqual(digest_of(self.folder), self.before)
-        self.assertEqual(temporary_folders() - self.temporary, set())
+        self.assertEqual(os.listdir(self.temporary), [])
 
     def assert_refused(self, run, *words):
         """One line, status 2, all as it was."""
@@ -162,7 +160,7 @@ class Outputs(Programs):
                 with self.subTest(program=name, signal=number):
                     with open(log_file, "w", encoding="utf-8") as log:
                         run = subprocess.Popen([PROGRAMS[name], *head, "out", *tail], cwd=self.folder,
-                                               stdout=log, stderr=log, stdin=subprocess.DEVNULL)
+                                               stdout=log, stderr=log, stdin=subprocess.DEVNULL, env=self.environment)
                     time.sleep(chance.uniform(0, 1.5))
                     run.send_signal(number)
                     status = run.wait(timeout=PATIENCE_S)
@@ -218,7 +216,7 @@ class Outputs(Programs):
             for name in names:
                 with open(os.path.join(place, name), "rb") as file:
                     self.assertNotIn(b"mmradartwin_tmp_", file.read(), msg=name)
-        self.assertEqual(temporary_folders() - self.temporary, set())
+        self.assertEqual(os.listdir(self.temporary), [])
 
     def test_a_damaged_session_is_written_and_said(self):
         os.remove(self.at("session", "captures", "001.bin"))

@@ -152,7 +152,7 @@ class Simulator(InFolder):
             base = {"specular": {"max_bounces": 2}, "corner": {}, "diffuse": {}}
             with open(twin_file, "w", encoding="ascii") as out:
                 out.write(f"scene: {self.lab}/scene.yaml\nmechanisms: {json.dumps({**base, **extension})}\n")
-            run(SIMULATE, self.lab, "--twin", twin_file, "--output", self.at("out"), "--noise", "none", "--seed", "7")
+            run(SIMULATE, self.lab, "--twin", twin_file, "--output", self.at("out"), "--noise", "none", "--seed", "7", "--force")
             written = mmradartwin.open_session(self.at("out"))
             twin = sim.Twin.of_session(self.lab, twin_file, seed=7)
             scale = 32768 * 10**(written.gain_db / 20)
