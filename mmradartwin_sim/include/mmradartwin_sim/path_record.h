@@ -27,7 +27,6 @@ struct PathRecord {
   /// empty where none is: what a mechanism of weight needs of the geometry.
   PerInteraction<double> reflection_cosine;
   Eigen::Vector3d departure, arrival;  ///< unit vectors in radar_link, both from the radar outwards
-  bool channels_apart = false;         ///< length_m differs between channels by more than their elements' places
   int bounces = 0;
   int range_bin = 0;                   ///< nearest bin of length/2
   double amplitude = 0;                ///< A_p, common to the channels

@@ -21,6 +21,9 @@ constexpr double kWeakShare = 1e-6, kStrongShare = 0.003;
 /// Power over that of the strongest bin, below which a changed response is left out.
 constexpr double kLeastResponse = 1e-7;
 constexpr std::size_t kMostBeamBins = 16;  ///< kMaxChannels
+/// Farthest that a channel's range may lie from the mean one for responses to be taken to first order in it. Such a
+/// response is wrong by half the square of this, times the window's curvature of 3: -38 dB.
+constexpr double kNear_bins = 0.09;
 /// Share of a path's power (of a weak path's power) below which a beam skips it.
 constexpr double kOffBeam = 1e-7, kOffBeamWeak = 1e-3;
 
@@ -97,7 +100,6 @@ void addToSignature(const PathRecord& record, std::size_t& signature) {
   const auto sign = [&](double v) { boost::hash_combine(signature, v); };
   for (double v : record.length_m) sign(v);
   for (const std::complex<double>& v : record.c) sign(v.real()), sign(v.imag());
-  sign(record.channels_apart);
   sign(record.departure.y());
   sign(record.arrival.y());
 }
@@ -194,6 +196,10 @@ struct OpenFields {
     mean[at] += own;
     squares[at] += own * own;
   }
+  /// Adds to the first fields of a bin that has a path's power already.
+  void addShape(int bin, const std::complex<float>* packed, std::initializer_list<float> factors) {
+    addMultiples(packed, size, factors.begin(), factors.size(), sums.data() + static_cast<std::size_t>(bin) * of_bin);
+  }
   void close(Fields& to) {
     if (last < first) return;
     const auto from = sums.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(first) * of_bin),
@@ -227,7 +233,7 @@ std::shared_ptr<const EchoGroup> EchoCollector::addTones(const std::vector<const
   return groups_.back();
 }
 
-void EchoCollector::addApart(const PathRecord& record, int reach, EchoGroup& group) {
+void EchoCollector::addApart(const PathRecord& record, int reach, bool strong, EchoGroup& group) {
   const double cosine = pathCosine(record);
   const auto channels = static_cast<std::size_t>(channels_);
   thread_local std::vector<double> place;
@@ -242,9 +248,8 @@ void EchoCollector::addApart(const PathRecord& record, int reach, EchoGroup& gro
   };
   const auto [low, high] = std::minmax_element(place.begin(), place.end());
   const int first = static_cast<int>(std::lround(*low)) - reach, last = static_cast<int>(std::lround(*high)) + reach;
-  const int around = first < 0 || last > samples_ - 1 ? samples_ : 0;
-  for (int r = first; r <= last; ++r) {
-    if (r - first >= samples_ || (reach < samples_ / 2 - 1 && (r < 0 || r > samples_ - 1))) continue;
+  for (int r = first; r <= std::min(last, first + samples_ - 1); ++r) {
+    if (!strong && (r < 0 || r > samples_ - 1)) continue;
     double mean = 0;
     for (std::size_t k = 0; k < channels; ++k) {
       const auto [w, per_m] = respond(r, k);
@@ -257,7 +262,7 @@ void EchoCollector::addApart(const PathRecord& record, int reach, EchoGroup& gro
     outer(slope.data(), cosine, curvature);
     outer(both.data(), cosine, shift);  // (a + b)(a + b)^H - a a^H - b b^H = a b^H + b a^H
     for (std::size_t i = 0; i < shift.size(); ++i) shift[i] -= power[i] + curvature[i];
-    const int bin = (r + around) % samples_;
+    const int bin = (r % samples_ + samples_) % samples_;
     open_fields.add(bin, power.data(), {1, 0, 0}, cosine, static_cast<float>(mean));
     open_fields.add(bin, shift.data(), {0, 1, 0}, 0, 0);
     open_fields.add(bin, curvature.data(), {0, 0, 1}, 0, 0);
@@ -302,16 +307,33 @@ void EchoCollector::addBeam(int beam, const std::vector<std::complex<double>>& r
 void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& group) {
   const bool weak = share < kWeakShare;
   const double cosine = pathCosine(record), place = (0.5 * meanLength_m(record) + group.added_range_m) / bin_m_;
-  thread_local std::vector<std::complex<float>> packed;
-  outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error is negligible beside the others'
   const bool strong = share >= kStrongShare;
   const int reach = weak ? kLobe_bins : strong ? std::min(kFarSkirt_bins, samples_ / 2 - 1) : kSkirt_bins;
-  if (record.channels_apart && !weak) {
-    addApart(record, reach, group);
-    return;
+  thread_local std::vector<std::complex<double>> c_apart, both;  // channels times their ranges beside the mean, in bins
+  double farthest = 0;
+  if (!weak) {
+    c_apart.resize(record.c.size());
+    for (std::size_t k = 0; k < c_apart.size(); ++k) {
+      const double apart = (0.5 * record.length_m[k] + group.added_range_m) / bin_m_ - place;
+      c_apart[k] = record.c[k] * apart;
+      farthest = std::max(farthest, std::abs(apart));
+    }
+    if (farthest > kNear_bins) {
+      addApart(record, reach, strong, group);
+      return;
+    }
   }
   const int middle = static_cast<int>(std::lround(place));
   if (middle + reach < 0 || middle - reach > samples_ - 1) return;
+  thread_local std::vector<std::complex<float>> packed, squares, products;
+  outer(record.c.data(), weak ? 0 : cosine, packed);  // a weak path's own angle error is negligible beside the others'
+  if (!weak) {
+    both.resize(record.c.size());
+    for (std::size_t k = 0; k < both.size(); ++k) both[k] = record.c[k] + c_apart[k];
+    outer(c_apart.data(), cosine, squares);
+    outer(both.data(), cosine, products);  // (a + b)(a + b)^H - a a^H - b b^H = a b^H + b a^H
+    for (std::size_t i = 0; i < size_; ++i) products[i] -= packed[i] + squares[i];
+  }
   // Spectra are periodic: the skirt of an echo near the first bin continues in the last ones.
   double power = 0;
   for (const std::complex<double>& c : record.c) power += std::norm(c) / channels_;
@@ -323,11 +345,18 @@ void EchoCollector::addTone(const PathRecord& record, double share, EchoGroup& g
     const int bin = (r + samples_) % samples_;
     const auto [w, per_bin] = kHann.at(r - place);
     const double slope = -per_bin / bin_m_;
-    open_fields.add(bin, packed.data(),
-                    {static_cast<float>(w * w), static_cast<float>(2 * w * slope), static_cast<float>(slope * slope)},
-                    cosine, static_cast<float>(power));
+    const auto f = [](double v) { return static_cast<float>(v); };
+    open_fields.add(bin, packed.data(), {f(w * w), f(2 * w * slope), f(slope * slope)}, cosine, f(power));
+    if (weak) continue;
+    // A channel that lies `apart` farther answers with w - per_bin apart, and so it is when all are shifted.
+    open_fields.addShape(bin, products.data(), {f(-w * per_bin), f(-slope * per_bin)});
+    open_fields.addShape(bin, squares.data(), {f(per_bin * per_bin)});
   }
-  addToBeams(record.c.data(), place, weak ? kOffBeamWeak : kOffBeam, group.beams);
+  if (weak) {
+    addToBeams(record.c.data(), place, kOffBeamWeak, group.beams);
+  } else {
+    addToBeams(record.c.data(), c_apart.data(), place, group.beams);
+  }
 }
 
 void EchoCollector::add(const PathRecord& record, const Eigen::MatrixXcd& y, const Eigen::MatrixXcd& slope) {
@@ -400,6 +429,32 @@ void EchoCollector::addToBeams(const std::complex<double>* c, double place, doub
     const std::size_t at = static_cast<std::size_t>(static_cast<int>(b) - beams.first);
     beams.mean[at] += static_cast<float>(own);
     beams.squares[at] += static_cast<float>(own * own);
+  }
+}
+
+void EchoCollector::addToBeams(const std::complex<double>* c, const std::complex<double>* c_apart, double place,
+                               Fields& beams) const {
+  thread_local std::vector<std::complex<double>> responses, slopes;
+  responses.resize(static_cast<std::size_t>(channels_));
+  slopes.resize(responses.size());
+  double all = 0;
+  for (int k = 0; k < channels_; ++k) all += std::norm(c[k]);
+  for (std::size_t b = 0; b < beams_.size(); ++b) {
+    const EchoBeam& beam = beams_[b];
+    const double middle = place - beam.first_bin;
+    if (middle < -kLobe_bins || middle > channels_ - 1 + kLobe_bins) continue;
+    std::complex<double> formed = 0, formed_apart = 0;
+    for (int k = 0; k < channels_; ++k) {
+      formed += std::conj(beam.weights[k]) * c[k];
+      formed_apart += std::conj(beam.weights[k]) * c_apart[k];
+    }
+    if (std::norm(formed) + std::norm(formed_apart) < kOffBeam * all) continue;
+    for (std::size_t i = 0; i < responses.size(); ++i) {
+      const auto [response, per_bin] = kHann.at(static_cast<double>(i) - middle);
+      responses[i] = formed * response - formed_apart * per_bin;
+      slopes[i] = -formed * per_bin / bin_m_;
+    }
+    addBeam(static_cast<int>(b), responses, slopes, beams);
   }
 }
 

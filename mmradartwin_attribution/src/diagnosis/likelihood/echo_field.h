@@ -105,8 +105,9 @@ class EchoCollector {
  private:
   EchoGroup& group(const PathRecord& record);
   void addTone(const PathRecord& record, double share, EchoGroup& group);
-  /// The same where channels have ranges of their own. reach: bins to either side.
-  void addApart(const PathRecord& record, int reach, EchoGroup& group);
+  /// The same where channels' ranges lie far apart. reach: bins to either side. strong: also around the spectrum's
+  /// ends.
+  void addApart(const PathRecord& record, int reach, bool strong, EchoGroup& group);
   /// response, slope: [bins of the beam] of the formed channels, and their derivative by the range.
   void addBeam(int beam, const std::vector<std::complex<double>>& response,
                const std::vector<std::complex<double>>& slope, EchoGroup::Fields& beams) const;
@@ -115,6 +116,9 @@ class EchoCollector {
   /// Adds |b^H c|^2 times outer products of the responses over each beam's bins. Skips a beam that receives less than
   /// the share `off` of the path's power.
   void addToBeams(const std::complex<double>* c, double place, double off, EchoGroup::Fields& beams) const;
+  /// The same of channels that lie a little beside `place`. c_apart: [channels] c times that distance in bins.
+  void addToBeams(const std::complex<double>* c, const std::complex<double>* c_apart, double place,
+                  EchoGroup::Fields& beams) const;
 
   const RadarConfig& radar_;
   const std::vector<EchoBeam>& beams_;

@@ -39,7 +39,6 @@ class TxDelay : public Mechanism, public WeightStage {
       record.length_m[k] += 2 * delay_m_;
       record.c[k] *= turn_;
     }
-    record.channels_apart = delay_m_ != 0;
     record.phase_rad = std::arg(record.c[0]);
     record.range_bin = rangeBin(context.radar, record.length_m[0]);
   }
