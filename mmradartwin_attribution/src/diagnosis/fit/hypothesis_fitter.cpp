@@ -36,6 +36,7 @@ ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanism
   state.echoes = source_.echoes(mechanisms, state.actor_range_m);
   state.latents = start != nullptr ? *start : model_.start(state.echoes);
   double reached = model_.fit(state.echoes, state.latents, start != nullptr ? kFurtherSteps : kFirstSteps);
+  reached = model_.fitWithoutTrap(state.echoes, state.latents, reached);
   // Echoes depend on ranges to first order only, so that they are collected again about the fitted ranges. A null below
   // its optimum would lend its missing nats to every hypothesis.
   for (int i = 0; i < kMostExpansions; ++i) {

@@ -189,6 +189,14 @@ void LikelihoodClimb::climb() {
   }
 }
 
+void LikelihoodClimb::climbOutOfTrap() {
+  SessionLatents latents = optimum_.state.latents;
+  const double reached = optimum_.state.log_likelihood;
+  if (model_.fitWithoutTrap(optimum_.state.echoes, latents, reached) < reached + kLikelier_nats) return;
+  take(stateAt(optimum_.scaled_values, latents), optimum_.scaled_values);
+  climb();
+}
+
 double LikelihoodClimb::stepBy(const Eigen::VectorXd& step) {
   for (double share : kStepShares) {
     std::vector<double> next = optimum_.scaled_values;
@@ -293,6 +301,7 @@ void LikelihoodClimb::climbFrom(ModelState state, std::vector<double> scaled_val
   optimum_.state = std::move(state);
   optimum_.scaled_values = std::move(scaled_values);
   climb();
+  climbOutOfTrap();
   if (optimum_.state.log_likelihood <= other.state.log_likelihood) optimum_ = std::move(other);
 }
 
@@ -338,6 +347,7 @@ Optimum LikelihoodClimb::run() {
   everyone_ = everyPose(optimum_.state);
   climb();
   scan();
+  climbOutOfTrap();
   if (!needsSearch()) return std::move(optimum_);
   // Where paths appear and vanish with each millimetre, slopes end at the first bump. A quadratic through values some
   // millimetres apart does not. The latents follow to first order.

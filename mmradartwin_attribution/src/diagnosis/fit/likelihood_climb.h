@@ -57,6 +57,8 @@ class LikelihoodClimb {
   void tryStarts();
   Scores derivatives(const ModelState& state, const std::vector<double>& scaled_values) const;
   void climb();
+  /// Climbs once more from the optimum with latents out of their trap, see ChannelLikelihood::fitWithoutTrap().
+  void climbOutOfTrap();
   /// Takes the longest share of a step that gains. Returns the gain, 0 where no share gains.
   double stepBy(const Eigen::VectorXd& step);
   /// Tries values over the whole range of a single number, and climbs from one that is likelier than the optimum.

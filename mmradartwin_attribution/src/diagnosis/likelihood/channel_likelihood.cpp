@@ -19,6 +19,9 @@ constexpr double kBeamShare = 3e-6;
 /// for which the change is evaluated.
 constexpr double kNegligibleShare = 3e-4, kMoved_m = 0.03;
 
+/// Logarithm of the factor on uncertain paths from which a fit is tried again from 0, and the steps that it may take.
+constexpr double kTrap = 1;
+constexpr int kTrapSteps = 6;
 constexpr double kLeastStep_nats = 0.1;  ///< expected gain below which fit() ends
 
 /// Indices of the globals in scores; kShape and kActors are the first of several.
@@ -626,6 +629,17 @@ double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLate
     if (!better || screened_nats < kLeastStep_nats) break;
   }
   return best;
+}
+
+double ChannelLikelihood::fitWithoutTrap(const std::vector<PoseEchoes>& echoes, SessionLatents& latents,
+                                         double reached) const {
+  if (latents.log_pose_sensitive < kTrap) return reached;
+  SessionLatents other = latents;
+  other.log_pose_sensitive = 0;
+  const double there = fit(echoes, other, kTrapSteps);
+  if (there <= reached) return reached;
+  latents = std::move(other);
+  return there;
 }
 
 SessionLatents ChannelLikelihood::start(const std::vector<PoseEchoes>& echoes) const {

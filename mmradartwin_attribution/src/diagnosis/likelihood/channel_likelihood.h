@@ -133,6 +133,10 @@ class ChannelLikelihood {
                     const std::vector<int>& poses) const;
   /// Fisher scoring of the latents from their present values. Returns the log-likelihood.
   double fit(const std::vector<PoseEchoes>& echoes, SessionLatents& latents, int iterations) const;
+  /// The same once more with the factor on uncertain paths back at 1, where a fit took it far away: what the twin lacks
+  /// can hold it at hundreds, beside a higher maximum. Latents of a lower likelihood than `reached` are not taken.
+  /// Returns the higher of both.
+  double fitWithoutTrap(const std::vector<PoseEchoes>& echoes, SessionLatents& latents, double reached) const;
   /// Latents after a share of a step of the globals, with each heading's best response to whole_step. Values and steps
   /// are limited.
   SessionLatents stepped(const SessionLatents& from, const Eigen::VectorXd& globals, const Scores& scores,

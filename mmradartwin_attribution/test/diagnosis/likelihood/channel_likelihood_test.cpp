@@ -197,6 +197,25 @@ TEST_F(ThreeActors, ScoresOfAMechanismAreTheLikelihoodsSlopes) {
 }
 
 // Draws have the expected covariance, and the strongest echo a level that does not fade.
+TEST_F(ThreeActors, AFactorOnUncertainPathsThatWentFarAwayIsTriedAgainFromOne) {
+  const ChannelLikelihood likelihood(data_, 3, PoseAccuracy());
+  const std::vector<PoseEchoes> expected = echoes();
+  SessionLatents latents = latents_;
+  latents.log_pose_sensitive = 6;
+  const double trapped = likelihood.logLikelihood(expected, latents);
+  const double reached = likelihood.fitWithoutTrap(expected, latents, trapped);
+  EXPECT_GT(reached, trapped + 10);
+  EXPECT_DOUBLE_EQ(reached, likelihood.logLikelihood(expected, latents));
+  EXPECT_LT(latents.log_pose_sensitive, 1);
+  // What is not far away stays, and so does what is likelier.
+  SessionLatents same = latents;
+  EXPECT_DOUBLE_EQ(likelihood.fitWithoutTrap(expected, same, reached), reached);
+  EXPECT_DOUBLE_EQ(same.log_pose_sensitive, latents.log_pose_sensitive);
+  latents.log_pose_sensitive = 6;
+  EXPECT_DOUBLE_EQ(likelihood.fitWithoutTrap(expected, latents, reached + 1e6), reached + 1e6);
+  EXPECT_DOUBLE_EQ(latents.log_pose_sensitive, 6);
+}
+
 TEST_F(ThreeActors, DrawsChannelsAsItExpectsThem) {
   const ChannelLikelihood model(data_, 3, PoseAccuracy());
   const auto expected = echoes();
