@@ -25,8 +25,10 @@ std::string MapEvidence::rejection(const HypothesisFit& fit, const FindingGain& 
   }
   if (in_maps) return "";
   // The likelihood knows the errors that it was given and trusts the twin in all else; what makes maps worse has no
-  // second witness.
-  const bool clearly_worse = explained[1] < 0 && explained_more < -bounds::kLeastExplainedMore;
+  // second witness. A law without a name only describes the data, so that it need not be certain to describe them
+  // worse.
+  const bool named = isCatalogued(fit.hypothesis.mechanism.mechanism);
+  const bool clearly_worse = explained_more < -bounds::kLeastExplainedMore && (explained[1] < 0 || !named);
   const Eigen::VectorXd nats_by_pose = gainByPose(fit, before_);
   if (!clearly_worse && hasEnoughEvidence(fit, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
   if (likelier) rejected_.push_back({nats_by_pose, true});
