@@ -229,9 +229,7 @@ class ThirdWorld:
         rng, level, received = self.rng(10), self.strongest(grids), []
         vector = rng.standard_normal((2, 8)) + 1j * rng.standard_normal((2, 8))
         vector /= np.sqrt(np.mean(np.abs(vector)**2, axis=1))[:, None]
-        image = 10**(rng.normal(-35, 2, 4) / 20) * np.exp(2j * np.pi * rng.random(4)) * self.has("images")
-        image = image + (on_grid(self.hidden["image_db"]) * np.exp(2j * np.pi * rng.random())
-                         if self.cause == "iq_imbalance" else 0)
+        image = self.images()
         gain_db = slow(rng, len(grids), 0.25) * self.has("gain_drift")
         hours = np.array([s.stamp_ns - self.stations[0].stamp_ns for s in self.stations]) / 3.6e12
         gain_db += self.of("gain_drift", "db_per_hour") * hours
@@ -272,6 +270,14 @@ class ThirdWorld:
         session.write_description(directory, self)
         with open(os.path.join(directory, "session.yaml"), "a", encoding="ascii") as out:
             out.write(STATED)
+
+    def images(self):
+        """[4] complex shares of the conjugate signal that receivers add, the hidden cause's among them."""
+        rng = self.rng(13)
+        image = 10**(rng.normal(-35, 2, 4) / 20) * np.exp(2j * np.pi * rng.random(4)) * self.has("images")
+        if self.cause == "iq_imbalance":
+            image = image + on_grid(self.hidden["image_db"]) * np.exp(2j * np.pi * rng.random())
+        return image
 
     def truth(self):
         """[{"cause", "parameters"}], empty where nothing is hidden."""
