@@ -241,7 +241,7 @@ class TwoCards : public ::testing::Test {
   std::pair<int, std::string> run(const std::string& arguments) const {
     const std::string command = std::string(MMRADARTWIN_PCAP_TO_CAPTURE) + " " + folder.file("a.pcap") + " --radar " +
                                 folder.file("radar.yaml") + " --output " + folder.file("a.bin") + " " + arguments +
-                                " 2>" + folder.file("log");
+                                " >" + folder.file("log") + " 2>&1";
     const int status = WEXITSTATUS(std::system(command.c_str()));
     const std::vector<std::uint8_t> log = readBytes(folder.file("log"));
     return {status, std::string(log.begin(), log.end())};
@@ -275,7 +275,7 @@ TEST_F(TwoCards, AreTakenApart) {
     std::fill(expected.begin() + lost * 1456, expected.begin() + (lost + 1) * 1456, std::uint8_t{0});
   }
   EXPECT_TRUE(expected == readBytes(folder.file("a.bin")));
-  const auto [whole_status, whole_log] = run("--card-ip 192.168.33.181");
+  const auto [whole_status, whole_log] = run("--card-ip 192.168.33.181 --force");
   EXPECT_EQ(0, whole_status);
   EXPECT_NE(std::string::npos, whole_log.find("30 frame(s)")) << whole_log;
   EXPECT_NE(std::string::npos, whole_log.find("0 with losses\n")) << whole_log;
