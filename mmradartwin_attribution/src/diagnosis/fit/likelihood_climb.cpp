@@ -197,6 +197,30 @@ void LikelihoodClimb::climbOutOfTrap() {
   climb();
 }
 
+void LikelihoodClimb::takeOverErrors() {
+  const int actor = task_.parts.size() == 1 ? source_.base().scene().actorIndex(task_.parts.front().subject) : -1;
+  if (actor < 0 || !geometric_ || coordinates_.empty()) return;
+  SessionLatents without = withoutErrors(optimum_.state.latents, actor);
+  Eigen::VectorXd apart(globals_);
+  for (int j = 0; j < globals_; ++j) apart[j] = without.global(j) - optimum_.state.latents.global(j);
+  const auto n = static_cast<Eigen::Index>(coordinates_.size());
+  const Eigen::MatrixXd information = regularised(optimum_.scores.information);
+  const Eigen::VectorXd step =
+      information.bottomRightCorner(n, n).ldlt().solve(-information.bottomLeftCorner(n, globals_) * apart);
+  std::vector<double> moved = optimum_.scaled_values;
+  for (std::size_t j = 0; j < moved.size(); ++j) {
+    const Coordinate& c = coordinates_[j];
+    const double low = std::min(c.scaled(c.min), c.scaled(c.max)), high = std::max(c.scaled(c.min), c.scaled(c.max));
+    moved[j] = std::clamp(moved[j] + step[static_cast<Eigen::Index>(j)], low, high);
+  }
+  ModelState state = stateAt(moved, without);
+  model_.fit(state.echoes, state.latents, kLatentSteps);
+  state = stateAt(moved, state.latents);
+  if (state.log_likelihood < optimum_.state.log_likelihood + kLikelier_nats) return;
+  take(state, moved);
+  climb();
+}
+
 double LikelihoodClimb::stepBy(const Eigen::VectorXd& step) {
   for (double share : kStepShares) {
     std::vector<double> next = optimum_.scaled_values;
@@ -356,6 +380,7 @@ Optimum LikelihoodClimb::run() {
     search(first_step);
     if (optimum_.state.log_likelihood - before < kRising_nats) break;
   }
+  takeOverErrors();
   return std::move(optimum_);
 }
 

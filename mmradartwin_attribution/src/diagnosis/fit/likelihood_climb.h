@@ -59,6 +59,9 @@ class LikelihoodClimb {
   void climb();
   /// Climbs once more from the optimum with latents out of their trap, see ChannelLikelihood::fitWithoutTrap().
   void climbOutOfTrap();
+  /// Climbs once more from where an actor has moved by what its own latent errors stand for. Seen from one side, a move
+  /// and an error of its range are alike, and the ridge between them is rough.
+  void takeOverErrors();
   /// Takes the longest share of a step that gains. Returns the gain, 0 where no share gains.
   double stepBy(const Eigen::VectorXd& step);
   /// Tries values over the whole range of a single number, and climbs from one that is likelier than the optimum.

@@ -19,11 +19,15 @@ class DarkPlate : public ::testing::Test {
     truth.push_back(reflectivityOf("Plate").at({kLevel_db / -3}));
     room_.measure(truth);
     fitted_.emplace(room_, firstOrder());
+    latents_ = fitted_->null.latents;
+    const auto echoes =
+        fitted_->source.echoes(mechanismsWith(firstOrder(), {plate_}, {kLevel_db / -3}), latents_.actor_range_m);
+    fitted_->model.fit(echoes, latents_, 20);
   }
   /// The likelihood with the level at a value of the scale and all latents refitted.
   double profileAt(double scaled) {
     const std::vector<NamedParameters> mechanisms = mechanismsWith(firstOrder(), {plate_}, {scaled});
-    SessionLatents latents = fitted_->null.latents;
+    SessionLatents latents = latents_;
     const auto echoes = fitted_->source.echoes(mechanisms, latents.actor_range_m);
     return fitted_->model.fit(echoes, latents, 20);
   }
@@ -32,12 +36,13 @@ class DarkPlate : public ::testing::Test {
   }
 
   ProfiledModel model() {
-    return {fitted_->source, fitted_->model, accuracy_, fitted_->null.mechanisms, fitted_->null.latents};
+    return {fitted_->source, fitted_->model, accuracy_, fitted_->null.mechanisms, latents_};
   }
 
   const PoseAccuracy accuracy_;
   MadeRoom room_{10};
   std::optional<FittedRoom> fitted_;
+  SessionLatents latents_;  ///< fitted with the material, as values are profiled after a joint fit
   const Hypothesis plate_ = reflectivityOf("Plate");
 };
 
