@@ -20,7 +20,7 @@ PACKAGES = {"process": "mmradartwin_dsp", "validate": "mmradartwin_dsp", "sessio
             "diagnose": "mmradartwin_attribution", "calibrate": "mmradartwin_attribution",
             "pcap_to_capture": "mmradartwin_driver", "replay_packets": "mmradartwin_driver", "doctor": "mmradartwin_driver",
             "configure_radar": "mmradartwin_driver", "dca1000_emulator": "mmradartwin_driver",
-            "emulated_rig": "mmradartwin_driver"}
+            "emulated_rig": "mmradartwin_driver", "awr2243_emulator": "mmradartwin_driver"}
 PROGRAMS = {name: find_program(package, name) for name, package in PACKAGES.items()}
 PATIENCE_S = 300
 
@@ -257,6 +257,15 @@ class Manner(Programs):
             with self.subTest(program=name):
                 self.assert_refused(self.run_program(name, "--quite"), "--quite", "did you mean '--quiet'")
                 self.assert_refused(self.run_program(name, "--nothing-of-the-kind=3"), "--nothing-of-the-kind")
+
+    def test_what_follows_a_command_is_the_commands_own(self):
+        run = self.run_program("awr2243_emulator", PROGRAMS["validate"], "session", "--no-such-option")
+        self.assert_refused(run, "--no-such-option")
+        self.assertIn("Usage: validate ", self.run_program("awr2243_emulator", PROGRAMS["validate"], "--help").stdout)
+        run = self.run_program("awr2243_emulator", "--quiet", PROGRAMS["validate"], "--version")
+        self.assertRegex(run.stdout, r"^validate \d+\.\d+\.\d+")
+        self.assert_refused(self.run_program("awr2243_emulator"), "no command")
+        self.assert_refused(self.run_program("awr2243_emulator", "--", "no_such_program"), "no_such_program")
 
     def test_pipes_and_devices_are_refused_at_once(self):
         os.mkfifo(self.at("pipe"))
