@@ -1,6 +1,7 @@
 """What the offline programs write, and what they leave alone: inputs, older results, and nothing half done."""
 import glob
 import hashlib
+import json
 import os
 import random
 import shutil
@@ -290,6 +291,25 @@ class Manner(Programs):
                     self.assertLess(time.monotonic() - begin, 60)
                     self.assertFalse(os.path.exists(self.at("out")))
         self.assertEqual(digest_of_files(self.folder), self.before)
+
+    def test_pipes_that_a_mesh_names_are_refused_at_once(self):
+        os.mkfifo(self.at("pipe"))
+        self.addCleanup(os.remove, self.at("pipe"))
+        triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+        gltf = {"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}], "scene": 0,
+                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+                "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                               "min": [0, 0, 0], "max": [1, 1, 0]}],
+                "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": "pipe", "byteLength": 36}]}
+        for name, text in (("room.obj", "mtllib pipe\no a\nusemtl Metal\n" + triangle), ("room.gltf", json.dumps(gltf))):
+            with open(self.at(name), "w", encoding="ascii") as mesh:
+                mesh.write(text)
+            with self.subTest(mesh=name):
+                run = self.run_program("make_scene", name, "--output", "out")
+                self.assertEqual((run.returncode, run.stderr.count("\n")), (2, 1), msg=run.stderr)
+                self.assertIn(f"error: {name}: names ", run.stderr)
+                self.assertIn("pipe: is a pipe and no file", run.stderr)
+                self.assertFalse(os.path.exists(self.at("out")))
 
     def test_results_go_to_stdout_and_a_log_holds_no_progress(self):
         run = self.run_program("process", "session", "--output", "out")
