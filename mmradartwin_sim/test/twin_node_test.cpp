@@ -190,6 +190,26 @@ TEST_F(TwinNodeTest, ActorsMoveWithTheirFrames) {
   EXPECT_GE(counted("grids with a moved actor"), 3);
 }
 
+// tf2 would keep the crate at the place of the future, and take nothing older.
+TEST_F(TwinNodeTest, LeavesTransformsOfTheFutureOut) {
+  const double future = ros::Time::now().toSec() + 3600;
+  ASSERT_TRUE(waitFor([&] {
+    sendActor(future, 1.25);
+    return counted("transforms of the future left out") > 0;
+  }));
+  const ComplexGrid wanted =
+      makeTwin(scene_, "  specular: {}\n  corner: {}\n  diffuse: {}\n  actor_moved: {actor: crate, dx_m: 0.5}\n")
+          .simulate(radarPose(0, 0, 0))
+          .grid.x;
+  double stamp = 500;
+  EXPECT_TRUE(waitFor([&] {
+    stamp += 1;
+    sendActor(stamp, 0.5);
+    send(stamp, radarPose(0, 0, 0));
+    return !grids_.empty() && (lastGrid() - wanted).norm() < 1e-9 * wanted.norm();
+  }));
+}
+
 TEST_F(TwinNodeTest, SaysThatTheTwinHasNoEcho) {
   send(400, radarPose(1000, 200, 100));  // in millimetres
   ASSERT_TRUE(waitFor([&] { return summary_.find("the twin has no echo") != std::string::npos; }));
