@@ -236,8 +236,9 @@ def parameters_page():
 
 TOPICS = """# Topics, services and actions
 
-{note}Names are relative unless they begin with `/`: a namespace moves them all. The action `attribution/diagnose`
-(`mmradartwin_msgs/Diagnose`) of `diagnosis_node` is made of topics below that name. Fields stand in [messages](messages.md).
+{note}Names are relative unless they begin with `/`: a namespace moves them all; `~` stands for the node's name. The action
+`attribution/diagnose` (`mmradartwin_msgs/Diagnose`) of `diagnosis_node` is made of topics below that name. Fields stand
+in [messages](messages.md).
 
 """
 

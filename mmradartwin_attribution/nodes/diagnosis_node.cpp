@@ -10,7 +10,6 @@
 #include <std_srvs/Trigger.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/message_filter.h>
-#include <tf2_ros/transform_listener.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include <cstdlib>
@@ -32,6 +31,7 @@
 #include "mmradartwin_dsp/ros/master_watch.h"
 #include "mmradartwin_dsp/ros/node_program.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
+#include "mmradartwin_dsp/ros/transform_reader.h"
 #include "mmradartwin_sim/plugin.h"
 #include "mmradartwin_sim/pose_placement.h"
 
@@ -128,7 +128,7 @@ class DiagnosisNode {
   explicit DiagnosisNode(const Settings& settings)
       : settings_(settings),
         spool_(settings.limits),
-        tf_listener_(tf_buffer_),
+        tf_reader_(tf_buffer_),
         posed_frames_(tf_buffer_, settings.map_frame, kLongestQueue, &spool_queue_),
         updater_(nh_, ros::NodeHandle("~")),
         server_(
@@ -185,9 +185,10 @@ class DiagnosisNode {
       ROS_WARN_THROTTLE(kWarnEvery_s, "frame left out: its stamp, %u s, is no time", cube->header.stamp.sec);
       return;
     }
-    // With simulated time the listener clears tf by itself when time goes back.
+    // With simulated time the reader clears tf by itself when time goes back.
     if (cube->header.stamp < newest_ && !ros::Time::isSimTime()) tf_buffer_.clear();
     newest_ = cube->header.stamp;
+    tf_reader_.measuredAt(newest_);
     posed_frames_.add(cube);
   }
 
@@ -225,6 +226,7 @@ class DiagnosisNode {
     status.add("frames kept", s.frames);
     status.add("frames left out", s.left_out);
     status.add("kept [MB]", static_cast<double>(s.bytes) / 1e6);
+    status.add("transforms of the future left out", tf_reader_.futureCount());
   }
 
   std::string outputFolder(const std::string& asked) const {
@@ -341,7 +343,7 @@ class DiagnosisNode {
   FrameSpool spool_;
   ros::CallbackQueue spool_queue_;
   tf2_ros::Buffer tf_buffer_;
-  tf2_ros::TransformListener tf_listener_;
+  TransformReader tf_reader_;
   tf2_ros::MessageFilter<Cube> posed_frames_;
   ros::Time newest_;
   std::vector<ros::Subscriber> subscribers_;

@@ -58,14 +58,7 @@ AttributionConfig read(YamlMap yaml) {
     r.rejectUnknownKeys();
   }
   yaml.rejectUnknownKeys();
-  if (!(c.floor_db <= c.weak_db)) yaml.fail("floor_db", "must not be above weak_db");
-  if (!(c.weak_db <= c.medium_db)) yaml.fail("weak_db", "must not be above medium_db");
-  if (!(c.medium_db <= c.strong_db)) yaml.fail("medium_db", "must not be above strong_db");
-  if (c.outer_azimuth_rad < c.max_azimuth_rad) yaml.fail("outer_azimuth_deg", "must not be below max_azimuth_deg");
-  if (c.far_limit_m < c.near_limit_m) yaml.fail("far_limit_m", "must not be below near_limit_m");
-  if (c.wide.range_m < c.tight.range_m || c.wide.azimuth_rad < c.tight.azimuth_rad) {
-    yaml.fail("wide", "must not be narrower than tight");
-  }
+  if (const Contradiction found = contradictionIn(c); !found.key.empty()) yaml.fail(found.key, found.why);
   return c;
 }
 
@@ -98,6 +91,18 @@ AttributionConfig::AttributionConfig()
       top_k{1, 3, 5},
       record_span_db(20),
       regions{20 * kDegree, -30, 3, 2 * kDegree, 0.005, -25, 0.5, 0.1} {}
+
+Contradiction contradictionIn(const AttributionConfig& c) {
+  if (!(c.floor_db <= c.weak_db)) return {"floor_db", "must not be above weak_db"};
+  if (!(c.weak_db <= c.medium_db)) return {"weak_db", "must not be above medium_db"};
+  if (!(c.medium_db <= c.strong_db)) return {"medium_db", "must not be above strong_db"};
+  if (c.outer_azimuth_rad < c.max_azimuth_rad) return {"outer_azimuth_deg", "must not be below max_azimuth_deg"};
+  if (c.far_limit_m < c.near_limit_m) return {"far_limit_m", "must not be below near_limit_m"};
+  if (c.wide.range_m < c.tight.range_m || c.wide.azimuth_rad < c.tight.azimuth_rad) {
+    return {"wide", "must not be narrower than tight"};
+  }
+  return {};
+}
 
 AttributionConfig loadAttributionConfig(const std::string& file) { return read(YamlMap::load(file)); }
 

@@ -14,7 +14,10 @@
 #include <vector>
 
 #include "../emulator/emulated_usb_bus.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/program.h"
 
+namespace mmradartwin {
 namespace {
 
 volatile pid_t child = 0;
@@ -23,30 +26,11 @@ void passOn(int signal) {
   if (child > 0) kill(child, signal);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  CLI::App app{"Runs a command with an emulated AWR2243 on its USB bus."};
-  app.prefix_command();
-  app.allow_extras();
-  bool no_firmware = false;
-  app.add_flag("--no-firmware", no_firmware, "the radar's flash is empty");
-  app.footer("The command follows the options: awr2243_emulator driver_node ...");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  std::vector<std::string> command = app.remaining();
-  if (!command.empty() && command.front() == "--") command.erase(command.begin());
-  if (command.empty()) {
-    std::fprintf(stderr, "error: no command; give the program that shall see the radar\n");
-    return 2;
-  }
-
-  mmradartwin::EmulatedAwr2243 radar(!no_firmware);
-  mmradartwin::EmulatedFtdi chip(radar);
-  mmradartwin::EmulatedUsbBus bus(chip);
+/// Returns the command's exit status, as a shell tells it.
+int runWithRadar(std::vector<std::string> command, bool with_firmware) {
+  EmulatedAwr2243 radar(with_firmware);
+  EmulatedFtdi chip(radar);
+  EmulatedUsbBus bus(chip);
   bus.plug();
   const char* before = std::getenv("LD_PRELOAD");
   setenv("UMOCKDEV_DIR", bus.root().c_str(), 1);
@@ -60,8 +44,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, passOn);
   pid_t started = 0;
   if (const int error = posix_spawnp(&started, arguments[0], nullptr, nullptr, arguments.data(), environ)) {
-    std::fprintf(stderr, "error: %s: %s\n", arguments[0], std::strerror(error));
-    return 2;
+    throw InputError(command.front() + ": " + std::strerror(error));
   }
   child = started;
   int status = 0;
@@ -69,4 +52,23 @@ int main(int argc, char** argv) {
   for (const std::string& violation : radar.violations) std::fprintf(stderr, "radar: %s\n", violation.c_str());
   for (const std::string& violation : chip.violations) std::fprintf(stderr, "USB chip: %s\n", violation.c_str());
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+}  // namespace
+}  // namespace mmradartwin
+
+int main(int argc, char** argv) {
+  using namespace mmradartwin;
+  CLI::App app{"Runs a command with an emulated AWR2243 on its USB bus."};
+  app.prefix_command();
+  app.allow_extras();
+  bool no_firmware = false;
+  app.add_flag("--no-firmware", no_firmware, "the radar's flash is empty");
+  app.footer("The command follows the options.\nExample: awr2243_emulator configure_radar radar.yaml");
+  return runProgram(app, argc, argv, [&] {
+    std::vector<std::string> command = app.remaining();
+    if (!command.empty() && command.front() == "--") command.erase(command.begin());
+    if (command.empty()) throw InputError("no command; give the program that shall see the radar");
+    return runWithRadar(command, !no_firmware);
+  });
 }

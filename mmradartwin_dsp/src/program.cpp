@@ -21,11 +21,12 @@ void print(const char* kind, const std::string& text) {
 }
 
 /// "" or what to say of the first word that looks like an option and is none. CLI11 itself would first ask for options
-/// that are missing.
+/// that are missing. The options of a command that follows are not looked at.
 std::string unknownOption(const CLI::App& app, int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--") break;
+    if (app.get_prefix_command() && word[0] != '-') break;
     if (word.size() < 2 || word[0] != '-' || !(word[1] == '-' || std::isalpha(static_cast<unsigned char>(word[1])))) {
       continue;
     }

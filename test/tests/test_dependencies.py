@@ -2,21 +2,29 @@
 import glob
 import os
 import re
+import subprocess
 import unittest
 import xml.etree.ElementTree
+
+import yaml
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 
 
+# What python3-rosdep2 brings along; rosdep reads it before all else.
+DEBIANS_LIST = "/usr/share/python3-rosdep2/debian.yaml"
+
+
 def known():
-    """{section: names} of rosdep_keys.txt."""
+    """{section: {name: Debian packages}} of rosdep_keys.txt."""
     sections, names = {}, None
     with open(os.path.join(ROOT, "test", "rosdep_keys.txt"), encoding="utf-8") as file:
         for line in map(str.strip, file):
             if line.startswith("["):
-                names = sections.setdefault(line.strip("[]"), [])
+                names = sections.setdefault(line.strip("[]"), {})
             elif line and not line.startswith("#"):
-                names.append(line)
+                name, _, debian = line.partition(":")
+                names[name] = debian.split()
     return sections
 
 
@@ -36,6 +44,11 @@ def debian_packages():
         return re.search(r"^packages=\(\n(.*?)\)$", file.read(), re.MULTILINE | re.DOTALL).group(1).split()
 
 
+def apt_knows_bookworm():
+    with open("/etc/os-release", encoding="utf-8") as file:
+        return "VERSION_CODENAME=bookworm\n" in file.read() and glob.glob("/var/lib/apt/lists/*_Packages*")
+
+
 class Dependencies(unittest.TestCase):
     def test_there_are_all_packages(self):
         self.assertGreaterEqual(len(packages()), 8)
@@ -51,6 +64,27 @@ class Dependencies(unittest.TestCase):
         sections = known()
         used = {depended for root in packages().values() for _, depended in dependencies(root)}
         self.assertEqual(sorted({*sections["ROS packages"], *sections["rosdep keys"]} - used), [])
+
+    def test_every_known_name_stands_for_packages(self):
+        sections = known()
+        for name, debian in {**sections["ROS packages"], **sections["rosdep keys"]}.items():
+            self.assertTrue(debian, name)
+
+    @unittest.skipUnless(apt_knows_bookworm(), "needs Debian 12 after apt-get update")
+    def test_debian_12_has_these_packages(self):
+        sections = known()
+        wanted = {*sections["no key"]}.union(*sections["ROS packages"].values(), *sections["rosdep keys"].values())
+        said = subprocess.run(["apt-cache", "policy", *sorted(wanted)], capture_output=True, text=True, check=True,
+                              timeout=120, env={**os.environ, "LC_ALL": "C"}).stdout
+        there = re.findall(r"^(\S+):\n  Installed: .*\n  Candidate: (?!\(none\))", said, re.MULTILINE)
+        self.assertEqual(sorted(wanted - set(there)), [])
+
+    @unittest.skipUnless(os.path.exists(DEBIANS_LIST), "needs python3-rosdep2")
+    def test_packages_of_ros_are_those_of_debians_list(self):
+        with open(DEBIANS_LIST, encoding="utf-8") as file:
+            debians = yaml.safe_load(file)
+        for name, debian in known()["ROS packages"].items():
+            self.assertEqual(debian, debians.get(name, {}).get("debian"), name)
 
     def test_what_rosdep_does_not_know_is_installed_by_name(self):
         for name in known()["no key"]:

@@ -31,6 +31,18 @@ for seconds in (1000, 4000000000, 4294967295, 1001):
     cube.header.stamp, cube.header.frame_id = rospy.Time(seconds), "radar_link"
     send("radar/adc", cube)
 """
+FUTURE = PUBLISH + """
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
+T = TransformStamped()
+T.header.stamp, T.header.frame_id, T.child_frame_id = rospy.Time.now() + rospy.Duration(3600), "map", "trolley"
+T.transform.rotation.w = 1
+publisher = rospy.Publisher("/tf", TFMessage, queue_size=10)
+while publisher.get_num_connections() < int(sys.argv[1]):
+    time.sleep(0.05)
+publisher.publish(TFMessage([T]))
+time.sleep(1)
+"""
 SESSIONS = PUBLISH + """
 for names in (["session.yaml", "a", "a/b"], ["."], ["session.yaml", "x" * 5000], ["../outside"], ["/outside"]):
     send("session", Session(files=[SessionFile(name=name, data=b"1") for name in names]))
@@ -74,6 +86,18 @@ class HostileMessages(InFolder):
         wait_for(lambda: "is no time" in self.text("diagnosis_node"), lambda: self.text("diagnosis_node"), 60)
         for node in nodes:
             self.assertIsNone(node.poll(), self.text("dsp_node") + self.text("diagnosis_node"))
+
+    def test_transforms_of_the_future_are_left_out_by_every_reader(self):
+        nodes = {"dsp_node": self.node("mmradartwin_dsp", "dsp_node"),
+                 "twin_node": self.node("mmradartwin_sim", "twin_node"),
+                 "room_pose": self.node("mmradartwin_sim", "room_pose",
+                                        "_scene:=package://mmradartwin_config/office/scene.yaml"),
+                 "diagnosis_node": self.node("mmradartwin_attribution", "diagnosis_node")}
+        self.python(FUTURE, str(len(nodes)))
+        for name, node in nodes.items():
+            wait_for(lambda name=name: "map -> trolley of /hostile" in self.text(name), lambda name=name: self.text(name), 60)
+            self.assertIn("ahead of this computer's clock", self.text(name))
+            self.assertIsNone(node.poll(), self.text(name))
 
     def test_sessions_that_cannot_be_unpacked_end_no_node(self):
         nodes = [self.node("mmradartwin_sim", "twin_node"), self.node("mmradartwin_attribution", "diagnosis_node"),

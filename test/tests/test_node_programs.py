@@ -108,21 +108,23 @@ class Graph(InFolder):
         """Help and master agree about the node. Each has a name of its own: a node's parameters outlive it."""
         name_of = "/looked_at_" + program[1]
         text = sections(run(program, "--help").stdout)
-        wanted = tuple({name if name[0] == "/" else "/" + name for name in text[section]} for section in SECTIONS[:3])
+        full = {name: name if name[0] == "/" else name_of + "/" + name[1:] if name[0] == "~" else "/" + name
+                for section in SECTIONS[:3] for name in text[section]}
+        wanted = tuple({full[name] for name in text[section]} for section in SECTIONS[:3])
+        of_roscpp = {name_of + "/get_loggers", name_of + "/set_logger_level"}
         with open(self.at(program[1] + ".log"), "w", encoding="utf-8") as log:
             node = subprocess.Popen([find_program(*program), *arguments, "__name:=" + name_of[1:]], stdout=log, stderr=log,
                                     env=self.environment)
 
         def there():
             subscribed, published, services = self.topics_of(name_of)
-            own = {name for name in services if not name.startswith(name_of + "/")}
-            return (subscribed, published - {"/rosout"}, own) == wanted
+            return (subscribed, published - {"/rosout"}, services - of_roscpp) == wanted
 
         try:
             wait_for(there, lambda: f"{wanted}, but {self.topics_of(name_of)}")
             types = dict(self.master.getTopicTypes())
             for name, (kind, _) in {**text["Subscribes"], **text["Publishes"]}.items():
-                self.assertIn(types[name if name[0] == "/" else "/" + name], (kind, "*"), name)
+                self.assertIn(types[full[name]], (kind, "*"), name)
         finally:
             end(node)
 

@@ -1,6 +1,7 @@
 """What the offline programs write, and what they leave alone: inputs, older results, and nothing half done."""
 import glob
 import hashlib
+import json
 import os
 import random
 import shutil
@@ -20,7 +21,7 @@ PACKAGES = {"process": "mmradartwin_dsp", "validate": "mmradartwin_dsp", "sessio
             "diagnose": "mmradartwin_attribution", "calibrate": "mmradartwin_attribution",
             "pcap_to_capture": "mmradartwin_driver", "replay_packets": "mmradartwin_driver", "doctor": "mmradartwin_driver",
             "configure_radar": "mmradartwin_driver", "dca1000_emulator": "mmradartwin_driver",
-            "emulated_rig": "mmradartwin_driver"}
+            "emulated_rig": "mmradartwin_driver", "awr2243_emulator": "mmradartwin_driver"}
 PROGRAMS = {name: find_program(package, name) for name, package in PACKAGES.items()}
 PATIENCE_S = 300
 
@@ -256,6 +257,15 @@ class Manner(Programs):
                 self.assert_refused(self.run_program(name, "--quite"), "--quite", "did you mean '--quiet'")
                 self.assert_refused(self.run_program(name, "--nothing-of-the-kind=3"), "--nothing-of-the-kind")
 
+    def test_what_follows_a_command_is_the_commands_own(self):
+        run = self.run_program("awr2243_emulator", PROGRAMS["validate"], "session", "--no-such-option")
+        self.assert_refused(run, "--no-such-option")
+        self.assertIn("Usage: validate ", self.run_program("awr2243_emulator", PROGRAMS["validate"], "--help").stdout)
+        run = self.run_program("awr2243_emulator", "--quiet", PROGRAMS["validate"], "--version")
+        self.assertRegex(run.stdout, r"^validate \d+\.\d+\.\d+")
+        self.assert_refused(self.run_program("awr2243_emulator"), "no command")
+        self.assert_refused(self.run_program("awr2243_emulator", "--", "no_such_program"), "no_such_program")
+
     def test_pipes_and_devices_are_refused_at_once(self):
         os.mkfifo(self.at("pipe"))
         self.addCleanup(os.remove, self.at("pipe"))
@@ -279,6 +289,25 @@ class Manner(Programs):
                     self.assertLess(time.monotonic() - begin, 60)
                     self.assertFalse(os.path.exists(self.at("out")))
         self.assertEqual(digest_of_files(self.folder), self.before)
+
+    def test_pipes_that_a_mesh_names_are_refused_at_once(self):
+        os.mkfifo(self.at("pipe"))
+        self.addCleanup(os.remove, self.at("pipe"))
+        triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+        gltf = {"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}], "scene": 0,
+                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+                "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                               "min": [0, 0, 0], "max": [1, 1, 0]}],
+                "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": "pipe", "byteLength": 36}]}
+        for name, text in (("room.obj", "mtllib pipe\no a\nusemtl Metal\n" + triangle), ("room.gltf", json.dumps(gltf))):
+            with open(self.at(name), "w", encoding="ascii") as mesh:
+                mesh.write(text)
+            with self.subTest(mesh=name):
+                run = self.run_program("make_scene", name, "--output", "out")
+                self.assertEqual((run.returncode, run.stderr.count("\n")), (2, 1), msg=run.stderr)
+                self.assertIn(f"error: {name}: names ", run.stderr)
+                self.assertIn("pipe: is a pipe and no file", run.stderr)
+                self.assertFalse(os.path.exists(self.at("out")))
 
     def test_results_go_to_stdout_and_a_log_holds_no_progress(self):
         run = self.run_program("process", "session", "--output", "out")

@@ -40,6 +40,12 @@ struct AttributionConfig {
   AttributionConfig();
 };
 
+/// Which key contradicts another one, and how; both empty where none does.
+struct Contradiction {
+  std::string key, why;
+};
+Contradiction contradictionIn(const AttributionConfig& config);
+
 /// Reads attribution.yaml strictly: keys that are absent keep their defaults, unknown ones are errors. Throws
 /// InputError.
 AttributionConfig loadAttributionConfig(const std::string& file);

@@ -1,5 +1,6 @@
 #include "mmradartwin_attribution/ros/attribution_node.h"
 
+#include <dynamic_reconfigure/Reconfigure.h>
 #include <mmradartwin_msgs/Ledger.h>
 #include <mmradartwin_msgs/Residuals.h>
 #include <visualization_msgs/MarkerArray.h>
@@ -19,6 +20,18 @@ namespace {
 constexpr double kSlow_s = 2;  // what takes longer is told
 constexpr std::int64_t kWentBack_ns = 1'000'000'000;
 constexpr std::size_t kMaxWaiting = 64;  // maps that wait for their counterpart
+constexpr const char* kTuning = "tuning";
+
+/// The thresholds among what is tuned, and all else of `config`.
+AttributionConfig withThresholds(AttributionConfig config, const TuningConfig& tuned) {
+  config.strong_db = tuned.strong_db;
+  config.medium_db = tuned.medium_db;
+  config.weak_db = tuned.weak_db;
+  config.response_margin_db = tuned.response_margin_db;
+  return config;
+}
+
+MarkerStyle styleOf(const TuningConfig& tuned) { return {tuned.max_paths, tuned.map_span_db, tuned.residual_span_db}; }
 
 // Names of a session's poses by the stamp at which each begins.
 std::map<std::int64_t, std::string> posesByStamp(const mmradartwin_msgs::Session& session) {
@@ -35,7 +48,10 @@ std::map<std::int64_t, std::string> posesByStamp(const mmradartwin_msgs::Session
 }  // namespace
 
 AttributionNode::AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
-    : nh_(std::move(nh)), settings_(readSettings<Settings>(private_nh)) {
+    : nh_(std::move(nh)), settings_([&private_nh] {
+        private_nh.deleteParam(kTuning);  // of an earlier run
+        return readSettings<Settings>(private_nh);
+      }()) {
   if (!settings_.config_file.empty()) config_ = loadAttributionConfig(settings_.config_file);
   residuals_ = nh_.advertise<mmradartwin_msgs::Residuals>("attribution/residuals", 10);
   ledger_ = nh_.advertise<mmradartwin_msgs::Ledger>("attribution/ledger", 1, true);
@@ -56,6 +72,7 @@ AttributionNode::AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& priv
   diagnostics_timer_ =
       nh_.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
   watchdog_ = nh_.createWallTimer(ros::WallDuration(5), &AttributionNode::watch, this);
+  startTuning(private_nh);
 }
 
 AttributionNode::Settings::Settings(StrictParameters& parameters) {
@@ -67,7 +84,11 @@ AttributionNode::Settings::Settings(StrictParameters& parameters) {
   frames.simulated = parameters.text("simulated_view_frame", frames.simulated, "tf frame of the simulated fan");
   frames.residual = parameters.text("residual_view_frame", frames.residual, "tf frame of the residual fan");
   markers_hz = parameters.number("markers_hz", 2, 1e-3, 100, "markers and ledgers come so often at most, Hz");
-  max_paths = parameters.integer("max_paths", 200, 0, 2000, "strongest paths that are shown");
+  style.max_paths = parameters.integer("max_paths", style.max_paths, 0, 2000, "strongest paths that are shown");
+  style.map_span_db = parameters.number("map_span_db", style.map_span_db, 0, 200,
+                                        "colours of the maps reach so far below the peak, dB; 0: down to floor_db");
+  style.residual_span_db = parameters.number("residual_span_db", style.residual_span_db, 1, 200,
+                                             "colours of the residual reach so far to either side of 0, dB");
   parameters.ofDiagnosticUpdater();
 }
 
@@ -87,9 +108,55 @@ NodeDescription AttributionNode::description() {
        topic<mmradartwin_msgs::Ledger>("attribution/ledger", "metrics over all poses so far; latched"),
        topic<visualization_msgs::MarkerArray>("attribution/markers", "maps, boxes, labels and paths for rviz"),
        topic<visualization_msgs::MarkerArray>("attribution/scene_markers", "the scene for rviz; latched"),
+       topic<dynamic_reconfigure::ConfigDescription>("~tuning/parameter_descriptions",
+                                                     "what can be tuned by eye; latched"),
+       topic<dynamic_reconfigure::Config>("~tuning/parameter_updates", "what it is tuned to; latched"),
        topic<diagnostic_msgs::DiagnosticArray>("/diagnostics", "whether maps come and are compared, and why not")},
-      {},
+      {service<dynamic_reconfigure::Reconfigure>("~tuning/set_parameters", "changes what is tuned by eye")},
       [](StrictParameters& parameters) { const Settings settings(parameters); }};
+}
+
+void AttributionNode::startTuning(const ros::NodeHandle& private_nh) {
+  tuned_.max_paths = settings_.style.max_paths;
+  tuned_.map_span_db = settings_.style.map_span_db;
+  tuned_.residual_span_db = settings_.style.residual_span_db;
+  tuned_.markers_hz = settings_.markers_hz;
+  tuned_.strong_db = config_.strong_db;
+  tuned_.medium_db = config_.medium_db;
+  tuned_.weak_db = config_.weak_db;
+  tuned_.response_margin_db = config_.response_margin_db;
+  tuning_ =
+      std::make_unique<dynamic_reconfigure::Server<TuningConfig>>(tuning_mutex_, ros::NodeHandle(private_nh, kTuning));
+  tuning_->updateConfig(tuned_);
+  tuning_->setCallback([this](TuningConfig& wanted, std::uint32_t) { onTuning(wanted); });
+}
+
+void AttributionNode::onTuning(TuningConfig& wanted) {
+  const AttributionConfig config = withThresholds(config_, wanted);
+  if (const Contradiction found = contradictionIn(config); !found.key.empty()) {
+    ROS_ERROR("tuning refused: %s %s", found.key.c_str(), found.why.c_str());
+    wanted = tuned_;  // the answer tells what stays
+    return;
+  }
+  tuned_ = wanted;
+  if (builder_) builder_->setStyle(styleOf(tuned_));
+  if (toYaml(config) != toYaml(config_)) {
+    config_ = config;
+    rebuild();
+    live_ledger_ = LiveLedger();
+    ROS_INFO("the comparison has other thresholds: the ledger begins anew");
+  }
+  compareLastPair();
+}
+
+void AttributionNode::compareLastPair() {
+  if (!last_measured_ || !last_simulated_) return;
+  last_markers_ = ros::WallTime();  // to be shown at once
+  try {
+    compare(*last_measured_, *last_simulated_);
+  } catch (const std::exception& error) {
+    ROS_WARN_THROTTLE(5, "the last maps: %s", error.what());
+  }
 }
 
 void AttributionNode::onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg) {
@@ -161,6 +228,7 @@ void AttributionNode::onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, 
     measured_.clear();
     simulated_.clear();
     last_measured_.reset();
+    last_simulated_.reset();
     live_ledger_ = LiveLedger();
     newest_ns_.reset();
   }
@@ -176,6 +244,7 @@ void AttributionNode::onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, 
   const MapMsg::ConstPtr sameInOtherList = match->second;
   other.erase(other.begin(), std::next(match));  // older ones will find no partner any more
   last_measured_ = measured ? msg : sameInOtherList;
+  last_simulated_ = measured ? sameInOtherList : msg;
   try {
     problem_.clear();
     compare(measured ? *msg : *sameInOtherList, measured ? *sameInOtherList : *msg);
@@ -212,7 +281,7 @@ void AttributionNode::rebuild() {
   if (!radar_) return;
   const SignalChain chain(*radar_);
   field_ = std::make_unique<EvaluationField>(config_, *radar_, chain.axes());
-  builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.frames, settings_.max_paths);
+  builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.frames, styleOf(tuned_));
   slow_ = true;  // until it is known
   if (scene_) regions_ = std::make_unique<RegionModel>(*scene_, *rays_, *field_, *radar_);
   regions_of_pose_.clear();
@@ -292,12 +361,11 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
 
   live_ledger_.add(measured.stamp_ns, T, name, measured.frames, pose.central);
   const ros::WallTime now = ros::WallTime::now();
-  if ((now - last_markers_).toSec() >= 1 / settings_.markers_hz) {
+  if ((now - last_markers_).toSec() >= 1 / tuned_.markers_hz) {
     last_markers_ = now;
     publishLedger(residuals.header.stamp);
     if (markers_.getNumSubscribers() > 0) {
-      if (had_subscribers_ == 0)
-        builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.frames, settings_.max_paths);
+      if (had_subscribers_ == 0) builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.frames, styleOf(tuned_));
       markers_.publish(builder_->build(pose, records_, T, name));
     }
     had_subscribers_ = markers_.getNumSubscribers();

@@ -13,7 +13,6 @@ namespace {
 
 using visualization_msgs::Marker;
 constexpr double kDegree = M_PI / 180.0;
-constexpr double kResidualSpan_db = 30;
 
 std_msgs::ColorRGBA rgba(double r, double g, double b, double a = 1) {
   std_msgs::ColorRGBA c;
@@ -111,8 +110,8 @@ std::string label(const Residual& r) {
 
 }  // namespace
 
-MarkerBuilder::MarkerBuilder(const EvaluationField& field, const MarkerFrames& frames, int max_paths)
-    : field_(field), frames_(frames), max_paths_(max_paths) {
+MarkerBuilder::MarkerBuilder(const EvaluationField& field, const MarkerFrames& frames, const MarkerStyle& style)
+    : field_(field), frames_(frames), style_(style) {
   const std::vector<double>&ranges = field_.axes().range_m, &azimuths = field_.axes().azimuth_rad;
   const double range_bin = ranges.size() > 1 ? ranges[1] - ranges[0] : 1;
   max_range_m_ = ranges.back();
@@ -155,7 +154,7 @@ void MarkerBuilder::addList(const Marker& m, Array& out) const {
 }
 
 void MarkerBuilder::addFans(const PoseAttribution& pose, Array& out) {
-  const double floor = field_.config().floor_db;
+  const double floor = style_.map_span_db > 0 ? -style_.map_span_db : field_.config().floor_db;
   const auto fan = [&](const std::string& ns, const std::string& frame, const auto& color) {
     Marker m = marker(ns, 0, Marker::TRIANGLE_LIST, frame);
     m.points = fan_points_;
@@ -177,7 +176,7 @@ void MarkerBuilder::addFans(const PoseAttribution& pose, Array& out) {
   fan("simulated", frames_.simulated, level(pose.simulated.level_db));
   fan("residual", frames_.residual, [&](int r, int a) {
     const double v = pose.residual_db(r, a);
-    return std::isnan(v) ? kNoData : diverging(v / kResidualSpan_db);
+    return std::isnan(v) ? kNoData : diverging(v / style_.residual_span_db);
   });
 }
 
@@ -283,7 +282,7 @@ void MarkerBuilder::addPaths(const std::vector<PathRecord>& records, const Eigen
   for (const PathRecord& r : records) {
     if (!r.vertices.empty() && r.event) strongest.push_back(&r);
   }
-  const std::size_t count = std::min<std::size_t>(strongest.size(), static_cast<std::size_t>(max_paths_));
+  const std::size_t count = std::min<std::size_t>(strongest.size(), static_cast<std::size_t>(style_.max_paths));
   std::partial_sort(strongest.begin(), strongest.begin() + static_cast<std::ptrdiff_t>(count), strongest.end(),
                     [](const PathRecord* a, const PathRecord* b) { return a->amplitude > b->amplitude; });
   strongest.resize(count);

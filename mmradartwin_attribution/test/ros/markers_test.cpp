@@ -151,7 +151,7 @@ TEST_F(PoseMarkers, TheStrongestPathsAreDrawnVertexByVertex) {
   weak.vertices = {{3, 0, 0}};
   weakest = weak;
   weakest.amplitude = 0.01;
-  MarkerBuilder builder(field_, frames_, 2);
+  MarkerBuilder builder(field_, frames_, {2, 0, 30});
   const Eigen::Isometry3d T(Eigen::Translation3d(1, 0, 0));
   const auto markers = builder.build(pose(true), {weakest, weak, strong}, T, "1");
   const auto corners = named(markers, "paths corner"), speculars = named(markers, "paths specular");

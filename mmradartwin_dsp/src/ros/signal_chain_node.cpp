@@ -16,8 +16,6 @@ namespace {
 constexpr double kWarnEvery_s = 5;
 /// Beyond it a frame's stamp and those of tf are of different clocks.
 constexpr double kClocksApart_s = 5;
-/// Transforms that are stamped later than this are of a wrong clock.
-constexpr std::int64_t kFuture_ns = 10'000'000'000;
 /// Frames that may wait for tf; a second at the fastest frame rates.
 constexpr std::size_t kLongestQueue = 1000;
 
@@ -160,21 +158,8 @@ void SignalChainNode::onTransforms(const tf2_msgs::TFMessage& message, bool fixe
   const ros::Time now = ros::Time::now();
   if (now < tf_heard_) forgetTransforms();
   tf_heard_ = now;
-  tf2_msgs::TFMessage kept;
-  for (const geometry_msgs::TransformStamped& transform : message.transforms) {
-    const std::int64_t ahead_ns = toNanoseconds(transform.header.stamp) - toNanoseconds(std::max(now, newest_));
-    if (!fixed && !now.isZero() && ahead_ns > kFuture_ns) {
-      // tf2 would take nothing older of this frame any more, for as long as that.
-      ++future_transforms_;
-      ROS_WARN_THROTTLE(
-          kWarnEvery_s,
-          "%s -> %s of %s is left out: its stamp is %.1f s ahead of this computer's clock; synchronise the "
-          "clocks (ntp, chrony)",
-          transform.header.frame_id.c_str(), transform.child_frame_id.c_str(), publisher.c_str(),
-          static_cast<double>(ahead_ns) * 1e-9);
-      continue;
-    }
-    kept.transforms.push_back(transform);
+  const tf2_msgs::TFMessage kept = future_transforms_.leaveOut(message, fixed, publisher, newest_);
+  for (const geometry_msgs::TransformStamped& transform : kept.transforms) {
     if (!fixed) newest_transform_ = transform.header.stamp;
     tf_buffer_.setTransform(transform, publisher, fixed);  // says itself what is wrong with one that it does not take
   }
@@ -312,7 +297,7 @@ void SignalChainNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& stat
   status.add("frames without a pose", without_pose_);
   status.add("frames refused", refused_);
   status.add("frames that wait for tf", queue_.size());
-  status.add("transforms of the future left out", future_transforms_);
+  status.add("transforms of the future left out", future_transforms_.count());
 }
 
 }  // namespace mmradartwin

@@ -37,7 +37,7 @@ RoomPoseNode::RoomPoseNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh
   scene_.emplace(loadScene(settings_.scene_file, kFrequency_hz));
   registration_.emplace(*scene_, settings_.registration);
   countTfWarningsOfProcess();
-  tf_listener_.emplace(tf_buffer_, nh);
+  tf_reader_.emplace(tf_buffer_);
   pose_publisher_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("room_pose", 10);
   updater_ = std::make_unique<diagnostic_updater::Updater>(nh, private_nh);
   updater_->setHardwareID("none");
@@ -146,6 +146,7 @@ void RoomPoseNode::refuse(const std::string& why) {
 void RoomPoseNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {
   cloud_at_ = ros::WallTime::now();
   const ros::Time stamp = cloud->header.stamp;
+  tf_reader_->measuredAt(stamp);
   if (last_ && (stamp < trusted_at_ || (stamp - trusted_at_).toSec() > settings_.lost_after_s)) {
     person_ = last_;  // looked for in a wider circle
     last_.reset();
@@ -244,6 +245,7 @@ void RoomPoseNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   }
   status.add("poses published", published_);
   status.add("clouds refused", refused_);
+  status.add("transforms of the future left out", tf_reader_->futureCount());
   status.add("last registration [ms]", register_ms_);
   if (!fit_) return;
   status.add("distance from the scene's surfaces, rms [m]", fit_->rms_m);

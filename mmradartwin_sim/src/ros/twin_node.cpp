@@ -32,7 +32,7 @@ TwinNode::TwinNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : settings_(readSettings<Settings>(private_nh)) {
   loadMechanismPlugins(settings_.plugins, "parameter plugins");
   if (!settings_.channels_file.empty()) channels_ = loadChannelCorrection(settings_.channels_file);
-  tf_listener_.emplace(tf_buffer_, nh);
+  tf_reader_.emplace(tf_buffer_);
   tf_watch_.emplace(nh);
   grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("twin/grid", 100);  // as many as may wait
   paths_publisher_ = nh.advertise<mmradartwin_msgs::PathRecords>("twin/paths", 1, true);
@@ -268,6 +268,7 @@ void TwinNode::onGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid) {
     return;
   }
   measured_at_ = ros::WallTime::now();
+  tf_reader_->measuredAt(grid->header.stamp);
   if (!twin_) {
     ROS_WARN_THROTTLE(kWarnEvery_s, "grids come, but there is no twin yet: %s",
                       !problem_.empty()
@@ -461,6 +462,7 @@ void TwinNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) con
   status.add("stamps without a usable pose", without_pose_);
   status.add("actors that move with tf", actors_.size());
   status.add("grids with a moved actor", actor_moves_);
+  status.add("transforms of the future left out", tf_reader_->futureCount());
   status.add("last simulation [ms]", simulate_ms_);
   if (last_) {
     status.add("records", last_->records.size());

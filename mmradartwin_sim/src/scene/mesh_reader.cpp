@@ -117,26 +117,47 @@ std::string lowerExtension(const std::string& file) {
   return e;
 }
 
-/// The files that assimp opens, one of them with another text.
-class FilesWithOneMended : public Assimp::DefaultIOSystem {
+/// The files that assimp opens: the mesh, with another text where one is given, and those that the mesh names, an OBJ's
+/// materials and a glTF's buffers. None but regular files is opened: reading a pipe or a device may wait without end.
+class MeshFiles : public Assimp::DefaultIOSystem {
  public:
-  FilesWithOneMended(std::string file, std::string text) : file_(std::move(file)), text_(std::move(text)) {}
+  explicit MeshFiles(std::string mesh, std::optional<std::string> text = std::nullopt)
+      : mesh_(std::move(mesh)), text_(std::move(text)) {}
+
+  bool Exists(const char* file) const override {
+    std::error_code error;
+    return std::filesystem::exists(file, error);
+  }
   Assimp::IOStream* Open(const char* file, const char* mode) override {
-    if (file != file_) return DefaultIOSystem::Open(file, mode);
-    return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(text_.data()), text_.size());
+    if (text_ && file == mesh_) {
+      return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(text_->data()), text_->size());
+    }
+    std::error_code error;
+    if (std::filesystem::is_directory(file, error)) return nullptr;
+    try {
+      requireRegularFile(file);
+    } catch (const InputError& refused) {  // assimp goes on without the file, and refuseWhatWasNoFile() speaks
+      if (refused_.empty()) refused_ = refused.what();
+      return nullptr;
+    }
+    return DefaultIOSystem::Open(file, mode);
+  }
+  /// Throws InputError where assimp asked for something else than a file.
+  void refuseWhatWasNoFile() const {
+    if (!refused_.empty()) throw InputError(mesh_ + ": names " + refused_);
   }
 
  private:
-  const std::string file_, text_;
+  const std::string mesh_;
+  const std::optional<std::string> text_;
+  std::string refused_;
 };
 
-/// Has assimp read an OBJ file with a digit on either side of every point.
-void mendNumbers(const std::string& file, Assimp::Importer& importer) {
+std::string textOf(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
   text << in.rdbuf();
-  std::optional<std::string> mended = withDigitsAroundPoints(text.str());
-  if (mended) importer.SetIOHandler(new FilesWithOneMended(file, std::move(*mended)));  // the importer deletes it
+  return text.str();
 }
 
 /// Numbers actors that are named alike: the second of a name becomes NAME_2, or the next number that is free.
@@ -291,25 +312,25 @@ std::vector<Actor> loadMesh(const std::string& file, const MeshFrame& stated) {
       digits ? Eigen::Vector3d(stated_frame.inverse() * stated.origin) : Eigen::Vector3d::Zero();
   FullPrecision exact;
   const aiScene* scene = nullptr;
+  std::optional<std::string> text;  // in place of the file's own
+  if (extension == ".obj") {
+    // A digit on either side of every point, which assimp wants.
+    const std::string own = off.isZero(0) ? textOf(file) : objWithoutOrigin(file, off);
+    text = withDigitsAroundPoints(own).value_or(own);
+    std::istringstream in(*text);
+    exact = readObjVertices(in);
+  }
+  auto* files = new MeshFiles(file, std::move(text));
+  importer.SetIOHandler(files);  // which deletes it
   if (extension == ".ply") {
     PlyMesh mesh = readPly(file);
     for (Eigen::Vector3d& v : mesh.vertices) keep(v -= off, exact);
-    const std::string text = mesh.toObj();
-    scene = importer.ReadFileFromMemory(text.data(), text.size(), steps, "obj");
-  } else if (extension == ".obj" && !off.isZero(0)) {
-    std::string text = objWithoutOrigin(file, off);
-    text = withDigitsAroundPoints(text).value_or(text);
-    std::istringstream in(text);
-    exact = readObjVertices(in);
-    scene = importer.ReadFileFromMemory(text.data(), text.size(), steps, "obj");
+    const std::string obj = mesh.toObj();
+    scene = importer.ReadFileFromMemory(obj.data(), obj.size(), steps, "obj");
   } else {
-    if (extension == ".obj") {
-      std::ifstream in(file);
-      exact = readObjVertices(in);
-      mendNumbers(file, importer);
-    }
     scene = importer.ReadFile(file, steps);
   }
+  files->refuseWhatWasNoFile();
   if (!scene || !scene->mRootNode) {
     std::string why = importer.GetErrorString();
     std::replace(why.begin(), why.end(), '\n', ' ');

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <dynamic_reconfigure/server.h>
+#include <mmradartwin_attribution/TuningConfig.h>
 #include <mmradartwin_msgs/PathRecords.h>
 #include <mmradartwin_msgs/RadarConfig.h>
 #include <mmradartwin_msgs/RangeAngleMap.h>
@@ -9,6 +11,7 @@
 #include <ros/ros.h>
 
 #include <Eigen/Geometry>
+#include <boost/thread/recursive_mutex.hpp>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -29,14 +32,17 @@
 
 namespace mmradartwin {
 
+using TuningConfig = mmradartwin_attribution::TuningConfig;  // made of cfg/Tuning.cfg
+
 /// radar/config, session, twin/scene, twin/moved_scene, twin/paths, radar/range_angle, twin/range_angle ->
 /// attribution/residuals, attribution/ledger, attribution/markers, attribution/scene_markers.
 ///
 /// Matches measured and simulated maps by stamp and attributes what differs. Poses are named after the session's
 /// poses.csv, else after their stamp. The scene is that of the parameter `scene`, else of twin/scene; where twin/scene
 /// brings another twin the ledger begins anew, and where stamps go back by more than a second (a bag that loops).
-/// Markers and ledger come `markers_hz` times a second at most, with up to `max_paths` paths. Callbacks must come one
-/// at a time.
+/// Markers and ledger come `markers_hz` times a second at most, with up to `max_paths` paths. What is tuned by eye is
+/// changed below ~tuning, by dynamic_reconfigure, and the last pair of maps shows it; it begins with what parameters
+/// and attribution.yaml say in each run. Callbacks must come one at a time.
 class AttributionNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
@@ -51,8 +57,8 @@ class AttributionNode {
 
     std::string config_file, scene_file, radar_frame;
     MarkerFrames frames;
+    MarkerStyle style;
     double markers_hz;
-    int max_paths;
   };
 
   void onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg);
@@ -64,6 +70,10 @@ class AttributionNode {
   void onSimulated(const MapMsg::ConstPtr& msg);
   void onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, MapMsg::ConstPtr>& own,
              std::map<std::int64_t, MapMsg::ConstPtr>& other, bool measured);
+  void startTuning(const ros::NodeHandle& private_nh);
+  void onTuning(TuningConfig& wanted);
+  /// Compares the last pair of maps once more.
+  void compareLastPair();
   void setScene(Scene scene);
   void onSceneViewer();
   void publishScene();
@@ -82,6 +92,9 @@ class AttributionNode {
   ros::NodeHandle nh_;
   const Settings settings_;
   AttributionConfig config_;
+  TuningConfig tuned_;
+  boost::recursive_mutex tuning_mutex_;  ///< of tuning_, which wants one
+  std::unique_ptr<dynamic_reconfigure::Server<TuningConfig>> tuning_;
   std::string twin_yaml_;
   ros::Publisher residuals_, ledger_, markers_, scene_markers_;
   std::vector<ros::Subscriber> subscribers_;
@@ -99,7 +112,7 @@ class AttributionNode {
 
   std::map<std::int64_t, MapMsg::ConstPtr> measured_, simulated_;  // waiting, by stamp
   std::optional<std::int64_t> newest_ns_;                          // of the measured maps
-  MapMsg::ConstPtr last_measured_;                                 // of the last pair
+  MapMsg::ConstPtr last_measured_, last_simulated_;                // the last pair
   mmradartwin_msgs::PathRecords::ConstPtr paths_, records_of_;
   std::vector<PathRecord> records_;
   std::map<std::int64_t, std::string> pose_names_;

@@ -18,11 +18,19 @@ struct MarkerFrames {
   std::string residual = "radar_link_view_residual";
 };
 
+/// What of the markers is a matter of taste.
+struct MarkerStyle {
+  int max_paths = 200;           ///< strongest paths
+  double map_span_db = 0;        ///< colours of the maps reach so far below the peak; 0: down to the field's floor
+  double residual_span_db = 30;  ///< and those of the residual to either side of 0 dB
+};
+
 /// Markers of one pose for rviz. Fans keep their topology and all markers their ids from message to message; markers
 /// that a pose no longer has are deleted by id. The first message clears what an earlier process left.
 class MarkerBuilder {
  public:
-  MarkerBuilder(const EvaluationField& field, const MarkerFrames& frames, int max_paths = 200);
+  MarkerBuilder(const EvaluationField& field, const MarkerFrames& frames, const MarkerStyle& style = {});
+  void setStyle(const MarkerStyle& style) { style_ = style; }
   visualization_msgs::MarkerArray build(const PoseAttribution& pose, const std::vector<PathRecord>& records,
                                         const Eigen::Isometry3d& T_map_radar, const std::string& caption);
 
@@ -40,7 +48,7 @@ class MarkerBuilder {
 
   EvaluationField field_;
   MarkerFrames frames_;
-  int max_paths_;
+  MarkerStyle style_;
   double max_range_m_;
   std::vector<geometry_msgs::Point> fan_points_;  // six per cell
   std::vector<std::pair<int, int>> fan_cells_;    // range and angle bin of each

@@ -16,6 +16,7 @@
 #include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/ros/future_transforms.h"
 #include "mmradartwin_dsp/ros/node_program.h"
 #include "mmradartwin_dsp/ros/topic_watch.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
@@ -72,6 +73,7 @@ class SignalChainNode {
   tf2_ros::Buffer tf_buffer_;
   TransformRecord tf_record_;
   TransformSources tf_sources_;
+  FutureTransforms future_transforms_;
   ros::Time tf_heard_, newest_transform_;
   ros::Publisher grid_publisher_, map_publisher_, twin_map_publisher_;
   ros::Subscriber config_subscriber_, cube_subscriber_, twin_subscriber_, tf_subscriber_, tf_static_subscriber_;
@@ -87,7 +89,7 @@ class SignalChainNode {
   int since_published_ = 0;
 
   TopicWatch cubes_{"the driver (or the bag's player)"};
-  std::uint64_t frames_ = 0, without_pose_ = 0, refused_ = 0, future_transforms_ = 0;
+  std::uint64_t frames_ = 0, without_pose_ = 0, refused_ = 0;
   std::string no_pose_;  ///< why the last frame had none; "" where it had one
   std::unique_ptr<diagnostic_updater::Updater> updater_;
   ros::WallTimer diagnostics_timer_;

@@ -7,7 +7,6 @@
 #include <sensor_msgs/PointCloud2.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_broadcaster.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <cstdint>
 #include <memory>
@@ -15,6 +14,7 @@
 #include <string>
 
 #include "mmradartwin_dsp/ros/node_program.h"
+#include "mmradartwin_dsp/ros/transform_reader.h"
 #include "mmradartwin_sim/room_registration.h"
 
 namespace mmradartwin {
@@ -67,7 +67,7 @@ class RoomPoseNode {
   double register_ms_ = 0;
 
   tf2_ros::Buffer tf_buffer_;
-  std::optional<tf2_ros::TransformListener> tf_listener_;
+  std::optional<TransformReader> tf_reader_;
   tf2_ros::TransformBroadcaster tf_broadcaster_;
   ros::Publisher pose_publisher_;
   ros::Subscriber cloud_subscriber_, imu_subscriber_, initial_subscriber_;

@@ -7,7 +7,6 @@
 #include <mmradartwin_msgs/Session.h>
 #include <ros/ros.h>
 #include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <cstdint>
 #include <memory>
@@ -17,6 +16,7 @@
 #include <vector>
 
 #include "mmradartwin_dsp/ros/node_program.h"
+#include "mmradartwin_dsp/ros/transform_reader.h"
 #include "mmradartwin_dsp/ros/transform_watch.h"
 #include "mmradartwin_dsp/temporary_folder.h"
 #include "mmradartwin_sim/cell_records.h"
@@ -112,7 +112,7 @@ class TwinNode {
   double simulate_ms_ = 0;
 
   tf2_ros::Buffer tf_buffer_;
-  std::optional<tf2_ros::TransformListener> tf_listener_;
+  std::optional<TransformReader> tf_reader_;
   std::optional<TransformWatch> tf_watch_;
   ros::Publisher grid_publisher_, paths_publisher_, scene_publisher_, moved_scene_publisher_;
   ros::Subscriber config_subscriber_, session_subscriber_, grid_subscriber_;
