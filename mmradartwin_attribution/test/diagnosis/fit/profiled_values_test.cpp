@@ -35,9 +35,7 @@ class DarkPlate : public ::testing::Test {
     return profiled(model(), {plate_}, {{scaled}, {standard_error_db}});
   }
 
-  ProfiledModel model() {
-    return {fitted_->source, fitted_->model, accuracy_, fitted_->null.mechanisms, latents_};
-  }
+  ProfiledModel model() { return {fitted_->source, fitted_->model, accuracy_, fitted_->null.mechanisms, latents_}; }
 
   const PoseAccuracy accuracy_;
   MadeRoom room_{10};
