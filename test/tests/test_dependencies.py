@@ -1,4 +1,5 @@
-"""package.xml files name only what rosdep knows, and what it does not know is installed by run.sh."""
+"""package.xml files name only what rosdep knows, and what it does not know is installed by run.sh. What demo and try start
+is built by run.sh."""
 import glob
 import os
 import re
@@ -36,6 +37,28 @@ def debian_packages():
         return re.search(r"^packages=\(\n(.*?)\)$", file.read(), re.MULTILINE | re.DOTALL).group(1).split()
 
 
+def started_by(files):
+    """Targets of the repository's compiled programs that scripts and launch files start, with what these include."""
+    left, seen, targets = list(files), set(), set()
+    while left:
+        file = left.pop()
+        if file in seen:
+            continue
+        seen.add(file)
+        with open(os.path.join(ROOT, "launch", file), encoding="utf-8") as opened:
+            text = opened.read()
+        programs = re.findall(r"rosrun (mmradartwin_\w+) (\S+)", text)
+        if file.endswith(".launch"):
+            root = xml.etree.ElementTree.fromstring(text)
+            programs += [(node.get("pkg"), node.get("type")) for node in root.iter("node")]
+            left += [include.get("file").split(")/")[1] for include in root.iter("include")]
+        else:
+            left += re.findall(r"^[^#\n]*?(?:mmradartwin_launch|launched .*) (\w+\.launch)", text, re.MULTILINE)
+        targets |= {f"{package}_{program}" for package, program in programs
+                    if package.startswith("mmradartwin_") and "." not in program}
+    return targets
+
+
 class Dependencies(unittest.TestCase):
     def test_there_are_all_packages(self):
         self.assertGreaterEqual(len(packages()), 8)
@@ -55,6 +78,14 @@ class Dependencies(unittest.TestCase):
     def test_what_rosdep_does_not_know_is_installed_by_name(self):
         for name in known()["no key"]:
             self.assertIn(name, debian_packages())
+
+    def test_demo_and_try_build_what_they_start(self):
+        with open(os.path.join(ROOT, "run.sh"), encoding="utf-8") as file:
+            built = re.search(r"^demo_targets=\(\n(.*?)\)$", file.read(), re.MULTILINE | re.DOTALL).group(1).split()
+        started = started_by(["scripts/demo.sh", "scripts/try.sh"])
+        self.assertIn("mmradartwin_driver_session_player", started)
+        self.assertIn("mmradartwin_dsp_session_to_bag", started)
+        self.assertEqual(sorted(started), sorted(set(built) - {"mmradartwin_msgs_generate_messages_py"}))
 
     def test_all_packages_bear_one_version_and_have_a_changelog_of_it(self):
         versions = {name: root.findtext("version") for name, root in packages().items()}
