@@ -96,20 +96,9 @@ build() {
   workspace
   [ -d /usr/lib/ccache ] && export PATH=/usr/lib/ccache:$PATH
   export ROS_LANG_DISABLE=genlisp:geneus:gennodejs  # messages for C++ and Python
-  say "Building ${part:-the workspace${1:+: $1}} (log: $ws/log/build.log)"
+  say "Building the workspace${1:+: $1} (log: $ws/log/build.log)"
   (cd "$ws" && logged "$ws/log/build.log" of_make "the build" catkin_make -j"$(jobs)" -DCMAKE_BUILD_TYPE=Release "$@")
 }
-
-# What demo.sh and try.sh run, and what the launch files that they name start; test_dependencies holds this list to them.
-demo_targets=(
-  mmradartwin_msgs_generate_messages_py
-  mmradartwin_dsp_dsp_node mmradartwin_dsp_session_to_bag
-  mmradartwin_driver_driver_node mmradartwin_driver_session_player
-  mmradartwin_sim_twin_node
-  mmradartwin_attribution_attribution_node mmradartwin_attribution_diagnosis_node
-  mmradartwin_attribution_diagnose mmradartwin_attribution_evaluate)
-
-build_for_demo() { part="what demo and try need" build "${demo_targets[@]}"; }
 
 source_workspace() {
   [ -f "$ws/devel/setup.bash" ] || die "the workspace is not built yet; run ./run.sh build"
@@ -269,8 +258,8 @@ try() {
 verb=${1:-}
 [ -n "$verb" ] && shift
 case $verb in
-  try) setup; build_for_demo; source_workspace; try "$@" ;;
-  demo) setup; build_for_demo; source_workspace; exec "$root/launch/scripts/demo.sh" "$(readlink -m "${1:-$root/demo_out}")" ;;
+  try) setup; build mmradartwin_demo; source_workspace; try "$@" ;;
+  demo) setup; build mmradartwin_demo; source_workspace; exec "$root/launch/scripts/demo.sh" "$(readlink -m "${1:-$root/demo_out}")" ;;
   test) setup; run_tests "$@" ;;
   setup) setup ;;
   build) setup; build ;;

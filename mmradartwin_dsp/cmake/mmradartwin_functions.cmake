@@ -95,10 +95,11 @@ function(mmradartwin_link_ros target)
   endif()
 endfunction()
 
-# mmradartwin_program(NAME [FOR_TESTS] SOURCES ... [LIBRARIES ...] [DEFINITIONS ...]): a program that rosrun finds by its
-# name; its target is ${PROJECT_NAME}_NAME. FOR_TESTS: built with the tests and not installed.
+# mmradartwin_program(NAME [FOR_TESTS | DEMO] SOURCES ... [LIBRARIES ...] [DEFINITIONS ...]): a program that rosrun finds
+# by its name; its target is ${PROJECT_NAME}_NAME. FOR_TESTS: built with the tests and not installed. DEMO: started by
+# `./run.sh demo` or `./run.sh try`, which build the target mmradartwin_demo alone.
 function(mmradartwin_program name)
-  cmake_parse_arguments(program "FOR_TESTS" "" "SOURCES;LIBRARIES;DEFINITIONS" ${ARGN})
+  cmake_parse_arguments(program "FOR_TESTS;DEMO" "" "SOURCES;LIBRARIES;DEFINITIONS" ${ARGN})
   set(target ${PROJECT_NAME}_${name})
   if(program_FOR_TESTS)
     add_executable(${target} EXCLUDE_FROM_ALL ${program_SOURCES})
@@ -106,6 +107,15 @@ function(mmradartwin_program name)
   else()
     add_executable(${target} ${program_SOURCES})
     install(TARGETS ${target} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+  endif()
+  if(program_DEMO)
+    if(NOT TARGET mmradartwin_demo)
+      add_custom_target(mmradartwin_demo)
+      if(TARGET mmradartwin_msgs_generate_messages_py)
+        add_dependencies(mmradartwin_demo mmradartwin_msgs_generate_messages_py)
+      endif()
+    endif()
+    add_dependencies(mmradartwin_demo ${target})
   endif()
   set_target_properties(${target} PROPERTIES OUTPUT_NAME ${name})
   if(NOT MMRADARTWIN_CORE)
