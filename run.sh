@@ -34,9 +34,10 @@ source "$root/launch/scripts/stages.sh"
 usage() {
   cat >&2 <<'U'
 usage: ./run.sh VERB
-  try [OUT]    install, build, then a first finding in a minute or two: a small measurement that hides something, and its
-               diagnosis; results in OUT (default try_out)
-  demo [OUT]   install, build, then play a generated session through the whole loop; results in OUT (default demo_out)
+  try [OUT]    install, build what it needs, then a first finding in a minute or two: a small measurement that hides
+               something, and its diagnosis; results in OUT (default try_out)
+  demo [OUT]   install, build what it needs, then play a generated session through the whole loop; results in OUT
+               (default demo_out)
   test         install, build, run the tests; the last line is "N passed, N failed, N skipped"
   test long    the same with more sessions of the diagnosis, another third each day; test all takes every one
   setup        install the Debian packages that are missing
@@ -94,6 +95,7 @@ jobs() {
 build() {
   workspace
   [ -d /usr/lib/ccache ] && export PATH=/usr/lib/ccache:$PATH
+  export ROS_LANG_DISABLE=genlisp:geneus:gennodejs  # messages for C++ and Python
   say "Building the workspace${1:+: $1} (log: $ws/log/build.log)"
   (cd "$ws" && logged "$ws/log/build.log" of_make "the build" catkin_make -j"$(jobs)" -DCMAKE_BUILD_TYPE=Release "$@")
 }
@@ -256,8 +258,8 @@ try() {
 verb=${1:-}
 [ -n "$verb" ] && shift
 case $verb in
-  try) setup; build; source_workspace; try "$@" ;;
-  demo) setup; build; source_workspace; exec "$root/launch/scripts/demo.sh" "$(readlink -m "${1:-$root/demo_out}")" ;;
+  try) setup; build mmradartwin_demo; source_workspace; try "$@" ;;
+  demo) setup; build mmradartwin_demo; source_workspace; exec "$root/launch/scripts/demo.sh" "$(readlink -m "${1:-$root/demo_out}")" ;;
   test) setup; run_tests "$@" ;;
   setup) setup ;;
   build) setup; build ;;

@@ -458,7 +458,7 @@ def mechanisms_page():
             source = read(path)
             if "REGISTER" not in source:
                 continue
-            name = re.search(r'kName = "(\w+)"', source).group(1)
+            name = re.search(r'^const std::string k\w+ = "(\w+)"', source, re.MULTILINE).group(1)
             about = re.search(r"((?:^/// .*\n)+)class \w+ : public Mechanism", source, re.M)
             words = " ".join(line[4:].strip() for line in about.group(1).splitlines()) if about else ""
             text += f"### {name}\n\n" + (words + "\n\n" if words else "")

@@ -10,7 +10,7 @@
 namespace mmradartwin {
 namespace {
 
-constexpr double kDegree = M_PI / 180.0;
+constexpr double kDegree_rad = M_PI / 180.0;
 
 void readNumber(YamlMap& yaml, const std::string& key, double min, double max, double scale, double& value) {
   if (yaml.has(key)) value = scale * yaml.number(key, min, max);
@@ -20,15 +20,15 @@ void readWindow(YamlMap& yaml, const std::string& key, MatchWindow& window) {
   if (!yaml.has(key)) return;
   YamlMap map = yaml.map(key);
   readNumber(map, "range_m", 0.0, 10.0, 1.0, window.range_m);
-  readNumber(map, "azimuth_deg", 0.0, 180.0, kDegree, window.azimuth_rad);
+  readNumber(map, "azimuth_deg", 0.0, 180.0, kDegree_rad, window.azimuth_rad);
   map.rejectUnknownKeys();
 }
 
 AttributionConfig read(YamlMap yaml) {
   AttributionConfig c;
   readNumber(yaml, "min_range_m", 0.0, 10.0, 1.0, c.min_range_m);
-  readNumber(yaml, "max_azimuth_deg", 1.0, 90.0, kDegree, c.max_azimuth_rad);
-  readNumber(yaml, "outer_azimuth_deg", 1.0, 90.0, kDegree, c.outer_azimuth_rad);
+  readNumber(yaml, "max_azimuth_deg", 1.0, 90.0, kDegree_rad, c.max_azimuth_rad);
+  readNumber(yaml, "outer_azimuth_deg", 1.0, 90.0, kDegree_rad, c.outer_azimuth_rad);
   readNumber(yaml, "floor_db", -200.0, -1.0, 1.0, c.floor_db);
   readNumber(yaml, "strong_db", -100.0, 0.0, 1.0, c.strong_db);
   readNumber(yaml, "medium_db", -100.0, 0.0, 1.0, c.medium_db);
@@ -47,10 +47,10 @@ AttributionConfig read(YamlMap yaml) {
   readNumber(yaml, "record_span_db", 0.0, 200.0, 1.0, c.record_span_db);
   if (yaml.has("regions")) {
     YamlMap r = yaml.map("regions");
-    readNumber(r, "max_elevation_deg", 0.0, 90.0, kDegree, c.regions.max_elevation_rad);
+    readNumber(r, "max_elevation_deg", 0.0, 90.0, kDegree_rad, c.regions.max_elevation_rad);
     readNumber(r, "support_floor_db", -200.0, 0.0, 1.0, c.regions.support_floor_db);
     if (r.has("image_order")) c.regions.image_order = static_cast<int>(r.integer("image_order", 1, 3));
-    readNumber(r, "corner_tolerance_deg", 0.0, 45.0, kDegree, c.regions.corner_tolerance_rad);
+    readNumber(r, "corner_tolerance_deg", 0.0, 45.0, kDegree_rad, c.regions.corner_tolerance_rad);
     readNumber(r, "corner_gap_m", 0.0, 1.0, 1.0, c.regions.corner_gap_m);
     readNumber(r, "extent_floor_db", -200.0, 0.0, 1.0, c.regions.extent_floor_db);
     readNumber(r, "extent_scattering", 0.01, 1.0, 1.0, c.regions.extent_scattering);
@@ -62,35 +62,35 @@ AttributionConfig read(YamlMap yaml) {
   return c;
 }
 
-std::string number(double value) {
+std::string numberText(double value) {
   std::ostringstream s;
   s << std::setprecision(12) << value;
   return s.str();
 }
 
 std::string window(const MatchWindow& w) {
-  return "{range_m: " + number(w.range_m) + ", azimuth_deg: " + number(w.azimuth_rad / kDegree) + "}";
+  return "{range_m: " + numberText(w.range_m) + ", azimuth_deg: " + numberText(w.azimuth_rad / kDegree_rad) + "}";
 }
 
 }  // namespace
 
 AttributionConfig::AttributionConfig()
     : min_range_m(0.16),
-      max_azimuth_rad(60 * kDegree),
-      outer_azimuth_rad(90 * kDegree),
+      max_azimuth_rad(60 * kDegree_rad),
+      outer_azimuth_rad(90 * kDegree_rad),
       floor_db(-50),
       strong_db(-15),
       medium_db(-20),
       weak_db(-25),
       response_margin_db(3),
-      tight{0.20, 5 * kDegree},
-      wide{0.60, 20 * kDegree},
-      agreement{0.35, 10 * kDegree},
+      tight{0.20, 5 * kDegree_rad},
+      wide{0.60, 20 * kDegree_rad},
+      agreement{0.35, 10 * kDegree_rad},
       near_limit_m(2),
       far_limit_m(4),
       top_k{1, 3, 5},
       record_span_db(20),
-      regions{20 * kDegree, -30, 3, 2 * kDegree, 0.005, -25, 0.5, 0.1} {}
+      regions{20 * kDegree_rad, -30, 3, 2 * kDegree_rad, 0.005, -25, 0.5, 0.1} {}
 
 Contradiction contradictionIn(const AttributionConfig& c) {
   if (!(c.floor_db <= c.weak_db)) return {"floor_db", "must not be above weak_db"};
@@ -115,36 +115,36 @@ std::string toYaml(const AttributionConfig& c) {
   s << "# Field of view: cells beyond min_range_m and within +-max_azimuth_deg are evaluated and set the "
        "normalisation;\n"
        "# those up to outer_azimuth_deg are reported apart.\n"
-    << "min_range_m: " << number(c.min_range_m) << "\n"
-    << "max_azimuth_deg: " << number(c.max_azimuth_rad / kDegree) << "\n"
-    << "outer_azimuth_deg: " << number(c.outer_azimuth_rad / kDegree) << "\n"
+    << "min_range_m: " << numberText(c.min_range_m) << "\n"
+    << "max_azimuth_deg: " << numberText(c.max_azimuth_rad / kDegree_rad) << "\n"
+    << "outer_azimuth_deg: " << numberText(c.outer_azimuth_rad / kDegree_rad) << "\n"
     << "# Levels below the map's peak.\n"
-    << "floor_db: " << number(c.floor_db) << "\n"
-    << "strong_db: " << number(c.strong_db) << "\n"
-    << "medium_db: " << number(c.medium_db) << "\n"
-    << "weak_db: " << number(c.weak_db) << "\n"
+    << "floor_db: " << numberText(c.floor_db) << "\n"
+    << "strong_db: " << numberText(c.strong_db) << "\n"
+    << "medium_db: " << numberText(c.medium_db) << "\n"
+    << "weak_db: " << numberText(c.weak_db) << "\n"
     << "# A response is a local maximum this much above what the point responses of stronger ones put there.\n"
-    << "response_margin_db: " << number(c.response_margin_db) << "\n"
+    << "response_margin_db: " << numberText(c.response_margin_db) << "\n"
     << "# Half widths around a region or a response; one bin where bins are wider.\n"
     << "tight: " << window(c.tight) << "\n"
     << "wide: " << window(c.wide) << "\n"
     << "agreement: " << window(c.agreement) << "\n"
     << "# Bands of the recall: near, mid, far.\n"
-    << "near_limit_m: " << number(c.near_limit_m) << "\n"
-    << "far_limit_m: " << number(c.far_limit_m) << "\n"
+    << "near_limit_m: " << numberText(c.near_limit_m) << "\n"
+    << "far_limit_m: " << numberText(c.far_limit_m) << "\n"
     << "top_k: [" << c.top_k.at(0) << ", " << c.top_k.at(1) << ", " << c.top_k.at(2) << "]\n"
     << "# The records of a residual reach down to this much below the strongest one in its cell.\n"
-    << "record_span_db: " << number(c.record_span_db) << "\n"
+    << "record_span_db: " << numberText(c.record_span_db) << "\n"
     << "# Expected response regions, from geometry and pose alone.\n"
     << "regions:\n"
-    << "  max_elevation_deg: " << number(c.regions.max_elevation_rad / kDegree) << "\n"
-    << "  support_floor_db: " << number(c.regions.support_floor_db) << "\n"
+    << "  max_elevation_deg: " << numberText(c.regions.max_elevation_rad / kDegree_rad) << "\n"
+    << "  support_floor_db: " << numberText(c.regions.support_floor_db) << "\n"
     << "  image_order: " << c.regions.image_order << "\n"
-    << "  corner_tolerance_deg: " << number(c.regions.corner_tolerance_rad / kDegree) << "\n"
-    << "  corner_gap_m: " << number(c.regions.corner_gap_m) << "\n"
-    << "  extent_floor_db: " << number(c.regions.extent_floor_db) << "\n"
-    << "  extent_scattering: " << number(c.regions.extent_scattering) << "\n"
-    << "  extent_spacing_m: " << number(c.regions.extent_spacing_m) << "\n";
+    << "  corner_tolerance_deg: " << numberText(c.regions.corner_tolerance_rad / kDegree_rad) << "\n"
+    << "  corner_gap_m: " << numberText(c.regions.corner_gap_m) << "\n"
+    << "  extent_floor_db: " << numberText(c.regions.extent_floor_db) << "\n"
+    << "  extent_scattering: " << numberText(c.regions.extent_scattering) << "\n"
+    << "  extent_spacing_m: " << numberText(c.regions.extent_spacing_m) << "\n";
   return s.str();
 }
 

@@ -7,7 +7,7 @@
 
 namespace mmradartwin {
 namespace {
-constexpr double kDegree = M_PI / 180.0;
+constexpr double kRadPerDegree = M_PI / 180.0;
 }  // namespace
 
 bool LiveLedger::counts(const Stretch& stretch) const { return stretch.end_ns - stretch.begin_ns >= 1000000000; }
@@ -22,7 +22,7 @@ void LiveLedger::add(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_radar
   if (!current_.empty()) {
     const Stretch& c = current_.front();
     const bool stands = (T_map_radar.translation() - c.T.translation()).norm() <= 0.02 &&
-                        Eigen::AngleAxisd(c.T.linear().transpose() * T_map_radar.linear()).angle() <= kDegree &&
+                        Eigen::AngleAxisd(c.T.linear().transpose() * T_map_radar.linear()).angle() <= kRadPerDegree &&
                         stamp_ns >= c.begin_ns;
     if (!stands) {
       if (counts(c)) {

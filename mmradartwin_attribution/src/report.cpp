@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/program_version.h"
 #include "mmradartwin_dsp/sha256.h"
 #include "mmradartwin_dsp/strict_yaml.h"
 #include "mmradartwin_dsp/temporary_folder.h"
@@ -34,7 +35,7 @@ void addSceneFiles(const std::string& scene_file, std::vector<std::string>& file
 
 }  // namespace
 
-std::string packageVersion() { return MMRADARTWIN_VERSION; }
+std::string packageVersion() { return programVersion(); }
 
 std::vector<std::string> inputFiles(const std::string& recording_path, const Recording& recording,
                                     const std::vector<std::string>& more) {

@@ -15,13 +15,13 @@ constexpr double kCardFastest_bit_per_s = 706e6;
 constexpr double kEthernetPacket_us = 12.26;  // 1456 + 10 + 28 + 18 + 20 bytes of preamble and gap
 constexpr double kPayloadBits = 8 * kFullPayloadBytes;
 
-std::string number(const char* format, double value) {
+std::string inFormat(const char* format, double value) {
   char text[48];
   std::snprintf(text, sizeof text, format, value);
   return text;
 }
 
-std::string mbit(double bit_per_s) { return number("%.1f Mbit/s", bit_per_s * 1e-6); }
+std::string mbit(double bit_per_s) { return inFormat("%.1f Mbit/s", bit_per_s * 1e-6); }
 
 /// Largest delay, in the card's ticks, at which the card still sends this rate; negative where no delay of TI's range
 /// does.
@@ -34,7 +34,7 @@ int ticksFor(double needed_bit_per_s) {
 
 std::string whatWouldFit(const RadarConfig& radar, const LinkBudget& link) {
   const double carried = link.carried_bit_per_s(), bits = 8.0 * static_cast<double>(radar.bytes_per_frame());
-  std::string fits = "frame_period_s of at least " + number("%.6g", std::ceil(bits / carried * 1e6) * 1e-6);
+  std::string fits = "frame_period_s of at least " + inFormat("%.6g", std::ceil(bits / carried * 1e6) * 1e-6);
   int samples = static_cast<int>(std::floor(radar.samples_per_chirp / link.share() + 1e-9));
   if (radar.layout == CaptureLayout::kTwoLane) samples -= samples % 2;
   if (samples >= 2) fits += ", or samples_per_chirp of at most " + std::to_string(samples);
@@ -42,7 +42,7 @@ std::string whatWouldFit(const RadarConfig& radar, const LinkBudget& link) {
   if (loops >= 1) fits += ", or loops_per_frame of at most " + std::to_string(loops);
   const int ticks = ticksFor(link.needed_bit_per_s);
   if (ticks >= 0) {
-    fits += ", or packet_delay_us of at most " + number("%.6g", ticks / 125.0) + " (" + std::to_string(ticks) +
+    fits += ", or packet_delay_us of at most " + inFormat("%.6g", ticks / 125.0) + " (" + std::to_string(ticks) +
             " ticks of the card)";
   } else {
     fits += "; no packet delay carries it: the card's fastest, 5 us, is " +
@@ -71,23 +71,23 @@ void checkLinkBudget(const RadarConfig& radar, double delay_us, double lane_bit_
   const LinkBudget link = linkBudget(radar, delay_us, lane_bit_per_s);
   if (link.lvds_per_chirp_s > link.chirp_s) {  // false where the chirp's duration is unknown
     const double fitting = radar.samples_per_chirp * link.chirp_s / link.lvds_per_chirp_s;
-    throw InputError("the LVDS lanes need " + number("%.2f us", link.lvds_per_chirp_s * 1e6) +
-                     " for a chirp's samples, and a chirp lasts " + number("%.2f us", link.chirp_s * 1e6) +
+    throw InputError("the LVDS lanes need " + inFormat("%.2f us", link.lvds_per_chirp_s * 1e6) +
+                     " for a chirp's samples, and a chirp lasts " + inFormat("%.2f us", link.chirp_s * 1e6) +
                      ": this would fit: idle_s of at least " +
-                     number("%.6g", std::ceil((link.lvds_per_chirp_s - radar.ramp_end_s) * 1e8) * 1e-8) +
+                     inFormat("%.6g", std::ceil((link.lvds_per_chirp_s - radar.ramp_end_s) * 1e8) * 1e-8) +
                      ", or samples_per_chirp of at most " + std::to_string(static_cast<int>(std::floor(fitting)) & ~1));
   }
   if (link.needed_bit_per_s <= link.carried_bit_per_s()) return;
   throw InputError("the radar's frames of " + std::to_string(radar.bytes_per_frame()) + " bytes every " +
-                   number("%.6g", radar.frame_period_s) + " s are " + mbit(link.needed_bit_per_s) +
-                   ", and at packet_delay_us " + number("%.6g", link.delay_us) + " the DCA1000 sends " +
+                   inFormat("%.6g", radar.frame_period_s) + " s are " + mbit(link.needed_bit_per_s) +
+                   ", and at packet_delay_us " + inFormat("%.6g", link.delay_us) + " the DCA1000 sends " +
                    mbit(link.card_bit_per_s) + " (Gigabit Ethernet carries " + mbit(link.ethernet_bit_per_s) +
                    "): this would fit: " + whatWouldFit(radar, link));
 }
 
 std::string describe(const LinkBudget& link) {
-  return number("%.1f of ", link.needed_bit_per_s * 1e-6) + mbit(link.carried_bit_per_s()) + " at a packet delay of " +
-         number("%.6g", link.delay_us) + " us";
+  return inFormat("%.1f of ", link.needed_bit_per_s * 1e-6) + mbit(link.carried_bit_per_s()) +
+         " at a packet delay of " + inFormat("%.6g", link.delay_us) + " us";
 }
 
 }  // namespace mmradartwin

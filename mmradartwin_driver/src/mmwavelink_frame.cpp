@@ -34,7 +34,7 @@ std::size_t crcBytes(MmwaveLinkCrc crc) {
   return 0;
 }
 
-std::string hex(unsigned value) {
+std::string hexadecimal(unsigned value) {
   static const char digits[] = "0123456789abcdef";
   std::string text = "0x";
   for (int shift = 12; shift >= 0; shift -= 4) text += digits[value >> shift & 0xF];
@@ -75,7 +75,8 @@ MmwaveLinkCrc MmwaveLinkHeader::crc() const {
 std::size_t MmwaveLinkHeader::crc_bytes() const { return crcBytes(crc()); }
 
 std::vector<std::uint8_t> encodeMessage(const MmwaveLinkMessage& message) {
-  if (message.message_id > 0x3FF) throw std::invalid_argument("message id " + hex(message.message_id) + " > 0x3ff");
+  if (message.message_id > 0x3FF)
+    throw std::invalid_argument("message id " + hexadecimal(message.message_id) + " > 0x3ff");
   if (message.sequence > 15) throw std::invalid_argument("sequence number " + std::to_string(message.sequence));
   if (message.crc == MmwaveLinkCrc::k64) throw std::invalid_argument("messages with a CRC-64 are not sent");
 
@@ -88,7 +89,7 @@ std::vector<std::uint8_t> encodeMessage(const MmwaveLinkMessage& message) {
   while ((kMmwaveLinkHeaderBytes + payload.size()) % kAlignment != 0) payload.push_back(0xFF);
   const std::size_t length = kMmwaveLinkHeaderBytes + payload.size() + crcBytes(message.crc);
   if (length > kMmwaveLinkMaxLength) {
-    throw std::length_error("message " + hex(message.message_id) + " of " + std::to_string(length) +
+    throw std::length_error("message " + hexadecimal(message.message_id) + " of " + std::to_string(length) +
                             " bytes; the radar takes " + std::to_string(kMmwaveLinkMaxLength) + " at most");
   }
 
@@ -164,7 +165,8 @@ DecodedMessage decodeMessage(const std::uint8_t* bytes, std::size_t size) {
   for (int i = 0; i < (header->sub_blocks & 0x7FF); ++i) {
     if (at + 4 > end) return {std::nullopt, "fewer sub-blocks than NSBC says"};
     const std::size_t length = word(bytes + at + 2);
-    if (length < 4 || at + length > end) return {std::nullopt, "sub-block " + hex(word(bytes + at)) + " overruns"};
+    if (length < 4 || at + length > end)
+      return {std::nullopt, "sub-block " + hexadecimal(word(bytes + at)) + " overruns"};
     message.sub_blocks.push_back({word(bytes + at), {bytes + at + 4, bytes + at + length}});
     at += length;
   }

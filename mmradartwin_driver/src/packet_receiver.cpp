@@ -25,7 +25,7 @@ std::size_t forceReceiveBuffer(int fd, std::size_t bytes) {
   return static_cast<std::size_t>(granted) / 2;
 }
 
-std::int64_t now_ns() {
+std::int64_t wallClock_ns() {
   timespec now;
   clock_gettime(CLOCK_REALTIME, &now);
   return now.tv_sec * 1'000'000'000LL + now.tv_nsec;
@@ -128,7 +128,7 @@ int PacketReceiver::receive(int timeout_ms, const std::function<void(const DataP
         overflow_ = count;
       }
     }
-    if (stamp_ns == 0) stamp_ns = now_ns();
+    if (stamp_ns == 0) stamp_ns = wallClock_ns();
     if (batch_->sources[i].sin_addr.s_addr != card_.s_addr) {
       ++counters_.foreign;
       continue;

@@ -73,8 +73,8 @@ double peakInView(const RangeAngleAxes& axes, const RealGrid& power_db) {
   return peak;
 }
 
-void text(cv::Mat& picture, const std::string& words, cv::Point2d at, double size, const cv::Scalar& color,
-          bool centred = false) {
+void drawText(cv::Mat& picture, const std::string& words, cv::Point2d at, double size, const cv::Scalar& color,
+              bool centred = false) {
   int baseline = 0;
   const cv::Size extent = cv::getTextSize(words, kFont, size, 1, &baseline);
   if (centred) at.x -= extent.width / 2.0;
@@ -147,14 +147,14 @@ void drawGraticule(cv::Mat& picture, const Layout& layout, const FanStyle& style
   for (double range_m = 0; range_m < style.max_range_m + 1e-9; range_m += step_m) {
     const std::string words = std::to_string(static_cast<int>(range_m)) + (range_m > 0 ? "" : " m");
     const double below = layout.origin.y + 17 * layout.scale;
-    text(picture, words, {layout.at(range_m, -M_PI / 2).x, below}, label, kInk, true);
-    if (range_m > 0) text(picture, words, {layout.at(range_m, M_PI / 2).x, below}, label, kInk, true);
+    drawText(picture, words, {layout.at(range_m, -M_PI / 2).x, below}, label, kInk, true);
+    if (range_m > 0) drawText(picture, words, {layout.at(range_m, M_PI / 2).x, below}, label, kInk, true);
   }
   for (int spoke_deg = -60; spoke_deg <= 60; spoke_deg += 30) {
     const cv::Point2d end = layout.at(style.max_range_m + 13 * layout.scale / layout.px_per_m, spoke_deg * M_PI / 180);
     const std::string sign = spoke_deg > 0 ? "+" : "";
-    text(picture, sign + std::to_string(spoke_deg) + (spoke_deg == 0 ? " deg" : ""), {end.x, end.y + 4 * layout.scale},
-         label, kInk, true);
+    drawText(picture, sign + std::to_string(spoke_deg) + (spoke_deg == 0 ? " deg" : ""),
+             {end.x, end.y + 4 * layout.scale}, label, kInk, true);
   }
 }
 
@@ -173,11 +173,11 @@ void drawColorBar(cv::Mat& picture, const Layout& layout, const FanStyle& style,
     const int at = y + cvRound((style.max_db - level) / span * height);
     cv::line(picture, {x + width, at}, {x + width + cvRound(4 * layout.scale), at}, kInk);
     const std::string sign = style.diverging && level > 0 ? "+" : "";
-    text(picture, sign + std::to_string(static_cast<int>(std::lround(level))),
-         {x + width + 7 * layout.scale, at + 5 * layout.scale}, label, kInk);
+    drawText(picture, sign + std::to_string(static_cast<int>(std::lround(level))),
+             {x + width + 7 * layout.scale, at + 5 * layout.scale}, label, kInk);
   }
   const std::string unit = style.diverging ? "dB" : style.normalise ? "dB re peak" : "dBFS";
-  text(picture, unit, {x + width / 2.0 + 14 * layout.scale, y - 9 * layout.scale}, label, kInk, true);
+  drawText(picture, unit, {x + width / 2.0 + 14 * layout.scale, y - 9 * layout.scale}, label, kInk, true);
 }
 
 void drawBox(cv::Mat& picture, const Layout& layout, const FanStyle& style, const FanBox& box) {
@@ -199,9 +199,9 @@ void drawBox(cv::Mat& picture, const Layout& layout, const FanStyle& style, cons
   if (box.label.empty()) return;
   const cv::Point2d at = layout.at(far_m, box.azimuth_rad) - cv::Point2d(0, 5 * layout.scale);
   for (const cv::Point2d shift : {cv::Point2d(1, 1), cv::Point2d(-1, 1), cv::Point2d(1, -1), cv::Point2d(-1, -1)}) {
-    text(picture, box.label, at + shift, 0.4 * layout.scale, cv::Scalar(20, 20, 20), true);
+    drawText(picture, box.label, at + shift, 0.4 * layout.scale, cv::Scalar(20, 20, 20), true);
   }
-  text(picture, box.label, at, 0.4 * layout.scale, box.color_bgr, true);
+  drawText(picture, box.label, at, 0.4 * layout.scale, box.color_bgr, true);
 }
 
 }  // namespace
@@ -222,7 +222,7 @@ cv::Mat drawFan(const RangeAngleAxes& axes, const RealGrid& power_db, const FanS
   drawColorBar(picture, layout, style, colors);
   for (const FanBox& box : boxes) drawBox(picture, layout, style, box);
   if (!style.title.empty()) {
-    text(picture, style.title, {layout.side * 0.5, 20 * layout.scale}, 0.55 * layout.scale, kInk);
+    drawText(picture, style.title, {layout.side * 0.5, 20 * layout.scale}, 0.55 * layout.scale, kInk);
   }
   return picture;
 }

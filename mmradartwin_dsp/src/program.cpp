@@ -95,6 +95,4 @@ void addJobsArgument(CLI::App& app, int& jobs) {
   app.add_option("--jobs", jobs, "threads; 0: one per core")->check(CLI::Range(0, 1024))->capture_default_str();
 }
 
-std::string programVersion() { return MMRADARTWIN_VERSION; }
-
 }  // namespace mmradartwin

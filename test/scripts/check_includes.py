@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Checks who includes whom: packages, libraries without ROS, the rooms of a package (its folders of sources), and circles.
+Checks too that sources of one folder, which are compiled together, give no name twice in their unnamed namespaces.
 
-Prints every forbidden include and exits with 1 where there is one. --levels prints the height of the include graph."""
+Prints every forbidden include and name and exits with 1 where there is one. --levels prints the height of the include graph."""
 import argparse
 import re
 import sys
@@ -224,11 +225,37 @@ def check_circles(sources):
         yield f"{min(circle)}: includes itself in a circle of {', '.join(sorted(circle))}"
 
 
+UNNAMED = re.compile(r"^namespace \{\n(.*?)^\}  // namespace$", re.MULTILINE | re.DOTALL)
+# In an unnamed namespace, at the start of a line: a type; constants; a function.
+NAMES = [re.compile(r"^(?:struct|class|enum class|enum) (\w+)"), re.compile(r"\b(k[A-Z]\w*)(?:\[\w*\])* ?[={]"),
+         re.compile(r"^[\w:].*?[ &*>](\w+)\(")]
+
+
+def unnamed_names(text):
+    """Names that the source's unnamed namespaces define, as far as lines tell."""
+    lines = [line.split("//")[0] for block in UNNAMED.findall(text) for line in block.splitlines()]
+    return {name for line in lines if re.match(r"(?!namespace |template|static_assert|using )[A-Za-z_]", line)
+            for pattern in NAMES for name in pattern.findall(line)}
+
+
+def check_names(sources):
+    """A function of the same name in another source would be an overload, and could be called in silence."""
+    folders = defaultdict(lambda: defaultdict(list))
+    for file in sources.includes:
+        if file.endswith(".cpp") and file.split("/")[1] in ("src", "emulator"):
+            for name in unnamed_names((sources.root / file).read_text(encoding="utf-8")):
+                folders[file.rsplit("/", 1)[0]][name].append(file)
+    for names in folders.values():
+        for name, files in sorted(names.items()):
+            if len(files) > 1:
+                yield f"{files[1]}: {name} is a name in {files[0]} too, and both are compiled together"
+
+
 def check(sources):
     problems = list(check_packages(sources))
     for folder, table in ROOMS.items():
         problems += check_rooms(sources, folder, table)
-    return problems + list(check_circles(sources))
+    return problems + list(check_circles(sources)) + list(check_names(sources))
 
 
 def print_levels(sources):

@@ -21,10 +21,22 @@ PARTS = ("src", "apps", "nodes", "emulator")
 UNKNOWN_TO_CLANG = {"-fcx-limited-range"}
 
 
+def entries_of_sources(build):
+    """Entries of compile_commands.json, with those that include others' sources (together/) as one for each of these."""
+    for entry in json.loads((build / "compile_commands.json").read_text(encoding="utf-8")):
+        file = Path(entry["file"])
+        if file.parent.name != "together":
+            yield entry
+            continue
+        for path in re.findall(r'^#include "(.*)"$', file.read_text(encoding="utf-8"), re.MULTILINE):
+            source = str((file.parent / path).resolve())
+            yield {**entry, "file": source, "command": entry["command"].replace(str(file), source)}
+
+
 def compile_commands(build, root):
     """Source's path from the root: its compile command without what clang does not know."""
     commands = {}
-    for entry in json.loads((build / "compile_commands.json").read_text(encoding="utf-8")):
+    for entry in entries_of_sources(build):
         try:
             file = Path(os.path.realpath(entry["file"])).relative_to(root).as_posix()
         except ValueError:

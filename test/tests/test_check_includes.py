@@ -166,6 +166,23 @@ class CheckIncludes(unittest.TestCase):
         self.assertIn("mmradartwin_driver  4  3  4  1\n", result.stdout)
         self.assertIn("circle: src/c, src/d", result.stdout)
 
+    def write_unnamed(self, file, *lines):
+        path = self.root / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("\n".join(["namespace mmradartwin {", "namespace {", *lines, "}  // namespace", "}", ""]), encoding="utf-8")
+
+    def test_names_of_one_folder_belong_to_one_source(self):
+        for first, second in [("constexpr int kOther = 1, kMost = 2;", "constexpr double kMost = 3;  // m"),
+                              ("double kMost(double x) {", "std::vector<int> kMost(const std::vector<int>& x) {"),
+                              ("struct kMost {", "class kMost : public Base {")]:
+            self.write_unnamed(f"{SIM}/rays/one.cpp", first)
+            self.write_unnamed(f"{SIM}/rays/two.cpp", "  // kMost", second)
+            self.assert_forbidden(f"{SIM}/rays/two.cpp", "kMost", f"{SIM}/rays/one.cpp")
+            self.write_unnamed(f"{SIM}/rays/two.cpp", "constexpr int kLeast = 0;  // kMost", "  const int kMost = 1;")
+            self.assert_allowed()
+            self.write_unnamed(f"{SIM}/physics/two.cpp", second)
+            self.assert_allowed()
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -1,4 +1,5 @@
-"""package.xml files name only what rosdep knows, and what it does not know is installed by run.sh."""
+"""package.xml files name only what rosdep knows, and what it does not know is installed by run.sh. What demo and try start
+is marked as such in CMakeLists.txt."""
 import glob
 import os
 import re
@@ -49,6 +50,28 @@ def apt_knows_bookworm():
         return "VERSION_CODENAME=bookworm\n" in file.read() and glob.glob("/var/lib/apt/lists/*_Packages*")
 
 
+def started_by(files):
+    """Targets of the repository's compiled programs that scripts and launch files start, with what these include."""
+    left, seen, targets = list(files), set(), set()
+    while left:
+        file = left.pop()
+        if file in seen:
+            continue
+        seen.add(file)
+        with open(os.path.join(ROOT, "launch", file), encoding="utf-8") as opened:
+            text = opened.read()
+        programs = re.findall(r"rosrun (mmradartwin_\w+) (\S+)", text)
+        if file.endswith(".launch"):
+            root = xml.etree.ElementTree.fromstring(text)
+            programs += [(node.get("pkg"), node.get("type")) for node in root.iter("node")]
+            left += [include.get("file").split(")/")[1] for include in root.iter("include")]
+        else:
+            left += re.findall(r"^[^#\n]*?(?:mmradartwin_launch|launched .*) (\w+\.launch)", text, re.MULTILINE)
+        targets |= {f"{package}_{program}" for package, program in programs
+                    if package.startswith("mmradartwin_") and "." not in program}
+    return targets
+
+
 class Dependencies(unittest.TestCase):
     def test_there_are_all_packages(self):
         self.assertGreaterEqual(len(packages()), 8)
@@ -89,6 +112,17 @@ class Dependencies(unittest.TestCase):
     def test_what_rosdep_does_not_know_is_installed_by_name(self):
         for name in known()["no key"]:
             self.assertIn(name, debian_packages())
+
+    def test_demo_and_try_build_what_they_start(self):
+        built = []
+        for file in glob.glob(os.path.join(ROOT, "*", "CMakeLists.txt")):
+            with open(file, encoding="utf-8") as opened:
+                programs = re.findall(r"^mmradartwin_program\((\w+) DEMO ", opened.read(), re.MULTILINE)
+            built += [f"{os.path.basename(os.path.dirname(file))}_{program}" for program in programs]
+        started = started_by(["scripts/demo.sh", "scripts/try.sh"])
+        self.assertIn("mmradartwin_driver_session_player", started)
+        self.assertIn("mmradartwin_dsp_session_to_bag", started)
+        self.assertEqual(sorted(started), sorted(built))
 
     def test_all_packages_bear_one_version_and_have_a_changelog_of_it(self):
         versions = {name: root.findtext("version") for name, root in packages().items()}

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "mmradartwin_dsp/output.h"
+#include "mmradartwin_dsp/program_version.h"
 
 namespace CLI {
 class App;
@@ -27,8 +28,5 @@ void addOutputArguments(CLI::App& app, OutputArguments& output, const std::strin
 void addForceArgument(CLI::App& app, OutputArguments& output);
 /// Adds --jobs; 0 stands for all cores.
 void addJobsArgument(CLI::App& app, int& jobs);
-
-/// The version of the package, with git's word where it was built from a checkout.
-std::string programVersion();
 
 }  // namespace mmradartwin

@@ -12,9 +12,9 @@ namespace {
 
 using Complex = std::complex<double>;
 
-Eigen::FFT<double>& fft() {
-  thread_local Eigen::FFT<double> fft(Eigen::FFT<double>::impl_type(), Eigen::FFT<double>::Unscaled);
-  return fft;
+Eigen::FFT<double>& unscaledFft() {
+  thread_local Eigen::FFT<double> unscaledFft(Eigen::FFT<double>::impl_type(), Eigen::FFT<double>::Unscaled);
+  return unscaledFft;
 }
 
 std::int16_t rounded(double value) {
@@ -43,10 +43,10 @@ void decodeRealChirp(const RadarConfig& radar, const std::uint8_t* bytes, std::i
       highest += n % 2 == 0 ? value : -value;
     }
     highest /= static_cast<double>(2 * N);
-    fft().fwd(spectrum.data(), time.data(), static_cast<Eigen::Index>(2 * N));
+    unscaledFft().fwd(spectrum.data(), time.data(), static_cast<Eigen::Index>(2 * N));
     // A cos p becomes A exp(jp): the half of positive frequencies counts twice.
     for (std::size_t r = 0; r < N; ++r) spectrum[r] *= (r == 0 ? 1.0 : 2.0) / static_cast<double>(2 * N);
-    fft().inv(analytic.data(), spectrum.data(), static_cast<Eigen::Index>(N));
+    unscaledFft().inv(analytic.data(), spectrum.data(), static_cast<Eigen::Index>(N));
     for (std::size_t n = 0; n < N; ++n) {
       // Without the highest frequency, which has no partner: the analytic signal's real part, and exactly, so that no
       // rounding hangs on the transform's last bit.
@@ -66,8 +66,8 @@ void encodeRealChirp(const RadarConfig& radar, const std::int16_t* samples, std:
                      static_cast<double>(samples[2 * (n * receivers + rx) + 1])};
     }
     std::fill(spectrum.begin(), spectrum.end(), Complex(0));
-    fft().fwd(spectrum.data(), analytic.data(), static_cast<Eigen::Index>(N));
-    fft().inv(time.data(), spectrum.data(), static_cast<Eigen::Index>(2 * N));
+    unscaledFft().fwd(spectrum.data(), analytic.data(), static_cast<Eigen::Index>(N));
+    unscaledFft().inv(time.data(), spectrum.data(), static_cast<Eigen::Index>(2 * N));
     for (std::size_t n = 0; n < 2 * N; ++n) {
       const std::int16_t value = rounded(time[n].real() / static_cast<double>(N));
       std::memcpy(bytes + place(radar, rx, n), &value, 2);

@@ -21,7 +21,7 @@ std::optional<std::int16_t> constantValue(const ByteReading& reading, const std:
   return first;
 }
 
-std::string inWords(std::int16_t value) {
+std::string constantInWords(std::int16_t value) {
   return value == 0 ? "only zeros" : "only a constant " + std::to_string(value);
 }
 
@@ -80,9 +80,9 @@ SilentReceivers silentReceivers(const ByteReading& reading, const std::vector<st
     if (!i && !q) continue;
     std::string& what = silent[static_cast<int>(rx)];
     if (i && q) {
-      what = *i == *q ? inWords(*i) : "only constants " + std::to_string(*i) + ", " + std::to_string(*q);
+      what = *i == *q ? constantInWords(*i) : "only constants " + std::to_string(*i) + ", " + std::to_string(*q);
     } else {
-      what = i ? inWords(*i) + " in I" : inWords(*q) + " in Q";
+      what = i ? constantInWords(*i) + " in I" : constantInWords(*q) + " in Q";
     }
   }
   return silent;

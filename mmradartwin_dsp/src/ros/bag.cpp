@@ -377,14 +377,14 @@ Recording fromStretches(BagContents& bag, const std::string& file, const std::st
   return recording;
 }
 
-std::string captureOf(const std::string& pattern, const std::string& pose) {
+std::string captureNamed(const std::string& pattern, const std::string& pose) {
   std::string file = pattern;
   return pattern.empty() ? pattern : file.replace(file.find("{pose}"), 6, pose);
 }
 
 void leaveOutUnseen(Recording& recording, const CubesByPose& assigned) {
   const auto unseen = [&](const Pose& pose) {
-    return !assigned.count(pose.name) && !fs::exists(captureOf(recording.capture_pattern, pose.name));
+    return !assigned.count(pose.name) && !fs::exists(captureNamed(recording.capture_pattern, pose.name));
   };
   recording.poses.erase(std::remove_if(recording.poses.begin(), recording.poses.end(), unseen), recording.poses.end());
   if (recording.poses.empty() && recording.problems.empty()) {
@@ -425,7 +425,7 @@ Recording openBag(const std::string& file, const BagOptions& options) try {
                                                                  const std::function<void(const AdcCube&)>& visit) {
     const auto cubes = assigned->find(pose.name);
     if (cubes != assigned->end() && !cubes->second.empty()) return bag->forEachFrame(pose.name, cubes->second, visit);
-    if (fs::exists(captureOf(pattern, pose.name))) return from_files(pose, visit);
+    if (fs::exists(captureNamed(pattern, pose.name))) return from_files(pose, visit);
     throw InputError(bag->file() + ": pose '" + pose.name +
                      "': bag holds no frames of it; its capture was missing or its time was cut out");
   };

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMostWaiting = 1000;
 constexpr std::int64_t kPlayedAgain_ns = 1000000000;
 
-ros::Time recordTime(std::int64_t stamp_ns) { return toRosTime(std::max<std::int64_t>(1, stamp_ns)); }
+ros::Time spoolTime(std::int64_t stamp_ns) { return toRosTime(std::max<std::int64_t>(1, stamp_ns)); }
 
 std::string inMegabytes(std::uint64_t bytes) { return std::to_string(bytes / 1000000) + " MB"; }
 
@@ -59,7 +59,7 @@ void FrameSpool::beginAnew() {
   state_ = {};
   if (!radar_) return;
   bag_.open(file_, rosbag::bagmode::Write);
-  const ros::Time start = recordTime(0);
+  const ros::Time start = spoolTime(0);
   bag_.write("radar/config", start, *radar_);
   if (session_) bag_.write("session", start, *session_);
   if (scene_) bag_.write("twin/scene", start, *scene_);
@@ -89,7 +89,7 @@ void FrameSpool::setSession(const mmradartwin_msgs::Session& session) {
     if (another) {
       beginAnew();
     } else if (bag_.isOpen()) {
-      bag_.write("session", recordTime(newest_ns_), session);
+      bag_.write("session", spoolTime(newest_ns_), session);
     }
   } catch (const rosbag::BagException& error) {
     state_.problem = error.what();
@@ -100,7 +100,7 @@ void FrameSpool::setScene(const mmradartwin_msgs::Scene& scene) {
   const std::lock_guard<std::mutex> lock(mutex_);
   scene_ = scene;
   try {
-    if (bag_.isOpen()) bag_.write("twin/scene", recordTime(newest_ns_), scene);
+    if (bag_.isOpen()) bag_.write("twin/scene", spoolTime(newest_ns_), scene);
   } catch (const rosbag::BagException& error) {
     state_.problem = error.what();
   }
@@ -171,7 +171,7 @@ void FrameSpool::keep(const mmradartwin_msgs::AdcCube& cube, const Eigen::Isomet
     ++state_.left_out;
     return;
   }
-  const ros::Time time = recordTime(stamp_ns);
+  const ros::Time time = spoolTime(stamp_ns);
   bag_.write("/tf", time, transformOf(T_map_radar, time));
   bag_.write("radar/adc", time, cube);
   ++standing_frames_;

@@ -9,7 +9,7 @@
 namespace mmradartwin {
 namespace {
 
-constexpr double kWarnEvery_s = 5;
+constexpr double kWarnOfFutureEvery_s = 5;
 /// Transforms that are stamped later than this are of a wrong clock.
 constexpr std::int64_t kFuture_ns = 10'000'000'000;
 
@@ -26,7 +26,7 @@ tf2_msgs::TFMessage FutureTransforms::leaveOut(const tf2_msgs::TFMessage& messag
       continue;
     }
     ++count_;
-    ROS_WARN_THROTTLE(kWarnEvery_s,
+    ROS_WARN_THROTTLE(kWarnOfFutureEvery_s,
                       "%s -> %s of %s is left out: its stamp is %.1f s ahead of this computer's clock; synchronise the "
                       "clocks (ntp, chrony)",
                       transform.header.frame_id.c_str(), transform.child_frame_id.c_str(), publisher.c_str(),

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/program_version.h"
 
 namespace mmradartwin {
 namespace {
@@ -48,7 +49,7 @@ int runNode(int argc, char** argv, const NodeDescription& description, const std
       return 0;
     }
     if (argument == "--version") {
-      std::printf("%s %s\n", description.program.c_str(), MMRADARTWIN_VERSION);
+      std::printf("%s %s\n", description.program.c_str(), programVersion().c_str());
       return 0;
     }
     if (argument.find(":=") == std::string::npos) {

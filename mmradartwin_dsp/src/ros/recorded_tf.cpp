@@ -12,7 +12,7 @@ namespace mmradartwin {
 namespace {
 
 /// By how much clocks differ where no delay of a computer or a network explains it any more, s.
-constexpr double kClocksApart_s = 5;
+constexpr double kTransformsApart_s = 5;
 
 std::string spanOf(const StampRecord& stamps) {
   return formatStamp(stamps.first_ns()) + " to " + formatStamp(stamps.last_ns()) + " s";
@@ -57,7 +57,7 @@ std::string RecordedTf::whyWrong(const std::string& map, const std::string& rada
 std::string RecordedTf::clocksApart(const std::string& edge, const StampRecord& frames, const StampRecord& transforms,
                                     double clock_offset_s) const {
   const auto offset = StampRecord::between(frames, transforms);
-  if (!offset || std::abs(offset->later_s - clock_offset_s) <= kClocksApart_s) return "";
+  if (!offset || std::abs(offset->later_s - clock_offset_s) <= kTransformsApart_s) return "";
   char apart[60], option[60];
   // What messages take from their stamp to the recorder, a tenth of a second or so, is in it.
   std::snprintf(apart, sizeof apart, "%.*f s %s", std::abs(offset->later_s) < 20 ? 1 : 0, std::abs(offset->later_s),

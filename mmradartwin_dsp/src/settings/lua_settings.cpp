@@ -54,7 +54,7 @@ class SettingsCall {
   const ScriptCall& call_;
 };
 
-void readProfile(const SettingsCall& call, RawSettings& settings) {
+void readLuaProfile(const SettingsCall& call, RawSettings& settings) {
   call.count(18, 18);
   RawSettings::Profile profile{};
   profile.start_ghz = call.number(1);
@@ -76,7 +76,7 @@ void readProfile(const SettingsCall& call, RawSettings& settings) {
   settings.setProfile(call.integer(0), profile, call.where());
 }
 
-void readChirps(const SettingsCall& call, RawSettings& settings) {
+void readLuaChirps(const SettingsCall& call, RawSettings& settings) {
   call.count(10, 10);
   for (std::size_t i = 3; i < 7; ++i) {
     if (call.number(i) != 0) {
@@ -89,7 +89,7 @@ void readChirps(const SettingsCall& call, RawSettings& settings) {
   settings.setChirps(call.integer(0), call.integer(1), {call.integer(2), mask}, call.where());
 }
 
-void readFrame(const SettingsCall& call, RawSettings& settings) {
+void readLuaFrame(const SettingsCall& call, RawSettings& settings) {
   call.count(6, 9);
   settings.set("chirp_start", call.integer(0), call.where());
   settings.set("chirp_end", call.integer(1), call.where());
@@ -97,7 +97,7 @@ void readFrame(const SettingsCall& call, RawSettings& settings) {
   settings.set("period_ms", call.number(4), call.where());
 }
 
-void readChannels(const SettingsCall& call, RawSettings& settings) {
+void readLuaChannels(const SettingsCall& call, RawSettings& settings) {
   call.count(10, 10);
   int mask = 0;
   for (std::size_t rx = 0; rx < 4; ++rx) mask |= call.integer(3 + rx) & 0xffff ? 1 << rx : 0;
@@ -107,7 +107,7 @@ void readChannels(const SettingsCall& call, RawSettings& settings) {
   settings.set("iq_swap", call.integer(9) & 0xffff, call.where());
 }
 
-void readDataPath(const SettingsCall& call, RawSettings& settings) {
+void readLuaDataPath(const SettingsCall& call, RawSettings& settings) {
   call.count(3, 3);
   settings.set("interface", call.integer(0) & 0xff, call.where());
   settings.set("packet", call.integer(1) & 0xff, call.where());
@@ -138,10 +138,10 @@ void readVariant(const SettingsCall& call, RawSettings& settings) {
 }
 
 /// chirp first, chirp last, then what each transmitter does.
-void refuseBpm(const SettingsCall& call, RawSettings&) {
+void refuseLuaBpm(const SettingsCall& call, RawSettings&) {
   if (!call.zeroFrom(2)) call.refuse(" inverts transmitters by chirp (BPM); " + std::string(kOnlyTdm));
 }
-void refusePhases(const SettingsCall& call, RawSettings&) {
+void refuseLuaPhases(const SettingsCall& call, RawSettings&) {
   if (!call.zeroFrom(2))
     call.refuse(" shifts transmitters' phases by chirp (beam steering or DDMA); " + std::string(kOnlyTdm));
 }
@@ -152,40 +152,40 @@ void refuseStream(const SettingsCall& call, RawSettings&) {
   call.refuse(" streams a constant frequency; " + std::string(kOnlyTdm));
 }
 
-using Reader = void (*)(const SettingsCall&, RawSettings&);
+using LuaReader = void (*)(const SettingsCall&, RawSettings&);
 
-const std::map<std::string, Reader>& readers() {
-  static const std::map<std::string, Reader> all = {{"ProfileConfig", readProfile},
-                                                    {"ChirpConfig", readChirps},
-                                                    {"FrameConfig", readFrame},
-                                                    {"ChanNAdcConfig", readChannels},
-                                                    {"DataPathConfig", readDataPath},
-                                                    {"LVDSLaneConfig", readLanes},
-                                                    {"CaptureCardConfig_Mode", readCardMode},
-                                                    {"CaptureCardConfig_PacketDelay", readPacketDelay},
-                                                    {"deviceVariantSelection", readVariant},
-                                                    {"BpmChirpConfig", refuseBpm},
-                                                    {"SetPerChirpPhaseShifterConfig", refusePhases},
-                                                    {"AdvanceFrameConfig", refuseFrames},
-                                                    {"AdvancedFrameConfig", refuseFrames},
-                                                    {"ContStrConfig", refuseStream}};
+const std::map<std::string, LuaReader>& luaReaders() {
+  static const std::map<std::string, LuaReader> all = {{"ProfileConfig", readLuaProfile},
+                                                       {"ChirpConfig", readLuaChirps},
+                                                       {"FrameConfig", readLuaFrame},
+                                                       {"ChanNAdcConfig", readLuaChannels},
+                                                       {"DataPathConfig", readLuaDataPath},
+                                                       {"LVDSLaneConfig", readLanes},
+                                                       {"CaptureCardConfig_Mode", readCardMode},
+                                                       {"CaptureCardConfig_PacketDelay", readPacketDelay},
+                                                       {"deviceVariantSelection", readVariant},
+                                                       {"BpmChirpConfig", refuseLuaBpm},
+                                                       {"SetPerChirpPhaseShifterConfig", refuseLuaPhases},
+                                                       {"AdvanceFrameConfig", refuseFrames},
+                                                       {"AdvancedFrameConfig", refuseFrames},
+                                                       {"ContStrConfig", refuseStream}};
   return all;
 }
 
 bool isCascade(const std::string& name) { return name.find("_mult") != std::string::npos; }
 bool isAdvancedChirp(const std::string& name) { return name.find("AdvChirp") != std::string::npos; }
 bool configures(const std::string& name) {
-  return readers().count(name) > 0 || isCascade(name) || isAdvancedChirp(name);
+  return luaReaders().count(name) > 0 || isCascade(name) || isAdvancedChirp(name);
 }
 
 void readCall(const ScriptCall& recorded, RawSettings& settings) {
   const SettingsCall call(recorded);
-  const auto reader = readers().find(recorded.name);
+  const auto reader = luaReaders().find(recorded.name);
   if (isCascade(recorded.name)) call.refuse(" configures one of several devices; a radar.yaml holds one");
   if (isAdvancedChirp(recorded.name)) {
     call.refuse(" sets chirps that differ from their profile (advanced chirps); " + std::string(kOnlyTdm));
   }
-  if (reader != readers().end()) reader->second(call, settings);
+  if (reader != luaReaders().end()) reader->second(call, settings);
 }
 
 /// The device by its whole name, as in SelectChipVersion("XWR1843"); "AR1642" is a family there.

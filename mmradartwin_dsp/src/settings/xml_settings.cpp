@@ -61,7 +61,7 @@ class Section {
   std::map<std::string, std::string> values_;
 };
 
-void readProfile(const Section& section, RawSettings& settings) {
+void readXmlProfile(const Section& section, RawSettings& settings) {
   RawSettings::Profile profile{};
   profile.start_ghz = section.number("startFreqConst");
   profile.idle_us = section.number("idleTimeConst");
@@ -85,7 +85,7 @@ void readProfile(const Section& section, RawSettings& settings) {
   settings.setProfile(section.integer("pprofileId"), profile, section.where());
 }
 
-void readChirps(const Section& section, RawSettings& settings) {
+void readXmlChirps(const Section& section, RawSettings& settings) {
   for (const char* variation : {"startFreqVar", "freqSlopeVar", "idleTimeVar", "adcStartTimeVar"}) {
     if (section.has(variation) && section.number(variation) != 0) {
       throw InputError(section.where() + ": " + variation +
@@ -100,7 +100,7 @@ void readChirps(const Section& section, RawSettings& settings) {
 /// The section holds places in the lists of Studio's window, not the values that it sends. Saved files of captures over
 /// LVDS that hold ADC samples only have 1 and 0 (first packet: samples, second: none); no public document says what
 /// the others stand for.
-void readDataPath(const Section& section, RawSettings& settings) {
+void readXmlDataPath(const Section& section, RawSettings& settings) {
   const auto known = [&](const std::string& key, int value, const std::string& meaning) {
     if (section.integer(key) == value) return;
     throw InputError(section.where() + ": " + key + " is " + std::to_string(section.integer(key)) + ", known is " +
@@ -131,8 +131,8 @@ void readXmlSettings(const std::string& file, const std::string& text, RawSettin
                      ": holds neither profile, chirps nor frame (apiname_profile_cfg and so on); save the "
                      "settings in mmWave Studio after they have been sent to the radar");
   }
-  if (profile.there()) readProfile(profile, settings);
-  if (chirps.there()) readChirps(chirps, settings);
+  if (profile.there()) readXmlProfile(profile, settings);
+  if (chirps.there()) readXmlChirps(chirps, settings);
   settings.only_last_chirps = file;
   const auto set = [&](const Section& from, const std::string& name, const std::string& key) {
     settings.set(name, from.integer(key), from.where());
@@ -151,7 +151,7 @@ void readXmlSettings(const std::string& file, const std::string& text, RawSettin
     set(adc, "adc_format", "formatVal");
     set(adc, "iq_swap", "IQSwap");
   }
-  if (const Section path = section("datapath"); path.there()) readDataPath(path, settings);
+  if (const Section path = section("datapath"); path.there()) readXmlDataPath(path, settings);
   if (const Section lanes = section("lvdslane"); lanes.there()) {
     set(lanes, "lane_format", "laneFormat");
     settings.set("lanes", __builtin_popcount(static_cast<unsigned>(lanes.mask("lane", 1, 4, "En"))), lanes.where());

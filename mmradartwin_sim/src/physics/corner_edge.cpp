@@ -10,13 +10,13 @@
 namespace mmradartwin {
 namespace {
 
-constexpr double kInset_m = 0.01;
-constexpr double kSmallestFactor = 0.01;
+constexpr double kCornerInset_m = 0.01;
+constexpr double kSmallestCornerFactor = 0.01;
 
 using Interval = std::pair<double, double>;
 
 /// Stretches of the line point + t along (in the facet's plane) that lie in the facet.
-std::vector<Interval> clip(const Facet& facet, const Eigen::Vector3d& point, const Eigen::Vector3d& along) {
+std::vector<Interval> insideParts(const Facet& facet, const Eigen::Vector3d& point, const Eigen::Vector3d& along) {
   const Eigen::Vector2d p((point - facet.origin).dot(facet.e1), (point - facet.origin).dot(facet.e2));
   const Eigen::Vector2d d(along.dot(facet.e1), along.dot(facet.e2)), n(-d.y(), d.x());
   std::vector<double> crossings;
@@ -44,7 +44,7 @@ double reach(const Facet& facet, const Eigen::Vector3d& point, const Eigen::Vect
   return far;
 }
 
-void addEdges(const Facet& a, const Facet& b, double meet_m, std::vector<CornerEdge>& edges) {
+void addCornerEdges(const Facet& a, const Facet& b, double meet_m, std::vector<CornerEdge>& edges) {
   if (!perpendicular(a, b)) return;
   const Eigen::Vector3d along = a.normal.cross(b.normal).normalized();
   // A point on both planes, near the facets so that no digits are lost.
@@ -57,14 +57,14 @@ void addEdges(const Facet& a, const Facet& b, double meet_m, std::vector<CornerE
   const Eigen::Vector3d in_a = a.normal.cross(along), in_b = b.normal.cross(along);
   for (double side_a : {1.0, -1.0}) {
     const Eigen::Vector3d into_a = side_a * in_a;
-    const std::vector<Interval> part_a = clip(a, point + meet_m * into_a, along);
+    const std::vector<Interval> part_a = insideParts(a, point + meet_m * into_a, along);
     if (part_a.empty()) continue;
     for (double side_b : {1.0, -1.0}) {
       const Eigen::Vector3d into_b = side_b * in_b;
-      for (const Interval& j : clip(b, point + meet_m * into_b, along)) {
+      for (const Interval& j : insideParts(b, point + meet_m * into_b, along)) {
         for (const Interval& i : part_a) {
           const double low = std::max(i.first, j.first), high = std::min(i.second, j.second);
-          if (high - low < kInset_m) continue;
+          if (high - low < kCornerInset_m) continue;
           edges.push_back({a.id, b.id, point + low * along, along, high - low, into_a, into_b, reach(a, point, into_a),
                            reach(b, point, into_b)});
         }
@@ -102,7 +102,7 @@ std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
       if (!boxes[i].box.intersects(boxes[j].box)) continue;
       const Facet& a = scene.facets[std::min(boxes[i].id, boxes[j].id)];
       const Facet& b = scene.facets[std::max(boxes[i].id, boxes[j].id)];
-      if (pair(a, b)) addEdges(a, b, meet_m, edges);
+      if (pair(a, b)) addCornerEdges(a, b, meet_m, edges);
     }
   }
   std::stable_sort(edges.begin(), edges.end(), [](const CornerEdge& a, const CornerEdge& b) {
@@ -122,7 +122,7 @@ void addCornerPath(const PoseContext& context, const ElementsInMap& elements, co
   const double wavelength = context.radar.wavelength_m();
   const double foot_at = to_radar.dot(edge.along);
   const bool inside = foot_at >= 0 && foot_at <= edge.length_m;
-  const double inset = std::min(kInset_m, 0.5 * edge.length_m);
+  const double inset = std::min(kCornerInset_m, 0.5 * edge.length_m);
   const double vertex_at = inside ? foot_at : (foot_at < 0 ? inset : edge.length_m - inset);
   const Eigen::Vector3d foot = edge.origin + foot_at * edge.along, vertex = edge.origin + vertex_at * edge.along;
   const Eigen::Vector3d way = vertex - elements.p;
@@ -137,7 +137,7 @@ void addCornerPath(const PoseContext& context, const ElementsInMap& elements, co
   if (aperture == CornerAperture::kNarrowerFace) across_a = across_b = std::min(across_a, across_b);
   const std::complex<double> factor =
       apertureAxis(-across_a * unit, across_b * unit) * apertureAxis(-foot_at * unit, (edge.length_m - foot_at) * unit);
-  if (std::abs(factor) < kSmallestFactor) return;
+  if (std::abs(factor) < kSmallestCornerFactor) return;
   const Facet &a = context.scene.facets[edge.a], &b = context.scene.facets[edge.b];
   if (!elements.sides.isOpen(a, vertex, elements.p) || !elements.sides.isOpen(b, vertex, elements.p)) return;
   const Eigen::Vector3d lifted = vertex + 2 * kFacesMeet_m * (edge.into_a + edge.into_b);

@@ -9,7 +9,7 @@ namespace mmradartwin {
 namespace {
 
 constexpr double kInset_m = 0.01;
-constexpr double kSmallestFactor = 0.01;
+constexpr double kSmallestCurvedFactor = 0.01;
 
 }  // namespace
 
@@ -42,7 +42,7 @@ std::optional<CurvedEcho> curvedEcho(const PoseContext& context, const ElementsI
   if (!surface.sphere) {
     const double unit = 2 / std::sqrt(wavelength * R), foot = along(elements.p);
     factor = apertureAxis(-foot * unit, (surface.length_m - foot) * unit);
-    if (std::abs(factor) < kSmallestFactor) return std::nullopt;
+    if (std::abs(factor) < kSmallestCurvedFactor) return std::nullopt;
   }
   echo.coefficient = wavelength / (8 * M_PI * R) * (surface.sphere ? divergence : std::sqrt(divergence)) * factor;
   // The reflection point of a transmitter and a receiver that stand close lies at the middle of both.

@@ -13,7 +13,7 @@ namespace {
 
 using Polygon = std::vector<Eigen::Vector2d>;
 
-constexpr double kSmallestFactor = 0.01;
+constexpr double kSmallestTrihedralFactor = 0.01;
 constexpr double kSmallestFace_m2 = 1e-6;
 
 double signedArea(const Polygon& polygon) {
@@ -135,7 +135,7 @@ void addTrihedralPath(const PoseContext& context, const ElementsInMap& elements,
     }
   }
   const std::complex<double> factor = aperturePolygon(parts);
-  if (std::abs(factor) < kSmallestFactor) return;
+  if (std::abs(factor) < kSmallestTrihedralFactor) return;
   for (int id : trihedral.facets) {
     if (!elements.sides.isOpen(context.scene.facets[id], trihedral.apex, elements.p)) return;
   }

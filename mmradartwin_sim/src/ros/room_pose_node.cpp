@@ -14,7 +14,7 @@
 namespace mmradartwin {
 namespace {
 
-constexpr double kWarnEvery_s = 5;
+constexpr double kWarnOfPoseEvery_s = 5;
 // Materials do not matter here; a scene is loaded for a frequency that its materials hold for.
 constexpr double kFrequency_hz = 77.93e9;
 
@@ -117,7 +117,7 @@ void RoomPoseNode::onImu(const sensor_msgs::Imu::ConstPtr& imu) {
     const auto& w = imu->angular_velocity;
     gravity_.add(imu->header.stamp.toSec(), R * Eigen::Vector3d(a.x, a.y, a.z), R * Eigen::Vector3d(w.x, w.y, w.z));
   } catch (const tf2::TransformException& error) {
-    ROS_WARN_THROTTLE(kWarnEvery_s, "imu left out, the place of its frame is not known: %s", error.what());
+    ROS_WARN_THROTTLE(kWarnOfPoseEvery_s, "imu left out, the place of its frame is not known: %s", error.what());
   }
 }
 
@@ -140,7 +140,7 @@ void RoomPoseNode::onInitialPose(const geometry_msgs::PoseWithCovarianceStamped:
 void RoomPoseNode::refuse(const std::string& why) {
   ++refused_;
   problem_ = why;
-  ROS_WARN_THROTTLE(kWarnEvery_s, "no pose published: %s", why.c_str());
+  ROS_WARN_THROTTLE(kWarnOfPoseEvery_s, "no pose published: %s", why.c_str());
 }
 
 void RoomPoseNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {

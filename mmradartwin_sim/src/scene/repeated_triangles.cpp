@@ -9,7 +9,7 @@
 namespace mmradartwin {
 namespace {
 
-using Polygon = std::vector<Eigen::Vector2d>;
+using Corners = std::vector<Eigen::Vector2d>;
 
 constexpr double kWhole = 1 - 1e-4;            // of a triangle's area
 constexpr double kTouch = 1e-7;                // of the smaller triangle's area: rounding
@@ -17,14 +17,14 @@ constexpr double kFullTurn = 2 * M_PI + 0.05;  // of angles about a vertex, and 
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-double areaOf(const Polygon& p) {
+double areaOf(const Corners& p) {
   double sum = 0;
   for (std::size_t i = 1; i + 1 < p.size(); ++i) sum += cross(p[i] - p[0], p[i + 1] - p[0]);
   return 0.5 * sum;
 }
 
-Polygon outline(const PlaneTriangle& t) {
-  Polygon polygon;
+Corners outline(const PlaneTriangle& t) {
+  Corners polygon;
   for (const Eigen::Vector3d& p : t.place) polygon.push_back(p.head<2>());
   return polygon;
 }
@@ -37,10 +37,10 @@ double heightAt(const PlaneTriangle& t, const Eigen::Vector2d& at) {
 
 /// Area that two triangles share (Sutherland and Hodgman), 0 where one is higher than the other.
 double sharedArea(const PlaneTriangle& a, const PlaneTriangle& b, double same_m) {
-  Polygon part = outline(a);
+  Corners part = outline(a);
   for (int k = 0; k < 3 && !part.empty(); ++k) {
     const Eigen::Vector2d from = b.place[k].head<2>(), along = b.place[(k + 1) % 3].head<2>() - from;
-    Polygon kept;
+    Corners kept;
     for (std::size_t i = 0; i < part.size(); ++i) {
       const Eigen::Vector2d &p = part[i], &q = part[(i + 1) % part.size()];
       const double hp = cross(along, p - from), hq = cross(along, q - from);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kSteps = 4, kStepsTogether = 3;  ///< Fisher steps of one hypothesis, of several jointly
 /// Fisher steps of the latents, from the data and from other latents.
-constexpr int kFirstSteps = 14, kFurtherSteps = 3;
+constexpr int kFreshSteps = 14, kFurtherSteps = 3;
 constexpr int kMostExpansions = 8;   ///< rounds in which a state's echoes are collected about the fitted ranges
 constexpr double kSettled_nats = 1;  ///< gain of a round below which these rounds end
 /// Shares of a fold's step that are tried until its places lose nothing.
@@ -35,7 +35,7 @@ ModelState HypothesisFitter::state(const std::vector<NamedParameters>& mechanism
   if (start != nullptr) state.actor_range_m = start->actor_range_m;
   state.echoes = source_.echoes(mechanisms, state.actor_range_m);
   state.latents = start != nullptr ? *start : model_.start(state.echoes);
-  double reached = model_.fit(state.echoes, state.latents, start != nullptr ? kFurtherSteps : kFirstSteps);
+  double reached = model_.fit(state.echoes, state.latents, start != nullptr ? kFurtherSteps : kFreshSteps);
   reached = model_.fitWithoutTrap(state.echoes, state.latents, reached);
   // Echoes depend on ranges to first order only, so that they are collected again about the fitted ranges. A null below
   // its optimum would lend its missing nats to every hypothesis.

@@ -12,7 +12,7 @@
 namespace mmradartwin::diagnosis::frames {
 namespace {
 
-constexpr double kAround_m = 0.3, kAround_deg = 8;  ///< about an echo, in a finding's place
+constexpr double kAroundEcho_m = 0.3, kAroundEcho_deg = 8;  ///< about an echo, in a finding's place
 
 /// Rms over frames with its interval: chi-squared of the frames, and the spread over poses.
 struct Rms {
@@ -64,7 +64,7 @@ std::string lawOf(FrameLawKind kind, bool common) {
   }
 }
 
-std::string wordsOf(FrameLawKind kind, bool common, const Rms& rms) {
+std::string lawInWords(FrameLawKind kind, bool common, const Rms& rms) {
   std::ostringstream text;
   const std::string who = common ? "all echoes" : "one echo";
   const std::string verb = common ? "" : "s";
@@ -103,8 +103,8 @@ std::vector<FrameFinding> lawFindings(const std::vector<PoseLaws>& poses, bool l
           const Eigen::Vector3d at = p.pose->T_map_radar * Eigen::Vector3d(law.range_m * std::cos(law.azimuth_rad),
                                                                            law.range_m * std::sin(law.azimuth_rad), 0);
           FindingPlace place;
-          place.range_m = {std::max(0.0, law.range_m - kAround_m), law.range_m + kAround_m};
-          place.azimuth_deg = {azimuth_deg - kAround_deg, azimuth_deg + kAround_deg};
+          place.range_m = {std::max(0.0, law.range_m - kAroundEcho_m), law.range_m + kAroundEcho_m};
+          place.azimuth_deg = {azimuth_deg - kAroundEcho_deg, azimuth_deg + kAroundEcho_deg};
           place.poses = {p.pose->name};
           place.x_m = at.x();
           place.y_m = at.y();
@@ -122,8 +122,8 @@ std::vector<FrameFinding> lawFindings(const std::vector<PoseLaws>& poses, bool l
       finding.false_alarm_rate = bounds::kFramesFalseAlarmRate;
       finding.parameters = {{"law", "", lawOf(kind, common), {}},
                             {nameOf(kind), unitOf(kind), rms.value, {{rms.low, rms.high}}}};
-      finding.description = wordsOf(kind, common, rms) + places.str() + "; at " + std::to_string(finding.poses.size()) +
-                            " of " + std::to_string(poses.size()) + " poses";
+      finding.description = lawInWords(kind, common, rms) + places.str() + "; at " +
+                            std::to_string(finding.poses.size()) + " of " + std::to_string(poses.size()) + " poses";
       findings.push_back(std::move(finding));
     }
   }

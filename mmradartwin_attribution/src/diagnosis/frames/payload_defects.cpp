@@ -12,17 +12,17 @@ namespace {
 
 constexpr std::size_t kPacketValues = kPacketBytes / 2;
 
-constexpr int kMostPackets = 4;                 ///< packets lost in a row of a slip that is searched for
-constexpr double kRoundingVariance = 1.0 / 12;  ///< of a value, by rounding alone
+constexpr int kMostPackets = 4;                     ///< packets lost in a row of a slip that is searched for
+constexpr double kRealRoundingVariance = 1.0 / 12;  ///< of a value, by rounding alone
 
-struct Run {
+struct ZeroRun {
   std::size_t begin, end;
 };
 
 /// Runs of zeros that are at least as long as a packet. At the end of the recording, whose last packet is short, a
 /// sixteenth of one is enough. Unusable values and missing frames end a run.
-std::vector<Run> zeroRuns(const Payload& payload, const std::vector<int>& order) {
-  std::vector<Run> runs;
+std::vector<ZeroRun> zeroRuns(const Payload& payload, const std::vector<int>& order) {
+  std::vector<ZeroRun> runs;
   std::size_t begin = 0;
   bool inside = false;
   const auto finish = [&](std::size_t end) {
@@ -137,7 +137,7 @@ std::optional<FrameTemplate> longestStretch(const Payload& payload, std::vector<
     freedom += weight[i] - 1;
     sum[i] /= weight[i];
   }
-  return FrameTemplate{std::move(sum), std::max(freedom > 0 ? residual / freedom : 0.0, kRoundingVariance)};
+  return FrameTemplate{std::move(sum), std::max(freedom > 0 ? residual / freedom : 0.0, kRealRoundingVariance)};
 }
 
 /// Blocks of the stream between packet boundaries, and the misfit of each to a template.
@@ -228,12 +228,12 @@ Payload toPayload(const std::vector<AdcCube>& cubes, const std::vector<int>& ord
 ZeroedPackets markZeroedPackets(Payload& payload, const std::vector<int>& order) {
   ZeroedPackets found;
   found.packets = static_cast<long long>((payload.value.size() + kPacketValues - 1) / kPacketValues);
-  const std::vector<Run> runs = zeroRuns(payload, order);
+  const std::vector<ZeroRun> runs = zeroRuns(payload, order);
   if (runs.empty()) return found;
 
   // Share of zeros outside these runs, at each position of a frame and overall.
   std::vector<std::uint8_t> in_run(payload.value.size(), 0);
-  for (const Run& r : runs) std::fill(&in_run[r.begin], &in_run[0] + r.end, std::uint8_t{1});
+  for (const ZeroRun& r : runs) std::fill(&in_run[r.begin], &in_run[0] + r.end, std::uint8_t{1});
   std::vector<int> zeros(payload.frame_values, 0), counted(payload.frame_values, 0);
   for (int f = 0; f < payload.frames; ++f) {
     for (std::size_t i = 0; i < payload.frame_values; ++i) {
@@ -247,9 +247,9 @@ ZeroedPackets markZeroedPackets(Payload& payload, const std::vector<int>& order)
   if (all == 0) return found;  // nothing but zeros: no packet is worse than the others
   const double share = std::max(std::accumulate(zeros.begin(), zeros.end(), 0.0) / all, 1.0 / 65536);
 
-  std::vector<Run> lost;
+  std::vector<ZeroRun> lost;
   std::vector<double> gains;
-  for (const Run& r : runs) {
+  for (const ZeroRun& r : runs) {
     double gain = 0;
     for (std::size_t at = r.begin; at < r.end; ++at) {
       const std::size_t i = at % payload.frame_values;
@@ -262,7 +262,7 @@ ZeroedPackets markZeroedPackets(Payload& payload, const std::vector<int>& order)
   // Packets are counted from arming. A bag may have begun later: the runs themselves then show where packets start.
   const auto packetsAt = [&](std::size_t phase) {
     long long packets = 0;
-    for (const Run& r : lost) {
+    for (const ZeroRun& r : lost) {
       const std::size_t first = firstPacket(payload, r.begin, phase);
       if (first + kPacketValues <= r.end) packets += static_cast<long long>((r.end - first) / kPacketValues);
     }
@@ -270,7 +270,7 @@ ZeroedPackets markZeroedPackets(Payload& payload, const std::vector<int>& order)
   };
   std::size_t phase = 0;
   long long best = packetsAt(0), possible = 0;
-  for (const Run& r : lost) possible += static_cast<long long>((r.end - r.begin) / kPacketValues);
+  for (const ZeroRun& r : lost) possible += static_cast<long long>((r.end - r.begin) / kPacketValues);
   for (std::size_t candidate = 1; best < possible && candidate < kPacketValues; ++candidate) {
     const long long packets = packetsAt(candidate);
     if (packets > best) {

@@ -25,7 +25,7 @@ constexpr double kAlike = 2;  ///< frames over which a body's echo is correlated
 constexpr int kSkirtBins = 8, kPeakBins = 2;  ///< distance from a cell that bounds its surroundings outside and inside
 
 template <typename T>
-T medianOf(std::vector<T> values) {
+T medianOfCopy(std::vector<T> values) {
   const auto middle = values.begin() + static_cast<long>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -47,7 +47,7 @@ double weightedMedian(std::vector<std::pair<double, double>>& values) {
 template <typename T>
 double errorOfMedian(std::vector<T> values, double median) {
   for (T& v : values) v = std::abs(v - median);
-  return 1.25 * 1.48 * medianOf(values) / std::sqrt(static_cast<double>(values.size()));
+  return 1.25 * 1.48 * medianOfCopy(values) / std::sqrt(static_cast<double>(values.size()));
 }
 
 /// Variance of the slope over frames through independent errors.
@@ -284,7 +284,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
     const std::complex<double> sum = std::accumulate(turns.begin(), turns.end(), std::complex<double>(0));
     std::vector<double> angles;
     for (const auto& z : turns) angles.push_back(std::arg(z * std::conj(sum)));
-    const double beside = medianOf(angles);
+    const double beside = medianOfCopy(angles);
     return Turn{std::arg(sum) + beside, errorOfMedian(angles, beside)};
   };
   std::vector<Turn> of_bins;
@@ -432,7 +432,7 @@ void ShotExaminer::readNoise(Spectra& spectra, ShotStatistics& result) const {
     for (std::size_t i = 0; i < spectra.shot.size(); ++i) {
       for (int b = 0; b < spectra.bins; ++b) power[static_cast<std::size_t>(b)] += std::norm(spectra.at(i, b)[k]);
     }
-    const double variance = medianOf(power) / freedom / median_of_mean / window_power;
+    const double variance = medianOfCopy(power) / freedom / median_of_mean / window_power;
     result.noise_variance[static_cast<std::size_t>(k)] = std::max(variance, 1.0 / 6);
   }
   std::vector<float> scale;
@@ -499,7 +499,7 @@ void ShotExaminer::readEvidence(const Spectra& spectra, ShotStatistics& result) 
       for (int d = -kSkirtBins; d <= kSkirtBins; ++d) {
         if (std::abs(d) > kPeakBins && b + d >= 0 && b + d < spectra.bins) around.push_back(ratio(b + d, a));
       }
-      const double q = ratio(b, a) / std::max(1.0f, medianOf(around));
+      const double q = ratio(b, a) / std::max(1.0f, medianOfCopy(around));
       if (q > 1) result.evidence(b, a) = static_cast<float>(freedom * (q - 1 - std::log(q)));
     }
   }

@@ -28,7 +28,7 @@ constexpr double kUsualPower = 14;            ///< which the best of a frame's c
 constexpr int kResponseBins = 2;              ///< half the width of Hann's response in range
 constexpr int kWideBins = 8;                  ///< the same down to the last sidelobes that matter
 constexpr double kApart_bins = 3;             ///< between two walkers in one frame
-constexpr double kBesideShare = 0.003;        ///< of a walker's power, down to which window and array leave sidelobes
+constexpr double kSidelobeShare = 0.003;      ///< of a walker's power, down to which window and array leave sidelobes
 constexpr double kGlint_m = 0.03;             ///< standard error of the place that a body's echo comes from, by frames
 constexpr double kSpeedError_m_per_s = 0.02;  ///< standard error of a body that is no point
 constexpr double kDrop95 = 1.92;              ///< nats below the highest likelihood that bound a 95 % interval
@@ -244,7 +244,7 @@ class Tracker {
       const double at = m.range_m / radar_.range_bin_m(), power = snr[static_cast<std::size_t>(f - run.first)];
       for (int b = 0; b < s_.bins; ++b) {
         const bool near = std::abs(b - at) < std::max(kApart_bins, kBody_m / radar_.range_bin_m());
-        const double share = near ? 1e6 : b > at ? bounds::kMostGhostShare : kBesideShare;
+        const double share = near ? 1e6 : b > at ? bounds::kMostGhostShare : kSidelobeShare;
         spent[b] = std::max(spent[b], static_cast<float>(std::log(1 + share * power)));
       }
     }

@@ -14,14 +14,14 @@ namespace {
 
 constexpr double kSameBody_m = 0.6;          ///< between the end of a track and the beginning of its continuation
 constexpr double kUsualSpeed_m_per_s = 2.0;  ///< of people in rooms, unseen
-constexpr double kOverlap = 0.34;          ///< share of the shorter of two stretches of one way, in which both are seen
-constexpr double kMostAcross_m_per_s = 3;  ///< of people; an interval beyond it tells nothing
-constexpr double kAround_m = 0.5;          ///< about a track, in a finding's place
-constexpr double kAround_deg = 10;
-constexpr double kRangeError_m = 0.1;      ///< standard error along the view, about a range bin
-constexpr double kAngleError_rad = 0.035;  ///< standard error across the view: 2 degrees, the array's errors
+constexpr double kOverlap = 0.34;  ///< share of the shorter of two stretches of one way, in which both are seen
+constexpr double kMostToldAcross_m_per_s = 3;  ///< of people; an interval beyond it tells nothing
+constexpr double kAroundTrack_m = 0.5;         ///< about a track, in a finding's place
+constexpr double kAroundTrack_deg = 10;
+constexpr double kTrackRangeError_m = 0.1;      ///< standard error along the view, about a range bin
+constexpr double kTrackAngleError_rad = 0.035;  ///< standard error across the view: 2 inDegrees, the array's errors
 
-double degrees(double rad) { return rad * 180 / M_PI; }
+double inDegrees(double rad) { return rad * 180 / M_PI; }
 
 /// Track in the map and in time.
 struct Step {
@@ -93,7 +93,7 @@ std::optional<Bounded> speedOf(const WalkTrack& t) {
   if (!t.radial) return std::nullopt;
   const Bounded& radial = *t.radial;
   const double across = std::abs(t.across_m_per_s), half = 1.96 * t.across_error_m_per_s;
-  if (half > kMostAcross_m_per_s) return std::nullopt;
+  if (half > kMostToldAcross_m_per_s) return std::nullopt;
   const double told = across > half ? across : 0;
   Bounded speed;
   speed.value = std::hypot(radial.value, told);
@@ -109,9 +109,10 @@ void addPlace(const Step& s, const RadarConfig& radar, FrameFinding& finding) {
   const double first_s = s.track->first_frame * radar.frame_period_s,
                last_s = s.track->last_frame * radar.frame_period_s;
   const Eigen::Vector2d begin = s.track->at(first_s), end = s.track->at(last_s);
-  place.range_m = {std::max(0.0, std::min(begin[0], end[0]) - kAround_m), std::max(begin[0], end[0]) + kAround_m};
-  place.azimuth_deg = {degrees(std::min(begin[1], end[1])) - kAround_deg,
-                       degrees(std::max(begin[1], end[1])) + kAround_deg};
+  place.range_m = {std::max(0.0, std::min(begin[0], end[0]) - kAroundTrack_m),
+                   std::max(begin[0], end[0]) + kAroundTrack_m};
+  place.azimuth_deg = {inDegrees(std::min(begin[1], end[1])) - kAroundTrack_deg,
+                       inDegrees(std::max(begin[1], end[1])) + kAroundTrack_deg};
   place.poses = {s.pose->name};
   place.x_m = s.middle.x();
   place.y_m = s.middle.y();
@@ -124,9 +125,10 @@ void addPosition(const Step& s, FrameFinding& finding) {
   const Eigen::Vector2d ray = s.middle - s.pose->T_map_radar.translation().head<2>();
   const double range_m = std::max(0.1, ray.norm());
   const Eigen::Vector2d along = ray / range_m, across(-along.y(), along.x());
-  const double across_m = kAngleError_rad * range_m;
+  const double across_m = kTrackAngleError_rad * range_m;
   const Eigen::Vector2d half =
-      1.96 * (along.cwiseAbs2() * kRangeError_m * kRangeError_m + across.cwiseAbs2() * across_m * across_m).cwiseSqrt();
+      1.96 * (along.cwiseAbs2() * kTrackRangeError_m * kTrackRangeError_m + across.cwiseAbs2() * across_m * across_m)
+                 .cwiseSqrt();
   finding.parameters.push_back({"x_m", "m", s.middle.x(), {{s.middle.x() - half.x(), s.middle.x() + half.x()}}});
   finding.parameters.push_back({"y_m", "m", s.middle.y(), {{s.middle.y() - half.y(), s.middle.y() + half.y()}}});
 }
@@ -175,7 +177,7 @@ std::string wordsOf(const Person& person, const Step& strongest) {
   const WalkTrack& t = *strongest.track;
   std::ostringstream text;
   text << "someone walks at (" << strongest.middle.x() << ", " << strongest.middle.y() << ") m in the map, at "
-       << t.range_m << " m and " << degrees(t.azimuth_rad) << " deg of pose " << strongest.pose->name;
+       << t.range_m << " m and " << inDegrees(t.azimuth_rad) << " deg of pose " << strongest.pose->name;
   if (t.radial) {
     text << ", " << (t.radial->value > 0 ? "away from" : "towards") << " the radar at " << std::abs(t.radial->value)
          << " m/s";

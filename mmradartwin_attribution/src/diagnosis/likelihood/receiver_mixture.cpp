@@ -12,7 +12,7 @@ namespace {
 
 /// Power over that of the pose's strongest echo from which a path is sent through the receiver. Products of weaker
 /// paths lie below the clutter.
-constexpr double kStrongShare = 1e-2;
+constexpr double kStrongEchoShare = 1e-2;
 constexpr std::size_t kMostPaired = 8;    ///< paths that are also sent in pairs
 constexpr double kRoundingShare = 1e-12;  ///< share of a path's power that is rounding
 constexpr std::size_t kMostKept = 64;     ///< responses of a pose
@@ -74,7 +74,7 @@ void ReceiverMixture::send(Alone& path) const {
 void ReceiverMixture::scaleTones(std::vector<PathRecord>& paths, const EchoCollector& collector) {
   std::sort(paths.begin(), paths.end(),
             [](const PathRecord& a, const PathRecord& b) { return a.amplitude > b.amplitude; });
-  const double least = paths.empty() ? 0 : std::sqrt(kStrongShare) * paths.front().amplitude;
+  const double least = paths.empty() ? 0 : std::sqrt(kStrongEchoShare) * paths.front().amplitude;
   for (PathRecord& record : paths) {
     if (record.amplitude <= least) break;
     Alone path{record, receiver_};

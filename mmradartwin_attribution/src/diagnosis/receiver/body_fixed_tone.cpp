@@ -20,7 +20,7 @@ constexpr double kStep_bins = 0.02;  ///< between ranges that are tried
 constexpr int kNeither = 12;
 constexpr double kTail = 4;            ///< degrees of freedom of the complex t, as in ChannelLikelihood
 constexpr double kShare = 0.5;         ///< weight of a bin: neighbours overlap through the window
-constexpr int kRounds = 6;             ///< iterations of the weights
+constexpr int kWeightRounds = 6;       ///< iterations of the weights
 constexpr double kLeastScale = 1e-30;  ///< floor of a bin's scale, against division by zero
 
 /// Samples [1][N] of a tone of amplitude 1 at a range, with phase 0 at the window's centre.
@@ -103,7 +103,7 @@ ToneFit fitTone(const FirstBins& data, const Eigen::VectorXcd& kernel, bool with
     std::nth_element(power.begin(), power.begin() + power.size() / 2, power.end());
     scale[static_cast<Eigen::Index>(r)] = std::max(power[power.size() / 2], kLeastScale);
   }
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kWeightRounds; ++round) {
     Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(data.channels());
     double total = 0;
     for (std::size_t r = 0; r < bins; ++r) {

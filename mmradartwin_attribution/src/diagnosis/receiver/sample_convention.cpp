@@ -18,7 +18,7 @@ namespace mmradartwin::diagnosis::receiver {
 namespace {
 
 constexpr std::size_t kPoses = 8;  ///< poses that are tried: a convention shows at every one
-constexpr int kIterations =
+constexpr int kConventionIterations =
     30;  ///< Fisher steps of the latents; see docs/verification/calibration_of_bounds.md#kiterations
 constexpr double kBetter_nats = 1;    ///< gain from which a step to another order is taken
 constexpr int kMostReceivers = 4;     ///< receivers up to which all orders are tried
@@ -267,7 +267,7 @@ std::optional<SampleConvention> findSampleConvention(const Twin& twin, const Cha
   std::vector<std::pair<double, NamedParameters>> tried;
   for (const char* name : {"iq_conjugation", "channel_conjugation"}) {
     const NamedParameters m = defaultMechanism(name);
-    tried.emplace_back(likelihood(&m, kIterations), m);
+    tried.emplace_back(likelihood(&m, kConventionIterations), m);
   }
   const std::vector<std::vector<int>> starts = startOrders(data.radar, likelihood);
   const std::vector<int>& same = starts.front();
@@ -276,9 +276,9 @@ std::optional<SampleConvention> findSampleConvention(const Twin& twin, const Cha
     const std::vector<int> order = climb(start, likelihood);
     if (order == same || !ends.insert(order).second) continue;
     const NamedParameters m = permutation(order);
-    tried.emplace_back(likelihood(&m, kIterations), m);
+    tried.emplace_back(likelihood(&m, kConventionIterations), m);
   }
-  const double as_said = likelihood(nullptr, kIterations);
+  const double as_said = likelihood(nullptr, kConventionIterations);
   std::stable_sort(tried.begin(), tried.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   const double gain = tried.front().first - as_said;
   if (gain < bounds::kLeastConventionNatsPerPose * likelihood.poses()) return std::nullopt;

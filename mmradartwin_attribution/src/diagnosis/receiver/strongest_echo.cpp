@@ -9,12 +9,12 @@
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-constexpr double kDbPerNeper = 8.685889638065035;
+constexpr double kDecibelPerNeper = 8.685889638065035;
 constexpr double kLevelError_db = 0.3;  ///< standard error for an echo alone in its cell
 /// Standard error for an echo that shares its cell, as relative phases are random.
 constexpr double kSharedError_db = 3;
-constexpr double kReach_bins = 2.5;    ///< distance within which echoes share a cell
-constexpr double kLobeOverTone = 1.5;  ///< power summed over Hann's main lobe, over that of the tone
+constexpr double kCellReach_bins = 2.5;  ///< distance within which echoes share a cell
+constexpr double kLobeOverTone = 1.5;    ///< power summed over Hann's main lobe, over that of the tone
 
 /// Mean power over the channels, by range bin.
 Eigen::VectorXd measuredPower(const PoseChannels& pose) {
@@ -62,7 +62,8 @@ MeasuredEcho strongestMeasured(const Twin& twin, const ChannelData& data) {
       const double lobe = tonePower(measured, bin);
       if (lobe <= strongest) continue;
       double all = 0;
-      for (const auto& [other, other_power] : expected) all += std::abs(other - place) < kReach_bins ? other_power : 0;
+      for (const auto& [other, other_power] : expected)
+        all += std::abs(other - place) < kCellReach_bins ? other_power : 0;
       const double own = lobe * power / all;
       if (own <= strongest) continue;
       strongest = own;
@@ -91,13 +92,13 @@ double strongestMeasured(const ChannelData& data) {
 void referToStrongestEcho(const Twin& twin, const ChannelData& data, Finding& f) {
   const MeasuredEcho echo = strongestMeasured(twin, data);
   if (!(echo.amplitude > 0)) return;
-  changeLevel(f, kDbPerNeper * std::log(strongestMeasured(data) / echo.amplitude), errorOf_db(echo));
+  changeLevel(f, kDecibelPerNeper * std::log(strongestMeasured(data) / echo.amplitude), errorOf_db(echo));
 }
 
 void referToStrongestHost(const Twin& twin, const ChannelData& data, double log_gain, double amplitude, Finding& f) {
   const MeasuredEcho echo = strongestMeasured(twin, data);
   if (!(echo.amplitude > 0)) return;
-  changeLevel(f, kDbPerNeper * (std::log(echo.amplitude / amplitude) - 0.5 * log_gain), errorOf_db(echo));
+  changeLevel(f, kDecibelPerNeper * (std::log(echo.amplitude / amplitude) - 0.5 * log_gain), errorOf_db(echo));
 }
 
 }  // namespace mmradartwin::diagnosis::receiver

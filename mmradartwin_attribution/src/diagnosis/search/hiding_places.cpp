@@ -10,8 +10,8 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kGrid_m = 0.1;        ///< spacing of the places, at least
-constexpr double kMostPlaces = 20000;  ///< places of a grid; that of a hall is coarser
+constexpr double kHidingGrid_m = 0.1;        ///< spacing of the places, at least
+constexpr double kMostHidingPlaces = 20000;  ///< places of a grid; that of a hall is coarser
 constexpr double kWidths_m[] = {0.2, 0.35, 0.6};
 constexpr double kBesideRadar_m = 0.1;  ///< nothing stands nearer to where the radar stood
 constexpr int kBinsOfEcho = 2;          ///< bins to each side that an echo fills
@@ -65,7 +65,7 @@ std::vector<HidingPlace> hidingPlaces(const Scene& scene, const ChannelLikelihoo
   for (const Actor& a : scene.actors) bounds.extend(a.bounds);
   if (paths.empty() || bounds.isEmpty()) return {};
   const Eigen::Vector2d first = bounds.min().head<2>(), size = bounds.sizes().head<2>();
-  const double grid_m = std::max(kGrid_m, std::sqrt(size.prod() / kMostPlaces));
+  const double grid_m = std::max(kHidingGrid_m, std::sqrt(size.prod() / kMostHidingPlaces));
   const int nx = static_cast<int>(size.x() / grid_m), ny = static_cast<int>(size.y() / grid_m);
   std::vector<HidingPlace> places(static_cast<std::size_t>(std::max(0, nx)) *
                                   static_cast<std::size_t>(std::max(0, ny)));

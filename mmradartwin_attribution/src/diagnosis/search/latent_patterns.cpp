@@ -9,9 +9,9 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kStep = 0.125;         ///< step of numerical derivatives, scaled
-constexpr double kMostStart = 8;        ///< limit of a start, scaled
-constexpr Eigen::Index kAlongLaw = 25;  ///< places of a law at which a named hypothesis is compared
+constexpr double kStep = 0.125;          ///< step of numerical derivatives, scaled
+constexpr double kMostPatternStart = 8;  ///< limit of a start, scaled
+constexpr Eigen::Index kAlongLaw = 25;   ///< places of a law at which a named hypothesis is compared
 
 /// Geometry that explains the latents: least squares of its coordinates v in z = D v, where z holds the errors of
 /// actors and poses in standard deviations and D how the geometry changes ranges and directions.
@@ -46,7 +46,7 @@ Screened sharedGeometry(ExpectedEchoes& source, const Hypothesis& hypothesis, co
   }
   const Eigen::VectorXd v = design.completeOrthogonalDecomposition().solve(latents);
   std::vector<double> start;
-  for (Eigen::Index c = 0; c < columns; ++c) start.push_back(std::clamp(v[c], -kMostStart, kMostStart));
+  for (Eigen::Index c = 0; c < columns; ++c) start.push_back(std::clamp(v[c], -kMostPatternStart, kMostPatternStart));
   return {hypothesis, 0.5 * (design * v).squaredNorm(), {start}};
 }
 

@@ -32,9 +32,9 @@ constexpr int kBearings = 24;                               ///< directions over
 constexpr int kLeastPathsOfActor = 12;                      ///< measured paths of an actor that has laws of its own
 /// Residual scatter over the previous one, below which a law is judged by its own scatter.
 constexpr double kOwnScatterShare = 0.7;
-constexpr double kWeakest_db = -45;          ///< in a law over amplitudes, weaker echoes count as this strong
-constexpr double kGainPerNumber_nats = 0.5;  ///< expected gain per number by chance
-constexpr double kMostStart = 8;             ///< limit of a start, scaled
+constexpr double kWeakest_db = -45;             ///< in a law over amplitudes, weaker echoes count as this strong
+constexpr double kLawGainPerNumber_nats = 0.5;  ///< expected gain per number by chance
+constexpr double kMostLawStart = 8;             ///< limit of a start, scaled
 
 /// Deviations of all paths in one observable, robustly weighted. P: paths, G: latents, K: directions of a law.
 struct Sample {
@@ -341,13 +341,14 @@ std::optional<Screened> LawScreen::best(const Sample& sample, const Over& over) 
   result.hypothesis.variant = best->words;
   result.hypothesis.coordinates = coordinatesOf(*best, observable);
   result.hypothesis.searched = best->searched + 1;  // one more for the variable
-  result.screened_nats = of_best.raw / of_best.overdispersion - kGainPerNumber_nats * best->priced(observable.constant);
+  result.screened_nats =
+      of_best.raw / of_best.overdispersion - kLawGainPerNumber_nats * best->priced(observable.constant);
   result.starts = {{}};
   for (Eigen::Index k = 0; k < of_best.value.size(); ++k) {
     // All values of a curve contain the constant; in other forms it is the first number.
     const bool has_constant = observable.constant && (k == 0 || best->words.empty());
     const double value = of_best.value[k] + (has_constant ? of_best.constant : 0);
-    result.starts.front().push_back(std::clamp(value / observable.typical, -kMostStart, kMostStart));
+    result.starts.front().push_back(std::clamp(value / observable.typical, -kMostLawStart, kMostLawStart));
   }
   return result;
 }
@@ -379,7 +380,7 @@ std::optional<Screened> LawScreen::bestBearing() const {
   }
   if (best_of_all) {
     ++best_of_all->hypothesis.searched;
-    best_of_all->screened_nats -= kGainPerNumber_nats;
+    best_of_all->screened_nats -= kLawGainPerNumber_nats;
   }
   return best_of_all;
 }
@@ -441,8 +442,8 @@ std::optional<Screened> LawScreen::bestPlace(const std::string& variable) const 
   result.hypothesis.coordinates = {
       {observable.parameter, observable.unit, 0, 0, observable.typical, -observable.limit, observable.limit}};
   result.hypothesis.searched = 4;  // place, radius and the variable
-  result.screened_nats = nats - kGainPerNumber_nats * kSpotNumbers;
-  result.starts = {{std::clamp(best.regression.value[0] / observable.typical, -kMostStart, kMostStart)}};
+  result.screened_nats = nats - kLawGainPerNumber_nats * kSpotNumbers;
+  result.starts = {{std::clamp(best.regression.value[0] / observable.typical, -kMostLawStart, kMostLawStart)}};
   return result;
 }
 
@@ -479,7 +480,7 @@ bool LawScreen::gainsFollowTime(const std::optional<Screened>& steps) const {
     by_time = std::max(by_time, regress(gain(), directionsOfPoses(afterSteps(steps_s))).raw);
   }
   const double by_pose = regress(gain(), directionsOfPoses(Eigen::MatrixXd::Identity(poses, poses))).raw;
-  const double by_chance = kGainPerNumber_nats * whole_ * static_cast<double>(poses);
+  const double by_chance = kLawGainPerNumber_nats * whole_ * static_cast<double>(poses);
   return by_pose - by_chance < bounds::kBeyondTime * by_time + bounds::kPriceOfLawNumber_nats;
 }
 
@@ -547,10 +548,10 @@ std::optional<Screened> LawScreen::bestSteps() const {
     h.mechanism.values.set("steps_s", sorted_s);
     h.variant += steps > 1 ? " where they show" : " where it shows";
     h.searched = steps;  // the times of the steps
-    result->screened_nats = nats - kGainPerNumber_nats * 2 * count;
+    result->screened_nats = nats - kLawGainPerNumber_nats * 2 * count;
     result->starts = {{}};
     for (double step_db : regression.value)
-      result->starts.front().push_back(std::clamp(step_db, -kMostStart, kMostStart));
+      result->starts.front().push_back(std::clamp(step_db, -kMostLawStart, kMostLawStart));
   }
   return result;
 }

@@ -11,14 +11,14 @@ namespace {
 
 constexpr double kSides_m[] = {0.25, 0.45};               ///< sides of a box that are tried
 constexpr double kTurned_deg = 15, kSquare_deg = 90;      ///< step of its turns; a square repeats after a quarter turn
-constexpr std::size_t kFacing = 5;                        ///< poses that a side of a box may face
+constexpr std::size_t kFacingPoses = 5;                   ///< poses that a side of a box may face
 constexpr double kSideFactors[] = {0.6, 0.8, 1.25, 1.6};  ///< factors on a side
-constexpr double kShifts_m[] = {-0.1, -0.05, 0.05, 0.1};  ///< shifts of a place
-constexpr double kTurns_deg[] = {-8, -3, 3, 8};           ///< turns about itself
-constexpr double kPlaceOffsets_m[] = {-0.1, 0, 0.1};      ///< offsets from the place that hidden paths pass
-constexpr int kSweeps = 4;                                ///< sweeps over the surroundings of a fit
-constexpr double kLeastSweepGain_nats = 5;                ///< gain of a sweep from which another one follows
-constexpr double kLeastForSweeps_nats = 15;               ///< gain of a fit from which it is swept
+constexpr double kPlaceShifts_m[] = {-0.1, -0.05, 0.05, 0.1};  ///< shifts of a place
+constexpr double kPlaceTurns_deg[] = {-8, -3, 3, 8};           ///< turns about itself
+constexpr double kPlaceOffsets_m[] = {-0.1, 0, 0.1};           ///< offsets from the place that hidden paths pass
+constexpr int kSweeps = 4;                                     ///< sweeps over the surroundings of a fit
+constexpr double kLeastSweepGain_nats = 5;                     ///< gain of a sweep from which another one follows
+constexpr double kLeastForSweeps_nats = 15;                    ///< gain of a fit from which it is swept
 
 /// Indices of a box's coordinates.
 enum Coordinates { kX, kY, kSide, kYaw };
@@ -52,11 +52,11 @@ std::vector<std::vector<double>> boxesAround(const HypothesisFit& fit) {
       for (int j : {-1, 0, 1}) add(center + half_m * (i * u + j * v), grown * side_m, yaw_deg);
     }
   }
-  for (double shift_m : kShifts_m) {
+  for (double shift_m : kPlaceShifts_m) {
     add(center + shift_m * u, side_m, yaw_deg);
     add(center + shift_m * v, side_m, yaw_deg);
   }
-  for (double turn_deg : kTurns_deg) add(center, side_m, yaw_deg + turn_deg);
+  for (double turn_deg : kPlaceTurns_deg) add(center, side_m, yaw_deg + turn_deg);
   return boxes;
 }
 
@@ -70,9 +70,9 @@ std::vector<std::vector<double>> placesAround(const HypothesisFit& fit) {
   };
   for (std::size_t i = 0; i < fit.scaled_values.size(); ++i) {
     if (fit.hypothesis.coordinates[i].unit == "deg") {
-      for (double turn_deg : kTurns_deg) add(i, turn_deg);
+      for (double turn_deg : kPlaceTurns_deg) add(i, turn_deg);
     } else if (fit.hypothesis.coordinates[i].unit == "m") {
-      for (double shift_m : kShifts_m) add(i, shift_m);
+      for (double shift_m : kPlaceShifts_m) add(i, shift_m);
     }
   }
   return places;
@@ -105,7 +105,7 @@ Screened asBox(const ChannelData& data, const ModelState& null, const Hypothesis
   std::vector<std::pair<double, std::size_t>> seen;
   for (std::size_t i = 0; i < data.poses.size(); ++i) seen.emplace_back(null.by_pose[i] - cylinder.state.by_pose[i], i);
   std::sort(seen.begin(), seen.end());
-  seen.resize(std::min(kFacing, seen.size()));
+  seen.resize(std::min(kFacingPoses, seen.size()));
   for (const auto& [gain, i] : seen) {
     const Eigen::Vector2d way = (data.poses[i].pose.T_map_radar.translation().head<2>() - axis).normalized();
     startBehind(way, std::fmod(std::atan2(way.y(), way.x()) * 180 / M_PI + 360, kSquare_deg));

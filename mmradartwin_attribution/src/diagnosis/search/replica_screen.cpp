@@ -17,7 +17,7 @@ namespace mmradartwin::diagnosis::search {
 namespace {
 
 /// Power of an echo whose replicas are searched for, over that of the pose's strongest one.
-constexpr double kLeastPower = 1e-4;
+constexpr double kLeastReplicaPower = 1e-4;
 constexpr double kNearest_bins = 1.75;           ///< from an echo: nearer bins belong to its main lobe
 constexpr double kFarthest_m = 3;                ///< from an echo
 constexpr double kStep_bins = 0.125;             ///< between distances
@@ -102,7 +102,7 @@ void ReplicaScan::scan(const Twin& twin, std::size_t j) {
   double strongest = 0;
   for (const PathRecord& r : records) strongest = std::max(strongest, r.amplitude);
   for (const PathRecord& r : records) {
-    if (r.bounces == 0 || r.amplitude * r.amplitude < kLeastPower * strongest * strongest) continue;
+    if (r.bounces == 0 || r.amplitude * r.amplitude < kLeastReplicaPower * strongest * strongest) continue;
     std::set<std::size_t> met = {0};
     for (int a : r.actors) {
       if (a >= 0) met.insert(1 + static_cast<std::size_t>(a));
@@ -196,8 +196,8 @@ Hypothesis ReplicaScan::hypothesisOf(const Peak& peak) const {
 
 /// The best of the highest peaks by `look`. The scan has few levels and takes echoes one by one, so that the whole
 /// likelihood decides. The distance becomes a coordinate to be fitted.
-std::optional<Screened> bestOf(const ReplicaScan& scan, std::vector<Peak> peaks, std::size_t looks,
-                               const std::function<Screened(const Hypothesis&)>& look) {
+std::optional<Screened> bestReplica(const ReplicaScan& scan, std::vector<Peak> peaks, std::size_t looks,
+                                    const std::function<Screened(const Hypothesis&)>& look) {
   std::sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) { return a.rank > b.rank; });
   if (peaks.size() > looks) peaks.resize(looks);
   std::optional<Screened> best;
@@ -224,13 +224,13 @@ std::vector<Screened> screenReplicas(const Twin& base, const ChannelLikelihood& 
   }
   const ReplicaScan scan(base, model, null, poses);
   std::vector<Screened> result;
-  if (auto of_all = bestOf(scan, scan.peaksOf(0, least_nats), kLooks, look)) result.push_back(std::move(*of_all));
+  if (auto of_all = bestReplica(scan, scan.peaksOf(0, least_nats), kLooks, look)) result.push_back(std::move(*of_all));
   std::vector<Peak> peaks;
   for (std::size_t target = 1; target < scan.targets(); ++target) {
     for (const Peak& p : scan.peaksOf(target, least_nats)) peaks.push_back(p);
   }
-  if (auto of_one = bestOf(scan, std::move(peaks), kLooks, look)) result.push_back(std::move(*of_one));
-  std::optional<Screened> face = bestOf(scan, scan.secondFaces(), kFaces, look);
+  if (auto of_one = bestReplica(scan, std::move(peaks), kLooks, look)) result.push_back(std::move(*of_one));
+  std::optional<Screened> face = bestReplica(scan, scan.secondFaces(), kFaces, look);
   if (face && face->screened_nats > bounds::kLeastNatsOfSecondFace) result.push_back(std::move(*face));
   return result;
 }

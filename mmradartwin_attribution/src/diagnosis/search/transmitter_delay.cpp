@@ -7,9 +7,9 @@
 namespace mmradartwin::diagnosis::search {
 namespace {
 
-constexpr double kFarthest_m = 2;    ///< longest delay that is looked for, one-way
-constexpr double kStep_bins = 0.25;  ///< of range, between delays that are looked at
-constexpr int kRefinements = 6;      ///< halvings of the step about the best one
+constexpr double kLongestDelay_m = 2;     ///< longest delay that is looked for, one-way
+constexpr double kDelayStep_bins = 0.25;  ///< of range, between delays that are looked at
+constexpr int kRefinements = 6;           ///< halvings of the step about the best one
 constexpr double kPhases_deg[] = {0, 90, 180, -90};
 
 /// Windowed product of two transmitters' samples, summed over receivers, one pose.
@@ -42,7 +42,7 @@ double powerAt(const std::vector<Eigen::VectorXcd>& products, double bins) {
 
 std::vector<double> transmitterDelays_m(const ChannelData& data) {
   const int receivers = data.radar.receivers();
-  const double bin_m = data.radar.range_bin_m(), farthest = kFarthest_m / bin_m;
+  const double bin_m = data.radar.range_bin_m(), farthest = kLongestDelay_m / bin_m;
   std::vector<double> delays_m = {0};
   for (int slot = 1; slot < data.radar.slots(); ++slot) {
     std::vector<Eigen::VectorXcd> products;
@@ -54,8 +54,8 @@ std::vector<double> transmitterDelays_m(const ChannelData& data) {
       power = there;
       best = bins;
     };
-    for (double bins = -farthest; bins <= farthest; bins += kStep_bins) tryAt(bins);
-    for (double step = kStep_bins / 2; step > kStep_bins / std::pow(2.0, kRefinements); step /= 2) {
+    for (double bins = -farthest; bins <= farthest; bins += kDelayStep_bins) tryAt(bins);
+    for (double step = kDelayStep_bins / 2; step > kDelayStep_bins / std::pow(2.0, kRefinements); step /= 2) {
       const double middle = best;
       tryAt(middle - step);
       tryAt(middle + step);

@@ -3,13 +3,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "channel_conjugation";
+const std::string kChannelConjugation = "channel_conjugation";
 
 /// The channel vector of every range bin conjugated: echoes at -azimuth, at their range. Conjugate and reversal of time
 /// (n to N - n, which leaves the periodic Hann window as it is) conjugate the range spectrum and nothing else.
 class ChannelConjugation : public Mechanism, public ReceiveStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kChannelConjugation; }
   std::vector<ParameterSpec> parameters() const override { return {}; }
   void configure(const Parameters&, const Scene&, const RadarConfig&) override {}
   int rank() const override { return 31; }

@@ -4,12 +4,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "channel_permutation";
+const std::string kChannelPermutation = "channel_permutation";
 
 /// Virtual channels delivered in another order.
 class ChannelPermutation : public Mechanism, public ReceiveStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kChannelPermutation; }
   std::vector<ParameterSpec> parameters() const override {
     ParameterSpec order =
         optionalNumbersSpec("order", "1", 0, 1023, "order[i] is the true channel delivered in place i");

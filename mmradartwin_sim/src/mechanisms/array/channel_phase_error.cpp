@@ -6,12 +6,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "channel_phase_error";
+const std::string kChannelPhaseError = "channel_phase_error";
 
 /// A phase and gain per virtual channel, the same for all paths.
 class ChannelPhaseError : public Mechanism, public ReceiveStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kChannelPhaseError; }
   std::vector<ParameterSpec> parameters() const override {
     ParameterSpec phase = numberSpec("phase_deg", "deg", -360, 360, "per virtual channel, channel 0 is 0");
     phase.kind = ParameterKind::kNumbers;

@@ -6,12 +6,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "element_pattern";
+const std::string kElementPattern = "element_pattern";
 
 /// Directivity of the elements: roll-off with azimuth as a cosine or a measured curve, and with elevation as a curve.
 class ElementPattern : public Mechanism, public WeightStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kElementPattern; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("cos_exponent", "1", 0, 100, 0, "n of the one-way power cos^n of the azimuth"), 0, 1.5),
             optionalNumbersSpec("angles_deg", "deg", -180, 180,
@@ -22,8 +22,8 @@ class ElementPattern : public Mechanism, public WeightStage {
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     exponent_ = values.number("cos_exponent");
-    azimuth_ = {values.numbers("angles_deg"), values.numbers("gain_db"), kName, "angles_deg", "gain_db"};
-    elevation_ = {values.numbers("elevation_angles_deg"), values.numbers("elevation_gain_db"), kName,
+    azimuth_ = {values.numbers("angles_deg"), values.numbers("gain_db"), kElementPattern, "angles_deg", "gain_db"};
+    elevation_ = {values.numbers("elevation_angles_deg"), values.numbers("elevation_gain_db"), kElementPattern,
                   "elevation_angles_deg", "elevation_gain_db"};
   }
   void reweight(const PoseContext&, PathRecord& record) const override {

@@ -6,12 +6,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "elevation_pattern";
+const std::string kElevationPattern = "elevation_pattern";
 
 /// Roll-off of the elements with elevation, as a cosine or a measured curve.
 class ElevationPattern : public Mechanism, public WeightStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kElevationPattern; }
   std::vector<ParameterSpec> parameters() const override {
     return {
         tried(numberSpec("cos_exponent", "1", 0, 100, 0, "n of the one-way power cos^n"), 0, 8),
@@ -20,7 +20,7 @@ class ElevationPattern : public Mechanism, public WeightStage {
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     exponent_ = values.number("cos_exponent");
-    curve_ = {values.numbers("angles_deg"), values.numbers("gain_db"), kName, "angles_deg", "gain_db"};
+    curve_ = {values.numbers("angles_deg"), values.numbers("gain_db"), kElevationPattern, "angles_deg", "gain_db"};
   }
   void reweight(const PoseContext&, PathRecord& record) const override {
     // One-way powers of both legs make the two-way power; its root is the amplitude.

@@ -7,7 +7,7 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "mutual_coupling";
+const std::string kMutualCoupling = "mutual_coupling";
 
 /// Neighbouring receive elements feed each other: y = C x within the receivers of each transmitter, C symmetric and
 /// Toeplitz with ones on its diagonal. Beside it stands level_db at phase_deg, decay_db less and phase_deg more for
@@ -15,7 +15,7 @@ const std::string kName = "mutual_coupling";
 /// follow from nothing: no level and phase are known where there is no coupling.
 class MutualCoupling : public Mechanism, public ReceiveStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kMutualCoupling; }
   std::vector<ParameterSpec> parameters() const override {
     const auto share = [](const char* name, const char* meaning) {
       return tried(numberSpec(name, "1", -1, 1, 0, meaning), 0, 0.05);

@@ -6,13 +6,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "transmitter_coupling";
+const std::string kTransmitterCoupling = "transmitter_coupling";
 
 /// A transmitter that is switched off still radiates a little: every transmitter's slot carries the others' signals,
 /// too, all at the same complex share.
 class TransmitterCoupling : public Mechanism, public ReceiveStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kTransmitterCoupling; }
   std::vector<ParameterSpec> parameters() const override {
     const auto share = [](const char* name, const char* meaning) {
       return tried(numberSpec(name, "1", -1, 1, 0, meaning), 0, 0.1);

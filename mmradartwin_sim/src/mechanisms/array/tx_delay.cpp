@@ -7,14 +7,14 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "tx_delay";
+const std::string kTxDelay = "tx_delay";
 
 /// One transmitter's channels come later: their beat frequencies rise, their phases at the window's centre turn by a
 /// number of its own. A feed that is longer by delay_m turns them by 360 degrees for each half wavelength, of which no
 /// one knows the rest to a degree.
 class TxDelay : public Mechanism, public WeightStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kTxDelay; }
   std::vector<ParameterSpec> parameters() const override {
     return {weighing(numberSpec("slot", "1", 0, 15, "of the transmitter: row of tx_position_m, from 0")),
             weighing(tried(numberSpec("delay_m", "m", -5, 5, "added to the one-way range of its channels"), 0, 0.02)),

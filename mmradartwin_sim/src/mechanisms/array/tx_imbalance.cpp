@@ -6,12 +6,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "tx_imbalance";
+const std::string kTxImbalance = "tx_imbalance";
 
 /// The second transmitter's block of channels turned or scaled.
 class TxImbalance : public Mechanism, public ReceiveStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kTxImbalance; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("phase_deg", "deg", -360, 360, 0, "of the second transmitter's channels"), 0, 10),
             tried(numberSpec("gain_db", "dB", -60, 60, 0, "of the second transmitter's channels"), 0, 1)};

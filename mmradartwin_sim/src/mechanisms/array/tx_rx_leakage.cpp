@@ -7,13 +7,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "tx_rx_leakage";
+const std::string kTxRxLeakage = "tx_rx_leakage";
 
 /// Coupling from transmitters into receivers: one echo fixed to the radar's body, the same at every pose, with an
 /// arbitrary but fixed complex vector over the channels.
 class TxRxLeakage : public Mechanism, public PathStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kTxRxLeakage; }
   std::vector<ParameterSpec> parameters() const override {
     ParameterSpec phase = numberSpec("phase_deg", "deg", -360, 360,
                                      "per virtual channel; without it and gain_db a fixed arbitrary vector");
@@ -55,7 +55,7 @@ class TxRxLeakage : public Mechanism, public PathStage {
     const double gain = context.receiver_gain(2 * range_m_);
     if (!(filtered > 0) || !(gain > 0)) return;
     PathRecord record;
-    record.event = &kName;
+    record.event = &kTxRxLeakage;
     record.departure = record.arrival = Eigen::Vector3d::UnitX();
     record.bounces = 0;
     record.length_m.assign(vector_.size(), 2 * range_m_);

@@ -7,12 +7,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "corner";
+const std::string kCorner = "corner";
 
 /// The retro paths of two and of three facets that meet at concave right angles.
 class Corner : public Mechanism, public PathStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kCorner; }
   std::vector<ParameterSpec> parameters() const override { return {}; }
   void configure(const Parameters&, const Scene&, const RadarConfig&) override {}
 
@@ -43,9 +43,9 @@ class Corner : public Mechanism, public PathStage {
     const auto wanted = [&](int facet) { return context.scene.facets[facet].actor == context.only_actor; };
     for (const CornerEdge& edge : edges_) {
       if (context.only_actor >= 0 && !wanted(edge.a) && !wanted(edge.b)) continue;
-      addCornerPath(context, elements, edge, {kName, 1}, records);
+      addCornerPath(context, elements, edge, {kCorner, 1}, records);
     }
-    for (const Trihedral& t : trihedra_) addTrihedralPath(context, elements, t, {kName, 1}, records);
+    for (const Trihedral& t : trihedra_) addTrihedralPath(context, elements, t, {kCorner, 1}, records);
   }
 
  private:

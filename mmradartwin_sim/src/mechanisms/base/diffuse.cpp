@@ -14,7 +14,7 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "diffuse";
+const std::string kDiffuse = "diffuse";
 
 /// Integral of ((1 + cos psi)/2)^alpha over the hemisphere, psi from the specular direction.
 /// Source: Degli-Esposti et al. 2007, eq. 12 (F_alpha).
@@ -40,7 +40,7 @@ double directiveNorm(int alpha, double cos_theta) {
 
 class Diffuse : public Mechanism, public PathStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kDiffuse; }
 
   std::vector<ParameterSpec> parameters() const override {
     ParameterSpec alpha = numberSpec("alpha", "1", 1, 100, 4, "width of the directive lobe");
@@ -61,7 +61,7 @@ class Diffuse : public Mechanism, public PathStage {
 
   void build(const Scene& scene, const RadarConfig& radar) override {
     points_ =
-        makeScatterPoints(scene, spacing_m_, radar.center_frequency_hz(), kName, [](const Facet&) { return true; });
+        makeScatterPoints(scene, spacing_m_, radar.center_frequency_hz(), kDiffuse, [](const Facet&) { return true; });
   }
 
   void sceneChanged(const Scene& scene, const RadarConfig& radar, const SceneChange& change) override {
@@ -70,7 +70,7 @@ class Diffuse : public Mechanism, public PathStage {
                                  [&](const ScatterPoint& p) { return moved(scene.facets[p.facet]); }),
                   points_.end());
     const std::vector<ScatterPoint> again =
-        makeScatterPoints(scene, spacing_m_, radar.center_frequency_hz(), kName, moved);
+        makeScatterPoints(scene, spacing_m_, radar.center_frequency_hz(), kDiffuse, moved);
     const auto kept = static_cast<std::ptrdiff_t>(points_.size());
     points_.insert(points_.end(), again.begin(), again.end());
     std::inplace_merge(points_.begin(), points_.begin() + kept, points_.end(),
@@ -138,7 +138,7 @@ class Diffuse : public Mechanism, public PathStage {
       if (!visible[i]) continue;
       const Facet& facet = context.scene.facets[lit[i]->facet];
       PathRecord record;
-      record.event = &kName;
+      record.event = &kDiffuse;
       record.actors = {facet.actor};
       record.facets = {facet.id};
       record.vertices = {lit[i]->position};

@@ -12,13 +12,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "specular";
+const std::string kSpecular = "specular";
 constexpr double kInset_m = 0.01;  // where a return beside a facet is taken to come from
 constexpr double kSmallestFactor = 0.01;
 
 class Specular : public Mechanism, public PathStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kSpecular; }
 
   std::vector<ParameterSpec> parameters() const override {
     ParameterSpec bounces = numberSpec("max_bounces", "1", 0, 8, 3, "highest order of reflection");
@@ -88,7 +88,7 @@ class Specular : public Mechanism, public PathStage {
     limits.in_view = [&](const Eigen::Vector3d& d) { return context.inFieldOfView(to_radar * d); };
     if (exhaustive_ >= 2) {
       for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2))
-        addImageRecord(context, elements, path, {kName, 1}, cutoff_, records);
+        addImageRecord(context, elements, path, {kSpecular, 1}, cutoff_, records);
     }
     if (exhaustive_ < max_bounces_ && ray_budget_ > 0) {
       limits.max_order = max_bounces_;
@@ -101,7 +101,7 @@ class Specular : public Mechanism, public PathStage {
           continue;
         if (!search_->solve(elements.p, sequence, context.rays, limits, path)) continue;
         const std::size_t before = records.size();
-        addImageRecord(context, elements, path, {kName, 1}, cutoff_, records);
+        addImageRecord(context, elements, path, {kSpecular, 1}, cutoff_, records);
         if (records.size() == before) continue;
         ++seeded_paths_;
         late_paths_ += !by_half;
@@ -150,7 +150,7 @@ class Specular : public Mechanism, public PathStage {
     const std::complex<double> coefficient = wavelength / (4 * M_PI * 2 * R) * specularShare(material) * gamma * factor;
     if (std::abs(coefficient) < cutoff_) return;
     PathRecord record;
-    record.event = &kName;
+    record.event = &kSpecular;
     record.actors = {facet.actor};
     record.facets = {facet.id};
     record.vertices = {vertex};
@@ -185,7 +185,7 @@ class Specular : public Mechanism, public PathStage {
     const std::complex<double> coefficient = echo->coefficient * specularShare(actor.material) * gamma;
     if (std::abs(coefficient) < cutoff_ || !(std::abs(coefficient) > 0)) return;
     PathRecord record;
-    record.event = &kName;
+    record.event = &kSpecular;
     record.actors = {surface.actor};
     record.facets = {surface.facets.front()};
     record.vertices = {echo->vertex};

@@ -6,13 +6,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "empirical_echo";
+const std::string kEmpiricalEcho = "empirical_echo";
 
 /// A point that answers alike in all directions, later than its distance says: a tag with a delay line, something that
 /// rings, a way behind a panel. It hides nothing.
 class EmpiricalEcho : public Mechanism, public PathStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kEmpiricalEcho; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("x_m", "m", -1e4, 1e4, "map"), numberSpec("y_m", "m", -1e4, 1e4, "map"),
@@ -28,7 +28,7 @@ class EmpiricalEcho : public Mechanism, public PathStage {
   void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
     std::optional<PointEcho> echo = pointEcho(context, place_, cross_section_m2_);
     if (!echo || echo->distance_m + behind_m_ > context.max_range_m) return;
-    echo->record.event = &kName;
+    echo->record.event = &kEmpiricalEcho;
     setContribution(context.radar, echo->amplitude, echo->record);
     lengthen(context.radar, 2 * behind_m_, echo->record);
     records.push_back(std::move(echo->record));

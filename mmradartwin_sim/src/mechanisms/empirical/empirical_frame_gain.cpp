@@ -6,12 +6,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "empirical_frame_gain";
+const std::string kEmpiricalFrameGain = "empirical_frame_gain";
 
 /// A level that changes from frame to frame, at every pose alike: what a diagnosis found without a cause.
 class EmpiricalFrameGain : public Mechanism, public ChirpStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kEmpiricalFrameGain; }
   std::vector<ParameterSpec> parameters() const override {
     ParameterSpec gain =
         optionalNumbersSpec("gain_db", "dB", -120, 120, "of each frame of a pose; the last one holds for all beyond");

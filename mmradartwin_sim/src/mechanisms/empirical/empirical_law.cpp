@@ -11,13 +11,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "empirical_law";
+const std::string kEmpiricalLaw = "empirical_law";
 
 /// A law that was read off the data and has no name: gain, delay or angle of paths, or gain and phase of some virtual
 /// channels, tabulated over one variable. Between the table's points it is linear, beyond its ends constant.
 class EmpiricalLaw : public Mechanism, public WeightStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kEmpiricalLaw; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     ParameterSpec at = optionalNumbersSpec("at", "of the variable", -1e6, 1e6, "where the law is given, ascending");
@@ -73,11 +73,11 @@ class EmpiricalLaw : public Mechanism, public WeightStage {
     }
     event_ = values.text("event");
     affected_.clear();
-    if (!values.text("material").empty()) affected_ = requireMaterial(scene, kName, values.text("material"));
+    if (!values.text("material").empty()) affected_ = requireMaterial(scene, kEmpiricalLaw, values.text("material"));
     if (!values.text("actor").empty()) {
       if (!affected_.empty()) throw InputError("mechanism empirical_law: give at most one of material and actor");
       affected_.assign(scene.actors.size(), false);
-      affected_[requireActor(scene, kName, values.text("actor"))] = true;
+      affected_[requireActor(scene, kEmpiricalLaw, values.text("actor"))] = true;
     }
     variable_.emplace(values.text("variable"), LawVariable::ReferencePlace{values.number("x_m"), values.number("y_m"),
                                                                            values.number("bearing_deg"),

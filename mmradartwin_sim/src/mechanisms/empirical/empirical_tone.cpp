@@ -7,13 +7,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "empirical_tone";
+const std::string kEmpiricalTone = "empirical_tone";
 
 /// A tone of one beat frequency with a phase of its own in every frame, wherever the radar stands (a clock, say): what
 /// a diagnosis found without a cause. It is one wave over the receivers, the same for all transmitters.
 class EmpiricalTone : public Mechanism, public ChirpStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kEmpiricalTone; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("beat_hz", "Hz", -1e9, 1e9, "in the sampled signal, that of an echo being positive"),

@@ -5,13 +5,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "adc_saturation";
+const std::string kAdcSaturation = "adc_saturation";
 
 /// A gain at which this share of all I and Q values of the session lies beyond full scale, where it is held. The
 /// session's gain_db is that gain.
 class AdcSaturation : public Mechanism, public DigitiseStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kAdcSaturation; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("clipped_fraction", "1", 1e-9, 0.5, "of all I and Q values of the session")};
   }

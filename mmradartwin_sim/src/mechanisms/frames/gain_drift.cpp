@@ -7,12 +7,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "gain_drift";
+const std::string kGainDrift = "gain_drift";
 
 /// A gain that changes with time, not place: at a rate, or by steps at times or at equal parts of the session's poses.
 class GainDrift : public Mechanism, public ReceiveStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kGainDrift; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("db_per_hour", "dB/h", -1000, 1000, 0, "give this or steps_db"), 0, 5),
             optionalNumbersSpec("steps_db", "dB", -100, 100, "steps of the gain in time order"),

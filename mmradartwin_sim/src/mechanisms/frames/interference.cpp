@@ -7,14 +7,14 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "interference";
+const std::string kInterference = "interference";
 
 /// Chirps of another radar that cross ours in some frames: its beat sweeps through the receiver's band as
 /// exp(j pi d_slope (t - t0)^2) and is seen while it lies within +-f_s/2, that is for f_s^2/d_slope samples. One wave
 /// over the receivers of a chirp, another for every chirp.
 class Interference : public Mechanism, public ChirpStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kInterference; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("frame_fraction", "1", 0, 1, "of frames that are hit"),
             numberSpec("level_db", "dB", -200, 200, 20, "of the burst over the session's strongest echo"),

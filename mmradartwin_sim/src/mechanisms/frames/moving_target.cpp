@@ -8,14 +8,14 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "moving_target";
+const std::string kMovingTarget = "moving_target";
 
 /// Someone who walks to and fro along a line about (x_m, y_m) for all of the session. Every chirp meets him where he
 /// is at the centre of its window, so that Doppler and the phase between TDM slots, 4 pi v T / lambda, follow from
 /// delays alone; what he moves within a chirp (a hundredth of a range bin at 10 m/s) is left out.
 class MovingTarget : public Mechanism, public ChirpPathStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kMovingTarget; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("x_m", "m", -1e4, 1e4, "map, middle of the walk"),
@@ -51,7 +51,7 @@ class MovingTarget : public Mechanism, public ChirpPathStage {
     const Eigen::Vector3d place = middle_ + along(walked_m) * direction_;
     std::optional<PointEcho> echo = pointEcho(context, place, cross_section_m2_);
     if (!echo) return;
-    echo->record.event = &kName;
+    echo->record.event = &kMovingTarget;
     setContribution(context.radar, echo->amplitude * fading(now, walked_m), echo->record);
     records.push_back(std::move(echo->record));
   }

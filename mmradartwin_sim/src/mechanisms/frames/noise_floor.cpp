@@ -6,13 +6,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "noise_floor";
+const std::string kNoiseFloor = "noise_floor";
 
 /// Thermal noise: circular, white, independent over receivers, samples and chirps. The level is the rms of one complex
 /// sample of one chirp; averaging n chirps takes 10 log10 n off it, the range transform another 10 log10(N 2/3).
 class NoiseFloor : public Mechanism, public DigitiseStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kNoiseFloor; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("level_dbfs", "dBFS", -200, 0, "rms of a complex sample, that the twin states"),
             numberSpec("delta_db", "dB", -100, 100, 0, "above what the twin states")};

@@ -6,13 +6,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "packet_loss";
+const std::string kPacketLoss = "packet_loss";
 constexpr std::size_t kPacketBytes = 1456;  // of the DCA1000, counted from the start of the recording
 
 /// Packets lost on the way, filled with zeros and not flagged.
 class PacketLoss : public Mechanism, public TransportStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kPacketLoss; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("lost_fraction", "1", 0, 1, "of packets")};
   }

@@ -5,13 +5,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "packet_misalignment";
-constexpr std::size_t kPacketBytes = 1456;
+const std::string kPacketMisalignment = "packet_misalignment";
+constexpr std::size_t kSlippedPacketBytes = 1456;
 
 /// In one pose a packet was lost and not filled: all that follows slips, and the recording runs on for as long.
 class PacketMisalignment : public Mechanism, public TransportStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kPacketMisalignment; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("pose", true, "", "name of the pose"),
@@ -24,10 +24,10 @@ class PacketMisalignment : public Mechanism, public TransportStage {
   }
   int rank() const override { return 1; }  // what arrived, lost packets filled or not, is then cut
   std::string onlyPose() const override { return pose_; }
-  std::size_t surplusBytes() const override { return kPacketBytes; }
+  std::size_t surplusBytes() const override { return kSlippedPacketBytes; }
   void transport(const PayloadContext& context, std::vector<std::uint8_t>& payload) const override {
     if (context.pose != pose_) return;
-    const std::size_t packets = payload.size() / kPacketBytes;
+    const std::size_t packets = payload.size() / kSlippedPacketBytes;
     std::size_t packet = static_cast<std::size_t>(packet_);
     if (packet_ < 0) {
       packet = static_cast<std::size_t>(drawUniform(drawKey(context.draw, 0x736C6970)) *
@@ -37,8 +37,8 @@ class PacketMisalignment : public Mechanism, public TransportStage {
       throw InputError("mechanism packet_misalignment: key packet: " + std::to_string(packet) + " is beyond pose " +
                        pose_ + ", which has " + std::to_string(packets) + " packets");
     }
-    const auto begin = payload.begin() + static_cast<std::ptrdiff_t>(packet * kPacketBytes);
-    payload.erase(begin, begin + static_cast<std::ptrdiff_t>(kPacketBytes));
+    const auto begin = payload.begin() + static_cast<std::ptrdiff_t>(packet * kSlippedPacketBytes);
+    payload.erase(begin, begin + static_cast<std::ptrdiff_t>(kSlippedPacketBytes));
   }
 
  private:

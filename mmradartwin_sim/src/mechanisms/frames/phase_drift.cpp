@@ -5,12 +5,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "phase_drift";
+const std::string kPhaseDrift = "phase_drift";
 
 /// Every frame is turned against the one before by the same angle, so that their average loses.
 class PhaseDrift : public Mechanism, public ChirpStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kPhaseDrift; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("rad_per_frame", "rad", -3.2, 3.2, "turn from one frame to the next")};
   }

@@ -6,7 +6,7 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "phase_noise";
+const std::string kPhaseNoise = "phase_noise";
 
 /// Phase noise of the one oscillator that sends and mixes: each echo carries exp(j[phi(t) - phi(t - tau)]), whose
 /// spectrum is S_phi(f) 4 sin^2(pi f tau), 2 L(f) = S_phi(f). With S_phi falling as 1/f^2 above the loop's bandwidth
@@ -14,7 +14,7 @@ const std::string kName = "phase_noise";
 /// a host is flat and grows with the square of its range. Below the loop's bandwidth ranges of metres cancel it anyway.
 class PhaseNoise : public Mechanism, public ModulationStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kPhaseNoise; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("level_dbc_per_hz", "dBc/Hz", -200, -40, "single sideband, at offset_hz"),
             numberSpec("offset_hz", "Hz", 1, 1e9, 1e6, "from the carrier, where level_dbc_per_hz holds")};

@@ -6,12 +6,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "quantisation";
+const std::string kQuantisation = "quantisation";
 
 /// A converter of fewer bits than the 16 of a sample: I and Q rounded to 2^bits levels over full scale.
 class Quantisation : public Mechanism, public DigitiseStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kQuantisation; }
   std::vector<ParameterSpec> parameters() const override {
     ParameterSpec bits = integerSpec("bits", "1", 1, 16, 16, "of the converter");
     bits.required = true;

@@ -5,12 +5,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "radar_pitch_offset";
+const std::string kRadarPitchOffset = "radar_pitch_offset";
 
 /// The radar looks pitch_deg further down than its pose says.
 class RadarPitchOffset : public Mechanism, public MountingStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kRadarPitchOffset; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("pitch_deg", "deg", -90, 90, "true minus reported, about y, nose down positive"), 0, 5)};
   }

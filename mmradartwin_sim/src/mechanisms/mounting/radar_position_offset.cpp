@@ -3,12 +3,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "radar_position_offset";
+const std::string kRadarPositionOffset = "radar_position_offset";
 
 /// The radar stands elsewhere than its pose says, by a constant vector in the radar frame.
 class RadarPositionOffset : public Mechanism, public MountingStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kRadarPositionOffset; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("forward_m", "m", -10, 10, 0, "true minus reported, along boresight"), 0, 0.03),
             tried(numberSpec("left_m", "m", -10, 10, 0, "true minus reported, to the left"), 0, 0.03)};

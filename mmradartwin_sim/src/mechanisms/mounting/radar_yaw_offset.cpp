@@ -5,12 +5,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "radar_yaw_offset";
+const std::string kRadarYawOffset = "radar_yaw_offset";
 
 /// The radar looks yaw_deg further to the left than its pose says.
 class RadarYawOffset : public Mechanism, public MountingStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kRadarYawOffset; }
   std::vector<ParameterSpec> parameters() const override {
     return {
         tried(numberSpec("yaw_deg", "deg", -180, 180, "true heading minus reported, positive to the left"), 0, 0.5)};

@@ -10,14 +10,14 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "corner_reflection";
+const std::string kCornerReflection = "corner_reflection";
 
 /// The retro path of corners that the named actors form with each other (or in themselves): the law of `corner`, for
 /// faces that come within gap_m of each other, where `corner` itself does not return that pair already. The three faces
 /// of a trihedral may lie any way: one whose boresight is level always has a face within 45 deg of the floor.
 class CornerReflection : public Mechanism, public PathStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kCornerReflection; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textsSpec("actors", "names of the actors whose faces form the corner"),
@@ -25,7 +25,8 @@ class CornerReflection : public Mechanism, public PathStage {
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
     if (values.texts("actors").empty()) throw InputError("mechanism corner_reflection: key actors: names no actor");
-    for (const std::string& actor : values.texts("actors")) named_.insert(requireActor(scene, kName, actor));
+    for (const std::string& actor : values.texts("actors"))
+      named_.insert(requireActor(scene, kCornerReflection, actor));
     gap_m_ = std::max(kFacesMeet_m, values.number("gap_m"));
   }
   int rank() const override { return 1; }  // after corner, whose records tell what is there already
@@ -55,11 +56,11 @@ class CornerReflection : public Mechanism, public PathStage {
     }
     const ElementsInMap elements(context);
     for (const CornerEdge& edge : edges_) {
-      if (known.count({edge.a, edge.b}) == 0) addCornerPath(context, elements, edge, {kName, 1}, records);
+      if (known.count({edge.a, edge.b}) == 0) addCornerPath(context, elements, edge, {kCornerReflection, 1}, records);
     }
     for (const Trihedral& t : trihedra_) {
       if (known.count({t.facets.begin(), t.facets.end()}) == 0)
-        addTrihedralPath(context, elements, t, {kName, 1}, records);
+        addTrihedralPath(context, elements, t, {kCornerReflection, 1}, records);
     }
   }
 

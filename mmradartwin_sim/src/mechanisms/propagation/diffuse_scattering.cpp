@@ -5,13 +5,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "diffuse_scattering";
+const std::string kDiffuseScattering = "diffuse_scattering";
 
 /// A material scatters though the twin has it smooth (or scatters otherwise than the twin says): sets the scattering
 /// coefficient S in the scene, so that `diffuse` returns S and every specular reflection sqrt(1 - S^2).
 class DiffuseScattering : public Mechanism, public SceneStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kDiffuseScattering; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("material", true, "", "material tag"),
@@ -19,7 +19,7 @@ class DiffuseScattering : public Mechanism, public SceneStage {
                   0, 0.4)};
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
-    affected_ = requireMaterial(scene, kName, values.text("material"));
+    affected_ = requireMaterial(scene, kDiffuseScattering, values.text("material"));
     coefficient_ = values.number("scattering_coefficient");
     for (std::size_t i = 0; i < affected_.size(); ++i) {
       if (affected_[i] && scene.actors[i].material.model == MaterialModel::kScalar) {

@@ -8,14 +8,14 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "edge_diffraction";
+const std::string kEdgeDiffraction = "edge_diffraction";
 
 /// Retro returns of exposed edges by UTD. A first-order `specular` return holds the edges of its facet in its aperture
 /// factor, also beside the facet; so an edge takes part only at poses where no such return of either face exists, and
 /// takes over where the aperture factor falls below that mechanism's limit.
 class EdgeDiffraction : public Mechanism, public PathStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kEdgeDiffraction; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("level", "1", 0, 100, 1, "factor of amplitude, 1 = UTD"), 0, 1)};
   }
@@ -59,7 +59,7 @@ class EdgeDiffraction : public Mechanism, public PathStage {
     const std::complex<double> coefficient = level_ * context.radar.wavelength_m() / (4 * M_PI) * found->factor;
     if (!(std::abs(coefficient) > 0)) return;
     PathRecord record;
-    record.event = &kName;
+    record.event = &kEdgeDiffraction;
     record.actors = {a.actor};
     record.facets = {a.id};
     record.vertices = {found->point};

@@ -5,12 +5,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "excess_attenuation";
+const std::string kExcessAttenuation = "excess_attenuation";
 
 /// Loss that grows with the way: dB of power per metre of one-way range, on every path.
 class ExcessAttenuation : public Mechanism, public WeightStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kExcessAttenuation; }
   std::vector<ParameterSpec> parameters() const override {
     return {
         tried(numberSpec("db_per_m", "dB/m", -20, 20, "loss of power per metre of one-way range, positive is a loss"),

@@ -9,14 +9,14 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "floor_ceiling_multipath";
+const std::string kFloorCeilingMultipath = "floor_ceiling_multipath";
 
 /// Paths over facets within 45 deg of the horizontal, which the base leaves out: the retro paths of corners that they
 /// form with upright faces, and images of second and third order with at least one such facet, within the same +-20 deg
 /// of elevation as all paths. A first-order return of such a facet leaves that field of view.
 class FloorCeilingMultipath : public Mechanism, public PathStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kFloorCeilingMultipath; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("level", "1", 0, 100, 1, "factor of amplitude, 1 = full"), 0, 1),
             numberSpec("gap_m", "m", 0, 1, 0.025, "upright faces that end this near to a floor stand on it")};
@@ -42,7 +42,7 @@ class FloorCeilingMultipath : public Mechanism, public PathStage {
     const ElementsInMap elements(context);
     // A wall over a picture's upper side is no corner as high as the wall.
     for (const CornerEdge& edge : corners_) {
-      addCornerPath(context, elements, edge, {kName, level_}, records, CornerAperture::kNarrowerFace);
+      addCornerPath(context, elements, edge, {kFloorCeilingMultipath, level_}, records, CornerAperture::kNarrowerFace);
     }
     if (order_ < 2) return;
     ImageSearch::Limits limits;
@@ -54,7 +54,7 @@ class FloorCeilingMultipath : public Mechanism, public PathStage {
     for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2)) {
       const bool ours = std::any_of(path.facets.begin(), path.facets.end(),
                                     [&](int id) { return !context.scene.facets[id].reflects; });
-      if (ours) addImageRecord(context, elements, path, {kName, level_}, 1e-10, records);
+      if (ours) addImageRecord(context, elements, path, {kFloorCeilingMultipath, level_}, 1e-10, records);
     }
   }
 

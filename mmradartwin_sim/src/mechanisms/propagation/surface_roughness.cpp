@@ -6,21 +6,21 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "surface_roughness";
+const std::string kSurfaceRoughness = "surface_roughness";
 
 /// Loss of the coherent reflection by roughness (Rayleigh, Ament): exp(-2 (k sigma cos theta)^2) of amplitude at every
 /// specular reflection from the material. Scattered returns stay; roughness_rms_m of materials.yaml takes no part in
 /// the base model.
 class SurfaceRoughness : public Mechanism, public WeightStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kSurfaceRoughness; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("material", true, "", "material tag"),
             tried(numberSpec("roughness_rms_m", "m", 0, 0.01, "rms height of the surface"), 0, 0.0003)};
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
-    rough_ = requireMaterial(scene, kName, values.text("material"));
+    rough_ = requireMaterial(scene, kSurfaceRoughness, values.text("material"));
     roughness_rms_m_ = values.number("roughness_rms_m");
   }
   void reweight(const PoseContext& context, PathRecord& record) const override {

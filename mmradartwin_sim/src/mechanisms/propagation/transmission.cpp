@@ -6,21 +6,21 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "transmission";
+const std::string kTransmission = "transmission";
 
 /// A panel that lets rays through, one_way_db at each crossing; its own front still reflects as before, its own back
 /// stays hidden. One leg of a path crosses it once, however thick its mesh. The delay inside is left out: (n - 1) d is
 /// millimetres.
 class Transmission : public Mechanism, public SceneStage, public WeightStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kTransmission; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("actor", true, "", "name of the actor"),
             weighing(tried(numberSpec("one_way_db", "dB", -200, 0, "level of one crossing, negative"), -200, -5))};
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
-    actor_ = requireActor(scene, kName, values.text("actor"));
+    actor_ = requireActor(scene, kTransmission, values.text("actor"));
     once_ = std::pow(10.0, values.number("one_way_db") / 20);
   }
   void editScene(Scene& scene) const override { scene.actors[actor_].occludes = false; }

@@ -14,7 +14,7 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "wall_ghost";
+const std::string kWallGhost = "wall_ghost";
 
 /// True for what encloses the room: a side of the scene is covered by it for the most part.
 bool enclosesRoom(const Scene& scene, const Actor& actor) {
@@ -32,7 +32,7 @@ bool enclosesRoom(const Scene& scene, const Actor& actor) {
 /// and goes over into the monostatic form), and with the phase that its direct echo has.
 class WallGhost : public Mechanism, public PathStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kWallGhost; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {
@@ -43,7 +43,7 @@ class WallGhost : public Mechanism, public PathStage {
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
     if (values.texts("walls").empty()) throw InputError("mechanism wall_ghost: key walls: names no actor");
-    for (const std::string& wall : values.texts("walls")) walls_.insert(requireActor(scene, kName, wall));
+    for (const std::string& wall : values.texts("walls")) walls_.insert(requireActor(scene, kWallGhost, wall));
     spacing_m_ = values.number("spacing_m");
     gain_ = std::pow(10.0, values.number("gain_db") / 20);
     edge_level_ = values.number("edge_level");
@@ -59,7 +59,7 @@ class WallGhost : public Mechanism, public PathStage {
     for (int a = 0; a < static_cast<int>(scene.actors.size()); ++a) {
       if (walls_.count(a) == 0 && !enclosesRoom(scene, scene.actors[static_cast<std::size_t>(a)])) objects.insert(a);
     }
-    points_ = makeScatterPoints(scene, spacing_m_, radar.center_frequency_hz(), kName,
+    points_ = makeScatterPoints(scene, spacing_m_, radar.center_frequency_hz(), kWallGhost,
                                 [&](const Facet& f) { return objects.count(f.actor) > 0; });
     edges_.clear();
     if (edge_level_ == 0) return;
@@ -205,7 +205,7 @@ class WallGhost : public Mechanism, public PathStage {
     second.departure = first.arrival;
     second.arrival = first.departure;
     for (PathRecord* record : {&first, &second}) {
-      record->event = &kName;
+      record->event = &kWallGhost;
       record->bounces = 2;
       setContribution(context.radar, scatterer.coefficient, *record);
       records.push_back(std::move(*record));

@@ -3,13 +3,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "carrier_scale";
+const std::string kCarrierScale = "carrier_scale";
 
 /// The array is wider against the wavelength than radar.yaml says: every sine of an angle appears 1 + scale larger.
 /// The ways from the elements differ from that of element 0 by 1 + scale times what geometry gives.
 class CarrierScale : public Mechanism, public WeightStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kCarrierScale; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("scale", "1", -0.2, 0.2, "epsilon of sin(theta) x (1 + epsilon), 0 is none"), 0, 0.01)};
   }

@@ -5,14 +5,14 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "chirp_nonlinearity";
+const std::string kChirpNonlinearity = "chirp_nonlinearity";
 
 /// A ripple on the chirp's frequency, deviation_hz sin(2 pi ripple_hz t + phase). Transmitted and received chirp differ
 /// by exp(j[phi_e(t) - phi_e(t - tau)]): paired echoes about every echo, ripple_hz away, their level in proportion to
 /// the range while 2 pi deviation tau is small.
 class ChirpNonlinearity : public Mechanism, public DistortionStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kChirpNonlinearity; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("deviation_hz", "Hz", 0, 1e8, "peak of the frequency's ripple"),
             numberSpec("ripple_hz", "Hz", 1, 1e9, "of the ripple along the chirp"),

@@ -6,12 +6,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "dc_offset";
+const std::string kDcOffset = "dc_offset";
 
 /// A constant per channel: range bin 0, no law over the channels.
 class DcOffset : public Mechanism, public ReceiveStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kDcOffset; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("level_db", "dB", -200, 100, "over the session's strongest echo, rms over channels")};
   }

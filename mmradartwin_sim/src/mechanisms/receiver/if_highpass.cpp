@@ -5,14 +5,14 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "if_highpass";
+const std::string kIfHighpass = "if_highpass";
 
 /// The receiver's IF high-pass: two first-order sections whose corners stand in a fixed ratio. corner_hz is where both
 /// together have lost 3 dB. The device's corner steps go by factors of two; radar.yaml's if_highpass_hz tells the ratio
 /// where it is known.
 class IfHighpass : public Mechanism, public ToneStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kIfHighpass; }
   std::vector<ParameterSpec> parameters() const override {
     return {
         tried(numberSpec("corner_hz", "Hz", 1e3, 1e7, "-3 dB of the whole"), 1000, 350000),

@@ -5,13 +5,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "if_lowpass";
+const std::string kIfLowpass = "if_lowpass";
 
 /// Edge of the receiver's decimation filter: a Butterworth low-pass on the tone of each path, as it stands ahead of
 /// the sampler.
 class IfLowpass : public Mechanism, public ToneStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kIfLowpass; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("corner_hz", "Hz", 1e3, 1e9, "-3 dB of the whole"), 1e+09, 4.5e+06),
             integerSpec("order", "1", 1, 20, 6, "of the Butterworth edge")};

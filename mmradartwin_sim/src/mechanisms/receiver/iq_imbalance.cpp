@@ -6,13 +6,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "iq_imbalance";
+const std::string kIqImbalance = "iq_imbalance";
 
 /// I and Q of unequal gain or not quite in quadrature: x + beta conj(x), an image at (R_max - R, -azimuth). Each
 /// receiver has a mixer of its own: beta is one number, or one per receiver.
 class IqImbalance : public Mechanism, public ReceiveStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kIqImbalance; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(orPerReceiver(numberSpec("image_db", "dB", -200, 0, "of the image against its host")), -200, -25),
             orPerReceiver(numberSpec("phase_deg", "deg", -360, 360, 0, "of beta"))};

@@ -3,12 +3,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "range_bias";
+const std::string kRangeBias = "range_bias";
 
 /// A delay inside the radar: every path is longer by twice the bias, the same at all channels.
 class RangeBias : public Mechanism, public WeightStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kRangeBias; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("range_m", "m", -5, 5, "added to every one-way range"), 0, 0.02)};
   }

@@ -3,12 +3,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "range_scale";
+const std::string kRangeScale = "range_scale";
 
 /// Slope or sampling rate off: beat frequencies scale, phases across the channels stay.
 class RangeScale : public Mechanism, public WeightStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kRangeScale; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("scale", "1", -0.5, 0.5, "epsilon of range x (1 + epsilon)"), 0, 0.005)};
   }

@@ -7,13 +7,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "second_harmonic";
+const std::string kSecondHarmonic = "second_harmonic";
 
 /// Square law ahead of the sampler's filter: echoes at the sums of beat frequencies, at twice the range for each echo
 /// by itself. What lies beyond the sampling rate is filtered off. Of the paths, the strongest 60 take part.
 class SecondHarmonic : public Mechanism, public DistortionStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kSecondHarmonic; }
   std::vector<ParameterSpec> parameters() const override {
     return {
         tried(numberSpec("level_db", "dB", -200, 0, "against the host, at the session's strongest host"), -200, -25)};

@@ -6,13 +6,13 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "actor_moved";
+const std::string kActorMoved = "actor_moved";
 
 /// An actor that stands elsewhere: moved, and turned about its centroid (of surface area) by Rz(dyaw) Ry(dpitch)
 /// Rx(droll) in map's axes. A diagnosis tries moves in the floor plane alone.
 class ActorMoved : public Mechanism, public SceneStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kActorMoved; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {
@@ -25,7 +25,7 @@ class ActorMoved : public Mechanism, public SceneStage {
         numberSpec("droll_deg", "deg", -180, 180, 0, "the same about map's x through the centroid, before the pitch")};
   }
   void configure(const Parameters& values, const Scene& scene, const RadarConfig&) override {
-    actor_ = requireActor(scene, kName, values.text("actor"));
+    actor_ = requireActor(scene, kActorMoved, values.text("actor"));
     shift_ = Eigen::Vector3d(values.number("dx_m"), values.number("dy_m"), values.number("dz_m"));
     const auto turn = [&](const char* key, const Eigen::Vector3d& axis) {
       return Eigen::AngleAxisd(values.number(key) * M_PI / 180, axis);

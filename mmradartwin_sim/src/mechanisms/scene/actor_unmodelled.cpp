@@ -8,7 +8,7 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "actor_unmodelled";
+const std::string kActorUnmodelled = "actor_unmodelled";
 constexpr int kSides = 24;  // of the screen that stands for the cylinder in occlusion
 
 /// Something of metal in the room that the scene lacks.
@@ -20,7 +20,7 @@ constexpr int kSides = 24;  // of the screen that stands for the cylinder in occ
 /// it is -1, or there is none.
 class ActorUnmodelled : public Mechanism, public SceneStage, public PathStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kActorUnmodelled; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {numberSpec("x_m", "m", -1000, 1000, "axis in map"),
@@ -68,7 +68,7 @@ class ActorUnmodelled : public Mechanism, public SceneStage, public PathStage {
     const std::optional<CurvedEcho> echo = curvedEcho(context, elements, cylinder);
     if (!echo || !context.rays.visible(elements.p, echo->vertex, 1e-3)) return;
     PathRecord record;
-    record.event = &kName;
+    record.event = &kActorUnmodelled;
     record.vertices = {echo->vertex};
     record.departure = record.arrival = echo->direction_radar;
     record.bounces = 1;
@@ -82,7 +82,7 @@ class ActorUnmodelled : public Mechanism, public SceneStage, public PathStage {
   /// Upright, its corners at radius_m from the axis, the first in direction first_rad; vertices low and high in turn.
   Actor prism(int sides, double radius_m, double first_rad) const {
     Actor actor;
-    actor.name = kName;
+    actor.name = kActorUnmodelled;
     for (int i = 0; i < sides; ++i) {
       const double a = first_rad + 2 * M_PI * i / sides;
       for (double z : {low_m_, high_m_}) {

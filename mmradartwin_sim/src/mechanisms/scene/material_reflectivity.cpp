@@ -7,12 +7,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "material_reflectivity";
+const std::string kMaterialReflectivity = "material_reflectivity";
 
 /// A material's or an actor's echo stronger or weaker, at every interaction with it.
 class MaterialReflectivity : public Mechanism, public WeightStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kMaterialReflectivity; }
   bool standsSeveralTimes() const override { return true; }
   std::vector<ParameterSpec> parameters() const override {
     return {textSpec("material", false, "", "material tag; give this or actor"),
@@ -28,7 +28,7 @@ class MaterialReflectivity : public Mechanism, public WeightStage {
     factor_ = std::pow(10.0, values.number("delta_db") / 20);
     affected_.assign(scene.actors.size(), false);
     if (!actor.empty()) {
-      affected_[requireActor(scene, kName, actor)] = true;
+      affected_[requireActor(scene, kMaterialReflectivity, actor)] = true;
       return;
     }
     bool any = false;

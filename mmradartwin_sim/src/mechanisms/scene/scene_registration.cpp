@@ -5,12 +5,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "scene_registration";
+const std::string kSceneRegistration = "scene_registration";
 
 /// The whole room stands elsewhere in map: turned about map's origin, then shifted.
 class SceneRegistration : public Mechanism, public SceneStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kSceneRegistration; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("x_m", "m", -100, 100, 0, "true minus twin, along map's x"), 0, 0.03),
             tried(numberSpec("y_m", "m", -100, 100, 0, "true minus twin, along map's y"), 0, 0.03),

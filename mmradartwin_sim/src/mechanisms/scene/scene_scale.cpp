@@ -3,12 +3,12 @@
 namespace mmradartwin {
 namespace {
 
-const std::string kName = "scene_scale";
+const std::string kSceneScale = "scene_scale";
 
 /// The whole room is larger or smaller than its scan, about map's origin; the radar's poses stay.
 class SceneScale : public Mechanism, public SceneStage {
  public:
-  const std::string& name() const override { return kName; }
+  const std::string& name() const override { return kSceneScale; }
   std::vector<ParameterSpec> parameters() const override {
     return {
         tried(numberSpec("scale", "1", -0.5, 0.5, "epsilon of the true scene = the twin's x (1 + epsilon)"), 0, 0.005)};
