@@ -16,15 +16,17 @@ FURTHER = {
     "images_of_receivers": ("iq_imbalance", {"image_db": [-36.5, -34.7, -28.5, -37.7]}),
 }
 SEED = 61
+# Of 12 poses one has more than half of what floor and ceiling return; without it too little is left.
+POSES = {"floor_ceiling_multipath": 20}
 
 
 @unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
 class EveryCause(InFolder):
-    """12 poses at six places, six frames each. Every number that a finding states is right within its own interval."""
+    """12 poses, six frames each. Every number that a finding states is right within its own interval."""
 
     def first_of(self, cause, values):
         """(measurement, first finding) of one session with the cause in it."""
-        measurement = Measurement(Settings(output=self.at("session"), seed=SEED, poses=12, headings=2,
+        measurement = Measurement(Settings(output=self.at("session"), seed=SEED, poses=POSES.get(cause, 12), headings=2,
                                            frames=6, tier="default", duplicates=0,
                                            effects=[effects.make_effect(cause, values, None)]))
         measurement.run()

@@ -198,9 +198,22 @@ void LikelihoodClimb::climbOutOfTrap() {
 }
 
 void LikelihoodClimb::takeOverErrors() {
-  const int actor = task_.parts.size() == 1 ? source_.base().scene().actorIndex(task_.parts.front().subject) : -1;
-  if (actor < 0 || !geometric_ || coordinates_.empty()) return;
-  SessionLatents without = withoutErrors(optimum_.state.latents, actor);
+  if (task_.parts.size() != 1 || coordinates_.empty() || task_.parts.front().subject.empty()) return;
+  const std::string& subject = task_.parts.front().subject;
+  const std::vector<Actor>& actors = source_.base().scene().actors;
+  SessionLatents without = optimum_.state.latents;
+  bool any = false;
+  for (std::size_t i = 0; i < actors.size(); ++i) {
+    if (actors[i].name == subject && geometric_) {
+      without = withoutErrors(std::move(without), static_cast<int>(i));
+    } else if (actors[i].name == subject || actors[i].material.name == subject) {
+      without.actor_gain[i] = 0;
+    } else {
+      continue;
+    }
+    any = true;
+  }
+  if (!any) return;
   Eigen::VectorXd apart(globals_);
   for (int j = 0; j < globals_; ++j) apart[j] = without.global(j) - optimum_.state.latents.global(j);
   const auto n = static_cast<Eigen::Index>(coordinates_.size());
@@ -372,6 +385,7 @@ Optimum LikelihoodClimb::run() {
   climb();
   scan();
   climbOutOfTrap();
+  takeOverErrors();
   if (!needsSearch()) return std::move(optimum_);
   // Where paths appear and vanish with each millimetre, slopes end at the first bump. A quadratic through values some
   // millimetres apart does not. The latents follow to first order.
