@@ -60,8 +60,8 @@ class LikelihoodClimb {
   /// Climbs once more from the optimum with latents out of their trap, see ChannelLikelihood::fitWithoutTrap().
   void climbOutOfTrap();
   /// Climbs once more from where the subject has taken over what latent errors of its actors stand for. Seen from one
-  /// side, a move and an error of its range are alike, a material's level and its actors' own, and a climb ends early on
-  /// the ridge between them.
+  /// side, a move and an error of its range are alike, a material's level and its actors' own, and a climb ends early
+  /// on the ridge between them.
   void takeOverErrors();
   /// Takes the longest share of a step that gains. Returns the gain, 0 where no share gains.
   double stepBy(const Eigen::VectorXd& step);
