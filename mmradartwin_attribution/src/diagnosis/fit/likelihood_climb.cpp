@@ -33,6 +33,9 @@ constexpr double kLeastForScan_nats = 3;           ///< gain over the null below
 constexpr double kLikelier_nats = 0.5;  ///< gain over the optimum for which a climb starts from a scanned value
 constexpr Eigen::Index kMostRough = 4;  ///< largest number of coordinates that are searched without slopes
 
+/// Limits of a coordinate's scaled value, the lower one first.
+std::pair<double, double> scaledLimits(const Coordinate& c) { return std::minmax({c.scaled(c.min), c.scaled(c.max)}); }
+
 /// Calls `value` at places that approach its maximum, without slopes (BOBYQA, Powell 2009).
 void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector<double> scaled_values,
                          double initial_step, const std::function<double(const std::vector<double>&)>& value) {
@@ -41,8 +44,9 @@ void searchQuadratically(const std::vector<Coordinate>& coordinates, std::vector
                                                                                       nlopt_destroy);
   std::vector<double> low, high;
   for (const Coordinate& c : coordinates) {
-    low.push_back(std::min(c.scaled(c.min), c.scaled(c.max)));
-    high.push_back(std::max(c.scaled(c.min), c.scaled(c.max)));
+    const auto [least, most] = scaledLimits(c);
+    low.push_back(least);
+    high.push_back(most);
   }
   const auto call = [](unsigned size, const double* x, double*, void* function) {
     return (*static_cast<const std::function<double(const std::vector<double>&)>*>(function))({x, x + size});
@@ -222,8 +226,7 @@ void LikelihoodClimb::takeOverErrors() {
       information.bottomRightCorner(n, n).ldlt().solve(-information.bottomLeftCorner(n, globals_) * apart);
   std::vector<double> moved = optimum_.scaled_values;
   for (std::size_t j = 0; j < moved.size(); ++j) {
-    const Coordinate& c = coordinates_[j];
-    const double low = std::min(c.scaled(c.min), c.scaled(c.max)), high = std::max(c.scaled(c.min), c.scaled(c.max));
+    const auto [low, high] = scaledLimits(coordinates_[j]);
     moved[j] = std::clamp(moved[j] + step[static_cast<Eigen::Index>(j)], low, high);
   }
   ModelState state = stateAt(moved, without);
@@ -242,7 +245,7 @@ double LikelihoodClimb::stepBy(const Eigen::VectorXd& step) {
       double& v = next[j];
       v += share * std::clamp(step[globals_ + static_cast<Eigen::Index>(j)], -kLongestStep, kLongestStep);
       if (c.logarithmic()) v = std::max(v, 0.3 * optimum_.scaled_values[j]);
-      const double low = std::min(c.scaled(c.min), c.scaled(c.max)), high = std::max(c.scaled(c.min), c.scaled(c.max));
+      const auto [low, high] = scaledLimits(c);
       v = std::clamp(v, low, high);
     }
     ModelState s =
