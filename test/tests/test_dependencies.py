@@ -69,7 +69,18 @@ def started_by(files):
             left += re.findall(r"^[^#\n]*?(?:mmradartwin_launch|launched .*) (\w+\.launch)", text, re.MULTILINE)
         targets |= {f"{package}_{program}" for package, program in programs
                     if package.startswith("mmradartwin_") and "." not in program}
-    return targets
+    return targets.union(*map(started_in_turn, targets))
+
+
+def started_in_turn(target):
+    """Targets of the programs that stand beside a program and that it starts. emulated_rig is for rig:=emulated alone."""
+    package, program = re.match(r"(mmradartwin_[a-z]+)_(\w+)", target).groups()
+    started = set()
+    for source in glob.glob(os.path.join(ROOT, package, "*", f"{program}.cpp")):
+        with open(source, encoding="utf-8") as text:
+            for call in re.findall(r"programBeside\((.*)\)", text.read()):
+                started |= set(re.findall(r'"(\w+)"', call)) - {"emulated_rig"}
+    return {f"{package}_{name}" for name in started}
 
 
 class Dependencies(unittest.TestCase):
@@ -121,6 +132,7 @@ class Dependencies(unittest.TestCase):
             built += [f"{os.path.basename(os.path.dirname(file))}_{program}" for program in programs]
         started = started_by(["scripts/demo.sh", "scripts/try.sh"])
         self.assertIn("mmradartwin_driver_session_player", started)
+        self.assertIn("mmradartwin_driver_dca1000_emulator", started)
         self.assertIn("mmradartwin_dsp_session_to_bag", started)
         self.assertEqual(sorted(started), sorted(built))
 
