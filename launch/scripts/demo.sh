@@ -16,7 +16,7 @@ source "$here/stages.sh"
 out=$(readlink -m "$1")
 locations=${DEMO_LOCATIONS:-10}
 headings=${DEMO_HEADINGS:-2}
-frames=${DEMO_FRAMES:-100}
+frames=${DEMO_FRAMES:-50}
 effect=${DEMO_EFFECT:-element_pattern}
 log=$out/log
 started=$SECONDS
