@@ -11,7 +11,9 @@
 namespace mmradartwin::diagnosis::fit {
 namespace {
 
-constexpr int kRefits = 3;                ///< Fisher steps of the latents at each point
+/// Most Fisher steps of the latents at each point. Fewer would leave latents on the way to where they take in a part of
+/// the step, and the profile would be too steep.
+constexpr int kRefits = 12;
 constexpr std::size_t kMostProfiled = 6;  ///< numbers profiled jointly: each pair of them costs one point
 constexpr int kWidths = 3;                ///< widths of a step that are tried
 constexpr double kWidest = 1;             ///< largest width of a geometry's step, scaled
