@@ -321,6 +321,50 @@ TEST_F(Corners, AreTheImageFormulaOnce) {
              db(r.amplitude), 0.3);
 }
 
+// In a room of four mirrors there is an image of the radar for each pair of numbers (m, n). Where both are odd, its
+// line runs through an edge: the corner itself at (1, 1), corners seen in other walls beyond.
+TEST_F(Corners, AreSeenInOtherWalls) {
+  const double length = 5, width = 4, x = 1.1, y = 1.37, heading_deg = 108.5;
+  addWall("south", "Metal", {0, 0}, {length, 0}, -30, 30);
+  addWall("east", "Metal", {length, 0}, {length, width}, -30, 30);
+  addWall("north", "Metal", {length, width}, {0, width}, -30, 30);
+  addWall("west", "Metal", {0, width}, {0, 0}, -30, 30);
+  const std::string scene = writeScene();
+  const auto recordsOf = [&](int bounces) {
+    std::vector<PathRecord> retro;
+    const Twin twin = makeTwin(scene, "  specular: {max_bounces: " + std::to_string(bounces) + "}\n", radarAt77GHz());
+    for (const PathRecord& r : twin.simulate(radarPose(x, y, 0, heading_deg)).records) {
+      if (r.bounces % 2 == 0 && (r.departure - r.arrival).norm() < 1e-9) retro.push_back(r);
+    }
+    return retro;
+  };
+  const auto imageAt = [](int number, double at, double size) {  // in the walls at 0 and at `size`
+    return number % 2 == 0 ? number * size + at : (number + 1) * size - at;
+  };
+  const Eigen::Vector2d ahead(std::cos(heading_deg * M_PI / 180), std::sin(heading_deg * M_PI / 180));
+  std::size_t expected = 0;
+  const std::vector<PathRecord> found = recordsOf(6);
+  for (int m = -5; m <= 5; m += 2) {
+    for (int n = -5; n <= 5; n += 2) {
+      const int order = std::abs(m) + std::abs(n);
+      const Eigen::Vector2d way(imageAt(m, x, length) - x, imageAt(n, y, width) - y);
+      if (order < 4 || order > 6 || way.dot(ahead) <= 0 || way.norm() > 20) continue;
+      ++expected;
+      const auto same = [&](const PathRecord& r) {
+        return r.bounces == order && std::abs(r.length_m[0] - way.norm()) < 1e-6;
+      };
+      ASSERT_EQ(std::count_if(found.begin(), found.end(), same), 1) << m << ", " << n;
+      const PathRecord& r = *std::find_if(found.begin(), found.end(), same);
+      EXPECT_NEAR(db(r.amplitude), db(kLambda77_m / (4 * M_PI * way.norm())), 0.3) << m << ", " << n;
+      const double azimuth_deg = std::remainder(std::atan2(way.y(), way.x()) * 180 / M_PI - heading_deg, 360.0);
+      EXPECT_NEAR(std::atan2(r.departure.y(), r.departure.x()) * 180 / M_PI, azimuth_deg, 1e-6);
+    }
+  }
+  EXPECT_GE(expected, 4u);
+  EXPECT_EQ(found.size(), expected);
+  EXPECT_TRUE(recordsOf(3).empty()) << "three bounces see no corner in a wall";
+}
+
 TEST_F(Corners, HaveOneApertureFromFarEndToFarEnd) {
   addFaces(1, 90, 0.1, 20);
   Twin twin = makeTwin(writeScene(), "  corner: {}\n", radarAt77GHz());

@@ -111,6 +111,17 @@ std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
   return edges;
 }
 
+std::complex<double> cornerFactor(const CornerEdge& edge, const Eigen::Vector3d& from, double wavelength_m,
+                                  CornerAperture aperture) {
+  const Eigen::Vector3d way = from - edge.origin;
+  const double x = way.dot(edge.into_a), y = way.dot(edge.into_b), R = std::hypot(x, y), at = way.dot(edge.along);
+  // Across the ray the faces end at -reach_a sin and +reach_b sin of their angles to it, first order in s = 2R.
+  const double unit = 2 / std::sqrt(wavelength_m * R);
+  double across_a = edge.reach_a_m * y / R, across_b = edge.reach_b_m * x / R;
+  if (aperture == CornerAperture::kNarrowerFace) across_a = across_b = std::min(across_a, across_b);
+  return apertureAxis(-across_a * unit, across_b * unit) * apertureAxis(-at * unit, (edge.length_m - at) * unit);
+}
+
 void addCornerPath(const PoseContext& context, const ElementsInMap& elements, const CornerEdge& edge,
                    const PathEvent& event, std::vector<PathRecord>& records, CornerAperture aperture) {
   const Eigen::Vector3d to_radar = elements.p - edge.origin;
@@ -131,12 +142,7 @@ void addCornerPath(const PoseContext& context, const ElementsInMap& elements, co
   const Eigen::Vector3d direction_radar = context.T_map_radar.linear().transpose() * (way / distance);
   if (!context.inFieldOfView(direction_radar)) return;
 
-  // Across the ray the faces end at -reach_a sin and +reach_b sin of their angles to it, first order in s = 2R.
-  const double unit = 2 / std::sqrt(wavelength * R);
-  double across_a = edge.reach_a_m * y / R, across_b = edge.reach_b_m * x / R;
-  if (aperture == CornerAperture::kNarrowerFace) across_a = across_b = std::min(across_a, across_b);
-  const std::complex<double> factor =
-      apertureAxis(-across_a * unit, across_b * unit) * apertureAxis(-foot_at * unit, (edge.length_m - foot_at) * unit);
+  const std::complex<double> factor = cornerFactor(edge, elements.p, wavelength, aperture);
   if (std::abs(factor) < kSmallestCornerFactor) return;
   const Facet &a = context.scene.facets[edge.a], &b = context.scene.facets[edge.b];
   if (!elements.sides.isOpen(a, vertex, elements.p) || !elements.sides.isOpen(b, vertex, elements.p)) return;

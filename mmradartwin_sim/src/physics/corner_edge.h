@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <complex>
 #include <functional>
 #include <string>
 #include <vector>
@@ -33,6 +34,10 @@ enum class CornerAperture {
                   ///< `corner`)
   kNarrowerFace,  ///< as far to both sides as the narrower reaches: what meets one face leaves as far on the other
 };
+
+/// Fresnel aperture factor of an edge's two faces for the retro path to a point, 1 for large ones.
+std::complex<double> cornerFactor(const CornerEdge& edge, const Eigen::Vector3d& from, double wavelength_m,
+                                  CornerAperture aperture = CornerAperture::kBothFaces);
 
 /// The retro path of one edge as seen from one pose, where there is one.
 void addCornerPath(const PoseContext& context, const ElementsInMap& elements, const CornerEdge& edge,

@@ -11,12 +11,6 @@ namespace {
 constexpr double kInside_m = 1e-9;
 constexpr double kOnPlane_m = 1e-7;
 
-/// Gap at the ends of a leg: a merged facet of a scan lies off the triangles that Embree sees.
-double legGap(const Facet& facet, const Eigen::Vector3d& direction) {
-  const double cosine = std::max(0.1, std::abs(facet.normal.dot(direction)));
-  return std::max(1e-3, 2 * facet.flatness_m / cosine);
-}
-
 /// The view of a point through a rectangle: the pyramid over it, outward normals as rows.
 class Beam {
  public:
@@ -41,6 +35,11 @@ class Beam {
 };
 
 }  // namespace
+
+double legGap(const Facet& facet, const Eigen::Vector3d& direction) {
+  const double cosine = std::max(0.1, std::abs(facet.normal.dot(direction)));
+  return std::max(1e-3, 2 * facet.flatness_m / cosine);
+}
 
 ImageSearch::ImageSearch(const Scene& scene, bool all_orientations)
     : scene_(scene), all_orientations_(all_orientations) {

@@ -16,6 +16,10 @@ inline Eigen::Vector3d mirror(const Eigen::Vector3d& p, const Facet& facet) {
   return p - 2 * facet.planeDistance(p) * facet.normal;
 }
 
+/// Gap in m that a ray along `direction` leaves at a facet: a merged facet of a scan lies off the triangles that Embree
+/// sees.
+double legGap(const Facet& facet, const Eigen::Vector3d& direction);
+
 /// A closed specular path from a point back to it.
 struct ImagePath {
   PerInteraction<int> facets;  ///< in the order in which they are met

@@ -3,6 +3,7 @@
 
 #include "mechanisms/base/built_in_mechanism.h"
 #include "physics/aperture.h"
+#include "physics/corner_in_walls.h"
 #include "physics/curved_echo.h"
 #include "physics/elements_in_map.h"
 #include "physics/image_record.h"
@@ -15,6 +16,7 @@ namespace {
 const std::string kSpecular = "specular";
 constexpr double kInset_m = 0.01;  // where a return beside a facet is taken to come from
 constexpr double kSmallestFactor = 0.01;
+constexpr double kMostWays = 2e6;  // edges times sequences of mirrors that are tried at a pose
 
 class Specular : public Mechanism, public PathStage {
  public:
@@ -39,11 +41,13 @@ class Specular : public Mechanism, public PathStage {
   void build(const Scene& scene, const RadarConfig&) override {
     search_ = std::make_unique<ImageSearch>(scene);
     exhaustive_ = std::min(max_bounces_, search_->exhaustiveOrder());
+    findEdges(scene);
   }
 
-  void sceneChanged(const Scene&, const RadarConfig&, const SceneChange& change) override {
+  void sceneChanged(const Scene& scene, const RadarConfig&, const SceneChange& change) override {
     search_->update(change.actors);
     exhaustive_ = std::min(max_bounces_, search_->exhaustiveOrder());
+    findEdges(scene);
   }
 
   std::vector<std::string> notes() const override {
@@ -52,6 +56,13 @@ class Specular : public Mechanism, public PathStage {
       notes.push_back("specular: " + std::to_string(search_->reflectors().size()) +
                       " facets are too many to try all sequences of more than " + std::to_string(exhaustive_) +
                       "; higher orders come from " + std::to_string(ray_budget_) + " launched rays per pose");
+    }
+    for (int walls = 1; 2 * walls + 2 <= max_bounces_; ++walls) {
+      if (waysOver(walls) <= kMostWays) continue;
+      notes.push_back("specular: " + std::to_string(edges_.size()) + " corners are too many to look for them in " +
+                      std::to_string(walls) + " mirror(s); paths of " + std::to_string(2 * walls + 2) +
+                      " bounces over a corner are left out");
+      break;
     }
     if (seeded_poses_ > 0) {
       notes.push_back("specular: launched rays found " + std::to_string(seeded_paths_) + " paths at " +
@@ -90,6 +101,7 @@ class Specular : public Mechanism, public PathStage {
       for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2))
         addImageRecord(context, elements, path, {kSpecular, 1}, cutoff_, records);
     }
+    addCornersInWalls(context, elements, limits, records);
     if (exhaustive_ < max_bounces_ && ray_budget_ > 0) {
       limits.max_order = max_bounces_;
       ImagePath path;
@@ -110,6 +122,30 @@ class Specular : public Mechanism, public PathStage {
   }
 
  private:
+  /// Edges that are seen in mirrors from four bounces on.
+  void findEdges(const Scene& scene) {
+    edges_.clear();
+    if (max_bounces_ < 4) return;
+    edges_ = findCornerEdges(
+        scene, kFacesMeet_m, [](const Facet& f) { return f.reflects; },
+        [](const Facet&, const Facet&) { return true; });
+  }
+
+  /// Ways that are tried at a pose to find the edges in so many mirrors.
+  double waysOver(int walls) const {
+    return static_cast<double>(edges_.size()) * std::pow(static_cast<double>(search_->reflectors().size()), walls);
+  }
+
+  void addCornersInWalls(const PoseContext& context, const ElementsInMap& elements, const ImageSearch::Limits& limits,
+                         std::vector<PathRecord>& records) const {
+    for (int walls = 1; 2 * walls + 2 <= max_bounces_ && waysOver(walls) <= kMostWays; ++walls) {
+      for (const CornerInWalls& corner :
+           findCornersInWalls(context, elements, edges_, search_->reflectors(), walls, limits)) {
+        addCornerInWalls(context, elements, corner, {kSpecular, 1}, cutoff_, records);
+      }
+    }
+  }
+
   void addFirstOrder(const PoseContext& context, const ElementsInMap& elements, const Facet& facet,
                      std::vector<PathRecord>& records) const {
     const double signed_distance = facet.planeDistance(elements.p), R = std::abs(signed_distance);
@@ -200,6 +236,7 @@ class Specular : public Mechanism, public PathStage {
   int max_bounces_ = 3, ray_budget_ = 0, exhaustive_ = 0;
   double cutoff_ = 0;
   std::unique_ptr<ImageSearch> search_;
+  std::vector<CornerEdge> edges_;
   // Convergence as notes() states it; no result depends on it.
   mutable std::atomic<int> seeded_poses_{0}, seeded_paths_{0}, late_paths_{0};
 };
