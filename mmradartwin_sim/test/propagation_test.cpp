@@ -184,6 +184,9 @@ TEST_F(Propagation, FloorAndCeilingReturnFromTheirCorners) {
   }
   // Beyond 20 deg of elevation there is nothing; level is a factor.
   EXPECT_EQ(run("  floor_ceiling_multipath: {level: 1}\n", radarPose(2, 0, 1)).records.size(), 1u);
+  const auto wide = run("  floor_ceiling_multipath: {level: 1, max_elevation_deg: 30}\n", radarPose(2, 0, 1)).records;
+  ASSERT_EQ(wide.size(), 2u) << "the corner over the ceiling, 1.5 m up at 3 m";
+  EXPECT_NEAR(std::max(wide[0].departure.z(), wide[1].departure.z()), 1.5 / std::hypot(3, 1.5), 1e-9);
   EXPECT_NEAR(run("  floor_ceiling_multipath: {level: 0.25}\n", radarPose(0, 0, 1)).records[0].amplitude /
                   s.records[0].amplitude,
               0.25, 1e-12);

@@ -64,9 +64,10 @@ class OtherSimulator(InFolder):
     def test_bounces_are_missing(self):
         self.assertEqual([one["cause"] for one in self.findings_of("P0")], ["trace_coverage"])
 
-    @unittest.skip("does not hold: a pitch of 17 deg and a law stand beside the floor; docs/verification/other_worlds.md")
-    def test_no_law_stands_that_makes_the_maps_worse(self):
-        self.assertLessEqual({one["cause"] for one in self.findings_of("W3")}, {"floor_ceiling_multipath"})
+    def test_floor_and_ceiling_are_seen_at_all_elevations(self):
+        (found,) = self.findings_of("W3")
+        self.assertEqual(found["cause"], "floor_ceiling_multipath")
+        self.assertEqual(found["parameters"]["max_elevation_deg"]["value"], 90)
 
 
 if __name__ == "__main__":

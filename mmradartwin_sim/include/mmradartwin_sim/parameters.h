@@ -22,6 +22,7 @@ struct ParameterSpec {
   /// For a diagnosis that tries the mechanism on data: the value at which it does nothing, and one at which it plainly
   /// does something. NaN where the parameter keeps its default in a trial. An integer or text is never tried.
   double neutral = std::numeric_limits<double>::quiet_NaN(), typical = std::numeric_limits<double>::quiet_NaN();
+  double also = std::numeric_limits<double>::quiet_NaN();  ///< a second value at which a trial holds the parameter
   bool or_list = false;  ///< of a number: a list may stand in its place, one number per receiver
   bool weighs = false;   ///< acts in reweight() and later alone: scene and traced paths stay as they are
 };

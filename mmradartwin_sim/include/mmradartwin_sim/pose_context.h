@@ -12,8 +12,10 @@
 
 namespace mmradartwin {
 
-/// Base field of view of emission and arrival: |azimuth| < 90 deg, |elevation| <= 20 deg of a direction in radar_link.
-bool inFieldOfView(const Eigen::Vector3d& direction_radar);
+constexpr double kBaseElevation_deg = 20;
+/// Field of view of emission and arrival: |azimuth| < 90 deg, |elevation| <= most_elevation_deg of a direction in
+/// radar_link. The base has kBaseElevation_deg.
+bool inFieldOfView(const Eigen::Vector3d& direction_radar, double most_elevation_deg = kBaseElevation_deg);
 
 /// Everything a mechanism may look at for one pose.
 struct PoseContext {
@@ -22,7 +24,7 @@ struct PoseContext {
   const RayCaster& rays;
   Eigen::Isometry3d T_map_radar;  ///< where the twin's radar is, after all pose() calls
   double frequency_hz;            ///< of the coefficients: the window's centre
-  bool inFieldOfView(const Eigen::Vector3d& direction_radar) const;  ///< the free function
+  bool inFieldOfView(const Eigen::Vector3d& direction_radar) const;  ///< the free function, with most_elevation_deg
   double max_range_m;                                                ///< paths with length/2 beyond are left out
   std::uint64_t seed;  ///< of what is random by nature (phases of scatter points)
   /// Strongest A_p of the session's poses, for levels that are relative to it.
@@ -41,6 +43,7 @@ struct PoseContext {
   /// Only paths that meet this actor (index in `scene`) are wanted; others that are added are thrown away. -1: all
   /// paths are wanted.
   int only_actor = -1;
+  double most_elevation_deg = kBaseElevation_deg;  ///< a mechanism may look farther up and down, in a copy
 };
 
 }  // namespace mmradartwin

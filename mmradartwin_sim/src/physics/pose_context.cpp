@@ -4,16 +4,14 @@
 
 namespace mmradartwin {
 
-namespace {
-const double kSine = std::sin(20 * M_PI / 180);
-}
-
-bool inFieldOfView(const Eigen::Vector3d& direction_radar) {
-  return direction_radar.x() > 0 && std::abs(direction_radar.z()) <= kSine * direction_radar.norm();
+bool inFieldOfView(const Eigen::Vector3d& direction_radar, double most_elevation_deg) {
+  static const double kBaseSine = std::sin(kBaseElevation_deg * M_PI / 180);
+  const double sine = most_elevation_deg == kBaseElevation_deg ? kBaseSine : std::sin(most_elevation_deg * M_PI / 180);
+  return direction_radar.x() > 0 && std::abs(direction_radar.z()) <= sine * direction_radar.norm();
 }
 
 bool PoseContext::inFieldOfView(const Eigen::Vector3d& direction_radar) const {
-  return mmradartwin::inFieldOfView(direction_radar);
+  return mmradartwin::inFieldOfView(direction_radar, most_elevation_deg);
 }
 
 }  // namespace mmradartwin

@@ -4,6 +4,8 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
+#include "diagnosis/catalogue/default_mechanism.h"
+
 namespace mmradartwin::diagnosis::hypotheses {
 namespace {
 
@@ -33,7 +35,11 @@ std::vector<FindingParameter> fittedParameters(const Hypothesis& hypothesis, con
         parameter.ci95 = {
             {std::max(c.min, *value - t * standard_error[j]), std::min(c.max, *value + t * standard_error[j])}};
       }
-      if (parameter.ci95.empty() && (wanted.one_of > 0 || wanted.optional)) continue;
+      const auto isDefault = [&] {
+        const Parameters usual = defaultMechanism(m.mechanism).values;
+        return usual.has(wanted.name) && usual.all().at(wanted.name) == parameter.value;
+      };
+      if (parameter.ci95.empty() && (wanted.one_of > 0 || (wanted.optional && isDefault()))) continue;
     } else if (list != nullptr) {
       parameter.ci95.assign(list->size(), {0, 0});
       for (std::size_t k = 0; k < list->size(); ++k) parameter.ci95[k] = {(*list)[k], (*list)[k]};

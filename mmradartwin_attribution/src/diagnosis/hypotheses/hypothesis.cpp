@@ -7,6 +7,7 @@
 #include <set>
 
 #include "diagnosis/likelihood/expected_echoes.h"
+#include "diagnosis/numbers/number_text.h"
 #include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/mechanism_registry.h"
@@ -102,6 +103,20 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
   }
   if (!material && !actor && !slot && spec("walls") == specs.end() && spec("actors") == specs.end()) {
     out.push_back(bare);
+  }
+}
+
+/// Adds each hypothesis once more with the second value of a parameter that has one.
+void addSecondValues(const std::vector<ParameterSpec>& specs, std::vector<Hypothesis>& all) {
+  for (const ParameterSpec& s : specs) {
+    if (std::isnan(s.also)) continue;
+    std::vector<Hypothesis> others = all;
+    for (Hypothesis& h : others) {
+      h.mechanism.values.set(s.name, s.also);
+      h.variant = s.name + " " + number(s.also);
+      h.searched += 1;
+    }
+    all.insert(all.end(), others.begin(), others.end());
   }
 }
 
@@ -252,6 +267,7 @@ std::vector<Hypothesis> allHypotheses(const Twin& twin, const std::vector<NamedP
     }
     std::vector<Hypothesis> all;
     addSubjects(twin, bare, specs, all);
+    addSecondValues(specs, all);
     for (int steps = 1; steps <= kMostSteps; ++steps) {
       if (std::optional<Hypothesis> stepped = withSteps(bare, steps)) all.push_back(std::move(*stepped));
     }

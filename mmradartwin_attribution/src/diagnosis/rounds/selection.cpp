@@ -100,7 +100,8 @@ void Selection::refitTogether() {
       const std::size_t numbers = a.hypothesis.coordinates.size();
       // A finding without numbers, or with an overwhelming gain, was judged by its own round. A law is judged again: it
       // may have stood for a named cause that had not been fitted yet.
-      if (numbers == 0 || (a.overwhelming && context_.fitter.isOverwhelming(fit.evidence[i].nats))) continue;
+      a.plain_beside_others = a.overwhelming && context_.fitter.isOverwhelming(fit.evidence[i].nats);
+      if (numbers == 0 || a.plain_beside_others) continue;
       const double rate = context_.fitter.falseAlarmRate(fit.evidence[i].scattered(), a.hypothesis, numbers, family_);
       if (rate > weakest_rate) {
         weakest = i;
@@ -130,6 +131,7 @@ void Selection::withdrawExplainedByUnknown() {
     if (!isCatalogued(h.mechanism.mechanism) || !h.subject.empty() || h.isGeometry() || h.coordinates.empty()) {
       return false;
     }
+    if (a.plain_beside_others) return false;  // whatever its interval says, which is wide where a number is a level
     const std::size_t numbers = h.coordinates.size();
     return context_.fitter.falseAlarmRate(natsFromNothing(h, a.scaled_values, a.standard_error), h, numbers, family_) >
            bounds::kFalseAlarmRateOfRound;

@@ -56,6 +56,8 @@ class Selection {
     std::optional<std::vector<std::string>> beside;
     /// Simpler hypotheses that explained nearly as much in its round, with their scaled values.
     std::vector<std::pair<Hypothesis, std::vector<double>>> rivals;
+    /// At the last joint fit its gain beside all others was overwhelming.
+    bool plain_beside_others = false;
   };
   std::vector<Accepted>::const_iterator acceptedAs(const Hypothesis& h) const;
   void accept(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding);

@@ -35,6 +35,22 @@ TEST(FittedParameters, IntervalsAreCentredAndWiderTheFewerThePlaces) {
   EXPECT_GT(widthOf(101), 2 * 1.96 * 0.004) << "no narrower than the standard error says";
 }
 
+TEST(FittedParameters, HaveAnOptionalOneWhereItIsNotTheUsual) {
+  Hypothesis floor;
+  floor.mechanism = defaultMechanism("floor_ceiling_multipath");
+  floor.coordinates = {{"level", "1", -1, 0, 1, 0, 100, {}}};
+  const auto namesOf = [&] {
+    std::vector<std::string> names;
+    for (const FindingParameter& p : fittedParameters(floor, {1}, {0.1}, "floor_ceiling_multipath", 17)) {
+      names.push_back(p.name);
+    }
+    return names;
+  };
+  EXPECT_EQ(namesOf(), std::vector<std::string>{"level"});
+  floor.mechanism.values.set("max_elevation_deg", 90.0);
+  EXPECT_EQ(namesOf(), (std::vector<std::string>{"level", "max_elevation_deg"}));
+}
+
 TEST(FittedParameters, IntervalsStayWithinTheParametersRange) {
   const FindingParameter p = fittedParameters(biasOf(), {33}, {0.5}, "range_bias", 17)[0];
   EXPECT_DOUBLE_EQ(p.ci95[0][1], 1);

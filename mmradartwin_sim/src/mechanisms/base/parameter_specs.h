@@ -32,6 +32,12 @@ inline ParameterSpec tried(ParameterSpec spec, double neutral, double typical) {
   return spec;
 }
 
+/// Says that a diagnosis tries the mechanism with this value of a parameter, too, beside its default.
+inline ParameterSpec alsoAt(ParameterSpec spec, double value) {
+  spec.also = value;
+  return spec;
+}
+
 /// Says that a list over receivers may stand in the number's place.
 inline ParameterSpec orPerReceiver(ParameterSpec spec) {
   spec.or_list = true;

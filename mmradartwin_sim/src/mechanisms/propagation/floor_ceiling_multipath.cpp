@@ -10,19 +10,24 @@ namespace mmradartwin {
 namespace {
 
 const std::string kFloorCeilingMultipath = "floor_ceiling_multipath";
+constexpr double kAnyElevation_deg = 90;  ///< elements that are alike in all elevations
 
 /// Paths over facets within 45 deg of the horizontal, which the base leaves out: the retro paths of corners that they
-/// form with upright faces, and images of second and third order with at least one such facet, within the same +-20 deg
-/// of elevation as all paths. A first-order return of such a facet leaves that field of view.
+/// form with upright faces, and images of up to the third order with at least one such facet, up to an elevation. With
+/// the base's 20 deg no first-order return of such a facet is in view.
 class FloorCeilingMultipath : public Mechanism, public PathStage {
  public:
   const std::string& name() const override { return kFloorCeilingMultipath; }
   std::vector<ParameterSpec> parameters() const override {
     return {tried(numberSpec("level", "1", 0, 100, 1, "factor of amplitude, 1 = full"), 0, 1),
+            alsoAt(numberSpec("max_elevation_deg", "deg", 0, 90, kBaseElevation_deg,
+                              "elevation up to which the elements send and receive these paths"),
+                   kAnyElevation_deg),
             numberSpec("gap_m", "m", 0, 1, 0.025, "upright faces that end this near to a floor stand on it")};
   }
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     level_ = values.number("level");
+    most_elevation_deg_ = values.number("max_elevation_deg");
     gap_m_ = std::max(kFacesMeet_m, values.number("gap_m"));
   }
   void build(const Scene& scene, const RadarConfig&) override {
@@ -37,21 +42,22 @@ class FloorCeilingMultipath : public Mechanism, public PathStage {
     return {"floor_ceiling_multipath: " + std::to_string(search_->reflectors().size()) +
             " facets are too many to try all sequences of more than " + std::to_string(order_)};
   }
-  void addPaths(const PoseContext& context, std::vector<PathRecord>& records) const override {
+  void addPaths(const PoseContext& given, std::vector<PathRecord>& records) const override {
     if (level_ <= 0) return;
+    PoseContext context = given;
+    context.most_elevation_deg = most_elevation_deg_;
     const ElementsInMap elements(context);
     // A wall over a picture's upper side is no corner as high as the wall.
     for (const CornerEdge& edge : corners_) {
       addCornerPath(context, elements, edge, {kFloorCeilingMultipath, level_}, records, CornerAperture::kNarrowerFace);
     }
-    if (order_ < 2) return;
     ImageSearch::Limits limits;
     limits.max_order = order_;
     limits.max_length_m = 2 * context.max_range_m;
     limits.forward = context.T_map_radar.linear().col(0);
     const Eigen::Matrix3d to_radar = context.T_map_radar.linear().transpose();
     limits.in_view = [&](const Eigen::Vector3d& d) { return context.inFieldOfView(to_radar * d); };
-    for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2)) {
+    for (const ImagePath& path : search_->find(elements.p, context.rays, limits)) {
       const bool ours = std::any_of(path.facets.begin(), path.facets.end(),
                                     [&](int id) { return !context.scene.facets[id].reflects; });
       if (ours) addImageRecord(context, elements, path, {kFloorCeilingMultipath, level_}, 1e-10, records);
@@ -59,7 +65,7 @@ class FloorCeilingMultipath : public Mechanism, public PathStage {
   }
 
  private:
-  double level_ = 1, gap_m_ = 0;
+  double level_ = 1, gap_m_ = 0, most_elevation_deg_ = kBaseElevation_deg;
   int order_ = 0;
   std::vector<CornerEdge> corners_;
   std::unique_ptr<ImageSearch> search_;
