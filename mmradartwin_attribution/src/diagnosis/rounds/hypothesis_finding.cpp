@@ -223,6 +223,30 @@ double correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return x.dot(y) / std::max(1e-300, x.norm() * y.norm());
 }
 
+double natsApart(const HypothesisFit& a, const HypothesisFit& b, const ChannelData& data) {
+  Eigen::VectorXd more = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.locations.size()));
+  for (std::size_t i = 0; i < a.state.by_pose.size(); ++i) {
+    more[data.poses[i].location] += a.state.by_pose[i] - b.state.by_pose[i];
+  }
+  const double places = static_cast<double>(more.size()), sum = more.sum();
+  if (places < 2) return std::abs(sum);
+  const double variance = places / (places - 1) * (more.array() - more.mean()).square().sum();
+  return std::min(std::abs(sum), 0.5 * sum * sum / std::max(variance, 1e-300));
+}
+
+void preferSimplerGeometry(std::vector<HypothesisFit>& fits, const ChannelData& data) {
+  const auto isGeometry = [](const HypothesisFit& f) { return f.hypothesis.isGeometry(); };
+  const auto best = std::find_if(fits.begin(), fits.end(), isGeometry);
+  auto simplest = best;
+  for (auto rival = best; rival != fits.end(); ++rival) {
+    if (isGeometry(*rival) && rival->ranking() > 0 && rival->numbers() < simplest->numbers() &&
+        natsApart(*best, *rival, data) <= bounds::kNotToldApart_nats) {
+      simplest = rival;
+    }
+  }
+  if (simplest != fits.end()) std::rotate(best, simplest, simplest + 1);
+}
+
 void preferBetterNames(std::vector<HypothesisFit>& fits, const ModelState& before) {
   const auto ofAllEchoes = [](const HypothesisFit& f) {
     return f.hypothesis.subject.empty() && isCatalogued(f.hypothesis.mechanism.mechanism);

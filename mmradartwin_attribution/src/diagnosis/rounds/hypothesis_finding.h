@@ -48,6 +48,13 @@ Eigen::VectorXd gainByPose(const HypothesisFit& fit, const ModelState& before);
 /// Pearson correlation of two gains; near 1 where they explain the same poses.
 double correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
 
+/// Nats by which one fit is likelier than another: the difference of their likelihoods, and no more than its scatter
+/// over places allows, z^2 / 2 of its sum (Vuong, Econometrica 57, 1989).
+double natsApart(const HypothesisFit& a, const HypothesisFit& b, const ChannelData& data);
+/// Moves a geometry of fewer numbers before the likeliest one where places do not tell the two apart. Seen from places
+/// that look one way, a bias of all ranges and a shift of the scene are alike, and more numbers take in more of what
+/// the model lacks.
+void preferSimplerGeometry(std::vector<HypothesisFit>& fits, const ChannelData& data);
 /// Gives the better of two causes of all echoes that gain alike over poses the lower false-alarm rate of the two. How
 /// sure an error of all echoes is follows from its surest name; which name it has follows from the likelihood.
 void preferBetterNames(std::vector<HypothesisFit>& fits, const ModelState& before);

@@ -159,6 +159,7 @@ bool HypothesisRounds::findOne(int round) {
   const ModelState& state = selection_.state();
   preferAbsences(fits);
   preferMoves(fits, context_.twin.scene());
+  preferSimplerGeometry(fits, context_.data);
   preferBetterNames(fits, state);
   MapEvidence maps(context_, state);
   std::vector<HypothesisFit> clutter;  // likelier than the fits that follow

@@ -352,15 +352,21 @@ void Selection::orderByGain() {
   mechanisms_ = before_rounds_;
   extended_ = extended_before_rounds_;
   std::vector<std::string> before;
+  bool measured = false;
   for (const Accepted& a : accepted_) {
     if (!a.beside || !std::is_permutation(a.beside->begin(), a.beside->end(), before.begin(), before.end())) {
       measureAgain(a);
+      measured = true;
     }
     before.push_back(a.hypothesis.label());
     replaceOrAppend(a.hypothesis.at(a.scaled_values), mechanisms_);
     replaceOrAppend(a.hypothesis.at(a.scaled_values), extended_);
   }
   state_.latents = found;
+  if (!measured) return;
+  // The state is that of all findings again, by which the rest of the session is judged.
+  context_.echoes.setBaseline(mechanisms_);
+  state_ = context_.fitter.state(mechanisms_, &found);
 }
 
 /// Measures a finding's gain over mechanisms_ again, in nats, explained power and metrics.
