@@ -6,11 +6,10 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/strict_yaml.h"
+#include "mmradartwin_dsp/units.h"
 
 namespace mmradartwin {
 namespace {
-
-constexpr double kDegree_rad = M_PI / 180.0;
 
 void readNumber(YamlMap& yaml, const std::string& key, double min, double max, double scale, double& value) {
   if (yaml.has(key)) value = scale * yaml.number(key, min, max);
@@ -20,15 +19,15 @@ void readWindow(YamlMap& yaml, const std::string& key, MatchWindow& window) {
   if (!yaml.has(key)) return;
   YamlMap map = yaml.map(key);
   readNumber(map, "range_m", 0.0, 10.0, 1.0, window.range_m);
-  readNumber(map, "azimuth_deg", 0.0, 180.0, kDegree_rad, window.azimuth_rad);
+  readNumber(map, "azimuth_deg", 0.0, 180.0, kDegree, window.azimuth_rad);
   map.rejectUnknownKeys();
 }
 
 AttributionConfig read(YamlMap yaml) {
   AttributionConfig c;
   readNumber(yaml, "min_range_m", 0.0, 10.0, 1.0, c.min_range_m);
-  readNumber(yaml, "max_azimuth_deg", 1.0, 90.0, kDegree_rad, c.max_azimuth_rad);
-  readNumber(yaml, "outer_azimuth_deg", 1.0, 90.0, kDegree_rad, c.outer_azimuth_rad);
+  readNumber(yaml, "max_azimuth_deg", 1.0, 90.0, kDegree, c.max_azimuth_rad);
+  readNumber(yaml, "outer_azimuth_deg", 1.0, 90.0, kDegree, c.outer_azimuth_rad);
   readNumber(yaml, "floor_db", -200.0, -1.0, 1.0, c.floor_db);
   readNumber(yaml, "strong_db", -100.0, 0.0, 1.0, c.strong_db);
   readNumber(yaml, "medium_db", -100.0, 0.0, 1.0, c.medium_db);
@@ -47,10 +46,10 @@ AttributionConfig read(YamlMap yaml) {
   readNumber(yaml, "record_span_db", 0.0, 200.0, 1.0, c.record_span_db);
   if (yaml.has("regions")) {
     YamlMap r = yaml.map("regions");
-    readNumber(r, "max_elevation_deg", 0.0, 90.0, kDegree_rad, c.regions.max_elevation_rad);
+    readNumber(r, "max_elevation_deg", 0.0, 90.0, kDegree, c.regions.max_elevation_rad);
     readNumber(r, "support_floor_db", -200.0, 0.0, 1.0, c.regions.support_floor_db);
     if (r.has("image_order")) c.regions.image_order = static_cast<int>(r.integer("image_order", 1, 3));
-    readNumber(r, "corner_tolerance_deg", 0.0, 45.0, kDegree_rad, c.regions.corner_tolerance_rad);
+    readNumber(r, "corner_tolerance_deg", 0.0, 45.0, kDegree, c.regions.corner_tolerance_rad);
     readNumber(r, "corner_gap_m", 0.0, 1.0, 1.0, c.regions.corner_gap_m);
     readNumber(r, "extent_floor_db", -200.0, 0.0, 1.0, c.regions.extent_floor_db);
     readNumber(r, "extent_scattering", 0.01, 1.0, 1.0, c.regions.extent_scattering);
@@ -69,28 +68,28 @@ std::string numberText(double value) {
 }
 
 std::string window(const MatchWindow& w) {
-  return "{range_m: " + numberText(w.range_m) + ", azimuth_deg: " + numberText(w.azimuth_rad / kDegree_rad) + "}";
+  return "{range_m: " + numberText(w.range_m) + ", azimuth_deg: " + numberText(w.azimuth_rad / kDegree) + "}";
 }
 
 }  // namespace
 
 AttributionConfig::AttributionConfig()
     : min_range_m(0.16),
-      max_azimuth_rad(60 * kDegree_rad),
-      outer_azimuth_rad(90 * kDegree_rad),
+      max_azimuth_rad(60 * kDegree),
+      outer_azimuth_rad(90 * kDegree),
       floor_db(-50),
       strong_db(-15),
       medium_db(-20),
       weak_db(-25),
       response_margin_db(3),
-      tight{0.20, 5 * kDegree_rad},
-      wide{0.60, 20 * kDegree_rad},
-      agreement{0.35, 10 * kDegree_rad},
+      tight{0.20, 5 * kDegree},
+      wide{0.60, 20 * kDegree},
+      agreement{0.35, 10 * kDegree},
       near_limit_m(2),
       far_limit_m(4),
       top_k{1, 3, 5},
       record_span_db(20),
-      regions{20 * kDegree_rad, -30, 3, 2 * kDegree_rad, 0.005, -25, 0.5, 0.1} {}
+      regions{20 * kDegree, -30, 3, 2 * kDegree, 0.005, -25, 0.5, 0.1} {}
 
 Contradiction contradictionIn(const AttributionConfig& c) {
   if (!(c.floor_db <= c.weak_db)) return {"floor_db", "must not be above weak_db"};
@@ -116,8 +115,8 @@ std::string toYaml(const AttributionConfig& c) {
        "normalisation;\n"
        "# those up to outer_azimuth_deg are reported apart.\n"
     << "min_range_m: " << numberText(c.min_range_m) << "\n"
-    << "max_azimuth_deg: " << numberText(c.max_azimuth_rad / kDegree_rad) << "\n"
-    << "outer_azimuth_deg: " << numberText(c.outer_azimuth_rad / kDegree_rad) << "\n"
+    << "max_azimuth_deg: " << numberText(c.max_azimuth_rad / kDegree) << "\n"
+    << "outer_azimuth_deg: " << numberText(c.outer_azimuth_rad / kDegree) << "\n"
     << "# Levels below the map's peak.\n"
     << "floor_db: " << numberText(c.floor_db) << "\n"
     << "strong_db: " << numberText(c.strong_db) << "\n"
@@ -137,10 +136,10 @@ std::string toYaml(const AttributionConfig& c) {
     << "record_span_db: " << numberText(c.record_span_db) << "\n"
     << "# Expected response regions, from geometry and pose alone.\n"
     << "regions:\n"
-    << "  max_elevation_deg: " << numberText(c.regions.max_elevation_rad / kDegree_rad) << "\n"
+    << "  max_elevation_deg: " << numberText(c.regions.max_elevation_rad / kDegree) << "\n"
     << "  support_floor_db: " << numberText(c.regions.support_floor_db) << "\n"
     << "  image_order: " << c.regions.image_order << "\n"
-    << "  corner_tolerance_deg: " << numberText(c.regions.corner_tolerance_rad / kDegree_rad) << "\n"
+    << "  corner_tolerance_deg: " << numberText(c.regions.corner_tolerance_rad / kDegree) << "\n"
     << "  corner_gap_m: " << numberText(c.regions.corner_gap_m) << "\n"
     << "  extent_floor_db: " << numberText(c.regions.extent_floor_db) << "\n"
     << "  extent_scattering: " << numberText(c.regions.extent_scattering) << "\n"

@@ -4,11 +4,10 @@
 #include <cmath>
 
 #include "mmradartwin_dsp/session.h"
+#include "mmradartwin_dsp/units.h"
 
 namespace mmradartwin {
-namespace {
-constexpr double kRadPerDegree = M_PI / 180.0;
-}  // namespace
+namespace {}  // namespace
 
 bool LiveLedger::counts(const Stretch& stretch) const { return stretch.end_ns - stretch.begin_ns >= 1000000000; }
 
@@ -22,7 +21,7 @@ void LiveLedger::add(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_radar
   if (!current_.empty()) {
     const Stretch& c = current_.front();
     const bool stands = (T_map_radar.translation() - c.T.translation()).norm() <= 0.02 &&
-                        Eigen::AngleAxisd(c.T.linear().transpose() * T_map_radar.linear()).angle() <= kRadPerDegree &&
+                        Eigen::AngleAxisd(c.T.linear().transpose() * T_map_radar.linear()).angle() <= kDegree &&
                         stamp_ns >= c.begin_ns;
     if (!stands) {
       if (counts(c)) {

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "mmradartwin_dsp/map_picture.h"
+#include "mmradartwin_dsp/units.h"
 
 namespace mmradartwin {
 namespace {
@@ -15,7 +16,6 @@ const cv::Scalar kWhite(255, 255, 255), kMagenta(255, 0, 255), kInk(40, 40, 40),
     kStation(178, 114, 0);
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
 constexpr int kFanHeight_px = 470;
-constexpr double kOneDegree_rad = M_PI / 180.0;
 
 std::string format(const char* pattern, double a, double b = 0, double c = 0) {
   char text[160];
@@ -100,7 +100,7 @@ std::string describe(const Residual& r) {
   std::string line = className(r.residual_class) + " " + classLabel(r.residual_class) + ": " +
                      (r.actor.empty() ? "at no expected region" : spoken(r.actor));
   if (!r.material.empty()) line += " (" + spoken(r.material) + ")";
-  line += format(", %.2f m, %+.0f deg: measured %.1f", r.range_m, r.azimuth_rad / kOneDegree_rad, r.measured_db);
+  line += format(", %.2f m, %+.0f deg: measured %.1f", r.range_m, r.azimuth_rad / kDegree, r.measured_db);
   return line + format(" dB, simulated %.1f dB", r.simulated_db);
 }
 
@@ -274,7 +274,7 @@ cv::Mat drawPose(const EvaluationField& field, const PoseResult& result) {
   put(picture,
       "pose " + result.pose.name + ", location " + result.pose.location +
           format(": radar at %.2f, %.2f, %.2f m", p.x(), p.y(), p.z()) +
-          format(", heading %+.1f deg", std::atan2(x.y(), x.x()) / kOneDegree_rad),
+          format(", heading %+.1f deg", std::atan2(x.y(), x.x()) / kDegree),
       14, 23, 0.6, kInk);
   int y = kHead + kFanHeight_px + 10;
   int matched = 0, active = 0;

@@ -16,6 +16,7 @@
 #include "mmradartwin_dsp/csv_reader.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/input_file.h"
+#include "mmradartwin_dsp/units.h"
 #include "target_echo.h"
 
 namespace mmradartwin {
@@ -24,18 +25,17 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kDeg = M_PI / 180;
 enum Index { kYaw, kForward, kLeft, kRange, kFirstPhase };
 // Largest standard deviations of a value that is of use for a mount; 95 % intervals may be twice as wide to each side.
-constexpr double kMostYaw_rad = 1 * kDeg, kMostOffset_m = 0.02, kMostPhase_rad = 15 * kDeg;
+constexpr double kMostYaw_rad = 1 * kDegree, kMostOffset_m = 0.02, kMostPhase_rad = 15 * kDegree;
 // Least scatter that few poses can show.
-constexpr double kLeastRange_m = 3e-4, kLeastHeading_rad = 0.02 * kDeg, kLeastChannel = 2e-3;
+constexpr double kLeastRange_m = 3e-4, kLeastHeading_rad = 0.02 * kDegree, kLeastChannel = 2e-3;
 
 /// Standard deviations of one pose's own errors.
 struct Scatter {
   double range_m = 0.005;  ///< of the radar's range beside the laser's
   double pose_m = 0.005;   ///< of the pose's distance
-  double heading_rad = 0.3 * kDeg;
+  double heading_rad = 0.3 * kDegree;
   double channel = 0.05;  ///< of a channel's real or imaginary part, rms 1
 };
 
@@ -204,7 +204,7 @@ Scatter scatterOf(const Residuals& residuals, const VectorXd& p, bool lasers) {
 
 double coarseYaw(const Residuals& residuals, const MountCalibrationOptions& options) {
   double best = 0, score = -1;
-  for (double yaw = -options.search_rad; yaw <= options.search_rad + 1e-9; yaw += 0.5 * kDeg) {
+  for (double yaw = -options.search_rad; yaw <= options.search_rad + 1e-9; yaw += 0.5 * kDegree) {
     double sum = 0;
     for (const Observation& o : residuals.observations) {
       const auto paths = targetPaths(residuals.radar, residuals.target, placed(o.echo.T_map_radar, yaw, 0, 0));
@@ -344,7 +344,7 @@ std::string undeterminedBecause(const MountFit& mount, bool yaw, bool channels) 
          format(
              ": from pose to pose its echo's direction scatters by %.1f deg and its channels by "
              "%.0f %%, ",
-             residuals.scatter.heading_rad / kDeg, 100 * residuals.scatter.channel) +
+             residuals.scatter.heading_rad / kDegree, 100 * residuals.scatter.channel) +
          "and there are " + std::to_string(residuals.observations.size()) + " poses of it" +
          (residuals.target.wall.empty() ? "; take more poses, of a larger or nearer reflector"
                                         : "; rough walls (concrete, plaster) do that: hold the radar before a "
@@ -376,7 +376,7 @@ VectorXd fillValues(const MountFit& mount, MountCalibration& result) {
     used(parameter) = v.value = 0;
     return v;
   };
-  result.yaw_deg = value("yaw_deg", "deg", kYaw, 1 / kDeg, false, yaw);
+  result.yaw_deg = value("yaw_deg", "deg", kYaw, 1 / kDegree, false, yaw);
   result.forward_m = value("forward_m", "m", kForward, 1, mount.forward_held, fixed(kForward, kMostOffset_m));
   result.left_m = value("left_m", "m", kLeft, 1, mount.left_held, fixed(kLeft, kMostOffset_m));
   result.range_m = value("range_m", "m", kRange, 1, false, fixed(kRange, kMostOffset_m));
@@ -386,7 +386,7 @@ VectorXd fillValues(const MountFit& mount, MountCalibration& result) {
   zero.name = "gain_db", zero.unit = "dB";
   result.gain_db.push_back(zero);
   for (int k = 1; k < M; ++k) {
-    result.phase_deg.push_back(value("phase_deg", "deg", kFirstPhase + k - 1, 1 / kDeg, false, channels));
+    result.phase_deg.push_back(value("phase_deg", "deg", kFirstPhase + k - 1, 1 / kDegree, false, channels));
     result.gain_db.push_back(value("gain_db", "dB", kFirstPhase + M - 1 + k - 1, 20 / std::log(10.0), false, channels));
   }
   if (!yaw || !channels) result.undetermined = undeterminedBecause(mount, yaw, channels);
@@ -397,12 +397,12 @@ void fillErrors(const Residuals& residuals, const VectorXd& p, int after, const 
   const auto paths =
       targetPaths(residuals.radar, residuals.target, placed(o.echo.T_map_radar, p(kYaw), p(kForward), p(kLeft)));
   if (!paths) return;
-  pose.azimuth_deg = std::atan2(paths->direction.y(), paths->direction.x()) / kDeg;
+  pose.azimuth_deg = std::atan2(paths->direction.y(), paths->direction.x()) / kDegree;
   pose.range_error_m[after] = o.echo.range_m - p(kRange) - paths->range_m;
   // The heading that would explain the channels, best by the array's answer alone.
   double best = 0, score = -1;
   for (double turn = -15; turn <= 15; turn += 0.02) {
-    const double error = residuals.channelError(o, p, turn * kDeg).squaredNorm();
+    const double error = residuals.channelError(o, p, turn * kDegree).squaredNorm();
     if (score < 0 || error < score) score = error, best = turn;
   }
   pose.azimuth_error_deg[after] = -best;  // a radar turned to the left sees the target further to the right
@@ -411,7 +411,7 @@ void fillErrors(const Residuals& residuals, const VectorXd& p, int after, const 
   for (int k = 1; k < M; ++k) against(k) *= std::polar(1.0, -p(kFirstPhase + k - 1));
   const std::complex<double> mean = against.sum();
   pose.channel_error_deg[after].clear();
-  for (int k = 0; k < M; ++k) pose.channel_error_deg[after].push_back(std::arg(against(k) * std::conj(mean)) / kDeg);
+  for (int k = 0; k < M; ++k) pose.channel_error_deg[after].push_back(std::arg(against(k) * std::conj(mean)) / kDegree);
 }
 
 }  // namespace
@@ -483,7 +483,7 @@ MountCalibration calibrateMount(const Recording& recording, const CalibrationTar
 }
 
 Eigen::Isometry3d correctedMount(const MountCalibration& c, const Eigen::Isometry3d& T_camera_radar) {
-  return placed(T_camera_radar, c.yaw_deg.value * kDeg, c.forward_m.value, c.left_m.value);
+  return placed(T_camera_radar, c.yaw_deg.value * kDegree, c.forward_m.value, c.left_m.value);
 }
 
 }  // namespace mmradartwin

@@ -7,12 +7,12 @@
 
 #include "mmradartwin_attribution/pose_picture.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/units.h"
 
 namespace mmradartwin {
 namespace {
 
 using visualization_msgs::Marker;
-constexpr double kDegree = M_PI / 180.0;
 
 std_msgs::ColorRGBA rgba(double r, double g, double b, double a = 1) {
   std_msgs::ColorRGBA c;

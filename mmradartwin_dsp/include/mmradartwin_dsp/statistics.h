@@ -4,6 +4,9 @@
 
 namespace mmradartwin {
 
+/// Variance that rounding to whole numbers adds to a real number.
+constexpr double kRoundingVariance = 1.0 / 12;
+
 /// Quantile by linear interpolation between order statistics; NaN for an empty list. `probability` is in [0, 1].
 double quantile(std::vector<double> values, double probability);
 /// The same of a list in ascending order.

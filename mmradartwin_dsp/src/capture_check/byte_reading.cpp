@@ -6,6 +6,7 @@
 #include <unsupported/Eigen/FFT>
 
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin {
 namespace {
@@ -17,7 +18,6 @@ using Order = ByteReading::Order;
 constexpr double kLogVariance = 1.6449;
 /// Neighbouring bins of a Hann window are correlated: that many bins count as one.
 constexpr double kBinsAlike = 1.5;
-constexpr double kRoundingVariance = 1.0 / 12;  ///< of a word
 
 Eigen::FFT<double>& fft() {
   thread_local Eigen::FFT<double> fft(Eigen::FFT<double>::impl_type(), Eigen::FFT<double>::Unscaled);

@@ -7,6 +7,8 @@
 #include <numeric>
 #include <utility>
 
+#include "mmradartwin_dsp/statistics.h"
+
 namespace mmradartwin {
 namespace {
 
@@ -20,7 +22,6 @@ constexpr double kAlikeOverlap = 0.3;
 constexpr double kGlanceNats = 3;
 constexpr double kFalseAlarmRate = 1e-6;
 constexpr std::size_t kGlancePeriods = 4;  ///< that a first glance takes
-constexpr double kVarianceOfRounding = 1.0 / 12;
 /// A word's error beyond three standard deviations is a break, not noise, and does not teach the prediction.
 constexpr double kBreak = 9;
 
@@ -51,7 +52,7 @@ std::vector<double> squaredErrors(const std::vector<std::int16_t>& words, std::s
     std::vector<double> sorted(error.begin() + static_cast<std::ptrdiff_t>(kOrder * stride), error.end());
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
-    most = kBreak * (*middle / 0.455 + kVarianceOfRounding);  // the median of a squared normal error is 0.455 variances
+    most = kBreak * (*middle / 0.455 + kRoundingVariance);  // the median of a squared normal error is 0.455 variances
   }
   return error;
 }
@@ -67,7 +68,7 @@ std::vector<double> trimmedMeans(const std::vector<double>& error, std::size_t p
     if (dropped > 0) std::sort(values.begin(), values.end());
     means[i] = std::accumulate(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(kept), 0.0) /
                    static_cast<double>(kept) +
-               kVarianceOfRounding;
+               kRoundingVariance;
   }
   return means;
 }

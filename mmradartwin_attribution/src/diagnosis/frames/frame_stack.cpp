@@ -10,6 +10,7 @@
 
 #include "diagnosis/catalogue/bounds.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::frames {
 namespace {
@@ -18,7 +19,7 @@ using Complex = std::complex<float>;
 
 constexpr int kNeighbourCodes = 16;  ///< codes next to the outermost one that show how often it should occur
 constexpr int kEchoesInBand = 8;     ///< a moving body with its limbs fills at most an eighth of the range bins
-constexpr double kRoundingVariance = 1.0 / 6;  ///< of a complex value, 1/12 each for I and Q
+constexpr double kComplexRounding = 2 * kRoundingVariance;  ///< of I and of Q
 
 float medianOf(std::vector<float>& values) {
   const auto middle = values.begin() + static_cast<long>(values.size() / 2);
@@ -243,7 +244,7 @@ double differenceVariance(const FrameStack& stack) {
       variances.push_back(medianOf(power) / static_cast<float>(2 * std::log(2.0) * window_power));
     }
   }
-  return variances.empty() ? kRoundingVariance : std::max<double>(medianOf(variances), kRoundingVariance);
+  return variances.empty() ? kComplexRounding : std::max<double>(medianOf(variances), kComplexRounding);
 }
 
 void turnFrames(double rad_per_frame, FrameStack& s) {

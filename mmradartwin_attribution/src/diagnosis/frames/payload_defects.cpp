@@ -6,14 +6,14 @@
 
 #include "diagnosis/catalogue/bounds.h"
 #include "mmradartwin_dsp/capture.h"
+#include "mmradartwin_dsp/statistics.h"
 
 namespace mmradartwin::diagnosis::frames {
 namespace {
 
 constexpr std::size_t kPacketValues = kPacketBytes / 2;
 
-constexpr int kMostPackets = 4;                     ///< packets lost in a row of a slip that is searched for
-constexpr double kRealRoundingVariance = 1.0 / 12;  ///< of a value, by rounding alone
+constexpr int kMostPackets = 4;  ///< packets lost in a row of a slip that is searched for
 
 struct ZeroRun {
   std::size_t begin, end;
@@ -137,7 +137,7 @@ std::optional<FrameTemplate> longestStretch(const Payload& payload, std::vector<
     freedom += weight[i] - 1;
     sum[i] /= weight[i];
   }
-  return FrameTemplate{std::move(sum), std::max(freedom > 0 ? residual / freedom : 0.0, kRealRoundingVariance)};
+  return FrameTemplate{std::move(sum), std::max(freedom > 0 ? residual / freedom : 0.0, kRoundingVariance)};
 }
 
 /// Blocks of the stream between packet boundaries, and the misfit of each to a template.

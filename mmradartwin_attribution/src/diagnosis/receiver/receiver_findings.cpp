@@ -11,6 +11,7 @@
 #include "diagnosis/catalogue/default_mechanism.h"
 #include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/receiver/strongest_echo.h"
+#include "mmradartwin_dsp/units.h"
 
 namespace mmradartwin::diagnosis::receiver {
 namespace {
@@ -232,7 +233,6 @@ Finding findingOf(const ChannelErrors& errors) {
     }
     return p;
   };
-  constexpr double kDegree = M_PI / 180;
   const Eigen::VectorXd phase_deg = errors.phase_rad / kDegree, error_deg = errors.phase_error_rad / kDegree;
   std::ostringstream text;
   text << std::setprecision(2) << std::fixed << "read from " << errors.echoes << " echoes, each from one direction: ";

@@ -9,19 +9,18 @@
 
 #include "diagnosis/catalogue/bounds.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/units.h"
 
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-constexpr double kDbPerNeper = 8.685889638065035;
-constexpr double kDegrees = 180 / M_PI;
 constexpr Eigen::Index kFirst = 2;  ///< first bin: leakage and offset lie below, and their images at the end
 constexpr int kIterations = 6;      ///< alternations between the image and the power beside it
 
-double levelOf_db(std::complex<double> beta) { return kDbPerNeper * std::log(std::abs(beta)); }
+double levelOf_db(std::complex<double> beta) { return kNeperOfAmplitude_db * std::log(std::abs(beta)); }
 
 /// Least standard error of an image of that size.
-double leastError(std::complex<double> beta) { return std::abs(beta) * bounds::kImageError_db / kDbPerNeper; }
+double leastError(std::complex<double> beta) { return std::abs(beta) * bounds::kImageError_db / kNeperOfAmplitude_db; }
 
 /// True where the receivers' images differ by more than chance and what a level is known by: the F test of means whose
 /// variances follow from as many locations.
@@ -108,9 +107,10 @@ bool measureImage(const ChannelData& data, Finding& finding) {
     all.push_back(std::move(parameter));
   };
   if (!image->differ) {
-    addInterval(level, levelOf_db(image->common), width * kDbPerNeper * image->common_error / std::abs(image->common));
+    addInterval(level, levelOf_db(image->common),
+                width * kNeperOfAmplitude_db * image->common_error / std::abs(image->common));
     replace(std::move(level));
-    finding.mechanism->values.set("phase_deg", std::arg(image->common) * kDegrees);
+    finding.mechanism->values.set("phase_deg", std::arg(image->common) / kDegree);
     return true;
   }
   std::vector<double> level_db, phase_deg;
@@ -118,9 +118,9 @@ bool measureImage(const ChannelData& data, Finding& finding) {
   for (Eigen::Index r = 0; r < image->beta.size(); ++r) {
     const double share = width * image->error[r] / std::abs(image->beta[r]);
     level_db.push_back(levelOf_db(image->beta[r]));
-    phase_deg.push_back(std::arg(image->beta[r]) * kDegrees);
-    addInterval(level, level_db.back(), kDbPerNeper * share);
-    addInterval(phase, phase_deg.back(), kDegrees * share);
+    phase_deg.push_back(std::arg(image->beta[r]) / kDegree);
+    addInterval(level, level_db.back(), kNeperOfAmplitude_db * share);
+    addInterval(phase, phase_deg.back(), 1 / kDegree * share);
   }
   level.value = level_db;
   phase.value = phase_deg;
@@ -137,7 +137,7 @@ void subtractImage(const NamedParameters& m, ChannelData& data) {
   };
   Eigen::VectorXcd beta(receivers);
   for (Eigen::Index r = 0; r < receivers; ++r) {
-    beta[r] = std::polar(std::pow(10.0, of("image_db", r) / 20), of("phase_deg", r) / kDegrees);
+    beta[r] = std::polar(std::pow(10.0, of("image_db", r) / 20), of("phase_deg", r) * kDegree);
   }
   const SignalChain chain(data.radar);
   for (PoseChannels& p : data.poses) {

@@ -6,10 +6,11 @@
 #include <utility>
 #include <vector>
 
+#include "mmradartwin_dsp/units.h"
+
 namespace mmradartwin::diagnosis::receiver {
 namespace {
 
-constexpr double kDecibelPerNeper = 8.685889638065035;
 constexpr double kLevelError_db = 0.3;  ///< standard error for an echo alone in its cell
 /// Standard error for an echo that shares its cell, as relative phases are random.
 constexpr double kSharedError_db = 3;
@@ -92,13 +93,13 @@ double strongestMeasured(const ChannelData& data) {
 void referToStrongestEcho(const Twin& twin, const ChannelData& data, Finding& f) {
   const MeasuredEcho echo = strongestMeasured(twin, data);
   if (!(echo.amplitude > 0)) return;
-  changeLevel(f, kDecibelPerNeper * std::log(strongestMeasured(data) / echo.amplitude), errorOf_db(echo));
+  changeLevel(f, kNeperOfAmplitude_db * std::log(strongestMeasured(data) / echo.amplitude), errorOf_db(echo));
 }
 
 void referToStrongestHost(const Twin& twin, const ChannelData& data, double log_gain, double amplitude, Finding& f) {
   const MeasuredEcho echo = strongestMeasured(twin, data);
   if (!(echo.amplitude > 0)) return;
-  changeLevel(f, kDecibelPerNeper * (std::log(echo.amplitude / amplitude) - 0.5 * log_gain), errorOf_db(echo));
+  changeLevel(f, kNeperOfAmplitude_db * (std::log(echo.amplitude / amplitude) - 0.5 * log_gain), errorOf_db(echo));
 }
 
 }  // namespace mmradartwin::diagnosis::receiver
