@@ -117,16 +117,18 @@ void TwinNode::onSession(const mmradartwin_msgs::Session::ConstPtr& session) {
   if (!settings_.scene_file.empty()) return;
   try {
     if (session_ && session_->files == session->files) return;  // once more, of a master that was restarted
+    // What is in use stays until the new one has been unpacked and read.
+    auto folder = std::make_unique<TemporaryFolder>();
+    restoreSessionFiles(storedFiles(*session), folder->path());
+    SessionOptions options;
+    options.need_captures = false;
+    const Recording recording = openSession(folder->path(), options);
     if (session_ && applied_twin_) {
       ROS_WARN("another session: the twin of %s is no longer applied", applied_twin_->c_str());
       applied_twin_.reset();
     }
     session_ = session;
-    session_folder_ = std::make_unique<TemporaryFolder>();
-    restoreSessionFiles(storedFiles(*session), session_folder_->path());
-    SessionOptions options;
-    options.need_captures = false;
-    const Recording recording = openSession(session_folder_->path(), options);
+    session_folder_ = std::move(folder);
     session_scene_ = recording.scene_file;
     session_twin_ = recording.twin_file;
     if (!radar_) radar_ = recording.radar;
@@ -309,7 +311,7 @@ void TwinNode::onRate(const ros::WallTimerEvent&) {
     if (last_ && last_ns_ == toNanoseconds(stamp) && (now - published_at_).toSec() < 1) return;
     published_at_ = now;
     simulate(fromMsg(T.transform), toNanoseconds(stamp));
-  } catch (const tf2::TransformException& error) {
+  } catch (const std::exception& error) {
     ROS_WARN_THROTTLE(kWarnEvery_s, "waiting for the pose of %s in %s: %s", settings_.radar_frame.c_str(),
                       settings_.map_frame.c_str(), error.what());
   }
