@@ -45,8 +45,8 @@ SignalChainNode::SignalChainNode(ros::NodeHandle nh, const ros::NodeHandle& priv
   updater_ = std::make_unique<diagnostic_updater::Updater>(nh, private_nh, ros::this_node::getName());
   updater_->setHardwareID("none");
   updater_->add("signal chain", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnose(status); });
-  diagnostics_timer_ =
-      nh.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(kDiagnosticsEvery_s),
+                                          [this](const ros::WallTimerEvent&) { updater_->force_update(); });
 }
 
 SignalChainNode::Settings::Settings(StrictParameters& parameters) {

@@ -49,8 +49,8 @@ TwinNode::TwinNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
   pending_timer_ = nh.createWallTimer(ros::WallDuration(0.005), &TwinNode::onPending, this);
   if (settings_.rate_hz > 0)
     rate_timer_ = nh.createWallTimer(ros::WallDuration(1 / settings_.rate_hz), &TwinNode::onRate, this);
-  diagnostics_timer_ =
-      nh.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(kDiagnosticsEvery_s),
+                                          [this](const ros::WallTimerEvent&) { updater_->force_update(); });
   if (!settings_.scene_file.empty() && radar_) rebuild();
 }
 
@@ -269,6 +269,7 @@ void TwinNode::onGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid) {
     ROS_WARN_THROTTLE(kWarnEvery_s, "radar/grid refused: its stamp, %u s, is no time", grid->header.stamp.sec);
     return;
   }
+  grids_.heard();
   measured_at_ = ros::WallTime::now();
   tf_reader_->measuredAt(grid->header.stamp);
   if (!twin_) {
@@ -447,10 +448,14 @@ void TwinNode::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp
 
 void TwinNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const {
   using Level = diagnostic_msgs::DiagnosticStatus;
+  // Along poses alone the twin goes on by itself; a measurement that was there is missed.
+  const std::string silence = grids_.ever() ? grids_.silence(grid_subscriber_) : "";
   if (!twin_) {
     status.summary(Level::ERROR, problem_.empty() ? "no radar/config or no scene yet" : problem_);
   } else if (last_ && !last_->check.ok()) {
     status.summary(Level::ERROR, "records and grid disagree");
+  } else if (!silence.empty()) {
+    status.summary(Level::ERROR, silence);
   } else if (!problem_.empty()) {
     status.summary(Level::WARN, problem_);
   } else if (!last_) {
