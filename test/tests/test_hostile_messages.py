@@ -222,6 +222,8 @@ class HostileMessages(InFolder):
         for path in (secret, inside):
             with open(path, "w", encoding="ascii") as file:
                 file.write("hidden_word: 1\n")
+        with open(self.at("allowed", "twin.yaml"), "w", encoding="ascii") as file:
+            file.write("mechanisms: {}\nmistyped: 1\n")
         os.mkfifo(pipe)
         os.symlink(secret, self.at("allowed", "link.yaml"))
         node = self.node("mmradartwin_sim", "twin_node", "_apply_folder:=" + self.at("allowed"),
@@ -229,15 +231,18 @@ class HostileMessages(InFolder):
                          "_scene:=package://mmradartwin_config/office/scene.yaml")
         begin = time.monotonic()
         answers = self.python(APPLY, secret, self.at("no_such.yaml"), self.at("allowed", "..", "secret.yaml"),
-                              self.at("allowed", "link.yaml"), "/etc/shadow", pipe, inside).splitlines()
+                              self.at("allowed", "link.yaml"), "/etc/shadow",
+                              "package://mmradartwin_config/../../../../../../../../../../.." + secret, pipe, inside,
+                              self.at("allowed", "twin.yaml")).splitlines()
         self.assertLess(time.monotonic() - begin, 120)
-        for answer in answers[:5]:
-            self.assertIn("lies below no folder", answer)
         for answer in answers[:6]:
+            self.assertIn("lies below no folder", answer)
+        for answer in answers[:8]:
             self.assertNotIn("hidden_word", answer)
             self.assertNotIn("root:", answer)
-        self.assertIn("is no file NAME.yaml", answers[5])
-        self.assertIn("hidden_word", answers[6])  # the user's own file: what is wrong with it
+        self.assertIn("is no file NAME.yaml", answers[6])
+        self.assertIn("is no twin.yaml", answers[7])
+        self.assertIn("mistyped", answers[8])  # a twin: what is wrong with it
         self.assertIsNone(node.poll(), self.text("twin_node"))
 
 

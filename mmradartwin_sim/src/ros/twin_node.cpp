@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
@@ -25,6 +27,19 @@ namespace {
 constexpr double kWarnEvery_s = 5;
 constexpr double kShowMovesEvery_s = 0.5;
 constexpr double kMeasuredFor_s = 1;  // without a grid for so long the twin goes on at its own rate
+
+/// Whether a line of the file begins with a key of a twin.yaml.
+bool looksLikeTwin(const std::string& file) {
+  constexpr int kMostLines = 10000;
+  std::ifstream in(resolvePath(file, "/"));
+  std::string line;
+  for (int i = 0; i < kMostLines && std::getline(in, line); ++i) {
+    for (const char* key : {"scene:", "radar:", "mechanisms:", "{scene:", "{radar:", "{mechanisms:"}) {
+      if (line.compare(0, std::strlen(key), key) == 0) return true;
+    }
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -226,12 +241,17 @@ std::string TwinNode::allowedTwin(const std::string& file) const {
   const char* const ros_home = std::getenv("ROS_HOME");
   if (ros_home || home) folders.push_back(ros_home ? ros_home : std::string(home) + "/.ros");
   const fs::path asked = error ? fs::path(path).lexically_normal() : real;
-  const bool inside = of_package || std::any_of(folders.begin(), folders.end(), [&asked](const std::string& folder) {
-                        std::error_code ignored;
-                        const fs::path root = fs::weakly_canonical(folder, ignored);
-                        const fs::path rest = asked.lexically_relative(root);
-                        return !folder.empty() && !rest.empty() && *rest.begin() != "..";
-                      });
+  // A package's path may lead out of it again.
+  if (of_package) {
+    const std::string package = file.substr(0, file.find('/', std::strlen("package://")));
+    folders.push_back(fs::path(resolvePath(package + "/package.xml", "/")).parent_path().string());
+  }
+  const bool inside = std::any_of(folders.begin(), folders.end(), [&asked](const std::string& folder) {
+    std::error_code ignored;
+    const fs::path root = fs::weakly_canonical(folder, ignored);
+    const fs::path rest = asked.lexically_relative(root);
+    return !folder.empty() && !rest.empty() && *rest.begin() != "..";
+  });
   if (!inside) {
     throw InputError(path + ": lies below no folder that twin/apply may read; the parameter apply_folder (now '" +
                      folders.front() + "') names another");
@@ -245,8 +265,10 @@ std::string TwinNode::allowedTwin(const std::string& file) const {
 
 bool TwinNode::onApply(mmradartwin_msgs::ApplyTwin::Request& request, mmradartwin_msgs::ApplyTwin::Response& response) {
   const std::string what = request.file.empty() ? "the twin that this node was started with" : request.file;
+  bool checked = false;
   try {
     const std::string file = request.file.empty() ? startingTwin() : allowedTwin(request.file);
+    checked = !request.file.empty();
     if (!radar_) throw InputError("no radar/config came yet: start the driver or the replay first");
     use(makeTwin(file));
     applied_twin_.reset();
@@ -258,7 +280,11 @@ bool TwinNode::onApply(mmradartwin_msgs::ApplyTwin::Request& request, mmradartwi
     if (measured_) simulate(measured_->first, measured_->second);
   } catch (const std::exception& error) {
     response.success = false;
-    response.message = "refused, the twin stays as it was: " + std::string(error.what());
+    // What is wrong with a file would be told in its own words: of a twin alone.
+    response.message = "refused, the twin stays as it was: " +
+                       (checked && !looksLikeTwin(request.file)
+                            ? request.file + ": is no twin.yaml, it has none of the keys scene, radar and mechanisms"
+                            : error.what());
     ROS_ERROR("twin/apply: %s", response.message.c_str());
   }
   return true;
