@@ -6,6 +6,9 @@ import sys
 import time
 import unittest
 
+import rospkg
+import yaml
+
 from in_folder import InFolder
 from mmradartwin_tests.installed_programs import find_program
 from test_launch_files import end, free_port, start_master
@@ -59,6 +62,11 @@ for wrong in 8 * (cloud(width=2**32 - 1), cloud(step=2**31), cloud(step=0)):  # 
     wrong.header.stamp, wrong.header.frame_id = rospy.Time(1002), "radar_link"
     publishers["cloud"].publish(wrong)
     time.sleep(0.3)
+"""
+LARGE = PUBLISH + """
+from mmradartwin_tests.moving_bag import config_message
+from mmradartwin_tests.radar import Radar
+send("radar/config", config_message(Radar(samples=128, loops=32768, frame_period_s=3.5))[0])
 """
 # Rounds of one loop: in each, maps of both kinds for a while, then measured ones alone, as where tf ends.
 ROUNDS = PUBLISH + """
@@ -180,6 +188,24 @@ class HostileMessages(InFolder):
         for name, node in nodes.items():
             self.assertIsNone(node.poll(), name + self.text(name))
         self.assertLess(self.text("dsp_node").count("is no time"), 2 * len(EDGES))
+
+    def test_frames_that_take_all_memory_are_refused_by_file_and_parameter(self):
+        with open(os.path.join(rospkg.RosPack().get_path("mmradartwin_config"), "radar.yaml"), encoding="utf-8") as file:
+            radar = yaml.safe_load(file)
+        radar.update(samples_per_chirp=128, loops_per_frame=32768, frame_period_s=3.5)
+        with open(self.at("large.yaml"), "w", encoding="ascii") as file:
+            yaml.safe_dump(radar, file)
+        driver = self.node("mmradartwin_driver", "driver_node", "_radar:=" + self.at("large.yaml"),
+                           "_card_ip:=127.77.3.2", "_host_ip:=127.77.3.1", "_configure_card:=false")
+        self.assertEqual(driver.wait(120), 2, self.text("driver_node"))
+        said = [line for line in self.text("driver_node").split("\n") if line]
+        self.assertEqual(len(said), 1, said)
+        for word in (self.at("large.yaml"), "65536 chirps", "128 samples", "MiB", "max_frame_mb allows 64"):
+            self.assertIn(word, said[0])
+        chain = self.node("mmradartwin_dsp", "dsp_node")
+        self.python(LARGE)
+        wait_for(lambda: "max_frame_mb" in self.text("dsp_node"), lambda: self.text("dsp_node"), 60)
+        self.assertIsNone(chain.poll(), self.text("dsp_node"))
 
     def test_rounds_of_a_loop_give_the_same_numbers(self):
         for package, program, *arguments in (
