@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <cstdlib>
 
 #include "assembly_scenario.h"
@@ -429,6 +430,8 @@ TEST(FrameAssembler, AWrongHeaderPutsNoByteWhereItDoesNotBelong) {
       chirps += bench.collected.cubes.size() * 2;
     }
     EXPECT_EQ(0u, wrong) << "of " << chirps << " in " << packets << " packets, " << flipped << " with a wrong header";
+    std::printf("%s: %zu packets, %zu wrong headers, %zu of %zu chirps flagged\n", c.name, packets, flipped, invalid,
+                chirps);
     if (c.loss > 0) continue;
     // A packet touches three chirps at most, and its wrong header costs no others.
     EXPECT_LE(invalid, 3 * flipped + static_cast<std::size_t>(runs));
