@@ -92,6 +92,8 @@ trap 'exit 130' INT TERM
 # A master of its own, so that the demo disturbs no other.
 port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
 export ROS_MASTER_URI=http://127.0.0.1:$port ROS_IP=127.0.0.1
+# With ROS_IP it keeps every socket on this computer.
+export LD_PRELOAD=libmmradartwin_dsp_loopback_only.so${LD_PRELOAD:+:$LD_PRELOAD}
 
 where=''
 [ -z "$xvfb" ] || where=' There is no display, so rviz draws on a virtual one.'

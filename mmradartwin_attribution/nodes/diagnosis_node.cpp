@@ -31,6 +31,7 @@
 #include "mmradartwin_dsp/ros/master_watch.h"
 #include "mmradartwin_dsp/ros/node_program.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
+#include "mmradartwin_dsp/ros/topic_watch.h"
 #include "mmradartwin_dsp/ros/transform_reader.h"
 #include "mmradartwin_sim/plugin.h"
 #include "mmradartwin_sim/pose_placement.h"
@@ -152,7 +153,7 @@ class DiagnosisNode {
     spool_spinner_.start();
     updater_.setHardwareID("none");
     updater_.add("diagnosis", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { describe(status); });
-    diagnostics_timer_ = nh_.createWallTimer(ros::WallDuration(1), &DiagnosisNode::onSecond, this);
+    diagnostics_timer_ = nh_.createWallTimer(ros::WallDuration(kDiagnosticsEvery_s), &DiagnosisNode::onTick, this);
     server_.start();
   }
 
@@ -181,6 +182,7 @@ class DiagnosisNode {
   }
 
   void onCube(const Cube::ConstPtr& cube) {
+    cubes_.heard();
     if (!usableStamp(cube->header.stamp)) {
       ROS_WARN_THROTTLE(kWarnEvery_s, "frame left out: its stamp, %u s, is no time", cube->header.stamp.sec);
       return;
@@ -209,7 +211,7 @@ class DiagnosisNode {
     return true;
   }
 
-  void onSecond(const ros::WallTimerEvent&) {
+  void onTick(const ros::WallTimerEvent&) {
     updater_.force_update();
     const std::string problem = spool_.state().problem;
     if (!problem.empty()) ROS_WARN_THROTTLE(kWarnEvery_s, "%s", problem.c_str());
@@ -218,7 +220,10 @@ class DiagnosisNode {
   void describe(diagnostic_updater::DiagnosticStatusWrapper& status) const {
     using Level = diagnostic_msgs::DiagnosticStatus;
     const FrameSpoolState s = spool_.state();
-    if (!s.problem.empty()) {
+    const std::string silence = cubes_.silence(subscribers_.back());
+    if (!silence.empty()) {
+      status.summary(Level::ERROR, silence);
+    } else if (!s.problem.empty()) {
       status.summary(Level::WARN, s.problem);
     } else {
       status.summary(Level::OK, s.frames > 0 ? "keeping frames" : "waiting for frames with a pose");
@@ -346,6 +351,7 @@ class DiagnosisNode {
   TransformReader tf_reader_;
   tf2_ros::MessageFilter<Cube> posed_frames_;
   ros::Time newest_;
+  TopicWatch cubes_{"the driver (or the bag's player)"};
   std::vector<ros::Subscriber> subscribers_;
   ros::Publisher findings_, finding_markers_;
   ros::ServiceServer forget_;

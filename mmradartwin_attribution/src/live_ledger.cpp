@@ -7,7 +7,9 @@
 #include "mmradartwin_dsp/units.h"
 
 namespace mmradartwin {
-namespace {}  // namespace
+namespace {
+constexpr std::size_t kNamedDuplicates = 100;
+}  // namespace
 
 bool LiveLedger::counts(const Stretch& stretch) const { return stretch.end_ns - stretch.begin_ns >= 1000000000; }
 
@@ -26,6 +28,7 @@ void LiveLedger::add(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_radar
     if (!stands) {
       if (counts(c)) {
         if (duplicate(c)) {
+          if (duplicates_.size() == kNamedDuplicates) duplicates_.pop_front();
           duplicates_.push_back(c.name);
         } else {
           finished_.push_back(c);
@@ -58,7 +61,7 @@ LedgerSummary LiveLedger::summary() const {
 }
 
 std::vector<std::string> LiveLedger::duplicates() const {
-  std::vector<std::string> names = duplicates_;
+  std::vector<std::string> names(duplicates_.begin(), duplicates_.end());
   if (!current_.empty() && counts(current_.front()) && duplicate(current_.front()))
     names.push_back(current_.front().name);
   return names;

@@ -129,5 +129,14 @@ TEST_F(LiveLedgerTest, DuplicatesAreLeftOutAndListed) {
   EXPECT_EQ(ledger_.duplicates(), std::vector<std::string>{"again"});
 }
 
+TEST_F(LiveLedgerTest, ALongDayNamesTheLastHundredDuplicates) {
+  stand(0, 2, 0, 0, "a", 0.2);
+  for (int i = 1; i <= 300; ++i) stand(10 * i, 1.5, i % 2, 0, std::to_string(i), 0.2);
+  const std::vector<std::string> names = ledger_.duplicates();
+  ASSERT_EQ(names.size(), 101u);
+  EXPECT_EQ(names.front(), "200");
+  EXPECT_EQ(names.back(), "300");
+}
+
 }  // namespace
 }  // namespace mmradartwin

@@ -32,6 +32,7 @@ ChildProcess::ChildProcess(const std::string& program, const std::vector<std::st
   if (pid_ == 0) {
     // Other threads may hold locks: nothing but system calls from here.
     dup2(ends[1], STDOUT_FILENO);
+    close_range(STDERR_FILENO + 1, ~0U, 0);  // sockets of the caller are none of the program's
     execv(program.c_str(), argv.data());
     _exit(127);
   }

@@ -14,6 +14,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr std::size_t kMostStatuses = 64;
+/// Datagrams that are looked at after a deadline: whoever sends without end holds nobody up.
+constexpr int kMostWaiting = 1000;
+
 std::int64_t now_ns() {
   timespec now;
   clock_gettime(CLOCK_REALTIME, &now);
@@ -48,9 +52,10 @@ void Dca1000Control::send(Dca1000Command command, const std::vector<std::uint8_t
 }
 
 std::optional<Dca1000Reply> Dca1000Control::receive(Clock::time_point deadline) {
-  for (;;) {
+  for (int late = 0; late < kMostWaiting;) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
     if (!socket_.waitReadable(left > 0 ? static_cast<int>(left) : 0)) return std::nullopt;
+    late += left <= 0;
     std::uint8_t bytes[64];
     sockaddr_in from{};
     socklen_t from_size = sizeof from;
@@ -61,6 +66,19 @@ std::optional<Dca1000Reply> Dca1000Control::receive(Clock::time_point deadline) 
     if (tap_) tap_({from, local_, bytes, static_cast<std::size_t>(size), now_ns()});
     if (const auto reply = decodeReply(bytes, static_cast<std::size_t>(size))) return reply;
   }
+  return std::nullopt;
+}
+
+void Dca1000Control::keep(std::uint16_t status) {
+  if (statuses_.size() == kMostStatuses) statuses_.pop_front();
+  statuses_.push_back(status);
+}
+
+void Dca1000Control::forgetStatuses() {
+  const auto now = Clock::now();
+  for (int i = 0; i < kMostWaiting && receive(now); ++i) {
+  }
+  statuses_.clear();
 }
 
 Dca1000Reply Dca1000Control::command(Dca1000Command command, const std::vector<std::uint8_t>& body, int attempts) {
@@ -69,7 +87,7 @@ Dca1000Reply Dca1000Control::command(Dca1000Command command, const std::vector<s
     const auto deadline = Clock::now() + options_.reply_timeout;
     while (const auto reply = receive(deadline)) {
       if (reply->code == static_cast<std::uint16_t>(command)) return *reply;
-      if (reply->code == static_cast<std::uint16_t>(Dca1000Command::kSystemStatus)) statuses_.push_back(reply->status);
+      if (reply->code == static_cast<std::uint16_t>(Dca1000Command::kSystemStatus)) keep(reply->status);
       // Any other reply is a late answer to an earlier attempt.
     }
   }
@@ -126,7 +144,7 @@ std::optional<std::uint16_t> Dca1000Control::takeStatus(std::chrono::millisecond
   while (statuses_.empty()) {
     const auto reply = receive(deadline);
     if (!reply) return std::nullopt;
-    if (reply->code == static_cast<std::uint16_t>(Dca1000Command::kSystemStatus)) statuses_.push_back(reply->status);
+    if (reply->code == static_cast<std::uint16_t>(Dca1000Command::kSystemStatus)) keep(reply->status);
   }
   const std::uint16_t status = statuses_.front();
   statuses_.pop_front();

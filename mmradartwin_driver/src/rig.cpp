@@ -18,6 +18,11 @@ constexpr milliseconds kAskWhileSilent{2000};
 /// Silence after which a recording has ended: the card sends the rest of a recording about 2 s after its last sample.
 constexpr milliseconds kStreamEnded{3500};
 constexpr int kReceiveTimeout_ms = 50;
+/// Longest time that packets are taken for the last ones of a completed recording.
+constexpr milliseconds kLastPackets{200};
+/// Statuses that are looked at before samples are received again.
+constexpr int kStatusesAtOnce = 16;
+constexpr seconds kRepeatStatusAfter{1};
 /// Longest time from the radar's start to its first samples, beyond two frames.
 constexpr seconds kFirstSamples{5};
 
@@ -148,8 +153,7 @@ void Rig::arm() {
     if (radar_control_) radar_control_->stop();
     // Datagrams of an earlier recording in the socket would be taken for the start of this one.
     receiver_->drain();
-    while (control_->takeStatus(milliseconds(0))) {
-    }
+    control_->forgetStatuses();
     assembler_.restart();
     control_->startRecord();
     if (radar_control_) radar_control_->start();
@@ -213,7 +217,9 @@ void Rig::stream() {
       events_(Level::kWarning, "the radar's USB port is there again: radar and card are set up anew");
       return control_->stopRecord();
     }
-    while (const auto status = control_->takeStatus(milliseconds(0))) {
+    for (int i = 0; i < kStatusesAtOnce; ++i) {
+      const auto status = control_->takeStatus(milliseconds(0));
+      if (!status) break;
       if (handleStatus(*status)) return;
     }
     if (silent > kAskWhileSilent && Clock::now() - asked > kAskWhileSilent) {
@@ -240,15 +246,20 @@ bool Rig::handleStatus(std::uint16_t status) {
     // Frames that this rig started run until it stops them.
     events_(radar_control_ ? Level::kWarning : Level::kInfo,
             "the card has completed its recording: the radar's frames have ended");
-    // The last packets may follow the status.
-    while (receiveBatch(20) && !stop_) {
+    // The last packets may follow the status. Those of a radar that goes on without end are for the next recording.
+    for (const auto until = Clock::now() + kLastPackets; Clock::now() < until && !stop_ && receiveBatch(20);) {
+      publishState();
     }
     assembler_.flush();
     control_->stopRecord();
     publishState();
     return true;
   }
-  if (status != 0) events_(Level::kWarning, "status of the card: " + describeStatus(status));
+  const bool repeated = status == told_status_ && Clock::now() - told_status_at_ < kRepeatStatusAfter;
+  if (status == 0 || repeated) return false;
+  told_status_ = status;
+  told_status_at_ = Clock::now();
+  events_(Level::kWarning, "status of the card: " + describeStatus(status));
   return false;
 }
 

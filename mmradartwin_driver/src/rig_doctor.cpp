@@ -16,6 +16,7 @@
 
 #include "mmradartwin_driver/dca1000_control.h"
 #include "mmradartwin_driver/link_budget.h"
+#include "mmradartwin_driver/listening_sockets.h"
 #include "mmradartwin_driver/packet_receiver.h"
 #include "mmradartwin_driver/radar_devices.h"
 #include "mmradartwin_driver/rig_error.h"
@@ -79,6 +80,7 @@ class Examination {
   bool run() {
     const bool linked = link();
     firewall();
+    graph();
     usb();
     const bool ports = linked && openPorts();
     if (!ports || !card()) return !problem_;
@@ -126,6 +128,20 @@ class Examination {
       tell(Level::kFine, "link", interface->name + " is up" + (speed.empty() ? "" : " at " + speed + " Mbit/s"));
     }
     return true;
+  }
+
+  /// What others reach of the ROS graph on this computer.
+  void graph() {
+    const std::vector<std::string> open = openRosSockets(options_.procfs);
+    if (open.empty()) {
+      return tell(
+          Level::kFine, "ROS",
+          std::string("nobody but this computer reaches a ROS process") + (geteuid() == 0 ? "" : " of this user"));
+    }
+    std::string list;
+    for (const std::string& socket : open) list += (list.empty() ? "" : ", ") + socket;
+    tell(Level::kNote, "ROS", "others reach " + list,
+         "whoever is on that network may read, steer and end these: docs/rig/safe_graph.md tells how to keep them out");
   }
 
   void firewall() {

@@ -85,6 +85,7 @@ void runOneRecording(std::mt19937_64& random, AssemblyScenario& result) {
   FrameAssembler::Options options;
   options.window_frames = static_cast<int>(between(random, 2, 4));
   options.window_bytes = between(random, 0, 8000);
+  options.window_packets = random() % 2 ? 64 : 0;
   std::vector<AdcCube> cubes;
   FrameAssembler assembler(
       radar, [&cubes](AdcCube&& cube) { cubes.push_back(std::move(cube)); }, options);
@@ -100,22 +101,22 @@ void runOneRecording(std::mt19937_64& random, AssemblyScenario& result) {
   how.reorder = share();
   how.truncate = share();
   how.depth = static_cast<int>(random() % 4 ? between(random, 1, 12) : between(random, 50, 200));
-  how.spared = begin > options.plausible_gap_bytes ? 4 : 0;  // what confirms a count that begins far off
-  if (sent.size() < how.spared) return;
-  if (how.spared == 0 && random() % 4 == 0) {
+  how.spared = 4;  // confirm a recording whose first packet is lost, and show whether lengths vary
+  if (begin <= options.plausible_gap_bytes && random() % 4 == 0) {
     sent.erase(sent.begin(), sent.begin() + static_cast<std::ptrdiff_t>(random() % sent.size()));
   }
+  if (sent.size() < how.spared) return;
 
-  ArrivalOracle oracle(
-      frame_bytes,
-      std::max<std::uint64_t>(static_cast<std::uint64_t>(options.window_frames) * frame_bytes, options.window_bytes));
+  ArrivalOracle oracle(frame_bytes, std::max({static_cast<std::uint64_t>(options.window_frames) * frame_bytes,
+                                              std::uint64_t{options.window_bytes},
+                                              static_cast<std::uint64_t>(options.window_packets) * 1462}));
   std::int64_t now_ns = 1'000'000'000;
   for (ArrivingPacket& packet : impair(random, sent, how)) {
     packet.stamp_ns = now_ns += 20'000;
     assembler.add(packet.view());
     oracle.arrive(packet.offset, packet.payload.size());
     ++result.packets;
-    if (random() % 200 == 0 && how.spared == 0) {
+    if (random() % 200 == 0 && begin <= options.plausible_gap_bytes) {
       assembler.flush();
       oracle.flush();
     }

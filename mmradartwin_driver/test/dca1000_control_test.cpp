@@ -74,6 +74,28 @@ TEST(Dca1000Control, StatusBetweenCommandAndReplyIsKept) {
   EXPECT_FALSE(control.takeStatus(milliseconds(20)));
 }
 
+TEST(Dca1000Control, KeepsTheNewestStatusesOfMany) {
+  const std::string host = loopbackIp(1), ip = loopbackIp(2);
+  ScriptedCard card(ip, 2, [](int request, std::uint8_t code) -> std::vector<std::vector<std::uint8_t>> {
+    std::vector<std::vector<std::uint8_t>> answers;
+    if (request == 0) {
+      for (std::uint16_t i = 0; i < 100; ++i) answers.push_back(reply(0x0a, i));
+    } else {
+      answers.push_back(reply(0x0a, kDdrFull));
+    }
+    answers.push_back(reply(code, 0));
+    return answers;
+  });
+  Dca1000Control control(host, ip, kDca1000ConfigPort, quick());
+  control.connect();
+  EXPECT_EQ(36, control.takeStatus(milliseconds(0)));
+  for (int left = 63; left > 0; --left) EXPECT_TRUE(control.takeStatus(milliseconds(0)));
+  EXPECT_FALSE(control.takeStatus(milliseconds(0)));
+  control.connect();
+  control.forgetStatuses();
+  EXPECT_FALSE(control.takeStatus(milliseconds(0)));
+}
+
 TEST(Dca1000Control, AsksAgainWhenAReplyIsLost) {
   const std::string host = loopbackIp(1), ip = loopbackIp(2);
   ScriptedCard card(ip, 3, [](int request, std::uint8_t code) -> std::vector<std::vector<std::uint8_t>> {

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdio>
+#include <cstdlib>
+
 #include "assembly_scenario.h"
 #include "mmradartwin_dsp/paper_radar.h"
 #include "packet_stream.h"
@@ -87,7 +90,7 @@ TEST(FrameAssembler, HandsOutEachFrameWhenItsLastByteIsThere) {
 TEST(FrameAssembler, LossAcrossAFrameBorderShiftsNothing) {
   Bench bench(paperRadar());
   bench.feed(0, 0, 1);
-  bench.feed(0, 2, 8);  // packet 1 spans the border at 2048
+  bench.feed(0, 2, 8, 36 * kMillisecond);  // packet 1 spans the border at 2048
   const auto& cubes = bench.collected.cubes;
   ASSERT_GE(cubes.size(), 3u);
   std::vector<bool> first = all(bench.radar_), second = all(bench.radar_);
@@ -106,13 +109,14 @@ TEST(FrameAssembler, WholeFramesLostAreAGapInTheSequence) {
   Bench bench(paperRadar());
   bench.feed(0, 0, 3);
   bench.feed(0, 300, 10);
+  bench.assembler.flush();
   const auto& cubes = bench.collected.cubes;
   EXPECT_EQ(0u, cubes[0].sequence);
   EXPECT_EQ(1u, cubes[1].sequence);
   EXPECT_EQ(2u, cubes[2].sequence);    // 272 bytes of it had come
   EXPECT_EQ(213u, cubes[3].sequence);  // 300 * 1456 / 2048 = 213.28
   EXPECT_EQ(210u, bench.assembler.counters().missing_frames);
-  EXPECT_EQ((300u - 3u) * 1456u, bench.assembler.counters().lost_bytes);
+  EXPECT_EQ((300u - 3u) * 1456u + (221 * 2048 - 310 * 1456), bench.assembler.counters().lost_bytes);
 }
 
 TEST(FrameAssembler, APacketMayBeTwoFramesLate) {
@@ -299,6 +303,168 @@ TEST(FrameClock, LateArrivalsAreNotBelievedPausesAre) {
   EXPECT_EQ(10 * period - 3000, clock.observe(10, 10 * period - 3000));
   EXPECT_EQ(12 * period - 3000, *clock.predict(12));
   EXPECT_EQ(11 * period + 40 * kMillisecond, clock.observe(11, 11 * period + 40 * kMillisecond));
+}
+
+/// What a card sends: packets of 1456 bytes, or as many as `longest` says, one after the other.
+std::vector<ArrivingPacket> recording(std::mt19937_64& random, std::uint64_t epoch, std::size_t packets, bool equal) {
+  std::vector<ArrivingPacket> sent;
+  std::uint64_t at = 0;
+  for (std::size_t i = 0; i < packets; ++i) {
+    const std::size_t size = equal ? 1456 : std::uniform_int_distribution<std::size_t>(1, 1462)(random);
+    ArrivingPacket packet{static_cast<std::uint32_t>(i + 1), at, std::vector<std::uint8_t>(size), 0};
+    for (std::size_t k = 0; k < size; ++k) packet.payload[k] = streamByte(epoch, at + k);
+    sent.push_back(std::move(packet));
+    at += size;
+  }
+  return sent;
+}
+
+/// Chirps that are said to be whole and hold another byte than the recording at their place.
+std::size_t wrongChirps(const RadarConfig& radar, const std::vector<AdcCube>& cubes, std::uint64_t epoch) {
+  std::size_t wrong = 0;
+  const std::size_t words_per_chirp = radar.bytes_per_frame() / 2 / static_cast<std::size_t>(radar.chirps_per_frame());
+  for (const AdcCube& cube : cubes) {
+    for (std::size_t chirp = 0; chirp < cube.chirp_valid.size(); ++chirp) {
+      bool right = true;
+      for (std::size_t word = chirp * words_per_chirp; word < (chirp + 1) * words_per_chirp && right; ++word) {
+        right =
+            cube.data[word] == expectedWord(epoch, cube.sequence * radar.bytes_per_frame() + byteOfWord(radar, word));
+      }
+      wrong += cube.chirp_valid[chirp] && !right;
+    }
+  }
+  return wrong;
+}
+
+std::size_t invalidChirps(const std::vector<AdcCube>& cubes) {
+  std::size_t invalid = 0;
+  for (const AdcCube& cube : cubes) {
+    invalid += static_cast<std::size_t>(std::count(cube.chirp_valid.begin(), cube.chirp_valid.end(), 0));
+  }
+  return invalid;
+}
+
+TEST(FrameAssembler, APacketOfTheRecordingBeforeIsNotBelievedRightAfterArming) {
+  for (const std::int64_t interval_ns : {40'000LL, 36'000'000LL}) {
+    for (const std::uint64_t stale : {720u, 721u, 60u, 3u}) {
+      Bench bench(paperRadar());
+      bench.assembler.restart();
+      bench.feedOne(5, stale, interval_ns);
+      bench.feed(0, 0, 1000, interval_ns);
+      bench.assembler.flush();
+      EXPECT_EQ(0u, wrongChirps(bench.radar_, bench.collected.cubes, 0)) << stale;
+      EXPECT_EQ(1u, bench.assembler.counters().rejected_packets) << stale;
+      ASSERT_EQ(711u, bench.collected.cubes.size()) << stale;
+      EXPECT_EQ(1u, invalidChirps(bench.collected.cubes)) << "of the last frame, which has not ended";
+    }
+  }
+}
+
+TEST(FrameAssembler, APacketOfTheRecordingBeforeIsNotBelievedWhereTheFirstOnesAreLost) {
+  Bench bench(paperRadar());
+  bench.assembler.restart();
+  bench.feedOne(5, 720);
+  bench.feed(0, 100, 900);
+  bench.assembler.flush();
+  EXPECT_EQ(0u, wrongChirps(bench.radar_, bench.collected.cubes, 0));
+  EXPECT_EQ(900u * 1456, bench.assembler.counters().bytes);
+}
+
+/// Flips `share` of the headers: any one of their ten bytes becomes any other. Between two of them at least `apart`
+/// packets lie. Returns how many.
+std::size_t flipHeaders(std::mt19937_64& random, double share, std::size_t apart,
+                        std::vector<ArrivingPacket>& packets) {
+  std::size_t flipped = 0, since = apart;
+  for (ArrivingPacket& packet : packets) {
+    if (++since <= apart || std::uniform_real_distribution<double>()(random) >= share) continue;
+    since = 0;
+    const unsigned byte = static_cast<unsigned>(random() % 10);
+    const std::uint64_t change = (1 + random() % 255) << 8 * (byte < 4 ? byte : byte - 4);
+    if (byte < 4) {
+      packet.sequence ^= static_cast<std::uint32_t>(change);
+    } else {
+      packet.offset ^= change;
+    }
+    ++flipped;
+  }
+  return flipped;
+}
+
+struct FlipCase {
+  const char* name;
+  bool equal;
+  double loss, duplicate, reorder, truncate, flipped;
+  int depth;
+  std::int64_t interval_ns;
+};
+
+TEST(FrameAssembler, AWrongHeaderPutsNoByteWhereItDoesNotBelong) {
+  const std::vector<FlipCase> cases = {
+      {"one in a hundred, as the card sends", true, 0, 0, 0, 0, 0.01, 1, 36'000},
+      {"the same at 20 frames a second", true, 0, 0, 0, 0, 0.01, 1, 36'000'000},
+      {"one in five", true, 0, 0, 0, 0, 0.2, 1, 36'000},
+      {"with all that may befall packets", true, 0.1, 0.1, 0.1, 0.02, 0.02, 20, 36'000},
+      {"of varying lengths", false, 0, 0, 0, 0, 0.01, 1, 36'000},
+      {"of varying lengths at 20 frames a second", false, 0, 0, 0, 0, 0.01, 1, 36'000'000},
+  };
+  std::mt19937_64 random(20261129);
+  for (const FlipCase& c : cases) {
+    SCOPED_TRACE(c.name);
+    std::size_t packets = 0, flipped = 0, wrong = 0, invalid = 0, chirps = 0;
+    const int runs = std::getenv("MMRADARTWIN_LONG") ? 1000 : 20;
+    for (int run = 0; run < runs; ++run) {
+      Bench bench(paperRadar());
+      Impairment how;
+      how.loss = c.loss, how.duplicate = c.duplicate, how.reorder = c.reorder, how.truncate = c.truncate;
+      how.depth = c.depth;
+      std::vector<ArrivingPacket> arriving = impair(random, recording(random, 0, 1500, c.equal), how);
+      flipped += flipHeaders(random, c.flipped, c.equal ? 0 : 8, arriving);
+      for (ArrivingPacket& packet : arriving) {
+        packet.stamp_ns = bench.now_ns += c.interval_ns;
+        bench.assembler.add(packet.view());
+      }
+      bench.assembler.flush();
+      packets += arriving.size();
+      wrong += wrongChirps(bench.radar_, bench.collected.cubes, 0);
+      invalid += invalidChirps(bench.collected.cubes);
+      chirps += bench.collected.cubes.size() * 2;
+    }
+    EXPECT_EQ(0u, wrong) << "of " << chirps << " in " << packets << " packets, " << flipped << " with a wrong header";
+    std::printf("%s: %zu packets, %zu wrong headers, %zu of %zu chirps flagged\n", c.name, packets, flipped, invalid,
+                chirps);
+    if (c.loss > 0) continue;
+    // A packet touches three chirps at most, and its wrong header costs no others.
+    EXPECT_LE(invalid, 3 * flipped + static_cast<std::size_t>(runs));
+  }
+}
+
+TEST(FrameAssembler, PacketsDisplacedBySixtyFourLoseNothing) {
+  std::mt19937_64 random(64);
+  for (const int depth : {8, 32, 64}) {
+    Bench bench(paperRadar());
+    std::vector<ArrivingPacket> sent = recording(random, 0, 20000, true);
+    Impairment how;
+    how.reorder = 0.1;
+    how.depth = depth - 1;  // the half that is added rounds up
+    how.spared = 1;
+    for (ArrivingPacket& packet : impair(random, sent, how)) {
+      packet.stamp_ns = bench.now_ns += 40'000;
+      bench.assembler.add(packet.view());
+    }
+    EXPECT_GT(bench.assembler.counters().reordered_packets, 1000u);
+    EXPECT_EQ(0u, bench.assembler.counters().incomplete_frames) << depth;
+    EXPECT_EQ(0u, bench.assembler.counters().late_packets) << depth;
+    EXPECT_EQ(20000u * 1456, bench.assembler.counters().bytes);
+    EXPECT_EQ(0u, wrongChirps(bench.radar_, bench.collected.cubes, 0));
+  }
+}
+
+TEST(FrameAssembler, AFrameWithAHoleWaitsNoLongerThanPacketsMayBeLate) {
+  Bench bench(paperRadar());
+  bench.feed(0, 0, 20, 36 * kMillisecond);
+  const std::size_t before = bench.collected.cubes.size();
+  bench.feed(0, 21, 5, 36 * kMillisecond);  // up to byte 37856: more than 5888 beyond the end of the torn frame, 14
+  EXPECT_GE(bench.collected.cubes.size(), before + 3);
 }
 
 /// 900 scenarios; `benchmark_scenarios` runs as many as one likes.

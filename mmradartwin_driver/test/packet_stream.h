@@ -50,7 +50,8 @@ inline std::size_t byteOfWord(const RadarConfig& radar, std::size_t word) {
   return sample * 16 + iq * 8 + rx * 2;
 }
 
-/// Cuts a recording into packets, from `begin` on; at most 240, fewer than an assembler remembers.
+/// Cuts a recording into packets, from `begin` on; at most 240, fewer than an assembler remembers. Where they are not
+/// `equal`, the first two differ in length.
 inline std::vector<ArrivingPacket> cutIntoPackets(std::mt19937_64& random, std::uint64_t epoch, std::uint64_t begin,
                                                   std::size_t bytes, bool equal) {
   std::vector<ArrivingPacket> packets;
@@ -60,6 +61,7 @@ inline std::vector<ArrivingPacket> cutIntoPackets(std::mt19937_64& random, std::
   std::uint32_t sequence = begin == 0 ? 1 : static_cast<std::uint32_t>(random());
   for (std::size_t at = 0; at < bytes && packets.size() < 240;) {
     std::size_t size = equal ? longest : std::uniform_int_distribution<std::size_t>(1, longest)(random);
+    if (!equal && packets.size() == 1 && size == packets.front().payload.size()) size = size % longest + 1;
     size = std::min(size, bytes - at);
     ArrivingPacket packet{sequence++, begin + at, std::vector<std::uint8_t>(size), 0};
     for (std::size_t i = 0; i < size; ++i) packet.payload[i] = streamByte(epoch, begin + at + i);

@@ -120,6 +120,20 @@ TEST(Rig, ArmsAnewWhenTheCardThrewSamplesAway) {
   EXPECT_EQ(frameOf(folder, radar, first + 1), (again + 1)->data);
 }
 
+TEST(Rig, ACompletedRecordingIsLeftThoughSamplesGoOn) {
+  TestFolder folder;
+  writeSession(folder, 0.01, {600});
+  const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  EmulatorProcess emulator(loopbackIp(1), loopbackIp(2), quickly(folder.file(""), {"--status-at", "40:0x100"}));
+  RunningRig running(radar);
+  ASSERT_TRUE(waitUntil([&] { return running.saw("completed its recording"); }));
+  const auto begin = std::chrono::steady_clock::now();
+  ASSERT_TRUE(waitUntil([&] { return running.rig.state().armings == 2; }));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));  // the session lasts for 6 s
+  ASSERT_TRUE(waitUntil([&] { return running.rig.state().phase == RigState::Phase::kStreaming; }));
+  EXPECT_LT(running.rig.state().silent_s, 1);
+}
+
 TEST(Rig, WaitsForACardAndComesBackToOneThatWasGone) {
   TestFolder folder;
   writeSession(folder, 0.01, {400});

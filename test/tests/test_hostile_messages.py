@@ -6,6 +6,9 @@ import sys
 import time
 import unittest
 
+import rospkg
+import yaml
+
 from in_folder import InFolder
 from mmradartwin_tests.installed_programs import find_program
 from test_launch_files import end, free_port, start_master
@@ -23,13 +26,100 @@ def send(topic, message):
     publisher.publish(message)
     time.sleep(1)
 """
-CUBES = PUBLISH + """
-radar = RadarConfig()
+EDGES = (1000, 4000000000, 4294967295, 2147483647, 0, 1001)  # s
+CUBES = PUBLISH + f"EDGES = {EDGES}" + """
+from mmradartwin_msgs.msg import RangeAngleMap, ReceiveGrid
+from mmradartwin_tests.moving_bag import config_message
+from mmradartwin_tests.radar import Radar
+from sensor_msgs.msg import Imu, PointCloud2, PointField
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
+radar, radar_hash = config_message(Radar())
 send("radar/config", radar)
-for seconds in (1000, 4000000000, 4294967295, 1001):
-    cube = AdcCube()
-    cube.header.stamp, cube.header.frame_id = rospy.Time(seconds), "radar_link"
-    send("radar/adc", cube)
+def cube():
+    return AdcCube(radar_hash=radar_hash, chirps=2, samples_per_chirp=64, receivers=4, samples=[1, 2] * 512,
+                   chirp_valid=bytes([1, 1]))
+def cloud(width=1, step=12):
+    return PointCloud2(width=width, height=1, point_step=step, row_step=12, data=bytes(12), is_dense=True, fields=[
+        PointField(name=name, offset=4 * i, datatype=PointField.FLOAT32, count=1) for i, name in enumerate("xyz")])
+kinds = {"radar/adc": cube, "radar/grid": ReceiveGrid, "radar/range_angle": RangeAngleMap, "twin/grid": ReceiveGrid,
+         "twin/range_angle": RangeAngleMap, "cloud": cloud, "imu": Imu,
+         "/tf": lambda: TFMessage([TransformStamped(child_frame_id="radar_link")])}
+publishers = {topic: rospy.Publisher(topic, type(make()), queue_size=20) for topic, make in kinds.items()}
+listeners = {"radar/adc": 2, "/tf": 5}
+while any(p.get_num_connections() < listeners.get(topic, 1) for topic, p in publishers.items()):
+    time.sleep(0.05)
+for seconds in EDGES:
+    for topic, make in kinds.items():
+        message = make()
+        header = message.transforms[0].header if topic == "/tf" else message.header
+        header.stamp, header.frame_id = rospy.Time(seconds), "map" if topic == "/tf" else "radar_link"
+        if topic == "/tf":
+            message.transforms[0].transform.rotation.w = 1
+        publishers[topic].publish(message)
+    time.sleep(0.3)
+for wrong in 8 * (cloud(width=2**32 - 1), cloud(step=2**31), cloud(step=0)):  # longer than warnings are throttled
+    wrong.header.stamp, wrong.header.frame_id = rospy.Time(1002), "radar_link"
+    publishers["cloud"].publish(wrong)
+    time.sleep(0.3)
+"""
+LARGE = PUBLISH + """
+from mmradartwin_tests.moving_bag import config_message
+from mmradartwin_tests.radar import Radar
+send("radar/config", config_message(Radar(samples=128, loops=32768, frame_period_s=3.5))[0])
+"""
+# Rounds of one loop: in each, maps of both kinds for a while, then measured ones alone, as where tf ends.
+ROUNDS = PUBLISH + """
+import copy
+from mmradartwin_msgs.msg import RangeAngleMap, Residuals
+from mmradartwin_tests.moving_bag import config_message
+from mmradartwin_tests.radar import Radar
+radar, radar_hash = config_message(Radar())
+send("radar/config", radar)
+templates, residuals = [], []
+keep = [rospy.Subscriber("radar/range_angle", RangeAngleMap, templates.append),
+        rospy.Subscriber("attribution/residuals", Residuals, residuals.append)]
+cubes = rospy.Publisher("radar/adc", AdcCube, queue_size=1)
+while cubes.get_num_connections() == 0 or keep[0].get_num_connections() == 0 or keep[1].get_num_connections() == 0:
+    time.sleep(0.05)
+number = 0
+while not templates:
+    number += 1
+    cube = AdcCube(radar_hash=radar_hash, chirps=2, samples_per_chirp=64, receivers=4, samples=[1, 2, 5, -7] * 256,
+                   chirp_valid=bytes([1, 1]))
+    cube.header.stamp, cube.header.frame_id = rospy.Time(number), "radar_link"
+    cubes.publish(cube)
+    time.sleep(0.2)
+measured, simulated = (rospy.Publisher(topic, RangeAngleMap, queue_size=100)
+                       for topic in ("radar/range_angle", "twin/range_angle"))
+while measured.get_num_connections() < 2 or simulated.get_num_connections() == 0:
+    time.sleep(0.05)
+m = copy.deepcopy(templates[-1])
+m.pose_valid = True
+m.T_map_radar.position.x, m.T_map_radar.position.y, m.T_map_radar.position.z = 3, 3, 1
+m.T_map_radar.orientation.w = 1
+s = copy.deepcopy(m)
+s.source = 1
+# Until twin/scene is there nothing is compared.
+while not residuals:
+    number += 1
+    for message, publisher in ((m, measured), (s, simulated)):
+        message.header.stamp = rospy.Time(1000 + number)
+        publisher.publish(message)
+    time.sleep(0.2)
+counts = []
+for round_number in range(4):
+    before = len(residuals)
+    for i in range(110):
+        m.header.stamp = s.header.stamp = rospy.Time.from_sec(900 + 0.05 * i)
+        measured.publish(m)
+        time.sleep(0.01)
+        if i < 30:
+            simulated.publish(s)
+            time.sleep(0.01)
+    time.sleep(1)
+    counts.append(len(residuals) - before)
+print(counts)
 """
 FUTURE = PUBLISH + """
 from geometry_msgs.msg import TransformStamped
@@ -81,11 +171,49 @@ class HostileMessages(InFolder):
         return done.stdout
 
     def test_stamps_that_no_clock_has_end_no_node(self):
-        nodes = [self.node("mmradartwin_dsp", "dsp_node"), self.node("mmradartwin_attribution", "diagnosis_node")]
+        radar = "package://mmradartwin_config/radar.yaml"
+        scene = "_scene:=package://mmradartwin_config/office/scene.yaml"
+        nodes = {"dsp_node": self.node("mmradartwin_dsp", "dsp_node"),
+                 "diagnosis_node": self.node("mmradartwin_attribution", "diagnosis_node"),
+                 "attribution_node": self.node("mmradartwin_attribution", "attribution_node"),
+                 "twin_node": self.node("mmradartwin_sim", "twin_node", "_radar:=" + radar, scene),
+                 "room_pose": self.node("mmradartwin_sim", "room_pose", scene, "_initial_pose:=3 3 0",
+                                        "_camera_frame:=radar_link", "_publish_tf:=false"),
+                 "driver_node": self.node("mmradartwin_driver", "driver_node", "_radar:=" + radar,
+                                          "_card_ip:=127.77.3.2", "_host_ip:=127.77.3.1")}
         self.python(CUBES)
-        wait_for(lambda: "is no time" in self.text("diagnosis_node"), lambda: self.text("diagnosis_node"), 60)
-        for node in nodes:
-            self.assertIsNone(node.poll(), self.text("dsp_node") + self.text("diagnosis_node"))
+        for name in nodes.keys() - {"driver_node"}:
+            wait_for(lambda name=name: "is no time" in self.text(name), lambda name=name: name + self.text(name), 60)
+        wait_for(lambda: "are not those of its data" in self.text("room_pose"), lambda: self.text("room_pose"), 60)
+        for name, node in nodes.items():
+            self.assertIsNone(node.poll(), name + self.text(name))
+        self.assertLess(self.text("dsp_node").count("is no time"), 2 * len(EDGES))
+
+    def test_frames_that_take_all_memory_are_refused_by_file_and_parameter(self):
+        with open(os.path.join(rospkg.RosPack().get_path("mmradartwin_config"), "radar.yaml"), encoding="utf-8") as file:
+            radar = yaml.safe_load(file)
+        radar.update(samples_per_chirp=128, loops_per_frame=32768, frame_period_s=3.5)
+        with open(self.at("large.yaml"), "w", encoding="ascii") as file:
+            yaml.safe_dump(radar, file)
+        driver = self.node("mmradartwin_driver", "driver_node", "_radar:=" + self.at("large.yaml"),
+                           "_card_ip:=127.77.3.2", "_host_ip:=127.77.3.1", "_configure_card:=false")
+        self.assertEqual(driver.wait(120), 2, self.text("driver_node"))
+        said = [line for line in self.text("driver_node").split("\n") if line]
+        self.assertEqual(len(said), 1, said)
+        for word in (self.at("large.yaml"), "65536 chirps", "128 samples", "MiB", "max_frame_mb allows 64"):
+            self.assertIn(word, said[0])
+        chain = self.node("mmradartwin_dsp", "dsp_node")
+        self.python(LARGE)
+        wait_for(lambda: "max_frame_mb" in self.text("dsp_node"), lambda: self.text("dsp_node"), 60)
+        self.assertIsNone(chain.poll(), self.text("dsp_node"))
+
+    def test_rounds_of_a_loop_give_the_same_numbers(self):
+        for package, program, *arguments in (
+                ("mmradartwin_dsp", "dsp_node", "_pose_timeout_s:=0"), ("mmradartwin_attribution", "attribution_node"),
+                ("mmradartwin_sim", "twin_node", "_rate_hz:=0",
+                 "_scene:=package://mmradartwin_config/office/scene.yaml")):
+            self.node(package, program, *arguments)
+        self.assertEqual(self.python(ROUNDS).split("\n")[0], "[30, 30, 30, 30]", self.text("attribution_node"))
 
     def test_transforms_of_the_future_are_left_out_by_every_reader(self):
         nodes = {"dsp_node": self.node("mmradartwin_dsp", "dsp_node"),
@@ -100,6 +228,13 @@ class HostileMessages(InFolder):
             self.assertIsNone(node.poll(), self.text(name))
 
     def test_sessions_that_cannot_be_unpacked_end_no_node(self):
+        # Nothing can be unpacked, as on a full disk.
+        self.environment["TMPDIR"] = self.at("no_such_folder")
+        full = self.node("mmradartwin_sim", "twin_node", "__name:=full")
+        self.python(SESSIONS)
+        wait_for(lambda: "session refused" in self.text("twin_node"), lambda: self.text("twin_node"), 60)
+        self.assertIsNone(full.poll(), self.text("twin_node"))
+        del self.environment["TMPDIR"]
         nodes = [self.node("mmradartwin_sim", "twin_node"), self.node("mmradartwin_attribution", "diagnosis_node"),
                  self.node("mmradartwin_attribution", "attribution_node")]
         self.python(SESSIONS)
@@ -113,6 +248,8 @@ class HostileMessages(InFolder):
         for path in (secret, inside):
             with open(path, "w", encoding="ascii") as file:
                 file.write("hidden_word: 1\n")
+        with open(self.at("allowed", "twin.yaml"), "w", encoding="ascii") as file:
+            file.write("mechanisms: {}\nmistyped: 1\n")
         os.mkfifo(pipe)
         os.symlink(secret, self.at("allowed", "link.yaml"))
         node = self.node("mmradartwin_sim", "twin_node", "_apply_folder:=" + self.at("allowed"),
@@ -120,15 +257,18 @@ class HostileMessages(InFolder):
                          "_scene:=package://mmradartwin_config/office/scene.yaml")
         begin = time.monotonic()
         answers = self.python(APPLY, secret, self.at("no_such.yaml"), self.at("allowed", "..", "secret.yaml"),
-                              self.at("allowed", "link.yaml"), "/etc/shadow", pipe, inside).splitlines()
+                              self.at("allowed", "link.yaml"), "/etc/shadow",
+                              "package://mmradartwin_config/../../../../../../../../../../.." + secret, pipe, inside,
+                              self.at("allowed", "twin.yaml")).splitlines()
         self.assertLess(time.monotonic() - begin, 120)
-        for answer in answers[:5]:
-            self.assertIn("lies below no folder", answer)
         for answer in answers[:6]:
+            self.assertIn("lies below no folder", answer)
+        for answer in answers[:8]:
             self.assertNotIn("hidden_word", answer)
             self.assertNotIn("root:", answer)
-        self.assertIn("is no file NAME.yaml", answers[5])
-        self.assertIn("hidden_word", answers[6])  # the user's own file: what is wrong with it
+        self.assertIn("is no file NAME.yaml", answers[6])
+        self.assertIn("is no twin.yaml", answers[7])
+        self.assertIn("mistyped", answers[8])  # a twin: what is wrong with it
         self.assertIsNone(node.poll(), self.text("twin_node"))
 
 

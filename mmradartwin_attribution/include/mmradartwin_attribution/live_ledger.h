@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <deque>
 #include <string>
 #include <vector>
 
@@ -19,7 +20,7 @@ class LiveLedger {
            const FieldMetrics& central);
   /// Over the finished stretches and the one that goes on.
   LedgerSummary summary() const;
-  /// Names of excluded duplicates, finished or going on.
+  /// Names of excluded duplicates, the last 100 finished ones and the one that goes on.
   std::vector<std::string> duplicates() const;
 
  private:
@@ -34,7 +35,7 @@ class LiveLedger {
   bool duplicate(const Stretch& stretch) const;
 
   std::vector<Stretch> finished_;
-  std::vector<std::string> duplicates_;
+  std::deque<std::string> duplicates_;
   std::vector<Stretch> current_;  // none or one
 };
 

@@ -69,8 +69,8 @@ AttributionNode::AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& priv
   updater_ = std::make_unique<diagnostic_updater::Updater>(nh_, private_nh, ros::this_node::getName());
   updater_->setHardwareID("none");
   updater_->add("attribution", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnose(status); });
-  diagnostics_timer_ =
-      nh_.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  diagnostics_timer_ = nh_.createWallTimer(ros::WallDuration(kDiagnosticsEvery_s),
+                                           [this](const ros::WallTimerEvent&) { updater_->force_update(); });
   watchdog_ = nh_.createWallTimer(ros::WallDuration(5), &AttributionNode::watch, this);
   startTuning(private_nh);
 }

@@ -15,7 +15,7 @@
 namespace mmradartwin {
 
 /// Command port of the card. Replies are matched by command code. Status datagrams that arrive between them are kept
-/// for takeStatus(). One thread at a time.
+/// for takeStatus(), the newest 64. One thread at a time.
 class Dca1000Control {
  public:
   struct Options {
@@ -45,11 +45,14 @@ class Dca1000Control {
 
   /// Next status datagram; waits for one up to the given time.
   std::optional<std::uint16_t> takeStatus(std::chrono::milliseconds wait);
+  /// Those of an earlier recording.
+  void forgetStatuses();
 
  private:
   Dca1000Reply command(Dca1000Command command, const std::vector<std::uint8_t>& body, int attempts);
   void done(Dca1000Command command, const std::vector<std::uint8_t>& body = {});
   void send(Dca1000Command command, const std::vector<std::uint8_t>& body);
+  void keep(std::uint16_t status);
   /// Next datagram of the card until `deadline`; foreign and malformed ones are skipped.
   std::optional<Dca1000Reply> receive(std::chrono::steady_clock::time_point deadline);
 

@@ -19,19 +19,31 @@ namespace mmradartwin {
 /// any number of frames and come late, twice, cut short or not at all.
 ///
 /// Frames are handed out in order: a complete one at once, one with holes as soon as data arrive that lie further than
-/// the reorder window behind its end, or at flush(). Frames of which not a single byte came are left out (a gap in the
-/// sequence). Bytes for frames already handed out are counted as late and dropped.
+/// the reorder window behind its end, or at flush(). That window is `window_packets` of the longest; a smaller one,
+/// `window_frames` and `window_bytes`, is enough where `reorder_ns` have passed since the frame's end. Frames of which
+/// not a single byte came are left out (a gap in the sequence). Bytes for frames already handed out are counted as late
+/// and dropped.
+///
+/// Nothing but the Ethernet checksum protects a packet's header, so sequence and count are held against each other:
+/// from one packet to the next in the sequence the count grows by the payload, and by the longest payload for each
+/// packet that is missing. A recording in which a short packet is followed at once shows that its packets vary in
+/// length; there the count must grow by 1 byte at least and 1462 at most for each. A packet that does not fit is held
+/// back as suspect, and so are one more than 64 packets ahead and the first of a recording, unless that is sequence 1
+/// at byte 0: it may be of the recording before. Suspects are placed when `confirm_packets` of them, each at most as
+/// many behind another, fit each other; a packet that fits what is placed rejects them. What is rejected is missing at
+/// its true place, and flagged there as lost. Where lengths vary, a packet that fits roughly and is contradicted by
+/// four that follow is taken out again; two wrong headers within these may go unnoticed.
 ///
 /// A packet that goes back in the count more than `reorder_ns` after the newest one is no reordered one. If it is the
-/// first of a recording (sequence 1, byte 0), or `confirm_packets` of them are near each other, then the count has been
-/// restarted: that ends all open frames, and a new epoch begins with frame 0. A packet implausibly far ahead is held
-/// back until as many are near each other. A restart whose first packets are lost and that lands ahead of the old count
-/// cannot be told from loss; arming through restart() leaves no such doubt.
+/// first of a recording, or suspects that begin with it are confirmed, then the count has been restarted: that ends all
+/// open frames, and a new epoch begins with frame 0. A restart whose first packets are lost and that lands ahead of the
+/// old count cannot be told from loss; arming through restart() leaves no such doubt.
 class FrameAssembler {
  public:
   struct Options {
-    int window_frames = 2;                          ///< at least; in the data, not in time
+    int window_frames = 2;                          ///< at least
     std::size_t window_bytes = 4 * 1472;            ///< at least
+    int window_packets = 64;                        ///< for what comes within reorder_ns
     std::uint64_t plausible_gap_bytes = 64u << 20;  ///< ahead of the newest byte
     std::int64_t reorder_ns = 20'000'000;           ///< what comes later than this was not reordered
     int confirm_packets = 4;
@@ -43,7 +55,7 @@ class FrameAssembler {
     std::uint64_t duplicate_packets = 0;
     std::uint64_t late_packets = 0;       ///< entirely or partly for frames already handed out
     std::uint64_t reordered_packets = 0;  ///< behind the newest byte, but in time
-    std::uint64_t rejected_packets = 0;   ///< did not fit the count, and no later packet continued them
+    std::uint64_t rejected_packets = 0;   ///< sequence or count did not fit, and no later packets bore them out
     std::uint64_t frames = 0;             ///< handed out
     std::uint64_t incomplete_frames = 0;  ///< of these
     std::uint64_t missing_frames = 0;     ///< without any byte before later data
@@ -76,12 +88,18 @@ class FrameAssembler {
     std::size_t received_bytes = 0;
     std::optional<std::int64_t> observed_start_ns;  ///< from the packet with the frame's first byte
     std::int64_t rough_start_ns = 0;                ///< from the first packet with any byte of the frame
+    std::int64_t passed_ns = 0;                     ///< when data beyond the frame's end first came
+  };
+  /// What a packet's header says, and how long its payload is.
+  struct Header {
+    std::uint32_t sequence = 0;
+    std::uint64_t byte_count = 0;
+    std::size_t size = 0;
   };
   struct Suspect {
-    std::uint32_t sequence;
-    std::uint64_t byte_count;
+    Header header;
     std::int64_t stamp_ns;
-    bool ahead;
+    bool behind;  ///< of a restarted count, maybe
     std::vector<std::uint8_t> payload;
   };
   /// Properties of a packet by which a copy of it is recognised.
@@ -91,21 +109,30 @@ class FrameAssembler {
     std::size_t size = 0;  ///< 0: none
     std::array<std::uint8_t, 64> head{};
   };
-  enum class Fit { kPlace, kDuplicate, kBehind, kAhead };
+  enum class Fit { kPlace, kDuplicate, kBehind, kImplausible };
 
   Slot& slot(std::uint64_t frame) { return slots_[frame % slots_.size()]; }
   std::uint64_t absoluteOffset(std::uint64_t byte_count) const;
   Fit fit(const DataPacket& packet, std::uint64_t offset) const;
   bool overlapsReceived(std::uint64_t offset, std::size_t size) const;
   const Fingerprint* findCopy(const DataPacket& packet) const;
-  bool continuesSuspects(const DataPacket& packet) const;
-  void suspect(const DataPacket& packet, bool ahead);
+  static Header headerOf(const DataPacket& packet);
+  bool follows(const Header& before, const Header& after) const;
+  bool fitsExactly(const Header& a, const Header& b) const;
+  bool fitsRoughly(const Header& a, const Header& b) const;
+  bool linked(const Suspect& suspect, const Header& header) const;
+  void suspect(const DataPacket& packet, bool behind);
+  std::vector<Suspect> confirmedWith(const Header& header) const;
   void rejectSuspects();
-  void acceptSuspects();
+  void accept(std::vector<Suspect> accepted);
+  std::uint64_t beginOf(const Suspect& first);
+  void distrustNewest();
+  void advanceNewest(const DataPacket& packet, bool sure);
   void place(const DataPacket& packet, std::uint64_t offset);
   void remember(const DataPacket& packet);
   std::size_t copyMissing(Slot& slot, std::size_t begin, const std::uint8_t* from, std::size_t size);
   void closeBefore(std::uint64_t frame);
+  void passEnds(std::uint64_t from, std::int64_t stamp_ns);
   void handOut(std::uint64_t frame);
   void handOutComplete();
   void beginEpoch();
@@ -113,7 +140,7 @@ class FrameAssembler {
   RadarConfig radar_;
   Output output_;
   Options options_;
-  std::uint64_t frame_bytes_, window_bytes_;
+  std::uint64_t frame_bytes_, window_bytes_, far_window_bytes_;
   FrameClock clock_;
   Counters counters_;
 
@@ -121,8 +148,11 @@ class FrameAssembler {
   std::uint64_t base_frame_ = 0;  ///< first one not handed out
   std::uint64_t next_byte_ = 0;   ///< end of the data seen in this epoch
   bool begun_ = false;            ///< a packet of this epoch has been placed
-  std::uint32_t newest_sequence_ = 0;
+  Header newest_;
   std::int64_t newest_stamp_ns_ = 0;
+  bool newest_sure_ = false;    ///< it fits its predecessor exactly
+  bool newest_rested_ = false;  ///< it came long after its predecessor: the rest of a recording, sent when that ended
+  bool lengths_vary_ = false;
   std::size_t longest_payload_ = 0;
   std::vector<Suspect> suspects_;
   std::vector<Fingerprint> recent_;

@@ -111,6 +111,8 @@ class Rig {
   const Clock::time_point started_ = Clock::now();
   Clock::time_point last_data_{};
   Clock::time_point last_report_{};
+  std::uint16_t told_status_ = 0;
+  Clock::time_point told_status_at_{};
 
   mutable std::mutex mutex_;
   RigState state_;

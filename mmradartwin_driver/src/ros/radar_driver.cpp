@@ -61,7 +61,7 @@ RadarDriver::RadarDriver(const ros::NodeHandle& nh, const ros::NodeHandle& priva
     updater_.add("radar pose", this, &RadarDriver::diagnosePose);
     countTfWarningsOfProcess();
     tf_buffer_ = std::make_unique<tf2_ros::Buffer>();
-    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(*tf_buffer_, handle);
+    tf_reader_ = std::make_unique<TransformReader>(*tf_buffer_);
     pose_timer_ =
         handle.createWallTimer(ros::WallDuration(0.02), [this](const ros::WallTimerEvent&) { observePose(); });
   }
@@ -192,6 +192,7 @@ void RadarDriver::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
   status.add("packets", state.packets.packets);
   status.add("duplicate packets", state.frames.duplicate_packets);
   status.add("late packets", state.frames.late_packets);
+  status.add("packets whose header did not fit", state.frames.rejected_packets);
   status.add("packets dropped by this host", state.packets.kernel_drops);
   status.add("packets from other addresses", state.packets.foreign);
   status.add("socket buffer [kB]", state.buffer_bytes >> 10);
@@ -259,7 +260,7 @@ void RadarDriver::observePose() {
     const geometry_msgs::TransformStamped T =
         tf_buffer_->lookupTransform(settings_.map_frame, settings_.frame_id, ros::Time(0));
     pose_watch_.observe(toNanoseconds(T.header.stamp), fromMsg(T.transform));
-  } catch (const tf2::TransformException&) {
+  } catch (const std::exception&) {
     // There is no pose yet, or its frames are not connected: the report states its age.
   }
 }
@@ -274,6 +275,7 @@ void RadarDriver::diagnosePose(diagnostic_updater::DiagnosticStatusWrapper& stat
   status.add("age [s]", report.age_s ? seconds(*report.age_s) : "unknown");
   status.add("gaps", report.gaps);
   status.add("jumps", report.jumps);
+  status.add("transforms of the future left out", tf_reader_->futureCount());
 }
 
 }  // namespace mmradartwin

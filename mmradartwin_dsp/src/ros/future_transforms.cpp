@@ -20,6 +20,13 @@ tf2_msgs::TFMessage FutureTransforms::leaveOut(const tf2_msgs::TFMessage& messag
   const ros::Time now = ros::Time::now();
   tf2_msgs::TFMessage kept;
   for (const geometry_msgs::TransformStamped& transform : message.transforms) {
+    if (!fixed && !usableStamp(transform.header.stamp)) {
+      ++count_;
+      ROS_WARN_THROTTLE(kWarnOfFutureEvery_s, "%s -> %s of %s is left out: its stamp, %u s, is no time",
+                        transform.header.frame_id.c_str(), transform.child_frame_id.c_str(), publisher.c_str(),
+                        transform.header.stamp.sec);
+      continue;
+    }
     const std::int64_t ahead_ns = toNanoseconds(transform.header.stamp) - toNanoseconds(std::max(now, measured));
     if (fixed || now.isZero() || ahead_ns <= kFuture_ns) {
       kept.transforms.push_back(transform);

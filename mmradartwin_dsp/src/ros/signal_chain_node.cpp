@@ -45,8 +45,8 @@ SignalChainNode::SignalChainNode(ros::NodeHandle nh, const ros::NodeHandle& priv
   updater_ = std::make_unique<diagnostic_updater::Updater>(nh, private_nh, ros::this_node::getName());
   updater_->setHardwareID("none");
   updater_->add("signal chain", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnose(status); });
-  diagnostics_timer_ =
-      nh.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(kDiagnosticsEvery_s),
+                                          [this](const ros::WallTimerEvent&) { updater_->force_update(); });
 }
 
 SignalChainNode::Settings::Settings(StrictParameters& parameters) {
@@ -186,7 +186,7 @@ void SignalChainNode::drain() {
         no_pose_ = why;
         ROS_WARN_THROTTLE(kWarnEvery_s, "frame at %.6f goes on without a pose: %s", stamp.toSec(), why.c_str());
       }
-    } catch (const tf2::TransformException& error) {
+    } catch (const std::exception& error) {  // of tf2, and of ros::Duration that cannot hold a difference
       const double waited_s = (ros::Time::now() - front.since).toSec();
       // Time that went back while the frame waited counts as waited out.
       if (waited_s >= 0 && waited_s < settings_.pose_timeout_s && queue_.size() < kLongestQueue) return;

@@ -18,7 +18,20 @@ constexpr double kWarnOfPoseEvery_s = 5;
 // Materials do not matter here; a scene is loaded for a frequency that its materials hold for.
 constexpr double kFrequency_hz = 77.93e9;
 
+/// Whether a cloud's fields and sizes are true of its data, which the iterators below rely on.
+bool consistent(const sensor_msgs::PointCloud2& cloud) {
+  const std::uint64_t points = std::uint64_t{cloud.width} * cloud.height;
+  if (cloud.point_step == 0 || points > cloud.data.size() / cloud.point_step) return false;
+  return std::all_of(cloud.fields.begin(), cloud.fields.end(), [&](const sensor_msgs::PointField& field) {
+    const bool coordinate = field.name == "x" || field.name == "y" || field.name == "z";
+    return !coordinate || (field.datatype == sensor_msgs::PointField::FLOAT32 &&
+                           std::uint64_t{field.offset} + sizeof(float) <= cloud.point_step);
+  });
+}
+
 std::vector<Eigen::Vector3d> readPoints(const sensor_msgs::PointCloud2& cloud, const Eigen::Isometry3d& T) {
+  if (!consistent(cloud)) throw std::runtime_error("its sizes or fields are not those of its data");
+  if (cloud.data.empty()) return {};
   std::vector<Eigen::Vector3d> points;
   points.reserve(static_cast<std::size_t>(cloud.width) * cloud.height);
   sensor_msgs::PointCloud2ConstIterator<float> x(cloud, "x"), y(cloud, "y"), z(cloud, "z");
@@ -109,6 +122,10 @@ NodeDescription RoomPoseNode::description() {
 
 void RoomPoseNode::onImu(const sensor_msgs::Imu::ConstPtr& imu) {
   if (imu->linear_acceleration_covariance[0] == -1) return;  // sensor_msgs/Imu: not measured
+  if (!usableStamp(imu->header.stamp)) {
+    ROS_WARN_THROTTLE(kWarnOfPoseEvery_s, "imu left out: its stamp, %u s, is no time", imu->header.stamp.sec);
+    return;
+  }
   try {
     const Eigen::Matrix3d R =
         fromMsg(tf_buffer_.lookupTransform(settings_.camera_frame, imu->header.frame_id, ros::Time(0)).transform)
@@ -116,7 +133,7 @@ void RoomPoseNode::onImu(const sensor_msgs::Imu::ConstPtr& imu) {
     const auto& a = imu->linear_acceleration;
     const auto& w = imu->angular_velocity;
     gravity_.add(imu->header.stamp.toSec(), R * Eigen::Vector3d(a.x, a.y, a.z), R * Eigen::Vector3d(w.x, w.y, w.z));
-  } catch (const tf2::TransformException& error) {
+  } catch (const std::exception& error) {
     ROS_WARN_THROTTLE(kWarnOfPoseEvery_s, "imu left out, the place of its frame is not known: %s", error.what());
   }
 }
@@ -146,6 +163,7 @@ void RoomPoseNode::refuse(const std::string& why) {
 void RoomPoseNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {
   cloud_at_ = ros::WallTime::now();
   const ros::Time stamp = cloud->header.stamp;
+  if (!usableStamp(stamp)) return refuse("the cloud's stamp, " + std::to_string(stamp.sec) + " s, is no time");
   tf_reader_->measuredAt(stamp);
   if (last_ && (stamp < trusted_at_ || (stamp - trusted_at_).toSec() > settings_.lost_after_s)) {
     person_ = last_;  // looked for in a wider circle
@@ -168,7 +186,7 @@ void RoomPoseNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {
   try {
     points = readPoints(*cloud, T_camera_cloud);
   } catch (const std::runtime_error& error) {
-    return refuse(std::string("the cloud has no x, y and z: ") + error.what());
+    return refuse(std::string("the cloud has no usable x, y and z: ") + error.what());
   }
   const ros::WallTime begin = ros::WallTime::now();
   const std::optional<Eigen::Vector3d> up = gravity_.up(stamp.toSec());

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
@@ -25,6 +27,19 @@ namespace {
 constexpr double kWarnEvery_s = 5;
 constexpr double kShowMovesEvery_s = 0.5;
 constexpr double kMeasuredFor_s = 1;  // without a grid for so long the twin goes on at its own rate
+
+/// Whether a line of the file begins with a key of a twin.yaml.
+bool looksLikeTwin(const std::string& file) {
+  constexpr int kMostLines = 10000;
+  std::ifstream in(resolvePath(file, "/"));
+  std::string line;
+  for (int i = 0; i < kMostLines && std::getline(in, line); ++i) {
+    for (const char* key : {"scene:", "radar:", "mechanisms:", "{scene:", "{radar:", "{mechanisms:"}) {
+      if (line.compare(0, std::strlen(key), key) == 0) return true;
+    }
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -49,8 +64,8 @@ TwinNode::TwinNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
   pending_timer_ = nh.createWallTimer(ros::WallDuration(0.005), &TwinNode::onPending, this);
   if (settings_.rate_hz > 0)
     rate_timer_ = nh.createWallTimer(ros::WallDuration(1 / settings_.rate_hz), &TwinNode::onRate, this);
-  diagnostics_timer_ =
-      nh.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(kDiagnosticsEvery_s),
+                                          [this](const ros::WallTimerEvent&) { updater_->force_update(); });
   if (!settings_.scene_file.empty() && radar_) rebuild();
 }
 
@@ -117,16 +132,18 @@ void TwinNode::onSession(const mmradartwin_msgs::Session::ConstPtr& session) {
   if (!settings_.scene_file.empty()) return;
   try {
     if (session_ && session_->files == session->files) return;  // once more, of a master that was restarted
+    // What is in use stays until the new one has been unpacked and read.
+    auto folder = std::make_unique<TemporaryFolder>();
+    restoreSessionFiles(storedFiles(*session), folder->path());
+    SessionOptions options;
+    options.need_captures = false;
+    const Recording recording = openSession(folder->path(), options);
     if (session_ && applied_twin_) {
       ROS_WARN("another session: the twin of %s is no longer applied", applied_twin_->c_str());
       applied_twin_.reset();
     }
     session_ = session;
-    session_folder_ = std::make_unique<TemporaryFolder>();
-    restoreSessionFiles(storedFiles(*session), session_folder_->path());
-    SessionOptions options;
-    options.need_captures = false;
-    const Recording recording = openSession(session_folder_->path(), options);
+    session_folder_ = std::move(folder);
     session_scene_ = recording.scene_file;
     session_twin_ = recording.twin_file;
     if (!radar_) radar_ = recording.radar;
@@ -224,12 +241,17 @@ std::string TwinNode::allowedTwin(const std::string& file) const {
   const char* const ros_home = std::getenv("ROS_HOME");
   if (ros_home || home) folders.push_back(ros_home ? ros_home : std::string(home) + "/.ros");
   const fs::path asked = error ? fs::path(path).lexically_normal() : real;
-  const bool inside = of_package || std::any_of(folders.begin(), folders.end(), [&asked](const std::string& folder) {
-                        std::error_code ignored;
-                        const fs::path root = fs::weakly_canonical(folder, ignored);
-                        const fs::path rest = asked.lexically_relative(root);
-                        return !folder.empty() && !rest.empty() && *rest.begin() != "..";
-                      });
+  // A package's path may lead out of it again.
+  if (of_package) {
+    const std::string package = file.substr(0, file.find('/', std::strlen("package://")));
+    folders.push_back(fs::path(resolvePath(package + "/package.xml", "/")).parent_path().string());
+  }
+  const bool inside = std::any_of(folders.begin(), folders.end(), [&asked](const std::string& folder) {
+    std::error_code ignored;
+    const fs::path root = fs::weakly_canonical(folder, ignored);
+    const fs::path rest = asked.lexically_relative(root);
+    return !folder.empty() && !rest.empty() && *rest.begin() != "..";
+  });
   if (!inside) {
     throw InputError(path + ": lies below no folder that twin/apply may read; the parameter apply_folder (now '" +
                      folders.front() + "') names another");
@@ -243,8 +265,10 @@ std::string TwinNode::allowedTwin(const std::string& file) const {
 
 bool TwinNode::onApply(mmradartwin_msgs::ApplyTwin::Request& request, mmradartwin_msgs::ApplyTwin::Response& response) {
   const std::string what = request.file.empty() ? "the twin that this node was started with" : request.file;
+  bool checked = false;
   try {
     const std::string file = request.file.empty() ? startingTwin() : allowedTwin(request.file);
+    checked = !request.file.empty();
     if (!radar_) throw InputError("no radar/config came yet: start the driver or the replay first");
     use(makeTwin(file));
     applied_twin_.reset();
@@ -256,7 +280,11 @@ bool TwinNode::onApply(mmradartwin_msgs::ApplyTwin::Request& request, mmradartwi
     if (measured_) simulate(measured_->first, measured_->second);
   } catch (const std::exception& error) {
     response.success = false;
-    response.message = "refused, the twin stays as it was: " + std::string(error.what());
+    // What is wrong with a file would be told in its own words: of a twin alone.
+    response.message = "refused, the twin stays as it was: " +
+                       (checked && !looksLikeTwin(request.file)
+                            ? request.file + ": is no twin.yaml, it has none of the keys scene, radar and mechanisms"
+                            : error.what());
     ROS_ERROR("twin/apply: %s", response.message.c_str());
   }
   return true;
@@ -267,6 +295,7 @@ void TwinNode::onGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& grid) {
     ROS_WARN_THROTTLE(kWarnEvery_s, "radar/grid refused: its stamp, %u s, is no time", grid->header.stamp.sec);
     return;
   }
+  grids_.heard();
   measured_at_ = ros::WallTime::now();
   tf_reader_->measuredAt(grid->header.stamp);
   if (!twin_) {
@@ -309,7 +338,7 @@ void TwinNode::onRate(const ros::WallTimerEvent&) {
     if (last_ && last_ns_ == toNanoseconds(stamp) && (now - published_at_).toSec() < 1) return;
     published_at_ = now;
     simulate(fromMsg(T.transform), toNanoseconds(stamp));
-  } catch (const tf2::TransformException& error) {
+  } catch (const std::exception& error) {
     ROS_WARN_THROTTLE(kWarnEvery_s, "waiting for the pose of %s in %s: %s", settings_.radar_frame.c_str(),
                       settings_.map_frame.c_str(), error.what());
   }
@@ -445,10 +474,14 @@ void TwinNode::simulate(const Eigen::Isometry3d& T_map_radar, std::int64_t stamp
 
 void TwinNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const {
   using Level = diagnostic_msgs::DiagnosticStatus;
+  // Along poses alone the twin goes on by itself; a measurement that was there is missed.
+  const std::string silence = grids_.ever() ? grids_.silence(grid_subscriber_) : "";
   if (!twin_) {
     status.summary(Level::ERROR, problem_.empty() ? "no radar/config or no scene yet" : problem_);
   } else if (last_ && !last_->check.ok()) {
     status.summary(Level::ERROR, "records and grid disagree");
+  } else if (!silence.empty()) {
+    status.summary(Level::ERROR, silence);
   } else if (!problem_.empty()) {
     status.summary(Level::WARN, problem_);
   } else if (!last_) {

@@ -3,7 +3,6 @@
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/ros.h>
 #include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <memory>
 #include <string>
@@ -11,6 +10,7 @@
 #include "mmradartwin_driver/pose_watch.h"
 #include "mmradartwin_driver/rig.h"
 #include "mmradartwin_dsp/ros/node_program.h"
+#include "mmradartwin_dsp/ros/transform_reader.h"
 
 namespace mmradartwin {
 
@@ -54,7 +54,7 @@ class RadarDriver {
   ros::WallTimer timer_, pose_timer_;
   PoseWatch pose_watch_;
   std::unique_ptr<tf2_ros::Buffer> tf_buffer_;
-  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  std::unique_ptr<TransformReader> tf_reader_;
   FrameAssembler::Counters diagnosed_frames_;
   PacketReceiver::Counters diagnosed_packets_;
   std::uint64_t diagnosed_not_taken_ = 0;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "mmradartwin_dsp/ros/node_program.h"
+#include "mmradartwin_dsp/ros/topic_watch.h"
 #include "mmradartwin_dsp/ros/transform_reader.h"
 #include "mmradartwin_dsp/ros/transform_watch.h"
 #include "mmradartwin_dsp/temporary_folder.h"
@@ -106,6 +107,7 @@ class TwinNode {
   /// Where and when the last measured grid was simulated.
   std::optional<std::pair<Eigen::Isometry3d, std::int64_t>> measured_;
   mmradartwin_msgs::ReceiveGrid::ConstPtr pending_;
+  TopicWatch grids_{"the signal chain"};
   ros::WallTime measured_at_, published_at_, moved_scene_at_;
   bool moved_scene_due_ = false;  ///< actors were placed since it was published
   std::uint64_t simulated_ = 0, reused_ = 0, skipped_ = 0, without_pose_ = 0, actor_moves_ = 0;
