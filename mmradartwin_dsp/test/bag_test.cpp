@@ -61,6 +61,18 @@ TEST(Conversions, RadarSurvivesAndHashesItsContent) {
   EXPECT_TRUE(saysInOneLine(inputError([&] { fromMsg(msg); }), "layout", "3lane"));
 }
 
+TEST(Conversions, ARadarOfVastFramesIsRefused) {
+  mmradartwin_msgs::RadarConfig msg = toMsg(paperRadar());
+  msg.loops_per_frame = 32768;
+  msg.frame_period_s = 2;
+  EXPECT_EQ(fromMsg(msg).loops_per_frame, 32768) << "64 MiB";
+  EXPECT_TRUE(saysInOneLine(inputError([&] { fromMsg(msg, 63); }), "radar/config", "max_frame_mb", "64 MiB"));
+  msg.samples_per_chirp = 128;
+  msg.sample_rate_hz = 1e7;
+  EXPECT_TRUE(saysInOneLine(inputError([&] { fromMsg(msg); }), "radar/config", "max_frame_mb", "128 MiB"));
+  EXPECT_EQ(fromMsg(msg, 128).samples_per_chirp, 128);
+}
+
 TEST(Conversions, HashIsThatOfTheSerialisedMessage) {
   // SHA-256 of the bytes, computed apart from this code (Python: struct and hashlib) for the paper's radar.
   EXPECT_EQ(radarHash(paperRadar()), 0x5fc669d3ee5054a8ull);
