@@ -29,6 +29,7 @@
 #include "mmradartwin_dsp/text.h"
 #include "ros/bag_set.h"
 #include "ros/frame_sources.h"
+#include "ros/message_lengths.h"
 #include "ros/recorded_tf.h"
 
 namespace mmradartwin {
@@ -84,7 +85,7 @@ class BagContents {
     }
     const auto view = bags_.view({topic(kCubes)}, first, last);
     for (const rosbag::MessageInstance& message : *view) {
-      const auto cube = message.instantiate<mmradartwin_msgs::AdcCube>();
+      const auto cube = instanceOf<mmradartwin_msgs::AdcCube>(message);
       if (!cube || !stamps.count(toNanoseconds(cube->header.stamp))) continue;
       if (cube->radar_hash != radar_hash) {
         throw InputError(file() + ": pose '" + pose + "': frame " + std::to_string(cube->sequence) +
@@ -161,7 +162,7 @@ class BagContents {
     const auto view = bags_.view({topic(name)});
     boost::shared_ptr<Message> last;
     for (const rosbag::MessageInstance& message : *view) {
-      last = message.instantiate<Message>();
+      last = instanceOf<Message>(message);
       if (!last) refuseVersion(message);
     }
     return last;
@@ -176,7 +177,7 @@ class BagContents {
     const auto view = bags_.view({topic("radar/config")});
     boost::shared_ptr<mmradartwin_msgs::RadarConfig> config;
     for (const rosbag::MessageInstance& message : *view) {
-      const auto next = message.instantiate<mmradartwin_msgs::RadarConfig>();
+      const auto next = instanceOf<mmradartwin_msgs::RadarConfig>(message);
       if (!next) refuseVersion(message);
       if (config && radarHash(*next) != radarHash(*config)) {
         throw InputError(file() + ": holds several radar configurations on " + topic("radar/config") +
@@ -208,7 +209,7 @@ class BagContents {
   /// Indexes the frames and finds T_map_radar at each one's stamp.
   void readFrames(RecordedTf& tf) {
     const auto feed = [&](const rosbag::MessageInstance& message, bool is_static) {
-      const auto transforms = message.instantiate<tf2_msgs::TFMessage>();
+      const auto transforms = instanceOf<tf2_msgs::TFMessage>(message);
       if (transforms) tf.add(*transforms, is_static, message.getCallerId(), toNanoseconds(message.getTime()));
     };
     const auto fixed = bags_.view({"/tf_static", "tf_static"});
@@ -221,7 +222,7 @@ class BagContents {
         settle(tf, waiting, false);
         continue;
       }
-      const auto cube = message.instantiate<mmradartwin_msgs::AdcCube>();
+      const auto cube = instanceOf<mmradartwin_msgs::AdcCube>(message);
       if (!cube) refuseVersion(message);
       waiting.push_back({toNanoseconds(cube->header.stamp), message.getTime(), std::nullopt, false});
       sources_.add(cube->header.frame_id, message.getCallerId());
