@@ -181,6 +181,8 @@ TEST(Output, MessagesNameItAsTheUserDoes) {
   const TestFolder folder;
   const Output output = Output::folder({folder / "out", false}, {}, "mark");
   EXPECT_EQ(Output::namedIn(output.path() + "/mark: cannot be written"), folder / "out/mark: cannot be written");
+  Output::showAs(output.path() + "/recorded", "lab.bag");
+  EXPECT_EQ(Output::namedIn(output.path() + "/recorded/office.obj: is damaged"), "lab.bag/office.obj: is damaged");
 }
 
 TEST(InputFile, IsNoPipeAndNoDevice) {

@@ -21,6 +21,7 @@
 #include "mmradartwin_dsp/bag_kind.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/input_file.h"
+#include "mmradartwin_dsp/output.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_dsp/session_files.h"
@@ -368,11 +369,15 @@ Recording fromStretches(BagContents& bag, const std::string& file, const std::st
     assigned[stretch.pose.name] = cubesOf(stretch, bag.cubes);
   }
   const auto scene = bag.scene();
-  if (scene && !scene->scene_file.empty() && fs::exists(scene->scene_file)) {
+  std::error_code none;
+  if (scene && !scene->scene_file.empty() && fs::exists(scene->scene_file, none)) {
     recording.scene_file = scene->scene_file;
     if (!scene->twin_yaml.empty()) {
       recording.twin_file = (fs::path(folder) / "twin.yaml").string();
-      std::ofstream(*recording.twin_file, std::ios::binary | std::ios::trunc) << scene->twin_yaml;
+      std::ofstream out(*recording.twin_file, std::ios::binary | std::ios::trunc);
+      out << scene->twin_yaml;
+      out.close();
+      if (!out) throw std::runtime_error(*recording.twin_file + ": cannot be written; check the free space");
     }
   }
   return recording;
@@ -405,6 +410,7 @@ Recording openBag(const std::string& file, const BagOptions& options) try {
     folder = temporary->path();
   }
   fs::create_directories(folder);
+  Output::showAs(folder, file);
   auto assigned = std::make_shared<CubesByPose>();
   Recording recording =
       bag->session ? fromSessionMessage(*bag, folder, *assigned) : fromStretches(*bag, file, folder, *assigned);
