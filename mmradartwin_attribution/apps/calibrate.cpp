@@ -142,7 +142,7 @@ int run(const Arguments& arguments) {
   writePicture(drawCalibration(calibration), (folder / "calibration.png").string());
   output.complete();
 
-  for (const PoseProblem& problem : calibration.problems) std::cerr << "error: " << problem.message << '\n';
+  sayProblems(calibration.problems);
   for (const std::string& line : calibration.notes) note(line);
   if (!calibration.undetermined.empty()) std::cerr << "error: " << calibration.undetermined << '\n';
   print(calibration.yaw_deg, "yaw");

@@ -80,7 +80,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   RecordingArguments::leaveOutTemporary(extended);
   report.write(diagnosis, command);
   output.complete();
-  for (const PoseProblem& problem : diagnosis.problems) std::cerr << "error: " << problem.message << '\n';
+  sayProblems(diagnosis.problems);
   std::cout << diagnosisText(diagnosis) << "Findings: " << output.name() << "/findings.json\n"
             << "Report: " << output.name() << "/index.html\n";
   return diagnosis.problems.empty() ? 0 : 2;

@@ -101,7 +101,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   report.write(evaluation, options.config, description);
   output.complete();
 
-  for (const PoseProblem& problem : evaluation.problems) std::cerr << "error: " << problem.message << '\n';
+  sayProblems(evaluation.problems);
   std::cout << reportText(evaluation, options.config) << "Report: " << output.name() << "/index.html\n";
   return evaluation.problems.empty() ? 0 : 2;
 }

@@ -154,7 +154,7 @@ void ReportWriter::writeSummary(const Evaluation& evaluation, const AttributionC
   j["inputs"] = nlohmann::json::array();
   for (const InputFile& f : run.inputs) j["inputs"].push_back({{"file", f.file}, {"sha256", f.sha256}});
   OutputFile file(directory_ + "/summary.json");
-  file.stream() << j.dump(2) << '\n';
+  file.stream() << j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
   file.close();
 }
 

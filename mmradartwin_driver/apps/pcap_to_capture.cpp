@@ -31,16 +31,23 @@ int main(int argc, char** argv) {
       note("the file begins within a recording: " + std::to_string(capture.before_file) +
            " frame(s) came before it and are left out");
     }
+    std::vector<std::string> notes, errors;
     for (std::size_t i = 1; i < capture.recordings.size(); ++i) {
-      note("frame " + std::to_string(capture.recordings[i]) + " begins another recording: the card was armed anew");
+      notes.push_back("frame " + std::to_string(capture.recordings[i]) +
+                      " begins another recording: the card was armed anew");
     }
     for (const CaptureFlaw& flaw : capture.flaws) {
-      std::cerr << "error: frame " << flaw.frame << ": " << flaw.lost_bytes << " bytes lost (zeros in the capture), "
-                << flaw.chirps.size() << " chirp(s) from " << flaw.chirps.front() << " on not whole\n";
+      errors.push_back("frame " + std::to_string(flaw.frame) + ": " + std::to_string(flaw.lost_bytes) +
+                       " bytes lost (zeros in the capture), " + std::to_string(flaw.chirps.size()) + " chirp(s) from " +
+                       std::to_string(flaw.chirps.front()) + " on not whole");
     }
+    noteAll(notes);
+    sayErrors(errors);
+    errors.clear();
     for (const std::uint64_t bytes : capture.cut_off) {
-      std::cerr << "error: a last frame was cut off after " << bytes << " bytes and left out\n";
+      errors.push_back("a last frame was cut off after " + std::to_string(bytes) + " bytes and left out");
     }
+    sayErrors(errors);
     std::cout << file.name() << ": " << capture.frames << " frame(s), the first at "
               << formatStamp(capture.first_stamp_ns) << " s, " << capture.flaws.size() << " with losses";
     if (capture.lost_packets > 0) std::cout << "; " << capture.lost_packets << " packets lost";

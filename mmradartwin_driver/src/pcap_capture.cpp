@@ -18,10 +18,13 @@ namespace {
 /// Longest hole that is filled with zeros: a damaged count must not fill the disk.
 constexpr std::uint64_t kLongestHole_bytes = 64u << 20;
 
+/// Holes that are so many times the samples are no losses: the counts are not those of one card's recordings.
+constexpr std::uint64_t kMostHolesOfSamples = 16;
+
 class CaptureOutput {
  public:
-  CaptureOutput(const RadarConfig& radar, const std::string& file)
-      : radar_(radar), file_(file), out_(file, std::ios::binary | std::ios::trunc) {
+  CaptureOutput(const RadarConfig& radar, const std::string& pcap, const std::string& file)
+      : radar_(radar), pcap_(pcap), file_(file), out_(file, std::ios::binary | std::ios::trunc) {
     if (!out_) {
       throw InputError(file + ": cannot be written (" + std::strerror(errno) + "); give a file in another folder");
     }
@@ -41,6 +44,7 @@ class CaptureOutput {
     if (missing * radar_.bytes_per_frame() > kLongestHole_bytes) {
       result.recordings.push_back(result.frames);
     } else {
+      demandMoreSamplesThanHoles(missing);
       for (std::uint64_t i = 0; i < missing; ++i) leaveOut();
     }
     expected_ = cube.sequence + std::uint64_t{1};
@@ -61,6 +65,16 @@ class CaptureOutput {
   PcapCapture result;
 
  private:
+  void demandMoreSamplesThanHoles(std::uint64_t further_frames) {
+    hole_frames_ += further_frames;
+    const std::uint64_t whole = result.frames + further_frames - hole_frames_;
+    if (hole_frames_ * radar_.bytes_per_frame() <= kLongestHole_bytes || hole_frames_ <= kMostHolesOfSamples * whole) {
+      return;
+    }
+    throw InputError(pcap_ + ": the counts of its packets leave out " + std::to_string(hole_frames_) +
+                     " frame(s) beside " + std::to_string(whole) +
+                     " that have samples; it is damaged, or no recording of this radar");
+  }
   void settle(bool last) {
     if (!held_) return;
     const AdcCube cube = std::move(*held_);
@@ -94,8 +108,9 @@ class CaptureOutput {
   }
 
   const RadarConfig& radar_;
-  std::string file_;
+  std::string pcap_, file_;
   std::ofstream out_;
+  std::uint64_t hole_frames_ = 0;
   std::optional<AdcCube> held_;
   std::uint64_t expected_ = 0;
   bool new_recording_ = true, start_seen_ = false;
@@ -142,7 +157,7 @@ class LostPackets {
 PcapCapture pcapToCapture(const std::string& pcap, const RadarConfig& radar, const std::string& output,
                           const PcapSource& source) {
   if (!source.card_ip.empty()) parseIpv4(source.card_ip);
-  CaptureOutput out(radar, output);
+  CaptureOutput out(radar, pcap, output);
   std::uint64_t epochs = 1;
   FrameAssembler* counted = nullptr;
   FrameAssembler assembler(radar, [&](AdcCube&& cube) {

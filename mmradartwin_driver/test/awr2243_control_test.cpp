@@ -1,9 +1,12 @@
 #include "awr2243/awr2243_control.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <ostream>
 #include <random>
@@ -138,6 +141,11 @@ TEST(Awr2243Control, SaysThatThereIsNoFirmware) {
     EXPECT_NE(std::string(error.what()).find("no firmware"), std::string::npos) << error.what();
   }
   EXPECT_THROW(loadFirmwareImage("/nonexistent/meta.bin"), InputError);
+  const auto image = std::filesystem::temp_directory_path() / ("disk_image_" + std::to_string(::getpid()));
+  std::ofstream(image).close();
+  std::filesystem::resize_file(image, std::uintmax_t{1} << 40);
+  EXPECT_THROW(loadFirmwareImage(image.string()), InputError) << "1 TB, which is not read first";
+  std::filesystem::remove(image);
 }
 
 struct Fault {

@@ -154,6 +154,33 @@ TEST(PcapCapture, NamesFramesWithLosses) {
   EXPECT_EQ(1u, capture.recordings.size());
 }
 
+TEST(PcapCapture, RefusesHolesThatDwarfTheSamples) {
+  TestFolder folder;
+  writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));
+  const RadarConfig radar = loadRadarConfig(folder.file("radar.yaml"));
+  const std::vector<std::uint8_t> samples(1024);
+  {
+    PcapWriter writer(folder.file("a.pcap"));
+    // Each leap of 61 MB comes with packets enough to be believed, and is less than the hole that ends a recording.
+    for (std::uint32_t leap = 0; leap < 20; ++leap) {
+      for (std::uint32_t i = 0; i < 8; ++i) {
+        const std::uint32_t packet = leap * 60'000 + i;
+        const auto datagram = dataDatagram(packet + 1, std::uint64_t{1024} * packet, samples.data(), samples.size());
+        writer.add({endpoint("192.168.33.180", 1024), endpoint("192.168.33.30", 4098), datagram.data(), datagram.size(),
+                    1'700'000'000'000'000'000 + packet * 100'000LL});
+      }
+    }
+  }
+  try {
+    pcapToCapture(folder.file("a.pcap"), radar, folder.file("a.bin"));
+    FAIL();
+  } catch (const InputError& error) {
+    const std::string said = error.what();
+    EXPECT_NE(said.find("a.pcap: the counts of its packets leave out "), std::string::npos) << said;
+  }
+  EXPECT_LT(std::filesystem::file_size(folder.file("a.bin")), 64u << 20);
+}
+
 TEST(PcapCapture, BeginsWithTheFileWhereTheRecordingWasUnderWay) {
   TestFolder folder;
   writeText(folder.file("radar.yaml"), paperRadarYaml(0.05));

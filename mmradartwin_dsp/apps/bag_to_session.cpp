@@ -32,7 +32,7 @@ int main(int argc, char** argv) {
     const std::vector<PoseProblem> problems = bagToSession(paths.front(), session.path(), show, options);
     session.complete();
     progress.clear();
-    for (const PoseProblem& problem : problems) std::cerr << "error: " << problem.message << "\n";
+    sayProblems(problems);
     std::cout << session.name() << " written\n";
     return problems.empty() ? 0 : 2;
   });

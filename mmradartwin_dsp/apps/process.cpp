@@ -120,7 +120,7 @@ int process(const Options& options) {
                      ": no pose gives a map; the first: " + (problems.empty() ? "it has none" : problems.front()));
   }
   output.complete();
-  for (const std::string& problem : problems) std::cerr << "error: " << problem << "\n";
+  sayErrors(problems);
   std::cout << maps << " map(s) in " << (fs::path(output.name()) / "maps").string() << ", " << problems.size()
             << " pose(s) skipped\n";
   return problems.empty() ? 0 : 2;

@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
     });
     bag.complete();
     progress.clear();
-    for (const PoseProblem& problem : problems) std::cerr << "error: " << problem.message << "\n";
+    sayProblems(problems);
     std::cout << bag.name() << " written\n";
     return problems.empty() ? 0 : 2;
   });

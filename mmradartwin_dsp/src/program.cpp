@@ -5,6 +5,8 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <new>
+#include <stdexcept>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/progress_line.h"
@@ -18,6 +20,13 @@ bool quiet = false;
 
 void print(const char* kind, const std::string& text) {
   std::cerr << kind << ": " << oneLine(Output::namedIn(text)) << "\n";
+}
+
+void printAll(const char* kind, const std::vector<std::string>& lines) {
+  constexpr std::size_t kShown = 8;
+  const std::size_t shown = lines.size() <= kShown + 1 ? lines.size() : kShown;
+  for (std::size_t i = 0; i < shown; ++i) print(kind, lines[i]);
+  if (shown < lines.size()) print(kind, "and " + std::to_string(lines.size() - shown) + " more of the kind");
 }
 
 /// "" or what to say of the first word that looks like an option and is none. CLI11 itself would first ask for options
@@ -68,7 +77,14 @@ int runProgram(CLI::App& app, int argc, char** argv, const std::function<int()>&
   } catch (const InputError& error) {
     status = 2;
     failure = error.what();
+  } catch (const std::filesystem::filesystem_error& error) {
+    status = 2;
+    const std::filesystem::path& place = error.path2().empty() ? error.path1() : error.path2();
+    failure = place.string() + ": cannot be read or written (" + error.code().message() +
+              "); check its name, rights and the free space";
   } catch (const std::bad_alloc&) {
+    failure = "not enough memory";
+  } catch (const std::length_error&) {
     failure = "not enough memory";
   } catch (const std::exception& error) {
     failure = error.what();
@@ -80,6 +96,12 @@ int runProgram(CLI::App& app, int argc, char** argv, const std::function<int()>&
 
 void note(const std::string& text) {
   if (!quiet) print("note", text);
+}
+
+void sayErrors(const std::vector<std::string>& errors) { printAll("error", errors); }
+
+void noteAll(const std::vector<std::string>& notes) {
+  if (!quiet) printAll("note", notes);
 }
 
 void addOutputArguments(CLI::App& app, OutputArguments& output, const std::string& description) {

@@ -141,6 +141,8 @@ std::size_t RadarConfig::bytes_per_frame() const {
   return static_cast<std::size_t>(chirps_per_frame()) * bytes_per_chirp();
 }
 
+double RadarConfig::frame_mb() const { return static_cast<double>(bytes_per_frame()) / (1 << 20); }
+
 std::int64_t RadarConfig::frame_offset_ns(std::int64_t i) const {
   return std::llround(static_cast<long double>(i) * static_cast<long double>(frame_period_s) * 1e9L);
 }
@@ -238,6 +240,7 @@ std::string toYaml(const RadarConfig& radar) {
     out << "]\n";
   }
   if (!radar.rx_enable.empty()) out << "rx_enable: " << listOf(radar.rx_enable) << "\n";
+  if (radar.max_frame_mb != kMaxFrame_mb) out << "max_frame_mb: " << yamlNumber(radar.max_frame_mb) << "\n";
   if (!radar.angle_slots.empty()) out << "angle_slots: " << listOf(radar.angle_slots) << "\n";
   return out.str();
 }

@@ -5,16 +5,33 @@
 
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/strict_yaml.h"
+#include "mmradartwin_dsp/text.h"
 #include "radar_plausibility.h"
 
 namespace mmradartwin {
 namespace {
 
+/// More transmitters or receivers than any radar has: products of sizes stay in range.
+constexpr std::size_t kMostAntennas = 1024;
+
 std::vector<Eigen::Vector3d> positions(YamlMap& yaml, const std::string& key) {
   std::vector<Eigen::Vector3d> positions;
   for (const std::vector<double>& row : yaml.rows(key, 3, -1e6, 1e6)) positions.emplace_back(row[0], row[1], row[2]);
   if (positions.empty()) yaml.fail(key, "is empty; give at least one position [x, y, z] in metres");
+  if (positions.size() > kMostAntennas) {
+    yaml.fail(key, "has " + std::to_string(positions.size()) + " positions; allowed: " + std::to_string(kMostAntennas));
+  }
   return positions;
+}
+
+void checkFrameSize(const RadarConfig& radar, const YamlMap& yaml) {
+  if (radar.frame_mb() <= radar.max_frame_mb) return;
+  yaml.fail("max_frame_mb",
+            "allows frames of " + significantNumber(radar.max_frame_mb, 4) + " MiB, and one of " +
+                std::to_string(radar.chirps_per_frame()) + " chirps (loops_per_frame x tx_position_m) of " +
+                std::to_string(radar.samples_per_chirp) + " complex samples from " +
+                std::to_string(radar.capture_receivers()) + " receivers has " + significantNumber(radar.frame_mb(), 4) +
+                " MiB; correct those numbers, or set max_frame_mb higher");
 }
 
 RadarConfig read(YamlMap yaml) {
@@ -42,6 +59,7 @@ RadarConfig read(YamlMap yaml) {
   if (yaml.has("ramp_end_s")) radar.ramp_end_s = readRadarNumber(yaml, "ramp_end_s");
   if (yaml.has("rx_gain_db")) radar.rx_gain_db = yaml.number("rx_gain_db", 0, 120);
   if (yaml.has("tx_backoff_db")) radar.tx_backoff_db = yaml.number("tx_backoff_db", 0, 60);
+  if (yaml.has("max_frame_mb")) radar.max_frame_mb = yaml.number("max_frame_mb", 0.001, 4096);
   if (yaml.has("if_highpass_hz")) {
     radar.if_highpass_hz = yaml.numbers("if_highpass_hz", 1, 1e9);
     if (radar.if_highpass_hz.size() != 2) yaml.fail("if_highpass_hz", "needs two corners, [Hz, Hz]");
@@ -88,6 +106,7 @@ RadarConfig read(YamlMap yaml) {
     radar.samples_per_chirp /= 2;
     radar.sample_rate_hz /= 2;
   }
+  checkFrameSize(radar, yaml);
   return radar;
 }
 

@@ -16,6 +16,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/stated_accuracy.h"
 #include "mmradartwin_dsp/strict_yaml.h"
+#include "mmradartwin_dsp/text.h"
 
 namespace mmradartwin {
 namespace {
@@ -30,6 +31,9 @@ constexpr double kQuaternionTolerance = 1e-3;
 /// Stamps typed with microseconds are rounded; poses recorded back to back must not fail for it.
 constexpr std::int64_t kOverlapTolerance_ns = 1000;
 
+/// Names of files have at most 255 bytes, and pictures, records and unfinished files add to a pose's.
+constexpr std::size_t kLongestName_bytes = 200;
+
 /// Empty where `name` may name a file, else why not.
 std::string unusableName(const std::string& name) {
   if (name.empty()) return "has no name";
@@ -37,6 +41,11 @@ std::string unusableName(const std::string& name) {
   if (name.find_first_of("/\\") != std::string::npos) {
     return "has a slash in its name; captures and maps are files of that name";
   }
+  if (name.size() > kLongestName_bytes) {
+    return "has a name of " + std::to_string(name.size()) + " bytes; allowed: " + std::to_string(kLongestName_bytes) +
+           "; captures and maps are files of that name";
+  }
+  if (!isPlainText(name)) return "has a name that is no UTF-8 text, or holds control characters; write it anew";
   return "";
 }
 
@@ -46,6 +55,10 @@ Pose readRow(const CsvReader& row) {
   pose.name = row.fields()[0];
   pose.location = row.fields()[1];
   if (pose.location.empty()) throw row.error("location is empty; name the spot, poses of one spot share it");
+  if (pose.location.size() > kLongestName_bytes || !isPlainText(pose.location)) {
+    throw row.error("location '" + shownShort(pose.location) + "' is no UTF-8 text of at most " +
+                    std::to_string(kLongestName_bytes) + " bytes; name the spot anew");
+  }
   try {
     pose.stamp_ns = parseStamp_ns(row.fields()[2]);
   } catch (const InputError& error) {
@@ -279,7 +292,7 @@ PoseTable parsePoses(const std::string& csv, const std::string& file) {
   while (reader.next()) {
     const std::string name = reader.fields()[0], pose = "pose '" + name + "'";
     const std::string unusable = unusableName(name);
-    if (!unusable.empty()) throw reader.error(pose + " " + unusable);
+    if (!unusable.empty()) throw reader.error("pose '" + shownShort(name) + "' " + unusable);
     if (!names.insert(name).second) throw reader.error(pose + " stands twice; every pose needs a name of its own");
     table.names.push_back(name);
     reader.callRow(pose);
@@ -349,7 +362,8 @@ SessionWriter::SessionWriter(const std::string& directory, const RadarConfig& ra
 void SessionWriter::add(const Pose& pose, const std::vector<AdcCube>& cubes) {
   const std::string unusable = unusableName(pose.name);
   if (!unusable.empty() || pose.name.find(',') != std::string::npos) {
-    throw InputError("pose '" + pose.name + "' " + (unusable.empty() ? "has a comma in its name" : unusable));
+    throw InputError("pose '" + shownShort(pose.name) + "' " +
+                     (unusable.empty() ? "has a comma in its name" : unusable));
   }
   writeCapture(radar_, cubes, (fs::path(directory_) / "captures" / (pose.name + ".bin")).string());
   poses_.push_back(pose);

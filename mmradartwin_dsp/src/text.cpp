@@ -43,6 +43,37 @@ std::string join(const std::vector<std::string>& words, const std::string& separ
   return line;
 }
 
+bool isPlainText(const std::string& text) {
+  const auto byte = [&text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  for (std::size_t i = 0; i < text.size();) {
+    const unsigned char first = byte(i++);
+    if (first < 0x20 || first == 0x7f) return false;
+    if (first < 0x80) continue;
+    // Well-formed sequences by the Unicode Standard, table 3-7.
+    const int more = first >= 0xc2 && first <= 0xdf   ? 1
+                     : first >= 0xe0 && first <= 0xef ? 2
+                     : first >= 0xf0 && first <= 0xf4 ? 3
+                                                      : 0;
+    if (more == 0) return false;
+    unsigned least = first == 0xe0 ? 0xa0 : first == 0xf0 ? 0x90 : 0x80;
+    unsigned most = first == 0xed ? 0x9f : first == 0xf4 ? 0x8f : 0xbf;
+    for (int k = 0; k < more; ++k, ++i) {
+      if (i >= text.size() || byte(i) < least || byte(i) > most) return false;
+      least = 0x80, most = 0xbf;
+    }
+  }
+  return true;
+}
+
+std::string shownShort(const std::string& text) {
+  constexpr std::size_t kShown = 40;
+  std::string shown = text.substr(0, kShown);
+  for (char& c : shown) {
+    if (c < 0x20 || c > 0x7e) c = '?';
+  }
+  return shown + (text.size() > kShown ? "..." : "");
+}
+
 std::string csvField(const std::string& text) {
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
   std::string quoted = "\"";

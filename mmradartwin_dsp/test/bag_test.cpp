@@ -5,6 +5,7 @@
 #include <ros/time.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
+#include <sys/resource.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include "mmradartwin_dsp/average_pose.h"
@@ -59,6 +60,18 @@ TEST(Conversions, RadarSurvivesAndHashesItsContent) {
   EXPECT_NE(radarHash(msg), hash);
   msg.layout = "3lane";
   EXPECT_TRUE(saysInOneLine(inputError([&] { fromMsg(msg); }), "layout", "3lane"));
+}
+
+TEST(Conversions, ARadarOfVastFramesIsRefused) {
+  mmradartwin_msgs::RadarConfig msg = toMsg(paperRadar());
+  msg.loops_per_frame = 32768;
+  msg.frame_period_s = 2;
+  EXPECT_EQ(fromMsg(msg).loops_per_frame, 32768) << "64 MiB";
+  EXPECT_TRUE(saysInOneLine(inputError([&] { fromMsg(msg, 63); }), "radar/config", "max_frame_mb", "64 MiB"));
+  msg.samples_per_chirp = 128;
+  msg.sample_rate_hz = 1e7;
+  EXPECT_TRUE(saysInOneLine(inputError([&] { fromMsg(msg); }), "radar/config", "max_frame_mb", "128 MiB"));
+  EXPECT_EQ(fromMsg(msg, 128).samples_per_chirp, 128);
 }
 
 TEST(Conversions, HashIsThatOfTheSerialisedMessage) {
@@ -362,6 +375,22 @@ TEST(RealCapture, SurvivesABagRoundTripBitForBit) {
   const SignalChain chain(session.radar);
   EXPECT_TRUE(chain.map(averagePose(session, session.poses[0])).power_db ==
               chain.map(averagePose(bag, bag.poses[0])).power_db);
+}
+
+TEST(Bag, AMessageThatSaysItIsLongerThanItIsTakesNoMemory) {
+  const TestFolder folder;
+  writeLiveBag(folder / "live.bag");
+  std::string bytes = readBytes(folder / "live.bag");
+  const std::string samples("\x00\x04\x00\x00\x05\x00\x05\x00", 8);  // 1024 of them, the first two
+  const std::size_t at = bytes.find(samples);
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, 4, "\xff\xff\xff\x7f");
+  writeBytes(folder / "live.bag", bytes);
+  EXPECT_TRUE(
+      saysInOneLine(inputError([&] { openBag(folder / "live.bag"); }), "live.bag", "damaged", "longer than it is"));
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  EXPECT_LT(usage.ru_maxrss, 1 << 20) << "kB; ROS makes room for 2147483647 samples first";
 }
 
 }  // namespace

@@ -165,10 +165,13 @@ TEST(Output, SweepsWhatAKilledProgramLeft) {
   writeBytes(folder / ".out.unfinished_young1/mark", "may be in use");
   for (const char* name : {".out.unfinished_abcdef", ".other.unfinished_abcdef"})
     fs::last_write_time(folder / name, old);
+  writeBytes(folder / ".out.unfinished_tomorr/mark", "made before the clock was set back");
+  fs::last_write_time(folder / ".out.unfinished_tomorr", fs::file_time_type::clock::now() + std::chrono::hours(24));
   const Output in_use = Output::folder({folder / "out", false}, {}, "mark");
   fs::last_write_time(in_use.path(), old);
   writeResult({folder / "out", false}, "1");
   EXPECT_FALSE(fs::exists(folder / ".out.unfinished_abcdef"));
+  EXPECT_FALSE(fs::exists(folder / ".out.unfinished_tomorr"));
   EXPECT_TRUE(fs::exists(folder / ".other.unfinished_abcdef"));
   EXPECT_TRUE(fs::exists(folder / ".out.unfinished_young1"));
   EXPECT_TRUE(fs::exists(in_use.path()));
@@ -178,6 +181,8 @@ TEST(Output, MessagesNameItAsTheUserDoes) {
   const TestFolder folder;
   const Output output = Output::folder({folder / "out", false}, {}, "mark");
   EXPECT_EQ(Output::namedIn(output.path() + "/mark: cannot be written"), folder / "out/mark: cannot be written");
+  Output::showAs(output.path() + "/recorded", "lab.bag");
+  EXPECT_EQ(Output::namedIn(output.path() + "/recorded/office.obj: is damaged"), "lab.bag/office.obj: is damaged");
 }
 
 TEST(InputFile, IsNoPipeAndNoDevice) {

@@ -177,5 +177,27 @@ TEST(RadarYamlInOtherUnits, RadarsAsTheyAreBuiltAreLeftAlone) {
   for (const auto& [name, values] : radars) EXPECT_EQ(refusal(values), "") << name;
 }
 
+TEST(FrameSize, IsBoundedUnlessAKeySaysSo) {
+  // 32768 loops x 2 slots x 64 samples x 4 receivers x 4 bytes
+  std::map<std::string, std::string> values = {{"loops_per_frame", "32768"}, {"frame_period_s", "2"}};
+  EXPECT_EQ(refusal(values), "") << "64 MiB";
+  values["samples_per_chirp"] = "66";
+  EXPECT_TRUE(saysInOneLine(refusal(values), "radar.yaml: key max_frame_mb", "has 66 MiB", "set max_frame_mb higher"));
+  values["max_frame_mb"] = "66";
+  EXPECT_EQ(refusal(values), "");
+  const RadarConfig radar = parseRadarConfig(radarYaml(values), "radar.yaml");
+  EXPECT_EQ(toYaml(parseRadarConfig(toYaml(radar), "again")), toYaml(radar));
+  EXPECT_TRUE(contains(toYaml(radar), "max_frame_mb: 66"));
+  values["max_frame_mb"] = "5000";
+  EXPECT_TRUE(saysInOneLine(refusal(values), "key max_frame_mb", "4096"));
+}
+
+TEST(FrameSize, AntennasAreBounded) {
+  std::string many;
+  for (int i = 0; i < 70000; ++i) many += (i ? ", [0, " : "[0, ") + std::to_string(i) + "e-3, 0]";
+  EXPECT_TRUE(saysInOneLine(refusal({{"tx_position_m", "[" + many + "]"}}), "key tx_position_m", "70000", "1024"));
+  EXPECT_TRUE(saysInOneLine(refusal({{"rx_position_m", "[" + many + "]"}}), "key rx_position_m", "70000", "1024"));
+}
+
 }  // namespace
 }  // namespace mmradartwin

@@ -77,6 +77,10 @@ TEST(Poses, RowsThatCannotBeUsedAreProblemsOfTheirOwn) {
   EXPECT_EQ(table.problems[0].pose, "a");
   EXPECT_TRUE(saysInOneLine(table.problems[0].message, "list.csv", "line 4", "'a'", "later"));
   EXPECT_TRUE(saysInOneLine(inputError([] { parsePoses("pose,place\n", "list.csv"); }), "list.csv", "header"));
+  const PoseTable latin1 = parsePoses(
+      "pose,location,stamp,x,y,z,qx,qy,qz,qw\na,t\xfcr,12.5,1,2,3,0,0,1,0\nb,door,13.5,1,2,3,0,0,1,0\n", "list.csv");
+  ASSERT_EQ(latin1.problems.size(), 1u);
+  EXPECT_TRUE(saysInOneLine(latin1.problems[0].message, "line 2", "location 't?r'", "UTF-8"));
 }
 
 TEST(Session, MissingAndTruncatedCapturesAreNamedWhenRead) {
@@ -164,6 +168,17 @@ TEST(Session, WhatMakesAllOfItUnusableIsOneLine) {
   EXPECT_TRUE(saysInOneLine(with("poses.csv", "001,A", "a/b,A"), "line 3", "slash"));
   EXPECT_TRUE(saysInOneLine(with("poses.csv", "001,A", ".x,A"), "line 3", "dot"));
   EXPECT_TRUE(saysInOneLine(with("poses.csv", "001,A,", "001,"), "line 3", "9 fields"));
+  EXPECT_TRUE(saysInOneLine(with("poses.csv", "001,A",
+                                 "K\xfc"
+                                 "che,A"),
+                            "line 3", "'K?che'", "UTF-8"));
+  EXPECT_EQ(with("poses.csv", "001,A",
+                 "K\xc3\xbc"
+                 "che,A"),
+            "");
+  const std::string long_name = with("poses.csv", "001,A", std::string(5000, 'x') + ",A");
+  EXPECT_TRUE(saysInOneLine(long_name, "line 3", "5000 bytes", "allowed: 200"));
+  EXPECT_LT(long_name.size(), 400u) << "not the name itself";
   EXPECT_TRUE(saysInOneLine(inputError([&] { openSession(folder / "none"); }), "none"));
 }
 

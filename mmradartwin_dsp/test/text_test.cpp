@@ -26,5 +26,23 @@ TEST(Text, FieldsAreQuotedWhereTheyMustBe) {
   EXPECT_EQ(",b", join({"", "b"}, ","));
 }
 
+TEST(Text, PlainTextIsUtf8WithoutControlCharacters) {
+  for (const char* good : {"", "a 1",
+                           "K\xc3\xbc"
+                           "che",
+                           "\xe6\x88\xbf", "\xf0\x9f\x93\xa1"})
+    EXPECT_TRUE(isPlainText(good)) << good;
+  // Latin-1, an overlong slash, a surrogate, beyond U+10FFFF, cut off, colours for a terminal.
+  for (const char* bad : {"K\xfc"
+                          "che",
+                          "\xc0\xaf", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xe6\x88", "a\x1b[31m", "a\nb", "\x7f"}) {
+    EXPECT_FALSE(isPlainText(bad)) << bad;
+  }
+  EXPECT_EQ(shownShort("K\xfc"
+                       "che"),
+            "K?che");
+  EXPECT_EQ(shownShort(std::string(5000, 'x')), std::string(40, 'x') + "...");
+}
+
 }  // namespace
 }  // namespace mmradartwin

@@ -64,7 +64,7 @@ int simulateRecordings(Arguments& arguments) {
     note("no noise is written but what the twin states");
   }
   for (const std::string& line : result.notes) note(line);
-  for (const PoseProblem& problem : result.problems) std::cerr << "error: " << problem.message << "\n";
+  sayProblems(result.problems);
   const double worst = std::max(result.worst_amplitude_error, result.worst_grid_error);
   if (worst > 1e-12) throw std::runtime_error("records and grid disagree by more than 1e-12");
   output.complete();

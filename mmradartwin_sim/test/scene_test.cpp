@@ -221,6 +221,35 @@ TEST_F(SceneTest, RefusesMeshesThatAreNone) {
   EXPECT_EQ(meshError("o a\nusemtl Metal\nv 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"), "");
 }
 
+TEST_F(SceneTest, RefusesFacesOfManyCorners) {
+  const auto face = [this](int corners) {
+    std::string obj = "o a\nusemtl Metal\n";
+    for (int i = 0; i < corners; ++i) {
+      obj += "v " + std::to_string(std::cos(2 * M_PI * i / corners)) + " " +
+             std::to_string(std::sin(2 * M_PI * i / corners)) + " 0\n";
+    }
+    obj += "f";
+    for (int i = 1; i <= corners; ++i) obj += " " + std::to_string(i);
+    write("face.obj", obj + "\n");
+    write("face.yaml", "meshes: [{file: face.obj}]\nmaterials: materials.yaml\n");
+    return sceneError(path("face.yaml"));
+  };
+  EXPECT_EQ(face(1000), "");
+  EXPECT_NE(face(900000).find("face.obj: a face has 900000 corners; allowed: 4096"), std::string::npos);
+}
+
+TEST_F(SceneTest, RefusesAGlbThatClaimsMoreThanItHas) {
+  const auto word = [](std::uint32_t value) { return std::string(reinterpret_cast<const char*>(&value), 4); };
+  const auto error = [&](std::uint32_t length, std::uint32_t chunk) {
+    write("room.glb", "glTF" + word(2) + word(length) + word(chunk) + "JSON{}  ");
+    write("glb.yaml", "meshes: [{file: room.glb}]\nmaterials: materials.yaml\n");
+    return sceneError(path("glb.yaml"));
+  };
+  EXPECT_NE(error(4294967295u, 4294967275u).find("room.glb: says to have 4294967295 bytes, and the file has 24"),
+            std::string::npos);
+  EXPECT_NE(error(24, 4294967275u).find("room.glb: says of a part to have 4294967275 bytes"), std::string::npos);
+}
+
 TEST_F(SceneTest, SurvivesDamagedFiles) {
   addBox("cabinet", "Metal", V(1, 1, 0), V(1.5, 1.5, 1));
   writeScene("whole");

@@ -11,6 +11,8 @@ import tempfile
 import time
 import unittest
 
+from card_packets import packets, pcap
+from chosen_sessions import RUN
 from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.session import Measurement, Settings
 from in_folder import InFolder
@@ -51,6 +53,8 @@ class Programs(InFolder):
             out.write("channelCfg 15 3 0\nadcCfg 2 1\nprofileCfg 0 77 7 6 40 0 0 75 1 64 5000 0 0 30\n"
                       "chirpCfg 0 0 0 0 0 0 0 1\nchirpCfg 1 1 0 0 0 0 0 2\nframeCfg 0 1 1 0 50 1 0\n"
                       "lvdsStreamCfg -1 0 1 0\n")
+        with open(os.path.join(cls.made, "packets.pcap"), "wb") as out:
+            out.write(pcap(packets(400)))
 
     def setUp(self):
         super().setUp()
@@ -76,6 +80,7 @@ class Programs(InFolder):
             "make_scene": ([mesh, "--output"], [], "scene.yaml"),
             "session_to_bag": (["session"], [], None),
             "import_settings": (["profile.cfg", "--device", "xwr1843", "--output"], [], None),
+            "pcap_to_capture": (["packets.pcap", "--radar", "session/radar.yaml", "--output"], [], None),
         }
 
     def assert_nothing_changed(self):
@@ -104,7 +109,8 @@ class Outputs(Programs):
         self.before = digest_of(self.folder)
         for name, (head, tail, mark) in self.commands().items():
             taken = ["session", "link", "session/session.yaml", "session/captures", "session/poses.csv",
-                     "session/captures/001.bin", ".", "session.bag", "hard.bag", "profile.cfg"]
+                     "session/captures/001.bin", ".", "session.bag", "hard.bag", "profile.cfg", "packets.pcap",
+                     "session/radar.yaml"]
             for output in taken:
                 for force in ([], ["--force"]):
                     if output == "." and mark is None:
@@ -151,26 +157,6 @@ class Outputs(Programs):
         for name, (head, tail, _) in self.commands().items():
             with self.subTest(program=name):
                 self.assert_refused(self.run_program(name, *head, "photos", *tail, "--force"), "photos")
-
-    def test_an_interrupted_program_leaves_nothing(self):
-        chance = random.Random(11)
-        log_file = self.folder + ".log"
-        self.addCleanup(os.remove, log_file)
-        for name, (head, tail, mark) in self.commands().items():
-            for number in (signal.SIGINT, signal.SIGTERM):
-                with self.subTest(program=name, signal=number):
-                    with open(log_file, "w", encoding="utf-8") as log:
-                        run = subprocess.Popen([PROGRAMS[name], *head, "out", *tail], cwd=self.folder,
-                                               stdout=log, stderr=log, stdin=subprocess.DEVNULL, env=self.environment)
-                    time.sleep(chance.uniform(0, 1.5))
-                    run.send_signal(number)
-                    status = run.wait(timeout=PATIENCE_S)
-                    if os.path.exists(self.at("out")):          # it was faster
-                        self.assertTrue(os.path.exists(self.at("out", mark) if mark else self.at("out")))
-                        shutil.rmtree(self.at("out")) if mark else os.remove(self.at("out"))
-                    else:
-                        self.assertEqual(status, -number)
-                    self.assert_nothing_changed()
 
     def test_a_full_disk_leaves_nothing(self):
         if os.geteuid() != 0:
@@ -231,8 +217,80 @@ class Outputs(Programs):
 FREE = {("session_to_bag", "session.bag"), ("session_to_bag", "hard.bag"), ("session_to_bag", "profile.cfg"),
         ("import_settings", "session.bag"), ("import_settings", "hard.bag"),
         ("import_settings", "session/session.yaml"), ("import_settings", "session/poses.csv"),
-        ("import_settings", "session/captures/001.bin"),
+        ("import_settings", "session/captures/001.bin"), ("import_settings", "session/radar.yaml"),
+        ("import_settings", "packets.pcap"), ("session_to_bag", "packets.pcap"),
+        *(("pcap_to_capture", output) for output in ("session/session.yaml", "session/poses.csv",
+                                                     "session/captures/001.bin", "session.bag", "hard.bag", "profile.cfg")),
         ("make_scene", "session"), ("bag_to_session", "session"), ("bag_to_session", "link")}
+
+
+class Interrupted(Programs):
+    """Every program with every output, ended by a signal at a time that is drawn: what was there stays, and what is there
+    afterwards is whole."""
+    INPUTS = ("session", "session.bag", "profile.cfg", "packets.pcap", "session/radar.yaml", "session/captures/001.bin")
+    ROUNDS = 20 if RUN else 1
+
+    def remove(self, name):
+        shutil.rmtree(self.at(name)) if os.path.isdir(self.at(name)) else os.remove(self.at(name))
+
+    def interrupted(self, call, number, after_s):
+        """Exit status of a program that gets the signal after so long; where it ends earlier, its own."""
+        with open(self.temporary + ".log", "w", encoding="utf-8") as log:
+            run = subprocess.Popen([PROGRAMS[call[0]], *call[1:]], cwd=self.folder, stdout=log, stderr=log,
+                                   stdin=subprocess.DEVNULL, env=self.environment)
+            try:
+                run.wait(timeout=after_s)
+            except subprocess.TimeoutExpired:
+                run.send_signal(number)
+            status = run.wait(timeout=PATIENCE_S)
+        os.remove(self.temporary + ".log")
+        return status
+
+    def assert_whole_or_as_before(self, before, status, number, mark):
+        """The output is the older one, or a new one that is complete; nothing else has changed."""
+        now = digest_of(self.folder)
+        of_output = {name: digest for name, digest in now.items() if name == "out" or name.startswith("out/")}
+        self.assertEqual({**now, **before}, {**before, **of_output}, "a file beside the output came or changed")
+        older = {name: digest for name, digest in before.items() if name == "out" or name.startswith("out/")}
+        if of_output != older:      # it was faster than the signal, or at it
+            self.assertNotIn("out/of_the_first_run", of_output)
+            self.assertIn(status, (0, 2, -number))
+            self.assertTrue(os.path.exists(self.at("out", mark) if mark else self.at("out")))
+        self.assertEqual(os.listdir(self.temporary), [])
+        self.assertEqual([name for name in os.listdir(self.folder) if name.startswith(".")], [])
+
+    def test_at_any_time(self):
+        chance = random.Random(11)
+        for name, (head, tail, mark) in self.commands().items():
+            begin = time.monotonic()
+            run = self.run_program(name, *head, "out", *tail)
+            takes_s = time.monotonic() - begin
+            self.assertIn(run.returncode, (0, 2), msg=run.stderr)
+            older = self.enterContext(tempfile.TemporaryDirectory())
+            if mark:
+                with open(self.at("out", "of_the_first_run"), "w", encoding="ascii") as out:
+                    out.write("stale")
+            shutil.move(self.at("out"), os.path.join(older, "out"))
+            for _ in range(self.ROUNDS):
+                for number in (signal.SIGINT, signal.SIGTERM):
+                    for kind in ("new", "exists", *self.INPUTS):
+                        after_s = chance.uniform(0, 1.1 * takes_s)
+                        with self.subTest(program=name, output=kind, signal=number, after_s=after_s):
+                            if kind == "exists":
+                                copy = shutil.copytree if mark else shutil.copy
+                                copy(os.path.join(older, "out"), self.at("out"))
+                            if (name, kind) in FREE:
+                                continue
+                            before = digest_of(self.folder)
+                            output = "out" if kind in ("new", "exists") else kind
+                            force = [] if kind == "new" else ["--force"]
+                            status = self.interrupted([name, *head, output, *tail, *force], number, after_s)
+                            self.assert_whole_or_as_before(before, status, number, mark)
+                            if output != "out":
+                                self.assertEqual(digest_of(self.folder), before)
+                            if os.path.lexists(self.at("out")):
+                                self.remove("out")
+            self.assert_nothing_changed()
 
 
 class Manner(Programs):

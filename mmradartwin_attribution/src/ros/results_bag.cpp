@@ -48,13 +48,17 @@ struct ResultsBag::Impl {
 
 ResultsBag::ResultsBag(const std::string& file, const EvaluationField& field, const Scene& scene)
     : impl_(std::make_unique<Impl>(file, field)) {
-  impl_->bag.write("attribution/scene_markers", impl_->time(0), sceneMarkers(scene, "map"),
-                   latched<visualization_msgs::MarkerArray>());
+  try {
+    impl_->bag.write("attribution/scene_markers", impl_->time(0), sceneMarkers(scene, "map"),
+                     latched<visualization_msgs::MarkerArray>());
+  } catch (const rosbag::BagException& error) {
+    impl_->writer.fail(error);
+  }
 }
 
 ResultsBag::~ResultsBag() = default;
 
-void ResultsBag::add(const PoseResult& pose) {
+void ResultsBag::add(const PoseResult& pose) try {
   // Every array stands for itself: rviz may be started anywhere in the bag.
   MarkerBuilder builder(impl_->field, {});
   const auto markers = builder.build(pose.attribution, pose.records, pose.pose.T_map_radar, pose.pose.name);
@@ -79,9 +83,11 @@ void ResultsBag::add(const PoseResult& pose) {
   }
   impl_->bag.write("attribution/residuals", impl_->time(pose.index, 0.05), residuals);
   impl_->bag.write("attribution/markers", impl_->time(pose.index, 0.05), markers);
+} catch (const rosbag::BagException& error) {
+  impl_->writer.fail(error);
 }
 
-void ResultsBag::finish(const Evaluation& evaluation) {
+void ResultsBag::finish(const Evaluation& evaluation) try {
   mmradartwin_msgs::Ledger ledger = toMsg(evaluation.central, evaluation.duplicates);
   ledger.header.frame_id = "radar_link";
   ledger.header.stamp = impl_->time(0);
@@ -93,6 +99,8 @@ void ResultsBag::finish(const Evaluation& evaluation) {
     impl_->bag.write("/tf", end, *impl_->last_tf);
   }
   impl_->writer.close();
+} catch (const rosbag::BagException& error) {
+  impl_->writer.fail(error);
 }
 
 }  // namespace mmradartwin

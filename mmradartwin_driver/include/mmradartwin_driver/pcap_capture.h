@@ -32,7 +32,7 @@ struct PcapCapture {
 /// positions, with zeros for missing packets. A recording begins with the card's answer to RECORD_START, where the file
 /// has it, and after a hole of more than 64 MB. A file that begins within a recording gives the frames from its first
 /// packet on. Throws InputError: unreadable file, no packet of samples, packets of several cards of which `source`
-/// chooses none, output that cannot be written.
+/// chooses none, losses that dwarf the samples, output that cannot be written.
 PcapCapture pcapToCapture(const std::string& pcap, const RadarConfig& radar, const std::string& output,
                           const PcapSource& source = {});
 

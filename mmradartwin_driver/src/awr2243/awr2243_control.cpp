@@ -1,6 +1,7 @@
 #include "awr2243/awr2243_control.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <thread>
@@ -289,6 +290,12 @@ std::vector<std::uint8_t> loadFirmwareImage(const std::string& file) {
   requireRegularFile(file);
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw InputError(file + ": the firmware image cannot be read; give the path of TI's meta image");
+  constexpr std::uintmax_t kLargestImage_bytes = 16 << 20;  // more cannot be sent
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  if (!error && size > kLargestImage_bytes) {
+    throw InputError(file + ": " + std::to_string(size) + " bytes are no firmware image; give TI's meta image");
+  }
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 

@@ -38,6 +38,8 @@ class Output {
 
   /// A text for the user in which each output stands under its own name, not under the one that it is written under.
   static std::string namedIn(std::string text);
+  /// From now on namedIn() names `path`, and what lies below it, so: what a bag holds is unpacked somewhere.
+  static void showAs(const std::string& path, const std::string& name);
 
  private:
   Output(const OutputArguments& arguments, const std::vector<std::string>& inputs, const std::string& mark);

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "mmradartwin_dsp/output.h"
 #include "mmradartwin_dsp/program_version.h"
@@ -21,6 +22,19 @@ int runProgram(CLI::App& app, int argc, char** argv, const std::function<int()>&
 
 /// Says on stderr what a user may want to know and need not act on; not in a quiet program.
 void note(const std::string& text);
+
+/// Says on stderr what was wrong with parts of the input, one line each; of many, the first and how many more there
+/// are.
+void sayErrors(const std::vector<std::string>& errors);
+/// The same of poses' problems.
+template <typename Problems>
+void sayProblems(const Problems& problems) {
+  std::vector<std::string> errors;
+  for (const auto& problem : problems) errors.push_back(problem.message);
+  sayErrors(errors);
+}
+/// As sayErrors(), of what a user need not act on.
+void noteAll(const std::vector<std::string>& notes);
 
 /// Adds --output and --force.
 void addOutputArguments(CLI::App& app, OutputArguments& output, const std::string& description);

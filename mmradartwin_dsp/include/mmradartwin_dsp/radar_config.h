@@ -10,6 +10,8 @@
 namespace mmradartwin {
 
 constexpr double kSpeedOfLight_m_per_s = 299792458.0;
+/// No memory is taken for larger frames, whatever a file or a message asks for, unless max_frame_mb says so. MiB.
+constexpr double kMaxFrame_mb = 64;
 
 enum class CaptureLayout {
   kFourLane,  ///< AWR2243, xWR1243/1443: per sample I rx0..rx3, then Q rx0..rx3
@@ -50,7 +52,8 @@ struct RadarConfig {
   std::vector<double> if_highpass_hz;
   std::vector<std::vector<int>> tx_enable;  ///< device's TX numbers, one list per slot
   std::vector<int> rx_enable;
-  std::vector<int> angle_slots;  ///< slots that the angle transform takes; empty: all
+  double max_frame_mb = kMaxFrame_mb;  ///< a radar whose frames are larger is refused, MiB; 64 without it
+  std::vector<int> angle_slots;        ///< slots that the angle transform takes; empty: all
   /// Receivers of the whole line where some were left out of rx_position_m because they deliver nothing; else empty.
   std::vector<Eigen::Vector3d> whole_line_rx_m;
 
@@ -67,6 +70,7 @@ struct RadarConfig {
   double chirp_period_s() const;        ///< from ramp to ramp: idle_s + ramp_end_s; NaN where radar.yaml does not say
   std::size_t bytes_per_chirp() const;  ///< in a capture: samples x capture_receivers x 4
   std::size_t bytes_per_frame() const;  ///< in a capture: chirps x bytes_per_chirp
+  double frame_mb() const;              ///< bytes_per_frame(), in MiB
   /// Start of frame i after that of frame 0, rounded once, so that it does not drift.
   std::int64_t frame_offset_ns(std::int64_t i) const;
   double bandwidth_hz() const;         ///< B = slope N / f_s

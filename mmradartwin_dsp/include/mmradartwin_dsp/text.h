@@ -11,6 +11,10 @@ std::string fixedNumber(double value, int digits, const std::string& missing = "
 std::string significantNumber(double value, int digits);
 /// The words one after the other, `separator` between them.
 std::string join(const std::vector<std::string>& words, const std::string& separator);
+/// True for UTF-8 without control characters, which every file and terminal can hold.
+bool isPlainText(const std::string& text);
+/// `text` for a message: at most 40 characters, with a question mark for each byte that is no plain ASCII character.
+std::string shownShort(const std::string& text);
 /// One field of a CSV line: in quotes, with quotes doubled, where it holds a comma, a quote or a line break.
 std::string csvField(const std::string& text);
 /// `text` as the content of an HTML element or a quoted attribute.

@@ -35,6 +35,7 @@ class Radar:
     ramp_end_s: float = math.nan
     rx_gain_db: float = math.nan
     tx_backoff_db: float = math.nan
+    max_frame_mb: float = 64.0      # a radar whose frames are larger is refused, MiB
     if_highpass_hz: list = field(default_factory=list)
     tx_enable: list = field(default_factory=list)
     rx_enable: list = field(default_factory=list)
@@ -123,6 +124,8 @@ def radar_of(yaml):
     for key, most in (("rx_gain_db", 120), ("tx_backoff_db", 60)):
         if yaml.has(key):
             values[key] = yaml.number(key, 0, most)
+    if yaml.has("max_frame_mb"):
+        values["max_frame_mb"] = yaml.number("max_frame_mb", 0.001, 4096)
     slots, receivers = len(values["tx_position_m"]), len(values["rx_position_m"])
     for key, length, read in (("if_highpass_hz", 2, lambda key: yaml.numbers(key, 1, 1e9)),
                               ("tx_enable", slots, lambda key: yaml.integer_lists(key, 0, 31)),

@@ -165,9 +165,7 @@ void Output::makeStage() {
   }
   path_ = is_folder_ ? stage_->path() : (fs::path(stage_->path()) / target.filename()).string();
   if (is_folder_) openAsUsual(stage_->path());
-  WrittenNames& names = writtenNames();
-  const std::lock_guard<std::mutex> lock(names.mutex);
-  names.shown[path_] = name_;
+  showAs(path_, name_);
 }
 
 void Output::complete() {
@@ -211,10 +209,18 @@ void Output::refillFolder() const {
   }
 }
 
+void Output::showAs(const std::string& path, const std::string& name) {
+  WrittenNames& names = writtenNames();
+  const std::lock_guard<std::mutex> lock(names.mutex);
+  names.shown.emplace(path, name);  // an output keeps its own name where a bag is unpacked into it
+}
+
 std::string Output::namedIn(std::string text) {
   WrittenNames& names = writtenNames();
   const std::lock_guard<std::mutex> lock(names.mutex);
-  for (const auto& [written, shown] : names.shown) {
+  // A folder within another comes first.
+  for (auto it = names.shown.rbegin(); it != names.shown.rend(); ++it) {
+    const auto& [written, shown] = *it;
     for (std::size_t at = 0; (at = text.find(written, at)) != std::string::npos; at += shown.size()) {
       text.replace(at, written.size(), shown);
     }

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <filesystem>
@@ -109,7 +110,8 @@ void removeAbandoned(const fs::path& parent, const std::string& name) {
     if (it->path().filename().string().compare(0, name.size(), name) != 0) continue;
     struct stat status = {};
     if (::lstat(folder.c_str(), &status) != 0 || !S_ISDIR(status.st_mode) || status.st_uid != ::geteuid()) continue;
-    if (std::time(nullptr) - status.st_mtime < kYoung_s) continue;
+    // One of tomorrow was made before the clock was set back.
+    if (std::abs(std::time(nullptr) - status.st_mtime) < kYoung_s) continue;
     const int lock = lockFolder(folder);
     if (lock < 0) continue;
     std::error_code ignored;

@@ -21,6 +21,7 @@
 #include "mmradartwin_dsp/bag_kind.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/input_file.h"
+#include "mmradartwin_dsp/output.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_dsp/session_files.h"
@@ -29,6 +30,7 @@
 #include "mmradartwin_dsp/text.h"
 #include "ros/bag_set.h"
 #include "ros/frame_sources.h"
+#include "ros/message_lengths.h"
 #include "ros/recorded_tf.h"
 
 namespace mmradartwin {
@@ -84,7 +86,7 @@ class BagContents {
     }
     const auto view = bags_.view({topic(kCubes)}, first, last);
     for (const rosbag::MessageInstance& message : *view) {
-      const auto cube = message.instantiate<mmradartwin_msgs::AdcCube>();
+      const auto cube = instanceOf<mmradartwin_msgs::AdcCube>(message);
       if (!cube || !stamps.count(toNanoseconds(cube->header.stamp))) continue;
       if (cube->radar_hash != radar_hash) {
         throw InputError(file() + ": pose '" + pose + "': frame " + std::to_string(cube->sequence) +
@@ -161,7 +163,7 @@ class BagContents {
     const auto view = bags_.view({topic(name)});
     boost::shared_ptr<Message> last;
     for (const rosbag::MessageInstance& message : *view) {
-      last = message.instantiate<Message>();
+      last = instanceOf<Message>(message);
       if (!last) refuseVersion(message);
     }
     return last;
@@ -176,7 +178,7 @@ class BagContents {
     const auto view = bags_.view({topic("radar/config")});
     boost::shared_ptr<mmradartwin_msgs::RadarConfig> config;
     for (const rosbag::MessageInstance& message : *view) {
-      const auto next = message.instantiate<mmradartwin_msgs::RadarConfig>();
+      const auto next = instanceOf<mmradartwin_msgs::RadarConfig>(message);
       if (!next) refuseVersion(message);
       if (config && radarHash(*next) != radarHash(*config)) {
         throw InputError(file() + ": holds several radar configurations on " + topic("radar/config") +
@@ -208,7 +210,7 @@ class BagContents {
   /// Indexes the frames and finds T_map_radar at each one's stamp.
   void readFrames(RecordedTf& tf) {
     const auto feed = [&](const rosbag::MessageInstance& message, bool is_static) {
-      const auto transforms = message.instantiate<tf2_msgs::TFMessage>();
+      const auto transforms = instanceOf<tf2_msgs::TFMessage>(message);
       if (transforms) tf.add(*transforms, is_static, message.getCallerId(), toNanoseconds(message.getTime()));
     };
     const auto fixed = bags_.view({"/tf_static", "tf_static"});
@@ -221,7 +223,7 @@ class BagContents {
         settle(tf, waiting, false);
         continue;
       }
-      const auto cube = message.instantiate<mmradartwin_msgs::AdcCube>();
+      const auto cube = instanceOf<mmradartwin_msgs::AdcCube>(message);
       if (!cube) refuseVersion(message);
       waiting.push_back({toNanoseconds(cube->header.stamp), message.getTime(), std::nullopt, false});
       sources_.add(cube->header.frame_id, message.getCallerId());
@@ -367,11 +369,15 @@ Recording fromStretches(BagContents& bag, const std::string& file, const std::st
     assigned[stretch.pose.name] = cubesOf(stretch, bag.cubes);
   }
   const auto scene = bag.scene();
-  if (scene && !scene->scene_file.empty() && fs::exists(scene->scene_file)) {
+  std::error_code none;
+  if (scene && !scene->scene_file.empty() && fs::exists(scene->scene_file, none)) {
     recording.scene_file = scene->scene_file;
     if (!scene->twin_yaml.empty()) {
       recording.twin_file = (fs::path(folder) / "twin.yaml").string();
-      std::ofstream(*recording.twin_file, std::ios::binary | std::ios::trunc) << scene->twin_yaml;
+      std::ofstream out(*recording.twin_file, std::ios::binary | std::ios::trunc);
+      out << scene->twin_yaml;
+      out.close();
+      if (!out) throw std::runtime_error(*recording.twin_file + ": cannot be written; check the free space");
     }
   }
   return recording;
@@ -404,6 +410,7 @@ Recording openBag(const std::string& file, const BagOptions& options) try {
     folder = temporary->path();
   }
   fs::create_directories(folder);
+  Output::showAs(folder, file);
   auto assigned = std::make_shared<CubesByPose>();
   Recording recording =
       bag->session ? fromSessionMessage(*bag, folder, *assigned) : fromStretches(*bag, file, folder, *assigned);

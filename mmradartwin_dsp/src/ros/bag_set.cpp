@@ -12,6 +12,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/input_file.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
+#include "ros/message_lengths.h"
 
 namespace mmradartwin {
 namespace {
@@ -70,12 +71,12 @@ std::string radarFrame(const BagSet& bags, const std::string& cube_topic, const 
   if (!wanted.empty()) return wanted;
   const auto cubes = bags.view({cube_topic});
   if (cubes->begin() == cubes->end()) return kRadarFrame;
-  const auto cube = cubes->begin()->instantiate<mmradartwin_msgs::AdcCube>();
+  const auto cube = instanceOf<mmradartwin_msgs::AdcCube>(*cubes->begin());
   const std::string named = cube ? withoutSlash(cube->header.frame_id) : "";
   if (named.empty() || named == kRadarFrame) return kRadarFrame;
   const auto transforms = bags.view({"/tf", "tf", "/tf_static", "tf_static"});
   for (const rosbag::MessageInstance& message : *transforms) {
-    const auto tf = message.instantiate<tf2_msgs::TFMessage>();
+    const auto tf = instanceOf<tf2_msgs::TFMessage>(message);
     if (!tf) continue;
     for (const geometry_msgs::TransformStamped& T : tf->transforms) {
       if (withoutSlash(T.child_frame_id) == named || withoutSlash(T.header.frame_id) == named) return named;

@@ -17,6 +17,7 @@
 #include "mmradartwin_dsp/stationary_poses.h"
 #include "mmradartwin_dsp/text.h"
 #include "ros/bag_set.h"
+#include "ros/message_lengths.h"
 
 namespace mmradartwin {
 namespace {
@@ -258,15 +259,15 @@ std::vector<BagFinding> validateBag(const std::string& file, const BagOptions& o
       return found == radars.end() ? nullptr : &found->second;
     };
     if (message.getDataType() == "tf2_msgs/TFMessage") {
-      if (const auto transforms = message.instantiate<tf2_msgs::TFMessage>()) tf.add(*transforms, topic == "tf_static");
+      if (const auto transforms = instanceOf<tf2_msgs::TFMessage>(message)) tf.add(*transforms, topic == "tf_static");
     } else if (message.getDataType() == "mmradartwin_msgs/RadarConfig") {
       RadarRecord* radar = record(config_end);
-      const auto config = radar ? message.instantiate<mmradartwin_msgs::RadarConfig>() : nullptr;
+      const auto config = radar ? instanceOf<mmradartwin_msgs::RadarConfig>(message) : nullptr;
       if (config) radar->addConfig(*config, toNanoseconds(message.getTime()));
       if (radar && !config) findings.add("message(s) of another version: run rosbag fix", message.getTopic());
     } else if (message.getDataType() == "mmradartwin_msgs/AdcCube") {
       RadarRecord* radar = record(cubes_end);
-      const auto cube = radar ? message.instantiate<mmradartwin_msgs::AdcCube>() : nullptr;
+      const auto cube = radar ? instanceOf<mmradartwin_msgs::AdcCube>(message) : nullptr;
       if (cube) radar->add(*cube);
       if (radar && !cube) findings.add("message(s) of another version: run rosbag fix", message.getTopic());
     }

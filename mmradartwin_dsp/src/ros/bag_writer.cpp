@@ -10,6 +10,7 @@ BagWriter::BagWriter(const std::string& file) : file_(file), bag_(std::make_uniq
   try {
     bag_->open(file, rosbag::bagmode::Write);
   } catch (const rosbag::BagException& error) {
+    if (bag_->isOpen()) bag_.release();  // its destructor would write the bag's end
     throw InputError(file + ": bag cannot be written (" + error.what() +
                      "); give a file in a folder that can be written");
   }
@@ -28,9 +29,13 @@ void BagWriter::close() {
     bag_->close();
   } catch (const rosbag::BagException& error) {
     bag_.release();
-    throw std::runtime_error(file_ + ": cannot be written to its end (" + error.what() + "); check the free space");
+    fail(error);
   }
   bag_.reset();
+}
+
+void BagWriter::fail(const std::exception& why) const {
+  throw std::runtime_error(file_ + ": cannot be written to its end (" + why.what() + "); check the free space");
 }
 
 }  // namespace mmradartwin

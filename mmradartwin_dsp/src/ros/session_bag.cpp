@@ -19,6 +19,7 @@
 #include "mmradartwin_dsp/session_files.h"
 #include "mmradartwin_dsp/sha256.h"
 #include "ros/bag_set.h"
+#include "ros/message_lengths.h"
 
 namespace mmradartwin {
 namespace {
@@ -118,7 +119,7 @@ boost::shared_ptr<mmradartwin_msgs::Session> readSessionMessage(const BagSet& ba
   boost::shared_ptr<mmradartwin_msgs::Session> session;
   if (topics.empty()) return session;
   const auto messages = bags.view(topics);
-  for (const rosbag::MessageInstance& message : *messages) session = message.instantiate<mmradartwin_msgs::Session>();
+  for (const rosbag::MessageInstance& message : *messages) session = instanceOf<mmradartwin_msgs::Session>(message);
   return session;
 }
 
@@ -246,7 +247,8 @@ std::vector<PoseProblem> sessionToBag(const std::string& session, const std::str
     const std::string& name = recording.pose_names[static_cast<std::size_t>(i)];
     const std::string capture = captureOf(recording.capture_pattern, name);
     requireRegularFile(capture);
-    const bool exists = fs::is_regular_file(capture);
+    std::error_code none;
+    const bool exists = fs::is_regular_file(capture, none);
     std::string bytes;  // a capture in several parts comes back as one file
     if (exists) {
       try {

@@ -92,8 +92,7 @@ void SignalChainNode::onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& co
   const std::uint64_t hash = radarHash(*config);
   if (chain_ && hash == radar_hash_) return;
   try {
-    const RadarConfig radar = fromMsg(*config);
-    requireFrameBelow(radar, settings_.max_frame_mb, "radar/config");
+    const RadarConfig radar = fromMsg(*config, settings_.max_frame_mb);
     SignalChain chain(radar);
     if (channels_) requireChannelsOf(radar, *channels_);
     chain_.emplace(std::move(chain));

@@ -24,6 +24,7 @@
 #include "scene/declared_frame.h"
 #include "scene/far_vertices.h"
 #include "scene/gltf_extensions.h"
+#include "scene/mesh_bounds.h"
 #include "scene/obj_numbers.h"
 #include "scene/ply_reader.h"
 
@@ -301,6 +302,7 @@ std::vector<Actor> loadMesh(const std::string& file, const MeshFrame& stated) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) throw InputError(file + ": no such mesh file");
   const std::string extension = lowerExtension(file);
+  if (extension == ".glb") refuseGlbBeyondItsEnd(file);
   if (extension == ".gltf" || extension == ".glb") refuseUnreadExtensions(file);
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_LINE | aiPrimitiveType_POINT);
@@ -326,11 +328,15 @@ std::vector<Actor> loadMesh(const std::string& file, const MeshFrame& stated) {
     PlyMesh mesh = readPly(file);
     for (Eigen::Vector3d& v : mesh.vertices) keep(v -= off, exact);
     const std::string obj = mesh.toObj();
-    scene = importer.ReadFileFromMemory(obj.data(), obj.size(), steps, "obj");
+    scene = importer.ReadFileFromMemory(obj.data(), obj.size(), 0, "obj");
   } else {
-    scene = importer.ReadFile(file, steps);
+    scene = importer.ReadFile(file, 0);
   }
   files->refuseWhatWasNoFile();
+  if (scene) {
+    refuseFacesOfManyCorners(file, *scene);
+    scene = importer.ApplyPostProcessing(steps);
+  }
   if (!scene || !scene->mRootNode) {
     std::string why = importer.GetErrorString();
     std::replace(why.begin(), why.end(), '\n', ' ');

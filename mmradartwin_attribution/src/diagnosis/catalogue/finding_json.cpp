@@ -102,7 +102,7 @@ Json json(const Finding& finding) {
 std::string toJson(const Finding& finding) {
   const std::string problem = problemOf(finding);
   if (!problem.empty()) throw std::logic_error("finding " + finding.cause + "/" + problem);
-  return json(finding).dump(1);
+  return json(finding).dump(1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::string toJson(const Findings& findings) {
@@ -121,7 +121,7 @@ std::string toJson(const Findings& findings) {
   j["findings"] = Json::array();
   for (const Finding& finding : findings.findings) j["findings"].push_back(json(finding));
   j["extended_twin"] = orNull(findings.extended_twin);
-  return j.dump(1) + "\n";
+  return j.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 void writeFindings(const Findings& findings, const std::string& file) {

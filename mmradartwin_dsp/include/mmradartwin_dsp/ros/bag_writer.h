@@ -1,5 +1,6 @@
 #pragma once
 
+#include <exception>
 #include <memory>
 #include <string>
 
@@ -21,6 +22,8 @@ class BagWriter {
   rosbag::Bag& bag() { return *bag_; }
   /// Throws std::runtime_error, which names the file, where the bag's end cannot be written.
   void close();
+  /// Throws std::runtime_error, which names the file: for what the bag throws while it is written.
+  [[noreturn]] void fail(const std::exception& why) const;
 
  private:
   std::string file_;
