@@ -188,7 +188,7 @@ run_fuzz() {
   separate_build fuzz fuzz -DCMAKE_C_COMPILER=clang -DCMAKE_CXX_COMPILER=clang++ -Dmmradartwin_tests_FUZZ=ON \
     "-DCMAKE_CXX_FLAGS=-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined"
   mkdir -p "$ws/fuzz/findings"
-  for package in dsp driver sim; do
+  for package in dsp driver messages sim; do
     program=$ws/fuzz/devel/lib/mmradartwin_tests/fuzz_$package
     for input in $("$program" -inputs); do
       say "fuzz: $input, $seconds s"

@@ -11,6 +11,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/input_file.h"
 #include "mmradartwin_dsp/session.h"
+#include "mmradartwin_dsp/text.h"
 #include "yaml_document.h"
 
 namespace mmradartwin {
@@ -159,6 +160,34 @@ void replaceAll(std::string& text, const std::string& from, const std::string& t
     text.replace(at, from.size(), to);
 }
 
+/// Throws InputError for names that are none of files, or of which one would be a folder of another.
+void refuseNames(const std::vector<StoredFile>& files) {
+  constexpr std::size_t kLongest_bytes = 255;  // of a file system's names
+  std::set<fs::path> names;
+  for (const StoredFile& file : files) {
+    const auto refuse = [&file](const std::string& why) {
+      throw InputError("session message: file name '" + shownShort(file.name) + "' " + why + "; it is not written");
+    };
+    const fs::path name = fs::path(file.name).lexically_normal();
+    if (file.name.empty() || name.is_absolute() || *name.begin() == "..") refuse("leaves the session's folder");
+    if (name == "." || !name.has_filename()) refuse("is that of a folder");
+    if (file.name.find('\0') != std::string::npos) refuse("holds a zero");
+    for (const fs::path& part : name) {
+      if (part.native().size() > kLongest_bytes) refuse("is too long");
+    }
+    if (file.name.size() > 8 * kLongest_bytes) refuse("is too long");
+    names.insert(name);
+  }
+  for (const fs::path& name : names) {
+    for (fs::path above = name.parent_path(); !above.empty(); above = above.parent_path()) {
+      if (names.count(above)) {
+        throw InputError("session message: '" + shownShort(above.string()) + "' is a file and the folder of '" +
+                         shownShort(name.string()) + "'; nothing is written");
+      }
+    }
+  }
+}
+
 }  // namespace
 
 std::string storedCapturePattern(const std::string& session_yaml) {
@@ -201,13 +230,8 @@ std::vector<StoredFile> gatherSessionFiles(const std::string& session_file) {
 
 void restoreSessionFiles(const std::vector<StoredFile>& files, const std::string& directory) {
   std::map<std::string, const StoredFile*> stored;
-  for (const StoredFile& file : files) {
-    const fs::path name = fs::path(file.name).lexically_normal();
-    if (file.name.empty() || name.is_absolute() || *name.begin() == "..") {
-      throw InputError("session message: file name '" + file.name + "' leaves the session's folder; it is not written");
-    }
-    stored[file.name] = &file;
-  }
+  refuseNames(files);
+  for (const StoredFile& file : files) stored[file.name] = &file;
   struct Entry {
     Place place;
     bool moved;  // written below external/ instead of where it came from

@@ -278,7 +278,9 @@ TEST(SessionFiles, OutsideFilesWorkElsewhereAndLeaveTheOriginalAlone) {
 
 TEST(SessionFiles, NamesThatLeaveTheFolderAreRefused) {
   const TestFolder folder;
-  for (const char* name : {"../evil", "/evil", "a/../../evil", ""}) {
+  const std::string long_name(5000, 'x');
+  for (const std::string& name : {std::string("../evil"), std::string("/evil"), std::string("a/../../evil"),
+                                  std::string(), std::string("."), std::string("a/"), long_name}) {
     EXPECT_TRUE(saysInOneLine(inputError([&] {
                                 restoreSessionFiles({{name, "x"}}, folder / "s");
                               }),
@@ -293,6 +295,13 @@ StampedTransform at(double t_s, double x, double yaw_deg, double jitter = 0) {
   frame.T_map_radar =
       Eigen::Translation3d(x, jitter, 1.1) * Eigen::AngleAxisd(yaw_deg * M_PI / 180, Eigen::Vector3d::UnitZ());
   return frame;
+}
+
+TEST(SessionFiles, AFileIsNoFolderOfAnother) {
+  const TestFolder folder;
+  const std::string said = inputError([&] { restoreSessionFiles({{"a", "1"}, {"a/b/c", "2"}}, folder / "s"); });
+  EXPECT_TRUE(saysInOneLine(said, "session message", "'a'", "'a/b/c'"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "s"));
 }
 
 TEST(StationaryPoses, AreStretchesOfASecond) {
