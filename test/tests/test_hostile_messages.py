@@ -200,7 +200,7 @@ class HostileMessages(InFolder):
         self.assertEqual(driver.wait(120), 2, self.text("driver_node"))
         said = [line for line in self.text("driver_node").split("\n") if line]
         self.assertEqual(len(said), 1, said)
-        for word in (self.at("large.yaml"), "65536 chirps", "128 samples", "MiB", "max_frame_mb allows 64"):
+        for word in (self.at("large.yaml"), "max_frame_mb", "64 MiB", "65536 chirps", "128 complex samples", "128 MiB"):
             self.assertIn(word, said[0])
         chain = self.node("mmradartwin_dsp", "dsp_node")
         self.python(LARGE)
