@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "diagnosis/catalogue/bounds.h"
+#include "diagnosis/fit/likelihood_climb.h"
 #include "diagnosis/hypotheses/fitted_parameters.h"
 #include "diagnosis/hypotheses/law_words.h"
 #include "diagnosis/numbers/number_text.h"
@@ -224,13 +225,11 @@ double correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
 }
 
 double natsApart(const HypothesisFit& a, const HypothesisFit& b, const ChannelData& data) {
-  Eigen::VectorXd more = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.locations.size()));
-  for (std::size_t i = 0; i < a.state.by_pose.size(); ++i) {
-    more[data.poses[i].location] += a.state.by_pose[i] - b.state.by_pose[i];
-  }
+  const std::vector<double> by_location = gainByLocation(data, b.state, a.state);
+  const Eigen::Map<const Eigen::ArrayXd> more(by_location.data(), static_cast<Eigen::Index>(by_location.size()));
   const double places = static_cast<double>(more.size()), sum = more.sum();
   if (places < 2) return std::abs(sum);
-  const double variance = places / (places - 1) * (more.array() - more.mean()).square().sum();
+  const double variance = places / (places - 1) * (more - more.mean()).square().sum();
   return std::min(std::abs(sum), 0.5 * sum * sum / std::max(variance, 1e-300));
 }
 

@@ -122,6 +122,28 @@ TEST(Preference, ABetterNameIsAsSureAsOneThatExplainsTheSamePoses) {
   EXPECT_EQ(fits[0].false_alarm_rate, 1e-3) << "not from the one that gains at other poses";
 }
 
+TEST(Preference, ASimplerGeometryComesFirstWherePlacesDoNotTellItApart) {
+  ChannelData data;
+  for (int i = 0; i < 4; ++i) {
+    data.locations.push_back(std::to_string(i));
+    data.poses.emplace_back().location = i;
+  }
+  const auto firstOf = [&](const std::vector<double>& shift_by_pose) {
+    std::vector<HypothesisFit> fits = {fitOf("scene_registration", 440), fitOf("range_bias", 400)};
+    const Coordinate metres{"range_m", "m", -1, 0, 0.03, -1, 1, {}};
+    fits[0].hypothesis.coordinates.assign(3, metres);
+    fits[1].hypothesis.coordinates.assign(1, metres);
+    fits[0].state.by_pose = shift_by_pose;
+    fits[1].state.by_pose = {100, 100, 100, 100};
+    fits[0].state.log_likelihood = 440;
+    fits[1].state.log_likelihood = 400;
+    preferSimplerGeometry(fits, data);
+    return fits[0].hypothesis.mechanism.mechanism;
+  };
+  EXPECT_EQ(firstOf({180, 60, 160, 40}), "range_bias") << "40 nats, scattered by 140";
+  EXPECT_EQ(firstOf({110, 111, 109, 110}), "scene_registration") << "40 nats, alike at all places";
+}
+
 TEST(GainByPose, IsTheDifferenceAndItsCorrelationPearsons) {
   ModelState before;
   before.by_pose = {1, 1, 1};
