@@ -15,7 +15,8 @@ namespace {
 
 constexpr int kRisingFactor = 12;        ///< factor on the number of steps while each gains kRising_nats
 constexpr double kLeastStep_nats = 0.2;  ///< expected gain of a step below which a climb ends
-constexpr double kRising_nats = 5;       ///< gain of the last step for which a climb goes on
+constexpr double kRising_nats = 5;       ///< gain of a step, or promise of the next one, for which a climb goes on
+constexpr double kKeptPromise = 0.1;     ///< share of its promise that such a step keeps at least
 constexpr double kClimb_steps = 4;       ///< steps as good as the last one within which a climb has to reach least_nats
 constexpr double kSearched[] = {0.3, 0.15};        ///< first steps of the search without slopes, scaled
 constexpr double kSearchTolerance = 0.02;          ///< tolerance of that search, scaled
@@ -176,7 +177,7 @@ Scores LikelihoodClimb::derivatives(const ModelState& state, const std::vector<d
 }
 
 void LikelihoodClimb::climb() {
-  double risen = 0;
+  double risen = 0, promised_nats = 0;
   for (int i = 0;; ++i) {
     optimum_.scores = derivatives(optimum_.state, optimum_.scaled_values);
     const Eigen::VectorXd step = regularised(optimum_.scores.information).ldlt().solve(optimum_.scores.total);
@@ -184,12 +185,15 @@ void LikelihoodClimb::climb() {
     const bool hopeless = task_.null != nullptr && i >= 2 &&
                           optimum_.state.log_likelihood + kClimb_steps * std::max(risen, screened_nats) <
                               task_.null->log_likelihood + task_.least_nats;
-    // On a ridge between a cause and the latents that absorbed it, each step is longer than the one before.
-    const int most = risen > kRising_nats ? kRisingFactor * task_.steps : task_.steps;
+    // On a ridge between a cause and the latents that absorbed it, each step is longer than the one before, or gains
+    // only a share of what its quadratic promises.
+    const bool rising = risen > kRising_nats || (screened_nats > kRising_nats && risen > kKeptPromise * promised_nats);
+    const int most = rising ? kRisingFactor * task_.steps : task_.steps;
     if (i >= most || screened_nats < kLeastStep_nats || hopeless) return;
     const double gained = stepBy(step);
     if (!(gained > 0)) return;
     risen = gained;
+    promised_nats = screened_nats;
   }
 }
 

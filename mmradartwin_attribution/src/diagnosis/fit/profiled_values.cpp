@@ -215,8 +215,10 @@ Step Profile::stepAlong(std::size_t j, const Fall& wanted) {
     step.curvature = 2 * fall / (step.width * step.width);
     const bool narrower = fall > wanted.most && step.width > wanted.narrowest;
     if (i == kWidths || (fall >= wanted.least && !narrower)) break;
-    step.width *= std::clamp(std::sqrt(wanted.wanted / std::max(fall, 0.1)), 0.1, 4.0);
-    step.width = std::max(step.width, wanted.narrowest);
+    const double other = step.width * std::clamp(std::sqrt(wanted.wanted / std::max(fall, 0.1)), 0.1, 4.0);
+    const double next = std::max(other, wanted.narrowest);
+    if ((widest > 0 ? std::min(next, widest) : next) == step.width) break;
+    step.width = next;
   }
   const double least = 0.2 / (step.width * step.width);
   step.flat = step.curvature < least;

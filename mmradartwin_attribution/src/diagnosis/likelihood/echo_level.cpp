@@ -10,6 +10,9 @@ constexpr double kUnknownShare = 0.05;                     ///< of the echoes: t
 constexpr double kLeftOfHidden[] = {0, 1e-4, 1e-3, 1e-2};  ///< power that edges and weaker ways leave of a hidden echo
 constexpr double kLeastRest = 1e-9;
 constexpr double kLeastSpread = 1e-5;  ///< a level known to 0.014 dB
+/// Beyond it an echo fades as a sum of phasors does. A log-normal law of a larger variance v has its mode at exp(-v),
+/// where its density is exp(v / 2): it would reward parameters that let the measured echo vanish.
+constexpr double kMostSpread = 1;
 
 /// Square of the echo's share of a cell from which on the level of a path is log-normal, and up to which it is that of
 /// a sum of phasors; between them the law is a mixture.
@@ -23,16 +26,17 @@ struct LevelLaw {
 
 /// Gamma law of mean 1. k log k - log Gamma(k) is Stirling's series, with an error below 1e-3 for k >= 1.
 LevelLaw sumOfPhasors(double x, double squares, double spread) {
-  const double k = std::max(1.0, 1 / (1 - (1 - std::min(1.0, spread)) * squares)), log_x = std::log(x);
+  const double k = std::max(1.0, 1 / (1 - (1 - spread) * squares)), log_x = std::log(x);
   const double factor = k + 0.5 * std::log(k / (2 * M_PI)) - 1 / (12 * k) + 1 / (360 * k * k * k);
   const double by_shape = 1 + 0.5 / k + 1 / (12 * k * k) + log_x - x;
-  const double shape = spread < 1 ? -k * k * squares * spread : 0;  // slope of k by the log spread
+  const double shape = spread < kMostSpread ? -k * k * squares * spread : 0;  // slope of k by the log spread
   return {factor + (k - 1) * log_x - k * x, k * (x - 1), by_shape * shape, k, 0.5 * shape * shape / (k * k)};
 }
 
 /// Log-normal law about the echo's share; the rest of the cell widens it as it widens the modulus of a long phasor.
 LevelLaw logNormal(double x, double share, double spread) {
-  const double variance = spread + 2 * (1 - share) / share, off = std::log(x / share), part = spread / variance;
+  const double variance = spread + 2 * (1 - share) / share, off = std::log(x / share);
+  const double part = spread < kMostSpread ? spread / variance : 0;
   return {-std::log(x) - 0.5 * std::log(2 * M_PI * variance) - 0.5 * off * off / variance, off / variance,
           0.5 * part * (off * off / variance - 1), 1 / variance, 0.5 * part * part};
 }
@@ -80,7 +84,7 @@ CellLikelihood::CellLikelihood(const InverseFactor& factor, const std::complex<d
   echo_share_ = std::min(1.0, echo.power * g);
   along_squares_ = x;
   across_weight_ = (freedom - 1) / (kTailFreedom + across);
-  const double squares = echo_share_ * echo_share_, spread = std::max(kLeastSpread, echo.spread);
+  const double squares = echo_share_ * echo_share_, spread = std::clamp(echo.spread, kLeastSpread, kMostSpread);
   usual_ = (1 - kUnknownShare) * squares;
   const double faded =
       std::log((freedom - 1) / (kTailFreedom + across)) - freedom * std::log1p(x / (kTailFreedom + across));

@@ -11,7 +11,8 @@ namespace {
 /// Logarithm of the factor on uncertain paths from which a fit is tried again from 0, and the steps that it may take.
 constexpr double kTrap = 1;
 constexpr int kTrapSteps = 6;
-constexpr double kLeastStep_nats = 0.1;  ///< expected gain below which fit() ends
+constexpr double kLeastStep_nats = 0.1;   ///< expected gain of a step below which fit() ends
+constexpr double kLeastGain_nats = 0.01;  ///< gain of a step below which fit() ends
 
 }  // namespace
 
@@ -56,7 +57,7 @@ double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLate
       best = value;
       better = true;
     }
-    if (!better || screened_nats < kLeastStep_nats) break;
+    if (best - derivatives.log_likelihood < kLeastGain_nats || screened_nats < kLeastStep_nats) break;
   }
   return best;
 }

@@ -103,6 +103,24 @@ TEST(EchoLevel, IsNotMovedByAFloorOfAnotherLevel) {
   }
 }
 
+TEST(EchoLevel, IsNoLikelierWhereItVanishesHoweverLittleIsKnown) {
+  // Channels in which nothing lies along the echo, against channels that hold the expected echo. Clutter alone is
+  // likelier by what it lacks across the echo, which is the same in both.
+  Cell model;
+  model.turn_rad = 0.4;
+  Vector across = Vector::Zero(kChannels);
+  across[0] = std::sqrt(powerOf(-35));
+  across -= model.direction() * (model.direction().dot(across) / static_cast<double>(kChannels));
+  for (double spread_db : {1.5, 5.0, 8.0, 15.0, 30.0}) {
+    model.spread_db = spread_db;
+    const double there = model.logLikelihood(across + model.direction());
+    for (double db : {-60.0, -80.0, -100.0}) {
+      const double vanished = model.logLikelihood(across + model.direction() * std::pow(10, db / 20));
+      EXPECT_LT(vanished, there + 1.5) << spread_db << " dB of spread, " << db << " dB";
+    }
+  }
+}
+
 TEST(EchoLevel, IsKnownByItsSpread) {
   // Curvature of the log-likelihood by the common level of many echoes, per echo: 1 / spread^2, less the share of
   // echoes whose level is not known.
