@@ -5,6 +5,8 @@ import unittest
 import numpy as np
 from scipy.special import fresnel
 
+from diagnose_program import PROGRAM, diagnose
+from in_folder import InFolder
 from mmradartwin_tests.geometry import sheet
 from mmradartwin_tests.near_field_bench import BUILT, Bench, Faults, PanelOptics, Station
 from mmradartwin_tests.radar import SPEED_OF_LIGHT
@@ -41,6 +43,28 @@ class Echoes(unittest.TestCase):
         clean = Bench(Faults(), places=[Station(0.349, 0.0, "here")], samples=64)
         turned = told.grid(told.reported[0]) / clean.grid(clean.reported[0])
         np.testing.assert_allclose(np.degrees(np.angle(turned[:, 5])), BUILT.phase_deg, atol=1e-6)
+
+
+@unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")
+class Diagnosis(InFolder):
+    """What the diagnosis says of the bench with all its faults."""
+
+    def test_all_faults_are_found(self):
+        Bench(BUILT, samples=SAMPLES).write(self.at("bench"))
+        status, findings, errors = diagnose(self.at("bench"), self.at("out"))
+        self.assertEqual(status, 0, msg=errors)
+        found = {one["cause"]: one["parameters"] for one in findings["findings"]}
+        # Edges of the plate, which the twin has not, are named diffuse scattering of metal.
+        self.assertEqual(set(found) - {"diffuse_scattering"},
+                         {"tx_rx_leakage", "iq_imbalance", "range_bias", "second_harmonic", "channel_phase_error"})
+        low, high = found["range_bias"]["range_m"]["ci95"]
+        self.assertTrue(low < BUILT.range_bias_m < high, msg=f"{low} to {high} m")
+        self.assertLess(high - low, 0.03)
+        self.assertEqual(found["second_harmonic"]["kind"]["value"], "bounce")
+        self.assertAlmostEqual(found["tx_rx_leakage"]["range_m"]["value"], BUILT.leakage_range_m, delta=0.001)
+        self.assertAlmostEqual(found["tx_rx_leakage"]["level_db"]["value"], BUILT.leakage_db, delta=0.5)
+        np.testing.assert_allclose(found["iq_imbalance"]["image_db"]["value"], BUILT.image_db, atol=0.3)
+        np.testing.assert_allclose(found["channel_phase_error"]["phase_deg"]["value"], BUILT.phase_deg, atol=1.5)
 
 
 if __name__ == "__main__":

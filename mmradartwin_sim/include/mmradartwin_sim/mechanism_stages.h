@@ -64,6 +64,9 @@ class PathStage {
 class WeightStage {
  public:
   virtual void reweight(const PoseContext& context, PathRecord& record) const = 0;
+  /// Length that reweight() adds to every path, m: a delay inside the radar, which a wave that meets the radar twice
+  /// passes once.
+  virtual double delay_m() const { return 0; }
 
  protected:
   ~WeightStage() = default;

@@ -23,6 +23,7 @@ struct ParameterSpec {
   /// does something. NaN where the parameter keeps its default in a trial. An integer or text is never tried.
   double neutral = std::numeric_limits<double>::quiet_NaN(), typical = std::numeric_limits<double>::quiet_NaN();
   double also = std::numeric_limits<double>::quiet_NaN();  ///< a second value at which a trial holds the parameter
+  std::string also_text;                                   ///< the same of a text, "" where there is none
   bool or_list = false;  ///< of a number: a list may stand in its place, one number per receiver
   bool weighs = false;   ///< acts in reweight() and later alone: scene and traced paths stay as they are
 };

@@ -167,7 +167,10 @@ struct AssembledTwin {
   /// Grid of filtered paths before receive().
   void propagate(const PoseContext& c, const std::vector<PathRecord>& filtered_paths, ComplexGrid& x) const {
     accumulate(c.radar, filtered_paths, x);
-    for (const DistortionStage* m : stages.distortions) m->distort(c, filtered_paths, x);
+    if (stages.distortions.empty()) return;
+    PoseContext with_delay = c;
+    for (const WeightStage* m : stages.weights) with_delay.delay_m += m->delay_m();
+    for (const DistortionStage* m : stages.distortions) m->distort(with_delay, filtered_paths, x);
   }
 
   void receive(const PoseContext& c, ComplexGrid& x) const {

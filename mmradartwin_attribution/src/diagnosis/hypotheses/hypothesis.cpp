@@ -109,11 +109,15 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
 /// Adds each hypothesis once more with the second value of a parameter that has one.
 void addSecondValues(const std::vector<ParameterSpec>& specs, std::vector<Hypothesis>& all) {
   for (const ParameterSpec& s : specs) {
-    if (std::isnan(s.also)) continue;
+    if (std::isnan(s.also) && s.also_text.empty()) continue;
     std::vector<Hypothesis> others = all;
     for (Hypothesis& h : others) {
-      h.mechanism.values.set(s.name, s.also);
-      h.variant = s.name + " " + number(s.also);
+      if (s.also_text.empty()) {
+        h.mechanism.values.set(s.name, s.also);
+      } else {
+        h.mechanism.values.set(s.name, s.also_text);
+      }
+      h.variant = s.name + " " + (s.also_text.empty() ? number(s.also) : s.also_text);
       h.searched += 1;
     }
     all.insert(all.end(), others.begin(), others.end());

@@ -72,9 +72,10 @@ double ChannelLikelihood::clutterLevel(const SessionLatents& latents, int bin) c
 }
 
 std::pair<int, double> ChannelLikelihood::shapeAt(int bin) const {
-  const int most = static_cast<int>(SessionLatents().floor_shape.size()) - 1;
-  const double first = firstBin(),
-               along = std::log(std::max<double>(bin, first) / first) / std::log((samples_ - 1) / first);
+  const double first = firstBin(), octaves = std::log2((samples_ - 1) / first);
+  const int nodes = static_cast<int>(SessionLatents().floor_shape.size());
+  const int most = std::clamp(static_cast<int>(std::lround(octaves)), 1, nodes - 1);
+  const double along = std::log2(std::max<double>(bin, first) / first) / octaves;
   const int at = std::clamp(static_cast<int>(most * along), 0, most - 1);
   return {at, most * along - at};
 }
@@ -475,13 +476,9 @@ void ChannelLikelihood::addPriors(const SessionLatents& latents, Scores& scores)
     scores.information(kActors + errors_ + a, kActors + errors_ + a) += range;
     scores.total[kActors + errors_ + a] -= range * latents.actor_range_m[a];
   }
-  // Levels of errors have a wide prior (a factor of 10 in power), so that none diverges where no data shows it.
-  const double rough = 1 / (2.3 * 2.3);
-  const SessionLatents usual;
-  for (int j = kRelative; j < kActors; ++j) {
-    scores.information(j, j) += rough;
-    scores.total[j] -= rough * (latents.global(j) - usual.global(j));
-  }
+  // Levels of errors that no data shows have no information. A little holds their steps, not their values.
+  constexpr double kHeld = 1 / (2.3 * 2.3);
+  for (int j = kRelative; j < kActors; ++j) scores.information(j, j) += kHeld;
 }
 
 void ChannelLikelihood::holdAtLimits(const SessionLatents& latents, Scores& scores) const {

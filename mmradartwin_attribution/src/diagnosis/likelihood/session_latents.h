@@ -15,7 +15,8 @@ namespace mmradartwin::diagnosis::likelihood {
 struct SessionLatents {
   double log_gain = 0;                  ///< measured power over the twin's
   double log_floor = 0;                 ///< clutter's power in a cell over PoseChannels::clutter
-  std::array<double, 6> floor_shape{};  ///< added to log_floor; nodes are even in log range, linear between
+  /// Added to log_floor. A node per octave of range up to 1024 bins, as many as the samples need; linear between.
+  std::array<double, 10> floor_shape{};
   double log_relative = -8;             ///< share of an echo's power that is independent between channels
   double log_pose_sensitive = 0;        ///< factor on the power of PoseEchoes::pose_sensitive
   double log_range = 0;                 ///< factor on the variance of a path's own range

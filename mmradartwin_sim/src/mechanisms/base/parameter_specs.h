@@ -37,6 +37,10 @@ inline ParameterSpec alsoAt(ParameterSpec spec, double value) {
   spec.also = value;
   return spec;
 }
+inline ParameterSpec alsoAt(ParameterSpec spec, const char* text) {
+  spec.also_text = text;
+  return spec;
+}
 
 /// Says that a list over receivers may stand in the number's place.
 inline ParameterSpec orPerReceiver(ParameterSpec spec) {

@@ -16,8 +16,9 @@ class RangeBias : public Mechanism, public WeightStage {
     range_m_ = values.number("range_m");
   }
   void reweight(const PoseContext& context, PathRecord& record) const override {
-    lengthen(context.radar, 2 * range_m_, record);
+    lengthen(context.radar, delay_m(), record);
   }
+  double delay_m() const override { return 2 * range_m_; }
 
  private:
   double range_m_ = 0;
