@@ -60,7 +60,8 @@ class Diagnosis(InFolder):
         low, high = found["range_bias"]["range_m"]["ci95"]
         self.assertTrue(low < BUILT.range_bias_m < high, msg=f"{low} to {high} m")
         self.assertLess(high - low, 0.03)
-        self.assertEqual(found["second_harmonic"]["kind"]["value"], "bounce")
+        bounces = next(one for one in findings["findings"] if one["cause"] == "second_harmonic")
+        self.assertEqual(bounces["mechanism"]["second_harmonic"]["kind"], "bounce")
         self.assertAlmostEqual(found["tx_rx_leakage"]["range_m"]["value"], BUILT.leakage_range_m, delta=0.001)
         self.assertAlmostEqual(found["tx_rx_leakage"]["level_db"]["value"], BUILT.leakage_db, delta=0.5)
         np.testing.assert_allclose(found["iq_imbalance"]["image_db"]["value"], BUILT.image_db, atol=0.3)

@@ -29,7 +29,7 @@ struct PoseContext {
   std::uint64_t seed;  ///< of what is random by nature (phases of scatter points)
   /// Strongest A_p of the session's poses, for levels that are relative to it.
   std::function<double()> strongest_amplitude;
-  double delay_m = 0;  ///< WeightStage::delay_m() of all weights; in DistortionStage alone
+  double delay_m = 0;      ///< WeightStage::delay_m() of all weights; in DistortionStage alone
   double paths_power = 0;  ///< sum of A_p^2 over the pose's paths before any weight; in WeightStage alone
   /// |gain| of the receiver's filters at a path length: what a level stated after the IF filter has to make up for.
   std::function<double(double length_m)> receiver_gain;
