@@ -13,17 +13,17 @@ namespace mmradartwin::diagnosis::likelihood {
 /// Latent numbers of a session: levels and small errors that every hypothesis has beside its cause. They are fitted
 /// along with each hypothesis. Powers are natural logarithms.
 struct SessionLatents {
-  double log_gain = 0;                  ///< measured power over the twin's
-  double log_floor = 0;                 ///< clutter's power in a cell over PoseChannels::clutter
+  double log_gain = 0;   ///< measured power over the twin's
+  double log_floor = 0;  ///< clutter's power in a cell over PoseChannels::clutter
   /// Added to log_floor. A node per octave of range up to 1024 bins, as many as the samples need; linear between.
   std::array<double, 10> floor_shape{};
-  double log_relative = -8;             ///< share of an echo's power that is independent between channels
-  double log_pose_sensitive = 0;        ///< factor on the power of PoseEchoes::pose_sensitive
-  double log_range = 0;                 ///< factor on the variance of a path's own range
-  double log_spread = -2.94;            ///< relative variance of the power of a path on its own, see CellLikelihood
-  std::vector<double> actor_gain;       ///< [errors, see errorOf()] natural logarithm of power, per interaction
-  std::vector<double> actor_range_m;    ///< [errors, see errorOf()] added one-way range, per interaction
-  std::vector<double> yaw_rad;          ///< [poses] error of the heading
+  double log_relative = -8;           ///< share of an echo's power that is independent between channels
+  double log_pose_sensitive = 0;      ///< factor on the power of PoseEchoes::pose_sensitive
+  double log_range = 0;               ///< factor on the variance of a path's own range
+  double log_spread = -2.94;          ///< relative variance of the power of a path on its own, see CellLikelihood
+  std::vector<double> actor_gain;     ///< [errors, see errorOf()] natural logarithm of power, per interaction
+  std::vector<double> actor_range_m;  ///< [errors, see errorOf()] added one-way range, per interaction
+  std::vector<double> yaw_rad;        ///< [poses] error of the heading
 
   /// Number j of those that all poses share ("globals"), in the order of Scores.
   double& global(int j);
