@@ -189,10 +189,6 @@ void LikelihoodClimb::climb() {
     // only a share of what its quadratic promises.
     const bool rising = risen > kRising_nats || (screened_nats > kRising_nats && risen > kKeptPromise * promised_nats);
     const int most = rising ? kRisingFactor * task_.steps : task_.steps;
-    if (getenv("DBG") != nullptr)
-      fprintf(stderr, "climb %s i %d at %.2f risen %.3f screened %.3f x %.4f\n",
-              task_.parts.empty() ? "-" : task_.parts.front().label().c_str(), i, optimum_.state.log_likelihood, risen,
-              screened_nats, optimum_.scaled_values.empty() ? 0 : optimum_.scaled_values[0]);
     if (i >= most || screened_nats < kLeastStep_nats || hopeless) return;
     const double gained = stepBy(step);
     if (!(gained > 0)) return;
