@@ -26,7 +26,7 @@ packages=(
   python3-setuptools python3-yaml
   build-essential ccache cmake git pkg-config
   catkin-lint clang-format clang-tidy shellcheck libbenchmark-dev libgtest-dev
-  imagemagick iproute2 procps umockdev x11-apps x11-utils xauth xvfb)
+  faketime imagemagick iproute2 procps umockdev x11-apps x11-utils xauth xvfb)
 
 # shellcheck disable=SC1091
 source "$root/launch/scripts/stages.sh"
