@@ -196,6 +196,8 @@ void FrameAssembler::suspect(const DataPacket& packet, bool behind) {
   suspects_.push_back({header, packet.stamp_ns, behind, {packet.payload, packet.payload + packet.size}});
   std::vector<Suspect> confirmed = confirmedWith(header);
   if (static_cast<int>(confirmed.size()) < options_.confirm_packets) return;
+  Suspect& first = confirmed.front();
+  first.behind = first.behind || followsRestart(first.header);
   counters_.rejected_packets += suspects_.size() - confirmed.size();
   suspects_.clear();
   accept(std::move(confirmed));
@@ -230,6 +232,14 @@ std::vector<FrameAssembler::Suspect> FrameAssembler::confirmedWith(const Header&
     return sequenceAfter(b.header.sequence, a.header.sequence);
   });
   return confirmed;
+}
+
+/// True where a packet of a restarted count came shortly before `first`, parted from it by lost ones of unknown length.
+bool FrameAssembler::followsRestart(const Header& first) const {
+  return std::any_of(suspects_.begin(), suspects_.end(), [&](const Suspect& s) {
+    return s.behind && sequenceAfter(first.sequence, s.header.sequence) &&
+           first.sequence - s.header.sequence <= kNearPackets && fitsRoughly(s.header, first);
+  });
 }
 
 void FrameAssembler::rejectSuspects() {
