@@ -182,6 +182,10 @@ void FrameAssembler::suspect(const DataPacket& packet, bool behind) {
   const Header header = headerOf(packet);
   for (Suspect& known : suspects_) {
     if (known.header.sequence != header.sequence || known.header.byte_count != header.byte_count) continue;
+    if (std::memcmp(known.payload.data(), packet.payload, std::min(known.payload.size(), packet.size)) != 0) {
+      rejectSuspects();  // the same place of another recording, as a later start has it
+      break;
+    }
     ++counters_.duplicate_packets;
     if (known.payload.size() < packet.size) {
       known.payload.assign(packet.payload, packet.payload + packet.size);

@@ -226,6 +226,23 @@ TEST(FrameAssembler, ARestartWithLostPacketsOfUnknownLengthsIsFound) {
   }
 }
 
+TEST(FrameAssembler, SuspectsOfAnEarlierStartAreNoCopiesOfLaterPackets) {
+  Bench bench(paperRadar());
+  bench.feed(0, 1, 2);  // two packets do not confirm each other
+  bench.now_ns += 300 * kMillisecond;
+  bench.feed(1, 1, 20);
+  bench.assembler.flush();
+  EXPECT_EQ(20u * 1456, bench.assembler.counters().bytes);
+  EXPECT_EQ(2u, bench.assembler.counters().rejected_packets);
+  EXPECT_EQ(0u, bench.assembler.counters().duplicate_packets);
+  for (const AdcCube& cube : bench.collected.cubes) {
+    for (std::size_t word = 0; word < cube.data.size(); ++word) {
+      if (cube.data[word] == 0) continue;
+      ASSERT_EQ(expectedWord(1, cube.sequence * 2048 + byteOfWord(bench.radar_, word)), cube.data[word]);
+    }
+  }
+}
+
 TEST(FrameAssembler, ArmingLeavesNoDoubt) {
   Bench bench(paperRadar());
   bench.feed(0, 0, 2);
