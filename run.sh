@@ -238,10 +238,11 @@ run_asan() {
   say "nothing found"
 }
 
+# Without the tests of the emulated USB bus: its thread is glib's, whose locks the sanitizer does not see.
 run_tsan() {
   local test status=0
-  local tests="dropping_worker_queue_test emulator_loopback_test rig_test radar_watch_test dca1000_control_test pcap_recording_test
-    child_process_test doctor_test configure_radar_test rig_self_test_test mmradartwin_dsp_output_test mmradartwin_dsp_signal_chain_test"
+  local tests="dropping_worker_queue_test emulator_loopback_test rig_test radar_watch_test dca1000_control_test pcap_recording_test"
+  tests+=" child_process_test doctor_test mmradartwin_dsp_output_test mmradartwin_dsp_signal_chain_test"
   separate_build tsan "$tests" "-DCATKIN_WHITELIST_PACKAGES=mmradartwin_msgs;mmradartwin_dsp;mmradartwin_driver" \
     "-DCMAKE_CXX_FLAGS=-fsanitize=thread"
   data_folder
