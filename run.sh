@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# mmradartwin's commands: ./run.sh try | demo | test | setup | build | bench | fuzz | tsan | core | lint | docs | exec CMD...
+# mmradartwin's commands: ./run.sh try | demo | test | setup | build | bench | fuzz | asan | tsan | core | lint | docs | exec CMD...
 set -euo pipefail
 
 root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
@@ -26,7 +26,7 @@ packages=(
   python3-setuptools python3-yaml
   build-essential ccache cmake git pkg-config
   catkin-lint clang-format clang-tidy shellcheck libbenchmark-dev libgtest-dev
-  imagemagick iproute2 procps umockdev x11-apps x11-utils xauth xvfb)
+  faketime imagemagick iproute2 procps umockdev x11-apps x11-utils xauth xvfb)
 
 # shellcheck disable=SC1091
 source "$root/launch/scripts/stages.sh"
@@ -46,7 +46,9 @@ usage: ./run.sh VERB
                protocol, stops after 90 min; called again with the same OUT it goes on
   fuzz [S]     every reader of foreign bytes under libFuzzer with address and undefined-behaviour sanitizer, S seconds
                each (60); needs clang; corpus and findings stay in .ws/fuzz
-  tsan         the streaming path's tests under the thread sanitizer
+  asan [T...]  tests of driver, dsp and sim that need no ROS master, or those named, under the address and
+               undefined-behaviour sanitizer; needs clang; outputs in .ws/asan
+  tsan         tests with threads, of driver and dsp, under the thread sanitizer
   core [...]   build what needs no ROS by cmake alone, without catkin, and run its tests; arguments go to ctest.
                `test` takes the libraries and one small test of each package
   lint [all]   format, includes, errors and names of C++, Python, shell scripts, packages; clang-tidy takes the newest
@@ -181,12 +183,17 @@ separate_build() {
   logged "$ws/log/${folder##*/}_build.log" of_make "the build" cmake --build "$folder/build" -j"$(jobs)" --target $targets
 }
 
+# fuzz_build TARGETS: by clang, with both sanitizers
+fuzz_build() {
+  command -v clang++ >/dev/null || die "clang is not here; as root: apt-get install clang"
+  separate_build fuzz "$1" -DCMAKE_C_COMPILER=clang -DCMAKE_CXX_COMPILER=clang++ -Dmmradartwin_tests_FUZZ=ON \
+    "-DCMAKE_CXX_FLAGS=-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined"
+}
+
 run_fuzz() {
   local seconds=${1:-60} package program input failed=()
   [[ $seconds =~ ^[0-9]+$ ]] || usage
-  command -v clang++ >/dev/null || die "clang is not here; as root: apt-get install clang"
-  separate_build fuzz fuzz -DCMAKE_C_COMPILER=clang -DCMAKE_CXX_COMPILER=clang++ -Dmmradartwin_tests_FUZZ=ON \
-    "-DCMAKE_CXX_FLAGS=-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined"
+  fuzz_build fuzz
   mkdir -p "$ws/fuzz/findings"
   for package in dsp driver messages sim; do
     program=$ws/fuzz/devel/lib/mmradartwin_tests/fuzz_$package
@@ -203,15 +210,45 @@ run_fuzz() {
   say "nothing found"
 }
 
+# Tests of a package that run without a ROS master, by their targets' names.
+masterless_tests() {
+  local package source name
+  for package in driver dsp sim; do
+    for source in "$root/mmradartwin_$package"/test/*_test.cpp; do
+      name=$(basename "$source" .cpp)
+      case $name in *_node_test | live_session_test) continue ;; esac
+      [ "$package" = driver ] || name=mmradartwin_${package}_$name
+      echo "$name"
+    done
+  done
+}
+
+run_asan() {
+  local test program failed=() names=("$@")
+  [ $# -gt 0 ] || mapfile -t names < <(masterless_tests)
+  fuzz_build "${names[*]}"
+  data_folder
+  mkdir -p "$ws/asan"
+  for test in "${names[@]}"; do
+    program=$(find "$ws/fuzz/devel/lib" -name "$test" -type f)
+    UBSAN_OPTIONS=print_stacktrace=1 "$program" --gtest_brief=1 >"$ws/asan/$test.log" 2>&1 || failed+=("$test")
+    say "address sanitizer: $test: $(tail -n 1 "$ws/asan/$test.log")"
+  done
+  [ ${#failed[@]} -eq 0 ] || { say "found something: ${failed[*]}; see $ws/asan"; exit 1; }
+  say "nothing found"
+}
+
+# Without the tests of the emulated USB bus: its thread is glib's, whose locks the sanitizer does not see.
 run_tsan() {
   local test status=0
   local tests="dropping_worker_queue_test emulator_loopback_test rig_test radar_watch_test dca1000_control_test pcap_recording_test"
+  tests+=" child_process_test doctor_test mmradartwin_dsp_output_test mmradartwin_dsp_signal_chain_test"
   separate_build tsan "$tests" "-DCATKIN_WHITELIST_PACKAGES=mmradartwin_msgs;mmradartwin_dsp;mmradartwin_driver" \
     "-DCMAKE_CXX_FLAGS=-fsanitize=thread"
   data_folder
   for test in $tests; do
     say "thread sanitizer: $test"
-    TSAN_OPTIONS="halt_on_error=0 exitcode=66" "$ws/tsan/devel/lib/mmradartwin_driver/$test" || status=1
+    TSAN_OPTIONS="halt_on_error=0 exitcode=66" "$(find "$ws/tsan/devel/lib" -name "$test" -type f)" || status=1
   done
   return $status
 }
@@ -265,6 +302,7 @@ case $verb in
   build) setup; build ;;
   bench) setup; run_bench "$@" ;;
   fuzz) setup; run_fuzz "$@" ;;
+  asan) setup; run_asan "$@" ;;
   tsan) setup; run_tsan ;;
   core) setup; core all "$@" ;;
   lint) setup; lint "$@" ;;

@@ -14,6 +14,7 @@
 #include "mmradartwin_dsp/map_picture.h"
 #include "mmradartwin_dsp/program.h"
 #include "mmradartwin_dsp/progress_line.h"
+#include "mmradartwin_sim/pose_placement.h"
 #include "mmradartwin_sim/twin.h"
 #include "recording_arguments.h"
 
@@ -112,7 +113,7 @@ int run(const Arguments& arguments) {
   CalibrationTarget target;
   std::optional<Twin> room;  // says where a wall's echo comes alone
   if (!arguments.wall.empty()) {
-    room.emplace(twin);
+    room.emplace(placedTwin(twin, recording.poses, recording.source));
     target = wallTarget(room->scene(), arguments.wall);
   } else {
     target.name = "the corner reflector";

@@ -62,6 +62,9 @@ PlayedSession openPlayedSession(const std::string& path, const std::string& rada
     played.poses.push_back(pose);
   }
   if (played.poses.empty()) {
+    if (!played.problems.empty()) {
+      throw InputError(path + ": no pose to play; the first problem: " + played.problems.front().message);
+    }
     throw InputError(path + ": no pose to play: " + std::to_string(session.poses.size()) +
                      " poses are usable, playing was to begin with number " + std::to_string(selection.first));
   }

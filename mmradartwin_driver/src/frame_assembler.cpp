@@ -182,6 +182,10 @@ void FrameAssembler::suspect(const DataPacket& packet, bool behind) {
   const Header header = headerOf(packet);
   for (Suspect& known : suspects_) {
     if (known.header.sequence != header.sequence || known.header.byte_count != header.byte_count) continue;
+    if (std::memcmp(known.payload.data(), packet.payload, std::min(known.payload.size(), packet.size)) != 0) {
+      rejectSuspects();  // the same place of another recording, as a later start has it
+      break;
+    }
     ++counters_.duplicate_packets;
     if (known.payload.size() < packet.size) {
       known.payload.assign(packet.payload, packet.payload + packet.size);
@@ -196,6 +200,8 @@ void FrameAssembler::suspect(const DataPacket& packet, bool behind) {
   suspects_.push_back({header, packet.stamp_ns, behind, {packet.payload, packet.payload + packet.size}});
   std::vector<Suspect> confirmed = confirmedWith(header);
   if (static_cast<int>(confirmed.size()) < options_.confirm_packets) return;
+  Suspect& first = confirmed.front();
+  first.behind = first.behind || followsRestart(first.header);
   counters_.rejected_packets += suspects_.size() - confirmed.size();
   suspects_.clear();
   accept(std::move(confirmed));
@@ -230,6 +236,14 @@ std::vector<FrameAssembler::Suspect> FrameAssembler::confirmedWith(const Header&
     return sequenceAfter(b.header.sequence, a.header.sequence);
   });
   return confirmed;
+}
+
+/// True where a packet of a restarted count came shortly before `first`, parted from it by lost ones of unknown length.
+bool FrameAssembler::followsRestart(const Header& first) const {
+  return std::any_of(suspects_.begin(), suspects_.end(), [&](const Suspect& s) {
+    return s.behind && sequenceAfter(first.sequence, s.header.sequence) &&
+           first.sequence - s.header.sequence <= kNearPackets && fitsRoughly(s.header, first);
+  });
 }
 
 void FrameAssembler::rejectSuspects() {

@@ -200,6 +200,49 @@ TEST(FrameAssembler, ARestartOfFewPacketsIsFoundAtTheEnd) {
   expectFrame(bench.radar_, bench.collected.cubes[72], 1, 0, all(bench.radar_));
 }
 
+TEST(FrameAssembler, ARestartWithLostPacketsOfUnknownLengthsIsFound) {
+  Bench bench(paperRadar());
+  bench.feed(0, 0, 1);
+  bench.now_ns += 300 * kMillisecond;
+  // Packets 1 and 3 are lost, and packet 2 alone lies behind the old count.
+  std::uint64_t next = 141;
+  for (const auto& [sequence, size] :
+       {std::pair<std::uint32_t, std::size_t>{2, 395}, {4, 897}, {5, 1118}, {6, 1064}, {7, 155}}) {
+    if (sequence == 4) next += 1206;
+    ArrivingPacket packet{sequence, next, std::vector<std::uint8_t>(size), bench.now_ns += 36'000};
+    for (std::size_t k = 0; k < size; ++k) packet.payload[k] = streamByte(1, next + k);
+    bench.assembler.add(packet.view());
+    next += size;
+  }
+  bench.assembler.flush();
+  EXPECT_EQ(2u, bench.assembler.counters().epochs);
+  for (std::size_t i = 0; i < bench.collected.cubes.size(); ++i) {
+    const AdcCube& cube = bench.collected.cubes[i];
+    for (std::size_t word = 0; word < cube.data.size(); ++word) {
+      if (cube.data[word] == 0) continue;
+      ASSERT_EQ(expectedWord(bench.collected.epochs[i] - 1, cube.sequence * 2048 + byteOfWord(bench.radar_, word)),
+                cube.data[word]);
+    }
+  }
+}
+
+TEST(FrameAssembler, SuspectsOfAnEarlierStartAreNoCopiesOfLaterPackets) {
+  Bench bench(paperRadar());
+  bench.feed(0, 1, 2);  // two packets do not confirm each other
+  bench.now_ns += 300 * kMillisecond;
+  bench.feed(1, 1, 20);
+  bench.assembler.flush();
+  EXPECT_EQ(20u * 1456, bench.assembler.counters().bytes);
+  EXPECT_EQ(2u, bench.assembler.counters().rejected_packets);
+  EXPECT_EQ(0u, bench.assembler.counters().duplicate_packets);
+  for (const AdcCube& cube : bench.collected.cubes) {
+    for (std::size_t word = 0; word < cube.data.size(); ++word) {
+      if (cube.data[word] == 0) continue;
+      ASSERT_EQ(expectedWord(1, cube.sequence * 2048 + byteOfWord(bench.radar_, word)), cube.data[word]);
+    }
+  }
+}
+
 TEST(FrameAssembler, ArmingLeavesNoDoubt) {
   Bench bench(paperRadar());
   bench.feed(0, 0, 2);

@@ -47,6 +47,13 @@ TEST(PlayedSession, LeavesOutWhatCannotBePlayedAndSaysSo) {
   PlayedSelection beyond;
   beyond.first = 3;
   EXPECT_THROW(openPlayedSession(folder.file(""), "", beyond), InputError);
+  std::filesystem::remove(folder.file("captures/c.bin"));
+  try {
+    openPlayedSession(folder.file(""), "", {});
+    FAIL() << "nothing can be played";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string::npos, std::string(error.what()).find("a.bin")) << error.what();
+  }
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -55,8 +56,8 @@ const Antennas kReceivers{"rx_position_m", &RadarConfig::rx_position_m};
 const Antennas kTransmitters{"tx_position_m", &RadarConfig::tx_position_m};
 
 std::string said(double value) { return significantNumber(value, 4); }
-/// A value in SI for radar.yaml, without the rounding of its conversion.
-std::string written(double value) { return yamlNumber(std::stod(significantNumber(value, 12))); }
+/// A value in SI for radar.yaml, without the rounding of its conversion. std::stod() would throw where it is tiny.
+std::string written(double value) { return yamlNumber(std::strtod(significantNumber(value, 12).c_str(), nullptr)); }
 
 /// A range by its text; an end that is not there is left out.
 struct Bounds {

@@ -31,7 +31,8 @@ void checkFrameSize(const RadarConfig& radar, const YamlMap& yaml) {
                 std::to_string(radar.chirps_per_frame()) + " chirps (loops_per_frame x tx_position_m) of " +
                 std::to_string(radar.samples_per_chirp) + " complex samples from " +
                 std::to_string(radar.capture_receivers()) + " receivers has " + significantNumber(radar.frame_mb(), 4) +
-                " MiB; correct those numbers, or set max_frame_mb higher");
+                " MiB; correct those numbers, or set max_frame_mb higher (of captures: messages and bags have " +
+                significantNumber(kMaxFrame_mb, 4) + " MiB at most)");
 }
 
 RadarConfig read(YamlMap yaml) {

@@ -177,6 +177,11 @@ TEST(RadarYamlInOtherUnits, RadarsAsTheyAreBuiltAreLeftAlone) {
   for (const auto& [name, values] : radars) EXPECT_EQ(refusal(values), "") << name;
 }
 
+TEST(RadarYamlInOtherUnits, TinyNumbersAreRefusedAsOthersAre) {
+  // In other units it is smaller than any normal number.
+  EXPECT_TRUE(saysInOneLine(refusal({{"adc_start_s", "5e-320"}, {"loops_per_frame", "32768"}}), "radar.yaml: key"));
+}
+
 TEST(FrameSize, IsBoundedUnlessAKeySaysSo) {
   // 32768 loops x 2 slots x 64 samples x 4 receivers x 4 bytes
   std::map<std::string, std::string> values = {{"loops_per_frame", "32768"}, {"frame_period_s", "2"}};

@@ -190,6 +190,9 @@ def yaml_rows():
         pcap_too(t, c), vast_frame(t, c)), ("radar.yaml", "max_frame_mb", "128 MiB"))
     for program, words in READERS.items():
         yield Row("radar.yaml: frames of 128 MiB", [program, *words], vast_frame, ("radar.yaml", "max_frame_mb"))
+    # What no reader of bags would take is not written.
+    yield Row("radar.yaml: frames of 128 MiB, which it allows", ["session_to_bag", *READERS["session_to_bag"]],
+              lambda t, c: (vast_frame(t, c), append(RADAR, "\nmax_frame_mb: 128\n")(t, c)), ("radar/config", "bags", "64 MiB"))
     texts = {"noise": None, "not UTF-8": b"device: \xff\xfe\n", "nothing": b"", "a list": b"- 1\n- 2\n",
              "nested 100,000 deep": b"a: " + b"[" * 100_000, "a billion laughs": laughs().encode(),
              "tabs": b"device:\tawr2243\n\tx: 1\n", "a loop of aliases": b"device: &x [*x]\n"}
@@ -297,7 +300,138 @@ def output_rows():
         yield Row("output: /dev/full", [program, *full], nothing, ("/dev/full",))
 
 
-ROWS = {"bags": bag_rows, "captures": capture_rows, "yaml": yaml_rows, "poses": pose_rows, "packets": pcap_rows,
+# Programs that judge a whole session.
+JUDGES = {"evaluate": ["session", "--no-pictures", "--no-bag", *OUT], "diagnose": ["session", "--findings", "0", *OUT],
+          "calibrate": ["session", "--wall", "wall_north", *OUT]}
+
+
+def all_of(*damages):
+    return lambda test, chance: [damage(test, chance) for damage in damages]
+
+
+def judged_session_rows():
+    damages = {
+        "no session.yaml": (remove("session/session.yaml"), ("session.yaml",)),
+        "no poses.csv": (remove(POSES), ("poses.csv",)),
+        "poses.csv is empty": (put(POSES, b""), ("poses.csv",)),
+        "poses.csv: noise": (noise(POSES), ("poses.csv",)),
+        "poses.csv: a head alone": (put(POSES, POSES_HEAD), ("poses.csv",)),
+        "poses.csv: a name that is no UTF-8": (change(POSES, "\n001,", b"\nb\xff\xfe,"), ("poses.csv", "UTF-8")),
+        "poses.csv: a name with a slash": (change(POSES, "\n001,", b"\na/x,"), ("poses.csv", "slash")),
+        "poses.csv: 300,000 bad poses": (put(POSES, POSES_HEAD + "".join(
+            f"p{i},a,{1_700_000_000 + i},1,2,1,0,0,0,0.5\n" for i in range(300_000))), ("poses.csv",)),
+        "no radar.yaml": (remove(RADAR), ("radar.yaml",)),
+        "radar.yaml: noise": (noise(RADAR), ("radar.yaml",)),
+        "radar.yaml: frames of 128 MiB": (vast_frame, ("radar.yaml", "max_frame_mb")),
+        "no mesh": (remove("session/office.obj"), ("office.obj",)),
+        "mesh: noise": (noise("session/office.obj"), ("office.obj",)),
+        "a room in millimetres": (in_millimetres, ("unit",)),
+        "materials.yaml: noise": (noise("session/materials.yaml"), ("materials.yaml",)),
+        "a capture is missing": (remove(CAPTURE), ("001.bin",)),
+        "a capture is cut within a frame": (cut(CAPTURE, 0.4), ("001.bin",)),
+        "a capture is a folder": (folder_instead(CAPTURE), ("001.bin",)),
+        "all captures are missing": (lambda t, c: shutil.rmtree(t.at("session/captures")), ("001.bin",)),
+        "all captures are empty": (all_of(*(put(f"session/captures/00{i}.bin", b"") for i in (1, 2, 3))), ("001.bin",)),
+        "all captures are text": (all_of(*(put(f"session/captures/00{i}.bin", b"range,power\n1.0,2.0\n" * 300)
+                                           for i in (1, 2, 3))), ("001.bin",))}
+    for damage, (make, says) in damages.items():
+        for program, words in JUDGES.items():
+            yield Row(f"judged session: {damage}", [program, *words], make, says)
+
+
+def judged_bag_rows():
+    damages = {"cut": cut("session.bag"), "scattered bytes": scatter("session.bag"), "empty": put("session.bag", b""),
+               "noise behind a bag's first line": put("session.bag", b"#ROSBAG V2.0\n" + bytes(range(256)) * 40)}
+    for damage, make in damages.items():
+        for program, words in JUDGES.items():
+            harmless = damage == "scattered bytes" and program != "calibrate"
+            yield Row(f"judged bag: {damage}", [program, "session.bag", *words[1:]], make, ("session.bag",),
+                      (0, 2) if harmless else (2,))
+
+
+def judged_options_rows():
+    """Files that an option names."""
+    options = {"--twin": JUDGES, "--scene": ("evaluate",), "--channels": ("evaluate", "diagnose"),
+               "--config": ("evaluate", "diagnose"), "--diagnosis-config": ("diagnose",), "--compare": ("diagnose",),
+               "--laser": ("calibrate",)}
+    texts = {"noise": noise("named"), "a list": put("named", b"- 1\n- 2\n"), "a billion laughs": put("named", laughs()),
+             "a key that is none": put("named", b"no_such_key: 1\n"), "missing": nothing,
+             "a folder": lambda t, c: os.mkdir(t.at("named"))}
+    for option, programs in options.items():
+        for program in programs:
+            for text, make in texts.items():
+                yield Row(f"file of {option}: {text}", [program, *JUDGES[program], option, "named"], make, ("named",))
+
+
+def judged_output_rows():
+    def older(test, _chance):
+        put("older/index.html", b"older")(test, None)
+
+    for program, words in JUDGES.items():
+        def output(to, *more, words=words):
+            return [word if word != "out" else to for word in words] + list(more)
+        yield Row("judge's output: ''", [program, *output("")], nothing, ("output",))
+        yield Row("judge's output: below a file", [program, *output("session.bag/out")], nothing, ("session.bag",))
+        yield Row("judge's output: a name of 300 characters", [program, *output("x" * 300)], nothing, ("cannot be written",))
+        yield Row("judge's output: /dev/full", [program, *output("/dev/full")], nothing, ("/dev/full",))
+        yield Row("judge's output: exists", [program, *output("older")], older, ("older", "--force"))
+        for force in ([], ["--force"]):
+            for input_ in ("session", "session/captures", "session/radar.yaml", "session/captures/001.bin"):
+                yield Row(f"judge's output: {input_} {' '.join(force)}", [program, *output(input_, *force)], nothing, (input_,))
+        yield Row("judge's output: a folder of something else --force", [program, *output("photos", "--force")],
+                  put("photos/cat.jpg", b"cat"), ("photos",))
+
+
+def replayed_rows():
+    whole = pcap(packets(40))
+    to = ["--rate", "1000", "--host-ip", "127.77.9.1", "--card-ip", "127.77.9.2"]
+    rows = {"missing": (nothing, (2,), ("b.pcap",), "b.pcap"), "empty": (put("a.pcap", b""), (2,), ("a.pcap",), "a.pcap"),
+            "noise": (noise("a.pcap"), (2,), ("a.pcap",), "a.pcap"),
+            "header alone": (put("a.pcap", whole[:24]), (2,), ("a.pcap",), "a.pcap"),
+            "a record of 4 GB": (put("a.pcap", whole[:24] + struct.pack("<IIII", 1, 1, 2**32 - 1, 2**32 - 1)), (2,),
+                                 ("a.pcap",), "a.pcap"),
+            "cut within a packet": (put("a.pcap", whole[:-300]), (0, 2), (), "a.pcap"),
+            "scattered bytes": (all_of(put("a.pcap", whole), scatter("a.pcap")), (0, 2), ("a.pcap",), "a.pcap"),
+            "counts that jump by 60 MB": (put("a.pcap", pcap(jumping(200, 60_000_000))), (0,), (), "a.pcap"),
+            "a folder": (lambda t, c: os.mkdir(t.at("a.pcap")), (2,), ("a.pcap",), "a.pcap"),
+            "a session": (nothing, (2,), ("session",), "session"),
+            "text": (put("a.pcap", b"range,power\n" * 100), (2,), ("a.pcap",), "a.pcap")}
+    for what, (make, status, says, name) in rows.items():
+        yield Row(f"replayed pcap: {what}", ["replay_packets", name, *to], make, says, status)
+    for option, value in (("--host-ip", "127.0.0.1;touch F"), ("--host-ip", "nowhere"),
+                          ("--rate", "nan"), ("--data-port", "70000")):
+        yield Row(f"replayed pcap: {option} {value}", ["replay_packets", "a.pcap", "--rate", "1000", option, value],
+                  put("a.pcap", whole), (option[2:] if option == "--rate" else value,))
+    yield Row("replayed pcap: --card-ip of another computer", ["replay_packets", "a.pcap", "--card-ip", "203.0.113.7"],
+              put("a.pcap", whole), ("203.0.113.7",), (1,))
+
+
+def emulated_rows():
+    """Programs that play a session, and those that read a radar's settings."""
+    for program, words in {"dca1000_emulator": ["session", "--card-ip", "127.77.9.2", "--host-ip", "127.77.9.1"],
+                           "emulated_rig": ["session", "--loopback", "--run-folder", "run"]}.items():
+        for damage, (make, says) in {
+                "no session.yaml": (remove("session/session.yaml"), ("session.yaml",)),
+                "poses.csv: noise": (noise(POSES), ("poses.csv",)),
+                "radar.yaml: noise": (noise(RADAR), ("radar.yaml",)),
+                "radar.yaml: frames of 128 MiB": (vast_frame, ("radar.yaml", "max_frame_mb")),
+                "all captures are missing": (lambda t, c: shutil.rmtree(t.at("session/captures")), ("001.bin",))}.items():
+            yield Row(f"played session: {damage}", [program, *words], make, says)
+    for damage, make in {"noise": noise("profile.cfg"), "empty": put("profile.cfg", b""),
+                         "a line of 50 MB": put("profile.cfg", b"x" * 50_000_000),
+                         "numbers that are none": put("profile.cfg", b"channelCfg 15 3 0\nprofileCfg 0 nan inf 7 6\n"),
+                         "cut": cut("profile.cfg", 0.4)}.items():
+        yield Row(f"imported settings: {damage}", ["import_settings", "profile.cfg", "--device", "xwr1843", *OUT], make,
+                  ("profile.cfg",))
+    for damage, make in {"noise": noise(RADAR), "frames of 128 MiB": vast_frame, "missing": remove(RADAR)}.items():
+        yield Row(f"doctor's radar.yaml: {damage}", ["doctor", "--radar", RADAR, "--no-usb"], make, ("radar.yaml",))
+    yield Row("emulated radar: no command", ["awr2243_emulator"], nothing, ("no command",))
+    yield Row("emulated radar: no such program", ["awr2243_emulator", "--", "no_such_program"], nothing, ("no_such_program",))
+
+
+ROWS = {"judged_sessions": judged_session_rows, "judged_bags": judged_bag_rows, "judged_options": judged_options_rows,
+        "judged_outputs": judged_output_rows, "replayed_packets": replayed_rows, "emulators": emulated_rows,
+        "bags": bag_rows, "captures": capture_rows, "yaml": yaml_rows, "poses": pose_rows, "packets": pcap_rows,
         "meshes": mesh_rows, "memory": memory_rows, "outputs": output_rows}
 
 

@@ -1,6 +1,11 @@
 #!/usr/bin/env python3
-"""kill -9 of each node of a running demo: who misses its messages says so and names it, and it comes back."""
+"""kill -9 of each node of a running demo: who misses its messages says so and names it, and it comes back.
+
+With MMRADARTWIN_LONG each node is killed twenty times more, at drawn times, as it starts, too.
+"""
+import functools
 import os
+import random
 import shutil
 import signal
 import tempfile
@@ -11,6 +16,7 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mmradartwin_msgs.msg import Residuals
 
+from chosen_sessions import RUN
 from made_session import make_session
 from test_launch_files import Launched
 from wait_for import wait_for
@@ -20,6 +26,7 @@ CASES = {"signal_chain": ("dsp_node", ("attribution: attribution", "twin: twin")
          "twin": ("twin_node", ("attribution: attribution",), "look at the twin"),
          "driver": ("driver_node", ("signal_chain: signal chain", "diagnosis: diagnosis"), "look at the driver"),
          "attribution": ("attribution_node", (), ""), "diagnosis": ("diagnosis_node", (), "")}
+KILLS = 20
 
 
 def process_of(program, name):
@@ -41,7 +48,7 @@ class KilledNodes(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.mkdtemp(prefix="mmradartwin_killed_")
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
-        make_session(os.path.join(self.folder, "session"), 2, 3000)
+        make_session(os.path.join(self.folder, "session"), 2, 15000 if RUN else 3000)
         self.said, self.residuals = [], []
 
     def take(self, message):
@@ -52,20 +59,51 @@ class KilledNodes(unittest.TestCase):
         """When the diagnostics of that name first held the words; None where they did not."""
         return next((t for t, n, _, text in self.said if t > since and n == name and words in text), None)
 
+    def launched(self):
+        return Launched("demo.launch", "session:=" + os.path.join(self.folder, "session"), "rviz:=false",
+                      "card_ip:=127.77.5.2", "host_ip:=127.77.5.1", "average_frames:=5")
+
+    def listen(self, launched):
+        """Until residuals come; one test of a run can, for a process has one node of rospy."""
+        os.environ.update({key: launched.environment[key] for key in ("ROS_MASTER_URI", "ROS_IP")})
+        rospy.init_node("killed_nodes_test", disable_signals=True)
+        for subscriber in (rospy.Subscriber("/diagnostics", DiagnosticArray, self.take, queue_size=100),
+                           rospy.Subscriber("attribution/residuals", Residuals, self.residuals.append, queue_size=100)):
+            self.addCleanup(subscriber.unregister)
+        wait_for(lambda: self.residuals, lambda: "residuals:\n" + launched.text()[-3000:])
+
     def test_silence_is_said_and_what_was_killed_comes_back(self):
-        with Launched("demo.launch", "session:=" + os.path.join(self.folder, "session"), "rviz:=false",
-                      "card_ip:=127.77.5.2", "host_ip:=127.77.5.1", "average_frames:=5") as launched:
-            os.environ.update({key: launched.environment[key] for key in ("ROS_MASTER_URI", "ROS_IP")})
-            rospy.init_node("killed_nodes_test", disable_signals=True)
-            keep = [rospy.Subscriber("/diagnostics", DiagnosticArray, self.take, queue_size=100),
-                    rospy.Subscriber("attribution/residuals", Residuals, self.residuals.append, queue_size=100)]
-            wait_for(lambda: self.residuals, lambda: "residuals:\n" + launched.text()[-3000:])
+        with self.launched() as launched:
+            self.listen(launched)
             for node, (program, listeners, words) in CASES.items():
                 with self.subTest(node=node):
                     self.kill_and_watch(launched, node, program, listeners, words)
+            if RUN:
+                self.kill_at_any_time(launched)
             self.assertIsNone(launched.process.poll(), launched.text()[-3000:])
-            for subscriber in keep:
-                subscriber.unregister()
+
+    def kill_at_any_time(self, launched):
+        """Nodes in a drawn order, up to 5 s after the last one is there again: now and then it is not up yet."""
+        chance = random.Random(17)
+        order = list(CASES) * KILLS
+        chance.shuffle(order)
+        before = launched.text().count("was ended by SIGKILL")
+        for number, node in enumerate(order):
+            program = CASES[node][0]
+            pid = wait_for(functools.partial(process_of, program, node), node)
+            time.sleep(chance.uniform(0, 5))
+            os.kill(pid, signal.SIGKILL)
+            wait_for(lambda pid=pid, node=node, program=program: process_of(program, node) not in (None, pid),
+                     f"{node} again, kill {number}")
+            if number % 10 == 9:
+                count = len(self.residuals)
+                wait_for(lambda count=count: len(self.residuals) > count + 20,
+                         lambda number=number: f"residuals after {number + 1} kills:\n{launched.text()[-3000:]}")
+        self.assertEqual(launched.text().count("was ended by SIGKILL") - before, len(order))
+        for listener in sorted({name for _, names, _ in CASES.values() for name in names}):
+            wait_for(lambda listener=listener: self.latest(listener)[2] != DiagnosticStatus.ERROR,
+                     lambda listener=listener: f"{listener} stays at {self.latest(listener)}")
+        print(f"{len(order)} kills at drawn times: {len(self.residuals)} residuals came, all is well again")
 
     def kill_and_watch(self, launched, node, program, listeners, words):
         pid = wait_for(lambda: process_of(program, node), node)

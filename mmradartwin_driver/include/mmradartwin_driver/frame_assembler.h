@@ -123,6 +123,7 @@ class FrameAssembler {
   bool linked(const Suspect& suspect, const Header& header) const;
   void suspect(const DataPacket& packet, bool behind);
   std::vector<Suspect> confirmedWith(const Header& header) const;
+  bool followsRestart(const Header& first) const;
   void rejectSuspects();
   void accept(std::vector<Suspect> accepted);
   std::uint64_t beginOf(const Suspect& first);

@@ -7,7 +7,6 @@
 #include "mmradartwin_driver/link_budget.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
-#include "mmradartwin_dsp/ros/frame_limit.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
 
 namespace mmradartwin {
@@ -89,7 +88,6 @@ RadarDriver::Settings::Settings(StrictParameters& parameters) {
   map_frame = parameters.text("map_frame", "map", "tf frame of the scene, in which the radar's pose is watched");
   pose.age_limit_s = parameters.number("pose_age_limit_s", pose.age_limit_s, 0.05, 3600,
                                        "an older pose is reported in diagnostics, s");
-  max_frame_mb = readFrameLimit_mb(parameters);
   parameters.ofDiagnosticUpdater();
 }
 
@@ -109,7 +107,7 @@ NodeDescription RadarDriver::description() {
 void RadarDriver::loadRadar() {
   options_ = settings_.rig;
   radar_ = loadRadarConfig(settings_.radar_file);
-  requireFrameBelow(radar_, settings_.max_frame_mb, settings_.radar_file);
+  fromMsg(toMsg(radar_));  // what nobody could read is not sent
   if (settings_.configure_radar) {
     if (!options_.configure_card) {
       throw InputError(

@@ -118,7 +118,7 @@ mmradartwin_msgs::RadarConfig toMsg(const RadarConfig& radar) {
   return msg;
 }
 
-RadarConfig fromMsg(const mmradartwin_msgs::RadarConfig& msg, double max_frame_mb) {
+RadarConfig fromMsg(const mmradartwin_msgs::RadarConfig& msg) {
   requirePlausible("radar/config", msg.samples_per_chirp, msg.loops_per_frame);
   if (msg.layout != "4lane" && msg.layout != "2lane") {
     throw InputError("radar/config: field layout is '" + msg.layout + "'; allowed: 4lane, 2lane");
@@ -127,7 +127,6 @@ RadarConfig fromMsg(const mmradartwin_msgs::RadarConfig& msg, double max_frame_m
     throw InputError("radar/config: field iq_order is '" + msg.iq_order + "'; allowed: iq, qi");
   }
   RadarConfig radar;
-  radar.max_frame_mb = max_frame_mb;
   radar.device = msg.device;
   radar.carrier_hz = msg.carrier_hz;
   radar.slope_hz_per_s = msg.slope_hz_per_s;

@@ -223,6 +223,8 @@ std::vector<PoseProblem> sessionToBag(const std::string& session, const std::str
   SessionOptions options;
   options.exclude_duplicates = false;
   const Recording recording = openSession(session, options);
+  mmradartwin_msgs::RadarConfig config = toMsg(recording.radar);
+  fromMsg(config);  // what nobody could read is not written
   mmradartwin_msgs::Session message;
   message.header.frame_id = "map";
   message.name = recording.name;
@@ -269,7 +271,6 @@ std::vector<PoseProblem> sessionToBag(const std::string& session, const std::str
     }
     if (progress) progress(i + 1, total);
   }
-  mmradartwin_msgs::RadarConfig config = toMsg(recording.radar);
   config.header.stamp = start;
   config.header.frame_id = "radar_link";
   writeLatched(bag, "/radar/config", start, config);

@@ -6,7 +6,6 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
-#include "mmradartwin_dsp/ros/frame_limit.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_dsp/stationary_poses.h"
 
@@ -65,7 +64,6 @@ SignalChainNode::Settings::Settings(StrictParameters& parameters) {
   radar_frame = parameters.text("radar_frame", kRadarFrame, "tf frame of the radar");
   channels_file = parameters.existingPath(
       "channels", "channels.yaml of calibrate, by which the measured branch is corrected; empty: none");
-  max_frame_mb = readFrameLimit_mb(parameters);
   parameters.ofDiagnosticUpdater();
 }
 
@@ -92,7 +90,7 @@ void SignalChainNode::onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& co
   const std::uint64_t hash = radarHash(*config);
   if (chain_ && hash == radar_hash_) return;
   try {
-    const RadarConfig radar = fromMsg(*config, settings_.max_frame_mb);
+    const RadarConfig radar = fromMsg(*config);
     SignalChain chain(radar);
     if (channels_) requireChannelsOf(radar, *channels_);
     chain_.emplace(std::move(chain));

@@ -33,7 +33,6 @@ class RadarDriver {
     PoseWatch::Options pose;
     std::string radar_file, frame_id, map_frame;
     bool configure_radar;
-    double max_frame_mb;
   };
 
   void publish(AdcCube&& cube);

@@ -29,8 +29,8 @@ Eigen::Isometry3d fromMsg(const geometry_msgs::Pose& pose);
 Eigen::Isometry3d fromMsg(const geometry_msgs::Transform& transform);
 
 mmradartwin_msgs::RadarConfig toMsg(const RadarConfig& radar);
-/// Throws InputError, as a radar.yaml of the same values does.
-RadarConfig fromMsg(const mmradartwin_msgs::RadarConfig& msg, double max_frame_mb = kMaxFrame_mb);
+/// Throws InputError, as a radar.yaml of the same values does that has no max_frame_mb.
+RadarConfig fromMsg(const mmradartwin_msgs::RadarConfig& msg);
 /// First 8 bytes, little endian, of the SHA-256 of the serialised message with a zeroed header.
 std::uint64_t radarHash(const mmradartwin_msgs::RadarConfig& msg);
 std::uint64_t radarHash(const RadarConfig& radar);

@@ -45,7 +45,7 @@ class SignalChainNode {
     explicit Settings(StrictParameters& parameters);
 
     int average_frames, publish_every;
-    double moved_m, moved_rad, pose_timeout_s, max_frame_mb;
+    double moved_m, moved_rad, pose_timeout_s;
     TransformLimits tf_limits;
     std::string map_frame, radar_frame, channels_file;
   };
