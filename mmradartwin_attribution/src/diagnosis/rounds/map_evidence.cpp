@@ -25,12 +25,12 @@ std::string MapEvidence::rejection(const HypothesisFit& fit, const FindingGain& 
   }
   if (in_maps) return "";
   // The likelihood knows the errors that it was given and trusts the twin in all else; what makes maps worse has no
-  // second witness. A law without a name only describes the data, so that it need not be certain to describe them
-  // worse.
+  // second witness. A law without a name only describes the data: where it describes no more of the power, it tells
+  // nothing.
   const bool named = isCatalogued(fit.hypothesis.mechanism.mechanism);
-  const bool clearly_worse = explained_more < -bounds::kLeastExplainedMore && (explained[1] < 0 || !named);
+  const bool clearly_worse = explained_more < -bounds::kLeastExplainedMore && explained[1] < 0;
   const Eigen::VectorXd nats_by_pose = gainByPose(fit, before_);
-  if (!clearly_worse && hasEnoughEvidence(fit, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
+  if (named && !clearly_worse && hasEnoughEvidence(fit, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
   if (likelier) rejected_.push_back({nats_by_pose, true});
   return (clearly_worse ? "the maps get worse" : "the maps gain nothing") + by_how_much;
 }
