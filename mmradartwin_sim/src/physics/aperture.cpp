@@ -59,6 +59,16 @@ std::complex<double> apertureAxis(double u1, double u2) {
   return (fresnelIntegral(u2) - fresnelIntegral(u1)) / Complex(1, -1);
 }
 
+std::complex<double> stripFactor(const StripEnd& low, const StripEnd& high, std::complex<double> weight_at_foot) {
+  const auto correction = [&](const StripEnd& end) -> Complex {
+    if (std::abs(end.u) < 1e-6) return 0;  // weights are even about the foot
+    return (end.weight - weight_at_foot) / end.u * phasor(end.u * end.u) / Complex(0, -M_PI);
+  };
+  return weight_at_foot * apertureAxis(low.u, high.u) + (correction(high) - correction(low)) / Complex(1, -1);
+}
+
+std::complex<double> edgeBeyond(double l, double h) { return toInfinity(l, h); }
+
 std::complex<double> aperturePolygon(const std::vector<std::vector<Eigen::Vector2d>>& loops) {
   Complex sum = 0;
   double turn = 0;
@@ -114,6 +124,31 @@ std::complex<double> apertureFactor(const Facet& facet, const Eigen::Vector3d& p
     }
   }
   return aperturePolygon(loops);
+}
+
+std::complex<double> echoFactor(const Facet& facet, const Eigen::Vector3d& foot, double R_m, double wavelength_m) {
+  if (!facet.rectangle) return apertureFactor(facet, foot, facet.normal, R_m, R_m, wavelength_m);
+  const double x = (foot - facet.origin).dot(facet.e1), y = (foot - facet.origin).dot(facet.e2);
+  struct Side {
+    double low_m, high_m;
+    double beside_m() const { return std::max({low_m, -high_m, 0.0}); }
+  };
+  Side along{-x, facet.size1_m - x}, across{-y, facet.size2_m - y};
+  if (across.beside_m() > along.beside_m()) std::swap(along, across);
+  const auto acrossAt = [&](double r_m) {
+    const double unit = 2 / std::sqrt(wavelength_m * r_m);
+    return apertureAxis(across.low_m * unit, across.high_m * unit);
+  };
+  const auto end = [&](double at_m) -> StripEnd {
+    const double r_m = std::hypot(R_m, at_m), extra_m = at_m * at_m / (r_m + R_m);
+    const double u = (at_m < 0 ? -1 : 1) * std::sqrt(8 * extra_m / wavelength_m);
+    if (std::abs(u) < 1e-6) return {u, 1.0};
+    // exp(-2jkr) R/r^3 over the plane; steps of u are steps of 4 sin/(lambda u) along it, the other axis has sqrt(r).
+    const double step = wavelength_m * u * r_m / (4 * at_m) / (0.5 * std::sqrt(wavelength_m * R_m));
+    const double ratio = R_m / r_m;
+    return {u, ratio * ratio * std::sqrt(ratio) * step * acrossAt(r_m)};
+  };
+  return stripFactor(end(along.low_m), end(along.high_m), acrossAt(R_m));
 }
 
 }  // namespace mmradartwin

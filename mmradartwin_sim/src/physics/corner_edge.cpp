@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kCornerInset_m = 0.01;
 constexpr double kSmallestCornerFactor = 0.01;
+constexpr double kSlopeOver = 1e-3;  // of the distance: how far from the edge a slope there is taken
 
 using Interval = std::pair<double, double>;
 
@@ -73,6 +74,41 @@ void addCornerEdges(const Facet& a, const Facet& b, double meet_m, std::vector<C
   }
 }
 
+/// CornerAperture::kPhysicalOptics.
+std::complex<double> physicalOptics(const CornerEdge& edge, const Eigen::Vector3d& from, double wavelength_m) {
+  const Eigen::Vector3d way = from - edge.origin;
+  const double along_a = way.dot(edge.into_a), along_b = way.dot(edge.into_b), R = std::hypot(along_a, along_b);
+  const double at = way.dot(edge.along);
+  const auto alongEdge = [&](double r_m) {
+    const double unit = 2 / std::sqrt(wavelength_m * r_m);
+    return apertureAxis(-at * unit, (edge.length_m - at) * unit);
+  };
+  const std::complex<double> at_edge = alongEdge(R);
+  // The echo of one face, lit by the image of the radar in the other. x along the face, y off it: of the radar.
+  const auto half = [&](double x, double y, double reach_m, double other_reach_m) {
+    // Light that comes by the far end of the other face ends here.
+    double end_m = reach_m;
+    if (y > other_reach_m) end_m = std::min(end_m, x * other_reach_m / (y - other_reach_m));
+    const auto stripEnd = [&](double at_m) -> StripEnd {
+      const double to_image_m = std::hypot(at_m + x, y), to_radar_m = std::hypot(at_m - x, y);
+      const double extra_m = std::max(1e-12, to_image_m + to_radar_m - 2 * R);
+      const double u = std::sqrt(4 * extra_m / wavelength_m);
+      const double slope = (at_m + x) / to_image_m + (at_m - x) / to_radar_m;  // of the extra path along the face
+      const double step = wavelength_m * u / (2 * slope) / (0.5 * std::sqrt(wavelength_m * R) * R / y);
+      const double spread = R * R * R / (to_image_m * to_image_m * to_radar_m);
+      const double mean_m = 2 * to_image_m * to_radar_m / (to_image_m + to_radar_m);
+      return {u, spread * step * std::sqrt(mean_m / R) * alongEdge(mean_m)};
+    };
+    // In the edge, where the strip begins, the weight's slope is what is left of the end point's correction.
+    const StripEnd beside = stripEnd(std::min(kSlopeOver * R, 0.5 * end_m));
+    const std::complex<double> slope = (beside.weight - at_edge) / beside.u;
+    return stripFactor({0, at_edge}, stripEnd(end_m), at_edge) -
+           slope / std::complex<double>(0, -M_PI) / std::complex<double>(1, -1);
+  };
+  return half(along_a, along_b, edge.reach_a_m, edge.reach_b_m) +
+         half(along_b, along_a, edge.reach_b_m, edge.reach_a_m);
+}
+
 }  // namespace
 
 std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
@@ -113,6 +149,7 @@ std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
 
 std::complex<double> cornerFactor(const CornerEdge& edge, const Eigen::Vector3d& from, double wavelength_m,
                                   CornerAperture aperture) {
+  if (aperture == CornerAperture::kPhysicalOptics) return physicalOptics(edge, from, wavelength_m);
   const Eigen::Vector3d way = from - edge.origin;
   const double x = way.dot(edge.into_a), y = way.dot(edge.into_b), R = std::hypot(x, y), at = way.dot(edge.along);
   // Across the ray the faces end at -reach_a sin and +reach_b sin of their angles to it, first order in s = 2R.

@@ -30,9 +30,11 @@ std::vector<CornerEdge> findCornerEdges(const Scene& scene, double meet_m,
 
 /// The part of two faces across the ray that makes up a corner's aperture.
 enum class CornerAperture {
-  kBothFaces,     ///< from the far end of the one to the far end of the other (docs/reference/contracts.md section 4,
-                  ///< `corner`)
-  kNarrowerFace,  ///< as far to both sides as the narrower reaches: what meets one face leaves as far on the other
+  kBothFaces,       ///< from the far end of the one to the far end of the other (docs/reference/contracts.md section 4,
+                    ///< `corner`)
+  kNarrowerFace,    ///< as far to both sides as the narrower reaches: what meets one face leaves as far on the other
+  kPhysicalOptics,  ///< likewise, each face by physical optics with its exact paths in the light that the other
+                    ///< reflects
 };
 
 /// Fresnel aperture factor of an edge's two faces for the retro path to a point, 1 for large ones.

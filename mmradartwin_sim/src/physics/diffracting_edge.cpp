@@ -25,7 +25,7 @@ struct Piece {
 
 using Pieces = std::map<std::pair<int, int>, std::vector<Piece>>;  // by facets
 
-void addPieces(const Scene& scene, const Actor& actor, Pieces& pieces) {
+void addPieces(const Scene& scene, const Actor& actor, EdgesOf those, Pieces& pieces) {
   struct Side {
     int u, v, triangle, third;
   };
@@ -54,7 +54,8 @@ void addPieces(const Scene& scene, const Actor& actor, Pieces& pieces) {
       }
       const bool rim = end - i == 1;
       const bool chords = scene.facets[a].curved >= 0 && scene.facets[a].curved == scene.facets[b].curved;
-      if ((rim || (a != b && !chords)) && scene.facets[a].reflects && scene.facets[b].reflects) {
+      const bool counts = those == EdgesOf::kAllFacets || (scene.facets[a].reflects && scene.facets[b].reflects);
+      if ((rim || (a != b && !chords)) && counts) {
         pieces[{a, b}].push_back({actor.vertices[first.u], actor.vertices[first.v], actor.vertices[first.third],
                                   actor.vertices[last.third]});
       }
@@ -185,13 +186,13 @@ Fresnel faceReflection(const Material& material, double cosine, double frequency
 
 }  // namespace
 
-std::vector<DiffractingEdge> findDiffractingEdges(const Scene& scene) {
+std::vector<DiffractingEdge> findDiffractingEdges(const Scene& scene, EdgesOf those) {
   std::vector<DiffractingEdge> edges;
   const Cover cover(scene);
   for (const Actor& actor : scene.actors) {
     if (!actor.present) continue;
     Pieces pieces;
-    addPieces(scene, actor, pieces);
+    addPieces(scene, actor, those, pieces);
     for (auto& [facets, list] : pieces) addEdges(scene, cover, facets, std::move(list), edges);
   }
   return edges;

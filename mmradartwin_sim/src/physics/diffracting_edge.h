@@ -22,11 +22,13 @@ struct DiffractingEdge {
   double n;                 ///< exterior angle over pi: 2 at a rim, 1.5 at a box's edge
 };
 
+enum class EdgesOf { kFacetsThatTakePart, kAllFacets };
+
 /// Edges of the facet graph that diffract: folds of more than 20 deg between two facets of one actor, and rims of open
-/// facets, along the stretches (2 cm and more) where no other facet touches them. Only facets that take part count.
+/// facets, along the stretches (2 cm and more) where no other facet touches them.
 /// Where two facets enclose less than half a turn of air, the edge is a corner of the room as seen from there;
 /// diffract() tells by the angles. The stretch where tessellations of two facets share no vertices is not found.
-std::vector<DiffractingEdge> findDiffractingEdges(const Scene& scene);
+std::vector<DiffractingEdge> findDiffractingEdges(const Scene& scene, EdgesOf those = EdgesOf::kFacetsThatTakePart);
 
 /// How one edge returns a field from source to observer.
 struct EdgeReturn {

@@ -7,9 +7,8 @@
 #include "physics/polarisation.h"
 
 namespace mmradartwin {
-
 void addImageRecord(const PoseContext& context, const ElementsInMap& elements, const ImagePath& path,
-                    const PathEvent& event, double cutoff, std::vector<PathRecord>& records) {
+                    const PathEvent& event, double cutoff, std::vector<PathRecord>& records, const GrazedEdges* edges) {
   const double wavelength = context.radar.wavelength_m();
   const int order = static_cast<int>(path.facets.size());
   const double total = (path.image - elements.p).norm();
@@ -28,18 +27,21 @@ void addImageRecord(const PoseContext& context, const ElementsInMap& elements, c
     before += leg.norm();
     record.reflection_cosine.push_back(std::min(1.0, std::abs(in.dot(facet.normal))));
     field = reflectField(field, in, facet.normal, material, context.frequency_hz);
-    weight *= specularShare(material) * apertureFactor(facet, path.vertices[i], in, before, total - before, wavelength);
+    const std::complex<double> aperture =
+        apertureFactor(facet, path.vertices[i], in, before, total - before, wavelength);
+    weight *= specularShare(material) * aperture;
     from = path.vertices[i];
     record.actors.push_back(facet.actor);
   }
   weight *= (verticalField(elements.up, arrival).cast<std::complex<double>>().transpose() * field)(0);
-  if (std::abs(weight) < cutoff) return;
+  if (edges) weight *= edges->factor(context, legsOf(context.scene, elements.p, path.facets, path.met));
+  if (std::abs(weight) < cutoff || !(std::abs(weight) > 0)) return;
   record.event = &event.name;
   record.facets = path.facets;
-  record.vertices = path.vertices;
+  record.vertices = path.met;
   const Eigen::Matrix3d to_radar = context.T_map_radar.linear().transpose();
-  record.departure = to_radar * (path.vertices.front() - elements.p).normalized();
-  record.arrival = to_radar * arrival;
+  record.departure = to_radar * (path.met.front() - elements.p).normalized();
+  record.arrival = to_radar * (path.met.back() - elements.p).normalized();
   record.bounces = order;
   record.length_m = elements.lengthsByImage([&](Eigen::Vector3d t) {
     for (int id : path.facets) t = mirror(t, context.scene.facets[id]);

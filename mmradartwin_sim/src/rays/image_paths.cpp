@@ -4,12 +4,19 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <tuple>
 
 namespace mmradartwin {
 namespace {
 
 constexpr double kInside_m = 1e-9;
 constexpr double kOnPlane_m = 1e-7;
+constexpr double kBesideInset_m = 0.01;  // within its boundary, where a facet returns what passes beside it
+
+/// How far beside a facet a path's vertex may lie at most.
+double besideReach_m(const ImageSearch::Limits& limits) {
+  return limits.wavelength_m > 0 ? kDarkReach * std::sqrt(limits.wavelength_m * limits.max_length_m / 8) : 0;
+}
 
 /// The view of a point through a rectangle: the pyramid over it, outward normals as rows.
 class Beam {
@@ -39,6 +46,32 @@ class Beam {
 double legGap(const Facet& facet, const Eigen::Vector3d& direction) {
   const double cosine = std::max(0.1, std::abs(facet.normal.dot(direction)));
   return std::max(1e-3, 2 * facet.flatness_m / cosine);
+}
+
+PathLegs legsOf(const Scene& scene, const Eigen::Vector3d& p, const PerInteraction<int>& facets,
+                const PerInteraction<Eigen::Vector3d>& vertices) {
+  PathLegs legs;
+  double before_m = 0;
+  for (std::size_t i = 0; i <= vertices.size(); ++i) {
+    const bool first = i == 0, last = i == vertices.size();
+    PathLeg leg{first ? p : vertices[i - 1],
+                last ? p : vertices[i],
+                1e-3,
+                before_m,
+                0,
+                {{first ? -1 : facets[i - 1], -1}, {last ? -1 : facets[i], -1}}};
+    const Eigen::Vector3d way = leg.to - leg.from;
+    const double length_m = way.norm();
+    for (const auto& end : leg.facets) {
+      if (end[0] >= 0) {
+        leg.gap_m = std::max(leg.gap_m, legGap(scene.facets[static_cast<std::size_t>(end[0])], way / length_m));
+      }
+    }
+    before_m += length_m;
+    legs.push_back(leg);
+  }
+  for (PathLeg& leg : legs) leg.total_m = before_m;
+  return legs;
 }
 
 ImageSearch::ImageSearch(const Scene& scene, bool all_orientations)
@@ -133,40 +166,66 @@ bool ImageSearch::solve(const Eigen::Vector3d& p, const PerInteraction<int>& seq
   Eigen::Vector3d at = p;
   for (int i = 0; i < order; ++i) image[i] = at = mirror(at, scene_.facets[sequence[i]]);
   if ((image[order - 1] - p).norm() > limits.max_length_m) return false;
-  std::array<Eigen::Vector3d, 8> vertex = image;
+  std::array<Eigen::Vector3d, 8> vertex = image, met = image;
+  const double total_m = (image[order - 1] - p).norm();
+  bool beside = false;
   at = p;
   for (int i = order - 1; i >= 0; --i) {
     const Facet& f = scene_.facets[sequence[i]];
     const double here = f.planeDistance(at), there = f.planeDistance(image[i]);
     if (!(here * there < 0) || std::abs(here) < kOnPlane_m || std::abs(there) < kOnPlane_m) return false;
     vertex[i] = at + here / (here - there) * (image[i] - at);
-    if (!f.contains(vertex[i], kInside_m)) return false;
+    met[i] = vertex[i];
+    if (!f.contains(vertex[i], kInside_m)) {
+      const Eigen::Vector3d way = vertex[i] - at;
+      const double length_m = way.norm();
+      if (beside || !(limits.wavelength_m > 0) || length_m < 1e-9) return false;
+      double after_m = length_m;
+      for (int k = i + 1; k < order; ++k) after_m += (vertex[k] - (k + 1 == order ? p : vertex[k + 1])).norm();
+      const double zone_m = std::sqrt(limits.wavelength_m * after_m * (total_m - after_m) / (2 * total_m));
+      const double cosine = std::max(0.1, std::abs(f.normal.dot(way)) / length_m);
+      if (!f.contains(vertex[i], std::min(kDarkReach * zone_m / cosine, besideReach_m(limits)))) return false;
+      beside = true;
+      met[i] = f.nearest(vertex[i], kBesideInset_m);
+    }
     at = vertex[i];
   }
   if (limits.in_view &&
-      (!limits.in_view((vertex[0] - p).normalized()) || !limits.in_view((vertex[order - 1] - p).normalized()))) {
+      (!limits.in_view((met[0] - p).normalized()) || !limits.in_view((met[order - 1] - p).normalized()))) {
     return false;
   }
   for (int i = 0; i < order; ++i) {
     const Facet& f = scene_.facets[sequence[i]];
-    if (!sides.isOpen(f, vertex[i], i == 0 ? p : vertex[i - 1]) ||
-        !sides.isOpen(f, vertex[i], i + 1 == order ? p : vertex[i + 1])) {
+    if (!sides.isOpen(f, met[i], i == 0 ? p : met[i - 1]) ||
+        !sides.isOpen(f, met[i], i + 1 == order ? p : met[i + 1])) {
       return false;
     }
   }
+  PathLeg leg;
+  leg.before_m = 0;
+  leg.total_m = total_m;
   for (int i = 0; i <= order; ++i) {
-    const Eigen::Vector3d& a = i == 0 ? p : vertex[i - 1];
-    const Eigen::Vector3d& b = i == order ? p : vertex[i];
-    const Eigen::Vector3d d = b - a;
+    leg.from = i == 0 ? p : met[i - 1];
+    leg.to = i == order ? p : met[i];
+    const Eigen::Vector3d d = leg.to - leg.from;
     const double length = d.norm();
     if (length < 1e-9) return false;
-    double gap = 1e-3;
-    if (i > 0) gap = std::max(gap, legGap(scene_.facets[sequence[i - 1]], d / length));
-    if (i < order) gap = std::max(gap, legGap(scene_.facets[sequence[i]], d / length));
-    if (!rays.visible(a, b, gap)) return false;
+    leg.gap_m = 1e-3;
+    if (i > 0) leg.gap_m = std::max(leg.gap_m, legGap(scene_.facets[sequence[i - 1]], d / length));
+    if (i < order) leg.gap_m = std::max(leg.gap_m, legGap(scene_.facets[sequence[i]], d / length));
+    if (!rays.visible(leg.from, leg.to, leg.gap_m)) {
+      if (!limits.passes) return false;
+      leg.facets[0][0] = i == 0 ? -1 : sequence[i - 1];
+      leg.facets[1][0] = i == order ? -1 : sequence[i];
+      leg.facets[0][1] = leg.facets[1][1] = -1;
+      if (!limits.passes(leg)) return false;
+    }
+    leg.before_m += length;
   }
   path.facets = sequence;
   path.vertices.assign(vertex.begin(), vertex.begin() + order);
+  path.met.assign(met.begin(), met.begin() + order);
+  path.beside = beside;
   path.image = image[order - 1];
   return true;
 }
@@ -182,6 +241,7 @@ class ImageSearch::Finder {
         limits_(limits),
         sides_(search.scene_, p),
         min_order_(min_order),
+        reach_m_(std::max(1e-6, besideReach_m(limits))),
         in_front_(search.reflectors_.size(), 1),
         wanted_(search.reflectors_.size(), 1),
         ways_to_(limits.max_order < 3 ? 0 : search.reflectors_.size()) {
@@ -192,6 +252,7 @@ class ImageSearch::Finder {
       }
       if (limits.only_actor >= 0) wanted_[i] = facet(i).actor == limits.only_actor;
       if (search.on_side_.empty()) all_.push_back(i);
+      windows_.push_back(window(static_cast<std::size_t>(i)));
     }
     for (const Mirror& m : search.mirrors_) {
       own_.push_back({m.normal.dot(p) - m.offset_m, m.e1.dot(p) - m.first1_m, m.e2.dot(p) - m.first2_m});
@@ -218,6 +279,19 @@ class ImageSearch::Finder {
 
   const Facet& facet(int reflector) const { return search_.scene_.facets[search_.reflectors_[reflector]]; }
 
+  /// The bounding rectangle with what lies beside it and still counts.
+  Eigen::Matrix<double, 3, 4> window(std::size_t reflector) const {
+    Eigen::Matrix<double, 3, 4> corners = search_.corners_[reflector].point;
+    if (!(limits_.wavelength_m > 0)) return corners;
+    const Mirror& m = search_.mirrors_[reflector];
+    const Eigen::Vector3d sum = reach_m_ * (m.e1 + m.e2), difference = reach_m_ * (m.e1 - m.e2);
+    corners.col(0) -= sum;
+    corners.col(1) += difference;
+    corners.col(2) += sum;
+    corners.col(3) -= difference;
+    return corners;
+  }
+
   double beyond_m(int b, const Eigen::Vector3d& image) const {
     const Mirror& m = search_.mirrors_[static_cast<std::size_t>(b)];
     return m.normal.dot(image) - m.offset_m;
@@ -231,9 +305,16 @@ class ImageSearch::Finder {
     if (!(o.distance_m * beyond_m > 0)) return false;
     const double share = o.distance_m / (o.distance_m + beyond_m);
     const double x = o.along1_m + share * (m.e1.dot(image_before) - m.first1_m - o.along1_m);
-    if (!(x > -1e-6 && x < m.size1_m + 1e-6)) return false;
+    if (!(x > -reach_m_ && x < m.size1_m + reach_m_)) return false;
     const double y = o.along2_m + share * (m.e2.dot(image_before) - m.first2_m - o.along2_m);
-    return y > -1e-6 && y < m.size2_m + 1e-6;
+    if (!(y > -reach_m_ && y < m.size2_m + reach_m_)) return false;
+    const double beside_m = std::max({-x, x - m.size1_m, -y, y - m.size2_m});
+    if (beside_m < 1e-6) return true;
+    // What solve() will ask for: the path goes straight to the image beyond the plane.
+    const double normal_m = std::abs(o.distance_m + beyond_m), difference_m = o.distance_m - beyond_m;
+    const double length2 = (image_before - p_).squaredNorm() - difference_m * difference_m + normal_m * normal_m;
+    const double zone2 = 0.5 * limits_.wavelength_m * std::sqrt(length2) * share * (1 - share);
+    return beside_m * beside_m * normal_m * normal_m <= kDarkReach * kDarkReach * zone2 * length2 * 1.0001;
   }
 
   void addSolved(const PerInteraction<int>& sequence) {
@@ -248,7 +329,7 @@ class ImageSearch::Finder {
     if (min_order_ <= 1 && wanted_[a]) addSolved({fa.id});
     if (limits_.max_order < 2) return;
     const Eigen::Vector3d image1 = mirror(p_, fa);
-    const Beam beam(image1, search_.corners_[a].point);
+    const Beam beam(image1, windows_[static_cast<std::size_t>(a)]);
     const bool any_side = search_.on_side_.empty();
     for (int b : any_side ? all_ : search_.on_side_[static_cast<std::size_t>(2 * a + (da > 0))]) {
       // Cheap tests first: few facets pass them where no third bounce follows.
@@ -256,7 +337,7 @@ class ImageSearch::Finder {
       if (b == a || std::abs(db) < kOnPlane_m) continue;
       const bool last = min_order_ <= 2 && (wanted_[a] || wanted_[b]) && in_front_[b] && meetsLast(b, db, image1);
       if ((!last && limits_.max_order < 3) || (any_side && !search_.faces(a, da > 0, b))) continue;
-      if (!beam.meets(search_.corners_[b].point)) continue;
+      if (!beam.meets(windows_[static_cast<std::size_t>(b)])) continue;
       const Facet& fb = facet(b);
       if (last && !perpendicular(fa, fb)) addSolved({fa.id, fb.id});
       if (limits_.max_order >= 3) ways_to_[static_cast<std::size_t>(b)][db > 0].push_back({a, image1});
@@ -285,7 +366,10 @@ class ImageSearch::Finder {
   /// The paths found, in the order of facets. Where the line to an image runs through an edge, several orders of the
   /// same facets are one path.
   std::vector<ImagePath> distinct() {
-    std::sort(found_.begin(), found_.end(), [](const ImagePath& a, const ImagePath& b) { return a.facets < b.facets; });
+    // Those that meet all their facets come first: they are the ones to keep.
+    std::sort(found_.begin(), found_.end(), [](const ImagePath& a, const ImagePath& b) {
+      return std::tie(a.beside, a.facets) < std::tie(b.beside, b.facets);
+    });
     std::vector<ImagePath> unique;
     for (const ImagePath& f : found_) {
       PerInteraction<int> set = f.facets;
@@ -299,6 +383,7 @@ class ImageSearch::Finder {
       }
       if (!known) unique.push_back(f);
     }
+    std::sort(unique.begin(), unique.end(), [](const ImagePath& a, const ImagePath& b) { return a.facets < b.facets; });
     return unique;
   }
 
@@ -308,9 +393,11 @@ class ImageSearch::Finder {
   const Limits& limits_;
   const SeenSides sides_;
   const int min_order_;
+  const double reach_m_;        // how far beside a facet a path may meet its plane
   std::vector<char> in_front_;  // can be first or last: some of the facet lies in front of the radar
   std::vector<char> wanted_;    // of Limits::only_actor
   std::vector<Own> own_;
+  std::vector<Eigen::Matrix<double, 3, 4>> windows_;
   std::vector<int> all_;  // reflectors, where sides are not known
   // Ways over one facet towards another, by the side of the other that they come to. A path of three bounces runs both
   // ways: it is one of these from either end, in the middle.

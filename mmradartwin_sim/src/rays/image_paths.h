@@ -16,15 +16,35 @@ inline Eigen::Vector3d mirror(const Eigen::Vector3d& p, const Facet& facet) {
   return p - 2 * facet.planeDistance(p) * facet.normal;
 }
 
+/// Fresnel parameter up to which a path passes on the dark side of an edge, sqrt(2): the first Fresnel zone touches it.
+constexpr double kDarkReach = 1.4142135623730951;
+
+/// One straight part of a closed path.
+struct PathLeg {
+  Eigen::Vector3d from, to;
+  double gap_m;      ///< that rays leave at its ends
+  double before_m;   ///< along the path, up to its beginning
+  double total_m;    ///< of the path
+  int facets[2][2];  ///< that it begins and ends at, -1 where there is none
+};
+using PathLegs = boost::container::small_vector<PathLeg, 4>;
+
 /// Gap in m that a ray along `direction` leaves at a facet: a merged facet of a scan lies off the triangles that Embree
 /// sees.
 double legGap(const Facet& facet, const Eigen::Vector3d& direction);
 
+/// The legs of a path from p over points on facets and back.
+PathLegs legsOf(const Scene& scene, const Eigen::Vector3d& p, const PerInteraction<int>& facets,
+                const PerInteraction<Eigen::Vector3d>& vertices);
+
 /// A closed specular path from a point back to it.
 struct ImagePath {
-  PerInteraction<int> facets;  ///< in the order in which they are met
-  PerInteraction<Eigen::Vector3d> vertices;
+  PerInteraction<int> facets;                ///< in the order in which they are met
+  PerInteraction<Eigen::Vector3d> vertices;  ///< on the facets' planes
+  PerInteraction<Eigen::Vector3d>
+      met;                ///< likewise, but where a vertex lies beside its facet the facet's nearest point
   Eigen::Vector3d image;  ///< of the point through all facets; the path is as long as it is far
+  bool beside = false;    ///< one of the vertices lies beside its facet
 };
 
 /// Exhaustive image search over a scene's facets; what depends on the scene alone is computed once.
@@ -41,10 +61,16 @@ class ImageSearch {
     int only_actor = -1;  ///< paths that meet this actor alone are found; -1: all are
     /// Directions (map, from the point outwards) in which the radar sends and receives; empty: all.
     std::function<bool(const Eigen::Vector3d&)> in_view;
+    /// Paths that pass beside one of their facets count up to kDarkReach; 0: none does.
+    double wavelength_m = 0;
+    /// Says whether a path goes on over a leg that something blocks, as edges leave light behind them; empty: none
+    /// does.
+    std::function<bool(const PathLeg&)> passes;
     /// Half space of in_view, for pruning: unit vector, or zero.
     Eigen::Vector3d forward = Eigen::Vector3d::Zero();
   };
-  /// Paths of order min_order..max_order whose reflection points lie inside their facets and whose legs are all free.
+  /// Paths of order min_order..max_order whose reflection points lie inside their facets, one of them at most a Fresnel
+  /// zone beside, and whose legs are all free or passed.
   /// Each facet sequence once; two sequences of the same facets with the same image once; perpendicular pairs at
   /// order 2 not at all (they are the corner's).
   std::vector<ImagePath> find(const Eigen::Vector3d& p, const RayCaster& rays, const Limits& limits,

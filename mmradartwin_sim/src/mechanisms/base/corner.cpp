@@ -13,8 +13,13 @@ const std::string kCorner = "corner";
 class Corner : public Mechanism, public PathStage {
  public:
   const std::string& name() const override { return kCorner; }
-  std::vector<ParameterSpec> parameters() const override { return {}; }
-  void configure(const Parameters&, const Scene&, const RadarConfig&) override {}
+  std::vector<ParameterSpec> parameters() const override {
+    return {integerSpec("knife_edges", "1", 0, 1, 0,
+                        "1: both faces by physical optics with exact paths; 0: one aperture from far end to far end")};
+  }
+  void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
+    aperture_ = values.number("knife_edges") > 0.5 ? CornerAperture::kPhysicalOptics : CornerAperture::kBothFaces;
+  }
 
   void build(const Scene& scene, const RadarConfig&) override {
     edges_ = findCornerEdges(
@@ -43,12 +48,13 @@ class Corner : public Mechanism, public PathStage {
     const auto wanted = [&](int facet) { return context.scene.facets[facet].actor == context.only_actor; };
     for (const CornerEdge& edge : edges_) {
       if (context.only_actor >= 0 && !wanted(edge.a) && !wanted(edge.b)) continue;
-      addCornerPath(context, elements, edge, {kCorner, 1}, records);
+      addCornerPath(context, elements, edge, {kCorner, 1}, records, aperture_);
     }
     for (const Trihedral& t : trihedra_) addTrihedralPath(context, elements, t, {kCorner, 1}, records);
   }
 
  private:
+  CornerAperture aperture_ = CornerAperture::kBothFaces;
   std::vector<CornerEdge> edges_;
   std::vector<Trihedral> trihedra_;
 };

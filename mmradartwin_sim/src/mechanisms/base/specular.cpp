@@ -6,6 +6,7 @@
 #include "physics/corner_in_walls.h"
 #include "physics/curved_echo.h"
 #include "physics/elements_in_map.h"
+#include "physics/grazed_edges.h"
 #include "physics/image_record.h"
 #include "physics/polarisation.h"
 #include "rays/image_paths.h"
@@ -29,23 +30,29 @@ class Specular : public Mechanism, public PathStage {
                                       "rays launched per pose to seed the orders that cannot be searched exhaustively");
     budget.kind = ParameterKind::kInteger;
     return {bounces, numberSpec("power_cutoff_db", "dB", -400, 0, -200, "paths with 20 log10(A_p) below are dropped"),
-            budget};
+            budget,
+            integerSpec(
+                "knife_edges", "1", 0, 1, 0,
+                "1: edges within a Fresnel zone weigh a path, and echoes have exact paths; 0: they hide by 0 or 1")};
   }
 
   void configure(const Parameters& values, const Scene&, const RadarConfig&) override {
     max_bounces_ = static_cast<int>(values.number("max_bounces"));
     ray_budget_ = static_cast<int>(values.number("ray_budget"));
+    knife_edges_ = values.number("knife_edges") > 0.5;
     cutoff_ = std::pow(10.0, values.number("power_cutoff_db") / 20);
   }
 
   void build(const Scene& scene, const RadarConfig&) override {
     search_ = std::make_unique<ImageSearch>(scene);
+    if (knife_edges_) grazed_ = std::make_unique<GrazedEdges>(scene);
     exhaustive_ = std::min(max_bounces_, search_->exhaustiveOrder());
     findEdges(scene);
   }
 
   void sceneChanged(const Scene& scene, const RadarConfig&, const SceneChange& change) override {
     search_->update(change.actors);
+    if (knife_edges_) grazed_ = std::make_unique<GrazedEdges>(scene);
     exhaustive_ = std::min(max_bounces_, search_->exhaustiveOrder());
     findEdges(scene);
   }
@@ -96,10 +103,14 @@ class Specular : public Mechanism, public PathStage {
     limits.forward = context.T_map_radar.linear().col(0);
     const Eigen::Matrix3d to_radar = context.T_map_radar.linear().transpose();
     limits.only_actor = only;
+    if (grazed_) {
+      limits.wavelength_m = context.radar.wavelength_m();
+      limits.passes = [&](const PathLeg& leg) { return grazed_->passes(leg, limits.wavelength_m); };
+    }
     limits.in_view = [&](const Eigen::Vector3d& d) { return context.inFieldOfView(to_radar * d); };
     if (exhaustive_ >= 2) {
       for (const ImagePath& path : search_->find(elements.p, context.rays, limits, 2))
-        addImageRecord(context, elements, path, {kSpecular, 1}, cutoff_, records);
+        addImageRecord(context, elements, path, {kSpecular, 1}, cutoff_, records, grazed_.get());
     }
     addCornersInWalls(context, elements, limits, records);
     if (exhaustive_ < max_bounces_ && ray_budget_ > 0) {
@@ -113,7 +124,7 @@ class Specular : public Mechanism, public PathStage {
           continue;
         if (!search_->solve(elements.p, sequence, context.rays, limits, path)) continue;
         const std::size_t before = records.size();
-        addImageRecord(context, elements, path, {kSpecular, 1}, cutoff_, records);
+        addImageRecord(context, elements, path, {kSpecular, 1}, cutoff_, records, grazed_.get());
         if (records.size() == before) continue;
         ++seeded_paths_;
         late_paths_ += !by_half;
@@ -172,19 +183,32 @@ class Specular : public Mechanism, public PathStage {
     if (!context.inFieldOfView(direction_radar)) return;
     if (!elements.sides.isOpen(facet, vertex, elements.p)) return;
     const double gap = std::max(1e-3, 2 * facet.flatness_m / std::max(0.1, std::abs(direction.dot(facet.normal))));
-    if (!context.rays.visible(elements.p, vertex, gap)) return;
+    const PathLegs legs{{elements.p, vertex, gap, 0, 2 * distance, {{-1, -1}, {facet.id, -1}}},
+                        {vertex, elements.p, gap, distance, 2 * distance, {{facet.id, -1}, {-1, -1}}}};
+    if (!context.rays.visible(elements.p, vertex, gap) && !(grazed_ && grazed_->passes(legs[0], wavelength))) return;
     const Eigen::Vector3d straight =
         -signed_distance / R * facet.normal;  // the image's direction, also beside the facet
-    const std::complex<double> factor = apertureFactor(facet, foot, straight, R, R, wavelength);
+    std::complex<double> factor =
+        knife_edges_ ? echoFactor(facet, foot, R, wavelength) : apertureFactor(facet, foot, straight, R, R, wavelength);
     if (std::abs(factor) < kSmallestFactor) return;
+    if (grazed_) factor *= grazed_->factor(context, legs);
+    if (!(std::abs(factor) > 0)) return;
 
     const Material& material = context.scene.actors[facet.actor].material;
     const Eigen::Vector3d e = verticalField(elements.up, straight);
     const ComplexVector back =
         reflectField(e.cast<std::complex<double>>(), straight, facet.normal, material, context.frequency_hz);
     const std::complex<double> gamma = (e.cast<std::complex<double>>().transpose() * back)(0);
-    const std::complex<double> coefficient = wavelength / (4 * M_PI * 2 * R) * specularShare(material) * gamma * factor;
+    std::complex<double> coefficient = wavelength / (4 * M_PI * 2 * R) * specularShare(material) * gamma * factor;
     if (std::abs(coefficient) < cutoff_) return;
+    if (knife_edges_ && !inside) {
+      // The factor's phase is against the image's path, the record's is against that over the vertex.
+      const auto phase = [&](double length_m) {
+        const double tau_s = length_m / kSpeedOfLight_m_per_s;
+        return 2 * M_PI * (context.frequency_hz - 0.5 * context.radar.slope_hz_per_s * tau_s) * tau_s;
+      };
+      coefficient *= std::polar(1.0, phase(2 * distance) - phase(2 * R));
+    }
     PathRecord record;
     record.event = &kSpecular;
     record.actors = {facet.actor};
@@ -235,7 +259,9 @@ class Specular : public Mechanism, public PathStage {
 
   int max_bounces_ = 3, ray_budget_ = 0, exhaustive_ = 0;
   double cutoff_ = 0;
+  bool knife_edges_ = false;
   std::unique_ptr<ImageSearch> search_;
+  std::unique_ptr<GrazedEdges> grazed_;  // where asked for
   std::vector<CornerEdge> edges_;
   // Convergence as notes() states it; no result depends on it.
   mutable std::atomic<int> seeded_poses_{0}, seeded_paths_{0}, late_paths_{0};
