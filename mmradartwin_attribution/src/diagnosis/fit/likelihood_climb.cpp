@@ -84,7 +84,11 @@ std::vector<SessionLatents> LikelihoodClimb::startingLatents() const {
     std::fill(without_ranges.actor_range_m.begin(), without_ranges.actor_range_m.end(), 0.0);
     SessionLatents without_errors = without_ranges;
     std::fill(without_errors.actor_gain.begin(), without_errors.actor_gain.end(), 0.0);
-    candidates.insert(candidates.end(), {without_headings, without_ranges, without_errors});
+    // The null's own levels of errors have grown by what the cause does.
+    SessionLatents usual_levels = task_.latents;
+    const SessionLatents usual;
+    for (int j = kRelative; j < kShape; ++j) usual_levels.global(j) = usual.global(j);
+    candidates.insert(candidates.end(), {without_headings, without_ranges, without_errors, usual_levels});
     for (const Hypothesis& h : task_.parts) {
       const int actor = source_.base().scene().actorIndex(h.subject);
       if (actor >= 0) candidates.push_back(withoutErrors(task_.latents, actor));

@@ -476,13 +476,9 @@ void ChannelLikelihood::addPriors(const SessionLatents& latents, Scores& scores)
     scores.information(kActors + errors_ + a, kActors + errors_ + a) += range;
     scores.total[kActors + errors_ + a] -= range * latents.actor_range_m[a];
   }
-  // Levels of errors have a wide prior (a factor of 10 in power), so that none diverges where no data shows it.
-  const double rough = 1 / (2.3 * 2.3);
-  const SessionLatents usual;
-  for (int j = kRelative; j < kActors; ++j) {
-    scores.information(j, j) += rough;
-    scores.total[j] -= rough * (latents.global(j) - usual.global(j));
-  }
+  // Levels of errors that no data shows have no information. A little holds their steps, not their values.
+  constexpr double kHeld = 1 / (2.3 * 2.3);
+  for (int j = kRelative; j < kActors; ++j) scores.information(j, j) += kHeld;
 }
 
 void ChannelLikelihood::holdAtLimits(const SessionLatents& latents, Scores& scores) const {
