@@ -183,8 +183,11 @@ class Specular : public Mechanism, public PathStage {
     if (!context.inFieldOfView(direction_radar)) return;
     if (!elements.sides.isOpen(facet, vertex, elements.p)) return;
     const double gap = std::max(1e-3, 2 * facet.flatness_m / std::max(0.1, std::abs(direction.dot(facet.normal))));
-    const PathLegs legs{{elements.p, vertex, gap, 0, 2 * distance, {{-1, -1}, {facet.id, -1}}},
-                        {vertex, elements.p, gap, distance, 2 * distance, {{facet.id, -1}, {-1, -1}}}};
+    PathLegs legs;
+    if (grazed_) {
+      legs = {{elements.p, vertex, gap, 0, 2 * distance, {{-1, -1}, {facet.id, -1}}},
+              {vertex, elements.p, gap, distance, 2 * distance, {{facet.id, -1}, {-1, -1}}}};
+    }
     if (!context.rays.visible(elements.p, vertex, gap) && !(grazed_ && grazed_->passes(legs[0], wavelength))) return;
     const Eigen::Vector3d straight =
         -signed_distance / R * facet.normal;  // the image's direction, also beside the facet
