@@ -34,6 +34,17 @@ void GainMeasurement::ofFit(const ModelState& before, HypothesisFit& fit, Findin
   finding.gain->log_likelihood_per_pose = likelihoodGain(context_.data, before.by_pose, likelihood);
 }
 
+GainMetric GainMeasurement::between(const ModelState& before, HypothesisFit& one, HypothesisFit& other) {
+  std::vector<CellPowers> powers[2];
+  for (int i = 0; i < 2; ++i) {
+    HypothesisFit& fit = i == 0 ? one : other;
+    context_.fitter.shortenFoldSteps(before, fit);
+    powers[i] = cellPowers(context_.data, heldOutEchoes(before.mechanisms, fit, {}));
+  }
+  context_.echoes.setBaseline(before.mechanisms);
+  return explainedPowerGain(context_.data, powers[0], powers[1]);
+}
+
 void GainMeasurement::ofChange(const ChannelData& before_data, const std::vector<NamedParameters>& before,
                                const ChannelData& after_data, const std::vector<NamedParameters>& after,
                                Finding& finding) {

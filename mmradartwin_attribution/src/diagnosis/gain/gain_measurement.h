@@ -24,6 +24,8 @@ class GainMeasurement {
   /// Gain of a fit over `before` in explained power and log-likelihood. Each fold of locations is expected with the
   /// values that the other folds gave.
   void ofFit(const ModelState& before, HypothesisFit& fit, Finding& finding);
+  /// Gain in explained power of one fit over another, both added to `before`, on places that neither saw.
+  GainMetric between(const ModelState& before, HypothesisFit& one, HypothesisFit& other);
   /// Gain in explained power of one list of mechanisms and its data over another, with nothing fitted. Does nothing
   /// with fewer than two locations. The expected echoes keep `before` as their baseline.
   void ofChange(const ChannelData& before_data, const std::vector<NamedParameters>& before,

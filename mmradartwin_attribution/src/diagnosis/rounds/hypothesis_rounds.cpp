@@ -134,22 +134,22 @@ bool HypothesisRounds::standsBeside(const std::vector<HypothesisFit>& clutter, c
   return rejectionByLikelihood(again).empty();
 }
 
-std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<HypothesisFit>& fits, std::size_t best,
-                                                          const GainMetric& explained) {
+std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<HypothesisFit>& fits, std::size_t best) {
   const ModelState& state = selection_.state();
   std::optional<std::size_t> better;
-  double most = explained.after + bounds::kLeastExplainedMore;
+  double most = bounds::kLeastExplainedMore;
   for (std::size_t i = best + 1; i < fits.size(); ++i) {
     HypothesisFit& rival = fits[i];
-    if (rival.ranking() < bounds::kAboutAsLikely * fits[best].ranking()) break;
-    if (!isCatalogued(rival.hypothesis.mechanism.mechanism) || !rejectionByLikelihood(rival).empty()) continue;
-    Finding finding = findingOf(rival, fits, state, context_.twin.scene(), context_.data);
-    gains_.ofFit(state, rival, finding);
-    const GainMetric& other = finding.gain->explained_power;
-    // The lower end of its interval: both are read from the same places.
-    if (other.before + (*other.difference_ci95)[0] <= most) continue;
+    const bool as_likely = rival.ranking() >= bounds::kAboutAsLikely * fits[best].ranking() ||
+                           natsApart(fits[best], rival, context_.data) <= bounds::kNotToldApart_nats;
+    if (!as_likely || !isCatalogued(rival.hypothesis.mechanism.mechanism) || !rejectionByLikelihood(rival).empty()) {
+      continue;
+    }
+    // Both are read from the same places, so that their difference is surer than either.
+    const double more = (*gains_.between(state, fits[best], rival).difference_ci95)[0];
+    if (!(more > most)) continue;
     better = i;
-    most = other.before + (*other.difference_ci95)[0];
+    most = more;
   }
   return better;
 }
@@ -180,7 +180,7 @@ bool HypothesisRounds::findOne(int round) {
       gains_.ofFit(state, fit, finding);
       verdict = maps.rejection(fit, *finding.gain);
       if (!verdict.empty()) continue;
-      if (const auto better = betterByMaps(fits, i, finding.gain->explained_power)) {
+      if (const auto better = betterByMaps(fits, i)) {
         verdict = "no likelier than " + fits[*better].hypothesis.label() + ", which explains more";
         const auto next = fits.begin() + static_cast<std::ptrdiff_t>(i) + 1;
         std::rotate(next, fits.begin() + static_cast<std::ptrdiff_t>(*better),
