@@ -8,6 +8,7 @@
 #include <memory>
 #include <numeric>
 
+#include "diagnosis/likelihood/bounded_step.h"
 #include "diagnosis/likelihood/profiled_scores.h"
 
 namespace mmradartwin::diagnosis::fit {
@@ -21,7 +22,10 @@ constexpr double kClimb_steps = 4;       ///< steps as good as the last one with
 constexpr double kSearched[] = {0.3, 0.15};        ///< first steps of the search without slopes, scaled
 constexpr double kSearchTolerance = 0.02;          ///< tolerance of that search, scaled
 constexpr int kSearchPlaces = 12;                  ///< evaluations of that search per coordinate
+constexpr double kShareOfPower = 0.125;            ///< step of the derivative by a power, in which all is linear
 constexpr double kLongestStep = 3;                 ///< longest step, scaled
+constexpr double kLongestShare = 8;                ///< of a step that gains more than it promises
+constexpr double kLeastShare = 0.3;                ///< of a logarithmic number that a step leaves
 constexpr double kStepShares[] = {1.0, 0.4, 0.1};  ///< shares of a step that are tried until one gains
 constexpr double kOneSidedFactors[] = {0.4, 2.0};  ///< factors on a one-sided start
 constexpr int kScanned = 12;                       ///< values over the range of a number that is no range
@@ -160,7 +164,8 @@ Scores LikelihoodClimb::derivatives(const ModelState& state, const std::vector<d
   SessionCovariance here;
   for (std::size_t j = 0; j < coordinates_.size(); ++j) {
     const Coordinate& coordinate = coordinates_[j];
-    const double step = coordinate.logarithmic() ? kSmallStep * std::max(1e-4, std::abs(scaled_values[j])) : kSmallStep;
+    const double step =
+        coordinate.logarithmic() ? kShareOfPower * std::max(1e-4, std::abs(scaled_values[j])) : kSmallStep;
     const auto covarianceAt = [&](double by) {
       std::vector<double> moved = scaled_values;
       moved[j] += by;
@@ -168,24 +173,44 @@ Scores LikelihoodClimb::derivatives(const ModelState& state, const std::vector<d
           source_.echoesNear(mechanismsAt(moved), state.mechanisms, everyone_, state.actor_range_m), state.latents,
           everyone_);
     };
-    // The likelihood of one strong path is a narrow ridge. A one-sided difference would contain the square of a turn or
-    // of a gain, which hides the slope and makes the information many times too large.
-    if (!coordinate.oneSided()) {
+    // The likelihood of one strong path is a narrow ridge. A one-sided difference would contain the square of a turn,
+    // of a shift or of a gain, which hides the slope and makes the information many times too large. A power is linear.
+    const auto [low, high] = scaledLimits(coordinate);
+    const double v = scaled_values[j];
+    if (!coordinate.logarithmic() && v - step >= low && v + step <= high) {
       directions.push_back(difference(covarianceAt(step), covarianceAt(-step), 2 * step));
       continue;
     }
     if (here.empty()) here = model_.covariance(state.echoes, state.latents, everyone_);
-    directions.push_back(difference(covarianceAt(step), here, everyone_, step));
+    const double inward = v + step <= high ? step : -step;
+    directions.push_back(difference(covarianceAt(inward), here, everyone_, inward));
   }
   return model_.scores(model_.basis(state.echoes, state.latents), directions, everyone_);
+}
+
+BoundedStep LikelihoodClimb::bestStep() const {
+  const auto [latents_low, latents_high] = model_.stepBounds(optimum_.state.latents);
+  const auto n = static_cast<Eigen::Index>(coordinates_.size());
+  Eigen::VectorXd low(globals_ + n), high(globals_ + n);
+  low.head(globals_) = latents_low;
+  high.head(globals_) = latents_high;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Coordinate& c = coordinates_[static_cast<std::size_t>(j)];
+    const double v = optimum_.scaled_values[static_cast<std::size_t>(j)];
+    auto [least, most] = scaledLimits(c);
+    if (c.logarithmic()) least = std::max(least, kLeastShare * v);
+    low[globals_ + j] = std::clamp(least - v, -kLongestStep, 0.0);
+    high[globals_ + j] = std::clamp(most - v, 0.0, kLongestStep);
+  }
+  return boundedStep(regularised(optimum_.scores.information), optimum_.scores.total, low, high);
 }
 
 void LikelihoodClimb::climb() {
   double risen = 0, promised_nats = 0;
   for (int i = 0;; ++i) {
     optimum_.scores = derivatives(optimum_.state, optimum_.scaled_values);
-    const Eigen::VectorXd step = regularised(optimum_.scores.information).ldlt().solve(optimum_.scores.total);
-    const double screened_nats = 0.5 * optimum_.scores.total.dot(step);
+    const BoundedStep best = bestStep();
+    const double screened_nats = best.promised_nats;
     const bool hopeless = task_.null != nullptr && i >= 2 &&
                           optimum_.state.log_likelihood + kClimb_steps * std::max(risen, screened_nats) <
                               task_.null->log_likelihood + task_.least_nats;
@@ -194,7 +219,7 @@ void LikelihoodClimb::climb() {
     const bool rising = risen > kRising_nats || (screened_nats > kRising_nats && risen > kKeptPromise * promised_nats);
     const int most = rising ? kRisingFactor * task_.steps : task_.steps;
     if (i >= most || screened_nats < kLeastStep_nats || hopeless) return;
-    const double gained = stepBy(step);
+    const double gained = stepBy(best);
     if (!(gained > 0)) return;
     risen = gained;
     promised_nats = screened_nats;
@@ -245,24 +270,33 @@ void LikelihoodClimb::takeOverErrors() {
   climb();
 }
 
-double LikelihoodClimb::stepBy(const Eigen::VectorXd& step) {
+std::optional<double> LikelihoodClimb::tryStep(const Eigen::VectorXd& step, const Optimum& from, double share) {
+  std::vector<double> next = from.scaled_values;
+  for (std::size_t j = 0; j < next.size(); ++j) {
+    const auto [low, high] = scaledLimits(coordinates_[j]);
+    next[j] = std::clamp(next[j] + share * step[globals_ + static_cast<Eigen::Index>(j)], low, high);
+  }
+  ModelState s = stateAt(next, model_.stepped(from.state.latents, step.head(globals_), from.scores, step, share));
+  const double gained = s.log_likelihood - optimum_.state.log_likelihood;
+  if (!(gained > 0)) return std::nullopt;
+  optimum_.state = std::move(s);
+  optimum_.scaled_values = std::move(next);
+  return gained;
+}
+
+double LikelihoodClimb::stepBy(const BoundedStep& best) {
+  const Optimum from = optimum_;
   for (double share : kStepShares) {
-    std::vector<double> next = optimum_.scaled_values;
-    for (std::size_t j = 0; j < next.size(); ++j) {
-      const Coordinate& c = coordinates_[j];
-      double& v = next[j];
-      v += share * std::clamp(step[globals_ + static_cast<Eigen::Index>(j)], -kLongestStep, kLongestStep);
-      if (c.logarithmic()) v = std::max(v, 0.3 * optimum_.scaled_values[j]);
-      const auto [low, high] = scaledLimits(c);
-      v = std::clamp(v, low, high);
+    const auto gained = tryStep(best.step, from, share);
+    if (!gained) continue;
+    // A step that gains more than its quadratic promises is too short.
+    double sum = *gained;
+    for (double longer = 2 * share; share == 1 && longer <= kLongestShare && sum > best.promised_nats; longer *= 2) {
+      const auto more = tryStep(best.step, from, longer);
+      if (!more) break;
+      sum += *more;
     }
-    ModelState s =
-        stateAt(next, model_.stepped(optimum_.state.latents, step.head(globals_), optimum_.scores, step, share));
-    if (s.log_likelihood <= optimum_.state.log_likelihood) continue;
-    const double gained = s.log_likelihood - optimum_.state.log_likelihood;
-    optimum_.state = std::move(s);
-    optimum_.scaled_values = next;
-    return gained;
+    return sum;
   }
   return 0;
 }

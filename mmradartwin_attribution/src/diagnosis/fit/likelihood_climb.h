@@ -1,10 +1,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "diagnosis/fit/hypothesis_fit.h"
 #include "diagnosis/hypotheses/hypothesis.h"
+#include "diagnosis/likelihood/bounded_step.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/rooms.h"
@@ -57,14 +59,19 @@ class LikelihoodClimb {
   void tryStarts();
   Scores derivatives(const ModelState& state, const std::vector<double>& scaled_values) const;
   void climb();
+  /// Step of the globals and of the coordinates that the quadratic at the optimum promises most for.
+  likelihood::BoundedStep bestStep() const;
   /// Climbs once more from the optimum with latents out of their trap, see ChannelLikelihood::fitWithoutTrap().
   void climbOutOfTrap();
   /// Climbs once more from where the subject has taken over what latent errors of its actors stand for. Seen from one
   /// side, a move and an error of its range are alike, a material's level and its actors' own, and a climb ends early
   /// on the ridge between them.
   void takeOverErrors();
-  /// Takes the longest share of a step that gains. Returns the gain, 0 where no share gains.
-  double stepBy(const Eigen::VectorXd& step);
+  /// Takes the longest share of a step that gains, and more of a step that gains more than it promises. Returns the
+  /// gain, 0 where no share gains.
+  double stepBy(const likelihood::BoundedStep& best);
+  /// Makes a share of a step the optimum where it is likelier. Returns how much.
+  std::optional<double> tryStep(const Eigen::VectorXd& step, const Optimum& from, double share);
   /// Tries values over the whole range of a single number, and climbs from one that is likelier than the optimum.
   /// Values of a range lie half a bin apart.
   void scan();

@@ -104,6 +104,11 @@ class ChannelLikelihood {
   /// can hold it at hundreds, beside a higher maximum. Latents of a lower likelihood than `reached` are not taken.
   /// Returns the higher of both.
   double fitWithoutTrap(const std::vector<PoseEchoes>& echoes, SessionLatents& latents, double reached) const;
+  struct Bounds {
+    Eigen::VectorXd low, high;  ///< [globals] low <= 0 <= high
+  };
+  /// Least and largest change of the globals in one step.
+  Bounds stepBounds(const SessionLatents& from) const;
   /// Latents after a share of a step of the globals, with each heading's best response to whole_step. Values and steps
   /// are limited.
   SessionLatents stepped(const SessionLatents& from, const Eigen::VectorXd& globals, const Scores& scores,

@@ -3,7 +3,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "diagnosis/likelihood/bounded_step.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
+#include "diagnosis/likelihood/profiled_scores.h"
 
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
@@ -19,18 +21,28 @@ constexpr double kLeastGain_nats = 0.01;  ///< gain of a step below which fit() 
 SessionLatents ChannelLikelihood::stepped(const SessionLatents& from, const Eigen::VectorXd& g, const Scores& scores,
                                           const Eigen::VectorXd& whole_step, double share) const {
   SessionLatents latents = from;
-  const auto held = [share](double step, double limit) { return std::clamp(share * step, -limit, limit); };
+  const Bounds bounds = stepBounds(from);
   for (int j = 0; j < latents.globals(); ++j) {
     const Limits limits = limitsOf(j, errors_, spread_);
-    double& v = latents.global(j);
-    v = std::clamp(v + held(g[j], limits.step), limits.low, limits.high);
+    const double change = share * std::clamp(g[j], bounds.low[j], bounds.high[j]);
+    latents.global(j) = std::clamp(from.global(j) + change, limits.low, limits.high);
   }
   for (std::size_t i = 0; i < latents.yaw_rad.size(); ++i) {
     const double step =
         scores.yaw_step[i] - scores.yaw_coupling.row(static_cast<Eigen::Index>(i)).dot(whole_step.transpose());
-    latents.yaw_rad[i] = std::clamp(latents.yaw_rad[i] + held(step, 0.02), -0.06, 0.06);
+    latents.yaw_rad[i] = std::clamp(latents.yaw_rad[i] + std::clamp(share * step, -0.02, 0.02), -0.06, 0.06);
   }
   return latents;
+}
+
+ChannelLikelihood::Bounds ChannelLikelihood::stepBounds(const SessionLatents& from) const {
+  Bounds bounds{Eigen::VectorXd(from.globals()), Eigen::VectorXd(from.globals())};
+  for (int j = 0; j < from.globals(); ++j) {
+    const Limits limits = limitsOf(j, errors_, spread_);
+    bounds.low[j] = std::clamp(limits.low - from.global(j), -limits.step, 0.0);
+    bounds.high[j] = std::clamp(limits.high - from.global(j), 0.0, limits.step);
+  }
+  return bounds;
 }
 
 double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLatents& latents, int iterations) const {
@@ -40,8 +52,9 @@ double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLate
   for (int i = 0; i < iterations; ++i) {
     const Scores derivatives = scores(basis(echoes, latents, false), {}, all);
     best = derivatives.log_likelihood;
-    const Eigen::VectorXd step = derivatives.information.ldlt().solve(derivatives.total);
-    const double screened_nats = 0.5 * derivatives.total.dot(step);
+    const Bounds bounds = stepBounds(latents);
+    const auto [step, promised_nats] =
+        boundedStep(regularised(derivatives.information), derivatives.total, bounds.low, bounds.high);
     bool better = false;
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(step.size());
     // All numbers together; where that fails, headings alone, then globals alone.
@@ -57,7 +70,7 @@ double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLate
       best = value;
       better = true;
     }
-    if (best - derivatives.log_likelihood < kLeastGain_nats || screened_nats < kLeastStep_nats) break;
+    if (best - derivatives.log_likelihood < kLeastGain_nats || promised_nats < kLeastStep_nats) break;
   }
   return best;
 }

@@ -8,7 +8,10 @@
 
 namespace mmradartwin::diagnosis::likelihood {
 
-constexpr double kSmallStep = 0.125;        ///< step of numerical derivatives, scaled
+/// Step of numerical derivatives, scaled. An echo 35 to 60 dB above its floor turns away from its covariance within
+/// some millimetres: at six times this step a score was three times the slope of the likelihood. Ten times less would
+/// show the rounding of single precision.
+constexpr double kSmallStep = 0.02;
 constexpr double kMostOverdispersion = 50;  ///< limit of every overdispersion over places
 
 /// Scores of a hypothesis' coordinates with everything else of the model refitted to first order (Schur complement).

@@ -16,6 +16,8 @@ double& SessionLatents::global(int j) {
 
 Limits limitsOf(int global, int errors, const LatentSpread& spread) {
   constexpr double kAny = std::numeric_limits<double>::infinity();
+  // What stands outside the scene has its place by parameters of its own, and not by the scene's error.
+  if (global == kActors + 2 * errors - 1) return {0, 0, spread.actor_range_m};
   if (global >= kActors + errors) {
     return {-spread.most_range_error_m, spread.most_range_error_m, spread.actor_range_m};
   }
