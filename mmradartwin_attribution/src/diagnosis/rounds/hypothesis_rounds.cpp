@@ -140,11 +140,8 @@ std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<Hypothesis
   double most = bounds::kLeastExplainedMore;
   for (std::size_t i = best + 1; i < fits.size(); ++i) {
     HypothesisFit& rival = fits[i];
-    const bool as_likely = rival.ranking() >= bounds::kAboutAsLikely * fits[best].ranking() ||
-                           natsApart(fits[best], rival, context_.data) <= bounds::kNotToldApart_nats;
-    if (!as_likely || !isCatalogued(rival.hypothesis.mechanism.mechanism) || !rejectionByLikelihood(rival).empty()) {
-      continue;
-    }
+    if (rival.ranking() < bounds::kAboutAsLikely * fits[best].ranking()) break;
+    if (!isCatalogued(rival.hypothesis.mechanism.mechanism) || !rejectionByLikelihood(rival).empty()) continue;
     // Both are read from the same places, so that their difference is surer than either.
     const double more = (*gains_.between(state, fits[best], rival).difference_ci95)[0];
     if (!(more > most)) continue;
