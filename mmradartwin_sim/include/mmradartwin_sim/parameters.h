@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -10,6 +11,8 @@ namespace mmradartwin {
 
 enum class ParameterKind { kNumber, kInteger, kText, kNumbers, kTexts };
 
+using ParameterValue = std::variant<double, std::string, std::vector<double>, std::vector<std::string>>;
+
 /// A parameter that a mechanism has. Ranges are checked before the mechanism sees a value.
 struct ParameterSpec {
   std::string name;  ///< with its unit as in docs/reference/causes.md, e.g. yaw_deg
@@ -17,13 +20,12 @@ struct ParameterSpec {
   ParameterKind kind = ParameterKind::kNumber;
   double min = 0, max = 0;
   bool required = true;
-  std::variant<double, std::string, std::vector<double>, std::vector<std::string>> default_value = 0.0;
+  ParameterValue default_value = 0.0;
   std::string meaning;  ///< one line
   /// For a diagnosis that tries the mechanism on data: the value at which it does nothing, and one at which it plainly
   /// does something. NaN where the parameter keeps its default in a trial. An integer or text is never tried.
   double neutral = std::numeric_limits<double>::quiet_NaN(), typical = std::numeric_limits<double>::quiet_NaN();
-  double also = std::numeric_limits<double>::quiet_NaN();  ///< a second value at which a trial holds the parameter
-  std::string also_text;                                   ///< the same of a text, "" where there is none
+  std::optional<ParameterValue> also;  ///< a second value at which a trial holds the parameter
   bool or_list = false;  ///< of a number: a list may stand in its place, one number per receiver
   bool weighs = false;   ///< acts in reweight() and later alone: scene and traced paths stay as they are
 };
@@ -31,7 +33,7 @@ struct ParameterSpec {
 /// Checked values by name; every parameter of the mechanism is present unless it is optional without default.
 class Parameters {
  public:
-  using Value = std::variant<double, std::string, std::vector<double>, std::vector<std::string>>;
+  using Value = ParameterValue;
   void set(const std::string& name, Value value);
   bool has(const std::string& name) const;
   double number(const std::string& name) const;

@@ -109,15 +109,12 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
 /// Adds each hypothesis once more with the second value of a parameter that has one.
 void addSecondValues(const std::vector<ParameterSpec>& specs, std::vector<Hypothesis>& all) {
   for (const ParameterSpec& s : specs) {
-    if (std::isnan(s.also) && s.also_text.empty()) continue;
+    if (!s.also) continue;
     std::vector<Hypothesis> others = all;
     for (Hypothesis& h : others) {
-      if (s.also_text.empty()) {
-        h.mechanism.values.set(s.name, s.also);
-      } else {
-        h.mechanism.values.set(s.name, s.also_text);
-      }
-      h.variant = s.name + " " + (s.also_text.empty() ? number(s.also) : s.also_text);
+      h.mechanism.values.set(s.name, *s.also);
+      const auto* text = std::get_if<std::string>(&*s.also);
+      h.variant = s.name + " " + (text != nullptr ? *text : number(std::get<double>(*s.also)));
       h.searched += 1;
     }
     all.insert(all.end(), others.begin(), others.end());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mmradartwin_sim/parameters.h"
@@ -33,12 +34,8 @@ inline ParameterSpec tried(ParameterSpec spec, double neutral, double typical) {
 }
 
 /// Says that a diagnosis tries the mechanism with this value of a parameter, too, beside its default.
-inline ParameterSpec alsoAt(ParameterSpec spec, double value) {
-  spec.also = value;
-  return spec;
-}
-inline ParameterSpec alsoAt(ParameterSpec spec, const char* text) {
-  spec.also_text = text;
+inline ParameterSpec alsoAt(ParameterSpec spec, ParameterValue value) {
+  spec.also = std::move(value);
   return spec;
 }
 
