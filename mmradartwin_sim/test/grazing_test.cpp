@@ -165,6 +165,31 @@ TEST_F(Grazing, OutAndBackAreTwoKnifeEdges) {
              kAllowed_db);
 }
 
+// A plate that stands on the wall's end is the corner's other face; on a wall that goes on behind it, it is in the way.
+TEST_F(Grazing, TheOtherFaceOfACornerHidesNoneOfAFacetThatEndsThere) {
+  const auto echo = [this](const std::string& name) {
+    const Twin twin = makeTwin(writeScene(name), "  specular: {max_bounces: 1, knife_edges: 1}\n", radarAt77GHz());
+    double found = 0;
+    for (const PathRecord& r : twin.simulate(radarPose(0, 0, 0)).records) {
+      if (r.actors[0] == 0) found = r.amplitude;
+    }
+    return db(found);
+  };
+  for (double behind_m : {0.0, 1.0}) {
+    const auto addFacet = [&] { addWall("facet", "Metal", {3, -0.02}, {3, -0.06 - behind_m}, -1, 1); };
+    addFacet();
+    const double alone_db = echo("alone");
+    addFacet();
+    addWall("plate", "Metal", {3, -0.06}, {2.8, -0.06}, -1, 1);
+    const double found_db = echo("with_plate");
+    if (behind_m > 0) {
+      EXPECT_GT(std::abs(found_db - alone_db), 1);
+    } else {
+      EXPECT_NEAR(found_db, alone_db, 1e-9);
+    }
+  }
+}
+
 // One wall of the wedge ends near the point where the path meets it.
 TEST_F(Grazing, TheEdgeOfTheReflectorIsOneToo) {
   const double end_m = 4 / std::sqrt(3.0);  // from the apex: where the radar at the origin meets the wall

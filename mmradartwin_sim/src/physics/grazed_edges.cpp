@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "physics/aperture.h"
+#include "physics/corner_edge.h"
 #include "physics/diffracting_edge.h"
 
 namespace mmradartwin {
@@ -149,13 +150,40 @@ GrazedEdges::GrazedEdges(const Scene& scene) : scene_(scene) {
     const int actor = scene.facets[static_cast<std::size_t>(e.a)].actor;
     if (!scene.actors[static_cast<std::size_t>(actor)].occludes) continue;
     const Eigen::Vector3d into_b = std::cos(e.n * M_PI) * e.into_a + std::sin(e.n * M_PI) * e.side;
-    edges_.push_back({e.origin, e.along, e.length_m, {e.into_a, into_b}, {e.a, e.b}, actor});
+    edges_.push_back({e.origin, e.along, e.length_m, {e.into_a, into_b}, {e.a, e.b}, actor, {}});
     const Eigen::Vector3d middle = e.origin + 0.5 * e.length_m * e.along;
     x_.push_back(static_cast<float>(middle.x()));
     y_.push_back(static_cast<float>(middle.y()));
     z_.push_back(static_cast<float>(middle.z()));
     half_.push_back(static_cast<float>(0.5 * e.length_m + 1e-3));
   }
+  const std::vector<CornerEdge> corners = findCornerEdges(
+      scene, kFacesMeet_m, [](const Facet& f) { return f.reflects; }, [](const Facet&, const Facet&) { return true; });
+  for (const CornerEdge& corner : corners) {
+    addEndOfWedge({corner.a, corner.origin, corner.into_a, corner.into_b}, corner.b);
+    addEndOfWedge({corner.b, corner.origin, corner.into_b, corner.into_a}, corner.a);
+  }
+}
+
+void GrazedEdges::addEndOfWedge(const EndOfWedge& end, int face) {
+  const Facet& facet = scene_.facets[static_cast<std::size_t>(end.facet)];
+  for (const auto& loop : facet.loops) {
+    for (const auto& q : loop) {
+      const Eigen::Vector3d p = facet.origin + q.x() * facet.e1 + q.y() * facet.e2;
+      if ((p - end.fold).dot(end.into_facet) < -kFacesMeet_m) return;  // it goes on behind the face
+    }
+  }
+  for (Edge& edge : edges_) {
+    if (edge.facets[0] == face || edge.facets[1] == face) edge.ends.push_back(end);
+  }
+}
+
+bool GrazedEdges::hidesNone(const Edge& edge, const PathLeg& leg) {
+  for (const EndOfWedge& end : edge.ends) {
+    if (end.facet == leg.facets[1][0] && end.holds(leg.from)) return true;
+    if (end.facet == leg.facets[0][0] && end.holds(leg.to)) return true;
+  }
+  return false;
 }
 
 template <typename Found>
@@ -171,7 +199,7 @@ void GrazedEdges::forEachNear(const PathLeg& leg, double wavelength_m, double re
     for (const auto& end : leg.facets) {
       for (int facet : end) of_ends = of_ends || (facet >= 0 && (facet == edge.facets[0] || facet == edge.facets[1]));
     }
-    if (of_ends) return;
+    if (of_ends || hidesNone(edge, leg)) return;
     const Eigen::Vector3d across = t.cross(edge.along);
     const double sine = across.norm();
     if (sine < 0.1) return;  // the edge runs along the leg
