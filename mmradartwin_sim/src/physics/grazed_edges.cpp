@@ -130,8 +130,8 @@ namespace {
 template <typename Known>
 bool areAllThatBlock(const RayCaster& rays, const PathLeg& leg, const Known& isKnown) {
   constexpr int kMost = 16;
-  const Eigen::Vector3d way = leg.to - leg.from, t = way.normalized();
-  const double to_m = way.norm() - leg.gap_m;
+  const Eigen::Vector3d t = (leg.to - leg.from) / leg.length_m;
+  const double to_m = leg.length_m - leg.gap_m;
   double from_m = leg.gap_m, step_m = 1e-4;
   for (int hits = 0; hits < kMost; ++hits) {
     const auto met = from_m < to_m ? rays.firstHit(leg.from + from_m * t, t, to_m - from_m) : std::nullopt;
@@ -180,24 +180,23 @@ void GrazedEdges::addEndOfWedge(const EndOfWedge& end, int face) {
 
 bool GrazedEdges::hidesNone(const Edge& edge, const PathLeg& leg) {
   for (const EndOfWedge& end : edge.ends) {
-    if (end.facet == leg.facets[1][0] && end.holds(leg.from)) return true;
-    if (end.facet == leg.facets[0][0] && end.holds(leg.to)) return true;
+    if (end.facet == leg.facets[1] && end.holds(leg.from)) return true;
+    if (end.facet == leg.facets[0] && end.holds(leg.to)) return true;
   }
   return false;
 }
 
 template <typename Found>
 void GrazedEdges::forEachNear(const PathLeg& leg, double wavelength_m, double reach, const Found& found) const {
-  const Eigen::Vector3d way = leg.to - leg.from;
-  const double length_m = way.norm();
+  const double length_m = leg.length_m;
   if (length_m < 4 * leg.gap_m) return;
-  const Eigen::Vector3d t = way / length_m;
+  const Eigen::Vector3d t = (leg.to - leg.from) / length_m;
   // Nowhere along a path is the unit of Fresnel parameters longer than in its middle.
   const double widest_m = reach * std::sqrt(wavelength_m * leg.total_m / 8);
   const auto look = [&](const Edge& edge) {
     bool of_ends = false;  // their own apertures hold the edges of the facets that the leg goes between
-    for (const auto& end : leg.facets) {
-      for (int facet : end) of_ends = of_ends || (facet >= 0 && (facet == edge.facets[0] || facet == edge.facets[1]));
+    for (int facet : leg.facets) {
+      of_ends = of_ends || (facet >= 0 && (facet == edge.facets[0] || facet == edge.facets[1]));
     }
     if (of_ends || hidesNone(edge, leg)) return;
     const Eigen::Vector3d across = t.cross(edge.along);
@@ -212,12 +211,8 @@ void GrazedEdges::forEachNear(const PathLeg& leg, double wavelength_m, double re
     if (on_leg < leg.gap_m || on_leg > length_m - leg.gap_m) return;
     // What lies in the plane of a facet that the leg ends at is beside it and not in the way.
     const Eigen::Vector3d point = edge.origin + on_edge * edge.along;
-    for (const auto& end : leg.facets) {
-      for (int id : end) {
-        if (id < 0) continue;
-        const Facet& facet = scene_.facets[static_cast<std::size_t>(id)];
-        if (std::abs(facet.planeDistance(point)) < leg.gap_m) return;
-      }
+    for (int id : leg.facets) {
+      if (id >= 0 && std::abs(scene_.facets[static_cast<std::size_t>(id)].planeDistance(point)) < leg.gap_m) return;
     }
     // Both faces on one side of the edge as seen along the leg: it bounds what is hidden. A face that is seen edge-on
     // counts with the edge that is met first.
@@ -320,11 +315,9 @@ std::complex<double> GrazedEdges::factor(const PoseContext& context, const PathL
                                    [](const Screen& s) { return s.covers; });
       if (!any || !areAllThatBlock(context.rays, legs[i], isKnown)) return 0;
     }
-    for (int facet : legs[i].facets[1]) {
-      if (facet < 0) continue;
-      const Eigen::Vector3d& normal = scene_.facets[static_cast<std::size_t>(facet)].normal;
-      unfold -= 2 * (unfold * normal) * normal.transpose();
-    }
+    if (legs[i].facets[1] < 0) continue;
+    const Eigen::Vector3d& normal = scene_.facets[static_cast<std::size_t>(legs[i].facets[1])].normal;
+    unfold -= 2 * (unfold * normal) * normal.transpose();
   }
 
   Complex field = 1;

@@ -10,6 +10,7 @@
 #include "physics/image_record.h"
 #include "physics/polarisation.h"
 #include "rays/image_paths.h"
+#include "records/path_phase.h"
 
 namespace mmradartwin {
 namespace {
@@ -182,13 +183,12 @@ class Specular : public Mechanism, public PathStage {
     const Eigen::Vector3d direction_radar = context.T_map_radar.linear().transpose() * direction;
     if (!context.inFieldOfView(direction_radar)) return;
     if (!elements.sides.isOpen(facet, vertex, elements.p)) return;
-    const double gap = std::max(1e-3, 2 * facet.flatness_m / std::max(0.1, std::abs(direction.dot(facet.normal))));
     PathLegs legs;
-    if (grazed_) {
-      legs = {{elements.p, vertex, gap, 0, 2 * distance, {{-1, -1}, {facet.id, -1}}},
-              {vertex, elements.p, gap, distance, 2 * distance, {{facet.id, -1}, {-1, -1}}}};
+    if (grazed_) legs = legsOf(context.scene, elements.p, {facet.id}, {vertex});
+    if (!context.rays.visible(elements.p, vertex, legGap(facet, direction)) &&
+        !(grazed_ && grazed_->passes(legs[0], wavelength))) {
+      return;
     }
-    if (!context.rays.visible(elements.p, vertex, gap) && !(grazed_ && grazed_->passes(legs[0], wavelength))) return;
     const Eigen::Vector3d straight =
         -signed_distance / R * facet.normal;  // the image's direction, also beside the facet
     std::complex<double> factor =
@@ -206,11 +206,8 @@ class Specular : public Mechanism, public PathStage {
     if (std::abs(coefficient) < cutoff_) return;
     if (knife_edges_ && !inside) {
       // The factor's phase is against the image's path, the record's is against that over the vertex.
-      const auto phase = [&](double length_m) {
-        const double tau_s = length_m / kSpeedOfLight_m_per_s;
-        return 2 * M_PI * (context.frequency_hz - 0.5 * context.radar.slope_hz_per_s * tau_s) * tau_s;
-      };
-      coefficient *= std::polar(1.0, phase(2 * distance) - phase(2 * R));
+      coefficient *=
+          std::polar(1.0, phaseAtCenter_rad(context.radar, 2 * distance) - phaseAtCenter_rad(context.radar, 2 * R));
     }
     PathRecord record;
     record.event = &kSpecular;
