@@ -1,13 +1,13 @@
 #include <atomic>
 #include <cmath>
 
+#include "corners/corner_in_walls.h"
+#include "echoes/curved_echo.h"
+#include "echoes/image_record.h"
+#include "edges/grazed_edges.h"
 #include "mechanisms/base/built_in_mechanism.h"
 #include "physics/aperture.h"
-#include "physics/corner_in_walls.h"
-#include "physics/curved_echo.h"
 #include "physics/elements_in_map.h"
-#include "physics/grazed_edges.h"
-#include "physics/image_record.h"
 #include "physics/polarisation.h"
 #include "rays/image_paths.h"
 #include "records/path_phase.h"

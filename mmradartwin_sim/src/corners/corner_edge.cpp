@@ -1,4 +1,4 @@
-#include "physics/corner_edge.h"
+#include "corners/corner_edge.h"
 
 #include <algorithm>
 #include <cmath>

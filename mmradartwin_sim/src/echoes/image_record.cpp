@@ -1,4 +1,4 @@
-#include "physics/image_record.h"
+#include "echoes/image_record.h"
 
 #include <cmath>
 

@@ -1,13 +1,13 @@
-#include "physics/grazed_edges.h"
+#include "edges/grazed_edges.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
 
+#include "corners/corner_edge.h"
+#include "edges/diffracting_edge.h"
 #include "physics/aperture.h"
-#include "physics/corner_edge.h"
-#include "physics/diffracting_edge.h"
 
 namespace mmradartwin {
 namespace {

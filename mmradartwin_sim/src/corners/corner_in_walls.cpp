@@ -1,4 +1,4 @@
-#include "physics/corner_in_walls.h"
+#include "corners/corner_in_walls.h"
 
 #include <algorithm>
 #include <cmath>
