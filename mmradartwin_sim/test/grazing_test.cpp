@@ -12,6 +12,7 @@ namespace {
 using Complex = std::complex<double>;
 constexpr double kLambda77_m = kSpeedOfLight_m_per_s / 77e9;
 constexpr double kAllowed_db = 0.3;
+constexpr double kBehind_m = -3;      // of the radar, where a screen ends whose other edge alone is asked for
 const double kDark = std::sqrt(2.0);  // where the dark side's first Fresnel zone ends
 
 /// Share of the field between Fresnel parameters low and high, over a path of rotated steps where high is infinite.
@@ -105,7 +106,7 @@ TEST_F(Grazing, OneEdgeOfAnObstacleIsAKnifeEdge) {
   stepAlongAxis(
       "leg beside a screen's edge, from its other side",
       [&] {
-        addWall("screen", "Metal", {2, 0}, {1.2, 0});
+        addWall("screen", "Metal", {2, 0}, {kBehind_m, 0});
       },
       [](double at, double unit) {
         const double nu = (2 - at) * unit;
@@ -118,7 +119,7 @@ TEST_F(Grazing, TwoEdgesAreAStrip) {
   stepAlongAxis(
       "leg through a gap of 8 cm between two things",
       [&] {
-        addWall("near", "Metal", {2 - half, 0}, {0.5, 0});
+        addWall("near", "Metal", {2 - half, 0}, {kBehind_m, 0});
         addWall("far", "Metal", {2 + half, 0}, {3.5, 0});
       },
       [&](double at, double unit) {
@@ -150,8 +151,12 @@ TEST_F(Grazing, OutAndBackAreTwoKnifeEdges) {
   const double unit = std::sqrt(2 * 6 / (kLambda77_m * 1.2 * 4.8));
   double worst = 0, worst_form = 0, worst_found = 0;
   int steps = 0;
-  for (double y = -0.12; y < 0.03; y += 0.003) {
-    const double expected = std::abs(beyondBoth(y * unit, 1.2 / 4.8)), found = level(twin, y) / level(open, y);
+  for (double y = -0.3; y < 0.03; y += 0.003) {
+    // On the lit side by what lies beyond either edge and beyond both.
+    const double beyond = std::abs(y) * unit;
+    const Complex both = beyondBoth(beyond, 1.2 / 4.8);
+    const double expected = std::abs(y > 0 ? both : 1.0 - 2.0 * between(beyond, 1e9) + both);
+    const double found = level(twin, y) / level(open, y);
     if (expected < 0.1) continue;
     ++steps;
     const double off = found > 0 ? std::abs(db(found) - db(expected)) : 99;

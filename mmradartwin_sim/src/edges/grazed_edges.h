@@ -23,8 +23,8 @@ class GrazedEdges {
   explicit GrazedEdges(const Scene& scene);
   /// True where the leg passes an edge on its dark side, within the first Fresnel zone.
   bool passes(const PathLeg& leg, double wavelength_m) const;
-  /// What the edges leave of a path's field, 1 where none is near, 0 where too little is left. Legs are free, or
-  /// passes() holds for them. In the exp(-jkL) convention.
+  /// What the edges leave of a path's field, 1 where none is near, 0 where something else is in the way. Legs are free,
+  /// or passes() holds for them. In the exp(-jkL) convention.
   std::complex<double> factor(const PoseContext& context, const PathLegs& legs) const;
 
  private:

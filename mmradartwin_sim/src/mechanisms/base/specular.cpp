@@ -195,7 +195,7 @@ class Specular : public Mechanism, public PathStage {
         knife_edges_ ? echoFactor(facet, foot, R, wavelength) : apertureFactor(facet, foot, straight, R, R, wavelength);
     if (std::abs(factor) < kSmallestFactor) return;
     if (grazed_) factor *= grazed_->factor(context, legs);
-    if (!(std::abs(factor) > 0)) return;
+    if (std::abs(factor) < kSmallestFactor) return;
 
     const Material& material = context.scene.actors[facet.actor].material;
     const Eigen::Vector3d e = verticalField(elements.up, straight);
