@@ -45,6 +45,17 @@ void pose8Channels(benchmark::State& state) {
 }
 BENCHMARK(pose8Channels)->Unit(benchmark::kMillisecond);
 
+void pose8ChannelsWithKnifeEdges(benchmark::State& state) {
+  TwinDescription description = loadTwin("", office(), paperRadar());
+  for (NamedParameters& m : description.mechanisms) {
+    if (m.values.has("knife_edges")) m.values.set("knife_edges", 1.0);
+  }
+  const Twin grazed(description);
+  int i = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(grazed.simulate(pose(i++)).records.size());
+}
+BENCHMARK(pose8ChannelsWithKnifeEdges)->Unit(benchmark::kMillisecond);
+
 void recordsToGrid(benchmark::State& state) {
   const Simulation s = twin().simulate(pose(0));
   ComplexGrid x;

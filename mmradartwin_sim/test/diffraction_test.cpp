@@ -1,8 +1,8 @@
 #include <complex>
 
 #include "closed_form.h"
-#include "physics/diffracting_edge.h"
-#include "physics/wedge_diffraction.h"
+#include "edges/diffracting_edge.h"
+#include "edges/wedge_diffraction.h"
 #include "scene_files.h"
 
 namespace mmradartwin {

@@ -12,6 +12,7 @@ namespace {
 using Complex = std::complex<double>;
 constexpr double kLambda77_m = kSpeedOfLight_m_per_s / 77e9;
 constexpr double kAllowed_db = 0.3;
+constexpr double kBehind_m = -3;      // of the radar, where a screen ends whose other edge alone is asked for
 const double kDark = std::sqrt(2.0);  // where the dark side's first Fresnel zone ends
 
 /// Share of the field between Fresnel parameters low and high, over a path of rotated steps where high is infinite.
@@ -105,7 +106,7 @@ TEST_F(Grazing, OneEdgeOfAnObstacleIsAKnifeEdge) {
   stepAlongAxis(
       "leg beside a screen's edge, from its other side",
       [&] {
-        addWall("screen", "Metal", {2, 0}, {1.2, 0});
+        addWall("screen", "Metal", {2, 0}, {kBehind_m, 0});
       },
       [](double at, double unit) {
         const double nu = (2 - at) * unit;
@@ -118,7 +119,7 @@ TEST_F(Grazing, TwoEdgesAreAStrip) {
   stepAlongAxis(
       "leg through a gap of 8 cm between two things",
       [&] {
-        addWall("near", "Metal", {2 - half, 0}, {0.5, 0});
+        addWall("near", "Metal", {2 - half, 0}, {kBehind_m, 0});
         addWall("far", "Metal", {2 + half, 0}, {3.5, 0});
       },
       [&](double at, double unit) {
@@ -150,8 +151,12 @@ TEST_F(Grazing, OutAndBackAreTwoKnifeEdges) {
   const double unit = std::sqrt(2 * 6 / (kLambda77_m * 1.2 * 4.8));
   double worst = 0, worst_form = 0, worst_found = 0;
   int steps = 0;
-  for (double y = -0.12; y < 0.03; y += 0.003) {
-    const double expected = std::abs(beyondBoth(y * unit, 1.2 / 4.8)), found = level(twin, y) / level(open, y);
+  for (double y = -0.3; y < 0.03; y += 0.003) {
+    // On the lit side by what lies beyond either edge and beyond both.
+    const double beyond = std::abs(y) * unit;
+    const Complex both = beyondBoth(beyond, 1.2 / 4.8);
+    const double expected = std::abs(y > 0 ? both : 1.0 - 2.0 * between(beyond, 1e9) + both);
+    const double found = level(twin, y) / level(open, y);
     if (expected < 0.1) continue;
     ++steps;
     const double off = found > 0 ? std::abs(db(found) - db(expected)) : 99;
@@ -163,6 +168,31 @@ TEST_F(Grazing, OutAndBackAreTwoKnifeEdges) {
   EXPECT_GT(steps, 30);
   expectForm("4.6 wall past a screen's edge, out and back, worst of the steps", "dB", worst_form, worst_found,
              kAllowed_db);
+}
+
+// A plate that stands on the wall's end is the corner's other face; on a wall that goes on behind it, it is in the way.
+TEST_F(Grazing, TheOtherFaceOfACornerHidesNoneOfAFacetThatEndsThere) {
+  const auto echo = [this](const std::string& name) {
+    const Twin twin = makeTwin(writeScene(name), "  specular: {max_bounces: 1, knife_edges: 1}\n", radarAt77GHz());
+    double found = 0;
+    for (const PathRecord& r : twin.simulate(radarPose(0, 0, 0)).records) {
+      if (r.actors[0] == 0) found = r.amplitude;
+    }
+    return db(found);
+  };
+  for (double behind_m : {0.0, 1.0}) {
+    const auto addFacet = [&] { addWall("facet", "Metal", {3, -0.02}, {3, -0.06 - behind_m}, -1, 1); };
+    addFacet();
+    const double alone_db = echo("alone");
+    addFacet();
+    addWall("plate", "Metal", {3, -0.06}, {2.8, -0.06}, -1, 1);
+    const double found_db = echo("with_plate");
+    if (behind_m > 0) {
+      EXPECT_GT(std::abs(found_db - alone_db), 1);
+    } else {
+      EXPECT_NEAR(found_db, alone_db, 1e-9);
+    }
+  }
 }
 
 // One wall of the wedge ends near the point where the path meets it.

@@ -12,7 +12,7 @@ DIAGNOSIS = "mmradartwin_attribution/src/diagnosis"
 ROOM_NAMES = ("catalogue", "numbers", "frames", "channels", "likelihood", "hypotheses", "fit", "receiver", "search", "gain",
               "rounds", "report")
 SIM = "mmradartwin_sim/src"
-SIM_ROOM_NAMES = ("scene", "records", "rays", "physics", "stages", "twin", "room", "ros")
+SIM_ROOM_NAMES = ("scene", "records", "rays", "physics", "corners", "edges", "echoes", "stages", "twin", "room", "ros")
 MECHANISM_ROOM_NAMES = ("base", "scene", "mounting", "propagation", "array", "receiver", "frames", "empirical")
 
 
@@ -95,7 +95,7 @@ class CheckIncludes(unittest.TestCase):
 
     def test_scene_may_not_include_what_is_computed_in_it(self):
         file = f"{SIM}/scene/facet_builder.cpp"
-        for room in ("records", "rays", "physics"):
+        for room in ("records", "rays", "physics", "echoes"):
             with self.subTest(room):
                 self.write(file, f'"{room}/{room}_unit.h"')
                 self.assert_forbidden(file, f"scene may not see {room}")

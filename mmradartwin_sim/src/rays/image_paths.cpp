@@ -48,27 +48,26 @@ double legGap(const Facet& facet, const Eigen::Vector3d& direction) {
   return std::max(1e-3, 2 * facet.flatness_m / cosine);
 }
 
+PathLeg makeLeg(const Scene& scene, const Eigen::Vector3d& from, int from_facet, const Eigen::Vector3d& to,
+                int to_facet, double before_m, double total_m) {
+  const Eigen::Vector3d way = to - from;
+  PathLeg leg{from, to, {from_facet, to_facet}, way.norm(), 1e-3, before_m, total_m};
+  for (int facet : leg.facets) {
+    if (facet < 0) continue;
+    leg.gap_m = std::max(leg.gap_m, legGap(scene.facets[static_cast<std::size_t>(facet)], way / leg.length_m));
+  }
+  return leg;
+}
+
 PathLegs legsOf(const Scene& scene, const Eigen::Vector3d& p, const PerInteraction<int>& facets,
                 const PerInteraction<Eigen::Vector3d>& vertices) {
   PathLegs legs;
   double before_m = 0;
   for (std::size_t i = 0; i <= vertices.size(); ++i) {
     const bool first = i == 0, last = i == vertices.size();
-    PathLeg leg{first ? p : vertices[i - 1],
-                last ? p : vertices[i],
-                1e-3,
-                before_m,
-                0,
-                {{first ? -1 : facets[i - 1], -1}, {last ? -1 : facets[i], -1}}};
-    const Eigen::Vector3d way = leg.to - leg.from;
-    const double length_m = way.norm();
-    for (const auto& end : leg.facets) {
-      if (end[0] >= 0) {
-        leg.gap_m = std::max(leg.gap_m, legGap(scene.facets[static_cast<std::size_t>(end[0])], way / length_m));
-      }
-    }
-    before_m += length_m;
-    legs.push_back(leg);
+    legs.push_back(makeLeg(scene, first ? p : vertices[i - 1], first ? -1 : facets[i - 1], last ? p : vertices[i],
+                           last ? -1 : facets[i], before_m, 0));
+    before_m += legs.back().length_m;
   }
   for (PathLeg& leg : legs) leg.total_m = before_m;
   return legs;
@@ -201,26 +200,14 @@ bool ImageSearch::solve(const Eigen::Vector3d& p, const PerInteraction<int>& seq
       return false;
     }
   }
-  PathLeg leg;
-  leg.before_m = 0;
-  leg.total_m = total_m;
+  double before_m = 0;
   for (int i = 0; i <= order; ++i) {
-    leg.from = i == 0 ? p : met[i - 1];
-    leg.to = i == order ? p : met[i];
-    const Eigen::Vector3d d = leg.to - leg.from;
-    const double length = d.norm();
-    if (length < 1e-9) return false;
-    leg.gap_m = 1e-3;
-    if (i > 0) leg.gap_m = std::max(leg.gap_m, legGap(scene_.facets[sequence[i - 1]], d / length));
-    if (i < order) leg.gap_m = std::max(leg.gap_m, legGap(scene_.facets[sequence[i]], d / length));
-    if (!rays.visible(leg.from, leg.to, leg.gap_m)) {
-      if (!limits.passes) return false;
-      leg.facets[0][0] = i == 0 ? -1 : sequence[i - 1];
-      leg.facets[1][0] = i == order ? -1 : sequence[i];
-      leg.facets[0][1] = leg.facets[1][1] = -1;
-      if (!limits.passes(leg)) return false;
-    }
-    leg.before_m += length;
+    const bool first = i == 0, last = i == order;
+    const PathLeg leg = makeLeg(scene_, first ? p : met[i - 1], first ? -1 : sequence[i - 1], last ? p : met[i],
+                                last ? -1 : sequence[i], before_m, total_m);
+    if (leg.length_m < 1e-9) return false;
+    if (!rays.visible(leg.from, leg.to, leg.gap_m) && !(limits.passes && limits.passes(leg))) return false;
+    before_m += leg.length_m;
   }
   path.facets = sequence;
   path.vertices.assign(vertex.begin(), vertex.begin() + order);

@@ -22,16 +22,20 @@ constexpr double kDarkReach = 1.4142135623730951;
 /// One straight part of a closed path.
 struct PathLeg {
   Eigen::Vector3d from, to;
-  double gap_m;      ///< that rays leave at its ends
-  double before_m;   ///< along the path, up to its beginning
-  double total_m;    ///< of the path
-  int facets[2][2];  ///< that it begins and ends at, -1 where there is none
+  int facets[2];  ///< that it begins and ends at, -1 where there is none
+  double length_m;
+  double gap_m;     ///< that rays leave at its ends
+  double before_m;  ///< along the path, up to its beginning
+  double total_m;   ///< of the path
 };
 using PathLegs = boost::container::small_vector<PathLeg, 4>;
 
 /// Gap in m that a ray along `direction` leaves at a facet: a merged facet of a scan lies off the triangles that Embree
 /// sees.
 double legGap(const Facet& facet, const Eigen::Vector3d& direction);
+
+PathLeg makeLeg(const Scene& scene, const Eigen::Vector3d& from, int from_facet, const Eigen::Vector3d& to,
+                int to_facet, double before_m, double total_m);
 
 /// The legs of a path from p over points on facets and back.
 PathLegs legsOf(const Scene& scene, const Eigen::Vector3d& p, const PerInteraction<int>& facets,

@@ -6,17 +6,14 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/scene.h"
+#include "records/path_phase.h"
 
 namespace mmradartwin {
-namespace {
-
-/// Phase of a path of delay tau at the window's centre, in turns kept near zero so that no digits are lost.
-double phaseAtCenter_rad(const RadarConfig& radar, double tau_s) {
+double phaseAtCenter_rad(const RadarConfig& radar, double length_m) {
+  const double tau_s = length_m / kSpeedOfLight_m_per_s;
   const double turns = radar.center_frequency_hz() * tau_s - 0.5 * radar.slope_hz_per_s * tau_s * tau_s;
   return 2 * M_PI * (turns - std::round(turns));
 }
-
-}  // namespace
 
 int rangeBin(const RadarConfig& radar, double length_m) {
   const int bin = static_cast<int>(std::lround(0.5 * length_m / radar.range_bin_m()));
@@ -61,7 +58,7 @@ void setContribution(const RadarConfig& radar, std::complex<double> coefficient,
   record.amplitude = std::abs(coefficient);
   record.c.resize(record.length_m.size());
   for (std::size_t k = 0; k < record.c.size(); ++k) {
-    record.c[k] = coefficient * std::polar(1.0, phaseAtCenter_rad(radar, record.length_m[k] / kSpeedOfLight_m_per_s));
+    record.c[k] = coefficient * std::polar(1.0, phaseAtCenter_rad(radar, record.length_m[k]));
   }
   record.phase_rad = std::arg(record.c[0]);
   record.range_bin = rangeBin(radar, record.length_m[0]);
@@ -79,9 +76,9 @@ void lengthen(const RadarConfig& radar, double extra_m, PathRecord& record) {
 
 void lengthenChannels(const RadarConfig& radar, const PerChannel<double>& extra_m, PathRecord& record) {
   for (std::size_t k = 0; k < record.c.size(); ++k) {
-    const double before = phaseAtCenter_rad(radar, record.length_m[k] / kSpeedOfLight_m_per_s);
+    const double before = phaseAtCenter_rad(radar, record.length_m[k]);
     record.length_m[k] += extra_m[k];
-    const double after = phaseAtCenter_rad(radar, record.length_m[k] / kSpeedOfLight_m_per_s);
+    const double after = phaseAtCenter_rad(radar, record.length_m[k]);
     record.c[k] *= std::polar(1.0, after - before);
   }
   record.phase_rad = std::arg(record.c[0]);

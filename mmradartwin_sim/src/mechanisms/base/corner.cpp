@@ -1,8 +1,8 @@
 #include <algorithm>
 
+#include "corners/trihedral.h"
 #include "mechanisms/base/built_in_mechanism.h"
 #include "physics/elements_in_map.h"
-#include "physics/trihedral.h"
 
 namespace mmradartwin {
 namespace {

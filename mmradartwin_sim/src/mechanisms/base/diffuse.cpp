@@ -4,11 +4,11 @@
 #include <optional>
 #include <unordered_map>
 
+#include "echoes/scatter_points.h"
 #include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "physics/elements_in_map.h"
 #include "physics/polarisation.h"
-#include "physics/scatter_points.h"
 #include "rays/view_cone.h"
 
 namespace mmradartwin {

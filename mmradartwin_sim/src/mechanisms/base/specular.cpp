@@ -1,15 +1,16 @@
 #include <atomic>
 #include <cmath>
 
+#include "corners/corner_in_walls.h"
+#include "echoes/curved_echo.h"
+#include "echoes/image_record.h"
+#include "edges/grazed_edges.h"
 #include "mechanisms/base/built_in_mechanism.h"
 #include "physics/aperture.h"
-#include "physics/corner_in_walls.h"
-#include "physics/curved_echo.h"
 #include "physics/elements_in_map.h"
-#include "physics/grazed_edges.h"
-#include "physics/image_record.h"
 #include "physics/polarisation.h"
 #include "rays/image_paths.h"
+#include "records/path_phase.h"
 
 namespace mmradartwin {
 namespace {
@@ -182,20 +183,19 @@ class Specular : public Mechanism, public PathStage {
     const Eigen::Vector3d direction_radar = context.T_map_radar.linear().transpose() * direction;
     if (!context.inFieldOfView(direction_radar)) return;
     if (!elements.sides.isOpen(facet, vertex, elements.p)) return;
-    const double gap = std::max(1e-3, 2 * facet.flatness_m / std::max(0.1, std::abs(direction.dot(facet.normal))));
     PathLegs legs;
-    if (grazed_) {
-      legs = {{elements.p, vertex, gap, 0, 2 * distance, {{-1, -1}, {facet.id, -1}}},
-              {vertex, elements.p, gap, distance, 2 * distance, {{facet.id, -1}, {-1, -1}}}};
+    if (grazed_) legs = legsOf(context.scene, elements.p, {facet.id}, {vertex});
+    if (!context.rays.visible(elements.p, vertex, legGap(facet, direction)) &&
+        !(grazed_ && grazed_->passes(legs[0], wavelength))) {
+      return;
     }
-    if (!context.rays.visible(elements.p, vertex, gap) && !(grazed_ && grazed_->passes(legs[0], wavelength))) return;
     const Eigen::Vector3d straight =
         -signed_distance / R * facet.normal;  // the image's direction, also beside the facet
     std::complex<double> factor =
         knife_edges_ ? echoFactor(facet, foot, R, wavelength) : apertureFactor(facet, foot, straight, R, R, wavelength);
     if (std::abs(factor) < kSmallestFactor) return;
     if (grazed_) factor *= grazed_->factor(context, legs);
-    if (!(std::abs(factor) > 0)) return;
+    if (std::abs(factor) < kSmallestFactor) return;
 
     const Material& material = context.scene.actors[facet.actor].material;
     const Eigen::Vector3d e = verticalField(elements.up, straight);
@@ -206,11 +206,8 @@ class Specular : public Mechanism, public PathStage {
     if (std::abs(coefficient) < cutoff_) return;
     if (knife_edges_ && !inside) {
       // The factor's phase is against the image's path, the record's is against that over the vertex.
-      const auto phase = [&](double length_m) {
-        const double tau_s = length_m / kSpeedOfLight_m_per_s;
-        return 2 * M_PI * (context.frequency_hz - 0.5 * context.radar.slope_hz_per_s * tau_s) * tau_s;
-      };
-      coefficient *= std::polar(1.0, phase(2 * distance) - phase(2 * R));
+      coefficient *=
+          std::polar(1.0, phaseAtCenter_rad(context.radar, 2 * distance) - phaseAtCenter_rad(context.radar, 2 * R));
     }
     PathRecord record;
     record.event = &kSpecular;

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <set>
 
+#include "corners/trihedral.h"
 #include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "physics/elements_in_map.h"
-#include "physics/trihedral.h"
 #include "scene/required_actor.h"
 
 namespace mmradartwin {

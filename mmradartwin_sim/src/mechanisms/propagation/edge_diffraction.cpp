@@ -1,8 +1,8 @@
 #include <cmath>
 #include <set>
 
+#include "edges/diffracting_edge.h"
 #include "mechanisms/base/built_in_mechanism.h"
-#include "physics/diffracting_edge.h"
 #include "physics/elements_in_map.h"
 
 namespace mmradartwin {

@@ -1,9 +1,9 @@
 #include <algorithm>
 
+#include "corners/corner_edge.h"
+#include "echoes/image_record.h"
 #include "mechanisms/base/built_in_mechanism.h"
-#include "physics/corner_edge.h"
 #include "physics/elements_in_map.h"
-#include "physics/image_record.h"
 #include "rays/image_paths.h"
 
 namespace mmradartwin {

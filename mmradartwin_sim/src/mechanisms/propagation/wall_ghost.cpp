@@ -2,12 +2,12 @@
 #include <cmath>
 #include <set>
 
+#include "echoes/scatter_points.h"
+#include "edges/diffracting_edge.h"
 #include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "physics/aperture.h"
-#include "physics/diffracting_edge.h"
 #include "physics/elements_in_map.h"
-#include "physics/scatter_points.h"
 #include "rays/image_paths.h"
 #include "scene/required_actor.h"
 

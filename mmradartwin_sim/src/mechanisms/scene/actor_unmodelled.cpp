@@ -1,8 +1,8 @@
 #include <cmath>
 
+#include "echoes/curved_echo.h"
 #include "mechanisms/base/built_in_mechanism.h"
 #include "mmradartwin_dsp/input_error.h"
-#include "physics/curved_echo.h"
 #include "physics/elements_in_map.h"
 
 namespace mmradartwin {

@@ -1,4 +1,4 @@
-#include "physics/wedge_diffraction.h"
+#include "edges/wedge_diffraction.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "physics/curved_echo.h"
+#include "echoes/curved_echo.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,8 +2,8 @@
 
 #include <vector>
 
+#include "edges/grazed_edges.h"
 #include "physics/elements_in_map.h"
-#include "physics/grazed_edges.h"
 #include "physics/path_event.h"
 #include "rays/image_paths.h"
 

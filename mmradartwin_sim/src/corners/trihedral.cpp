@@ -1,4 +1,4 @@
-#include "physics/trihedral.h"
+#include "corners/trihedral.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "physics/corner_edge.h"
+#include "corners/corner_edge.h"
 #include "physics/path_event.h"
 
 namespace mmradartwin {

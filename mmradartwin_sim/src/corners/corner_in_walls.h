@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "physics/corner_edge.h"
+#include "corners/corner_edge.h"
 #include "physics/elements_in_map.h"
 #include "physics/path_event.h"
 #include "rays/image_paths.h"

@@ -1,4 +1,4 @@
-#include "physics/scatter_points.h"
+#include "echoes/scatter_points.h"
 
 #include <cmath>
 

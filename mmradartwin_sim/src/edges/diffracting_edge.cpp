@@ -1,12 +1,12 @@
-#include "physics/diffracting_edge.h"
+#include "edges/diffracting_edge.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 
+#include "edges/wedge_diffraction.h"
 #include "physics/aperture.h"
-#include "physics/wedge_diffraction.h"
 #include "scene/vertex_weld.h"
 
 namespace mmradartwin {

@@ -1,11 +1,10 @@
-#include "physics/corner_in_walls.h"
+#include "corners/corner_in_walls.h"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-#include "physics/aperture.h"
-#include "physics/polarisation.h"
+#include "physics/reflections.h"
 
 namespace mmradartwin {
 namespace {
@@ -126,38 +125,21 @@ void addCornerInWalls(const PoseContext& context, const ElementsInMap& elements,
   record.vertices.push_back(way->turn);
   for (std::size_t i = corner.walls.size(); i-- > 0;) record.vertices.push_back(way->vertices[i]);
 
-  Eigen::Vector3d in = (way->vertices.front() - elements.p).normalized();
-  const Eigen::Vector3d out = in;
-  ComplexVector field = verticalField(elements.up, in).cast<std::complex<double>>();
-  std::complex<double> weight =
+  const int turn = static_cast<int>(corner.walls.size());
+  const std::complex<double> at_edge =
       event.level * wavelength / (4 * M_PI * 2 * R) * cornerFactor(edge, way->image, wavelength);
-  double before = 0;
-  Eigen::Vector3d from = elements.p;
-  const std::size_t turn = corner.walls.size();
-  for (std::size_t i = 0; i < record.facets.size(); ++i) {
-    const Facet& facet = context.scene.facets[static_cast<std::size_t>(record.facets[i])];
-    const Material& material = context.scene.actors[static_cast<std::size_t>(facet.actor)].material;
-    before += (record.vertices[i] - from).norm();
-    from = record.vertices[i];
-    record.actors.push_back(facet.actor);
-    record.reflection_cosine.push_back(std::min(1.0, std::abs(in.dot(facet.normal))));
-    field = reflectField(field, in, facet.normal, material, context.frequency_hz);
-    weight *= specularShare(material);
-    const bool is_of_edge = i == turn || i == turn + 1;
-    if (!is_of_edge) weight *= apertureFactor(facet, record.vertices[i], in, before, 2 * R - before, wavelength);
-    in -= 2 * in.dot(facet.normal) * facet.normal;
-  }
-  weight *= (verticalField(elements.up, out).cast<std::complex<double>>().transpose() * field)(0);
+  const std::complex<double> weight = reflectAlong(context, elements, record.vertices, 2 * R, turn, at_edge, record);
   if (std::abs(weight) < cutoff || !(std::abs(weight) > 0)) return;
   record.event = &event.name;
-  record.departure = record.arrival = context.T_map_radar.linear().transpose() * out;
+  record.departure = record.arrival =
+      context.T_map_radar.linear().transpose() * (way->vertices.front() - elements.p).normalized();
   record.bounces = static_cast<int>(record.facets.size());
   // Both reflections at the edge together turn a point by half a turn about it.
   record.length_m = elements.lengthsByImage([&](Eigen::Vector3d t) {
     const auto mirrored = [&](int wall) { t = mirror(t, context.scene.facets[static_cast<std::size_t>(wall)]); };
     for (int wall : corner.walls) mirrored(wall);
     t = 2 * (edge.origin + (t - edge.origin).dot(edge.along) * edge.along) - t;
-    for (std::size_t i = turn; i-- > 0;) mirrored(corner.walls[i]);
+    for (std::size_t i = corner.walls.size(); i-- > 0;) mirrored(corner.walls[i]);
     return t;
   });
   setContribution(context.radar, std::conj(weight), record);
