@@ -46,7 +46,7 @@ def seeds_of(text):
 
 def run(arguments):
     """Runs what is missing."""
-    results = Results(os.path.join(arguments.output, "results.jsonl"))
+    results = Results(os.path.join(arguments.output, "results.jsonl"), ("row", "status", "truths", "findings"))
     rows = arguments.what.split(",")
     for row in rows:
         if row not in ("clean", "single", *hidden.CAUSES):
