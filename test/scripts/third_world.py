@@ -52,6 +52,9 @@ def run(arguments):
         if row not in ("clean", "single", *hidden.CAUSES):
             raise ValueError(f"--what {row}: is none of clean, single, {', '.join(hidden.CAUSES)}")
     without = [p for p in arguments.without.split(",") if p]
+    for name in without:
+        if name not in PROPERTIES:
+            raise ValueError(f"--without {name}: is no property; there are {', '.join(PROPERTIES)}")
     if not arguments.table:
         program = find_program("mmradartwin_attribution", "diagnose")
         if program is None:
