@@ -213,13 +213,13 @@ run_fuzz() {
 # Tests of a package that run without a ROS master, by their targets' names.
 masterless_tests() {
   local package source name
-  for package in driver dsp sim; do
-    for source in "$root/mmradartwin_$package"/test/*_test.cpp; do
+  for package in driver dsp sim attribution; do
+    while read -r source; do
       name=$(basename "$source" .cpp)
       case $name in *_node_test | live_session_test) continue ;; esac
       [ "$package" = driver ] || name=mmradartwin_${package}_$name
       echo "$name"
-    done
+    done < <(find "$root/mmradartwin_$package/test" -name '*_test.cpp' | LC_ALL=C sort)
   done
 }
 
@@ -238,17 +238,17 @@ run_asan() {
   say "nothing found"
 }
 
-# Without the tests of the emulated USB bus: its thread is glib's, whose locks the sanitizer does not see.
 run_tsan() {
   local test status=0
   local tests="dropping_worker_queue_test emulator_loopback_test rig_test radar_watch_test dca1000_control_test pcap_recording_test"
   tests+=" child_process_test doctor_test mmradartwin_dsp_output_test mmradartwin_dsp_signal_chain_test"
+  tests+=" configure_radar_test rig_self_test_test"
   separate_build tsan "$tests" "-DCATKIN_WHITELIST_PACKAGES=mmradartwin_msgs;mmradartwin_dsp;mmradartwin_driver" \
     "-DCMAKE_CXX_FLAGS=-fsanitize=thread"
   data_folder
   for test in $tests; do
     say "thread sanitizer: $test"
-    TSAN_OPTIONS="halt_on_error=0 exitcode=66" "$(find "$ws/tsan/devel/lib" -name "$test" -type f)" || status=1
+    TSAN_OPTIONS="halt_on_error=0 exitcode=66 suppressions=$root/test/tsan_suppressions.txt" "$(find "$ws/tsan/devel/lib" -name "$test" -type f)" || status=1
   done
   return $status
 }

@@ -7,6 +7,7 @@ The exit status is 0 only where something passed, nothing failed and ctest ended
 """
 import argparse
 import json
+import os
 import pathlib
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -87,6 +88,11 @@ def main():
     arguments = parser.parse_args()
     if (arguments.list is None) != (arguments.ran is None):
         parser.error("--list and --ran go together")
+    if os.path.exists(arguments.results) and not os.path.isdir(arguments.results):
+        parser.error(f"{arguments.results}: is no folder")
+    for step in arguments.step:
+        if "=" not in step:
+            parser.error(f"--step {step}: wants NAME=STATUS")
 
     folder = pathlib.Path(arguments.results).resolve()
     outcomes = {"passed": [], "failed": [], "skipped": []}
@@ -99,7 +105,11 @@ def main():
         for name, outcome, message in cases:
             outcomes[outcome].append((file.parent.name, name, message))
     if arguments.list is not None:
-        for name, message in check_modules(modules_of(arguments.list, folder), endings_of(arguments.ran), recorded):
+        try:
+            modules = modules_of(arguments.list, folder)
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            parser.error(f"{arguments.list}: is no list of ctest ({error!r})")
+        for name, message in check_modules(modules, endings_of(arguments.ran), recorded):
             outcomes["failed"].append(("ctest", name, message))
     if arguments.status != 0 and not outcomes["failed"]:
         outcomes["failed"].append(("ctest", "itself", f"it ended with status {arguments.status}"))

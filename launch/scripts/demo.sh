@@ -23,9 +23,8 @@ started=$SECONDS
 # shellcheck disable=SC2034 # read by stage
 stages=6
 
-mkdir -p "$out"
-rm -rf "$out/session" "$out/report" "$out/diagnosis" "$out/report_extended" "$out/demo.bag" "$out/demo.bag.active" \
-  "$out/rviz.png" "$out/rviz_extended.png" "$out/rviz_before_after.png" "$log"
+own_folder "$out" .mmradartwin_demo session truth.json report diagnosis report_extended demo.bag demo.bag.active rviz.png \
+  rviz_extended.png rviz_before_after.png log
 mkdir -p "$log"
 export ROS_LOG_DIR=$log/ros
 say "What follows takes some minutes. All that the programs say goes to $log."

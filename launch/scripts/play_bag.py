@@ -17,6 +17,9 @@ import sys
 import rospkg
 from roslib.packages import find_node
 
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import ros_master
+
 # What rosbag play says of its progress, again and again.
 PROGRESS = re.compile(r"\[(\w+) *\] .*Duration: (-?[0-9.]+) / ([0-9.]+)")
 
@@ -27,6 +30,7 @@ def say(level, text):
 
 class Player:
     def __init__(self, bags, options):
+        self.bags = bags
         self.command = [*find_node("rosbag", "play")[:1], *bags, *options]  # --topics takes all that follows
         self.stays, self.paused = "--keep-alive" in options, "--pause" in options
         self.child, self.stopping = None, False
@@ -53,6 +57,9 @@ class Player:
                     over = True
                     say(" INFO", "the bag is over; a diagnosis is possible now (rosrun mmradartwin_attribution "
                                  "request_diagnosis); Ctrl-C ends")
+        if self.child.returncode and not self.stopping:
+            say("FATAL", f"{', '.join(self.bags)}: rosbag play has ended with status {self.child.returncode}, for the reason "
+                         "above")
         return 0 if self.stopping else self.child.returncode
 
     def node(self):
@@ -81,6 +88,9 @@ def main():
     folder = os.getcwd()
     if arguments[:1] == ["--folder"] and len(arguments) > 1:
         folder, arguments = arguments[1] or folder, arguments[2:]
+    if arguments[:1] and arguments[0].startswith("--") and arguments[0] != "--":
+        say("FATAL", f"{arguments[0]} is not known here; rosbag's options stand behind --")
+        return 2
     options = [word for word in arguments if ":=" in word]  # of ROS
     arguments = [word for word in arguments if ":=" not in word]
     if "--" in arguments:
@@ -100,6 +110,10 @@ def main():
                 hint = f"; {bag}.active is: its recording has not ended (rosbag reindex makes it readable)"
             say("FATAL", f"{bag}: is no file{hint}")
             return 2
+    missing = ros_master.problem()
+    if missing:
+        say("FATAL", missing)
+        return 2
     return Player(bags, options).run()
 
 

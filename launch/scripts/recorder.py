@@ -20,6 +20,9 @@ import time
 import rospkg
 from roslib.packages import find_node
 
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import ros_master
+
 UNITS = {"": 1, "k": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
 LOOK_EVERY_S = 0.5
 # New recordings begin with so many times the least free space: else a bag would follow the other every second.
@@ -110,6 +113,10 @@ class Recorder:
         if not os.path.isdir(self.folder):
             say(f"{self.folder}: is no folder; give output:= with a folder that exists", error=True)
             return 2
+        missing = ros_master.problem()
+        if missing:
+            say(missing, error=True)
+            return 2
         if not self.record_program:
             say("rosbag's record is not here; install rosbag", error=True)
             return 2
@@ -155,6 +162,9 @@ def main():
     parser.add_argument("--version", action="version",
                         version="recorder.py " + rospkg.RosPack().get_manifest("mmradartwin_launch").version)
     options, arguments = parser.parse_known_args()
+    if not options.output_prefix:
+        say("output: is empty; give the beginning of the bags' names", error=True)
+        return 2
     prefix = os.path.normpath(os.path.join(options.folder or os.getcwd(), options.output_prefix))
     return Recorder(options.min_free, prefix, arguments).run()
 

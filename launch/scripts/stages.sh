@@ -4,6 +4,22 @@
 say() { printf '%s\n' "$*" >&2; }
 die() { say "error: $*"; exit 2; }
 
+# own_folder FOLDER MARK NAME...: makes the folder and removes NAMEs of an earlier run in it, which left the file MARK. Where
+# that is not there, a NAME in it is somebody else's, and all stays.
+own_folder() {
+  local folder=$1 mark=$2 name
+  shift 2
+  if [ ! -e "$folder/$mark" ]; then
+    for name in "$@"; do
+      [ ! -e "$folder/$name" ] || die "$folder: holds a '$name' that is not of an earlier run; name another folder"
+    done
+  fi
+  if ! { mkdir -p "$folder" && touch "$folder/$mark"; } 2>/dev/null; then
+    die "$folder: no folder can be made or written there"
+  fi
+  for name in "$@"; do rm -rf "${folder:?}/$name"; done
+}
+
 # stage TEXT: the heading of the next stage; `stages` holds how many there are.
 stage_number=0
 stage() {

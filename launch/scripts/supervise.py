@@ -49,8 +49,13 @@ class Supervisor:
 
     def run(self):
         while not self.stopping:
-            with subprocess.Popen(self.command) as self.child:
-                status = self.child.wait()
+            try:
+                with subprocess.Popen(self.command) as self.child:
+                    status = self.child.wait()
+            except OSError as error:
+                say("FATAL", f"{self.command[0]}: cannot be started ({error.strerror})")
+                self.end_roslaunch()
+                return 2
             if self.stopping or status >= 0 or not self.restart:
                 break
             say("ERROR", f"{self.name()} was ended by {signal.Signals(-status).name}: it is started again in "

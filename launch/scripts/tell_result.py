@@ -113,9 +113,41 @@ def judge(truth, findings):
     return right, lines
 
 
-def read(file):
-    with open(file, encoding="utf-8") as text:
-        return json.load(text)
+def read(file, key):
+    """The file's object, whose `key` is a list of findings or effects. ValueError, which names the file, for others."""
+    try:
+        with open(file, encoding="utf-8") as text:
+            content = json.load(text)
+    except OSError as error:
+        raise ValueError(f"{file}: {error.strerror}") from None
+    except RecursionError:
+        raise ValueError(f"{file}: is nested too deep") from None
+    except ValueError as error:
+        raise ValueError(f"{file}: is no JSON: {error}") from None
+    entries = content.get(key) if isinstance(content, dict) else None
+    if not isinstance(entries, list):
+        raise ValueError(f"{file}: has no list '{key}'")
+    for entry in entries:
+        if not isinstance(entry, dict) or not isinstance(entry.get("cause"), str) or \
+                not isinstance(entry.get("parameters"), dict):
+            raise ValueError(f"{file}: {key}: each must have a cause and parameters")
+    return content
+
+
+def read_findings(file):
+    content = read(file, "findings")
+    for finding in content["findings"]:
+        for name, parameter in finding["parameters"].items():
+            interval = parameter.get("ci95") if isinstance(parameter, dict) else None
+            if not isinstance(parameter, dict) or "value" not in parameter or \
+                    not (interval is None or isinstance(interval, list) and len(interval) == 2 and
+                         all(map(is_number, interval))):
+                raise ValueError(f"{file}: findings: {finding['cause']}: {name}: must have a value, and two numbers as ci95")
+        gain = finding.get("gain") or {}
+        power = (gain.get("explained_power") or {}) if isinstance(gain, dict) else None
+        if not isinstance(power, dict) or not all(value is None or is_number(value) for value in power.values()):
+            raise ValueError(f"{file}: findings: {finding['cause']}: gain: explained_power must hold numbers")
+    return content
 
 
 def main():
@@ -123,8 +155,8 @@ def main():
         print(__doc__, file=sys.stderr if sys.argv[1:] not in (["--help"], ["-h"]) else sys.stdout)
         return 0 if sys.argv[1:] in (["--help"], ["-h"]) else 2
     try:
-        right, lines = judge(read(sys.argv[1]), read(sys.argv[2]))
-    except (OSError, ValueError) as error:
+        right, lines = judge(read(sys.argv[1], "effects"), read_findings(sys.argv[2]))
+    except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     print("\n".join(lines))

@@ -19,13 +19,15 @@ started=$SECONDS
 # shellcheck disable=SC2034 # read by stage
 stages=2
 
-mkdir -p "$out"
-rm -rf "$out/session" "$out/sample.bag" "$out/truth.json" "$out/diagnosis" "$log"
-mkdir -p "$log"
 if [ -n "$sample" ]; then
   if [ ! -f "$sample/session/session.yaml" ] || [ ! -f "$sample/truth.json" ]; then
     die "$sample: must hold session/ and truth.json"
   fi
+  [ "$(readlink -m "$sample")" != "$out" ] || die "$out: is the sample itself; name another folder"
+fi
+own_folder "$out" .mmradartwin_try session sample.bag truth.json diagnosis log
+mkdir -p "$log"
+if [ -n "$sample" ]; then
   stage "Sample: $sample"
   cp -r "$sample/session" "$sample/truth.json" "$out/"
 else

@@ -14,6 +14,9 @@
 #include <thread>
 
 #include "mmradartwin_attribution/progress_line.h"
+#include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/ros/wait_for_master.h"
 
 namespace {
 
@@ -45,23 +48,7 @@ int apply(const std::string& twin_file) {
   return call.response.success ? 0 : 2;
 }
 
-/// roscpp waits for a master without end.
-bool startWithin(double wait_s) {
-  const ros::WallTime begin = ros::WallTime::now();
-  while (!ros::master::check()) {
-    if (interrupted || (ros::WallTime::now() - begin).toSec() > wait_s) return false;
-    std::this_thread::sleep_for(kLook);
-  }
-  ros::start();
-  return true;
-}
-
 int run(const Arguments& arguments) {
-  if (!startWithin(arguments.wait_s)) {
-    std::cerr << "error: no ROS master answers at " << ros::master::getURI()
-              << ": start live.launch or replay.launch first, or set ROS_MASTER_URI\n";
-    return 2;
-  }
   // actionlib waits for a clock without end. Other times are the wall's: a replay's clock ends with the bag.
   if (!ros::Time::waitForValid(ros::WallDuration(arguments.wait_s))) {
     std::cerr << "error: /use_sim_time is set and no /clock comes: does the replay still run?\n";
@@ -118,7 +105,6 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  ros::init(argc, argv, "request_diagnosis", ros::init_options::AnonymousName | ros::init_options::NoSigintHandler);
   Arguments arguments;
   CLI::App app("Asks what the twin gets wrong about the poses seen so far.");
   app.name("request_diagnosis");
@@ -127,11 +113,26 @@ int main(int argc, char** argv) {
   app.add_option("--twin", arguments.twin, "twin.yaml to judge (default: the one that is simulated)");
   app.add_flag("--apply", arguments.apply, "simulate with the extended twin from then on");
   app.add_option("--wait", arguments.wait_s, "seconds to wait for the node")->check(CLI::Range(0.0, 1e6));
+  std::vector<std::string> words;
+  ros::removeROSArgs(argc, argv, words);
+  std::vector<std::string> given(words.rbegin(), words.rend() - 1);  // as CLI11 wants them, without the program
   try {
-    app.parse(argc, argv);
+    app.parse(given);
+    mmradartwin::checkFinite(app);
+    std::signal(SIGINT, [](int) { interrupted = 1; });
+    const mmradartwin::MasterAddress master = mmradartwin::masterAddress(argc, argv);
+    if (!mmradartwin::masterAnswers(master, arguments.wait_s, [] { return interrupted != 0; })) {
+      throw mmradartwin::InputError(mmradartwin::noMasterAnswers(master));
+    }
   } catch (const CLI::ParseError& error) {
-    return app.exit(error, std::cout, std::cerr) == 0 ? 0 : 2;
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    std::cerr << "error: " << error.what() << "; run with --help for the options\n";
+    return 2;
+  } catch (const mmradartwin::InputError& error) {
+    std::cerr << "error: " << error.what() << '\n';
+    return 2;
   }
-  std::signal(SIGINT, [](int) { interrupted = 1; });
+  ros::init(argc, argv, "request_diagnosis", ros::init_options::AnonymousName | ros::init_options::NoSigintHandler);
+  ros::start();
   return run(arguments);
 }

@@ -329,12 +329,14 @@ class SessionPlayer {
 }  // namespace mmradartwin
 
 int main(int argc, char** argv) {
-  return mmradartwin::runNode(argc, argv, mmradartwin::description(), [] {
+  constexpr double kMasterWithin_s = 10;
+  const auto play = [] {
     // The spinner serves tf while this thread keeps the schedule.
     ros::AsyncSpinner spinner(1);
     spinner.start();
     mmradartwin::SessionPlayer player;
     const mmradartwin::MasterWatch master_watch;
     return player.play();
-  });
+  };
+  return mmradartwin::runNode(argc, argv, mmradartwin::description(), play, kMasterWithin_s);
 }

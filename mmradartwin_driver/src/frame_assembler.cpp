@@ -61,6 +61,7 @@ void FrameAssembler::add(const DataPacket& packet) {
   const std::uint64_t offset = absoluteOffset(packet.byte_count);
   switch (fit(packet, offset)) {
     case Fit::kPlace:
+      if (after_quiet && laterSuspects(packet) > 1) return suspect(packet, true);
       rejectSuspects();
       place(packet, offset);
       break;
@@ -76,7 +77,7 @@ void FrameAssembler::add(const DataPacket& packet) {
       }
       break;
     case Fit::kImplausible:
-      suspect(packet, after_quiet && offset < next_byte_);
+      suspect(packet, after_quiet && (offset < next_byte_ || laterSuspects(packet) > 0));
       break;
   }
 }
@@ -102,6 +103,15 @@ bool FrameAssembler::follows(const Header& before, const Header& after) const {
   return grown == packets * longest || grown == before.size + (packets - 1) * longest;
 }
 
+/// As fitsExactly() of a recording whose packets are as long as the longer one of the two, whatever came before.
+bool FrameAssembler::fitsOtherLength(const Header& a, const Header& b) const {
+  if (a.sequence == b.sequence) return false;
+  const bool forward = sequenceAfter(b.sequence, a.sequence);
+  const Header &before = forward ? a : b, &after = forward ? b : a;
+  const std::uint64_t packets = after.sequence - before.sequence;
+  return (after.byte_count - before.byte_count) % kCountModulus == packets * std::max(before.size, after.size);
+}
+
 bool FrameAssembler::fitsExactly(const Header& a, const Header& b) const {
   if (a.sequence == b.sequence) return a.byte_count == b.byte_count;
   return sequenceAfter(b.sequence, a.sequence) ? follows(a, b) : follows(b, a);
@@ -117,10 +127,14 @@ bool FrameAssembler::fitsRoughly(const Header& a, const Header& b) const {
   return grown >= before.size + (packets - 1) && grown <= packets * std::max(longest_payload_, kLongestPayload);
 }
 
+bool FrameAssembler::fitsNewest(const Header& header) const {
+  return fitsExactly(newest_, header) || (lengths_vary_ && fitsRoughly(newest_, header));
+}
+
 FrameAssembler::Fit FrameAssembler::fit(const DataPacket& packet, std::uint64_t offset) const {
   const Header header = headerOf(packet);
   if (!begun_) return packet.sequence == 1 && packet.byte_count == 0 ? Fit::kPlace : Fit::kImplausible;
-  const bool fits = fitsExactly(newest_, header) || (lengths_vary_ && fitsRoughly(newest_, header));
+  const bool fits = fitsNewest(header);
   if (offset >= next_byte_) {
     if (offset - next_byte_ > options_.plausible_gap_bytes) return Fit::kImplausible;
     // The sequence number must rise with the count, else the two belong to different recordings.
@@ -175,7 +189,14 @@ void FrameAssembler::remember(const DataPacket& packet) {
 bool FrameAssembler::linked(const Suspect& suspect, const Header& header) const {
   return sequenceDistance(suspect.header.sequence, header.sequence) <=
              static_cast<std::uint32_t>(options_.confirm_packets) &&
-         fitsExactly(suspect.header, header);
+         (fitsExactly(suspect.header, header) || fitsOtherLength(suspect.header, header));
+}
+
+/// Suspects that came long before the packet and are no earlier in the sequence: in one recording it does not go back.
+int FrameAssembler::laterSuspects(const DataPacket& packet) const {
+  return static_cast<int>(std::count_if(suspects_.begin(), suspects_.end(), [&](const Suspect& s) {
+    return packet.stamp_ns - s.stamp_ns > options_.reorder_ns && !sequenceAfter(packet.sequence, s.header.sequence);
+  }));
 }
 
 void FrameAssembler::suspect(const DataPacket& packet, bool behind) {
@@ -273,7 +294,8 @@ std::uint64_t FrameAssembler::beginOf(const Suspect& first) {
   if (!begun_) return next_byte_ + (count - next_byte_) % kCountModulus;
   const bool later = sequenceAfter(first.header.sequence, newest_.sequence);
   const std::uint64_t ahead = (count - next_byte_) % kCountModulus;
-  if (later && !first.behind && ahead < kCountModulus / 2) return next_byte_ + ahead;
+  const bool another = first.stamp_ns - newest_stamp_ns_ > options_.reorder_ns && !fitsNewest(first.header);
+  if (later && !first.behind && !another && ahead < kCountModulus / 2) return next_byte_ + ahead;
   const bool wrong_newest = !newest_sure_;
   if (wrong_newest) distrustNewest();
   if (later && !first.behind && wrong_newest) return absoluteOffset(count);

@@ -510,6 +510,38 @@ TEST(FrameAssembler, AFrameWithAHoleWaitsNoLongerThanPacketsMayBeLate) {
   EXPECT_GE(bench.collected.cubes.size(), before + 3);
 }
 
+/// Recordings that follow each other unannounced; the first packets of the later one are lost.
+TEST(FrameAssembler, RestartsThatLandAheadOfTheCountAreSeenWhereTheSequenceGoesBack) {
+  for (const std::uint64_t seed : {5795, 10211, 11399, 14426, 28052, 38726}) {
+    const AssemblyScenario scenario = runAssemblyScenario(seed);
+    EXPECT_EQ(0u, scenario.misplaced) << "seed " << seed;
+    EXPECT_EQ(0u, scenario.unflagged) << "seed " << seed;
+    EXPECT_EQ("", scenario.problem) << "seed " << seed;
+  }
+}
+
+TEST(FrameAssembler, ASequenceThatGoesBackBehindSuspectsIsALaterRecording) {
+  std::mt19937_64 random(7);
+  Bench bench(paperRadar());
+  const auto give = [&](std::vector<ArrivingPacket>& packets, std::size_t from, std::size_t count) {
+    for (std::size_t i = from; i < from + count; ++i) {
+      packets[i].stamp_ns = bench.now_ns += 40'000;
+      bench.assembler.add(packets[i].view());
+    }
+    bench.now_ns += 100 * kMillisecond;
+  };
+  std::vector<ArrivingPacket> first = recording(random, 0, 10, true), second = recording(random, 1, 40, true);
+  for (ArrivingPacket& packet : first) {
+    if (packet.sequence > 1) packet.offset += 16;  // what the first packet says fits none of the others
+  }
+  give(first, 0, 1);
+  give(first, 5, 3);
+  // Its sequence number and count go on where the first recording's first packet ended.
+  give(second, 1, 39);
+  bench.assembler.flush();
+  EXPECT_EQ(2u, bench.assembler.counters().epochs);
+}
+
 /// 900 scenarios; `benchmark_scenarios` runs as many as one likes.
 class AssemblyScenarios : public testing::TestWithParam<int> {};
 

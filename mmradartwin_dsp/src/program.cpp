@@ -2,6 +2,8 @@
 
 #include <CLI/CLI.hpp>
 #include <cctype>
+#include <cmath>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <iostream>
@@ -60,6 +62,7 @@ int runProgram(CLI::App& app, int argc, char** argv, const std::function<int()>&
     const std::string unknown = unknownOption(app, argc, argv);
     if (!unknown.empty()) throw InputError(unknown);
     app.parse(argc, argv);
+    checkFinite(app);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
     print("error", std::string(error.what()) + "; run with --help for the options");
@@ -92,6 +95,17 @@ int runProgram(CLI::App& app, int argc, char** argv, const std::function<int()>&
   waitWhereInterrupted();
   print("error", failure);
   return status;
+}
+
+void checkFinite(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->get_type_name().rfind("FLOAT", 0) != 0) continue;
+    for (const std::string& word : option->results()) {
+      if (!std::isfinite(std::strtod(word.c_str(), nullptr))) {
+        throw InputError(option->get_name() + ": '" + word + "' is no finite number");
+      }
+    }
+  }
 }
 
 void note(const std::string& text) {

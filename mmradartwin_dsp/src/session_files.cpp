@@ -258,7 +258,7 @@ void restoreSessionFiles(const std::vector<StoredFile>& files, const std::string
     const std::string name = entry.place.storedName();
     if (!stored.count(name) || written.count(name)) continue;
     std::string bytes = stored.at(name)->bytes;
-    const References references = findReferences(name, bytes);
+    const References references = findReferences((fs::path(directory) / name).string(), bytes);
     for (const std::string& reference : references.names) {
       const Place target = entry.place.follow(reference);
       const auto found = stored.find(target.storedName());

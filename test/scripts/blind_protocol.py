@@ -24,6 +24,8 @@ EFFECTS = {"clean": 1, "single": len(draws.SINGLE), "later": len(draws.LATER), "
            "twice": len(draws.TWICE), "outside": len(draws.OUTSIDE), "decoy": len(draws.DECOYS),
            "recording": len(recordings.INJECTIONS)}
 
+NEEDS = ("row", "tier", "poses", "frames", "status", "findings", "seconds")
+
 
 def parse():
     """Command line."""
@@ -111,7 +113,7 @@ def run(arguments):
     """Runs what is missing."""
     counts = wanted_trials(arguments)
     sealed = ledger.Ledger(arguments.output)
-    results = trials.Results(os.path.join(arguments.output, "results.jsonl"))
+    results = trials.Results(os.path.join(arguments.output, "results.jsonl"), NEEDS)
     if not arguments.table:
         program = find_program("mmradartwin_attribution", "diagnose")
         if program is None:

@@ -8,6 +8,7 @@ import tempfile
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
+from mmradartwin_tests.arguments import whole
 from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.path_comparison import compare
 from mmradartwin_tests.session import Measurement, Settings
@@ -16,8 +17,8 @@ from mmradartwin_tests.session import Measurement, Settings
 def main():
     """Prints one row per tier; status 1 where the medians of isolated strong paths exceed 0.3 dB, 5 mm or 0.3 deg."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seed", type=int, default=int.from_bytes(os.urandom(3), "little"))
-    parser.add_argument("--poses", type=int, help="fewer poses than the full campaign")
+    parser.add_argument("--seed", type=whole(0), default=int.from_bytes(os.urandom(3), "little"))
+    parser.add_argument("--poses", type=whole(1), help="fewer poses than the full campaign")
     arguments = parser.parse_args()
     program = find_program("mmradartwin_sim", "simulate")
     if program is None:

@@ -7,10 +7,27 @@ import sys
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
 from mmradartwin_tests import office
+from mmradartwin_tests.output import new_folder
+
+FILES = {"office.obj", "scene.yaml", "materials.yaml"}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--output", required=True, help="folder to write")
+    parser.add_argument("--force", action="store_true", help="replace an office that exists")
+    arguments = parser.parse_args()
+    try:
+        with new_folder(arguments.output, arguments.force, lambda folder: set(os.listdir(folder)) == FILES) as folder:
+            office.write_scene(folder)
+    except (ValueError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("error: stopped; nothing is written", file=sys.stderr)
+        return 1
+    return 0
+
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--output", required=True, help="directory to write into")
-    arguments = parser.parse_args()
-    os.makedirs(arguments.output, exist_ok=True)
-    office.write_scene(arguments.output)
+    sys.exit(main())

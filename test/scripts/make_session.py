@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Writes a measured session: raw captures of the test office with the paper's radar, with hidden effects or none."""
 import argparse
+import math
 import os
 import sys
 
@@ -10,6 +11,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
 from mmradartwin_tests import campaign, effects, session
+from mmradartwin_tests.output import check_new, new_folder
 
 
 def value_of(text):
@@ -46,42 +48,71 @@ def parse():
     parser.add_argument("--truth", help="file for what the session hides (JSON); never inside the session")
     parser.add_argument("--paths-csv", help="directory for the true path lists; never inside the session")
     parser.add_argument("--jobs", type=int, help="processes")
+    parser.add_argument("--force", action="store_true", help="replace a session, truth and path lists that exist")
     return parser.parse_args()
+
+
+def check(arguments):
+    """ValueError for a number out of its range."""
+    for name, least in (("locations", 1), ("headings", 1), ("frames", 1), ("duplicates", 0), ("jobs", 1), ("seed", 0),
+                        ("speckle_seed", 0), ("pause", 0), ("strength", -math.inf)):
+        value = getattr(arguments, name)
+        if value is not None and not (math.isfinite(value) and value >= least):
+            raise ValueError(f"--{name.replace('_', '-')} {value}: must be at least {least}")
+    if arguments.poses is not None and not 1 <= arguments.poses <= arguments.locations * arguments.headings:
+        raise ValueError(f"--poses {arguments.poses}: must be 1 to {arguments.locations * arguments.headings}")
+    for option in ("truth", "paths_csv"):
+        path = getattr(arguments, option)
+        flag = "--" + option.replace("_", "-")
+        if path is None:
+            continue
+        if os.path.realpath(path).startswith(os.path.realpath(arguments.output) + os.sep):
+            raise ValueError(f"{flag} {path}: lies inside the session; choose a place outside")
+        check_new(flag, path, arguments.force)
+        if os.path.lexists(path) and os.path.isdir(path) != (option == "paths_csv"):
+            raise ValueError(f"{flag} {path}: is {'a' if option == 'truth' else 'no'} folder")
+
+
+def chosen_effects(arguments):
+    """Effects of the options --effect, --param and --strength."""
+    parameters = {name: {} for name in arguments.effect}
+    for item in arguments.param:
+        key, _, text = item.partition("=")
+        owner, _, name = key.rpartition(".")
+        owner = owner or (arguments.effect[0] if arguments.effect else "")
+        if owner not in parameters or not text:
+            raise ValueError(f"--param {item}: wants [EFFECT.]KEY=VALUE of an effect given with --effect")
+        parameters[owner][name] = value_of(text)
+        # By the unit in its name it is a number, or several.
+        if isinstance(parameters[owner][name], str) and name.endswith(("_m", "_deg", "_db", "_hz", "_s")):
+            raise ValueError(f"--param {item}: must be a number")
+    return [effects.make_effect(name, parameters[name], arguments.strength if i == 0 else None)
+            for i, name in enumerate(arguments.effect)]
+
+
+def is_session(folder):
+    return os.path.isfile(os.path.join(folder, "session.yaml"))
 
 
 def main():
     """Entry point; returns the exit status."""
     arguments = parse()
     try:
-        parameters = {name: {} for name in arguments.effect}
-        for item in arguments.param:
-            key, _, text = item.partition("=")
-            owner, _, name = key.rpartition(".")
-            owner = owner or (arguments.effect[0] if arguments.effect else "")
-            if owner not in parameters or not text:
-                raise ValueError(f"--param {item}: wants [EFFECT.]KEY=VALUE of an effect given with --effect")
-            parameters[owner][name] = value_of(text)
-        chosen = [effects.make_effect(name, parameters[name], arguments.strength if i == 0 else None)
-                  for i, name in enumerate(arguments.effect)]
-        for name in ("locations", "headings", "frames"):
-            if getattr(arguments, name) < 1:
-                raise ValueError(f"--{name} {getattr(arguments, name)}: must be at least 1")
-        if arguments.poses is not None and not 1 <= arguments.poses <= arguments.locations * arguments.headings:
-            raise ValueError(f"--poses {arguments.poses}: must be 1 to {arguments.locations * arguments.headings}")
-        for option in ("truth", "paths_csv"):
-            path = getattr(arguments, option)
-            if path and os.path.realpath(path).startswith(os.path.realpath(arguments.output) + os.sep):
-                flag = "--" + option.replace("_", "-")
-                raise ValueError(f"{flag} {path}: lies inside the session; choose a place outside")
-        settings = session.Settings(
-            output=arguments.output, seed=arguments.seed, locations=arguments.locations, headings=arguments.headings,
-            frames=arguments.frames, poses=arguments.poses, tier=arguments.tier, speckle_seed=arguments.speckle_seed,
-            pause_s=arguments.pause, duplicates=arguments.duplicates, effects=chosen, truth=arguments.truth,
-            paths_csv=arguments.paths_csv, at_reported=arguments.at_reported, jobs=arguments.jobs)
-        session.Measurement(settings).run()
+        check(arguments)
+        chosen = chosen_effects(arguments)
+        with new_folder(arguments.output, arguments.force, is_session) as folder:
+            settings = session.Settings(
+                output=folder, seed=arguments.seed, locations=arguments.locations, headings=arguments.headings,
+                frames=arguments.frames, poses=arguments.poses, tier=arguments.tier, speckle_seed=arguments.speckle_seed,
+                pause_s=arguments.pause, duplicates=arguments.duplicates, effects=chosen, truth=arguments.truth,
+                paths_csv=arguments.paths_csv, at_reported=arguments.at_reported, jobs=arguments.jobs)
+            session.Measurement(settings).run()
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("error: stopped; nothing is written", file=sys.stderr)
+        return 1
     return 0
 
 

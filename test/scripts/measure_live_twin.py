@@ -17,6 +17,10 @@ import time
 import rosgraph
 import rospkg
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
+
+from mmradartwin_tests.arguments import positive
+
 HEADER = f"{'phase':<22}{'sent/s':>8}{'twin/s':>8}{'lag median':>12}{'95 %':>8}{'worst':>8}{'skipped':>9}"
 
 
@@ -101,11 +105,13 @@ class Stream:
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=10, help="of each phase")
-    parser.add_argument("--rate", type=float, default=20, help="frames per second")
+    parser.add_argument("--seconds", type=positive, default=10, help="of each phase")
+    parser.add_argument("--rate", type=positive, default=20, help="frames per second")
     parser.add_argument("--no-rviz", action="store_true", help="without rviz beside it")
     parser.add_argument("--twin", default="", help="twin.yaml; default: the base mechanisms")
     arguments = parser.parse_args()
+    if arguments.twin and not os.path.isfile(arguments.twin):
+        parser.error(f"--twin {arguments.twin}: is no file")
     config = rospkg.RosPack().get_path("mmradartwin_config")
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{free_port()}"
     port = os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1]

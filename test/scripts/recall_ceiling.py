@@ -13,6 +13,7 @@ import tempfile
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
+from mmradartwin_tests.arguments import whole
 from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.session import Measurement, Settings
 
@@ -23,9 +24,9 @@ BRANCHES = ("twin", "ceiling", "ceiling at reported poses")
 def main():
     """Prints the table; status 1 where |Q3 median| exceeds 0.5 dB or a pooled recall is below 0.95 of the ceiling."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seed", type=int, default=int.from_bytes(os.urandom(3), "little"))
-    parser.add_argument("--sessions", type=int, default=3)
-    parser.add_argument("--poses", type=int, help="fewer poses than the full campaign")
+    parser.add_argument("--seed", type=whole(0), default=int.from_bytes(os.urandom(3), "little"))
+    parser.add_argument("--sessions", type=whole(1), default=3)
+    parser.add_argument("--poses", type=whole(1), help="fewer poses than the full campaign")
     arguments = parser.parse_args()
     program = find_program("mmradartwin_attribution", "evaluate")
     if program is None:

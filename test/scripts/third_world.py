@@ -46,12 +46,15 @@ def seeds_of(text):
 
 def run(arguments):
     """Runs what is missing."""
-    results = Results(os.path.join(arguments.output, "results.jsonl"))
+    results = Results(os.path.join(arguments.output, "results.jsonl"), ("row", "status", "truths", "findings"))
     rows = arguments.what.split(",")
     for row in rows:
         if row not in ("clean", "single", *hidden.CAUSES):
             raise ValueError(f"--what {row}: is none of clean, single, {', '.join(hidden.CAUSES)}")
     without = [p for p in arguments.without.split(",") if p]
+    for name in without:
+        if name not in PROPERTIES:
+            raise ValueError(f"--without {name}: is no property; there are {', '.join(PROPERTIES)}")
     if not arguments.table:
         program = find_program("mmradartwin_attribution", "diagnose")
         if program is None:

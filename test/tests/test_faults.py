@@ -1,106 +1,16 @@
-"""Faults of files, disks and machines, one a row: what is done, what the program must say, what must not be lost.
+"""Faults of files, one a row: what is done, what the program must say, what must not be lost.
 
 Each run takes every row once; with MMRADARTWIN_LONG twenty times, with other damage each time. docs/verification/faults.md
 is the table of rows.
 """
-import collections
 import os
-import random
 import shutil
 import struct
-import subprocess
-import sys
-import threading
-import time
 import unittest
 
 from card_packets import jumping, packets, pcap
-from chosen_sessions import RUN
-from test_program_outputs import PROGRAMS, Programs, digest_of
-
-ROUNDS = 20 if RUN else 1
-LONGEST_S = 60
-LARGEST_MB = 1500
-MOST_LINES = 12
-
-# name: what is done. call: the program and its words. make(test, chance): does it. says: words of the error; status: those
-# allowed. A row whose damage may be harmless allows 0.
-Row = collections.namedtuple("Row", "name call make says status", defaults=[None, (), (2,)])
-
-
-# ---- damage
-
-def cut(name, share=None):
-    def damage(test, chance):
-        size = os.path.getsize(test.at(name))
-        os.truncate(test.at(name), int(size * (chance.uniform(0.02, 0.98) if share is None else share)))
-    return damage
-
-
-def scatter(name, bytes_=12):
-    """Some bytes changed anywhere."""
-    def damage(test, chance):
-        with open(test.at(name), "r+b") as file:
-            for _ in range(bytes_):
-                file.seek(chance.randrange(os.path.getsize(test.at(name))))
-                file.write(bytes([chance.randrange(256)]))
-    return damage
-
-
-def zero(name, share=0.2):
-    """A stretch of zeros, as a disk leaves them."""
-    def damage(test, chance):
-        size = os.path.getsize(test.at(name))
-        with open(test.at(name), "r+b") as file:
-            file.seek(int(chance.uniform(0, 1 - share) * size))
-            file.write(bytes(int(share * size)))
-    return damage
-
-
-def put(name, content):
-    """A file of that text or of those bytes."""
-    def damage(test, _chance):
-        os.makedirs(os.path.dirname(test.at(name)), exist_ok=True)
-        with open(test.at(name), "wb") as file:
-            file.write(content if isinstance(content, bytes) else content.encode())
-    return damage
-
-
-def noise(name, size=4096):
-    return lambda test, chance: put(name, chance.randbytes(size))(test, chance)
-
-
-def remove(name):
-    return lambda test, _chance: os.remove(test.at(name))
-
-
-def folder_instead(name):
-    def damage(test, _chance):
-        os.remove(test.at(name))
-        os.mkdir(test.at(name))
-    return damage
-
-
-def change(name, old, new):
-    """A text in place of another."""
-    def damage(test, _chance):
-        with open(test.at(name), "rb") as file:
-            text = file.read()
-        assert old.encode() in text, (name, old)
-        put(name, text.replace(old.encode(), new if isinstance(new, bytes) else new.encode()))(test, None)
-    return damage
-
-
-def append(name, text):
-    def damage(test, _chance):
-        with open(test.at(name), "ab") as file:
-            file.write(text if isinstance(text, bytes) else text.encode())
-    return damage
-
-
-def nothing(_test, _chance):
-    """No damage: the call itself is the fault."""
-
+from faults import (CAPTURE, OUT, POSES, POSES_HEAD, RADAR, FaultRows, Row, add_tests, all_of, append, change, cut, folder_instead,
+                    in_millimetres, laughs, misled_index, noise, nothing, put, remove, scatter, tail_noise, vast_frame, zero)
 
 # ---- meshes
 
@@ -116,58 +26,25 @@ def glb_that_claims(size):
     return b"glTF" + struct.pack("<II", 2, size) + struct.pack("<I", size - 20) + b"JSON"
 
 
-def in_millimetres(test, _chance):
-    found = [os.path.join(place, name) for place, _, names in os.walk(test.at("session")) for name in names
-             if name.endswith(".obj")]
-    assert found
-    for file in found:
-        with open(file, encoding="utf-8") as text:
-            lines = text.read().splitlines()
-        with open(file, "w", encoding="utf-8") as out:
-            for line in lines:
-                if line.startswith("v "):
-                    line = "v " + " ".join(str(1000 * float(value)) for value in line.split()[1:4])
-                out.write(line + "\n")
-
-
-# ---- poses
-
-POSES_HEAD = "pose,location,stamp,x,y,z,qx,qy,qz,qw\n"
-POSES = "session/poses.csv"
-
-
-def laughs():
-    text = "a0: &a0 [lol, lol, lol, lol, lol, lol, lol, lol, lol]\n"
-    for i in range(1, 9):
-        text += f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n"
-    return text
-
-
-OUT = ["--output", "out"]
 READERS = {"process": ["session", *OUT], "simulate": ["session", *OUT], "session_to_bag": ["session", "out"]}
 BAG_READERS = {"process": ["session.bag", *OUT], "simulate": ["session.bag", *OUT],
                "bag_to_session": ["session.bag", "out"], "validate": ["session.bag"]}
 TO_CAPTURE = ("pcap_to_capture", ["a.pcap", "--radar", "session/radar.yaml", *OUT])
-RADAR = "session/radar.yaml"
-CAPTURE = "session/captures/001.bin"
 
 
 def bag_rows():
     damages = {"cut": cut("session.bag"), "cut in its first 20 bytes": lambda t, c: os.truncate(t.at("session.bag"), 20),
                "scattered bytes": scatter("session.bag"), "a stretch of zeros": zero("session.bag"),
                "its index damaged": lambda t, c: tail_noise(t, c, "session.bag"), "empty": put("session.bag", b""),
-               "noise behind a bag's first line": put("session.bag", b"#ROSBAG V2.0\n" + bytes(range(256)) * 40)}
+               "noise behind a bag's first line": put("session.bag", b"#ROSBAG V2.0\n" + bytes(range(256)) * 40),
+               "an index entry that leads out of its chunk": misled_index("session.bag"),
+               "a message that leads out of its chunk": misled_index("session.bag", message_too=True),
+               "its materials are no YAML": change("session.bag", "\nmaterials:\n  Metal: {", "\nmaterials:\n  Metal: }")}
     for damage, make in damages.items():
         for program, words in BAG_READERS.items():
-            harmless = damage not in ("cut in its first 20 bytes", "empty", "noise behind a bag's first line")
+            harmless = damage not in ("cut in its first 20 bytes", "empty", "noise behind a bag's first line",
+                                      "an index entry that leads out of its chunk", "a message that leads out of its chunk")
             yield Row(f"bag: {damage}", [program, *words], make, ("session.bag",), (0, 2) if harmless else (2,))
-
-
-def tail_noise(test, chance, name):
-    size = os.path.getsize(test.at(name))
-    with open(test.at(name), "r+b") as file:
-        file.seek(int(size * 0.97))
-        file.write(chance.randbytes(64))
 
 
 def capture_rows():
@@ -200,13 +77,6 @@ def yaml_rows():
         for file in ("session/radar.yaml", "session/session.yaml", "session/scene.yaml"):
             yield Row(f"{os.path.basename(file)}: {text}", ["simulate", *READERS["simulate"]],
                       noise(file) if content is None else put(file, content), (os.path.basename(file),))
-
-
-def vast_frame(test, chance):
-    change(RADAR, "loops_per_frame: 1", "loops_per_frame: 32768")(test, chance)
-    change(RADAR, "samples_per_chirp: 64", "samples_per_chirp: 128")(test, chance)
-    change(RADAR, "sample_rate_hz: ", "sample_rate_hz: 1.0e+7 #")(test, chance)
-    change(RADAR, "frame_period_s: ", "frame_period_s: 2 #")(test, chance)
 
 
 def pose_rows():
@@ -303,10 +173,6 @@ def output_rows():
 # Programs that judge a whole session.
 JUDGES = {"evaluate": ["session", "--no-pictures", "--no-bag", *OUT], "diagnose": ["session", "--findings", "0", *OUT],
           "calibrate": ["session", "--wall", "wall_north", *OUT]}
-
-
-def all_of(*damages):
-    return lambda test, chance: [damage(test, chance) for damage in damages]
 
 
 def judged_session_rows():
@@ -435,270 +301,11 @@ ROWS = {"judged_sessions": judged_session_rows, "judged_bags": judged_bag_rows, 
         "meshes": mesh_rows, "memory": memory_rows, "outputs": output_rows}
 
 
-def peak_mb(process):
-    """The most memory that a process has had until now; 0 where it has just ended."""
-    try:
-        with open(f"/proc/{process}/status", encoding="ascii") as status:
-            return max((int(line.split()[1]) / 1024 for line in status if line.startswith("VmHWM:")), default=0)
-    except (FileNotFoundError, ProcessLookupError):
-        return 0
+class Faults(FaultRows):
+    """Of the offline programs."""
 
 
-class Faults(Programs):
-    """The rows that damage a file and run a program once."""
-
-    def run_measured(self, call):
-        """(status, stdout, stderr, seconds, MB)."""
-        with open(self.temporary + ".out", "w+", encoding="utf-8", errors="replace") as out, \
-                open(self.temporary + ".err", "w+", encoding="utf-8", errors="replace") as err:
-            begin = time.monotonic()
-            run = subprocess.Popen([PROGRAMS[call[0]], *call[1:]], cwd=self.folder, stdout=out, stderr=err,
-                                   stdin=subprocess.DEVNULL, env=self.environment)
-            megabytes = 0
-            while run.poll() is None:
-                megabytes = max(megabytes, peak_mb(run.pid))
-                if time.monotonic() - begin > LONGEST_S or megabytes > LARGEST_MB:
-                    run.kill()
-                time.sleep(0.01)
-            out.seek(0), err.seek(0)
-            said = run.returncode, out.read(), err.read(), time.monotonic() - begin, megabytes
-        os.remove(self.temporary + ".out"), os.remove(self.temporary + ".err")
-        return said
-
-    def check(self, row, chance):
-        row.make(self, chance)
-        before = digest_of(self.folder)
-        status, out, err, seconds, megabytes = self.run_measured(row.call)
-        if os.environ.get("FAULT_LOG"):
-            with open(os.environ["FAULT_LOG"], "a", encoding="utf-8") as log:
-                log.write(f"{row.name} | {row.call[0]} | {status} | {seconds:.1f} s | {megabytes:.0f} MB | {err[:600]!r}\n")
-        self.assertIn(status, row.status, msg=err[:2000])
-        if status:
-            if row.call[0] == "validate":      # whose findings are its result
-                err += out
-            else:
-                self.assertIn("error: ", err)
-            for word in row.says:
-                self.assertIn(word, err[:4000])
-        self.assertNotIn("std::", err)
-        self.assertNotIn("mmradartwin_tmp_", err)
-        if row.call[0] != "validate":
-            self.assertLessEqual(err.count("\n"), MOST_LINES, msg=err[:2000])
-        self.assertLess(seconds, LONGEST_S)
-        self.assertLess(megabytes, LARGEST_MB)
-        self.assertEqual({k: v for k, v in digest_of(self.folder).items() if k != "out" and not k.startswith("out/")}, before)
-        self.assertEqual(os.listdir(self.temporary), [])
-
-    def again(self):
-        """All files as at first."""
-        for name in os.listdir(self.folder):
-            path = self.at(name)
-            shutil.rmtree(path) if os.path.isdir(path) and not os.path.islink(path) else os.remove(path)
-        shutil.copytree(self.made, self.folder, dirs_exist_ok=True)
-
-    def take(self, rows):
-        for round_ in range(ROUNDS):
-            for number, row in enumerate(rows):
-                with self.subTest(fault=row.name, program=row.call[0], round=round_):
-                    self.check(row, random.Random(1000 * round_ + number))
-                self.again()
-
-
-def small_disk(test, options):
-    """A file system of its own in `small`; skips where none can be had."""
-    if os.geteuid() != 0:
-        test.skipTest("a small file system needs root")
-    os.makedirs(test.at("small"))
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", options, "tmpfs", test.at("small")], check=False,
-                             capture_output=True)
-    if mounted.returncode:
-        test.skipTest("no file system can be mounted here")
-    test.addCleanup(subprocess.run, ["umount", test.at("small")], check=False)
-
-
-class Machines(Programs):
-    """Disks that are full or cannot be written, clocks that jump, other people's load, files that change meanwhile."""
-
-    def commands(self):
-        # Those two take long: test_program_outputs has full disks and signals for them.
-        return {name: call for name, call in super().commands().items() if name not in ("evaluate", "diagnose")}
-
-    def failed(self, name, run):
-        """One line of an error, nothing left, nothing changed."""
-        self.assertIn(run.returncode, (1, 2), msg=f"{name}: {run.stderr}")
-        self.assertEqual(run.stderr.count("error: "), 1, msg=run.stderr)
-        self.assertNotIn("std::", run.stderr)
-        self.assertNotIn("unfinished", run.stderr)
-        self.assertIn("small", run.stderr)
-        self.assert_nothing_changed()
-
-    def test_disks_that_fill_up_at_every_output(self):
-        chance = random.Random(5)
-        small_disk(self, "size=64k")
-        for _ in range(ROUNDS):
-            for name, (head, tail, mark) in self.commands().items():
-                # Not a byte left, and as much as the result takes half of the way.
-                for room in (0, chance.randrange(1, 9)):
-                    filler = self.at("small", "filler")
-                    with open(filler, "wb") as file:
-                        file.write(bytes(65536 - 4096 * room))
-                    self.before = digest_of(self.folder)
-                    with self.subTest(program=name, room=4096 * room):
-                        run = self.run_program(name, *head, "small/out", *tail)
-                        if run.returncode in (0, 2) and os.path.lexists(self.at("small", "out")):
-                            self.assertGreater(room, 0)
-                            self.assertTrue(mark is None or os.path.exists(self.at("small", "out", mark)))
-                            shutil.rmtree(self.at("small", "out")) if mark else os.remove(self.at("small", "out"))
-                        else:
-                            self.failed(name, run)
-                    os.remove(filler)
-                    self.assertEqual(os.listdir(self.at("small")), [])
-
-    def test_a_full_place_for_temporary_files(self):
-        small_disk(self, "size=8k")
-        with open(self.at("small", "filler"), "wb") as file:
-            file.write(bytes(8192))
-        self.before = digest_of(self.folder)
-        self.environment["TMPDIR"] = self.at("small")
-        for name, words in BAG_READERS.items():
-            with self.subTest(program=name):
-                run = self.run_program(name, *words)
-                if run.returncode != 0 or not run.stderr == "":     # some need no temporary file
-                    self.assertIn(run.returncode, (0, 1, 2), msg=run.stderr)
-                    self.assertNotIn("std::", run.stderr)
-                if os.path.lexists(self.at("out")):
-                    shutil.rmtree(self.at("out"))
-                self.assert_nothing_changed()
-
-    def test_disks_that_cannot_be_written(self):
-        small_disk(self, "size=64k")
-        subprocess.run(["mount", "-o", "remount,ro", self.at("small")], check=True)
-        for name, (head, tail, _) in self.commands().items():
-            for output in ("small/out", "small", "small/a/b/out"):
-                with self.subTest(program=name, output=output):
-                    run = self.run_program(name, *head, output, *tail)
-                    self.assertEqual(run.returncode, 2, msg=run.stderr)
-                    self.failed(name, run)
-
-    def test_clocks_that_jump(self):
-        faketime = shutil.which("faketime")
-        if faketime is None:
-            self.skipTest("faketime is not installed (Debian's package faketime)")
-        whole = self.results(["process", "session", "--output", "out"])
-        for clock in ("-30 years", "+30 years", "@2106-02-07 06:28:10", "@1970-01-01 00:00:05"):
-            with self.subTest(clock=clock):
-                run = subprocess.run([faketime, "-f", clock, PROGRAMS["process"], "session", "--output", "out"],
-                                     cwd=self.folder, capture_output=True, text=True, check=False, timeout=LONGEST_S,
-                                     env=self.environment)
-                self.assertEqual(run.returncode, 0, msg=run.stderr)
-                self.assertEqual(self.taken_away("out"), whole)
-
-    def taken_away(self, name):
-        """Digests of a result, which is removed."""
-        digests = digest_of(self.at(name))
-        shutil.rmtree(self.at(name))
-        return digests
-
-    def results(self, call):
-        run = self.run_program(*call)
-        self.assertEqual(run.returncode, 0, msg=run.stderr)
-        return self.taken_away("out")
-
-    def test_eight_programs_that_take_the_processor(self):
-        calls = (["process", "session", *OUT], ["simulate", "session", *OUT], ["process", "session.bag", *OUT])
-        alone = [self.results(call) for call in calls]
-        hogs = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(8)]
-        try:
-            for _ in range(ROUNDS):
-                for call, whole in zip(calls, alone):
-                    with self.subTest(program=call[0]):
-                        self.assertEqual(self.results(call), whole)
-        finally:
-            for hog in hogs:
-                hog.kill()
-                hog.wait()
-
-    def meshes(self):
-        return [os.path.join(place, name) for place, _, names in os.walk(self.at("session")) for name in names
-                if name.endswith(".obj")]
-
-    def test_a_mesh_that_is_swapped_meanwhile(self):
-        mesh = self.meshes()[0]
-        call = ["simulate", "session", *OUT]
-        with open(mesh, encoding="utf-8") as text:
-            first = text.read()
-        other = "".join("v " + " ".join(str(1.01 * float(value)) for value in line.split()[1:4]) + "\n"
-                        if line.startswith("v ") else line for line in first.splitlines(keepends=True))
-        samples = lambda digests: {name: digest for name, digest in digests.items() if name.startswith("captures")}
-        begin = time.monotonic()
-        of_first = samples(self.results(call))
-        takes_s = time.monotonic() - begin
-        put(os.path.relpath(mesh, self.folder), other)(self, None)
-        of_other = samples(self.results(call))
-        chance = random.Random(3)
-        for round_ in range(5 * ROUNDS):
-            old, new = ((first, of_first), (other, of_other))[::1 if round_ % 2 else -1]
-            with open(mesh, "w", encoding="utf-8") as out:
-                out.write(old[0])
-            with open(mesh + ".new", "w", encoding="utf-8") as out:
-                out.write(new[0])
-            timer = threading.Timer(chance.uniform(0, takes_s), os.replace, (mesh + ".new", mesh))
-            timer.start()
-            with self.subTest(round=round_):
-                self.assertIn(samples(self.results(call)), (of_first, of_other))
-            timer.join()
-
-    def test_a_capture_that_shrinks_meanwhile(self):
-        chance = random.Random(4)
-        whole = self.results(["process", "session", *OUT])
-        for round_ in range(5 * ROUNDS):
-            timer = threading.Timer(chance.uniform(0, 0.2), os.truncate, (self.at("session", "captures", "001.bin"), 100))
-            timer.start()
-            run = self.run_program("process", "session", *OUT)
-            timer.join()
-            with self.subTest(round=round_):
-                self.assertIn(run.returncode, (0, 2), msg=run.stderr)
-                made = self.taken_away("out") if os.path.exists(self.at("out")) else {}
-                for name, digest in made.items():
-                    self.assertEqual(whole[name], digest, "a map of half a capture")
-                if run.returncode == 2:
-                    self.assertIn("001", run.stderr)
-            shutil.copy(os.path.join(self.made, "session", "captures", "001.bin"), self.at("session", "captures"))
-
-    def test_what_a_killed_program_left_is_swept_by_the_next(self):
-        chance = random.Random(6)
-        for _ in range(ROUNDS):
-            for name, words in BAG_READERS.items():
-                if name == "validate":
-                    continue
-                for _try in range(4):
-                    run = subprocess.Popen([PROGRAMS[name], *words], cwd=self.folder, stdout=subprocess.DEVNULL,
-                                           stderr=subprocess.DEVNULL, env=self.environment)
-                    time.sleep(chance.uniform(0, 0.4))
-                    run.kill()
-                    run.wait()
-                # They are swept when they are a minute old, or from a clock that was set back.
-                left = [os.path.join(self.temporary, entry) for entry in os.listdir(self.temporary)]
-                left += [self.at(entry) for entry in os.listdir(self.folder) if entry.startswith(".")]
-                for number, path in enumerate(left):
-                    at = time.time() + (3600 if number % 2 else -3600)
-                    os.utime(path, (at, at))
-                shutil.rmtree(self.at("out"), ignore_errors=True)
-                with self.subTest(program=name, left=len(left)):
-                    run = self.run_program(name, *words)
-                    self.assertIn(run.returncode, (0, 2), msg=run.stderr)
-                    self.assertEqual([entry for entry in os.listdir(self.folder) if entry.startswith(".")], [])
-                    self.assertEqual(os.listdir(self.temporary), [])
-                shutil.rmtree(self.at("out"), ignore_errors=True)
-        self.assert_nothing_changed()
-
-
-def add_tests():
-    for subject, rows in ROWS.items():
-        setattr(Faults, f"test_{subject}", lambda self, rows=rows: self.take(list(rows())))
-
-
-add_tests()
+add_tests(Faults, ROWS)
 
 
 if __name__ == "__main__":

@@ -82,7 +82,7 @@ class InstallSpace(unittest.TestCase):
 
     def make_session(self):
         self.run_there("rosrun mmradartwin_tests make_session.py --output session --seed 3 --locations 1 --headings 1 "
-                       "--frames 4 --effect actor_moved --truth truth.json")
+                       "--frames 4 --effect actor_moved --truth truth.json --force")
 
     def test_a_session_is_made_simulated_and_evaluated_there(self):
         self.make_session()
@@ -105,7 +105,7 @@ class InstallSpace(unittest.TestCase):
         for script in ("demo.sh", "try.sh"):
             self.assertIn("usage: " + script, self.run_there(f"rosrun mmradartwin_launch {script} --help"))
         folder = os.path.join(self.prefix, "lib", "mmradartwin_launch")
-        for name in ("stages.sh", "tell_result.py", "emulated_rig.sh", "recorder.py"):
+        for name in ("stages.sh", "tell_result.py", "emulated_rig.sh", "recorder.py", "ros_master.py"):
             self.assertTrue(os.path.isfile(os.path.join(folder, name)), name)
 
     def test_every_node_of_the_launch_files_is_found_there(self):

@@ -36,8 +36,10 @@ namespace mmradartwin {
 ///
 /// A packet that goes back in the count more than `reorder_ns` after the newest one is no reordered one. If it is the
 /// first of a recording, or suspects that begin with it are confirmed, then the count has been restarted: that ends all
-/// open frames, and a new epoch begins with frame 0. A restart whose first packets are lost and that lands ahead of the
-/// old count cannot be told from loss; arming through restart() leaves no such doubt.
+/// open frames, and a new epoch begins with frame 0. So it is where the sequence goes back behind suspects that came as
+/// long before, and where suspects that came so long after the newest packet do not fit it. A restart whose first
+/// packets are lost and that lands ahead of the old count, as a continuation would, cannot be told from loss; arming
+/// through restart() leaves no such doubt.
 class FrameAssembler {
  public:
   struct Options {
@@ -119,8 +121,11 @@ class FrameAssembler {
   static Header headerOf(const DataPacket& packet);
   bool follows(const Header& before, const Header& after) const;
   bool fitsExactly(const Header& a, const Header& b) const;
+  bool fitsOtherLength(const Header& a, const Header& b) const;
+  bool fitsNewest(const Header& header) const;
   bool fitsRoughly(const Header& a, const Header& b) const;
   bool linked(const Suspect& suspect, const Header& header) const;
+  int laterSuspects(const DataPacket& packet) const;
   void suspect(const DataPacket& packet, bool behind);
   std::vector<Suspect> confirmedWith(const Header& header) const;
   bool followsRestart(const Header& first) const;

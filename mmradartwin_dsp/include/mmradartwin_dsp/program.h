@@ -20,6 +20,9 @@ namespace mmradartwin {
 /// leaves no temporary folder and no unfinished output.
 int runProgram(CLI::App& app, int argc, char** argv, const std::function<int()>& run);
 
+/// InputError where a number of the command line is not finite: CLI::Range lets nan through.
+void checkFinite(const CLI::App& app);
+
 /// Says on stderr what a user may want to know and need not act on; not in a quiet program.
 void note(const std::string& text);
 

@@ -93,7 +93,12 @@ class BagContents {
                          " was taken with another radar configuration than " + topic("radar/config") +
                          " says; cut the bag with rosbag filter");
       }
-      AdcCube frame = fromMsg(*cube);
+      AdcCube frame;
+      try {
+        frame = fromMsg(*cube);
+      } catch (const InputError& error) {
+        throw InputError(file() + ": pose '" + pose + "': " + error.what());
+      }
       checkShape(pose, frame);
       visit(frame);
     }
@@ -399,6 +404,12 @@ void leaveOutUnseen(Recording& recording, const CubesByPose& assigned) {
   }
 }
 
+/// Names the bag in an error about what it holds.
+InputError withBag(const std::string& file, const InputError& error) {
+  const std::string text = error.what();
+  return Output::namedIn(text).find(file) == std::string::npos ? InputError(file + ": " + text) : error;
+}
+
 }  // namespace
 
 Recording openBag(const std::string& file, const BagOptions& options) try {
@@ -454,6 +465,8 @@ Recording openBag(const std::string& file, const BagOptions& options) try {
   return recording;
 } catch (const ros::Exception& error) {
   throw damagedBag(file, error);
+} catch (const InputError& error) {
+  throw withBag(file, error);
 }
 
 namespace {

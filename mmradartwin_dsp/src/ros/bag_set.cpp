@@ -12,6 +12,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/input_file.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
+#include "ros/bag_index.h"
 #include "ros/message_lengths.h"
 
 namespace mmradartwin {
@@ -103,6 +104,10 @@ BagSet::BagSet(const std::vector<std::string>& files) : files_(files), label_(fi
       throw InputError(file + ": bag has no index; run `rosbag reindex " + file + "` first");
     } catch (const rosbag::BagException& error) {
       throw InputError(file + ": cannot be read as a bag (" + error.what() + ")");
+    }
+    const std::string damage = whyNoIndex(file);
+    if (!damage.empty()) {
+      throw InputError(file + ": bag is damaged (" + damage + "); record it again, or try rosbag reindex");
     }
   }
   if (files.size() > 1) label_ += " and " + std::to_string(files.size() - 1) + " more";

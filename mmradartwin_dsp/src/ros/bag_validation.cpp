@@ -12,6 +12,7 @@
 #include <set>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/output.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
 #include "mmradartwin_dsp/stationary_poses.h"
@@ -216,9 +217,9 @@ void checkPoses(const std::string& file, const std::string& label, BagOptions op
     }
   } catch (const InputError& error) {
     // What it says may have been found above already: then nothing is added but that there is no pose.
-    const std::string text = error.what();
-    findings.add("no pose can be found",
-                 text.compare(0, label.size(), label) == 0 ? text.substr(label.size() + 2) : text);
+    const std::string text = Output::namedIn(error.what());
+    const bool named = text.compare(0, label.size() + 2, label + ": ") == 0;
+    findings.add("no pose can be found", named ? text.substr(label.size() + 2) : text);
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program_version.h"
+#include "mmradartwin_dsp/ros/wait_for_master.h"
 
 namespace mmradartwin {
 namespace {
@@ -41,7 +42,8 @@ std::string helpOf(const NodeDescription& description) {
   return text.str();
 }
 
-int runNode(int argc, char** argv, const NodeDescription& description, const std::function<int()>& run) {
+int runNode(int argc, char** argv, const NodeDescription& description, const std::function<int()>& run,
+            std::optional<double> master_within_s) {
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
     if (argument == "--help" || argument == "-h") {
@@ -57,6 +59,13 @@ int runNode(int argc, char** argv, const NodeDescription& description, const std
                    argument.c_str());
       return 2;
     }
+  }
+  try {
+    const MasterAddress master = masterAddress(argc, argv);
+    if (master_within_s && !masterAnswers(master, *master_within_s)) throw InputError(noMasterAnswers(master));
+  } catch (const InputError& error) {
+    ROS_FATAL("%s", error.what());
+    return 2;
   }
   ros::init(argc, argv, description.name);
   const ros::NodeHandle keep_alive;  // with the last handle the console goes, and the errors below with it

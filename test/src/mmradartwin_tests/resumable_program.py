@@ -15,6 +15,8 @@ def run_resumable(parse, run):
         signal.signal(number, _stop)
     arguments = parse()
     try:
+        if not arguments.output:
+            raise ValueError("--output: is empty")
         os.makedirs(arguments.output, exist_ok=True)
         run(arguments)
     except (ValueError, OSError) as error:

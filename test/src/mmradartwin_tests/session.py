@@ -8,6 +8,7 @@ import json
 import math
 import multiprocessing
 import os
+import signal
 
 import numpy as np
 
@@ -21,6 +22,12 @@ NOISE_RMS = 4.1e-7
 PEAK_DBFS = -9.0       # no sample of the session is above
 GAIN_STEP_DB = 2.0     # as the receiver's gain codes
 FULL_SCALE = 32768.0
+
+
+def leave_signals_to_parent():
+    """For processes of a pool: Ctrl-C reaches them, too, and the pool ends them by SIGTERM."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 @dataclasses.dataclass
@@ -208,7 +215,7 @@ class Measurement:
         jobs = settings.jobs or min(len(self.stations), os.cpu_count() or 1)
         self.tracer.diffuse(self.stations[0].true)   # the scatter points are then shared by all processes
         if jobs > 1:
-            with multiprocessing.get_context("fork").Pool(jobs) as pool:
+            with multiprocessing.get_context("fork").Pool(jobs, leave_signals_to_parent) as pool:
                 results = pool.map(self.propagate, self.stations, chunksize=2)
         else:
             results = [self.propagate(s) for s in self.stations]

@@ -4,6 +4,7 @@
 #include <ros/service_traits.h>
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,7 +41,9 @@ struct NodeDescription {
 std::string helpOf(const NodeDescription& description);
 
 /// The main() of a node. --help and --version answer before any master is asked. Else roscpp is started, and what `run`
-/// throws becomes one line and the exit status: 2 for an InputError, else 1.
-int runNode(int argc, char** argv, const NodeDescription& description, const std::function<int()>& run);
+/// throws becomes one line and the exit status: 2 for an InputError, else 1. Nodes wait for a master as long as it
+/// takes; with `master_within_s` it has to answer by then.
+int runNode(int argc, char** argv, const NodeDescription& description, const std::function<int()>& run,
+            std::optional<double> master_within_s = std::nullopt);
 
 }  // namespace mmradartwin

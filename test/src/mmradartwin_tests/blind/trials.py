@@ -23,28 +23,34 @@ KEPT = ("cause", "parameters", "candidates", "evidence", "mechanism", "where", "
 
 
 class Results:
-    """A file of JSON lines, one per finished trial. An incomplete last line (the machine stopped) is dropped."""
+    """A file of JSON lines, one per finished trial, each with the keys `needs`. An incomplete last line (the machine
+    stopped) counts for nothing, and goes when the next is added."""
 
-    def __init__(self, file):
-        self.file, self.records = file, {}
+    def __init__(self, file, needs=()):
+        self.file, self.records, self.whole_size = file, {}, None
         if not os.path.exists(file):
             return
         with open(file, "rb") as stream:
             data = stream.read()
         whole = data[:data.rfind(b"\n") + 1]
         if len(whole) < len(data):
-            os.truncate(file, len(whole))
+            self.whole_size = len(whole)
         for number, line in enumerate(whole.splitlines(), 1):
             try:
                 record = json.loads(line)
                 self.records[record["key"]] = record
-            except (ValueError, KeyError, TypeError):
+                for name in needs:
+                    record[name]
+            except (ValueError, KeyError, TypeError, RecursionError):
                 raise ValueError(f"{file}: line {number} is no result; take the line out, its trial runs again") \
                     from None
 
     def add(self, record):
         """Keeps a finished trial."""
         self.records[record["key"]] = record
+        if self.whole_size is not None:
+            os.truncate(self.file, self.whole_size)
+            self.whole_size = None
         with open(self.file, "a", encoding="utf-8") as out:
             out.write(json.dumps(record) + "\n")
             out.flush()
