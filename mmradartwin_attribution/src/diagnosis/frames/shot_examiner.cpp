@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "diagnosis/catalogue/bounds.h"
+#include "diagnosis/frames/doppler_frame.h"
 #include "mmradartwin_dsp/chirp_period.h"
 
 namespace mmradartwin::diagnosis::frames {
@@ -103,93 +104,6 @@ std::vector<MovingEcho> bodiesOf(std::vector<MovingEcho> echoes) {
 
 }  // namespace
 
-/// Range spectra of the residuals of shots that are nearly complete.
-struct ShotExaminer::Spectra {
-  int channels = 0, bins = 0;
-  std::vector<int> shot;                   ///< indices of the shots
-  std::vector<Complex> residual;           ///< [shot][bin][channel]; in units of the noise after readNoise()
-  std::vector<Complex> average;            ///< [bin][channel]; likewise in units of the noise
-  std::vector<std::complex<double>> gain;  ///< [shot] common to all cells, removed from the residuals
-  int per_frame = 1;                       ///< shots
-  const Complex* at(std::size_t i, int bin) const {
-    return &residual[(i * static_cast<std::size_t>(bins) + static_cast<std::size_t>(bin)) *
-                     static_cast<std::size_t>(channels)];
-  }
-  Complex* at(std::size_t i, int bin) { return const_cast<Complex*>(std::as_const(*this).at(i, bin)); }
-};
-
-/// Cell of range and Doppler; `turns` are those of the phase over a frame, signed.
-struct ShotExaminer::DopplerCell {
-  int bin = 0, doppler = 0, turns = 0;
-};
-
-/// Doppler spectra of one frame's loops, with Hann's window and unit noise.
-class ShotExaminer::DopplerFrame {
- public:
-  DopplerFrame(int channels, int bins, int loops)
-      : channels_(channels),
-        bins_(bins),
-        loops_(loops),
-        least_(static_cast<float>(
-            boost::math::gamma_q_inv(static_cast<double>(channels), bounds::kDopplerCellFalseAlarmRate))),
-        spectra_(static_cast<std::size_t>(loops) * static_cast<std::size_t>(bins * channels)),
-        power_(bins, loops) {
-    for (double w : hannWindow(loops)) {
-      window_.push_back(static_cast<float>(w));
-      window_power_ += window_.back() * window_.back();
-    }
-  }
-  int loops() const { return loops_; }
-  float power(int bin, int doppler) const { return power_(bin, doppler); }
-  Eigen::Map<const Eigen::VectorXcf> cell(int bin, int doppler) const {
-    return Eigen::Map<const Eigen::VectorXcf>(&spectra_[static_cast<std::size_t>((doppler * bins_ + bin) * channels_)],
-                                              channels_);
-  }
-  /// Transforms the shots from begin to end, all of one frame. Loops without a shot count as zero.
-  void transform(const Spectra& s, std::size_t begin, std::size_t end) {
-    std::vector<Complex> in(static_cast<std::size_t>(loops_)), out(in);
-    for (int b = 0; b < bins_; ++b) {
-      for (int k = 0; k < channels_; ++k) {
-        std::fill(in.begin(), in.end(), Complex(0));
-        for (std::size_t i = begin; i < end; ++i) {
-          const auto loop = static_cast<std::size_t>(s.shot[i] % loops_);
-          in[loop] = s.at(i, b)[k] * window_[loop] / std::sqrt(window_power_);
-        }
-        fft().fwd(out.data(), in.data(), loops_);
-        for (int d = 0; d < loops_; ++d) {
-          spectra_[static_cast<std::size_t>((d * bins_ + b) * channels_ + k)] = out[static_cast<std::size_t>(d)];
-        }
-      }
-      for (int d = 0; d < loops_; ++d) power_(b, d) = cell(b, d).squaredNorm();
-    }
-  }
-  /// Cells of range and Doppler that exceed the noise and their neighbours.
-  std::vector<DopplerCell> movingPeaks() const {
-    std::vector<DopplerCell> peaks;
-    for (int b = 1; b + 1 < bins_; ++b) {
-      for (int d = 0; d < loops_; ++d) {
-        const int turns = d < (loops_ + 1) / 2 ? d : d - loops_;
-        // Static echoes leak into two turns per frame through the window, and flicker there.
-        if (std::abs(turns) <= 2 || power_(b, d) < least_) continue;
-        bool highest = true;
-        for (int i = -1; i <= 1; ++i) {
-          for (int j = -1; j <= 1; ++j) highest &= power_(b, d) >= power_(b + i, (d + j + loops_) % loops_);
-        }
-        if (highest) peaks.push_back({b, d, turns});
-      }
-    }
-    return peaks;
-  }
-
- private:
-  int channels_, bins_, loops_;
-  float least_;  ///< power that noise in all channels does not reach
-  std::vector<float> window_;
-  float window_power_ = 0;
-  std::vector<Complex> spectra_;  ///< [doppler][bin][channel]
-  Eigen::ArrayXXf power_;         ///< [bin][doppler]
-};
-
 ShotExaminer::ShotExaminer(const RadarConfig& radar) : radar_(radar), chain_(radar) {
   for (double w : hannWindow(radar.samples_per_chirp)) window_.push_back(static_cast<float>(w));
   beams_.resize(radar.channels(), kAngleBins);
@@ -215,8 +129,8 @@ Eigen::VectorXcf ShotExaminer::steering(double azimuth_rad) const {
   return v;
 }
 
-ShotExaminer::Spectra ShotExaminer::spectra(const FrameStack& stack, const std::vector<Complex>& average) const {
-  Spectra spectra;
+ResidualSpectra ShotExaminer::spectra(const FrameStack& stack, const std::vector<Complex>& average) const {
+  ResidualSpectra spectra;
   spectra.channels = stack.channels();
   spectra.bins = stack.samples;
   spectra.per_frame = stack.loops;
@@ -309,7 +223,7 @@ double ShotExaminer::commonTurn(const FrameStack& stack) const {
   return common.rad + weightedMedian(weighed);
 }
 
-void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& spectra, ShotStatistics& result) const {
+void ShotExaminer::takeCommonGain(const FrameStack& stack, ResidualSpectra& spectra, ShotStatistics& result) const {
   spectra.gain.assign(spectra.shot.size(), 1);
   result.frame_level.assign(static_cast<std::size_t>(stack.frames), 1);
   const double freedom = static_cast<double>(spectra.shot.size()) - 1;
@@ -371,7 +285,7 @@ void ShotExaminer::takeCommonGain(const FrameStack& stack, Spectra& spectra, Sho
   }
 }
 
-void ShotExaminer::takeLaws(const FrameStack& stack, Spectra& s, ShotStatistics& result) const {
+void ShotExaminer::takeLaws(const FrameStack& stack, ResidualSpectra& s, ShotStatistics& result) const {
   FrameLaws taken =
       takeFrameLaws(radar_, {s.channels, s.bins, stack.loops, stack.frames, s.shot, &s.gain, &s.average, &s.residual});
   result.laws = std::move(taken.laws);
@@ -385,7 +299,7 @@ void ShotExaminer::takeLaws(const FrameStack& stack, Spectra& s, ShotStatistics&
   }
 }
 
-void ShotExaminer::readSteadiness(const Spectra& spectra, ShotStatistics& result) const {
+void ShotExaminer::readSteadiness(const ResidualSpectra& spectra, ShotStatistics& result) const {
   const double freedom = static_cast<double>(spectra.shot.size()) - 1;
   if (freedom < 4) return;
   std::vector<double> varied(static_cast<std::size_t>(spectra.bins), 0), standing(varied);
@@ -417,7 +331,7 @@ void ShotExaminer::readSteadiness(const Spectra& spectra, ShotStatistics& result
   if (all > 0) result.unsteady_share = unsteady / all;
 }
 
-void ShotExaminer::readNoise(Spectra& spectra, ShotStatistics& result) const {
+void ShotExaminer::readNoise(ResidualSpectra& spectra, ShotStatistics& result) const {
   double window_power = 0;
   for (float w : window_) window_power += w * w;
   const double freedom = static_cast<double>(spectra.shot.size()) - 1;
@@ -441,7 +355,7 @@ void ShotExaminer::readNoise(Spectra& spectra, ShotStatistics& result) const {
   for (std::size_t i = 0; i < spectra.average.size(); ++i) spectra.average[i] *= scale[i % scale.size()];
 }
 
-void ShotExaminer::readUnsteadiness(const Spectra& spectra, ShotStatistics& result) const {
+void ShotExaminer::readUnsteadiness(const ResidualSpectra& spectra, ShotStatistics& result) const {
   const double values = static_cast<double>(spectra.shot.size()) * spectra.channels,
                freedom = values - spectra.channels;
   // A changing radar changes all its echoes, which remain to be explained.
@@ -458,7 +372,7 @@ void ShotExaminer::readUnsteadiness(const Spectra& spectra, ShotStatistics& resu
   }
 }
 
-void ShotExaminer::readEvidence(const Spectra& spectra, ShotStatistics& result) const {
+void ShotExaminer::readEvidence(const ResidualSpectra& spectra, ShotStatistics& result) const {
   result.evidence = Eigen::ArrayXXf::Zero(spectra.bins, kAngleBins);
   const double freedom = static_cast<double>(spectra.shot.size()) - 1;
   if (freedom < 4) return;
@@ -505,7 +419,7 @@ void ShotExaminer::readEvidence(const Spectra& spectra, ShotStatistics& result) 
   }
 }
 
-void ShotExaminer::readEchoes(const Spectra& spectra, ShotStatistics& result) const {
+void ShotExaminer::readEchoes(const ResidualSpectra& spectra, ShotStatistics& result) const {
   // A bin holds M times the noise, over all channels.
   const auto least = static_cast<float>(
       boost::math::gamma_q_inv(static_cast<double>(spectra.channels), bounds::kMovingBinFalseAlarmRate));
@@ -538,7 +452,7 @@ void ShotExaminer::readEchoes(const Spectra& spectra, ShotStatistics& result) co
   }
 }
 
-void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& spectra, ShotStatistics& result) const {
+void ShotExaminer::readTurn(const FrameStack& stack, const ResidualSpectra& spectra, ShotStatistics& result) const {
   result.turn_variance = std::numeric_limits<double>::infinity();
   const double shots = static_cast<double>(spectra.shot.size());
   if (stack.frames < 3 || spectra.shot.size() < 3) return;
@@ -589,7 +503,7 @@ void ShotExaminer::readTurn(const FrameStack& stack, const Spectra& spectra, Sho
 
 ShotStatistics ShotExaminer::examine(const FrameStack& stack, const std::vector<Complex>& average) const {
   ShotStatistics result;
-  Spectra s = spectra(stack, average);
+  ResidualSpectra s = spectra(stack, average);
   takeCommonGain(stack, s, result);
   // Before laws are taken: what they leave of a radar that changes looks like walkers and bursts.
   readSteadiness(s, result);
@@ -616,7 +530,7 @@ ShotStatistics ShotExaminer::examine(const FrameStack& stack, const std::vector<
   return result;
 }
 
-void ShotExaminer::readDopplerEchoes(const Spectra& s, ShotStatistics& result) const {
+void ShotExaminer::readDopplerEchoes(const ResidualSpectra& s, ShotStatistics& result) const {
   DopplerFrame frame(s.channels, s.bins, s.per_frame);
   for (std::size_t begin = 0; begin < s.shot.size();) {
     const int number = s.shot[begin] / s.per_frame;

@@ -8,6 +8,7 @@
 #include "diagnosis/frames/frame_laws.h"
 #include "diagnosis/frames/frame_stack.h"
 #include "diagnosis/frames/moving_cell.h"
+#include "diagnosis/frames/residual_spectra.h"
 #include "diagnosis/frames/walk_tracker.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_dsp/range_angle.h"
@@ -46,6 +47,9 @@ struct ShotStatistics {
   double unsteady_nats = 0;  ///< by which those bins vary more than noise
 };
 
+struct DopplerCell;
+class DopplerFrame;
+
 /// Examines how shots differ, in range, angle and time.
 class ShotExaminer {
  public:
@@ -57,19 +61,16 @@ class ShotExaminer {
   const RangeAngleAxes& axes() const { return chain_.axes(); }
 
  private:
-  struct Spectra;
-  struct DopplerCell;
-  class DopplerFrame;
-  Spectra spectra(const FrameStack& stack, const std::vector<std::complex<float>>& average) const;
-  void takeCommonGain(const FrameStack& stack, Spectra& spectra, ShotStatistics& result) const;
-  void takeLaws(const FrameStack& stack, Spectra& spectra, ShotStatistics& result) const;
-  void readSteadiness(const Spectra& spectra, ShotStatistics& result) const;
-  void readNoise(Spectra& spectra, ShotStatistics& result) const;
-  void readUnsteadiness(const Spectra& spectra, ShotStatistics& result) const;
-  void readEvidence(const Spectra& spectra, ShotStatistics& result) const;
-  void readEchoes(const Spectra& spectra, ShotStatistics& result) const;
-  void readDopplerEchoes(const Spectra& spectra, ShotStatistics& result) const;
-  void readTurn(const FrameStack& stack, const Spectra& spectra, ShotStatistics& result) const;
+  ResidualSpectra spectra(const FrameStack& stack, const std::vector<std::complex<float>>& average) const;
+  void takeCommonGain(const FrameStack& stack, ResidualSpectra& spectra, ShotStatistics& result) const;
+  void takeLaws(const FrameStack& stack, ResidualSpectra& spectra, ShotStatistics& result) const;
+  void readSteadiness(const ResidualSpectra& spectra, ShotStatistics& result) const;
+  void readNoise(ResidualSpectra& spectra, ShotStatistics& result) const;
+  void readUnsteadiness(const ResidualSpectra& spectra, ShotStatistics& result) const;
+  void readEvidence(const ResidualSpectra& spectra, ShotStatistics& result) const;
+  void readEchoes(const ResidualSpectra& spectra, ShotStatistics& result) const;
+  void readDopplerEchoes(const ResidualSpectra& spectra, ShotStatistics& result) const;
+  void readTurn(const FrameStack& stack, const ResidualSpectra& spectra, ShotStatistics& result) const;
   /// Adds the whole turns between loops that the track of a walker tells; false where it leaves them open.
   bool unwrap(const std::vector<WalkTrack>& tracks, int frame, DopplerCell& peak) const;
   MovingCell movingCell(const DopplerFrame& frame, const DopplerCell& peak,
