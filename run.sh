@@ -46,7 +46,7 @@ usage: ./run.sh VERB
                protocol, stops after 90 min; called again with the same OUT it goes on
   fuzz [S]     every reader of foreign bytes under libFuzzer with address and undefined-behaviour sanitizer, S seconds
                each (60); needs clang; corpus and findings stay in .ws/fuzz
-  asan [T...]  tests of driver, dsp and sim that need no ROS master, or those named, under the address and
+  asan [T...]  tests of all packages that need no ROS master, or those named, under the address and
                undefined-behaviour sanitizer; needs clang; outputs in .ws/asan
   tsan         tests with threads, of driver and dsp, under the thread sanitizer
   core [...]   build what needs no ROS by cmake alone, without catkin, and run its tests; arguments go to ctest.
