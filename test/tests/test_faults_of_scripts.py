@@ -184,7 +184,8 @@ def generated_rows():
                   ["--pause", "nan"], ["--duplicates", "-1"], ["--truth", "out/truth.json"], ["--truth", "session"],
                   ["--truth", "session", "--force"], ["--truth", "session.bag"], ["--paths-csv", "session.bag"],
                   ["--paths-csv", "session.bag", "--force"], ["--jobs", "-1"], ["--seed", "-1"]):
-        yield Row(f"generated: {' '.join(words)}", [*make, "--output", "out", *words], nothing, (words[0] if words[0] != "--effect" else "",))
+        told = "" if words[0] == "--effect" else words[0]
+        yield Row(f"generated: {' '.join(words)}", [*make, "--output", "out", *words], nothing, (told,))
     for script in ("demo.sh", "try.sh"):
         for output, says in (("", "usage"), ("session.bag", "session.bag"), ("session.bag/out", "session.bag"),
                              ("/dev/full", "/dev/full")):

@@ -26,8 +26,8 @@ struct ParameterSpec {
   /// does something. NaN where the parameter keeps its default in a trial. An integer or text is never tried.
   double neutral = std::numeric_limits<double>::quiet_NaN(), typical = std::numeric_limits<double>::quiet_NaN();
   std::optional<ParameterValue> also;  ///< a second value at which a trial holds the parameter
-  bool or_list = false;  ///< of a number: a list may stand in its place, one number per receiver
-  bool weighs = false;   ///< acts in reweight() and later alone: scene and traced paths stay as they are
+  bool or_list = false;                ///< of a number: a list may stand in its place, one number per receiver
+  bool weighs = false;                 ///< acts in reweight() and later alone: scene and traced paths stay as they are
 };
 
 /// Checked values by name; every parameter of the mechanism is present unless it is optional without default.
