@@ -134,18 +134,28 @@ def read(file, key):
     return content
 
 
+def is_interval(told):
+    return isinstance(told, list) and len(told) == 2 and all(map(is_number, told))
+
+
+def has_interval(parameter):
+    """Whether ci95 is absent, an interval, or one for each number of a list."""
+    told = parameter.get("ci95")
+    if told is None or not isinstance(parameter["value"], list):
+        return told is None or is_interval(told)
+    return isinstance(told, list) and len(told) == len(parameter["value"]) and all(map(is_interval, told))
+
+
 def read_findings(file):
     content = read(file, "findings")
     for finding in content["findings"]:
         for name, parameter in finding["parameters"].items():
-            interval = parameter.get("ci95") if isinstance(parameter, dict) else None
-            if not isinstance(parameter, dict) or "value" not in parameter or \
-                    not (interval is None or isinstance(interval, list) and len(interval) == 2 and
-                         all(map(is_number, interval))):
+            if not isinstance(parameter, dict) or "value" not in parameter or not has_interval(parameter):
                 raise ValueError(f"{file}: findings: {finding['cause']}: {name}: must have a value, and two numbers as ci95")
         gain = finding.get("gain") or {}
         power = (gain.get("explained_power") or {}) if isinstance(gain, dict) else None
-        if not isinstance(power, dict) or not all(value is None or is_number(value) for value in power.values()):
+        if not isinstance(power, dict) or not all(power.get(key) is None or is_number(power[key])
+                                                  for key in ("before", "after")):
             raise ValueError(f"{file}: findings: {finding['cause']}: gain: explained_power must hold numbers")
     return content
 

@@ -16,7 +16,7 @@ def number(value, low, high):
 
 def finding(cause, **parameters):
     return {"cause": cause, "parameters": parameters,
-            "gain": {"explained_power": {"before": 0.731, "after": 0.952}}}
+            "gain": {"explained_power": {"before": 0.731, "after": 0.952, "difference_ci95": [0.2, 0.24]}}}
 
 
 class TellResult(unittest.TestCase):
@@ -82,6 +82,12 @@ class TellResult(unittest.TestCase):
         self.assertIn("Hidden: sofa stands +0.10 m along x and -0.20 m along y from where the scene has it.\n", said)
         self.assertIn("Found:  sofa stands +0.12 m along x and -0.20 m along y", said)
         self.assertIn("\n        actor_moved: actor sofa; dx_m 0.12 m (95 %: 0 to 0.2); ", said)
+
+    def test_a_list_has_an_interval_for_each_number(self):
+        levels = {"value": [-36.5, -28.5], "unit": "dB", "ci95": [[-36.6, -36.4], [-28.6, -28.4]]}
+        status, said = self.tell([{"cause": "iq_imbalance", "parameters": {}}], [finding("iq_imbalance", image_db=levels)])
+        self.assertEqual(status, 0)
+        self.assertIn("-36.5", said)
 
     def test_nothing_hidden_and_nothing_found_is_right(self):
         self.assertEqual(self.tell([], [])[0], 0)
