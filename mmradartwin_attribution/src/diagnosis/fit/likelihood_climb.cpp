@@ -206,23 +206,23 @@ BoundedStep LikelihoodClimb::bestStep() const {
 }
 
 void LikelihoodClimb::climb() {
-  double risen = 0, promised_nats = 0;
+  double risen = 0, last_promised_nats = 0;
   for (int i = 0;; ++i) {
     optimum_.scores = derivatives(optimum_.state, optimum_.scaled_values);
     const BoundedStep best = bestStep();
-    const double screened_nats = best.promised_nats;
     const bool hopeless = task_.null != nullptr && i >= 2 &&
-                          optimum_.state.log_likelihood + kClimb_steps * std::max(risen, screened_nats) <
+                          optimum_.state.log_likelihood + kClimb_steps * std::max(risen, best.promised_nats) <
                               task_.null->log_likelihood + task_.least_nats;
     // On a ridge between a cause and the latents that absorbed it, each step is longer than the one before, or gains
     // only a share of what its quadratic promises.
-    const bool rising = risen > kRising_nats || (screened_nats > kRising_nats && risen > kKeptPromise * promised_nats);
+    const bool rising =
+        risen > kRising_nats || (best.promised_nats > kRising_nats && risen > kKeptPromise * last_promised_nats);
     const int most = rising ? kRisingFactor * task_.steps : task_.steps;
-    if (i >= most || screened_nats < kLeastStep_nats || hopeless) return;
+    if (i >= most || best.promised_nats < kLeastStep_nats || hopeless) return;
     const double gained = stepBy(best);
     if (!(gained > 0)) return;
     risen = gained;
-    promised_nats = screened_nats;
+    last_promised_nats = best.promised_nats;
   }
 }
 

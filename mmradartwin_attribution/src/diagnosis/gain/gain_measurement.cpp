@@ -24,9 +24,9 @@ std::vector<PoseEchoes> GainMeasurement::heldOutEchoes(const std::vector<NamedPa
 }
 
 void GainMeasurement::ofFit(const ModelState& before, HypothesisFit& fit, Finding& finding) {
-  context_.fitter.shortenFoldSteps(before, fit);
-  measureHeldOutGain(context_.data, cellPowers(context_.data, context_.echoes.echoes(before.mechanisms)),
-                     cellPowers(context_.data, heldOutEchoes(before.mechanisms, fit, {})), finding);
+  const std::vector<CellPowers> after = heldOutPowers(before, fit);
+  measureHeldOutGain(context_.data, cellPowers(context_.data, context_.echoes.echoes(before.mechanisms)), after,
+                     finding);
   std::vector<double> likelihood;
   context_.likelihood.logLikelihood(heldOutEchoes(before.mechanisms, fit, fit.state.actor_range_m), fit.state.latents,
                                     &likelihood);
@@ -34,15 +34,11 @@ void GainMeasurement::ofFit(const ModelState& before, HypothesisFit& fit, Findin
   finding.gain->log_likelihood_per_pose = likelihoodGain(context_.data, before.by_pose, likelihood);
 }
 
-GainMetric GainMeasurement::between(const ModelState& before, HypothesisFit& one, HypothesisFit& other) {
-  std::vector<CellPowers> powers[2];
-  for (int i = 0; i < 2; ++i) {
-    HypothesisFit& fit = i == 0 ? one : other;
-    context_.fitter.shortenFoldSteps(before, fit);
-    powers[i] = cellPowers(context_.data, heldOutEchoes(before.mechanisms, fit, {}));
-  }
+std::vector<CellPowers> GainMeasurement::heldOutPowers(const ModelState& before, HypothesisFit& fit) {
+  context_.fitter.shortenFoldSteps(before, fit);
+  std::vector<CellPowers> powers = cellPowers(context_.data, heldOutEchoes(before.mechanisms, fit, {}));
   context_.echoes.setBaseline(before.mechanisms);
-  return explainedPowerGain(context_.data, powers[0], powers[1]);
+  return powers;
 }
 
 void GainMeasurement::ofChange(const ChannelData& before_data, const std::vector<NamedParameters>& before,

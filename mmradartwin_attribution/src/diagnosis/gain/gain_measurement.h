@@ -5,6 +5,7 @@
 #include "diagnosis/channels/channel_data.h"
 #include "diagnosis/fit/diagnosis_context.h"
 #include "diagnosis/fit/hypothesis_fit.h"
+#include "diagnosis/gain/held_out_gain.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/rooms.h"
@@ -24,8 +25,8 @@ class GainMeasurement {
   /// Gain of a fit over `before` in explained power and log-likelihood. Each fold of locations is expected with the
   /// values that the other folds gave.
   void ofFit(const ModelState& before, HypothesisFit& fit, Finding& finding);
-  /// Gain in explained power of one fit over another, both added to `before`, on places that neither saw.
-  GainMetric between(const ModelState& before, HypothesisFit& one, HypothesisFit& other);
+  /// Cell powers of every pose with a fit added to `before`, each with the values of the fold that did not see it.
+  std::vector<CellPowers> heldOutPowers(const ModelState& before, HypothesisFit& fit);
   /// Gain in explained power of one list of mechanisms and its data over another, with nothing fitted. Does nothing
   /// with fewer than two locations. The expected echoes keep `before` as their baseline.
   void ofChange(const ChannelData& before_data, const std::vector<NamedParameters>& before,
