@@ -7,7 +7,8 @@ import sys
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
 from mmradartwin_tests import office
-from mmradartwin_tests.output import new_folder
+from mmradartwin_tests.exit_status import exit_status
+from mmradartwin_tests.output import STOPPED, new_folder
 
 FILES = {"office.obj", "scene.yaml", "materials.yaml"}
 
@@ -17,16 +18,11 @@ def main():
     parser.add_argument("--output", required=True, help="folder to write")
     parser.add_argument("--force", action="store_true", help="replace an office that exists")
     arguments = parser.parse_args()
-    try:
+
+    def write():
         with new_folder(arguments.output, arguments.force, lambda folder: set(os.listdir(folder)) == FILES) as folder:
             office.write_scene(folder)
-    except (ValueError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("error: stopped; nothing is written", file=sys.stderr)
-        return 1
-    return 0
+    return exit_status(write, STOPPED)
 
 
 if __name__ == "__main__":

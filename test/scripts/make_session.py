@@ -11,7 +11,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
 from mmradartwin_tests import campaign, effects, session
-from mmradartwin_tests.output import check_new, new_folder
+from mmradartwin_tests.exit_status import exit_status
+from mmradartwin_tests.output import STOPPED, check_new, new_folder
 
 
 def value_of(text):
@@ -97,7 +98,8 @@ def is_session(folder):
 def main():
     """Entry point; returns the exit status."""
     arguments = parse()
-    try:
+
+    def measure():
         check(arguments)
         chosen = chosen_effects(arguments)
         with new_folder(arguments.output, arguments.force, is_session) as folder:
@@ -107,13 +109,7 @@ def main():
                 pause_s=arguments.pause, duplicates=arguments.duplicates, effects=chosen, truth=arguments.truth,
                 paths_csv=arguments.paths_csv, at_reported=arguments.at_reported, jobs=arguments.jobs)
             session.Measurement(settings).run()
-    except (ValueError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("error: stopped; nothing is written", file=sys.stderr)
-        return 1
-    return 0
+    return exit_status(measure, STOPPED)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,8 @@ import os
 import shutil
 import signal
 
+STOPPED = "error: stopped; nothing is written"   # what a program says that writes into new_folder()
+
 
 def check_new(option, path, force=False):
     """ValueError where `path` cannot be a new file or folder, or exists without `force`."""

@@ -1,7 +1,8 @@
 """A program whose finished trials do not run again."""
 import os
 import signal
-import sys
+
+from mmradartwin_tests.exit_status import exit_status
 
 
 def _stop(number, frame):
@@ -14,15 +15,10 @@ def run_resumable(parse, run):
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
     arguments = parse()
-    try:
+
+    def make_and_run():
         if not arguments.output:
             raise ValueError("--output: is empty")
         os.makedirs(arguments.output, exist_ok=True)
         run(arguments)
-    except (ValueError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("stopped; the same call goes on where this one ended", file=sys.stderr)
-        return 1
-    return 0
+    return exit_status(make_and_run, "stopped; the same call goes on where this one ended")
