@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 // Function clones for processors with AVX2, where loops run twice as fast; the arithmetic is the same.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
@@ -9,15 +10,30 @@
 #else
 #define MMRADARTWIN_VECTORISED
 #endif
-#define MMRADARTWIN_INLINE inline __attribute__((always_inline))
+#define MMRADARTWIN_INLINE __attribute__((always_inline))
 
 namespace mmradartwin::diagnosis::numbers {
 namespace {
 
-/// Number of channels of the usual array, known to the compiler; kAny stands for all other numbers.
-constexpr int kUsual = 8, kAny = 0;
+constexpr int kAny = 0;                 ///< stands for a number of channels that is known at run time only
 constexpr int kWide = 4;                ///< numbers of a vector register
 constexpr double kSmallTurn_rad = 0.7;  ///< up to which a short series is right to 1e-9
+
+/// Calls the kernel with the number of channels as a constant, where four receivers and one to three transmitters give
+/// it: loops of a known length run about twice as fast.
+template <typename Kernel>
+MMRADARTWIN_INLINE inline auto withConstant(int channels, Kernel kernel) {
+  switch (channels) {
+    case 4:
+      return kernel(std::integral_constant<int, 4>());
+    case 8:
+      return kernel(std::integral_constant<int, 8>());
+    case 12:
+      return kernel(std::integral_constant<int, 12>());
+    default:
+      return kernel(std::integral_constant<int, kAny>());
+  }
+}
 
 template <int kChannels>
 constexpr int packedSize(int channels) {
@@ -26,7 +42,7 @@ constexpr int packedSize(int channels) {
 }
 
 template <int kChannels>
-MMRADARTWIN_INLINE void addField(const float* from, double factor, int channels, double* re, double* im) {
+MMRADARTWIN_INLINE inline void addField(const float* from, double factor, int channels, double* re, double* im) {
   const int size = packedSize<kChannels>(channels);
   for (int i = 0; i < size; ++i) {
     re[i] += factor * static_cast<double>(from[2 * i]);
@@ -35,7 +51,8 @@ MMRADARTWIN_INLINE void addField(const float* from, double factor, int channels,
 }
 
 template <int kChannels>
-MMRADARTWIN_INLINE void phasors(const double* apart, double most, double turn, int channels, double* re, double* im) {
+MMRADARTWIN_INLINE inline void phasors(const double* apart, double most, double turn, int channels, double* re,
+                                       double* im) {
   const int size = packedSize<kChannels>(channels);
   if (most * std::abs(turn) < kSmallTurn_rad) {
     for (int i = 0; i < size; ++i) {
@@ -53,8 +70,9 @@ MMRADARTWIN_INLINE void phasors(const double* apart, double most, double turn, i
 
 /// Computes the Cholesky factor column by column in place, then its inverse.
 template <int kChannels>
-MMRADARTWIN_INLINE bool invertFactor(const double* packed_re, const double* packed_im, int channels,
-                                     double (*to_re)[kMaxChannels], double (*to_im)[kMaxChannels], double* log_det) {
+MMRADARTWIN_INLINE inline bool invertFactor(const double* packed_re, const double* packed_im, int channels,
+                                            double (*to_re)[kMaxChannels], double (*to_im)[kMaxChannels],
+                                            double* log_det) {
   const int n = kChannels == kAny ? channels : kChannels;
   double re[kMaxChannels][kMaxChannels], im[kMaxChannels][kMaxChannels];  // [column][row]
   for (int l = 0; l < n; ++l) {
@@ -111,8 +129,8 @@ MMRADARTWIN_INLINE bool invertFactor(const double* packed_re, const double* pack
 }
 
 template <int kChannels>
-MMRADARTWIN_INLINE void whitenBy(const double (*re)[kMaxChannels], const double (*im)[kMaxChannels],
-                                 const double* packed_re, const double* packed_im, int channels, double* v) {
+MMRADARTWIN_INLINE inline void whitenBy(const double (*re)[kMaxChannels], const double (*im)[kMaxChannels],
+                                        const double* packed_re, const double* packed_im, int channels, double* v) {
   const int n = kChannels == kAny ? channels : kChannels;
   double half_re[kMaxChannels][kMaxChannels], half_im[kMaxChannels][kMaxChannels];  // of L^-1 D, [column][row]
   for (int c = 0; c < n; ++c) {
@@ -146,19 +164,19 @@ MMRADARTWIN_INLINE void whitenBy(const double (*re)[kMaxChannels], const double 
 }
 
 MMRADARTWIN_VECTORISED void addFieldTo(const float* from, double factor, int channels, double* re, double* im) {
-  if (channels == kUsual) return addField<kUsual>(from, factor, channels, re, im);
-  addField<kAny>(from, factor, channels, re, im);
+  return withConstant(channels,
+                      [&](auto n) MMRADARTWIN_INLINE { return addField<n()>(from, factor, channels, re, im); });
 }
 
 MMRADARTWIN_VECTORISED void phasorsTo(const double* apart, double most, double turn, int channels, double* re,
                                       double* im) {
-  if (channels == kUsual) return phasors<kUsual>(apart, most, turn, channels, re, im);
-  phasors<kAny>(apart, most, turn, channels, re, im);
+  return withConstant(channels,
+                      [&](auto n) MMRADARTWIN_INLINE { return phasors<n()>(apart, most, turn, channels, re, im); });
 }
 
 template <int kChannels>
-MMRADARTWIN_INLINE void addTurned(const float* const* fields, const double* factors, const PackedTurn& turn,
-                                  int channels, double* re, double* im) {
+MMRADARTWIN_INLINE inline void addTurned(const float* const* fields, const double* factors, const PackedTurn& turn,
+                                         int channels, double* re, double* im) {
   const int size = packedSize<kChannels>(channels);
   const double *turn_re = turn.re.data(), *turn_im = turn.im.data();
   alignas(64) double own_re[kMaxPacked], own_im[kMaxPacked];
@@ -174,8 +192,8 @@ MMRADARTWIN_INLINE void addTurned(const float* const* fields, const double* fact
 
 MMRADARTWIN_VECTORISED void addTurnedTo(const float* const* fields, const double* factors, const PackedTurn& turn,
                                         int channels, double* re, double* im) {
-  if (channels == kUsual) return addTurned<kUsual>(fields, factors, turn, channels, re, im);
-  addTurned<kAny>(fields, factors, turn, channels, re, im);
+  return withConstant(
+      channels, [&](auto n) MMRADARTWIN_INLINE { return addTurned<n()>(fields, factors, turn, channels, re, im); });
 }
 
 /// Takes four columns beside each other, so that each number is read once for four products.
@@ -218,14 +236,15 @@ MMRADARTWIN_VECTORISED void pairProductsTo(const double* v, int rows, int column
 MMRADARTWIN_VECTORISED bool invertFactorOf(const double* packed_re, const double* packed_im, int channels,
                                            double (*to_re)[kMaxChannels], double (*to_im)[kMaxChannels],
                                            double* log_det) {
-  if (channels == kUsual) return invertFactor<kUsual>(packed_re, packed_im, channels, to_re, to_im, log_det);
-  return invertFactor<kAny>(packed_re, packed_im, channels, to_re, to_im, log_det);
+  return withConstant(channels, [&](auto n) MMRADARTWIN_INLINE {
+    return invertFactor<n()>(packed_re, packed_im, channels, to_re, to_im, log_det);
+  });
 }
 
 MMRADARTWIN_VECTORISED void whitenTo(const double (*re)[kMaxChannels], const double (*im)[kMaxChannels],
                                      const double* packed_re, const double* packed_im, int channels, double* v) {
-  if (channels == kUsual) return whitenBy<kUsual>(re, im, packed_re, packed_im, channels, v);
-  whitenBy<kAny>(re, im, packed_re, packed_im, channels, v);
+  return withConstant(
+      channels, [&](auto n) MMRADARTWIN_INLINE { return whitenBy<n()>(re, im, packed_re, packed_im, channels, v); });
 }
 
 MMRADARTWIN_VECTORISED void addMultiplesTo(const float* field, std::size_t numbers, const float* factors,
