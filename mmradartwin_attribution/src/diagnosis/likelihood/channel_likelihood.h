@@ -107,6 +107,9 @@ class ChannelLikelihood {
   struct Bounds {
     Eigen::VectorXd low, high;  ///< [globals] low <= 0 <= high
   };
+  /// Latents that lie from `from` by a share of what `there` lies from `here`, within their limits.
+  SessionLatents extrapolated(const SessionLatents& from, const SessionLatents& here, const SessionLatents& there,
+                              double share) const;
   /// Least and largest change of the globals in one step.
   Bounds stepBounds(const SessionLatents& from) const;
   /// Latents after a share of a step of the globals, with each heading's best response to whole_step. Values and steps

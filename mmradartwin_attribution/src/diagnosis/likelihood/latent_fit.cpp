@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
+#include <utility>
 
 #include "diagnosis/likelihood/bounded_step.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
@@ -13,8 +15,9 @@ namespace {
 /// Logarithm of the factor on uncertain paths from which a fit is tried again from 0, and the steps that it may take.
 constexpr double kTrap = 1;
 constexpr int kTrapSteps = 6;
-constexpr double kLeastStep_nats = 0.1;   ///< expected gain of a step below which fit() ends
-constexpr double kLeastGain_nats = 0.01;  ///< gain of a step below which fit() ends
+constexpr double kYawStep_rad = 0.02, kMostYaw_rad = 0.06;  ///< longest step of a heading, largest heading error
+constexpr double kLeastStep_nats = 0.1;                     ///< expected gain of a step below which fit() ends
+constexpr double kLeastGain_nats = 0.01;                    ///< gain of a step below which fit() ends
 
 }  // namespace
 
@@ -30,7 +33,23 @@ SessionLatents ChannelLikelihood::stepped(const SessionLatents& from, const Eige
   for (std::size_t i = 0; i < latents.yaw_rad.size(); ++i) {
     const double step =
         scores.yaw_step[i] - scores.yaw_coupling.row(static_cast<Eigen::Index>(i)).dot(whole_step.transpose());
-    latents.yaw_rad[i] = std::clamp(latents.yaw_rad[i] + std::clamp(share * step, -0.02, 0.02), -0.06, 0.06);
+    latents.yaw_rad[i] = std::clamp(latents.yaw_rad[i] + std::clamp(share * step, -kYawStep_rad, kYawStep_rad),
+                                    -kMostYaw_rad, kMostYaw_rad);
+  }
+  return latents;
+}
+
+SessionLatents ChannelLikelihood::extrapolated(const SessionLatents& from, const SessionLatents& here,
+                                               const SessionLatents& there, double share) const {
+  SessionLatents latents = from;
+  for (int j = 0; j < latents.globals(); ++j) {
+    const Limits limits = limitsOf(j, errors_, spread_);
+    latents.global(j) =
+        std::clamp(from.global(j) + share * (there.global(j) - here.global(j)), limits.low, limits.high);
+  }
+  for (std::size_t i = 0; i < latents.yaw_rad.size(); ++i) {
+    latents.yaw_rad[i] =
+        std::clamp(from.yaw_rad[i] + share * (there.yaw_rad[i] - here.yaw_rad[i]), -kMostYaw_rad, kMostYaw_rad);
   }
   return latents;
 }
@@ -55,20 +74,22 @@ double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLate
     const Bounds bounds = stepBounds(latents);
     const auto [step, promised_nats] =
         boundedStep(regularised(derivatives.information), derivatives.total, bounds.low, bounds.high);
-    bool better = false;
-    const Eigen::VectorXd none = Eigen::VectorXd::Zero(step.size());
-    // All numbers together; where that fails, headings alone, then globals alone.
-    for (int attempt = 0; attempt < 6 && !better; ++attempt) {
-      constexpr double kShares[] = {1.0, 0.5, 0.2, 0.05};
-      SessionLatents next = attempt < 4    ? stepped(latents, step, derivatives, step, kShares[attempt])
-                            : attempt == 4 ? stepped(latents, none, derivatives, none, 1)
-                                           : stepped(latents, step, derivatives, step, 0.5);
-      if (attempt == 5) next.yaw_rad = latents.yaw_rad;
-      const double value = logLikelihood(echoes, next);
-      if (value <= best) continue;
+    const SessionLatents from = latents;
+    const auto take = [&](SessionLatents next) -> std::optional<double> {
+      const double value = logLikelihood(echoes, next), gained = value - best;
+      if (!(gained > 0)) return std::nullopt;
       latents = std::move(next);
       best = value;
-      better = true;
+      return gained;
+    };
+    const double gained = gainAlong(promised_nats, {1.0, 0.5, 0.2, 0.05}, [&, &step = step](double share) {
+      return take(stepped(from, step, derivatives, step, share));
+    });
+    if (!(gained > 0)) {  // headings alone, then globals alone
+      const Eigen::VectorXd none = Eigen::VectorXd::Zero(step.size());
+      SessionLatents globals = stepped(from, step, derivatives, step, 0.5);
+      globals.yaw_rad = from.yaw_rad;
+      if (!take(stepped(from, none, derivatives, none, 1))) take(std::move(globals));
     }
     if (best - derivatives.log_likelihood < kLeastGain_nats || promised_nats < kLeastStep_nats) break;
   }

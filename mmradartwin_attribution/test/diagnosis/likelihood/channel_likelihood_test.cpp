@@ -183,6 +183,22 @@ TEST_F(ThreeActors, PromisesNothingBeyondALimit) {
   }
 }
 
+TEST_F(ThreeActors, LatentsGoOnAlongALineToTheirLimits) {
+  const ChannelLikelihood model(data_, 3, PoseAccuracy());
+  SessionLatents there = latents_, from = latents_;
+  there.log_gain += 0.2;
+  there.log_relative += 3;
+  there.yaw_rad[0] += 0.01;
+  from.log_floor += 1;
+  const SessionLatents half = model.extrapolated(from, latents_, there, 0.5);
+  EXPECT_DOUBLE_EQ(half.log_gain, latents_.log_gain + 0.1);
+  EXPECT_DOUBLE_EQ(half.log_floor, latents_.log_floor + 1);
+  EXPECT_DOUBLE_EQ(half.yaw_rad[0], latents_.yaw_rad[0] + 0.005);
+  const SessionLatents far = model.extrapolated(from, latents_, there, 100);
+  const int relative = 2;
+  EXPECT_DOUBLE_EQ(far.log_relative, limitsOf(relative, 4, LatentSpread()).high);
+}
+
 TEST_F(ThreeActors, ScoresOfAMechanismAreTheLikelihoodsSlopes) {
   PoseAccuracy known;
   known.heading_rad = 1e-7;  // nothing is eliminated
