@@ -31,7 +31,8 @@ constexpr double kMostCorrelated = 0.95;    ///< limit of the correlation of two
 struct ProfilePoint {
   double log_likelihood = 0;
   Eigen::VectorXd by_location;  ///< [locations] nats, with the prior of the headings there
-  Eigen::VectorXd latents;      ///< [2 errors] errors of the actors, in standard deviations
+  Eigen::VectorXd errors;       ///< [2 errors] errors of the actors, in standard deviations
+  SessionLatents latents;
 };
 
 // Paths that begin and end within the session locate things, too. Ranges and directions do not say everything.
@@ -110,9 +111,13 @@ struct Step {
 /// Profile of the likelihood about a fit, along each coordinate and at one corner of each pair.
 class Profile {
  public:
-  Profile(const ProfiledModel& model, const std::vector<Hypothesis>& parts, const ProfiledValues& fit);
+  /// start: latents near those of the fit.
+  Profile(const ProfiledModel& model, const std::vector<Hypothesis>& parts, const ProfiledValues& fit,
+          const SessionLatents& start);
   /// Values at the best point, with the fit's errors.
   const ProfiledValues& best() const { return best_; }
+  /// Latents of the fit.
+  const SessionLatents& latents() const { return here_.latents; }
   /// True where the maximum lies beyond the steps, so that they give no width.
   bool endsBeyondItsSteps() const;
   /// Values at the best point with their standard errors.
@@ -122,7 +127,12 @@ class Profile {
   std::vector<NamedParameters> mechanismsAt(const std::vector<double>& scaled_values) const {
     return mechanismsWith(model_.base, parts_, scaled_values);
   }
-  ProfilePoint pointAt(const std::vector<double>& scaled_values) const;
+  /// start: where the latents are likely to be.
+  ProfilePoint pointAt(const std::vector<double>& scaled_values, const SessionLatents& start) const;
+  /// Latents that lie from `from` by a share of what `point` lies from the fit.
+  SessionLatents beyond(const SessionLatents& from, const ProfilePoint& point, double share) const {
+    return model_.likelihood.extrapolated(from, here_.latents, point.latents, share);
+  }
   /// Makes a point the best one where its likelihood is higher.
   void consider(const ProfilePoint& point, const std::vector<double>& scaled_values);
   /// Limits of the scaled value of coordinate j.
@@ -142,14 +152,15 @@ class Profile {
   ProfiledValues best_;
   std::vector<Step> steps_;
   Eigen::VectorXd slope_;
-  Eigen::MatrixXd fall_, scores_, latents_;  ///< [n][n], [locations][n], [2 errors][n]
-  Eigen::MatrixXd covariance_;               ///< [n][n] inverse of the curvatures
+  Eigen::MatrixXd fall_, scores_, errors_;  ///< [n][n], [locations][n], [2 errors][n]
+  Eigen::MatrixXd covariance_;              ///< [n][n] inverse of the curvatures
   Eigen::VectorXd to_top_;
   std::vector<double> top_;
   Eigen::VectorXd geometric_;
 };
 
-Profile::Profile(const ProfiledModel& model, const std::vector<Hypothesis>& parts, const ProfiledValues& fit)
+Profile::Profile(const ProfiledModel& model, const std::vector<Hypothesis>& parts, const ProfiledValues& fit,
+                 const SessionLatents& start)
     : model_(model), parts_(parts), fit_(fit), best_(fit) {
   for (const Hypothesis& h : parts) {
     coordinates_.insert(coordinates_.end(), h.coordinates.begin(), h.coordinates.end());
@@ -157,18 +168,22 @@ Profile::Profile(const ProfiledModel& model, const std::vector<Hypothesis>& part
                    model.source.altersGeometry(h.at(std::vector<double>(h.coordinates.size(), 1.0))));
   }
   const bool rough = std::count(traces_.begin(), traces_.end(), 1) > 0;
-  here_ = pointAt(fit.scaled_values);
+  here_.latents = start;
+  here_ = pointAt(fit.scaled_values, start);
   highest_ = here_.log_likelihood;
   for (std::size_t j = 0; j < coordinates_.size(); ++j) steps_.push_back(stepAlong(j, rough ? kRough : kSmooth));
   evaluateCorners();
   climbToTop();
 }
 
-ProfilePoint Profile::pointAt(const std::vector<double>& scaled_values) const {
+ProfilePoint Profile::pointAt(const std::vector<double>& scaled_values, const SessionLatents& start) const {
   const ChannelData& data = model_.likelihood.data();
   const LatentSpread& spread = model_.likelihood.spread();
-  SessionLatents fitted = model_.latents;
-  const std::vector<PoseEchoes> echoes = model_.source.echoes(mechanismsAt(scaled_values), fitted.actor_range_m);
+  const std::vector<PoseEchoes> echoes =
+      model_.source.echoes(mechanismsAt(scaled_values), model_.latents.actor_range_m);
+  const bool likelier =
+      model_.likelihood.logLikelihood(echoes, start) > model_.likelihood.logLikelihood(echoes, here_.latents);
+  SessionLatents fitted = likelier ? start : here_.latents;
   model_.likelihood.fit(echoes, fitted, kRefits);
   std::vector<double> by_pose;
   ProfilePoint point;
@@ -179,9 +194,10 @@ ProfilePoint Profile::pointAt(const std::vector<double>& scaled_values) const {
     point.by_location[data.poses[i].location] += by_pose[i] - 0.5 * heading * heading;
   }
   const Eigen::Index errors = static_cast<Eigen::Index>(fitted.actor_gain.size());
-  point.latents.resize(2 * errors);
-  point.latents << Eigen::Map<const Eigen::VectorXd>(fitted.actor_gain.data(), errors) / spread.actor_gain,
+  point.errors.resize(2 * errors);
+  point.errors << Eigen::Map<const Eigen::VectorXd>(fitted.actor_gain.data(), errors) / spread.actor_gain,
       Eigen::Map<const Eigen::VectorXd>(fitted.actor_range_m.data(), errors) / spread.actor_range_m;
+  point.latents = std::move(fitted);
   return point;
 }
 
@@ -205,12 +221,14 @@ Step Profile::stepAlong(std::size_t j, const Fall& wanted) {
   step.width = std::max(wanted.narrowest, 2 * fit_.standard_error[j] / slope);
   if (traces_[j]) step.width = std::min(step.width, kWidest);
   std::vector<double> moved = fitted;
+  double last_width = 0;
   for (int i = 1;; ++i) {
     if (widest > 0) step.width = std::min(step.width, widest);
     moved[j] = fitted[j] + step.width;
-    step.ahead = pointAt(moved);
+    step.ahead = pointAt(moved, i == 1 ? here_.latents : beyond(here_.latents, step.ahead, step.width / last_width));
     moved[j] = fitted[j] - step.width;
-    step.behind = pointAt(moved);
+    step.behind = pointAt(moved, beyond(here_.latents, step.ahead, -1));
+    last_width = step.width;
     const double fall = here_.log_likelihood - 0.5 * (step.ahead.log_likelihood + step.behind.log_likelihood);
     step.curvature = 2 * fall / (step.width * step.width);
     const bool narrower = fall > wanted.most && step.width > wanted.narrowest;
@@ -236,21 +254,21 @@ void Profile::evaluateCorners() {
   slope_ = Eigen::VectorXd::Zero(n);
   fall_ = Eigen::MatrixXd::Zero(n, n);
   scores_ = Eigen::MatrixXd::Zero(here_.by_location.size(), n);
-  latents_ = Eigen::MatrixXd::Zero(here_.latents.size(), n);
+  errors_ = Eigen::MatrixXd::Zero(here_.errors.size(), n);
   for (Eigen::Index j = 0; j < n; ++j) {
     const Step& a = steps_[static_cast<std::size_t>(j)];
     fall_(j, j) = a.curvature;
     if (a.flat) continue;
     slope_[j] = (a.ahead.log_likelihood - a.behind.log_likelihood) / (2 * a.width);
     scores_.col(j) = (a.ahead.by_location - a.behind.by_location) / (2 * a.width);
-    latents_.col(j) = (a.ahead.latents - a.behind.latents) / (2 * a.width);
+    errors_.col(j) = (a.ahead.errors - a.behind.errors) / (2 * a.width);
     for (Eigen::Index k = 0; k < j; ++k) {
       const Step& b = steps_[static_cast<std::size_t>(k)];
       if (b.flat) continue;
       std::vector<double> moved = fit_.scaled_values;
       moved[static_cast<std::size_t>(j)] += a.width;
       moved[static_cast<std::size_t>(k)] += b.width;
-      const ProfilePoint corner = pointAt(moved);
+      const ProfilePoint corner = pointAt(moved, beyond(a.ahead.latents, b.ahead, 1));
       consider(corner, moved);
       const double both = corner.log_likelihood - a.ahead.log_likelihood - b.ahead.log_likelihood;
       const double most = kMostCorrelated * std::sqrt(a.curvature * b.curvature);
@@ -263,14 +281,16 @@ void Profile::climbToTop() {
   covariance_ = positiveDefinite(fall_).inverse();
   to_top_ = covariance_ * slope_;
   top_ = fit_.scaled_values;
+  SessionLatents latents = here_.latents;
   for (std::size_t j = 0; j < top_.size(); ++j) {
     const auto [low, high] = limits(j);
     const double width = steps_[j].width;
     top_[j] =
         std::clamp(fit_.scaled_values[j] + std::clamp(to_top_[static_cast<Eigen::Index>(j)], -width, width), low, high);
+    latents = beyond(latents, steps_[j].ahead, (top_[j] - fit_.scaled_values[j]) / width);
   }
   geometric_ = geometricVarianceHere();
-  consider(pointAt(top_), top_);
+  consider(pointAt(top_, latents), top_);
 }
 
 Eigen::VectorXd Profile::geometricVarianceHere() const {
@@ -300,7 +320,7 @@ ProfiledValues Profile::withErrors() const {
   // An actor's error is the same at all places, so that its prior bounds it and the scatter over places does not show
   // it.
   const Eigen::MatrixXd scatter =
-      centred.transpose() * centred * (locations / std::max(1.0, locations - 1)) + latents_.transpose() * latents_;
+      centred.transpose() * centred * (locations / std::max(1.0, locations - 1)) + errors_.transpose() * errors_;
   const Eigen::MatrixXd robust = covariance_ * scatter * covariance_;
   ProfiledValues result = best_;
   for (std::size_t k = 0; k < coordinates_.size(); ++k) {
@@ -318,14 +338,17 @@ ProfiledValues Profile::withErrors() const {
 ProfiledValues profiled(const ProfiledModel& model, const std::vector<Hypothesis>& parts, const ProfiledValues& fit,
                         int again) {
   ProfiledValues values = fit;
+  SessionLatents latents = model.latents;
   for (;; --again) {
-    const Profile profile(model, parts, values);
+    const Profile profile(model, parts, values, latents);
     if (!profile.endsBeyondItsSteps() || again <= 0) return profile.withErrors();
     values = profile.best();
+    latents = profile.latents();
   }
 }
 
-void profileParts(const ProfiledModel& model, const std::vector<Hypothesis>& parts, std::vector<ProfiledValues>& fits) {
+bool profileParts(const ProfiledModel& model, const std::vector<Hypothesis>& parts, std::vector<ProfiledValues>& fits,
+                  std::optional<std::size_t> only) {
   std::vector<std::size_t> few;
   std::size_t numbers = 0;
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -338,7 +361,12 @@ void profileParts(const ProfiledModel& model, const std::vector<Hypothesis>& par
   for (std::size_t i : few) {
     if (numbers > kMostProfiled) groups.push_back({i});
   }
+  bool all = true;
   for (const std::vector<std::size_t>& group : groups) {
+    if (only && std::find(group.begin(), group.end(), *only) == group.end()) {
+      all = false;
+      continue;
+    }
     std::vector<NamedParameters> beside = model.base;
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const bool member = std::find(group.begin(), group.end(), i) != group.end();
@@ -361,6 +389,7 @@ void profileParts(const ProfiledModel& model, const std::vector<Hypothesis>& par
       error += count;
     }
   }
+  return all;
 }
 
 }  // namespace mmradartwin::diagnosis::fit

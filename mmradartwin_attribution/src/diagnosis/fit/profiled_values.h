@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "diagnosis/hypotheses/hypothesis.h"
@@ -34,7 +36,9 @@ ProfiledValues profiled(const ProfiledModel& model, const std::vector<Hypothesis
                         int again = 2);
 
 /// Profiles several hypotheses in place: jointly where they have few numbers, else one at a time given the others. A
-/// hypothesis with too many numbers (channel errors) is left unchanged.
-void profileParts(const ProfiledModel& model, const std::vector<Hypothesis>& parts, std::vector<ProfiledValues>& fits);
+/// hypothesis with too many numbers (channel errors) is left unchanged. only: index of the part that is profiled, with
+/// those that are profiled jointly with it; without it all are. Returns true where no other part would be.
+bool profileParts(const ProfiledModel& model, const std::vector<Hypothesis>& parts, std::vector<ProfiledValues>& fits,
+                  std::optional<std::size_t> only = std::nullopt);
 
 }  // namespace mmradartwin::diagnosis::fit

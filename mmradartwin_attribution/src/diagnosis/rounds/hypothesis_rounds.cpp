@@ -88,7 +88,7 @@ void HypothesisRounds::run(const std::vector<NamedParameters>& mechanisms, const
   for (int round = 0; round < most_rounds; ++round) {
     if (!findOne(round)) break;
   }
-  selection_.orderByGain();
+  selection_.finish();
 }
 
 std::vector<HypothesisFit> HypothesisRounds::fitBest(int round) {

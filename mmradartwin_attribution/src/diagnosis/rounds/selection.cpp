@@ -45,6 +45,7 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
   const auto accepted = accepted_;
   const auto findings = findings_;
   const SessionLatents latents_before = state_.latents;
+  const bool profiled_before = all_profiled_;
   family_ = family;
   accept(fit, fits, std::move(finding));
   state_.latents = fit.state.latents;
@@ -52,7 +53,8 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
   if (accepted_.size() > 1) refitTogether();
   context_.echoes.setBaseline(mechanisms_);
   if (acceptedAs(fit.hypothesis) != accepted_.end()) {
-    profileFound();
+    // An unknown judges all others by their intervals; the last round profiles what is left.
+    profileFound(unknownNats() > 0 ? std::nullopt : std::optional<std::size_t>(accepted_.size() - 1));
     withdrawExplainedByUnknown();
   }
   const bool stands = acceptedAs(fit.hypothesis) != accepted_.end();
@@ -62,6 +64,7 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
     findings_ = findings;
     writeBackFindings();
     state_.latents = latents_before;
+    all_profiled_ = profiled_before;
     context_.echoes.setBaseline(mechanisms_);
     if (is_nothing) return "its interval holds the value that does nothing";
     return stands ? "no larger than what errors of actors and poses look like" : "worth nothing beside the rest";
@@ -149,7 +152,7 @@ void Selection::withdrawExplainedByUnknown() {
 void Selection::refitAndProfile() {
   refitTogether();
   context_.echoes.setBaseline(mechanisms_);
-  profileFound();
+  profileFound(std::nullopt);
 }
 
 void Selection::renameVerdict(const std::string& label, const std::string& verdict) {
@@ -158,8 +161,8 @@ void Selection::renameVerdict(const std::string& label, const std::string& verdi
   }
 }
 
-/// Profiles the values and intervals of all findings of rounds.
-void Selection::profileFound() {
+/// Profiles the values and intervals of all findings of rounds, or of only one and what is profiled with it.
+void Selection::profileFound(std::optional<std::size_t> only) {
   context_.report("errors of what was found", 0);
   std::vector<Hypothesis> parts;
   std::vector<ProfiledValues> fits;
@@ -167,8 +170,9 @@ void Selection::profileFound() {
     parts.push_back(a.hypothesis);
     fits.push_back({a.scaled_values, a.standard_error});
   }
-  profileParts({context_.echoes, context_.likelihood, context_.pose_accuracy, before_rounds_, state_.latents}, parts,
-               fits);
+  all_profiled_ =
+      profileParts({context_.echoes, context_.likelihood, context_.pose_accuracy, before_rounds_, state_.latents},
+                   parts, fits, only);
   for (std::size_t i = 0; i < accepted_.size(); ++i) {
     Accepted& a = accepted_[i];
     a.scaled_values = fits[i].scaled_values;
@@ -333,6 +337,12 @@ void Selection::exchangeNames() {
   if (exchanged) refitAndProfile();
 }
 
+void Selection::finish() {
+  if (!all_profiled_) profileFound(std::nullopt);
+  orderByGain();
+}
+
+/// Sorts what was found by its gain, and measures gains again where the order changed.
 void Selection::orderByGain() {
   std::vector<std::size_t> places;
   for (const Accepted& a : accepted_) places.push_back(a.finding);

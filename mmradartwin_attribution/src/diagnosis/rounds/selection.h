@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
@@ -41,9 +42,9 @@ class Selection {
   /// changed; "" where it stands.
   std::string take(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding,
                    std::size_t family);
-  /// Sorts the findings of rounds by falling gain, an unknown last. Gains are measured again where other findings now
-  /// precede them.
-  void orderByGain();
+  /// Profiles what was found, and sorts it by falling gain, an unknown last. Gains are measured again where other
+  /// findings now precede them.
+  void finish();
 
  private:
   /// Finding of a round as it was fitted last; `finding` is its index among the findings.
@@ -67,7 +68,8 @@ class Selection {
   void withdrawExplainedByUnknown();
   void refitAndProfile();
   void renameVerdict(const std::string& label, const std::string& verdict);
-  void profileFound();
+  void profileFound(std::optional<std::size_t> only);
+  void orderByGain();
   bool mayBeNothing(const Hypothesis& hypothesis) const;
   bool isWithinErrors(const HypothesisFit& fit) const;
   std::optional<HypothesisFit> betterName(const Accepted& a);
@@ -84,7 +86,8 @@ class Selection {
   std::vector<NamedParameters> before_rounds_, extended_before_rounds_;
   ModelState state_;
   std::vector<Accepted> accepted_;
-  std::size_t family_ = 1;  ///< number of hypotheses of the last round
+  bool all_profiled_ = true;  ///< values and intervals of accepted_ are those of their profiles
+  std::size_t family_ = 1;    ///< number of hypotheses of the last round
 };
 
 }  // namespace mmradartwin::diagnosis::rounds
