@@ -136,9 +136,7 @@ bool HypothesisRounds::standsBeside(const std::vector<HypothesisFit>& clutter, c
 
 std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<HypothesisFit>& fits, std::size_t best) {
   const ModelState& state = selection_.state();
-  std::optional<std::size_t> better;
   std::optional<std::vector<CellPowers>> of_best;
-  double most = bounds::kLeastExplainedMore;
   for (std::size_t i = best + 1; i < fits.size(); ++i) {
     HypothesisFit& rival = fits[i];
     if (rival.ranking() < bounds::kAboutAsLikely * fits[best].ranking()) break;
@@ -146,12 +144,9 @@ std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<Hypothesis
     // Both are read from the same places, so that their difference is surer than either.
     if (!of_best) of_best = gains_.heldOutPowers(state, fits[best]);
     const GainMetric gain = explainedPowerGain(context_.data, *of_best, gains_.heldOutPowers(state, rival));
-    const double more = (*gain.difference_ci95)[0];
-    if (!(more > most)) continue;
-    better = i;
-    most = more;
+    if ((*gain.difference_ci95)[0] > bounds::kLeastExplainedMore) return i;
   }
-  return better;
+  return std::nullopt;
 }
 
 bool HypothesisRounds::findOne(int round) {

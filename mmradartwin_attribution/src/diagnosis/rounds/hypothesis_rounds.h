@@ -48,8 +48,8 @@ class HypothesisRounds {
   bool isClutter(const HypothesisFit& fit) const;
   /// True of a fit that would also be one where the twin has this clutter.
   bool standsBeside(const std::vector<HypothesisFit>& clutter, const HypothesisFit& fit);
-  /// Index of a named fit after fits[best] that is about as likely and explains clearly more power on held-out places;
-  /// nothing where there is none.
+  /// Index of the likeliest named fit after fits[best] that is about as likely and explains clearly more power on
+  /// held-out places; nothing where there is none.
   std::optional<std::size_t> betterByMaps(std::vector<HypothesisFit>& fits, std::size_t best);
 
   DiagnosisContext& context_;
