@@ -11,7 +11,7 @@ unset PYTHONHOME
 # All that is used, by name: Debian's ros-desktop-full-dev would bring some hundred more. Programs of ROS come first, then
 # ROS to build with, messages for rostopic and rosservice, libraries, tools, and what tests and the demo run.
 packages=(
-  rosbash rospack-tools rosout rviz tf2-tools libnodeletlib-tools python3-actionlib python3-rosbag python3-roslaunch
+  rosbash rospack-tools rosout rviz librviz-dev qtbase5-dev tf2-tools libnodeletlib-tools python3-actionlib python3-rosbag python3-roslaunch
   python3-rosmsg python3-rosnode python3-rosparam python3-rosservice python3-rostopic python3-rospy
   catkin ros-message-generation libactionlib-dev libclass-loader-dev libdiagnostic-updater-dev
   libdynamic-reconfigure-config-init-mutex-dev libnodeletlib-dev librosbag-dev python3-dynamic-reconfigure libroscpp-dev librostest-dev libtf2-eigen-dev libtf2-ros-dev pluginlib-dev python3-rostest

@@ -39,7 +39,7 @@ say "      $(find "$out/session/captures" -name '*.bin' | wc -l) captures, $(du 
 xvfb=
 if [ -z "${DISPLAY:-}" ]; then
   for n in $(seq 90 120); do [ -e "/tmp/.X11-unix/X$n" ] || break; done
-  Xvfb ":$n" -screen 0 1600x960x24 +extension GLX >/dev/null 2>&1 &
+  Xvfb ":$n" -screen 0 1920x1080x24 +extension GLX >/dev/null 2>&1 &
   xvfb=$!
   export DISPLAY=:$n LIBGL_ALWAYS_SOFTWARE=1
 fi

@@ -36,12 +36,8 @@ def shown():
         if not news.wait_for(lambda: len(seen) == 2, 60):
             raise SystemExit("no markers and residuals after a change")
         markers = [m for m in seen["markers"].markers if m.action == Marker.ADD]
-        fan = {m.ns: m.colors for m in markers if m.ns in ("measured", "residual")}
-        darkest = min(c.r + c.g for c in fan["measured"])
         return {"path points": sum(len(m.points) for m in markers if m.ns.startswith("paths ")),
-                "dark cells": sum(c.r + c.g == darkest for c in fan["measured"]),
-                "pale": sum(min(c.r, c.g, c.b) for c in fan["residual"]),
-                "responses": sum(len(m.points) for m in markers if m.ns in ("matched", "mismatch")),
+                "responses": sum(len(m.points) for m in markers if m.ns in ("matched", "C1", "C2", "C3", "C4", "C5")),
                 "residuals": len(seen["residuals"].residuals)}
 for line in sys.stdin:
     with news:
@@ -75,13 +71,10 @@ class Tuning(InFolder):
                 return json.loads(line)
 
             values, first = tuned(max_paths=50)
-            self.assertEqual((values["max_paths"], values["strong_db"], values["residual_span_db"]), (50, -15, 30))
+            self.assertEqual((values["max_paths"], values["strong_db"]), (50, -15))
             self.assertGreater(first["path points"], 0)
             self.assertGreater(first["residuals"] + first["responses"], 0)
             self.assertEqual(tuned(max_paths=0)[1]["path points"], 0)
-            narrow = tuned(map_span_db=10)[1]
-            self.assertGreater(narrow["dark cells"], first["dark cells"])
-            self.assertGreater(tuned(residual_span_db=100)[1]["pale"], narrow["pale"])
 
             # Thresholds: fewer responses are compared above a higher level, more above a lower one.
             few = tuned(strong_db=-1)[1]
@@ -104,7 +97,7 @@ class Tuning(InFolder):
         master.setParam("/attribution/tuning", {"max_paths": 3, "of_another_version": 1})
         with open(self.at("attribution.yaml"), "w", encoding="ascii") as file:
             file.write("strong_db: -12\n")
-        node = subprocess.Popen([find_program("mmradartwin_attribution", "attribution_node"), "_residual_span_db:=20",
+        node = subprocess.Popen([find_program("mmradartwin_attribution", "attribution_node"), "_markers_hz:=3",
                                  "_config:=" + self.at("attribution.yaml")], env=environment)
         self.addCleanup(end, node)
 
@@ -117,7 +110,7 @@ class Tuning(InFolder):
             return values if values.get("strong_db") == -12 else None
 
         tuned = wait_for(tuned_to, "the node's values")
-        self.assertEqual((tuned["max_paths"], tuned["residual_span_db"]), (200, 20))
+        self.assertEqual((tuned["max_paths"], tuned["markers_hz"]), (60, 3))
         self.assertNotIn("of_another_version", tuned)
 
 

@@ -31,8 +31,6 @@ AttributionConfig withThresholds(AttributionConfig config, const TuningConfig& t
   return config;
 }
 
-MarkerStyle styleOf(const TuningConfig& tuned) { return {tuned.max_paths, tuned.map_span_db, tuned.residual_span_db}; }
-
 // Names of a session's poses by the stamp at which each begins.
 std::map<std::int64_t, std::string> posesByStamp(const mmradartwin_msgs::Session& session) {
   std::map<std::int64_t, std::string> names;
@@ -54,6 +52,7 @@ AttributionNode::AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& priv
       }()) {
   if (!settings_.config_file.empty()) config_ = loadAttributionConfig(settings_.config_file);
   residuals_ = nh_.advertise<mmradartwin_msgs::Residuals>("attribution/residuals", 10);
+  residual_map_ = nh_.advertise<MapMsg>("attribution/residual_map", 10);
   ledger_ = nh_.advertise<mmradartwin_msgs::Ledger>("attribution/ledger", 1, true);
   markers_ = nh_.advertise<visualization_msgs::MarkerArray>("attribution/markers", 2);
   scene_markers_ = nh_.advertise<visualization_msgs::MarkerArray>(
@@ -79,16 +78,9 @@ AttributionNode::Settings::Settings(StrictParameters& parameters) {
   config_file = parameters.existingPath("config", "attribution.yaml: thresholds and windows; empty: the defaults");
   scene_file = parameters.existingPath("scene", "scene.yaml; empty: the scene of twin/scene");
   radar_frame = parameters.text("radar_frame", "radar_link", "tf frame of the radar");
-  frames.map = parameters.text("map_frame", frames.map, "tf frame of the scene");
-  frames.measured = parameters.text("measured_view_frame", frames.measured, "tf frame of the measured fan");
-  frames.simulated = parameters.text("simulated_view_frame", frames.simulated, "tf frame of the simulated fan");
-  frames.residual = parameters.text("residual_view_frame", frames.residual, "tf frame of the residual fan");
+  map_frame = parameters.text("map_frame", "map", "tf frame of the scene");
   markers_hz = parameters.number("markers_hz", 2, 1e-3, 100, "markers and ledgers come so often at most, Hz");
-  style.max_paths = parameters.integer("max_paths", style.max_paths, 0, 2000, "strongest paths that are shown");
-  style.map_span_db = parameters.number("map_span_db", style.map_span_db, 0, 200,
-                                        "colours of the maps reach so far below the peak, dB; 0: down to floor_db");
-  style.residual_span_db = parameters.number("residual_span_db", style.residual_span_db, 1, 200,
-                                             "colours of the residual reach so far to either side of 0, dB");
+  max_paths = parameters.integer("max_paths", 60, 0, 2000, "strongest paths that are shown");
   parameters.ofDiagnosticUpdater();
 }
 
@@ -105,8 +97,10 @@ NodeDescription AttributionNode::description() {
        topic<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", "measured map"),
        topic<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", "simulated map")},
       {topic<mmradartwin_msgs::Residuals>("attribution/residuals", "what differs in a pair of maps"),
+       topic<MapMsg>("attribution/residual_map", "the difference itself, simulated - measured, as a map"),
        topic<mmradartwin_msgs::Ledger>("attribution/ledger", "metrics over all poses so far; latched"),
-       topic<visualization_msgs::MarkerArray>("attribution/markers", "maps, boxes, labels and paths for rviz"),
+       topic<visualization_msgs::MarkerArray>("attribution/markers",
+                                              "the radar, boxes on the floor and paths for rviz"),
        topic<visualization_msgs::MarkerArray>("attribution/scene_markers", "the scene for rviz; latched"),
        topic<dynamic_reconfigure::ConfigDescription>("~tuning/parameter_descriptions",
                                                      "what can be tuned by eye; latched"),
@@ -117,9 +111,7 @@ NodeDescription AttributionNode::description() {
 }
 
 void AttributionNode::startTuning(const ros::NodeHandle& private_nh) {
-  tuned_.max_paths = settings_.style.max_paths;
-  tuned_.map_span_db = settings_.style.map_span_db;
-  tuned_.residual_span_db = settings_.style.residual_span_db;
+  tuned_.max_paths = settings_.max_paths;
   tuned_.markers_hz = settings_.markers_hz;
   tuned_.strong_db = config_.strong_db;
   tuned_.medium_db = config_.medium_db;
@@ -139,7 +131,7 @@ void AttributionNode::onTuning(TuningConfig& wanted) {
     return;
   }
   tuned_ = wanted;
-  if (builder_) builder_->setStyle(styleOf(tuned_));
+  if (builder_) builder_->setMaxPaths(tuned_.max_paths);
   if (toYaml(config) != toYaml(config_)) {
     config_ = config;
     rebuild();
@@ -271,7 +263,7 @@ void AttributionNode::publishScene() {
   const ros::WallTime now = ros::WallTime::now();
   if (!scene_ || !scene_due_ || (now - scene_published_).toSec() < 2) return;
   const bool moved = moved_scene_ && moved_scene_stamp_ >= scene_stamp_;
-  scene_markers_.publish(sceneMarkers(moved ? *moved_scene_ : *scene_, settings_.frames.map));
+  scene_markers_.publish(sceneMarkers(moved ? *moved_scene_ : *scene_, settings_.map_frame));
   scene_published_ = now;
   scene_due_ = false;
 }
@@ -281,7 +273,7 @@ void AttributionNode::rebuild() {
   if (!radar_) return;
   const SignalChain chain(*radar_);
   field_ = std::make_unique<EvaluationField>(config_, *radar_, chain.axes());
-  builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.frames, styleOf(tuned_));
+  builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.map_frame, tuned_.max_paths);
   slow_ = true;  // until it is known
   if (scene_) regions_ = std::make_unique<RegionModel>(*scene_, *rays_, *field_, *radar_);
   regions_of_pose_.clear();
@@ -358,6 +350,13 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
   residuals.header.stamp = measured_msg.header.stamp;
   residuals.header.frame_id = settings_.radar_frame;
   residuals_.publish(residuals);
+  if (residual_map_.getNumSubscribers() > 0) {
+    MapMsg map = residualMapMsg(*field_, pose, T);
+    map.header = residuals.header;
+    map.radar_hash = radar_hash_;
+    map.frames = measured_msg.frames;
+    residual_map_.publish(map);
+  }
 
   live_ledger_.add(measured.stamp_ns, T, name, measured.frames, pose.central);
   const ros::WallTime now = ros::WallTime::now();
@@ -365,7 +364,8 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
     last_markers_ = now;
     publishLedger(residuals.header.stamp);
     if (markers_.getNumSubscribers() > 0) {
-      if (had_subscribers_ == 0) builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.frames, styleOf(tuned_));
+      if (had_subscribers_ == 0)
+        builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.map_frame, tuned_.max_paths);
       markers_.publish(builder_->build(pose, records_, T, name));
     }
     had_subscribers_ = markers_.getNumSubscribers();

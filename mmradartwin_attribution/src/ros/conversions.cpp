@@ -73,6 +73,20 @@ mmradartwin_msgs::Finding toMsg(const Finding& finding) {
   return msg;
 }
 
+constexpr std::uint8_t kResidualSource = 2;  // see RangeAngleMap.msg
+
+mmradartwin_msgs::RangeAngleMap mapOf(const EvaluationField& field, const RealGrid& levels_db, std::uint8_t source,
+                                      const Eigen::Isometry3d& T_map_radar) {
+  mmradartwin_msgs::RangeAngleMap msg;
+  msg.source = source;
+  msg.range_m = field.axes().range_m;
+  msg.azimuth_rad = field.axes().azimuth_rad;
+  msg.power_db.assign(levels_db.data(), levels_db.data() + levels_db.size());
+  msg.pose_valid = true;
+  msg.T_map_radar = mmradartwin::toMsg(T_map_radar);
+  return msg;
+}
+
 Eigen::Vector3d vector(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
 Eigen::Vector3d vector(const geometry_msgs::Vector3& p) { return {p.x, p.y, p.z}; }
 
@@ -80,6 +94,7 @@ Eigen::Vector3d vector(const geometry_msgs::Vector3& p) { return {p.x, p.y, p.z}
 
 mmradartwin_msgs::Residuals toMsg(const EvaluationField& field, const PoseAttribution& pose, const std::string& name,
                                   const Eigen::Isometry3d& T_map_radar) {
+  const MatchWindow& tight = field.config().tight;
   mmradartwin_msgs::Residuals msg;
   msg.pose = name;
   msg.T_map_radar = toMsg(T_map_radar);
@@ -87,6 +102,8 @@ mmradartwin_msgs::Residuals toMsg(const EvaluationField& field, const PoseAttrib
     mmradartwin_msgs::ResponseRegion region;
     region.range_m = r.range_m;
     region.azimuth_rad = r.azimuth_rad;
+    region.half_range_m = field.halfRange_m(tight);
+    region.half_azimuth_rad = field.halfAzimuth_rad(tight, r.azimuth_rad);
     region.actor = r.actor;
     region.kind = regionKindName(r.kind);
     region.measured_strong = r.measured_strong;
@@ -100,6 +117,8 @@ mmradartwin_msgs::Residuals toMsg(const EvaluationField& field, const PoseAttrib
     residual.measured_stronger = r.measured_stronger;
     residual.range_m = r.range_m;
     residual.azimuth_rad = r.azimuth_rad;
+    residual.half_range_m = field.halfRange_m(tight);
+    residual.half_azimuth_rad = field.halfAzimuth_rad(tight, r.azimuth_rad);
     residual.measured_db = r.measured_db;
     residual.simulated_db = r.simulated_db;
     residual.actor = r.actor;
@@ -112,6 +131,16 @@ mmradartwin_msgs::Residuals toMsg(const EvaluationField& field, const PoseAttrib
   const double* begin = pose.residual_db.data();
   msg.residual_db.assign(begin, begin + pose.residual_db.size());
   return msg;
+}
+
+mmradartwin_msgs::RangeAngleMap toMsg(const EvaluationField& field, const NormalisedMap& map, Branch source,
+                                      const Eigen::Isometry3d& T_map_radar) {
+  return mapOf(field, map.level_db.array() + map.peak_db, static_cast<std::uint8_t>(source), T_map_radar);
+}
+
+mmradartwin_msgs::RangeAngleMap residualMapMsg(const EvaluationField& field, const PoseAttribution& pose,
+                                               const Eigen::Isometry3d& T_map_radar) {
+  return mapOf(field, pose.residual_db, kResidualSource, T_map_radar);
 }
 
 constexpr double mmradartwin_msgs::Ledger::*fieldOf(std::string_view metric) {

@@ -2,12 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <opencv2/imgproc.hpp>
 
-#include "mmradartwin_attribution/pose_picture.h"
 #include "mmradartwin_dsp/ros/conversions.h"
-#include "mmradartwin_dsp/units.h"
 
 namespace mmradartwin {
 namespace {
@@ -23,16 +19,7 @@ std_msgs::ColorRGBA rgba(double r, double g, double b, double a = 1) {
   return c;
 }
 
-const std_msgs::ColorRGBA kWhite = rgba(1, 1, 1), kMagenta = rgba(1, 0, 1), kGrey = rgba(0.62, 0.62, 0.62),
-                          kNoData = rgba(0.22, 0.22, 0.22);
-
-/// The hue that classes have in pictures at full brightness, halfway to white: thin letters of that hue itself cannot
-/// be read on viridis.
-std_msgs::ColorRGBA letterColor(ResidualClass c) {
-  const cv::Scalar bgr = classColor_bgr(c);
-  const double most = std::max({bgr[0], bgr[1], bgr[2]});
-  return rgba(0.5 + 0.5 * bgr[2] / most, 0.5 + 0.5 * bgr[1] / most, 0.5 + 0.5 * bgr[0] / most);
-}
+const std_msgs::ColorRGBA kWhite = rgba(1, 1, 1), kBlack = rgba(0, 0, 0), kMismatch = rgba(1, 0.549, 1);
 
 std_msgs::ColorRGBA eventColor(const std::string& event) {
   if (event == "specular") return rgba(0.941, 0.894, 0.259);
@@ -47,30 +34,6 @@ std_msgs::ColorRGBA eventColor(const std::string& event) {
   return rgba(0.3 + 0.7 * table[sector][0], 0.3 + 0.7 * table[sector][1], 0.3 + 0.7 * table[sector][2]);
 }
 
-// 256 colours of viridis, as the pictures of the programs have them.
-const std::vector<std_msgs::ColorRGBA>& sequential() {
-  static const std::vector<std_msgs::ColorRGBA> colors = [] {
-    cv::Mat ramp(1, 256, CV_8U), mapped;
-    for (int i = 0; i < 256; ++i) ramp.at<unsigned char>(0, i) = static_cast<unsigned char>(i);
-    cv::applyColorMap(ramp, mapped, cv::COLORMAP_VIRIDIS);
-    std::vector<std_msgs::ColorRGBA> result;
-    for (int i = 0; i < 256; ++i) {
-      const cv::Vec3b c = mapped.at<cv::Vec3b>(0, i);
-      result.push_back(rgba(c[2] / 255.0, c[1] / 255.0, c[0] / 255.0));
-    }
-    return result;
-  }();
-  return colors;
-}
-
-// Blue where the measurement is stronger, red where the simulation is, as in the pictures.
-std_msgs::ColorRGBA diverging(double share) {
-  const double t = std::clamp(share, -1.0, 1.0), a = std::abs(t);
-  const double end[2][3] = {{0.129, 0.4, 0.675}, {0.698, 0.094, 0.169}};
-  const double* e = end[t > 0];
-  return rgba(0.97 + (e[0] - 0.97) * a, 0.97 + (e[1] - 0.97) * a, 0.97 + (e[2] - 0.97) * a);
-}
-
 geometry_msgs::Point point(double x, double y, double z) {
   geometry_msgs::Point p;
   p.x = x;
@@ -79,64 +42,34 @@ geometry_msgs::Point point(double x, double y, double z) {
   return p;
 }
 
-geometry_msgs::Point polar(double range_m, double azimuth_rad, double z) {
-  return point(range_m * std::cos(azimuth_rad), range_m * std::sin(azimuth_rad), z);
-}
-
 geometry_msgs::Point point(const Eigen::Vector3d& p) { return point(p.x(), p.y(), p.z()); }
 
-void addOutline(Marker& lines, double near_m, double far_m, double from_rad, double to_rad, double z) {
+/// Outline of a polar box on the floor, where the radar's boresight points to `yaw_rad`.
+void addOutline(Marker& lines, const Eigen::Vector2d& radar_m, double yaw_rad, double near_m, double far_m,
+                double from_rad, double to_rad) {
   constexpr int kSteps = 8;
+  constexpr double kAboveFloor_m = 0.04;
   std::vector<geometry_msgs::Point> ring;
-  for (int i = 0; i <= kSteps; ++i) ring.push_back(polar(far_m, from_rad + (to_rad - from_rad) * i / kSteps, z));
-  for (int i = kSteps; i >= 0; --i) ring.push_back(polar(near_m, from_rad + (to_rad - from_rad) * i / kSteps, z));
+  const auto add = [&](double range_m, double azimuth_rad) {
+    ring.push_back(point(radar_m.x() + range_m * std::cos(yaw_rad + azimuth_rad),
+                         radar_m.y() + range_m * std::sin(yaw_rad + azimuth_rad), kAboveFloor_m));
+  };
+  for (int i = 0; i <= kSteps; ++i) add(far_m, from_rad + (to_rad - from_rad) * i / kSteps);
+  for (int i = kSteps; i >= 0; --i) add(near_m, from_rad + (to_rad - from_rad) * i / kSteps);
   for (std::size_t i = 0; i < ring.size(); ++i) {
     lines.points.push_back(ring[i]);
     lines.points.push_back(ring[(i + 1) % ring.size()]);
   }
 }
 
-std::string spoken(std::string actor) {
-  std::replace(actor.begin(), actor.end(), ';', '+');
-  return actor;
-}
-
-std::string label(const Residual& r) {
-  char level[40];
-  std::snprintf(level, sizeof level, "%+.1f dB", r.simulated_db - r.measured_db);
-  return className(r.residual_class) + " " + classLabel(r.residual_class) + ": " +
-         (r.actor.empty() ? "" : spoken(r.actor) + " ") + level;
-}
-
 }  // namespace
 
-MarkerBuilder::MarkerBuilder(const EvaluationField& field, const MarkerFrames& frames, const MarkerStyle& style)
-    : field_(field), frames_(frames), style_(style) {
-  const std::vector<double>&ranges = field_.axes().range_m, &azimuths = field_.axes().azimuth_rad;
-  const double range_bin = ranges.size() > 1 ? ranges[1] - ranges[0] : 1;
-  max_range_m_ = ranges.back();
-  const auto edge = [&](std::size_t a, std::size_t b) {  // bins are uniform in the sine
-    return std::asin(std::clamp(0.5 * (std::sin(azimuths[a]) + std::sin(azimuths[b])), -1.0, 1.0));
-  };
-  for (std::size_t a = 1; a + 1 < azimuths.size(); ++a) {
-    if (std::isnan(azimuths[a - 1]) || std::isnan(azimuths[a]) || std::isnan(azimuths[a + 1])) continue;
-    const double from = edge(a - 1, a), to = edge(a, a + 1);
-    for (std::size_t r = 1; r < ranges.size(); ++r) {
-      const double near_m = ranges[r] - range_bin / 2, far_m = ranges[r] + range_bin / 2;
-      fan_cells_.emplace_back(static_cast<int>(r), static_cast<int>(a));
-      fan_points_.push_back(polar(near_m, from, 0));
-      fan_points_.push_back(polar(far_m, from, 0));
-      fan_points_.push_back(polar(far_m, to, 0));
-      fan_points_.push_back(polar(near_m, from, 0));
-      fan_points_.push_back(polar(far_m, to, 0));
-      fan_points_.push_back(polar(near_m, to, 0));
-    }
-  }
-}
+MarkerBuilder::MarkerBuilder(const EvaluationField& field, const std::string& map_frame, int max_paths)
+    : field_(field), map_frame_(map_frame), max_paths_(max_paths) {}
 
-Marker MarkerBuilder::marker(const std::string& ns, int id, int type, const std::string& frame) const {
+Marker MarkerBuilder::marker(const std::string& ns, int id, int type) const {
   Marker m;
-  m.header.frame_id = frame;  // stamp 0: at the latest transform, and locked to the frame
+  m.header.frame_id = map_frame_;  // stamp 0: at the latest transform, and locked to the frame
   m.frame_locked = true;
   m.ns = ns;
   m.id = id;
@@ -148,133 +81,43 @@ Marker MarkerBuilder::marker(const std::string& ns, int id, int type, const std:
   return m;
 }
 
-void MarkerBuilder::addList(const Marker& m, Array& out) const {
+void MarkerBuilder::addList(const Marker& m, Array& out) {
   out.markers.push_back(m);
   if (m.points.empty()) out.markers.back().action = Marker::DELETE;
 }
 
-void MarkerBuilder::addFans(const PoseAttribution& pose, Array& out) {
-  const double floor = style_.map_span_db > 0 ? -style_.map_span_db : field_.config().floor_db;
-  const auto fan = [&](const std::string& ns, const std::string& frame, const auto& color) {
-    Marker m = marker(ns, 0, Marker::TRIANGLE_LIST, frame);
-    m.points = fan_points_;
-    m.colors.reserve(2 * fan_cells_.size());
-    for (const auto& [r, a] : fan_cells_) {
-      const std_msgs::ColorRGBA c = color(r, a);
-      m.colors.push_back(c);  // one colour per triangle, two triangles per cell
-      m.colors.push_back(c);
-    }
-    out.markers.push_back(std::move(m));
-  };
-  const auto level = [&](const RealGrid& map) {
-    return [&map, floor](int r, int a) {
-      const double share = (map(r, a) - floor) / -floor;
-      return sequential()[static_cast<std::size_t>(std::lround(255 * std::clamp(share, 0.0, 1.0)))];
-    };
-  };
-  fan("measured", frames_.measured, level(pose.measured.level_db));
-  fan("simulated", frames_.simulated, level(pose.simulated.level_db));
-  fan("residual", frames_.residual, [&](int r, int a) {
-    const double v = pose.residual_db(r, a);
-    return std::isnan(v) ? kNoData : diverging(v / style_.residual_span_db);
-  });
-}
-
-void MarkerBuilder::addGrid(const std::string& frame, const std::string& title, Array& out) {
-  Marker lines = marker("grid " + title, 0, Marker::LINE_LIST, frame);
-  lines.scale.x = 0.012;
-  lines.color = kGrey;
-  const int last_m = static_cast<int>(max_range_m_ + 0.5);
-  const double from = field_.axes().azimuth_rad.size() ? -field_.config().outer_azimuth_rad : 0, to = -from;
-  constexpr int kSteps = 48;
-  for (int range = 1; range <= last_m; ++range) {
-    for (int i = 0; i < kSteps; ++i) {
-      lines.points.push_back(polar(range, from + (to - from) * i / kSteps, 0.01));
-      lines.points.push_back(polar(range, from + (to - from) * (i + 1) / kSteps, 0.01));
-    }
-  }
-  for (int spoke = -90; spoke <= 90; spoke += 15) {
-    if (std::abs(spoke * kDegree) > to + 1e-9) continue;
-    lines.points.push_back(polar(1, spoke * kDegree, 0.01));
-    lines.points.push_back(polar(last_m, spoke * kDegree, 0.01));
-  }
-  out.markers.push_back(std::move(lines));
-  int id = 1;
-  const auto text = [&](const geometry_msgs::Point& at, const std::string& words, double height) {
-    Marker m = marker("grid " + title, id++, Marker::TEXT_VIEW_FACING, frame);
-    m.pose.position = at;
-    m.scale.z = height;
-    m.text = words;
-    out.markers.push_back(std::move(m));
-  };
-  text(point(last_m + 1.0, 0, 0.05), title, 0.6);
-  for (int range = 2; range <= last_m; range += 2) text(point(-0.3, range, 0.05), std::to_string(range) + " m", 0.32);
-  for (int spoke = -60; spoke <= 60; spoke += 30) {
-    text(polar(last_m + 0.4, spoke * kDegree, 0.05), std::to_string(spoke) + "°", 0.32);
-  }
-}
-
-void MarkerBuilder::addBoxes(const PoseAttribution& pose, Array& out) {
+void MarkerBuilder::addBoxes(const PoseAttribution& pose, const Eigen::Isometry3d& T_map_radar, Array& out) const {
+  constexpr double kLine_m = 0.03, kRim_m = 0.08;
   const MatchWindow& tight = field_.config().tight;
+  const Eigen::Vector3d ahead = T_map_radar.linear().col(0);
+  const double yaw = std::atan2(ahead.y(), ahead.x());
   const auto outline = [&](Marker& lines, double range_m, double azimuth_rad) {
     const double dr = field_.halfRange_m(tight), da = field_.halfAzimuth_rad(tight, azimuth_rad);
-    addOutline(lines, std::max(0.0, range_m - dr), range_m + dr, azimuth_rad - da, azimuth_rad + da, 0.03);
+    addOutline(lines, T_map_radar.translation().head<2>(), yaw, std::max(0.0, range_m - dr), range_m + dr,
+               azimuth_rad - da, azimuth_rad + da);
   };
-  for (int branch = 0; branch < 2; ++branch) {
-    const std::string& frame = branch == 0 ? frames_.measured : frames_.simulated;
-    Marker matched = marker("matched", branch, Marker::LINE_LIST, frame);
-    Marker mismatch = marker("mismatch", branch, Marker::LINE_LIST, frame);
-    matched.scale.x = mismatch.scale.x = 0.05;
-    mismatch.color = kMagenta;
-    for (const ResponseRegion& r : pose.regions) {
-      if (r.field == Field::kCentral && r.measured_strong && r.simulated_strong)
-        outline(matched, r.range_m, r.azimuth_rad);
-    }
-    for (const Residual& r : pose.residuals) {
-      if (r.measured_stronger == (branch == 0)) outline(mismatch, r.range_m, r.azimuth_rad);
-    }
-    addList(matched, out);
-    addList(mismatch, out);
-  }
-}
-
-void MarkerBuilder::addLabels(const PoseAttribution& pose, Array& out) {
-  std::map<std::string, int> shown;
-  // A dark copy just behind each text keeps it legible on bright cells.
-  const auto add = [&](const std::string& ns, const std::string& frame, const geometry_msgs::Point& at,
-                       const std::string& words, const std_msgs::ColorRGBA& color) {
-    for (bool shadow : {true, false}) {
-      Marker m = marker(ns, shown[ns]++, Marker::TEXT_VIEW_FACING, frame);
-      m.pose.position = at;
-      m.scale.z = 0.5;
-      m.color = color;
-      m.text = words;
-      if (shadow) {
-        m.pose.position = point(at.x - 0.04, at.y - 0.04, at.z - 0.05);
-        m.color = rgba(0, 0, 0);
-      }
-      out.markers.push_back(std::move(m));
-    }
-  };
-  for (const Residual& r : pose.residuals) {
-    add(className(r.residual_class), r.measured_stronger ? frames_.measured : frames_.simulated,
-        polar(r.range_m + field_.halfRange_m(field_.config().tight) + 0.35, r.azimuth_rad, 0.2), label(r),
-        letterColor(r.residual_class));
+  std::vector<Marker> boxes = {marker("matched", 1, Marker::LINE_LIST)};
+  for (int k = 1; k <= 5; ++k) {
+    boxes.push_back(marker(className(static_cast<ResidualClass>(k)), 1, Marker::LINE_LIST));
+    boxes.back().color = kMismatch;
   }
   for (const ResponseRegion& r : pose.regions) {
-    if (r.field != Field::kCentral || !r.measured_strong || !r.simulated_strong) continue;
-    for (const std::string& frame : {frames_.measured, frames_.simulated}) {
-      add("matched actors", frame, polar(std::max(0.2, r.range_m - 0.45), r.azimuth_rad, 0.2), spoken(r.actor), kWhite);
-    }
+    if (r.field == Field::kCentral && r.measured_strong && r.simulated_strong)
+      outline(boxes[0], r.range_m, r.azimuth_rad);
   }
-  for (const auto& [ns, count] : labels_shown_) {
-    for (int id = shown[ns]; id < count; ++id) {
-      Marker m = marker(ns, id, Marker::TEXT_VIEW_FACING, frames_.measured);
-      m.action = Marker::DELETE;
-      out.markers.push_back(std::move(m));
-    }
+  for (const Residual& r : pose.residuals) {
+    outline(boxes[static_cast<std::size_t>(r.residual_class)], r.range_m, r.azimuth_rad);
   }
-  labels_shown_ = shown;
+  for (Marker& box : boxes) {
+    box.scale.x = kLine_m;
+    Marker rim = box;  // dark, so that the box stands out on bright cells
+    rim.id = 0;
+    rim.scale.x = kRim_m;
+    rim.color = kBlack;
+    for (geometry_msgs::Point& p : rim.points) p.z -= 0.01;
+    addList(rim, out);
+    addList(box, out);
+  }
 }
 
 void MarkerBuilder::addPaths(const std::vector<PathRecord>& records, const Eigen::Isometry3d& T_map_radar, Array& out) {
@@ -282,17 +125,17 @@ void MarkerBuilder::addPaths(const std::vector<PathRecord>& records, const Eigen
   for (const PathRecord& r : records) {
     if (!r.vertices.empty() && r.event) strongest.push_back(&r);
   }
-  const std::size_t count = std::min<std::size_t>(strongest.size(), static_cast<std::size_t>(style_.max_paths));
+  const std::size_t count = std::min<std::size_t>(strongest.size(), static_cast<std::size_t>(max_paths_));
   std::partial_sort(strongest.begin(), strongest.begin() + static_cast<std::ptrdiff_t>(count), strongest.end(),
                     [](const PathRecord* a, const PathRecord* b) { return a->amplitude > b->amplitude; });
   strongest.resize(count);
   const Eigen::Vector3d radar = T_map_radar.translation();
   std::map<std::string, Marker> by_event;
   for (const std::string& event : events_shown_) {
-    by_event.emplace(event, marker("paths " + event, 0, Marker::LINE_LIST, frames_.map));
+    by_event.emplace(event, marker("paths " + event, 0, Marker::LINE_LIST));
   }
   for (const PathRecord* r : strongest) {
-    auto [entry, added] = by_event.emplace(*r->event, marker("paths " + *r->event, 0, Marker::LINE_LIST, frames_.map));
+    auto [entry, added] = by_event.emplace(*r->event, marker("paths " + *r->event, 0, Marker::LINE_LIST));
     if (added) events_shown_.push_back(*r->event);
     Marker& m = entry->second;
     m.scale.x = 0.015;
@@ -314,14 +157,14 @@ void MarkerBuilder::addPaths(const std::vector<PathRecord>& records, const Eigen
   for (const auto& [event, m] : by_event) addList(m, out);
 }
 
-void MarkerBuilder::addRadar(const Eigen::Isometry3d& T_map_radar, const std::string& caption, Array& out) {
-  Marker arrow = marker("radar", 0, Marker::ARROW, frames_.map);
+void MarkerBuilder::addRadar(const Eigen::Isometry3d& T_map_radar, const std::string& caption, Array& out) const {
+  Marker arrow = marker("radar", 0, Marker::ARROW);
   arrow.pose = toMsg(T_map_radar);
   arrow.scale.x = 0.8;
   arrow.scale.y = arrow.scale.z = 0.12;
   arrow.color = rgba(0, 0.447, 0.698);
   out.markers.push_back(std::move(arrow));
-  Marker text = marker("radar", 1, Marker::TEXT_VIEW_FACING, frames_.map);
+  Marker text = marker("radar", 1, Marker::TEXT_VIEW_FACING);
   const Eigen::Vector3d p = T_map_radar.translation();
   text.pose.position = point(p.x(), p.y(), p.z() + 0.4);
   text.scale.z = 0.5;
@@ -334,17 +177,12 @@ visualization_msgs::MarkerArray MarkerBuilder::build(const PoseAttribution& pose
                                                      const Eigen::Isometry3d& T_map_radar, const std::string& caption) {
   Array out;
   if (first_) {
-    Marker clear = marker("", 0, Marker::ARROW, frames_.map);
+    Marker clear = marker("", 0, Marker::ARROW);
     clear.action = Marker::DELETEALL;
     out.markers.push_back(clear);
     first_ = false;
   }
-  addFans(pose, out);
-  addGrid(frames_.measured, "measured", out);
-  addGrid(frames_.simulated, "simulated", out);
-  addGrid(frames_.residual, "residual", out);
-  addBoxes(pose, out);
-  addLabels(pose, out);
+  addBoxes(pose, T_map_radar, out);
   addPaths(records, T_map_radar, out);
   addRadar(T_map_radar, caption, out);
   return out;

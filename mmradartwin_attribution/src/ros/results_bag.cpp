@@ -4,6 +4,7 @@
 #include <tf2_eigen/tf2_eigen.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include <array>
 #include <mutex>
 #include <optional>
 
@@ -60,11 +61,16 @@ ResultsBag::~ResultsBag() = default;
 
 void ResultsBag::add(const PoseResult& pose) try {
   // Every array stands for itself: rviz may be started anywhere in the bag.
-  MarkerBuilder builder(impl_->field, {});
+  MarkerBuilder builder(impl_->field);
   const auto markers = builder.build(pose.attribution, pose.records, pose.pose.T_map_radar, pose.pose.name);
   auto residuals = toMsg(impl_->field, pose.attribution, pose.pose.name, pose.pose.T_map_radar);
   residuals.header.frame_id = "radar_link";
   residuals.header.stamp = impl_->time(pose.index);
+  const PoseAttribution& attribution = pose.attribution;
+  std::array<std::pair<const char*, mmradartwin_msgs::RangeAngleMap>, 3> maps = {
+      {{"radar/range_angle", toMsg(impl_->field, attribution.measured, Branch::kMeasured, pose.pose.T_map_radar)},
+       {"twin/range_angle", toMsg(impl_->field, attribution.simulated, Branch::kSimulated, pose.pose.T_map_radar)},
+       {"attribution/residual_map", residualMapMsg(impl_->field, attribution, pose.pose.T_map_radar)}}};
   geometry_msgs::TransformStamped transform = tf2::eigenToTransform(pose.pose.T_map_radar);
   transform.header.frame_id = "map";
   transform.child_frame_id = "radar_link";
@@ -80,6 +86,11 @@ void ResultsBag::add(const PoseResult& pose) try {
     tf2_msgs::TFMessage tf;
     tf.transforms.push_back(transform);
     impl_->bag.write("/tf", time, tf);
+  }
+  for (auto& [topic, map] : maps) {
+    map.header = residuals.header;
+    map.frames = static_cast<std::uint32_t>(pose.frames);
+    impl_->bag.write(topic, impl_->time(pose.index, 0.05), map);
   }
   impl_->bag.write("attribution/residuals", impl_->time(pose.index, 0.05), residuals);
   impl_->bag.write("attribution/markers", impl_->time(pose.index, 0.05), markers);

@@ -35,7 +35,7 @@ namespace mmradartwin {
 using TuningConfig = mmradartwin_attribution::TuningConfig;  // made of cfg/Tuning.cfg
 
 /// radar/config, session, twin/scene, twin/moved_scene, twin/paths, radar/range_angle, twin/range_angle ->
-/// attribution/residuals, attribution/ledger, attribution/markers, attribution/scene_markers.
+/// attribution/residuals, attribution/residual_map, attribution/ledger, attribution/markers, attribution/scene_markers.
 ///
 /// Matches measured and simulated maps by stamp and attributes what differs. Poses are named after the session's
 /// poses.csv, else after their stamp. The scene is that of the parameter `scene`, else of twin/scene; where twin/scene
@@ -55,10 +55,9 @@ class AttributionNode {
   struct Settings {
     explicit Settings(StrictParameters& parameters);
 
-    std::string config_file, scene_file, radar_frame;
-    MarkerFrames frames;
-    MarkerStyle style;
+    std::string config_file, scene_file, radar_frame, map_frame;
     double markers_hz;
+    int max_paths;
   };
 
   void onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg);
@@ -96,7 +95,7 @@ class AttributionNode {
   boost::recursive_mutex tuning_mutex_;  ///< of tuning_, which wants one
   std::unique_ptr<dynamic_reconfigure::Server<TuningConfig>> tuning_;
   std::string twin_yaml_;
-  ros::Publisher residuals_, ledger_, markers_, scene_markers_;
+  ros::Publisher residuals_, residual_map_, ledger_, markers_, scene_markers_;
   std::vector<ros::Subscriber> subscribers_;
   ros::Subscriber measured_subscriber_, simulated_subscriber_;
   TopicWatch measured_heard_{"the signal chain"}, simulated_heard_{"the twin, and the signal chain"};

@@ -3,6 +3,7 @@
 #include <mmradartwin_msgs/Findings.h>
 #include <mmradartwin_msgs/Ledger.h>
 #include <mmradartwin_msgs/PathRecords.h>
+#include <mmradartwin_msgs/RangeAngleMap.h>
 #include <mmradartwin_msgs/Residuals.h>
 #include <mmradartwin_msgs/Scene.h>
 
@@ -18,6 +19,12 @@ namespace mmradartwin {
 /// The caller sets the headers.
 mmradartwin_msgs::Residuals toMsg(const EvaluationField& field, const PoseAttribution& pose, const std::string& name,
                                   const Eigen::Isometry3d& T_map_radar);
+/// A normalised map in the unit that it had, clipped as it is compared.
+mmradartwin_msgs::RangeAngleMap toMsg(const EvaluationField& field, const NormalisedMap& map, Branch source,
+                                      const Eigen::Isometry3d& T_map_radar);
+/// Simulated - measured [dB], NaN where they are not compared.
+mmradartwin_msgs::RangeAngleMap residualMapMsg(const EvaluationField& field, const PoseAttribution& pose,
+                                               const Eigen::Isometry3d& T_map_radar);
 mmradartwin_msgs::Ledger toMsg(const LedgerSummary& summary, const std::vector<std::string>& duplicates);
 /// Throws std::logic_error as toJson() does.
 mmradartwin_msgs::Findings toMsg(const Findings& findings);

@@ -2,7 +2,6 @@
 
 #include <visualization_msgs/MarkerArray.h>
 
-#include <map>
 #include <string>
 #include <vector>
 
@@ -11,48 +10,29 @@
 
 namespace mmradartwin {
 
-struct MarkerFrames {
-  std::string map = "map";
-  std::string measured = "radar_link_view_measured";
-  std::string simulated = "radar_link_view_simulated";
-  std::string residual = "radar_link_view_residual";
-};
-
-/// What of the markers is a matter of taste.
-struct MarkerStyle {
-  int max_paths = 200;           ///< strongest paths
-  double map_span_db = 0;        ///< colours of the maps reach so far below the peak; 0: down to the field's floor
-  double residual_span_db = 30;  ///< and those of the residual to either side of 0 dB
-};
-
-/// Markers of one pose for rviz. Fans keep their topology and all markers their ids from message to message; markers
-/// that a pose no longer has are deleted by id. The first message clears what an earlier process left.
+/// Markers of one pose for rviz, in the scene's frame: the radar, boxes on the floor below its plane where both maps
+/// respond (namespace "matched") and where they differ (a namespace for each class), and the strongest paths (one for
+/// each event). All keep their ids from message to message; what a pose no longer has is deleted by id. The first
+/// message clears what an earlier process left.
 class MarkerBuilder {
  public:
-  MarkerBuilder(const EvaluationField& field, const MarkerFrames& frames, const MarkerStyle& style = {});
-  void setStyle(const MarkerStyle& style) { style_ = style; }
+  explicit MarkerBuilder(const EvaluationField& field, const std::string& map_frame = "map", int max_paths = 60);
+  void setMaxPaths(int max_paths) { max_paths_ = max_paths; }
   visualization_msgs::MarkerArray build(const PoseAttribution& pose, const std::vector<PathRecord>& records,
                                         const Eigen::Isometry3d& T_map_radar, const std::string& caption);
 
  private:
   using Array = visualization_msgs::MarkerArray;
-  void addFans(const PoseAttribution& pose, Array& out);
-  void addGrid(const std::string& frame, const std::string& title, Array& out);
-  void addBoxes(const PoseAttribution& pose, Array& out);
-  void addLabels(const PoseAttribution& pose, Array& out);
+  void addBoxes(const PoseAttribution& pose, const Eigen::Isometry3d& T_map_radar, Array& out) const;
   void addPaths(const std::vector<PathRecord>& records, const Eigen::Isometry3d& T_map_radar, Array& out);
-  void addRadar(const Eigen::Isometry3d& T_map_radar, const std::string& caption, Array& out);
-  visualization_msgs::Marker marker(const std::string& ns, int id, int type, const std::string& frame) const;
+  void addRadar(const Eigen::Isometry3d& T_map_radar, const std::string& caption, Array& out) const;
+  visualization_msgs::Marker marker(const std::string& ns, int id, int type) const;
   /// Adds a list marker, or deletes it where it has no points.
-  void addList(const visualization_msgs::Marker& marker, Array& out) const;
+  static void addList(const visualization_msgs::Marker& marker, Array& out);
 
   EvaluationField field_;
-  MarkerFrames frames_;
-  MarkerStyle style_;
-  double max_range_m_;
-  std::vector<geometry_msgs::Point> fan_points_;  // six per cell
-  std::vector<std::pair<int, int>> fan_cells_;    // range and angle bin of each
-  std::map<std::string, int> labels_shown_;       // by namespace
+  std::string map_frame_;
+  int max_paths_;
   std::vector<std::string> events_shown_;
   bool first_ = true;
 };

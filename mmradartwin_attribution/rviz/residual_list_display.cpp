@@ -1,0 +1,95 @@
+#include "residual_list_display.h"
+
+#include <rviz/properties/ros_topic_property.h>
+
+#include <cmath>
+#include <pluginlib/class_list_macros.hpp>
+
+#include "mmradartwin_attribution/residual.h"
+#include "words_panel.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kMostOften_hz = 4;
+
+QString signedNumber(double value, int digits) {
+  return QString::number(value, 'f', digits).replace('-', QChar(0x2212));
+}
+
+QString cell(const QString& words, bool right = false) {
+  return QString("<td%1>%2&nbsp;&nbsp;</td>").arg(right ? " align='right'" : "", words);
+}
+
+QString rowOf(int number, const mmradartwin_msgs::Residual& r) {
+  const auto c = static_cast<ResidualClass>(r.residual_class);
+  const QString class_name = QString::fromStdString(className(c) + " " + classLabel(c));
+  QString actor = QString::fromStdString(r.actor).replace(';', " + ").toHtmlEscaped();
+  if (!r.material.empty()) actor += " (" + QString::fromStdString(r.material).replace(';', " + ").toHtmlEscaped() + ")";
+  return "<tr>" + cell(QString("<b>%1</b>").arg(number), true) + cell(class_name) + cell(actor) +
+         cell(signedNumber(r.range_m, 2) + " m", true) +
+         cell(signedNumber(r.azimuth_rad * 180 / M_PI, 0) + QChar(0xb0), true) +
+         cell(signedNumber(r.measured_db, 1), true) + cell(signedNumber(r.simulated_db, 1), true) + "</tr>";
+}
+
+QString listOf(const mmradartwin_msgs::Residuals& msg) {
+  int matched = 0;
+  for (const auto& region : msg.regions) matched += region.measured_strong && region.simulated_strong;
+  QString html = QString::fromUtf8("<b>pose %1</b> · places that agree (white boxes): %2 · that differ (magenta): %3")
+                     .arg(QString::fromStdString(msg.pose).toHtmlEscaped())
+                     .arg(matched)
+                     .arg(msg.residuals.size());
+  if (msg.residuals.empty()) return html;
+  html +=
+      "<table cellspacing='1'><tr><th></th><th align='left'>class</th><th align='left'>where it is expected from</th>"
+      "<th>range</th><th>angle</th><th>measured, dB&nbsp;</th><th>twin, dB</th></tr>";
+  int number = 0;
+  for (const auto& residual : msg.residuals) html += rowOf(++number, residual);
+  return html + "</table>";
+}
+
+}  // namespace
+
+ResidualListDisplay::ResidualListDisplay() {
+  topic_ = new rviz::RosTopicProperty(
+      "Topic", "", QString::fromStdString(ros::message_traits::datatype<mmradartwin_msgs::Residuals>()),
+      "Residuals to list.", this);
+  connect(topic_, &rviz::Property::changed, this, [this] { subscribe(); });
+}
+
+ResidualListDisplay::~ResidualListDisplay() { delete panel_; }
+
+void ResidualListDisplay::onInitialize() {
+  panel_ = new WordsPanel(getName());
+  panel_->setWords("What the numbers on the maps stand for. No comparison has come yet.");
+  setAssociatedWidget(panel_);
+}
+
+void ResidualListDisplay::setTopic(const QString& topic, const QString&) { topic_->setString(topic); }
+
+void ResidualListDisplay::subscribe() {
+  subscriber_.shutdown();
+  if (!isEnabled() || !initialized() || topic_->getTopicStd().empty()) return;
+  try {
+    subscriber_ = update_nh_.subscribe<mmradartwin_msgs::Residuals>(
+        topic_->getTopicStd(), 1, [this](const mmradartwin_msgs::Residuals::ConstPtr& msg) {
+          residuals_ = msg;
+          due_ = true;
+        });
+    setStatus(rviz::StatusProperty::Ok, "Topic", "subscribed");
+  } catch (const ros::Exception& error) {
+    setStatus(rviz::StatusProperty::Error, "Topic", error.what());
+  }
+}
+
+void ResidualListDisplay::update(float, float) {
+  const ros::WallTime now = ros::WallTime::now();
+  if (!due_ || !panel_ || (now - shown_).toSec() < 1 / kMostOften_hz) return;
+  due_ = false;
+  shown_ = now;
+  panel_->setWords(listOf(*residuals_));
+}
+
+}  // namespace mmradartwin
+
+PLUGINLIB_EXPORT_CLASS(mmradartwin::ResidualListDisplay, rviz::Display)

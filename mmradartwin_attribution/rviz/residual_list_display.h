@@ -1,0 +1,41 @@
+#pragma once
+
+#include <mmradartwin_msgs/Residuals.h>
+#include <ros/subscriber.h>
+#include <ros/time.h>
+#include <rviz/display.h>
+
+#include <QPointer>
+
+namespace rviz {
+class RosTopicProperty;
+}
+
+namespace mmradartwin {
+
+class WordsPanel;
+
+/// rviz display of mmradartwin_msgs/Residuals: what the numbers on the maps stand for.
+class ResidualListDisplay : public rviz::Display {
+ public:
+  ResidualListDisplay();
+  ~ResidualListDisplay() override;
+  void update(float wall_dt, float ros_dt) override;
+  void setTopic(const QString& topic, const QString& datatype) override;
+
+ protected:
+  void onInitialize() override;
+  void onEnable() override { subscribe(); }
+  void onDisable() override { subscriber_.shutdown(); }
+
+ private:
+  void subscribe();
+  rviz::RosTopicProperty* topic_;
+  ros::Subscriber subscriber_;
+  mmradartwin_msgs::Residuals::ConstPtr residuals_;
+  bool due_ = false;
+  ros::WallTime shown_;
+  QPointer<WordsPanel> panel_;
+};
+
+}  // namespace mmradartwin
