@@ -143,7 +143,7 @@ void MapPanel::drawMarks(QPainter& painter) const {
     if (mark.range_m - mark.half_range_m > up_to_m_) continue;
     const double near_m = std::max(0.0, mark.range_m - mark.half_range_m), far_m = mark.range_m + mark.half_range_m;
     QPainterPath box;
-    constexpr int kSteps = 8;
+    constexpr int kSteps = 3;
     for (int i = 0; i <= 2 * kSteps + 1; ++i) {
       const bool far = i <= kSteps;
       const double share = (far ? i : 2 * kSteps + 1 - i) / static_cast<double>(kSteps);
@@ -152,8 +152,8 @@ void MapPanel::drawMarks(QPainter& painter) const {
     }
     box.closeSubpath();
     painter.setBrush(Qt::NoBrush);
-    painter.strokePath(box, QPen(toQColor(kBoxRim), 4.5, Qt::SolidLine, Qt::SquareCap, Qt::MiterJoin));
-    painter.strokePath(box, QPen(toQColor(mark.color), 1.8, Qt::SolidLine, Qt::SquareCap, Qt::MiterJoin));
+    painter.strokePath(box, QPen(toQColor(kBoxRim), 4.5, Qt::SolidLine, Qt::FlatCap, Qt::BevelJoin));
+    painter.strokePath(box, QPen(toQColor(mark.color), 1.8, Qt::SolidLine, Qt::FlatCap, Qt::BevelJoin));
     if (mark.number == 0) continue;
     const QPointF top = at(far_m, mark.azimuth_rad);
     const QSizeF size = textSize(QString::number(mark.number));

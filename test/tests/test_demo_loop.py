@@ -26,9 +26,10 @@ def picture_pixels(file):
     return numpy.frombuffer(raw, numpy.uint8).reshape(height, width, 3).astype(int)
 
 
-def fan_columns(pixels):
-    """Columns that hold the floor of a fan's colour map, viridis(0) = (68, 1, 84): stretches of at least 100 columns."""
-    floor = (numpy.abs(pixels - numpy.array([68, 1, 84])).sum(axis=2) < 24).sum(axis=0) > 40
+def fan_stretches(pixels, axis):
+    """Columns (axis 0) or rows (1) that hold the floor of a fan's colour map, viridis(0) = (68, 1, 84): stretches of at
+    least 100 pixels."""
+    floor = (numpy.abs(pixels - numpy.array([68, 1, 84])).sum(axis=2) < 24).sum(axis=axis) > 40
     edges = numpy.flatnonzero(numpy.diff(numpy.concatenate([[0], floor.astype(int), [0]])))
     return [(a, b) for a, b in zip(edges[::2], edges[1::2]) if b - a >= 100]
 
@@ -66,7 +67,7 @@ def check_report(test, folder, names):
             test.assertAlmostEqual(float(text or 0), float(row[column] or 0), delta=0.00051, msg=name)   # of three decimals
         picture = os.path.join("pictures", name + ".png")
         test.assertIn(f'src="{picture}"', page)
-        test.assertGreaterEqual(len(fan_columns(picture_pixels(os.path.join(folder, picture)))), 2, name)
+        test.assertGreaterEqual(len(fan_stretches(picture_pixels(os.path.join(folder, picture)), 0)), 2, name)
     test.assertIn('src="coverage.png"', page)
     coverage = picture_pixels(os.path.join(folder, "coverage.png"))
     test.assertGreater(len(numpy.unique(coverage.reshape(-1, 3), axis=0)), 4, "nothing is drawn")
@@ -141,14 +142,16 @@ class DemoLoop(unittest.TestCase):
         self.assertEqual(before_after.shape[0], 2 * picture_pixels(self.path("rviz.png")).shape[0])
 
     def check_fans(self, pixels):
-        fans = fan_columns(pixels)
-        self.assertGreaterEqual(len(fans), 2, f"fans found in columns {fans}")
+        panels = pixels[:, -440:]  # of the maps: measured above simulated
+        fans = fan_stretches(panels, 1)
+        self.assertGreaterEqual(len(fans), 2, f"fans found in rows {fans}")
         # Each holds echoes too: the upper half of viridis, teal to yellow, has more green than blue or red in it.
-        red, green, blue = pixels[..., 0], pixels[..., 1], pixels[..., 2]
+        red, green, blue = panels[..., 0], panels[..., 1], panels[..., 2]
         echo = (green > 130) & (green > blue) & (green - numpy.minimum(red, blue) > 40)
+        echo[:, -62:] = False  # colour bars
         middle = (fans[0][1] + fans[1][0]) // 2
-        self.assertGreater(echo[:, fans[0][0]:middle].sum(), 100)
-        self.assertGreater(echo[:, middle:fans[1][1]].sum(), 100)
+        self.assertGreater(echo[fans[0][0]:middle].sum(), 100)
+        self.assertGreater(echo[middle:fans[1][1]].sum(), 100)
 
     def test_report_shows_every_pose_and_what_was_counted_there(self):
         check_report(self, self.path("report"), [f"{i:03d}" for i in range(1, POSES + 1)])

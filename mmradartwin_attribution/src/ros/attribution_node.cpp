@@ -155,7 +155,11 @@ void AttributionNode::onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg
   try {
     radar_ = std::make_unique<RadarConfig>(fromMsg(*msg));
     radar_hash_ = radarHash(*msg);
-    if (!settings_.scene_file.empty()) setScene(loadScene(settings_.scene_file, radar_->center_frequency_hz()));
+    if (!settings_.scene_file.empty()) {
+      setScene(loadScene(settings_.scene_file, radar_->center_frequency_hz()));
+      scene_due_ = true;
+      publishScene();
+    }
     rebuild();
   } catch (const std::exception& error) {
     ROS_ERROR("radar/config: %s", error.what());
@@ -168,7 +172,11 @@ void AttributionNode::onScene(const mmradartwin_msgs::Scene::ConstPtr& msg) {
       const ros::WallTime begin = ros::WallTime::now();
       announce("reading the scene of " + msg->scene_file);
       scene_stamp_ = msg->header.stamp;
-      setScene(sceneFromMsg(*msg));
+      Scene scene = actorsFromMsg(*msg);
+      // It is seen before it is understood.
+      scene_markers_.publish(sceneMarkers(scene, settings_.map_frame));
+      rebuildFacets(scene);
+      setScene(std::move(scene));
       rebuild();
       announceEnd(begin);
     }
@@ -181,7 +189,7 @@ void AttributionNode::onScene(const mmradartwin_msgs::Scene::ConstPtr& msg) {
 
 void AttributionNode::onMovedScene(const mmradartwin_msgs::Scene::ConstPtr& msg) {
   try {
-    moved_scene_ = std::make_unique<Scene>(sceneFromMsg(*msg));
+    moved_scene_ = std::make_unique<Scene>(actorsFromMsg(*msg));  // it is shown alone
     moved_scene_stamp_ = msg->header.stamp;
     scene_due_ = true;
     publishScene();
@@ -251,13 +259,19 @@ void AttributionNode::setScene(Scene scene) {
   rays_.reset();
   scene_ = std::make_unique<Scene>(std::move(scene));
   rays_ = std::make_unique<RayCaster>(*scene_);
-  scene_due_ = true;
-  publishScene();
 }
 
 // The latched scene reaches a viewer at once, and is lost to it where tf does not yet reach: rviz drops markers that
 // it cannot place. So each viewer gets it once more when tf has been there for a pair of maps.
 void AttributionNode::onSceneViewer() { scene_viewer_since_ = ros::WallTime::now(); }
+
+void AttributionNode::showSceneToNewViewer() {
+  if (!scene_viewer_since_.isZero() && (ros::WallTime::now() - scene_viewer_since_).toSec() > 1) {
+    scene_viewer_since_ = ros::WallTime();
+    scene_due_ = true;
+  }
+  publishScene();
+}
 
 void AttributionNode::publishScene() {
   const ros::WallTime now = ros::WallTime::now();
@@ -343,6 +357,7 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
     records_.clear();
     records_of_.reset();
   }
+  showSceneToNewViewer();
   const PoseAttribution pose = attributePose(*field_, measured, simulated, regionsAt(T), records_);
   const std::string name = nameAt(measured.stamp_ns);
 
@@ -371,11 +386,6 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
     had_subscribers_ = markers_.getNumSubscribers();
   }
   ++pairs_;
-  if (!scene_viewer_since_.isZero() && (now - scene_viewer_since_).toSec() > 1) {
-    scene_viewer_since_ = ros::WallTime();
-    scene_due_ = true;
-  }
-  publishScene();
 }
 
 std::string AttributionNode::nameAt(std::int64_t stamp_ns) const {

@@ -10,6 +10,7 @@
 #include "ledger_fields.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/units.h"
 
 namespace mmradartwin {
 namespace {
@@ -207,9 +208,15 @@ std::vector<PathRecord> pathsFromMsg(const mmradartwin_msgs::PathRecords& msg, c
   return records;
 }
 
-Scene sceneFromMsg(const mmradartwin_msgs::Scene& msg) {
+Scene actorsFromMsg(const mmradartwin_msgs::Scene& msg) {
   Scene scene;
   scene.file = msg.scene_file;
+  if (msg.facet_angle_rad != 0 || msg.facet_offset_m != 0) {
+    if (!(msg.facet_angle_rad > 0 && msg.facet_offset_m > 0)) {
+      throw InputError("scene message: facet_angle_rad and facet_offset_m must both be above 0, or both be 0");
+    }
+    scene.tolerance = {msg.facet_angle_rad / kDegree, msg.facet_offset_m};
+  }
   for (const mmradartwin_msgs::SceneActor& m : msg.actors) {
     Actor actor;
     actor.name = m.name;
@@ -232,6 +239,11 @@ Scene sceneFromMsg(const mmradartwin_msgs::Scene& msg) {
     }
     scene.actors.push_back(std::move(actor));
   }
+  return scene;
+}
+
+Scene sceneFromMsg(const mmradartwin_msgs::Scene& msg) {
+  Scene scene = actorsFromMsg(msg);
   rebuildFacets(scene);
   return scene;
 }

@@ -167,7 +167,7 @@ void MarkerBuilder::addRadar(const Eigen::Isometry3d& T_map_radar, const std::st
   Marker text = marker("radar", 1, Marker::TEXT_VIEW_FACING);
   const Eigen::Vector3d p = T_map_radar.translation();
   text.pose.position = point(p.x(), p.y(), p.z() + 0.4);
-  text.scale.z = 0.5;
+  text.scale.z = 0.35;
   text.text = caption.empty() ? "radar" : "pose " + caption;
   out.markers.push_back(std::move(text));
 }
@@ -224,7 +224,8 @@ visualization_msgs::MarkerArray sceneMarkers(const Scene& scene, const std::stri
 }
 
 visualization_msgs::MarkerArray findingMarkers(const Findings& findings, const std::string& map_frame) {
-  constexpr double kLeastRadius_m = 0.15, kAbove_m = 2.2;
+  constexpr double kLeastRadius_m = 0.15, kAbove_m = 2.2, kLetters_m = 0.4;
+  constexpr double kApart_m = 2.5;  // labels nearer to each other would overlap: the later one stands higher
   constexpr int kCorners = 36;
   const std_msgs::ColorRGBA color = rgba(1, 0.45, 0.45, 1);
   visualization_msgs::MarkerArray out;
@@ -256,8 +257,14 @@ visualization_msgs::MarkerArray findingMarkers(const Findings& findings, const s
       label.type = Marker::TEXT_VIEW_FACING;
       label.points.clear();
       label.scale.x = label.scale.y = 1;
-      label.scale.z = 0.55;
+      label.scale.z = kLetters_m;
       label.pose.position = point(*place.x_m, *place.y_m + 0.5, kAbove_m);
+      for (const Marker& other : out.markers) {
+        if (other.type != Marker::TEXT_VIEW_FACING || other.action != Marker::ADD) continue;
+        const double away_m = std::hypot(other.pose.position.x - *place.x_m, other.pose.position.y - *place.y_m - 0.5);
+        if (away_m >= kApart_m) continue;
+        label.pose.position.z = std::max(label.pose.position.z, other.pose.position.z + 1.3 * kLetters_m);
+      }
       label.text = f.cause + (place.actors.empty() ? "" : " " + place.actors.front());
       out.markers.push_back(label);
     }

@@ -48,6 +48,26 @@ TEST(FindingMarkers, NothingIsShownOfFindingsWithoutAPlace) {
 }
 
 /// One pose whose echo at 5 m and 30 deg is measured alone, beside one at 3 m that both branches have.
+TEST(FindingMarkers, NamesOfOnePlaceStandOverEachOther) {
+  Findings findings;
+  for (const char* cause : {"material_reflectivity", "actor_moved"}) {
+    Finding finding;
+    finding.cause = cause;
+    FindingPlace place;
+    place.x_m = 4;
+    place.y_m = 3;
+    finding.where.push_back(place);
+    findings.findings.push_back(finding);
+  }
+  std::vector<const Marker*> labels;
+  const auto shown = findingMarkers(findings, "map");
+  for (const Marker& m : shown.markers) {
+    if (m.type == Marker::TEXT_VIEW_FACING && m.action == Marker::ADD) labels.push_back(&m);
+  }
+  ASSERT_EQ(labels.size(), 2u);
+  EXPECT_GE(labels[1]->pose.position.z - labels[0]->pose.position.z, labels[0]->scale.z);
+}
+
 class PoseMarkers : public ::testing::Test {
  protected:
   static ResponseRegion region(const std::string& actor, double range_m, double azimuth_deg) {

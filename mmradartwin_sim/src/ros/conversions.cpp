@@ -1,6 +1,7 @@
 #include "mmradartwin_sim/ros/conversions.h"
 
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/units.h"
 
 namespace mmradartwin {
 namespace {
@@ -61,6 +62,8 @@ mmradartwin_msgs::Scene toMsg(const Scene& scene, const std::string& twin_yaml) 
   mmradartwin_msgs::Scene msg;
   msg.scene_file = scene.file;
   msg.twin_yaml = twin_yaml;
+  msg.facet_angle_rad = scene.tolerance.angle_deg * kDegree;
+  msg.facet_offset_m = scene.tolerance.offset_m;
   for (const Actor& actor : scene.actors) {
     msg.actors.emplace_back();
     mmradartwin_msgs::SceneActor& m = msg.actors.back();

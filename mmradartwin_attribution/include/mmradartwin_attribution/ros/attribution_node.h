@@ -75,6 +75,7 @@ class AttributionNode {
   void compareLastPair();
   void setScene(Scene scene);
   void onSceneViewer();
+  void showSceneToNewViewer();
   void publishScene();
   void rebuild();
   void beginAnew();

@@ -31,8 +31,10 @@ mmradartwin_msgs::Findings toMsg(const Findings& findings);
 
 /// Records with the indices of `scene`'s actors (-1 for a name it lacks); facets are not in the message.
 std::vector<PathRecord> pathsFromMsg(const mmradartwin_msgs::PathRecords& msg, const Scene& scene);
-/// Actors with their triangles, tags and colours, facets rebuilt. Throws InputError for broken geometry (a triangle
+/// Actors with their triangles, tags and colours, without facets. Throws InputError for broken geometry (a triangle
 /// count that is no whole number, coordinates that are not finite).
+Scene actorsFromMsg(const mmradartwin_msgs::Scene& msg);
+/// The same with facets, which take seconds of a scan.
 Scene sceneFromMsg(const mmradartwin_msgs::Scene& msg);
 
 }  // namespace mmradartwin

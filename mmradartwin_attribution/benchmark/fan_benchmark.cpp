@@ -1,0 +1,77 @@
+// What the window's thread does for each message of a range-angle map: three maps at 20 Hz are 60 of these in a second.
+#include <benchmark/benchmark.h>
+
+#include <QApplication>
+#include <QImage>
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include "map_panel.h"
+
+namespace mmradartwin {
+namespace {
+
+struct Map {
+  std::shared_ptr<const FanGeometry> geometry;
+  std::vector<float> power_db;
+};
+
+Map madeMap(int ranges, int angles) {
+  std::vector<double> range, azimuth;
+  for (int r = 0; r < ranges; ++r) range.push_back(0.04 * r);
+  for (int a = 0; a < angles; ++a) azimuth.push_back(std::asin((2.0 * a - angles) / angles));
+  std::mt19937 draws(1);
+  std::normal_distribution<float> level(-50, 10);
+  Map map{std::make_shared<FanGeometry>(range, azimuth), {}};
+  for (int i = 0; i < ranges * angles; ++i) map.power_db.push_back(level(draws));
+  return map;
+}
+
+// Levels to texels.
+void BM_Shade(benchmark::State& state) {
+  const Map map = madeMap(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
+  MapShading shading;
+  shading.residual = state.range(2) != 0;
+  ShadedMap shaded;
+  for (auto _ : state) {
+    shade(*map.geometry, map.power_db, shading, shaded);
+    benchmark::DoNotOptimize(shaded.argb.data());
+  }
+}
+BENCHMARK(BM_Shade)
+    ->ArgNames({"ranges", "angles", "residual"})
+    ->Args({256, 64, 0})
+    ->Args({256, 64, 1})
+    ->Args({256, 181, 0})
+    ->Unit(benchmark::kMillisecond);
+
+// Levels to a painted panel of the layout's size, with boxes.
+void BM_ShadeAndPaint(benchmark::State& state) {
+  const Map map = madeMap(256, static_cast<int>(state.range(0)));
+  MapPanel panel;
+  panel.resize(440, 310);
+  panel.setFan(map.geometry, 8, M_PI / 3);
+  std::vector<MapMark> marks;
+  for (int i = 1; i <= 8; ++i) marks.push_back({0.8 * i, 0.1 * (i - 4), 0.2, 0.06, kMismatchBox, i});
+  panel.setMarks(marks);
+  QImage window(panel.size(), QImage::Format_RGB32);
+  ShadedMap shaded;
+  for (auto _ : state) {
+    shade(*map.geometry, map.power_db, {}, shaded);
+    panel.setMap(shaded, "dB of peak");
+    panel.render(&window);
+  }
+}
+BENCHMARK(BM_ShadeAndPaint)->ArgName("angles")->Arg(64)->Arg(181)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace mmradartwin
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  qputenv("QT_QPA_PLATFORM", "offscreen");
+  const QApplication application(argc, argv);
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}
