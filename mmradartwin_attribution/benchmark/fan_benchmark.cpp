@@ -53,17 +53,28 @@ void BM_ShadeAndPaint(benchmark::State& state) {
   panel.resize(440, 310);
   panel.setFan(map.geometry, 8, M_PI / 3);
   std::vector<MapMark> marks;
-  for (int i = 1; i <= 8; ++i) marks.push_back({0.8 * i, 0.1 * (i - 4), 0.2, 0.06, kMismatchBox, i});
+  for (int i = 1; i <= state.range(1); ++i) marks.push_back({0.8 * i, 0.1 * (i - 4), 0.2, 0.06, kMismatchBox, i});
   panel.setMarks(marks);
   QImage window(panel.size(), QImage::Format_RGB32);
   ShadedMap shaded;
   for (auto _ : state) {
     shade(*map.geometry, map.power_db, {}, shaded);
+    if (state.range(2) != 0) {  // boxes move from map to map
+      for (MapMark& mark : marks) mark.azimuth_rad = -mark.azimuth_rad;
+    }
+    panel.setMarks(marks);
     panel.setMap(shaded, "dB of peak");
+    panel.refresh();
     panel.render(&window);
   }
 }
-BENCHMARK(BM_ShadeAndPaint)->ArgName("angles")->Arg(64)->Arg(181)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_ShadeAndPaint)
+    ->ArgNames({"angles", "boxes", "moving"})
+    ->Args({64, 0, 0})
+    ->Args({64, 8, 0})
+    ->Args({64, 8, 1})
+    ->Args({181, 8, 0})
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace mmradartwin

@@ -2,19 +2,21 @@
 
 #include <QPainter>
 #include <QPainterPath>
-#include <chrono>
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "label_layout.h"
 #include "map_painting.h"
 #include "scale_ticks.h"
+#include "thread_time.h"
 
 namespace mmradartwin {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
-constexpr double kMargin_px = 22;  // for labels around the fan
-constexpr double kTitle_px = 38;   // two lines above it
+constexpr double kMargin_px = 22, kSideMargin_px = 36;  // for labels around the fan
+constexpr double kTitle_px = 38;                        // two lines above it
 
 }  // namespace
 
@@ -29,7 +31,7 @@ void MapPanel::setFan(std::shared_ptr<const FanGeometry> geometry, double up_to_
   up_to_m_ = up_to_m;
   up_to_rad_ = std::min(up_to_rad, M_PI / 2);
   cells_due_ = true;
-  update();
+  paint_due_ = true;
 }
 
 void MapPanel::setMap(const ShadedMap& map, const QString& unit) {
@@ -41,18 +43,25 @@ void MapPanel::setMap(const ShadedMap& map, const QString& unit) {
   map_ = map;
   unit_ = unit;
   image_due_ = true;
-  update();
+  paint_due_ = true;
 }
 
 void MapPanel::setWords(const QString& title, const QString& note) {
   title_ = title;
   note_ = note;
-  update();
+  paint_due_ = true;
 }
 
+// What moves by less than half a pixel, as the noise of a map makes it, stays as it is drawn.
 void MapPanel::setMarks(std::vector<MapMark> marks) {
+  const auto alike = [this](const MapMark& a, const MapMark& b) {
+    const QPointF away = at(a.range_m, a.azimuth_rad) - at(b.range_m, b.azimuth_rad);
+    return a.number == b.number && a.color.g == b.color.g && a.half_range_m == b.half_range_m &&
+           std::hypot(away.x(), away.y()) < 0.5;
+  };
+  if (std::equal(marks.begin(), marks.end(), marks_.begin(), marks_.end(), alike)) return;
   marks_ = std::move(marks);
-  update();
+  over_due_ = paint_due_ = true;
 }
 
 double MapPanel::takePainting_s() { return std::exchange(painting_s_, 0); }
@@ -62,11 +71,11 @@ QPointF MapPanel::at(double range_m, double azimuth_rad) const {
 }
 
 void MapPanel::lookUpCells() {
-  const double room_w = width() - kColorBarWidth_px - 2 * kMargin_px;
+  const double room_w = width() - kColorBarWidth_px - 2 * kSideMargin_px;
   const double room_h = height() - kTitle_px - 2 * kMargin_px;
   const double half = up_to_m_ * std::sin(up_to_rad_);
   scale_px_ = std::max(1e-3, std::min(room_w / (2 * half), room_h / up_to_m_));
-  apex_px_ = {kMargin_px + room_w / 2, height() - kMargin_px};
+  apex_px_ = {kSideMargin_px + room_w / 2, height() - kMargin_px};
   const int left = static_cast<int>(std::floor(apex_px_.x() - half * scale_px_));
   const int top = static_cast<int>(std::floor(apex_px_.y() - up_to_m_ * scale_px_));
   const int w = std::max(1, static_cast<int>(2 * half * scale_px_) + 2);
@@ -133,6 +142,7 @@ void MapPanel::drawDecoration() {
   drawColorBar(painter, QRectF(width() - kColorBarWidth_px, 0, kColorBarWidth_px - 4, height() - 4), map_.scale,
                map_.reference_db, unit_);
   decoration_due_ = false;
+  over_due_ = true;
 }
 
 void MapPanel::drawMarks(QPainter& painter) const {
@@ -174,8 +184,12 @@ void MapPanel::drawMarks(QPainter& painter) const {
   }
 }
 
+void MapPanel::refresh() {
+  if (std::exchange(paint_due_, false)) update();
+}
+
 void MapPanel::paintEvent(QPaintEvent*) {
-  const auto begin = std::chrono::steady_clock::now();
+  const double begin_s = threadTime_s();
   QPainter painter(this);
   painter.fillRect(rect(), toQColor(kBackground));
   painter.setPen(toQColor(kLabel));
@@ -201,11 +215,16 @@ void MapPanel::paintEvent(QPaintEvent*) {
       image_due_ = false;
     }
     if (decoration_due_) drawDecoration();
+    if (over_due_) {
+      over_ = decoration_.copy();
+      QPainter over(&over_);
+      drawMarks(over);
+      over_due_ = false;
+    }
     painter.drawImage(image_at_, image_);
-    painter.drawPixmap(0, 0, decoration_);
-    drawMarks(painter);
+    painter.drawPixmap(0, 0, over_);
   }
-  painting_s_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  painting_s_ += threadTime_s() - begin_s;
 }
 
 }  // namespace mmradartwin

@@ -30,7 +30,9 @@ class MapPanel : public QWidget {
   void setMap(const ShadedMap& map, const QString& unit);
   void setWords(const QString& title, const QString& note);
   void setMarks(std::vector<MapMark> marks);
-  /// Seconds that painting has taken since the last call.
+  /// Has what was set painted.
+  void refresh();
+  /// Seconds of the processor that painting has taken since the last call.
   double takePainting_s();
   QSize sizeHint() const override { return {460, 280}; }
   QSize minimumSizeHint() const override { return {160, 100}; }
@@ -54,8 +56,8 @@ class MapPanel : public QWidget {
   std::vector<std::int32_t> cell_of_pixel_;  ///< of image_, -1: none
   QImage image_;
   QPoint image_at_;
-  QPixmap decoration_;
-  bool cells_due_ = true, image_due_ = true, decoration_due_ = true;
+  QPixmap decoration_, over_;  ///< rings, words and bar; the same with boxes
+  bool cells_due_ = true, image_due_ = true, decoration_due_ = true, over_due_ = true, paint_due_ = true;
   double painting_s_ = 0;
 };
 

@@ -15,18 +15,17 @@
 #include <rviz/view_manager.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <map>
 #include <pluginlib/class_list_macros.hpp>
 
 #include "fan_visual.h"
 #include "map_panel.h"
+#include "thread_time.h"
 
 namespace mmradartwin {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using StatusProperty = rviz::StatusProperty;
 
 constexpr double kDegree = M_PI / 180;
@@ -35,12 +34,14 @@ constexpr double kAll_rad = M_PI / 2 + 1e-6;
 constexpr double kFollowed_db = 30;  ///< the range follows what is so much below the reference
 constexpr std::uint8_t kResidualSource = 2;
 
-double since_s(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
-
-/// Ranges that the displays of this window need: all are drawn to one scale.
-std::map<const RangeAngleDisplay*, double>& neededRanges_m() {
-  static std::map<const RangeAngleDisplay*, double> ranges;
-  return ranges;
+/// All displays of this window are drawn to one scale of range.
+struct CommonRange {
+  std::map<const RangeAngleDisplay*, double> needed_m;
+  double shown_m = 0;
+};
+CommonRange& commonRange() {
+  static CommonRange range;
+  return range;
 }
 
 }  // namespace
@@ -48,7 +49,7 @@ std::map<const RangeAngleDisplay*, double>& neededRanges_m() {
 RangeAngleDisplay::RangeAngleDisplay() { addProperties(); }
 
 RangeAngleDisplay::~RangeAngleDisplay() {
-  neededRanges_m().erase(this);
+  commonRange().needed_m.erase(this);
   delete panel_;
 }
 
@@ -88,6 +89,7 @@ void RangeAngleDisplay::addProperties() {
       new FloatProperty("Height [m]", 0.02F, "Of the map above the floor, or above the radar's plane.", in_scene_);
   grid_ = new BoolProperty("Rings and rays", true, "With their words.", in_scene_);
   color_bar_ = new BoolProperty("Colour bar", false, "Beside the map in the scene; the panel has one, too.", in_scene_);
+  fade_ = new BoolProperty("Fade", true, "The weaker a level or difference, the more transparent.", in_scene_);
   for (FloatProperty* positive : {span_, residual_span_}) positive->setMin(1);
   for (FloatProperty* length : {range_, peak_beyond_}) length->setMin(0);
   alpha_->setMin(0);
@@ -99,10 +101,10 @@ void RangeAngleDisplay::addProperties() {
       subscribe();
     });
   }
-  for (Property* property :
-       std::initializer_list<Property*>{kind_, colors_, span_, residual_span_, reference_, reference_dbfs_,
-                                        peak_beyond_, range_, front_only_, in_scene_, alpha_, grid_, color_bar_}) {
-    connect(property, &Property::changed, this, [this] { show(); });
+  for (Property* property : std::initializer_list<Property*>{kind_, colors_, span_, residual_span_, reference_,
+                                                             reference_dbfs_, peak_beyond_, range_, front_only_,
+                                                             in_scene_, alpha_, grid_, color_bar_, fade_}) {
+    connect(property, &Property::changed, this, [this] { due_ = true; });
   }
 }
 
@@ -119,11 +121,12 @@ void RangeAngleDisplay::onEnable() { subscribe(); }
 void RangeAngleDisplay::onDisable() {
   map_subscriber_.shutdown();
   residuals_subscriber_.shutdown();
-  neededRanges_m().erase(this);
+  commonRange().needed_m.erase(this);
 }
 
 void RangeAngleDisplay::reset() {
   Display::reset();
+  told_.clear();
   map_.reset();
   residuals_.reset();
   visual_->setVisible(false);
@@ -133,7 +136,7 @@ void RangeAngleDisplay::setTopic(const QString& topic, const QString&) { topic_-
 
 void RangeAngleDisplay::setName(const QString& name) {
   Display::setName(name);
-  showWords();
+  due_ = true;
 }
 
 void RangeAngleDisplay::subscribe() {
@@ -144,9 +147,9 @@ void RangeAngleDisplay::subscribe() {
     if (topic->getTopicStd().empty()) return;
     try {
       subscribed(topic->getTopicStd());
-      setStatus(StatusProperty::Ok, topic->getName(), "subscribed");
+      tell(StatusProperty::Ok, topic->getName(), "subscribed");
     } catch (const ros::Exception& error) {
-      setStatus(StatusProperty::Error, topic->getName(), error.what());
+      tell(StatusProperty::Error, topic->getName(), error.what());
     }
   };
   // Of maps that come faster than they are drawn the last one counts.
@@ -159,31 +162,26 @@ void RangeAngleDisplay::subscribe() {
 }
 
 void RangeAngleDisplay::onMap(const mmradartwin_msgs::RangeAngleMap::ConstPtr& msg) {
-  const Clock::time_point begin = Clock::now();
+  const double begin_s = threadTime_s();
   try {
     if (!map_ || !geometry_ || map_->range_m != msg->range_m || map_->azimuth_rad.size() != msg->azimuth_rad.size() ||
         !std::equal(map_->azimuth_rad.begin(), map_->azimuth_rad.end(), msg->azimuth_rad.begin(),
                     [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); })) {
       geometry_ = std::make_shared<FanGeometry>(msg->range_m, msg->azimuth_rad);
-      shown_range_m_ = 0;
     }
     map_ = msg;
-    show();
-    setStatus(StatusProperty::Ok, "Map", "maps come");
+    due_ = true;
   } catch (const std::exception& error) {
     map_.reset();
-    setStatus(StatusProperty::Error, "Map", error.what());
+    tell(StatusProperty::Error, "Map", error.what());
   }
   ++spent_maps_;
-  tellTime(since_s(begin));
+  tellTime(threadTime_s() - begin_s);
 }
 
 void RangeAngleDisplay::onResiduals(const mmradartwin_msgs::Residuals::ConstPtr& msg) {
-  const Clock::time_point begin = Clock::now();
   residuals_ = msg;
-  showWords();
-  showMarks();
-  tellTime(since_s(begin));
+  due_ = true;
 }
 
 bool RangeAngleDisplay::isResidual() const {
@@ -220,16 +218,16 @@ double RangeAngleDisplay::neededRange_m() const {
 
 double RangeAngleDisplay::range_m() {
   if (range_->getFloat() > 0) return std::min<double>(range_->getFloat(), geometry_->farthest_m());
-  neededRanges_m()[this] = neededRange_m();
+  CommonRange& common = commonRange();
+  common.needed_m[this] = neededRange_m();
   double needed = 1;
-  for (const auto& [display, range] : neededRanges_m()) needed = std::max(needed, range);
+  for (const auto& [display, range] : common.needed_m) needed = std::max(needed, range);
   // It grows at once and shrinks where little of it is needed, so that maps do not flutter.
-  if (needed > shown_range_m_ || needed < 0.6 * shown_range_m_) shown_range_m_ = std::ceil(1.05 * needed);
-  return std::min(shown_range_m_, geometry_->farthest_m());
+  if (needed > common.shown_m || needed < 0.6 * common.shown_m) common.shown_m = std::ceil(1.05 * needed);
+  return std::min(common.shown_m, geometry_->farthest_m());
 }
 
 void RangeAngleDisplay::show() {
-  if (!map_ || !panel_) return;
   shade(*geometry_, map_->power_db, shading(), shaded_);
   const double azimuth = front_only_->getBool() ? kFront_rad : M_PI / 2;
   panel_->setFan(geometry_, range_m(), azimuth);
@@ -238,6 +236,7 @@ void RangeAngleDisplay::show() {
                                                          : QString("dB of peak");
   panel_->setMap(shaded_, unit);
   showWords();
+  showMarks();
   visual_->setSurroundings(grid_->getBool(), color_bar_->getBool(), unit);
   visual_due_ = true;
   if (!in_scene_->getBool()) visual_->setVisible(false);
@@ -289,8 +288,8 @@ void RangeAngleDisplay::place() {
   const auto& header = map_->header;
   if (!frames.getTransform(header.frame_id, header.stamp, position, orientation) &&
       !frames.getTransform(header.frame_id, ros::Time(), position, orientation)) {
-    setStatus(StatusProperty::Error, "Frame",
-              "no transform from " + QString::fromStdString(header.frame_id) + " to " + fixed_frame_);
+    tell(StatusProperty::Error, "Frame",
+         "no transform from " + QString::fromStdString(header.frame_id) + " to " + fixed_frame_);
     visual_->setVisible(false);
     return;
   }
@@ -299,8 +298,7 @@ void RangeAngleDisplay::place() {
     Ogre::Vector3 floor;
     Ogre::Quaternion level;
     if (!frames.getTransform(floor_frame_->getFrameStd(), ros::Time(), floor, level)) {
-      setStatus(StatusProperty::Error, "Frame",
-                "no transform from " + floor_frame_->getFrame() + " to " + fixed_frame_);
+      tell(StatusProperty::Error, "Frame", "no transform from " + floor_frame_->getFrame() + " to " + fixed_frame_);
       visual_->setVisible(false);
       return;
     }
@@ -311,35 +309,63 @@ void RangeAngleDisplay::place() {
     orientation.FromAxes(ahead, up.crossProduct(ahead), up);
     position -= up * (position - floor).dotProduct(up);
   }
-  setStatus(StatusProperty::Ok, "Frame", "transforms are there");
+  tell(StatusProperty::Ok, "Frame", "transforms are there");
   visual_->setPlace(position + up * height_->getFloat(), orientation);
   visual_->setVisible(true);
 }
 
 void RangeAngleDisplay::update(float, float) {
-  if (!map_ || !in_scene_->getBool()) return;
-  const Clock::time_point begin = Clock::now();
+  if (!map_ || !panel_) return;
+  const double begin_s = threadTime_s();
+  if (due_) {
+    due_ = false;
+    try {
+      show();
+      tell(StatusProperty::Ok, "Map", "maps come");
+    } catch (const std::exception& error) {
+      map_.reset();
+      tell(StatusProperty::Error, "Map", error.what());
+      return;
+    }
+  }
+  panel_->refresh();
+  if (in_scene_->getBool()) drawInScene();
+  tellTime(threadTime_s() - begin_s);
+}
+
+void RangeAngleDisplay::drawInScene() {
   if (visual_due_) {
     const double azimuth = front_only_->getBool() ? kFront_rad : M_PI / 2, range = range_m();
     visual_->setFan(geometry_, range, azimuth);
-    visual_->setMap(shaded_);
+    if (fade_->getBool()) {
+      fade(map_->power_db, shaded_, faded_);
+      visual_->setMap(faded_);
+    } else {
+      visual_->setMap(shaded_);
+    }
     visual_->setAlpha(alpha_->getFloat());
     visual_due_ = false;
   }
   place();
   visual_->fitLabelsTo(*context_->getViewManager()->getCurrent()->getCamera());
-  tellTime(since_s(begin));
+}
+
+// A status costs a message through Qt's queue: it is set where it has changed.
+void RangeAngleDisplay::tell(StatusProperty::Level level, const QString& name, const QString& text) {
+  QString& told = told_[name];
+  if (told == text) return;
+  told = text;
+  setStatus(level, name, text);
 }
 
 void RangeAngleDisplay::tellTime(double spent_s) {
   constexpr int kMaps = 50;
   spent_s_ += spent_s;
   if (spent_maps_ < kMaps) return;
+  if (!panel_) return;
   const double per_map_ms = 1e3 * (spent_s_ + panel_->takePainting_s()) / spent_maps_;
   setStatus(StatusProperty::Ok, "Time",
             QString("%1 ms of the window's thread for each map").arg(per_map_ms, 0, 'f', 2));
-  ROS_DEBUG_NAMED("gui_time", "%s: %.3f ms of the window's thread for each of %d maps", getNameStd().c_str(),
-                  per_map_ms, spent_maps_);
   spent_s_ = 0;
   spent_maps_ = 0;
 }

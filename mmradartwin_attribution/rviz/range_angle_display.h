@@ -6,6 +6,8 @@
 #include <rviz/display.h>
 
 #include <QPointer>
+#include <QString>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -55,13 +57,15 @@ class RangeAngleDisplay : public rviz::Display {
   /// Up to where the fan is drawn: the property, or what all displays together need.
   double range_m();
   double neededRange_m() const;
+  void drawInScene();
   void place();
+  void tell(rviz::StatusProperty::Level level, const QString& name, const QString& text);
   void tellTime(double spent_s);
 
   rviz::RosTopicProperty *topic_, *residuals_topic_;
   rviz::EnumProperty *kind_, *colors_, *reference_;
   rviz::FloatProperty *span_, *residual_span_, *reference_dbfs_, *peak_beyond_, *range_;
-  rviz::BoolProperty *front_only_, *in_scene_, *flat_, *grid_, *color_bar_;
+  rviz::BoolProperty *front_only_, *in_scene_, *flat_, *grid_, *color_bar_, *fade_;
   rviz::FloatProperty *alpha_, *height_;
   rviz::TfFrameProperty* floor_frame_;
 
@@ -69,12 +73,13 @@ class RangeAngleDisplay : public rviz::Display {
   mmradartwin_msgs::RangeAngleMap::ConstPtr map_;
   mmradartwin_msgs::Residuals::ConstPtr residuals_;
   std::shared_ptr<const FanGeometry> geometry_;
-  ShadedMap shaded_;
-  double shown_range_m_ = 0, shown_azimuth_rad_ = 0;
+  ShadedMap shaded_, faded_;
   QPointer<MapPanel> panel_;
   std::unique_ptr<FanVisual> visual_;
-  bool visual_due_ = false;  ///< the fan in the scene has not the last map
-  double spent_s_ = 0;       ///< by this display in the GUI's thread, since it was told last
+  bool due_ = false;                 ///< properties, map or residuals have changed since show()
+  bool visual_due_ = false;          ///< the fan in the scene has not the last map
+  std::map<QString, QString> told_;  ///< statuses
+  double spent_s_ = 0;               ///< by this display of the window's thread, since it was told last
   int spent_maps_ = 0;
 };
 

@@ -2,6 +2,8 @@
 
 #include <rviz/properties/ros_topic_property.h>
 
+#include <QRegularExpression>
+#include <QStringList>
 #include <cmath>
 #include <pluginlib/class_list_macros.hpp>
 
@@ -32,13 +34,30 @@ QString rowOf(int number, const mmradartwin_msgs::Residual& r) {
          cell(signedNumber(r.measured_db, 1), true) + cell(signedNumber(r.simulated_db, 1), true) + "</tr>";
 }
 
+/// The scene's file, and the names below `mechanisms:`.
+QString wordsOf(const mmradartwin_msgs::Scene& twin) {
+  QStringList mechanisms;
+  bool within = false;
+  for (const QString& line : QString::fromStdString(twin.twin_yaml).split('\n')) {
+    if (!line.startsWith(' ')) within = line.startsWith("mechanisms:");
+    static const QRegularExpression kName("^ {1,4}([a-z]\\w*):");
+    const QRegularExpressionMatch name = kName.match(line);
+    if (within && name.hasMatch()) mechanisms << name.captured(1);
+  }
+  QString file = QString::fromStdString(twin.scene_file).section('/', -2);
+  if (file.startsWith("mmradartwin_tmp_")) file = "the session's scene";  // written out for the simulation
+  return QString("<b>twin</b>: %1; %2").arg(file.toHtmlEscaped(), mechanisms.join(", ").toHtmlEscaped());
+}
+
 QString listOf(const mmradartwin_msgs::Residuals& msg) {
   int matched = 0;
   for (const auto& region : msg.regions) matched += region.measured_strong && region.simulated_strong;
-  QString html = QString::fromUtf8("<b>pose %1</b> · places that agree (white boxes): %2 · that differ (magenta): %3")
-                     .arg(QString::fromStdString(msg.pose).toHtmlEscaped())
-                     .arg(matched)
-                     .arg(msg.residuals.size());
+  QString html = msg.pose.empty()
+                     ? ""
+                     : QString::fromUtf8("<b>pose %1</b> · ").arg(QString::fromStdString(msg.pose).toHtmlEscaped());
+  html += QString::fromUtf8("places that agree (white boxes): %1 · that differ (magenta): %2")
+              .arg(matched)
+              .arg(msg.residuals.size());
   if (msg.residuals.empty()) return html;
   html +=
       "<table cellspacing='1'><tr><th></th><th align='left'>class</th><th align='left'>where it is expected from</th>"
@@ -54,7 +73,12 @@ ResidualListDisplay::ResidualListDisplay() {
   topic_ = new rviz::RosTopicProperty(
       "Topic", "", QString::fromStdString(ros::message_traits::datatype<mmradartwin_msgs::Residuals>()),
       "Residuals to list.", this);
-  connect(topic_, &rviz::Property::changed, this, [this] { subscribe(); });
+  scene_topic_ = new rviz::RosTopicProperty(
+      "Twin topic", "", QString::fromStdString(ros::message_traits::datatype<mmradartwin_msgs::Scene>()),
+      "The twin that is told above the list; empty: none.", this);
+  for (rviz::RosTopicProperty* topic : {topic_, scene_topic_}) {
+    connect(topic, &rviz::Property::changed, this, [this] { subscribe(); });
+  }
 }
 
 ResidualListDisplay::~ResidualListDisplay() { delete panel_; }
@@ -65,12 +89,26 @@ void ResidualListDisplay::onInitialize() {
   setAssociatedWidget(panel_);
 }
 
+void ResidualListDisplay::onDisable() {
+  subscriber_.shutdown();
+  scene_subscriber_.shutdown();
+}
+
 void ResidualListDisplay::setTopic(const QString& topic, const QString&) { topic_->setString(topic); }
 
 void ResidualListDisplay::subscribe() {
-  subscriber_.shutdown();
-  if (!isEnabled() || !initialized() || topic_->getTopicStd().empty()) return;
+  onDisable();
+  if (!isEnabled() || !initialized()) return;
   try {
+    if (!scene_topic_->getTopicStd().empty()) {
+      scene_subscriber_ = update_nh_.subscribe<mmradartwin_msgs::Scene>(
+          scene_topic_->getTopicStd(), 1, [this](const mmradartwin_msgs::Scene::ConstPtr& msg) {
+            twin_ = wordsOf(*msg);
+            due_ = residuals_ != nullptr;
+            if (!due_ && panel_) panel_->setWords(twin_ + "<br>The comparison has not come yet.");
+          });
+    }
+    if (topic_->getTopicStd().empty()) return;
     subscriber_ = update_nh_.subscribe<mmradartwin_msgs::Residuals>(
         topic_->getTopicStd(), 1, [this](const mmradartwin_msgs::Residuals::ConstPtr& msg) {
           residuals_ = msg;
@@ -87,7 +125,7 @@ void ResidualListDisplay::update(float, float) {
   if (!due_ || !panel_ || (now - shown_).toSec() < 1 / kMostOften_hz) return;
   due_ = false;
   shown_ = now;
-  panel_->setWords(listOf(*residuals_));
+  panel_->setWords((twin_.isEmpty() ? "" : twin_ + "<br>") + listOf(*residuals_));
 }
 
 }  // namespace mmradartwin

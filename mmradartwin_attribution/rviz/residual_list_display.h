@@ -1,6 +1,7 @@
 #pragma once
 
 #include <mmradartwin_msgs/Residuals.h>
+#include <mmradartwin_msgs/Scene.h>
 #include <ros/subscriber.h>
 #include <ros/time.h>
 #include <rviz/display.h>
@@ -15,7 +16,7 @@ namespace mmradartwin {
 
 class WordsPanel;
 
-/// rviz display of mmradartwin_msgs/Residuals: what the numbers on the maps stand for.
+/// rviz display of mmradartwin_msgs/Residuals: what the numbers on the maps stand for, and which twin they are of.
 class ResidualListDisplay : public rviz::Display {
  public:
   ResidualListDisplay();
@@ -26,12 +27,13 @@ class ResidualListDisplay : public rviz::Display {
  protected:
   void onInitialize() override;
   void onEnable() override { subscribe(); }
-  void onDisable() override { subscriber_.shutdown(); }
+  void onDisable() override;
 
  private:
   void subscribe();
-  rviz::RosTopicProperty* topic_;
-  ros::Subscriber subscriber_;
+  rviz::RosTopicProperty *topic_, *scene_topic_;
+  ros::Subscriber subscriber_, scene_subscriber_;
+  QString twin_;  ///< its scene and mechanisms
   mmradartwin_msgs::Residuals::ConstPtr residuals_;
   bool due_ = false;
   ros::WallTime shown_;

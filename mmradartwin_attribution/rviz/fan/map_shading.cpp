@@ -63,4 +63,16 @@ void shade(const FanGeometry& geometry, const std::vector<float>& power_db, cons
   }
 }
 
+void fade(const std::vector<float>& power_db, const ShadedMap& shaded, ShadedMap& faded) {
+  faded = shaded;
+  const bool residual = shaded.scale.map == ColorMap::kBlueWhiteRed;
+  const auto zero = static_cast<float>(residual ? 0 : shaded.scale.low_db);
+  const float step = 2 * 255 / static_cast<float>(shaded.scale.high_db - zero);
+  for (std::size_t i = 0; i < faded.argb.size(); ++i) {
+    const float above = std::isnan(power_db[i]) ? 0 : power_db[i] - zero;
+    const float alpha = std::clamp((residual ? std::abs(above) : above) * step, 0.0F, 255.0F);
+    if (faded.argb[i] != 0) faded.argb[i] = (faded.argb[i] & 0xffffffU) | (static_cast<std::uint32_t>(alpha) << 24);
+  }
+}
+
 }  // namespace mmradartwin

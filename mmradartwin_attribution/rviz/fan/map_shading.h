@@ -31,5 +31,8 @@ struct ShadedMap {
 /// Cells without a level (NaN) have the colour kNoData. Reuses the memory of `shaded`.
 void shade(const FanGeometry& geometry, const std::vector<float>& power_db, const MapShading& shading,
            ShadedMap& shaded);
+/// The same map, the more transparent the weaker: opaque from the middle of the scale upwards, of a residual from the
+/// middle of either side outwards.
+void fade(const std::vector<float>& power_db, const ShadedMap& shaded, ShadedMap& faded);
 
 }  // namespace mmradartwin

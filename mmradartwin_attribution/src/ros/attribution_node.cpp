@@ -373,7 +373,8 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
     residual_map_.publish(map);
   }
 
-  live_ledger_.add(measured.stamp_ns, T, name, measured.frames, pose.central);
+  live_ledger_.add(measured.stamp_ns, T, name.empty() ? formatStamp(measured.stamp_ns) : name, measured.frames,
+                   pose.central);
   const ros::WallTime now = ros::WallTime::now();
   if ((now - last_markers_).toSec() >= 1 / tuned_.markers_hz) {
     last_markers_ = now;
@@ -390,7 +391,7 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
 
 std::string AttributionNode::nameAt(std::int64_t stamp_ns) const {
   auto after = pose_names_.upper_bound(stamp_ns);
-  return after == pose_names_.begin() ? formatStamp(stamp_ns) : std::prev(after)->second;
+  return after == pose_names_.begin() ? "" : std::prev(after)->second;
 }
 
 void AttributionNode::watch(const ros::WallTimerEvent&) {

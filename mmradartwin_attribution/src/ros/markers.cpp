@@ -189,7 +189,8 @@ visualization_msgs::MarkerArray MarkerBuilder::build(const PoseAttribution& pose
 }
 
 visualization_msgs::MarkerArray sceneMarkers(const Scene& scene, const std::string& map_frame) {
-  constexpr double kUprightAlpha = 0.75, kLevelAlpha = 0.3;
+  constexpr double kUprightAlpha = 0.6, kLevelAlpha = 0.3;
+  constexpr double kUprightWhite = 0.35, kLevelWhite = 0.5;  // walls that are lit from behind would be black
   std::map<std::string, Marker> by_material;
   const auto list = [&](const Actor& actor, bool level) -> Marker& {
     Marker& m = by_material[actor.material_tag + (level ? " level" : "")];
@@ -202,9 +203,9 @@ visualization_msgs::MarkerArray sceneMarkers(const Scene& scene, const std::stri
       m.pose.orientation.w = 1;
       m.scale.x = m.scale.y = m.scale.z = 1;
       const auto& c = actor.material.color;
-      // Half way to white.
-      m.color = level ? rgba(0.5 + 0.5 * c[0], 0.5 + 0.5 * c[1], 0.5 + 0.5 * c[2], kLevelAlpha)
-                      : rgba(c[0], c[1], c[2], kUprightAlpha);
+      const double white = level ? kLevelWhite : kUprightWhite;
+      const auto part = [&](int i) { return white + (1 - white) * c[i]; };
+      m.color = rgba(part(0), part(1), part(2), level ? kLevelAlpha : kUprightAlpha);
     }
     return m;
   };

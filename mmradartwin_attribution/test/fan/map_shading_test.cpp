@@ -144,6 +144,28 @@ TEST_F(Shading, AResidualIsNotNormalised) {
   EXPECT_EQ(shown(2, 10), argb(colorsOf(ColorMap::kBlueWhiteRed).front()));
 }
 
+TEST_F(Shading, FadedCellsAreTheMoreTransparentTheWeaker) {
+  at(2, 8) = 0;
+  at(2, 9) = -30;
+  at(2, 10) = -15;
+  at(2, 11) = NAN;
+  ShadedMap faded;
+  const auto alpha = [&](int a) { return faded.argb[static_cast<std::size_t>(32 + a)] >> 24; };
+  shade(geometry_, power_, shading_, shaded_);
+  fade(power_, shaded_, faded);
+  EXPECT_EQ(faded.argb[40], shaded_.argb[40]);
+  EXPECT_EQ(alpha(9), 127u);  // a quarter of 40 dB above the lower end
+  EXPECT_EQ(alpha(10), 255u);
+  EXPECT_EQ(alpha(11), 0u);
+  EXPECT_EQ(alpha(1), 0u);
+  shading_.residual = true;
+  shade(geometry_, power_, shading_, shaded_);
+  fade(power_, shaded_, faded);
+  EXPECT_EQ(alpha(8), 0u);
+  EXPECT_EQ(alpha(9), 255u);
+  EXPECT_EQ(alpha(10), 255u);
+}
+
 TEST_F(Shading, AMapOfAnotherShapeIsRefused) {
   power_.pop_back();
   EXPECT_THROW(shade(geometry_, power_, shading_, shaded_), InputError);

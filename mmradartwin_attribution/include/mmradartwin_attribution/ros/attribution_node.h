@@ -38,11 +38,11 @@ using TuningConfig = mmradartwin_attribution::TuningConfig;  // made of cfg/Tuni
 /// attribution/residuals, attribution/residual_map, attribution/ledger, attribution/markers, attribution/scene_markers.
 ///
 /// Matches measured and simulated maps by stamp and attributes what differs. Poses are named after the session's
-/// poses.csv, else after their stamp. The scene is that of the parameter `scene`, else of twin/scene; where twin/scene
-/// brings another twin the ledger begins anew, and where stamps go back by more than a second (a bag that loops).
-/// Markers and ledger come `markers_hz` times a second at most, with up to `max_paths` paths. What is tuned by eye is
-/// changed below ~tuning, by dynamic_reconfigure, and the last pair of maps shows it; it begins with what parameters
-/// and attribution.yaml say in each run. Callbacks must come one at a time.
+/// poses.csv; else the ledger names them after their stamp. The scene is that of the parameter `scene`, else of
+/// twin/scene; where twin/scene brings another twin the ledger begins anew, and where stamps go back by more than a
+/// second (a bag that loops). Markers and ledger come `markers_hz` times a second at most, with up to `max_paths`
+/// paths. What is tuned by eye is changed below ~tuning, by dynamic_reconfigure, and the last pair of maps shows it; it
+/// begins with what parameters and attribution.yaml say in each run. Callbacks must come one at a time.
 class AttributionNode {
  public:
   /// Throws InputError for unknown or unusable parameters.
@@ -82,6 +82,7 @@ class AttributionNode {
   void publishLedger(const ros::Time& stamp);
   const std::vector<ResponseRegion>& regionsAt(const Eigen::Isometry3d& T);
   void compare(const MapMsg& measured_msg, const MapMsg& simulated_msg);
+  /// Of the session's pose, empty where none is defined.
   std::string nameAt(std::int64_t stamp_ns) const;
   void watch(const ros::WallTimerEvent&);
   /// What takes seconds with a large scene: said before and after, here and in diagnostics.
