@@ -264,7 +264,7 @@ class LaunchFiles(unittest.TestCase):
                          lambda: f"four bags: {os.listdir(self.folder)}")
         bags = sorted(glob.glob(self.path("recorded*.bag")))
         self.assertGreater(len(bags), 3, os.listdir(self.folder))
-        recorded, latched = set(), {"radar/config", "session", "twin/scene", "tf_static"}
+        recorded, latched = set(), {"radar/config", "session", "twin/scene"}
         for file in bags:
             with rosbag.Bag(file) as bag:  # which keeps topics as they were asked for
                 topics = {topic.lstrip("/") for topic in bag.get_type_and_topic_info().topics}
