@@ -162,7 +162,8 @@ void FanVisual::Impl::drawSurroundings() {
       const auto angle = [&](int step) { return up_to_rad * (2.0 * step / kSteps - 1); };
       line(polar(range, angle(i), kGridAbove_m), polar(range, angle(i + 1), kGridAbove_m));
     }
-    labels.push_back(label(range, -up_to_rad, wordsPicture(QString("%1 m").arg(range))));
+    // The outermost ring's words would lie over those of the outermost ray.
+    if (range < 0.93 * up_to_m) labels.push_back(label(range, -up_to_rad, wordsPicture(QString("%1 m").arg(range))));
   }
   const int last_deg = static_cast<int>(up_to_rad / kDegree + 0.5);
   for (int deg = -90; deg <= 90; deg += 30) {
