@@ -132,10 +132,10 @@ status=0
 python3 "$here/tell_result.py" "$out/truth.json" "$out/diagnosis/findings.json" || status=$?
 cat <<TEXT
 
-Open this page:  $out/diagnosis/index.html
+Open this page:  $out/diagnosis/report.html
 Beside it in $out:
   rviz_before_after.png                 what rviz showed, before and after
-  report/ and report_extended/          every pose, before and after (index.html)
+  report/ and report_extended/          the comparison before and after (report.html)
   demo.bag                              the recording
   session/, truth.json, log/            raw captures, what was hidden, what the programs said
 To see it again:  ./run.sh exec roslaunch mmradartwin_launch replay.launch bag:=$bag

@@ -46,7 +46,7 @@ status=0
 python3 "$here/tell_result.py" "$out/truth.json" "$out/diagnosis/findings.json" || status=$?
 cat <<TEXT
 
-Open this page:  $out/diagnosis/index.html
+Open this page:  $out/diagnosis/report.html
 The measurement: $out/session, as a bag $out/sample.bag
 In rviz:         ./run.sh exec roslaunch mmradartwin_launch replay.launch bag:=$out/sample.bag
 $((SECONDS - started)) s.

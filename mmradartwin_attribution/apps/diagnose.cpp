@@ -6,6 +6,7 @@
 
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/diagnosis_report.h"
+#include "mmradartwin_attribution/report.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
 #include "mmradartwin_dsp/progress_line.h"
@@ -42,13 +43,14 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   const std::optional<std::string> scene = arguments.input.sceneFile(recording);
   const std::string twin_file = arguments.input.twinFile(recording);
 
-  const DiagnosisReport report(output.path());
+  const DiagnosisReport report(output.path(), arguments.input.templates);
   DiagnosisOptions options;
   options.jobs = arguments.jobs;
   options.most_findings = arguments.findings;
   if (!arguments.config.empty()) options.config = loadAttributionConfig(arguments.config);
   if (!arguments.diagnosis_config.empty()) options.accuracy = loadStatedAccuracy(arguments.diagnosis_config);
   Diagnosis diagnosis;
+  std::string given_twin_yaml;
   {
     ProgressLine line;
     options.on_progress = [&line](const DiagnosisProgress& progress) { line.show(progress.share, progress.stage); };
@@ -62,6 +64,9 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
       diagnosis = diagnoseReceiver(recording, options);
     } else {
       Twin twin = twinAt(arguments.input.loadTwinOf(recording), recording.poses, recording.source);
+      TwinDescription given = twin.description();
+      RecordingArguments::leaveOutTemporary(given);
+      given_twin_yaml = given.toYaml();
       for (const std::string& line : meshNotes(twin.scene())) note(line);
       for (const std::string& file : arguments.compared) {
         options.compared.push_back(arguments.input.loadTwinOf(recording, file));
@@ -78,11 +83,25 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   }
   if (radarHash(extended.radar) == radarHash(recording.radar)) extended.radar_file.clear();
   RecordingArguments::leaveOutTemporary(extended);
-  report.write(diagnosis, command);
+  RunDescription description;
+  description.command = command;
+  description.recording = arguments.input.recording();
+  description.simulated = "twin";
+  description.version = packageVersion();
+  description.attribution_yaml = toYaml(options.config);
+  description.radar_yaml = toYaml(recording.radar);
+  if (diagnosis.has_twin) description.twin_yaml = given_twin_yaml;
+  std::vector<std::string> more = {
+      arguments.config, arguments.diagnosis_config, arguments.input.radarFile(), arguments.input.channels,
+      twin_file,        scene.value_or("")};
+  more.insert(more.end(), arguments.compared.begin(), arguments.compared.end());
+  more.insert(more.end(), arguments.input.recordings.begin() + 1, arguments.input.recordings.end());
+  description.inputs = hashFiles(inputFiles(arguments.input.recording(), recording, more));
+  report.write(diagnosis, description);
   output.complete();
   sayProblems(diagnosis.problems);
   std::cout << diagnosisText(diagnosis) << "Findings: " << output.name() << "/findings.json\n"
-            << "Report: " << output.name() << "/index.html\n";
+            << "Report: " << output.name() << "/report.html\n";
   return diagnosis.problems.empty() ? 0 : 2;
 }
 
@@ -101,6 +120,7 @@ int main(int argc, char** argv) {
   app.add_option("--compare", arguments.compared,
                  "other twin.yaml of the same scene: how much likelier or less likely each makes the same channels")
       ->allow_extra_args(false);
+  arguments.input.addTemplatesTo(app);
   addJobsArgument(app, arguments.jobs);
   app.add_option(
          "--findings", arguments.findings,

@@ -32,7 +32,7 @@ struct Arguments {
 int run(const Arguments& arguments, const std::vector<std::string>& command) {
   std::vector<std::string> inputs = arguments.input.inputs();
   inputs.insert(inputs.end(), {arguments.simulated, arguments.config});
-  Output output = Output::folder(arguments.output, inputs, "index.html");
+  Output output = Output::folder(arguments.output, inputs, "report.html");
   const Recording recording = arguments.input.open();
   const bool from_twin = arguments.simulated.empty();
   // The twin also brings the scene that the expected regions come from; beside a simulated session it is that of the
@@ -40,24 +40,24 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   Twin twin = placedTwin(from_twin ? arguments.input.loadTwinOf(recording)
                                    : loadTwin("", arguments.input.sceneFile(recording), recording.radar),
                          recording.poses, recording.source);
+  EvaluationOptions options;
+  if (!arguments.config.empty()) options.config = loadAttributionConfig(arguments.config);
+  options.jobs = arguments.jobs;
+  const SignalChain chain(recording.radar);
+  const EvaluationField field(options.config, recording.radar, chain.axes());
   Recording other;
   SimulatedBranch simulated;
   if (from_twin) {
     std::vector<Eigen::Isometry3d> poses;
     for (const Pose& pose : recording.poses) poses.push_back(pose.T_map_radar);
     twin.prepare(poses);
-    simulated = simulatedByTwin(twin, diffuseRecordsFrom(arguments.diffuse_records, "--diffuse-records"));
+    simulated = simulatedByTwin(twin, diffuseRecordsFrom(arguments.diffuse_records, "--diffuse-records"), &field);
   } else {
     other = arguments.input.open(arguments.simulated);
     simulated = simulatedBySession(other);
   }
 
-  const ReportWriter report(output.path());
-  EvaluationOptions options;
-  if (!arguments.config.empty()) options.config = loadAttributionConfig(arguments.config);
-  options.jobs = arguments.jobs;
-  const SignalChain chain(recording.radar);
-  const EvaluationField field(options.config, recording.radar, chain.axes());
+  const ReportWriter report(output.path(), arguments.input.templates);
   std::unique_ptr<ResultsBag> bag;
   if (!arguments.no_bag) bag = std::make_unique<ResultsBag>(output.path() + "/results.bag", field, twin.scene());
   options.on_pose = [&](const PoseResult& pose) {
@@ -76,7 +76,10 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   if (used.empty() && !evaluation.problems.empty()) {
     throw InputError(recording.source + ": no pose can be compared; the first: " + evaluation.problems.front().message);
   }
-  writePicture(drawCoverage(twin.scene(), used), output.path() + "/coverage.png");
+  ReportPictures pictures;
+  if (!arguments.no_pictures) pictures.field = &field;
+  pictures.coverage = drawCoverage(twin.scene(), used);
+  writePicture(pictures.coverage, output.path() + "/coverage.png");
   if (bag) bag->finish(evaluation);
 
   RunDescription description;
@@ -98,11 +101,11 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
     more.insert(more.end(), files.begin(), files.end());
   }
   description.inputs = hashFiles(inputFiles(arguments.input.recording(), recording, more));
-  report.write(evaluation, options.config, description);
+  report.write(evaluation, options.config, description, pictures);
   output.complete();
 
   sayProblems(evaluation.problems);
-  std::cout << reportText(evaluation, options.config) << "Report: " << output.name() << "/index.html\n";
+  std::cout << reportText(evaluation, options.config) << "Report: " << output.name() << "/report.html\n";
   return evaluation.problems.empty() ? 0 : 2;
 }
 
@@ -120,6 +123,7 @@ int main(int argc, char** argv) {
                  "records of rough surfaces: summed by cells of a facet, or all points")
       ->check(CLI::IsMember({"cells", "points"}))
       ->capture_default_str();
+  arguments.input.addTemplatesTo(app);
   addJobsArgument(app, arguments.jobs);
   app.add_flag("--no-pictures", arguments.no_pictures, "leave the per-pose pictures out");
   app.add_flag("--no-bag", arguments.no_bag, "leave results.bag (for rviz) out");

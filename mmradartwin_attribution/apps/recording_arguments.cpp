@@ -33,9 +33,14 @@ void RecordingArguments::addChannelsTo(CLI::App& app) {
                  "channels.yaml of calibrate: channel errors to take out of the measured branch");
 }
 
+void RecordingArguments::addTemplatesTo(CLI::App& app) {
+  app.add_option("--report-templates", templates,
+                 "folder with changed copies of share/mmradartwin_attribution/report: templates of report.html");
+}
+
 std::vector<std::string> RecordingArguments::inputs() const {
   std::vector<std::string> all = recordings;
-  all.insert(all.end(), {twin, scene, radar, channels});
+  all.insert(all.end(), {twin, scene, radar, channels, templates});
   return all;
 }
 

@@ -15,7 +15,7 @@ namespace mmradartwin {
 
 /// What evaluate, diagnose and calibrate take alike: a recording and what stands beside it.
 struct RecordingArguments {
-  std::string twin, scene, radar, layout, channels;
+  std::string twin, scene, radar, layout, channels, templates;
   std::vector<std::string> recordings;  ///< several bags are read as one
   BagOptions bag;
   std::string plugins;
@@ -25,6 +25,8 @@ struct RecordingArguments {
   void addTo(CLI::App& app);
   /// Adds --channels.
   void addChannelsTo(CLI::App& app);
+  /// Adds --report-templates.
+  void addTemplatesTo(CLI::App& app);
 
   const std::string& recording() const { return recordings.front(); }
   /// All files and folders that the user named.

@@ -313,9 +313,15 @@ class DiagnosisNode {
       if (channels_) requireChannelsOf(recording.radar, *channels_);
       recording.channels = channels_;
       const Diagnosis diagnosis = diagnosePoses(recording, goal->twin);
-      DiagnosisReport(output).write(diagnosis, {"attribution/diagnose", output, goal->twin});
+      RunDescription run;
+      run.command = {"attribution/diagnose", output, goal->twin};
+      run.recording = recording.source;
+      run.version = packageVersion();
+      run.attribution_yaml = toYaml(config_);
+      run.radar_yaml = toYaml(recording.radar);
+      DiagnosisReport(output).write(diagnosis, run);
       result.findings_file = output + "/findings.json";
-      result.report_file = output + "/index.html";
+      result.report_file = output + "/report.html";
       const Findings written = readFindings(result.findings_file);
       if (written.extended_twin) result.extended_twin_file = output + "/" + *written.extended_twin;
       result.findings = toMsg(written);

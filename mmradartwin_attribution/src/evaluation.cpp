@@ -18,12 +18,17 @@ RangeAngleMap averagedMap(const Recording& recording, const SignalChain& chain, 
   return chain.map(averagePose(recording, pose));
 }
 
-SimulatedBranch simulatedByTwin(const Twin& twin, DiffuseRecords diffuse_records) {
+SimulatedBranch simulatedByTwin(const Twin& twin, DiffuseRecords diffuse_records, const EvaluationField* field) {
   auto chain = std::make_shared<SignalChain>(twin.radar());
-  return [&twin, chain, diffuse_records](const Pose& pose) {
+  return [&twin, chain, diffuse_records, field](const Pose& pose) {
     Simulation simulation = twin.simulate(pose.T_map_radar, pose.stamp_ns);
-    return SimulatedPose{chain->map(simulation.grid),
-                         exportedRecords(twin.radar(), std::move(simulation.records), diffuse_records)};
+    SimulatedPose simulated;
+    simulated.map = chain->map(simulation.grid);
+    if (field != nullptr && simulation.propagation_only) {
+      simulated.expected_power = expectedPower(*field, twin.radar(), simulation.records);
+    }
+    simulated.records = exportedRecords(twin.radar(), std::move(simulation.records), diffuse_records);
+    return simulated;
   };
 }
 
@@ -79,6 +84,8 @@ Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated
       }
       out.frames = map.frames;
       SimulatedPose other = simulated(out.pose);
+      out.explained = explainedPower(field, map, other.map, other.expected_power);
+      out.expected_known = other.expected_power.size() > 0;
       out.attribution = attributePose(field, map, other.map, regions.regions(out.pose.T_map_radar), other.records);
       for (const Residual& residual : out.attribution.residuals) {
         for (int index : residual.records) out.residual_records.emplace(index, other.records[index]);
@@ -99,6 +106,7 @@ Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated
   arena.execute([&] { tbb::parallel_for(std::size_t{0}, result.poses.size(), work); });
 
   Ledger central, outer;
+  result.expected_known = true;
   for (const PoseResult& pose : result.poses) {
     if (!pose.used) {
       result.problems.push_back({pose.pose.name, pose.problem});
@@ -106,6 +114,8 @@ Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated
     }
     central.add(pose.attribution.central);
     outer.add(pose.attribution.outer);
+    result.explained.add(pose.explained);
+    result.expected_known = result.expected_known && pose.expected_known;
     if (pose.attribution.convention.conjugatedBetter()) ++result.conjugated_better;
   }
   result.central = central.summary();

@@ -16,6 +16,8 @@ const cv::Scalar kWhite(255, 255, 255), kMagenta(255, 0, 255), kInk(40, 40, 40),
     kStation(178, 114, 0);
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
 constexpr int kFanHeight_px = 470;
+constexpr int kSmallFanHeight_px = 420;
+constexpr double kSmallFanLetters = 2;
 
 std::string format(const char* pattern, double a, double b = 0, double c = 0) {
   char text[160];
@@ -297,6 +299,38 @@ cv::Mat drawPose(const EvaluationField& field, const PoseResult& result) {
         kSoft);
   }
   return picture;
+}
+
+std::array<cv::Mat, 3> drawPoseFans(const EvaluationField& field, const PoseResult& result) {
+  const PoseAttribution& pose = result.attribution;
+  std::array<std::vector<FanBox>, 3> boxes_of;  // of matches, then of residuals: these are drawn over those
+  const MatchWindow& tight = field.config().tight;
+  const auto box = [&](double range_m, double azimuth_rad, const cv::Scalar& color, const std::string& label) {
+    return FanBox{range_m, azimuth_rad, field.halfRange_m(tight), field.halfAzimuth_rad(tight, azimuth_rad),
+                  color,   label};
+  };
+  for (const ResponseRegion& r : pose.regions) {
+    if (r.field != Field::kCentral || !r.measured_strong || !r.simulated_strong) continue;
+    for (std::size_t fan : {0U, 1U}) boxes_of[fan].push_back(box(r.range_m, r.azimuth_rad, kWhite, ""));
+  }
+  for (std::size_t i = 0; i < pose.residuals.size(); ++i) {
+    const Residual& r = pose.residuals[i];
+    boxes_of[r.measured_stronger ? 0 : 1].push_back(box(r.range_m, r.azimuth_rad, kMagenta, std::to_string(i + 1)));
+    boxes_of[2].push_back(box(r.range_m, r.azimuth_rad, kInk, std::to_string(i + 1)));
+  }
+  FanStyle style;
+  style.height_px = kSmallFanHeight_px;
+  style.letters = kSmallFanLetters;
+  style.min_db = field.config().floor_db;
+  style.max_range_m = shownRange_m(field, pose);
+  std::array<cv::Mat, 3> fans;
+  fans[0] = drawFan(field.axes(), pose.measured.level_db, style, boxes_of[0]);
+  fans[1] = drawFan(field.axes(), pose.simulated.level_db, style, boxes_of[1]);
+  style.diverging = true;
+  style.min_db = -30;
+  style.max_db = 30;
+  fans[2] = drawFan(field.axes(), pose.residual_db, style, boxes_of[2]);
+  return fans;
 }
 
 cv::Mat drawCoverage(const Scene& scene, const std::vector<Pose>& poses, double cut_height_m) {

@@ -1,86 +1,29 @@
 #include "mmradartwin_attribution/report.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <set>
 #include <sstream>
+#include <stdexcept>
 
 #include "mmradartwin_dsp/input_error.h"
-#include "mmradartwin_dsp/program_version.h"
-#include "mmradartwin_dsp/sha256.h"
-#include "mmradartwin_dsp/strict_yaml.h"
-#include "mmradartwin_dsp/temporary_folder.h"
+#include "page/evaluation_page.h"
+#include "page/evaluation_summary.h"
+#include "page/page_numbers.h"
+#include "page/shipped_templates.h"
 
 namespace mmradartwin {
-namespace {
 
 namespace fs = std::filesystem;
 
-// Meshes and materials that a scene names. A scene that cannot be read is reported where it is loaded, not here.
-void addSceneFiles(const std::string& scene_file, std::vector<std::string>& files) {
-  files.push_back(scene_file);
-  try {
-    YamlMap scene = YamlMap::load(scene_file);
-    if (scene.has("materials")) files.push_back(resolvePath(scene.text("materials"), scene_file));
-    if (scene.has("meshes")) {
-      for (YamlMap& mesh : scene.maps("meshes")) files.push_back(resolvePath(mesh.text("file"), scene_file));
-    }
-  } catch (const InputError&) {
-  }
-}
+/// The report's template, read and checked.
+struct ReportWriter::Page {
+  page::PageTemplate evaluation;
+};
 
-}  // namespace
-
-std::string packageVersion() { return programVersion(); }
-
-std::vector<std::string> inputFiles(const std::string& recording_path, const Recording& recording,
-                                    const std::vector<std::string>& more) {
-  std::vector<std::string> files;
-  fs::path path(recording_path);
-  if (path.filename() == "session.yaml") path = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  std::error_code error;
-  if (fs::is_directory(path, error)) {
-    for (const char* name : {"session.yaml", "radar.yaml", "poses.csv"}) files.push_back((path / name).string());
-    std::set<std::string> captures;
-    for (const auto& entry : fs::directory_iterator(path / "captures", error)) {
-      if (entry.is_regular_file(error)) captures.insert(entry.path().string());
-    }
-    files.insert(files.end(), captures.begin(), captures.end());
-  } else {
-    files.push_back(path.string());
-  }
-  if (fs::is_regular_file(recording.radar_file, error)) files.push_back(recording.radar_file);
-  if (recording.scene_file) addSceneFiles(*recording.scene_file, files);
-  if (recording.twin_file) files.push_back(*recording.twin_file);
-  for (const std::string& file : more) {
-    if (file.size() > 10 && fs::path(file).filename() == "scene.yaml") {
-      addSceneFiles(file, files);
-    } else {
-      files.push_back(file);
-    }
-  }
-  std::vector<std::string> result;
-  std::set<std::string> seen;
-  for (const std::string& file : files) {
-    if (file.empty() || !fs::is_regular_file(file, error) || TemporaryFolder::holds(file)) continue;
-    if (seen.insert(fs::weakly_canonical(file, error).string()).second) result.push_back(file);
-  }
-  return result;
-}
-
-std::vector<InputFile> hashFiles(const std::vector<std::string>& files) {
-  std::vector<InputFile> result(files.size());
-  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) {
-    result[i] = {files[i], sha256OfFile(files[i])};
-  });
-  return result;
-}
-
-ReportWriter::ReportWriter(const std::string& directory) : directory_(directory) {
+ReportWriter::ReportWriter(const std::string& directory, const std::string& templates)
+    : directory_(directory), page_(new Page{page::evaluationTemplate(page::templatesOf(templates))}) {
   std::error_code error;
   fs::create_directories(fs::path(directory) / "pictures", error);
   if (error) {
@@ -88,10 +31,34 @@ ReportWriter::ReportWriter(const std::string& directory) : directory_(directory)
   }
 }
 
+ReportWriter::~ReportWriter() = default;
+
 std::string ReportWriter::pictureFile(const std::string& pose) const {
   std::string name = pose;  // a pose is any string: keep it inside the folder
   std::replace(name.begin(), name.end(), '/', '_');
   return directory_ + "/pictures/" + name + ".png";
+}
+
+void ReportWriter::write(const Evaluation& evaluation, const AttributionConfig& config, const RunDescription& run,
+                         const ReportPictures& pictures) const {
+  writePoses(evaluation, config);
+  writeResiduals(evaluation);
+  writeRegions(evaluation);
+  const auto save = [&](const std::string& name, const std::string& content) {
+    const std::string file = directory_ + "/" + name;
+    std::ofstream out(file, std::ios::trunc);
+    out << content;
+    out.close();
+    if (!out) throw std::runtime_error(file + ": cannot be written; check folder, rights and free space");
+  };
+  nlohmann::json summary = page::evaluationSummary(evaluation, config, run);
+  summary["answer"] = page::shownText(page::evaluationAnswer(summary));
+  save("summary.json", summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  save("table.txt", reportText(evaluation, config));
+  save("attribution.yaml", run.attribution_yaml);
+  save("radar.yaml", run.radar_yaml);
+  if (!run.twin_yaml.empty()) save("twin.yaml", run.twin_yaml);
+  save("report.html", page::evaluationPage(page_->evaluation, evaluation, summary, run, pictures));
 }
 
 std::string reportText(const Evaluation& evaluation, const AttributionConfig& config) {

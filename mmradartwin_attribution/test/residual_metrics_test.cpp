@@ -55,7 +55,7 @@ TEST_F(ResidualMetrics, HaveNamesOfTheirOwn) {
 
 TEST_F(ResidualMetrics, StandInTableAndPage) {
   const auto rows = tableRows(evaluation_.central, {1, 3, 5});
-  const std::string text = file("table.txt"), page = file("index.html");
+  const std::string text = file("table.txt"), page = file("report.html");
   for (std::size_t i = 0; i < std::size(kResidualMetrics); ++i) {
     const ResidualMetric& metric = kResidualMetrics[i];
     std::size_t found = 0;
@@ -66,7 +66,9 @@ TEST_F(ResidualMetrics, StandInTableAndPage) {
       EXPECT_NE(row[2].find(decimal(valueOf(i), metric.digits)), std::string::npos) << metric.name << ": " << row[2];
       EXPECT_NE(row[2].find(metric.unit), std::string::npos) << metric.name;
       EXPECT_NE(text.find(row[2]), std::string::npos) << metric.name;
-      EXPECT_NE(page.find("<td>" + row[2] + "</td>"), std::string::npos) << metric.name;
+      const std::string cell = "<data value=\"" + nlohmann::json(valueOf(i)).dump() +
+                               "\" data-of=\"summary.json#/central/" + metric.name + "\">";
+      EXPECT_NE(page.find(cell), std::string::npos) << metric.name;
     }
     EXPECT_EQ(found, 1u) << metric.name;
     if (metric.word[0] == '\0') continue;

@@ -19,7 +19,8 @@ constexpr double kNearRange_m = 0.16;
 /// Where things stand on the picture. The radar is at (x, y) of `origin`, boresight up, left of the radar left.
 struct Layout {
   explicit Layout(const FanStyle& style) {
-    scale = style.height_px / 600.0;
+    scale = style.height_px / 600.0 * style.letters;
+    line = style.height_px / 600.0;
     top = static_cast<int>((style.title.empty() ? 26 : 50) * scale);
     bottom = static_cast<int>(34 * scale);
     radius = style.height_px - top - bottom;
@@ -35,7 +36,9 @@ struct Layout {
             origin.y - range_m * px_per_m * std::cos(azimuth_rad)};
   }
 
-  double scale, px_per_m;
+  double scale;  ///< of letters and margins
+  double line;   ///< of lines
+  double px_per_m;
   int top, bottom, side, bar, radius;
   cv::Point origin;
   cv::Size size;
@@ -74,13 +77,13 @@ double peakInView(const RangeAngleAxes& axes, const RealGrid& power_db) {
 }
 
 void drawText(cv::Mat& picture, const std::string& words, cv::Point2d at, double size, const cv::Scalar& color,
-              bool centred = false) {
+              bool centred = false, int thickness = 1) {
   int baseline = 0;
-  const cv::Size extent = cv::getTextSize(words, kFont, size, 1, &baseline);
+  const cv::Size extent = cv::getTextSize(words, kFont, size, thickness, &baseline);
   if (centred) at.x -= extent.width / 2.0;
   at.x = std::max(2.0, std::min(at.x, picture.cols - extent.width - 2.0));
   at.y = std::max(extent.height + 2.0, std::min(at.y, picture.rows - baseline - 2.0));
-  cv::putText(picture, words, cv::Point(cvRound(at.x), cvRound(at.y)), kFont, size, color, 1, cv::LINE_AA);
+  cv::putText(picture, words, cv::Point(cvRound(at.x), cvRound(at.y)), kFont, size, color, thickness, cv::LINE_AA);
 }
 
 /// Index of the nearest azimuth bin, -1 beyond half a bin outside of the axis. Bins are uniform in the sine.
@@ -192,12 +195,18 @@ void drawBox(cv::Mat& picture, const Layout& layout, const FanStyle& style, cons
   for (int i = kSteps; i >= 0; --i) {
     outline.emplace_back(layout.at(near_m, box.azimuth_rad + box.half_azimuth_rad * (2.0 * i / kSteps - 1)));
   }
-  const int width = std::max(1, cvRound(layout.scale));
+  const bool large = style.letters > 1;  // shown small: boxes and labels have to stay visible then
+  const int width = std::max(1, cvRound((large ? 3 : 1) * layout.line));
   // A dark rim keeps a white box visible on yellow cells and a magenta one on red.
   cv::polylines(picture, outline, true, cv::Scalar(30, 30, 30), width + 2, cv::LINE_AA);
   cv::polylines(picture, outline, true, box.color_bgr, width, cv::LINE_AA);
   if (box.label.empty()) return;
   const cv::Point2d at = layout.at(far_m, box.azimuth_rad) - cv::Point2d(0, 5 * layout.scale);
+  if (large) {
+    drawText(picture, box.label, at, 0.4 * layout.scale, cv::Scalar(20, 20, 20), true, 6);
+    drawText(picture, box.label, at, 0.4 * layout.scale, kPaper, true, 2);
+    return;
+  }
   for (const cv::Point2d shift : {cv::Point2d(1, 1), cv::Point2d(-1, 1), cv::Point2d(1, -1), cv::Point2d(-1, -1)}) {
     drawText(picture, box.label, at + shift, 0.4 * layout.scale, cv::Scalar(20, 20, 20), true);
   }

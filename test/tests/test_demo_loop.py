@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The demo on a small session, as a user runs it: emulator, UDP, driver, tf, signal chain, twin, attribution, rviz, report."""
+import base64
 import collections
 import csv
 import html
@@ -41,34 +42,37 @@ def rows_of(*parts):
 
 
 def check_report(test, folder, names):
-    """index.html has a figure of each pose, whose caption says what poses.csv and residuals.csv hold of it."""
-    with open(os.path.join(folder, "index.html"), encoding="utf-8") as file:
+    """report.html has a row of each pose with what poses.csv and residuals.csv hold of it, and pictures of the worst."""
+    with open(os.path.join(folder, "report.html"), encoding="utf-8") as file:
         page = html.unescape(file.read())
     with open(os.path.join(folder, "summary.json"), encoding="utf-8") as file:
-        central = json.load(file)["central"]
+        summary = json.load(file)
     rows = rows_of(folder, "poses.csv")
     test.assertEqual([row["pose"] for row in rows], names)
     active, recalled = (sum(int(row[column]) for row in rows) for column in ("active", "recalled"))
     test.assertGreater(active, 0)
-    test.assertAlmostEqual(central["recall"], recalled / active)
+    test.assertAlmostEqual(summary["central"]["recall"], recalled / active)
+    test.assertEqual(sorted(summary["worst_first"]), names)
+    explained = [float(row["explained_power"]) for row in sorted(rows, key=lambda row: summary["worst_first"].index(row["pose"]))]
+    test.assertEqual(explained, sorted(explained))
     classes = collections.Counter((row["pose"], row["class"]) for row in rows_of(folder, "residuals.csv"))
-    captions = dict(re.findall(r"<figcaption>Pose (\d+): ([^<]*)", page))
-    test.assertEqual(set(captions), set(names))
+    text = re.sub(r"<[^>]*>", "", page.split("All poses, the worst first")[1].replace("</td>", " "))
     for row in rows:
-        name = row["pose"]
-        counted = "/".join(str(classes[name, f"C{i}"]) for i in range(1, 6))
-        test.assertEqual(counted, "/".join(row[f"c{i}"] for i in range(1, 6)), name)
-        said = re.fullmatch(r"(\d+) of (\d+) measured regions recalled, Q1 ([\d.]*), Q2 ([\d.]*), C1–C5 ([\d/]+)",
-                            captions[name])
-        test.assertTrue(said, captions[name])
-        test.assertEqual(said.group(1, 2, 5), (row["recalled"], row["active"], counted), name)
-        for text, column in zip(said.group(3, 4), ("q1_energy", "q2_energy")):
-            test.assertEqual(bool(text), bool(row[column]), name)   # neither says a number where nothing was measured
-            test.assertAlmostEqual(float(text or 0), float(row[column] or 0), delta=0.00051, msg=name)   # of three decimals
-        picture = os.path.join("pictures", name + ".png")
-        test.assertIn(f'src="{picture}"', page)
-        test.assertGreaterEqual(len(fan_stretches(picture_pixels(os.path.join(folder, picture)), 0)), 2, name)
-    test.assertIn('src="coverage.png"', page)
+        counted = "/".join(str(classes[row["pose"], f"C{i}"]) for i in range(1, 6))
+        test.assertEqual(counted, "/".join(row[f"c{i}"] for i in range(1, 6)), row["pose"])
+        said = re.search(rf"^{row['pose']} \S+ % (\d+) of (\d+) ([\d.]+) ([\d.]+) \S+ ([\d/]+) $", text, re.MULTILINE)
+        test.assertTrue(said, text[:400])
+        test.assertEqual(said.group(1, 2, 5), (row["recalled"], row["active"], counted), row["pose"])
+        for shown, column in zip(said.group(3, 4), ("q1_energy", "q2_energy")):
+            test.assertAlmostEqual(float(shown), float(row[column]), delta=0.00051, msg=row["pose"])   # of three decimals
+        picture = os.path.join(folder, "pictures", row["pose"] + ".png")
+        test.assertGreaterEqual(len(fan_stretches(picture_pixels(picture), 0)), 2, row["pose"])
+    pictures = re.findall(r'src="data:image/png;base64,([^"]*)"', page)
+    test.assertEqual(len(pictures), 3 * min(len(names), 4) + 1, "three of each pose that is shown, and the coverage")
+    with tempfile.NamedTemporaryFile(suffix=".png") as file:
+        file.write(base64.b64decode(pictures[0]))
+        file.flush()
+        test.assertGreaterEqual(len(fan_stretches(picture_pixels(file.name), 0)), 1, "the measured fan of the worst pose")
     coverage = picture_pixels(os.path.join(folder, "coverage.png"))
     test.assertGreater(len(numpy.unique(coverage.reshape(-1, 3), axis=0)), 4, "nothing is drawn")
 
@@ -95,7 +99,7 @@ class DemoLoop(unittest.TestCase):
     def test_ends_with_a_diagnosis_and_the_twin_that_it_extends(self):
         with open(self.path("diagnosis", "findings.json")) as file:
             self.assertEqual(json.load(file)["poses"]["count"], POSES)
-        self.assertTrue(os.path.exists(self.path("report_extended", "index.html")))
+        self.assertTrue(os.path.exists(self.path("report_extended", "report.html")))
         self.assertRegex(self.demo.stdout, r"Hidden: the antennas.*\n +element_pattern: cos_exponent [0-9.]+\nFound: +\w")
 
     def test_speaks_in_few_lines_and_names_a_page_that_is_there(self):

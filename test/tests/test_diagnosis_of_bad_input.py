@@ -124,7 +124,7 @@ class BadInput(InFolder):
         self.assertEqual(status, 2, msg=errors)
         self.assertEqual((findings["poses"]["count"], findings["poses"]["locations"]), (1, 1))
         self.assertIn("fewer than 3 poses", findings["poses"]["held_out"])
-        with open(os.path.join(self.output, "index.html"), encoding="utf-8") as page:
+        with open(os.path.join(self.output, "report.html"), encoding="utf-8") as page:
             self.assertEqual(page.read().count("all its samples are zero"), 2)
 
     def test_a_twin_of_another_array_is_refused(self):
@@ -189,7 +189,7 @@ class BadInput(InFolder):
         self.assertEqual([(f["cause"], f["parameters"]["pose"]["value"]) for f in findings["findings"]],
                          [("packet_misalignment", "001")])
         self.assertEqual(findings["poses"]["count"], 6)
-        with open(os.path.join(self.output, "index.html"), encoding="utf-8") as report:
+        with open(os.path.join(self.output, "report.html"), encoding="utf-8") as report:
             self.assertNotIn("packet = ", report.read())    # which packet was lost nobody knows
 
     def test_a_recording_that_is_not_there(self):

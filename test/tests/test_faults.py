@@ -231,7 +231,7 @@ def judged_options_rows():
 
 def judged_output_rows():
     def older(test, _chance):
-        put("older/index.html", b"older")(test, None)
+        put("older/report.html", b"older")(test, None)
 
     for program, words in JUDGES.items():
         def output(to, *more, words=words):

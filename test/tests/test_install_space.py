@@ -88,7 +88,7 @@ class InstallSpace(unittest.TestCase):
         self.make_session()
         self.run_there("rosrun mmradartwin_sim simulate session --output simulated")
         self.run_there("rosrun mmradartwin_attribution evaluate session --output report")
-        self.assertTrue(os.path.isfile(os.path.join(self.stage, "report", "index.html")))
+        self.assertTrue(os.path.isfile(os.path.join(self.stage, "report", "report.html")))
 
     def test_a_bag_is_replayed_there(self):
         self.make_session()

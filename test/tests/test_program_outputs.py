@@ -74,7 +74,7 @@ class Programs(InFolder):
         return {
             "process": (["session", "--output"], [], "maps"),
             "simulate": (["session", "--output"], [], "session.yaml"),
-            "evaluate": (["session", "--no-pictures", "--output"], [], "index.html"),
+            "evaluate": (["session", "--no-pictures", "--output"], [], "report.html"),
             "diagnose": (["session", "--findings", "0", "--output"], [], "findings.json"),
             "bag_to_session": (["session.bag"], [], "session.yaml"),
             "make_scene": ([mesh, "--output"], [], "scene.yaml"),

@@ -86,7 +86,7 @@ class ScenePlacement(PlacedSession):
         self.assertFalse(os.path.exists(self.at("simulate", "session.yaml")))
         evaluate = self.run_program("mmradartwin_attribution", "evaluate", "--no-pictures", "--no-bag")
         self.assertEqual(evaluate.returncode, 2, msg=evaluate.stderr)
-        self.assertFalse(os.path.exists(self.at("evaluate", "index.html")))
+        self.assertFalse(os.path.exists(self.at("evaluate", "report.html")))
         for figure in FIGURES:
             self.assertNotIn(figure, evaluate.stdout)
         status, findings, errors = diagnose(self.session, self.at("diagnose"))

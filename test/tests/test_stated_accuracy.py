@@ -45,7 +45,7 @@ class StatedAccuracy(InFolder):
                              tier="office", duplicates=0, actor_range_m=scene_m, actor_gain_db=level_db)).run()
         status, found, errors = diagnose(self.at("session"), self.at("diagnosis"))
         self.assertEqual(status, 0, msg=errors)
-        with open(self.at("diagnosis", "index.html"), encoding="utf-8") as page:
+        with open(self.at("diagnosis", "report.html"), encoding="utf-8") as page:
             return found, page.read()
 
     def test_errors_as_stated_are_found_as_stated(self):

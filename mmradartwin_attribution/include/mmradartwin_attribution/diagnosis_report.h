@@ -1,21 +1,29 @@
 #pragma once
 
+#include <memory>
 #include <string>
-#include <vector>
 
 #include "mmradartwin_attribution/diagnosis_result.h"
+#include "mmradartwin_attribution/run_description.h"
 
 namespace mmradartwin {
 
-/// Writes into a folder: findings.json, twin.extended.yaml, tried.csv and index.html.
+/// Writes into a folder: findings.json, summary.json, twin.extended.yaml, tried.csv and report.html, which holds all
+/// that it shows.
 class DiagnosisReport {
  public:
-  /// Creates the folder. Throws InputError where that is not possible.
-  explicit DiagnosisReport(const std::string& directory);
-  void write(const Diagnosis& diagnosis, const std::vector<std::string>& command) const;
+  /// Creates the folder. templates: as for ReportWriter. Throws InputError where the folder cannot be created, and for
+  /// a template that uses a name which is not there.
+  explicit DiagnosisReport(const std::string& directory, const std::string& templates = "");
+  ~DiagnosisReport();
+  DiagnosisReport(const DiagnosisReport&) = delete;
+  DiagnosisReport& operator=(const DiagnosisReport&) = delete;
+  void write(const Diagnosis& diagnosis, const RunDescription& run) const;
 
  private:
+  struct Page;
   std::string directory_;
+  std::unique_ptr<const Page> page_;
 };
 
 /// The findings as a person reads them, a line each and their gains.

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "mmradartwin_attribution/explained_power.h"
 #include "mmradartwin_attribution/ledger.h"
 #include "mmradartwin_attribution/residual.h"
 #include "mmradartwin_attribution/response_region.h"
@@ -22,14 +23,17 @@ namespace mmradartwin {
 struct SimulatedPose {
   RangeAngleMap map;
   std::vector<PathRecord> records;  ///< empty where the simulated side is a recording
+  RealGrid expected_power = {};     ///< expectedPower() of all paths; empty where it was not asked for or is not known
 };
 /// Gives the simulated side of a pose; called for several poses at once. Throws InputError for a pose that cannot be
 /// used.
 using SimulatedBranch = std::function<SimulatedPose(const Pose&)>;
 
 /// Simulates with a twin. Keeps a reference to it. Which records a residual points to depends on `diffuse_records`, the
-/// residuals themselves do not.
-SimulatedBranch simulatedByTwin(const Twin& twin, DiffuseRecords diffuse_records = DiffuseRecords::kPoints);
+/// residuals themselves do not. field, where there is one: expected powers are computed in its cells; kept, too. A twin
+/// whose receiver does more than to add up paths has none.
+SimulatedBranch simulatedByTwin(const Twin& twin, DiffuseRecords diffuse_records = DiffuseRecords::kPoints,
+                                const EvaluationField* field = nullptr);
 /// Takes another session's averaged captures, by pose name. Keeps a reference to it.
 SimulatedBranch simulatedBySession(const Recording& session);
 /// The same branch, which throws InputError for a map without any echo: no figure of it would mean anything.
@@ -44,6 +48,8 @@ struct PoseResult {
   bool used = false;
   std::string problem;  ///< where not used: one line for the user
   int frames = 0;       ///< in the measured average
+  ExplainedPower explained;
+  bool expected_known = false;  ///< explained compares with the expectation over phases, not with one draw of them
   PoseAttribution attribution;
   std::vector<PathRecord> records;             ///< behind the simulated map; residuals index them (see keep_records)
   std::map<int, PathRecord> residual_records;  ///< those of them that make up a residual, by index
@@ -63,6 +69,12 @@ struct Evaluation {
   std::vector<std::string> duplicates;
   std::vector<PoseProblem> problems;  ///< of the recording and of single poses
   int conjugated_better = 0;          ///< poses whose conjugated measurement agrees better
+  ExplainedPower explained;           ///< over all poses
+  bool expected_known = false;        ///< of every pose; else its share is that of a single draw of phases
+
+  double explainedShare() const { return explained.share(explained.amplitudeGain()); }
+  /// Of one pose, under the gain of all.
+  double explainedShare(const PoseResult& pose) const { return pose.explained.share(explained.amplitudeGain()); }
 };
 
 /// Gives the measured map of a pose, as SimulatedBranch the simulated one.

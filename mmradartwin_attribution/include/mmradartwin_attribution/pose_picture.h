@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -16,8 +17,18 @@ cv::Scalar classColor_bgr(ResidualClass c);
 /// list of the residuals with class and levels.
 cv::Mat drawPose(const EvaluationField& field, const PoseResult& result);
 
+/// The three fans of drawPose(), one by one and with letters that stay readable when they are shown small: measured,
+/// simulated, difference. Boxes of residuals bear their number in PoseAttribution::residuals, from 1 on.
+std::array<cv::Mat, 3> drawPoseFans(const EvaluationField& field, const PoseResult& result);
+
 /// Acquisition coverage: the scene from above, coloured by material, with the radar's places and headings. Horizontal
 /// surfaces above `cut_height_m` (a ceiling) are left out.
 cv::Mat drawCoverage(const Scene& scene, const std::vector<Pose>& poses, double cut_height_m = 2.0);
+
+/// What the report's pictures are drawn from.
+struct ReportPictures {
+  const EvaluationField* field = nullptr;  ///< of the evaluation; nullptr: no pictures of poses
+  cv::Mat coverage;                        ///< drawCoverage(); empty: none
+};
 
 }  // namespace mmradartwin

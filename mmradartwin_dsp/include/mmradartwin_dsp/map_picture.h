@@ -23,6 +23,7 @@ struct FanStyle {
   bool diverging = false;
   double max_range_m = 10;
   int height_px = 600;
+  double letters = 1;  ///< size of letters and of the margins that hold them, against the usual
   std::string title;
 };
 

@@ -1,208 +1,325 @@
 #include "diagnosis/report/diagnosis_page.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <sstream>
 
+#include "diagnosis/report/diagnosis_answer.h"
+#include "diagnosis/report/finding_figure.h"
 #include "diagnosis/report/finding_words.h"
-#include "mmradartwin_attribution/report.h"
+#include "mmradartwin_dsp/text.h"
+#include "page/page_picture.h"
+#include "page/paper_figures.h"
+#include "page/run_values.h"
+#include "page/shipped_templates.h"
 
 namespace mmradartwin::diagnosis::report {
 namespace {
 
-constexpr std::size_t kMostRecords = 10;  ///< of a finding's table; all of them stand in its CSV file
-constexpr int kMostHypotheses = 60;       ///< of the table; all of them stand in tried.csv
-constexpr double kLeastShown_nats = 1;    ///< promise of the weakest hypothesis of the table
-constexpr double kBarWidth_em = 10;       ///< of the hypothesis that promised most
+using page::PageNumbers;
+using page::PageValue;
+using page::PageValues;
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (char c : text) {
-    if (c == '<') {
-      out += "&lt;";
-    } else if (c == '>') {
-      out += "&gt;";
-    } else if (c == '&') {
-      out += "&amp;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
+constexpr std::size_t kMostRecords = 10;  ///< of a finding's table; all of them stand in its CSV file
+constexpr std::size_t kMostTried = 60;    ///< of the table; all of them stand in tried.csv
+constexpr double kLeastShown_nats = 1;    ///< promise of the weakest hypothesis of the table
+
+const char* const kNames =
+    "answer pose_count location_count held_out has_twin[] no_twin[] recording_word steps[step] has_findings[] "
+    "findings[number cause class action wrong to_do parameters[parameter] description has_description[] candidates "
+    "has_candidates[] experiment has_experiment[] gain_nats false_alarms runner_up margin has_runner_up[] "
+    "has_gain[] metrics[metric before after difference paper] has_maps[] before after plan places[x y has_point[] "
+    "ranges "
+    "has_ranges[] actors has_actors[] poses has_poses[]] records[event actors pose before_db before_m before_deg "
+    "after_db "
+    "after_m after_deg] has_records[] records_file] "
+    "tried[what round gain verdict] has_tried[] tried_count accuracy[key stated estimated] far_worse[sentence] "
+    "compared[file sentence] has_compared[] ";
+
+std::string wordOf(const char* shown, const char* word) {
+  return page::wordHtml(shown, *page::docsGlossary().meaning(word));
 }
 
+/// One row of a finding's table.
 struct GainRow {
-  const char* name;
-  const GainMetric* metric;
+  const char *shown, *word;
+  const char* pointer;  ///< below "gain"
+  const char* paper;    ///< name of the paper's figure, "" for none
+  enum { kPercent, kDb, kCount } form;
 };
 
-std::vector<GainRow> gainRows(const FindingGain& gain) {
-  return {{"explained power", &gain.explained_power},
-          {"log-likelihood per pose", &gain.log_likelihood_per_pose},
-          {"recall", &gain.recall},
-          {"recall, near", &gain.recall_band[0]},
-          {"recall, mid", &gain.recall_band[1]},
-          {"recall, far", &gain.recall_band[2]},
-          {"Q1 energy", &gain.q1},
-          {"Q2 energy", &gain.q2},
-          {"Q3 median, dB", &gain.q3_median_db},
-          {"C1", &gain.classes[0]},
-          {"C2", &gain.classes[1]},
-          {"C3", &gain.classes[2]},
-          {"C4", &gain.classes[3]},
-          {"C5", &gain.classes[4]}};
-}
-
-void writeAccuracy(const Findings& findings, std::ostream& html) {
-  html << "<p>Stated accuracy of the ground (1 sigma), by which the session is judged:";
-  const char* separator = " ";
-  for (const AccuracyKey& key : accuracyKeys()) {
-    html << separator << key.name << " " << shownNumber(findings.accuracy.*key.member);
-    const auto estimate = findings.estimated.find(key.name);
-    if (estimate != findings.estimated.end()) {
-      html << " (the session shows " << shownNumber(estimate->second.value) << ")";
+std::vector<PageValues> gainRows(const PageNumbers& numbers, const std::string& gain) {
+  static const std::array<GainRow, 13> kRows = {{
+      {"Explained power", "explained power", "/explained_power", "", GainRow::kPercent},
+      {"Recall", "recall", "/recall", "/recall", GainRow::kPercent},
+      {"Recall, near", "recall", "/recall/bands/near", "/recall_by_band/near/recall", GainRow::kPercent},
+      {"Recall, mid", "recall", "/recall/bands/mid", "/recall_by_band/mid/recall", GainRow::kPercent},
+      {"Recall, far", "recall", "/recall/bands/far", "/recall_by_band/far/recall", GainRow::kPercent},
+      {"Q1 energy", "Q1", "/q1", "/q1_energy", GainRow::kPercent},
+      {"Q2 energy", "Q2", "/q2", "/q2_energy", GainRow::kPercent},
+      {"Q3 median, dB", "Q3", "/q3_median_db", "/q3_median_db", GainRow::kDb},
+      {"C1", "C1", "/classes/C1", "", GainRow::kCount},
+      {"C2", "C2", "/classes/C2", "", GainRow::kCount},
+      {"C3", "C3", "/classes/C3", "", GainRow::kCount},
+      {"C4", "C4", "/classes/C4", "", GainRow::kCount},
+      {"C5", "C5", "/classes/C5", "", GainRow::kCount},
+  }};
+  const auto cell = [&](const GainRow& row, const std::string& pointer) {
+    return row.form == GainRow::kPercent ? numbers.percent(pointer)
+           : row.form == GainRow::kDb    ? numbers.fixed(pointer, 2)
+                                         : numbers.count(pointer);
+  };
+  std::vector<PageValues> rows;
+  for (const GainRow& row : kRows) {
+    const std::string at = gain + row.pointer;
+    if (std::isnan(numbers.value(at + "/before")) && std::isnan(numbers.value(at + "/after"))) continue;
+    std::string difference, paper = "\u2013";
+    if (!std::isnan(numbers.value(at + "/difference_ci95/0"))) {
+      difference = cell(row, at + "/difference_ci95/0") + " to " + cell(row, at + "/difference_ci95/1");
     }
-    separator = ", ";
-  }
-  html << ".</p>";
-  for (const std::string& sentence : shownFarWorse(findings)) html << "<p><b>" << escaped(sentence) << "</b></p>";
-}
-
-void writeHead(const Diagnosis& diagnosis, std::ostream& html) {
-  html << "<!doctype html><meta charset=\"utf-8\"><title>Diagnosis</title><style>body{font:15px "
-          "sans-serif;max-width:60em;"
-          "margin:2em auto;color:#222}table{border-collapse:collapse;margin:.5em 0}td,th{padding:.2em "
-          ".8em;text-align:right;"
-          "border-bottom:1px solid #ddd}td:first-child,th:first-child{text-align:left}h2{margin-top:1.5em}"
-          ".bar{background:#48c;height:.8em;display:inline-block}</style><h1>What the simulation gets wrong</h1>";
-  html << "<p>Verdict <b>" << diagnosis.findings.verdict() << "</b>; " << diagnosis.findings.poses << " poses at "
-       << diagnosis.findings.locations << " locations; held out: " << escaped(diagnosis.findings.held_out) << ". ";
-  if (diagnosis.has_twin) {
-    html << "The twin as given explains " << shownNumber(diagnosis.explained_power) << " of the measured power. "
-         << "<a href=\"twin.extended.yaml\">twin.extended.yaml</a>, ";
-  }
-  html << "<a href=\"findings.json\">findings.json</a></p>";
-  if (diagnosis.has_twin) writeAccuracy(diagnosis.findings, html);
-  if (diagnosis.problems.empty()) return;
-  html << "<p>Left out:</p><ul>";
-  for (const PoseProblem& problem : diagnosis.problems) html << "<li>" << escaped(problem.message) << "</li>";
-  html << "</ul>";
-}
-
-void writeEvidence(const Finding& finding, std::ostream& html) {
-  html << "<p>Evidence: " << shownNumber(finding.evidence.log_likelihood_gain, 4) << " nats, false alarms at most "
-       << shownNumber(finding.evidence.false_alarm_rate, 2);
-  if (finding.evidence.runner_up) {
-    html << "; next: " << *finding.evidence.runner_up << ", " << shownNumber(finding.evidence.margin.value_or(0), 4)
-         << " nats less";
-  }
-  html << "</p>";
-  if (finding.candidates.size() < 2) return;
-  html << "<p>Not told apart:";
-  for (const CauseProbability& candidate : finding.candidates) {
-    html << " " << escaped(shownCandidate(candidate));
-  }
-  if (finding.experiment) html << ". To tell: " << escaped(*finding.experiment);
-  html << "</p>";
-}
-
-void writePlace(const FindingPlace& place, std::ostream& html) {
-  if (place.x_m && place.y_m) {
-    html << "<p>At x = " << shownNumber(*place.x_m) << " m, y = " << shownNumber(*place.y_m) << " m in map</p>";
-  }
-  if (place.range_m && place.azimuth_deg) {
-    html << "<p>Cells that carry it: " << shownNumber((*place.range_m)[0]) << " to " << shownNumber((*place.range_m)[1])
-         << " m, " << shownNumber((*place.azimuth_deg)[0]) << " to " << shownNumber((*place.azimuth_deg)[1])
-         << " deg</p>";
-  }
-  if (!place.actors.empty()) html << "<p>Actor: " << escaped(place.actors.front()) << "</p>";
-  if (place.poses.empty()) return;
-  html << "<p>Poses that carry it most:";
-  for (const std::string& pose : place.poses) html << " " << escaped(pose);
-  html << "</p>";
-}
-
-void writeGain(const FindingGain& gain, std::ostream& html) {
-  html << "<table><tr><th>on held-out places</th><th>before</th><th>after</th><th>difference, 95 %</th></tr>";
-  for (const GainRow& row : gainRows(gain)) {
-    if (std::isnan(row.metric->before) && std::isnan(row.metric->after)) continue;
-    html << "<tr><td>" << row.name << "</td><td>" << shownNumber(row.metric->before, 4) << "</td><td>"
-         << shownNumber(row.metric->after, 4) << "</td><td>";
-    if (row.metric->difference_ci95) {
-      html << shownNumber((*row.metric->difference_ci95)[0]) << " to "
-           << shownNumber((*row.metric->difference_ci95)[1]);
+    for (const page::PaperFigure& figure : page::kPaperFigures) {
+      if (std::string(row.paper) != figure.name) continue;
+      paper = row.form == GainRow::kPercent ? page::percentText(figure.value) : fixedNumber(figure.value, 2);
     }
-    html << "</td></tr>";
+    rows.push_back({{"metric", PageValue::html(wordOf(row.shown, row.word))},
+                    {"before", PageValue::html(cell(row, at + "/before"))},
+                    {"after", PageValue::html(cell(row, at + "/after"))},
+                    {"difference", PageValue::html(difference)},
+                    {"paper", paper}});
   }
-  html << "</table>";
+  return rows;
 }
 
-void writeRecords(std::vector<ChangedRecord> records, std::ostream& html) {
-  std::stable_sort(records.begin(), records.end(),
-                   [](const ChangedRecord& a, const ChangedRecord& b) { return a.strongest_db() > b.strongest_db(); });
-  html << "<table><tr><th>strongest paths that it changes</th><th>pose</th><th>dB "
-          "before</th><th>m</th><th>deg</th><th>dB "
-          "after</th><th>m</th><th>deg</th></tr>";
-  for (std::size_t i = 0; i < std::min(kMostRecords, records.size()); ++i) {
-    const ChangedRecord& record = records[i];
-    html << "<tr><td>" << record.event << ", " << escaped(joined(record.actors)) << "</td><td>" << escaped(record.pose)
-         << "</td><td>" << shownRecord(record.before, "</td><td>") << "</td><td>"
-         << shownRecord(record.after, "</td><td>") << "</td></tr>";
+std::vector<PageValues> placeItems(const Finding& finding, const PageNumbers& numbers, const std::string& at) {
+  std::vector<PageValues> items;
+  for (std::size_t k = 0; k < finding.where.size(); ++k) {
+    const FindingPlace& place = finding.where[k];
+    const std::string here = at + "/where/" + std::to_string(k);
+    const bool ranges = place.range_m && place.azimuth_deg;
+    items.push_back({{"x", PageValue::html(numbers.significant(here + "/x_m"))},
+                     {"y", PageValue::html(numbers.significant(here + "/y_m"))},
+                     {"has_point", place.x_m.has_value() && place.y_m.has_value()},
+                     {"ranges", PageValue::html(numbers.interval(here + "/range_m") + " m and from " +
+                                                numbers.interval(here + "/azimuth_deg") + "\u00b0")},
+                     {"has_ranges", ranges},
+                     {"actors", mmradartwin::join(place.actors, ", ")},
+                     {"has_actors", !place.actors.empty()},
+                     {"poses", mmradartwin::join(place.poses, ", ")},
+                     {"has_poses", !place.poses.empty()}});
   }
-  html << "</table>";
+  return items;
 }
 
-void writeFinding(const Finding& finding, std::size_t number, const FindingFiles& files, std::ostream& html) {
+/// Cell of a record's table, as its CSV file has the number.
+PageValue recordCell(const std::optional<RecordState>& record, double RecordState::*member, const std::string& file,
+                     std::size_t row, const std::string& column) {
+  if (!record) return PageValue("\u2013");
+  const std::string text = shownNumber((*record).*member, 4);
+  return PageValue::html(page::numberHtml(text, file + "#" + std::to_string(row) + "/" + column, text));
+}
+
+/// The strongest paths that a finding changes; several of one pose that look alike are told once.
+std::vector<PageValues> recordRows(const std::vector<ChangedRecord>& records, const std::string& file) {
+  std::vector<std::size_t> order(records.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return records[a].strongest_db() > records[b].strongest_db(); });
+  std::vector<PageValues> rows;
+  std::string last;
+  for (std::size_t i : order) {
+    const ChangedRecord& r = records[i];
+    const std::string said =
+        r.pose + r.event + joined(r.actors) + shownRecord(r.before, ",") + "," + shownRecord(r.after, ",");
+    if (said == last) continue;
+    last = said;
+    if (rows.size() == kMostRecords) break;
+    rows.push_back({{"event", r.event},
+                    {"actors", mmradartwin::join(r.actors, ", ")},
+                    {"pose", r.pose},
+                    {"before_db", recordCell(r.before, &RecordState::amplitude_db, file, i, "amplitude_before_db")},
+                    {"before_m", recordCell(r.before, &RecordState::range_m, file, i, "range_before_m")},
+                    {"before_deg", recordCell(r.before, &RecordState::azimuth_deg, file, i, "azimuth_before_deg")},
+                    {"after_db", recordCell(r.after, &RecordState::amplitude_db, file, i, "amplitude_after_db")},
+                    {"after_m", recordCell(r.after, &RecordState::range_m, file, i, "range_after_m")},
+                    {"after_deg", recordCell(r.after, &RecordState::azimuth_deg, file, i, "azimuth_after_deg")}});
+  }
+  return rows;
+}
+
+std::vector<PageValues> parameterItems(const Finding& finding, std::size_t index, const PageNumbers& numbers) {
+  std::vector<PageValues> items;
+  for (const FindingParameter& p : finding.parameters) {
+    items.push_back({{"parameter", PageValue::html(htmlEscape(p.name) + " = " + parameterHtml(p, index, numbers))}});
+  }
+  for (const std::string& more : shownBesides(finding)) items.push_back({{"parameter", more}});
+  return items;
+}
+
+PageValues findingItem(const Diagnosis& diagnosis, std::size_t index, const CauseWords& words,
+                       const PageNumbers& numbers, const FindingFiles& files) {
+  const Finding& finding = diagnosis.findings.findings[index];
   const CauseDescription& cause = causeDescription(finding.cause);
-  html << "<h2>" << number << ". " << finding.cause << " (" << className(cause.residual_class)
-       << ")</h2><p>Action: " << escaped(cause.action()) << "</p><ul>";
-  for (const FindingParameter& parameter : finding.parameters) {
-    html << "<li>" << escaped(shownParameter(parameter)) << "</li>";
-  }
-  for (const std::string& more : shownBesides(finding)) html << "<li>" << escaped(more) << "</li>";
-  html << "</ul>";
-  if (finding.description) html << "<p>" << escaped(*finding.description) << "</p>";
-  writeEvidence(finding, html);
-  for (const FindingPlace& place : finding.where) writePlace(place, html);
-  html << "<p><a href=\"" << files.figure << "\"><img style=\"max-width:100%\" src=\"" << files.figure
-       << "\" alt=\"figure of " << finding.cause << "\"></a></p>";
-  if (finding.gain) writeGain(*finding.gain, html);
-  if (files.records.empty()) return;
-  writeRecords(finding.records, html);
-  html << "<p>All of them: <a href=\"" << files.records << "\">" << files.records << "</a></p>";
+  const std::string at = "/findings/" + std::to_string(index), evidence = at + "/evidence";
+  const std::string class_name = className(cause.residual_class);
+  const FindingParts parts = drawFindingParts(finding, diagnosis.plan);
+  const bool maps = !parts.before.empty();
+  std::vector<PageValues> metrics = finding.gain ? gainRows(numbers, at + "/gain") : std::vector<PageValues>();
+  std::vector<PageValues> records = recordRows(finding.records, files.records);
+  PageValues item = {
+      {"number", std::to_string(index + 1)},
+      {"cause", finding.cause},
+      {"class", PageValue::html(wordOf(class_name.c_str(), class_name.c_str()))},
+      {"action", cause.action()},
+      {"wrong", PageValue::html(words.wrong(finding, index, numbers))},
+      {"to_do", PageValue::html(words.toDo(finding, index, numbers))},
+      {"parameters", parameterItems(finding, index, numbers)},
+      {"description", finding.description.value_or("")},
+      {"has_description", finding.description.has_value()},
+      {"candidates", PageValue::html(candidatesHtml(finding, index, numbers))},
+      {"has_candidates", finding.candidates.size() > 1},
+      {"experiment", finding.experiment.value_or("")},
+      {"has_experiment", finding.experiment.has_value()},
+      {"gain_nats", PageValue::html(numbers.significant(evidence + "/log_likelihood_gain"))},
+      {"false_alarms", PageValue::html(numbers.chance(evidence + "/false_alarm_rate"))},
+      {"runner_up", finding.evidence.runner_up.value_or("")},
+      {"margin", PageValue::html(numbers.significant(evidence + "/margin"))},
+      {"has_runner_up", finding.evidence.runner_up.has_value()},
+      {"has_gain", !metrics.empty()},
+      {"metrics", std::move(metrics)},
+      {"has_maps", maps},
+      {"before", PageValue::html(maps ? page::pictureHtml(parts.before, "maps without " + finding.cause) : "")},
+      {"after", PageValue::html(maps ? page::pictureHtml(parts.after, "maps with " + finding.cause) : "")},
+      {"plan", PageValue::html(page::pictureHtml(
+                   parts.plan, "the room from above, with what " + finding.cause + " is about in red"))},
+      {"places", placeItems(finding, numbers, at)},
+      {"has_records", !records.empty()},
+      {"records", std::move(records)},
+      {"records_file", files.records}};
+  return item;
 }
 
-void writeHypotheses(const std::vector<TriedHypothesis>& tried, std::ostream& html) {
-  html << "<h2>Hypotheses</h2><p>Nats that the score test promised, and those that were "
-          "fitted.</p><table><tr><th>hypothesis"
-          "</th><th>round</th><th>promised</th><th>gain</th><th>what became of it</th><th></th></tr>";
-  double most_nats = 1;
-  for (const TriedHypothesis& hypothesis : tried) most_nats = std::max(most_nats, hypothesis.screened_nats);
-  int rows = 0;
-  for (const TriedHypothesis& hypothesis : tried) {
-    if (hypothesis.screened_nats < kLeastShown_nats || ++rows > kMostHypotheses) continue;
-    html << "<tr><td>" << escaped(hypothesis.label) << "</td><td>" << hypothesis.round + 1 << "</td><td>"
-         << shownNumber(hypothesis.screened_nats, 4) << "</td><td>" << shownNumber(hypothesis.gain, 4) << "</td><td>"
-         << escaped(hypothesis.verdict) << "</td><td><span class=\"bar\" style=\"width:"
-         << kBarWidth_em * std::sqrt(std::max(0.0, hypothesis.screened_nats) / most_nats) << "em\"></span></td></tr>";
+/// Number of a hypothesis as tried.csv has it in this row.
+PageValue triedNumber(double value, std::size_t row, const char* column) {
+  if (std::isnan(value)) return PageValue("\u2013");
+  return PageValue::html(page::numberHtml(shownNumber(value, 6), "tried.csv#" + std::to_string(row) + "/" + column,
+                                          page::significantText(value, 3)));
+}
+
+std::vector<PageValues> triedRows(const std::vector<TriedHypothesis>& tried) {
+  std::vector<PageValues> rows;
+  for (std::size_t i = 0; i < tried.size() && rows.size() < kMostTried; ++i) {
+    const TriedHypothesis& h = tried[i];
+    if (h.screened_nats < kLeastShown_nats) continue;
+    const bool fitted = !std::isnan(h.gain);
+    rows.push_back({{"what", h.label},
+                    {"round", std::to_string(h.round + 1)},
+                    {"gain", triedNumber(h.gain, i, "gain_nats")},
+                    {"verdict", !h.verdict.empty() ? h.verdict
+                                : fitted           ? "another one gained more"
+                                                   : "not fitted"}});
   }
-  html << "</table>";
+  return rows;
+}
+
+std::vector<PageValues> accuracyRows(const PageNumbers& numbers) {
+  std::vector<PageValues> rows;
+  for (const AccuracyKey& key : accuracyKeys()) {
+    const std::string at = std::string("/accuracy/") + key.name;
+    rows.push_back({{"key", key.name},
+                    {"stated", PageValue::html(numbers.significant(at + "/stated"))},
+                    {"estimated", PageValue::html(numbers.significant(at + "/estimated"))}});
+  }
+  return rows;
+}
+
+std::vector<PageValues> comparedItems(const PageNumbers& summary) {
+  std::vector<PageValues> items;
+  for (std::size_t i = 0; i < summary.values()["compared"].size(); ++i) {
+    const std::string at = "/compared/" + std::to_string(i);
+    items.push_back(
+        {{"file", summary.values()["compared"][i]["file"].get<std::string>()},
+         {"sentence", PageValue::html("explains " + summary.percent(at + "/explained_power") +
+                                      " of the measured power; the recording is likelier under it by " +
+                                      summary.significant(at + "/log_likelihood_gain") + " " + wordOf("nats", "nat") +
+                                      " (" + summary.interval(at + "/log_likelihood_gain_ci95") +
+                                      " by places; below zero: less likely)")}});
+  }
+  return items;
+}
+
+/// What to do, the most useful first.
+std::vector<PageValues> stepItems(const Diagnosis& diagnosis, const CauseWords& words, const PageNumbers& numbers) {
+  std::vector<PageValues> steps;
+  const auto add = [&](const std::string& html) { steps.push_back({{"step", PageValue::html(html)}}); };
+  const std::vector<Finding>& found = diagnosis.findings.findings;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const std::string about = found.size() > 1 ? "<b>" + htmlEscape(found[i].cause) + ":</b> " : "";
+    if (found[i].experiment)
+      add(about + "Measure what tells the names apart: " + htmlEscape(*found[i].experiment) + ".");
+    add(about + words.toDo(found[i], i, numbers));
+  }
+  return steps;
 }
 
 }  // namespace
 
-std::string diagnosisPage(const Diagnosis& diagnosis, const std::vector<FindingFiles>& files,
-                          const std::vector<std::string>& command) {
-  std::ostringstream html;
-  writeHead(diagnosis, html);
-  for (std::size_t i = 0; i < diagnosis.findings.findings.size(); ++i) {
-    writeFinding(diagnosis.findings.findings[i], i + 1, files[i], html);
+nlohmann::json diagnosisSummary(const Diagnosis& diagnosis, const RunDescription& run) {
+  nlohmann::json j;
+  j["format"] = "mmradartwin_diagnosis_summary/1";
+  j["version"] = run.version;
+  j["command"] = run.command;
+  j["recording"] = run.recording;
+  j["explained_power"] = diagnosis.has_twin && std::isfinite(diagnosis.explained_power)
+                             ? nlohmann::json(diagnosis.explained_power)
+                             : nlohmann::json(nullptr);
+  j["tried"] = diagnosis.tried.size();
+  j["compared"] = nlohmann::json::array();
+  for (const ComparedTwin& twin : diagnosis.compared) {
+    j["compared"].push_back({{"file", twin.file},
+                             {"log_likelihood_gain", twin.log_likelihood_gain},
+                             {"log_likelihood_gain_ci95", twin.log_likelihood_gain_ci95},
+                             {"explained_power", twin.explained_power}});
   }
-  writeHypotheses(diagnosis.tried, html);
-  html << "<h2>Run</h2><p>mmradartwin " << escaped(packageVersion()) << "</p><pre>";
-  for (const std::string& word : command) html << escaped(word) << " ";
-  html << "</pre>";
-  return html.str();
+  j["problems"] = nlohmann::json::array();
+  for (const PoseProblem& p : diagnosis.problems) j["problems"].push_back({{"pose", p.pose}, {"message", p.message}});
+  j["inputs"] = nlohmann::json::array();
+  for (const InputFile& f : run.inputs) j["inputs"].push_back({{"file", f.file}, {"sha256", f.sha256}});
+  return j;
+}
+
+page::PageTemplate diagnosisTemplate(const page::TemplateText& text) {
+  return {"diagnosis.html", text, page::pageNames(std::string(kNames) + page::kRunNames), page::docsGlossary()};
+}
+
+std::string diagnosisPage(const page::PageTemplate& page, const CauseWords& words, const Diagnosis& diagnosis,
+                          const nlohmann::json& findings, const nlohmann::json& summary,
+                          const std::vector<FindingFiles>& files, const RunDescription& run) {
+  const PageNumbers numbers(findings, "findings.json"), of_summary(summary, "summary.json");
+  PageValues values;
+  page::addRunValues(run, diagnosis.problems, values);
+  values["recording_word"] = page::shellWord(run.recording);
+  values["answer"] = PageValue::html(diagnosisAnswer(diagnosis, words, findings, summary));
+  values["pose_count"] = PageValue::html(numbers.count("/poses/count"));
+  values["location_count"] = PageValue::html(numbers.count("/poses/locations"));
+  values["held_out"] = diagnosis.findings.held_out;
+  values["has_twin"] = diagnosis.has_twin;
+  values["no_twin"] = !diagnosis.has_twin;
+  values["steps"] = stepItems(diagnosis, words, numbers);
+  std::vector<PageValues> items;
+  for (std::size_t i = 0; i < files.size(); ++i) items.push_back(findingItem(diagnosis, i, words, numbers, files[i]));
+  values["has_findings"] = !items.empty();
+  values["findings"] = std::move(items);
+  std::vector<PageValues> tried = triedRows(diagnosis.tried);
+  values["has_tried"] = !tried.empty();
+  values["tried"] = std::move(tried);
+  values["tried_count"] = PageValue::html(of_summary.count("/tried"));
+  values["accuracy"] = diagnosis.has_twin ? accuracyRows(numbers) : std::vector<PageValues>();
+  std::vector<PageValues> far_worse, compared = comparedItems(of_summary);
+  for (const std::string& sentence : shownFarWorse(diagnosis.findings)) far_worse.push_back({{"sentence", sentence}});
+  values["far_worse"] = std::move(far_worse);
+  values["has_compared"] = !compared.empty();
+  values["compared"] = std::move(compared);
+  return page.render(values);
 }
 
 }  // namespace mmradartwin::diagnosis::report

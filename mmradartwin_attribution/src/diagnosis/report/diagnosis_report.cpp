@@ -6,11 +6,13 @@
 #include <map>
 #include <sstream>
 
+#include "diagnosis/report/diagnosis_answer.h"
 #include "diagnosis/report/diagnosis_page.h"
 #include "diagnosis/report/finding_figure.h"
 #include "diagnosis/report/finding_words.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/map_picture.h"
+#include "page/shipped_templates.h"
 
 namespace mmradartwin {
 
@@ -102,9 +104,21 @@ std::vector<FindingFiles> filesOf(const std::vector<Finding>& findings) {
 
 }  // namespace
 
-DiagnosisReport::DiagnosisReport(const std::string& directory) : directory_(directory) { makeFolder(directory); }
+/// The report's template and the words for causes, read and checked.
+struct DiagnosisReport::Page {
+  page::PageTemplate diagnosis;
+  CauseWords words;
+};
 
-void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::string>& command) const {
+DiagnosisReport::DiagnosisReport(const std::string& directory, const std::string& templates)
+    : directory_(directory),
+      page_(new Page{diagnosisTemplate(page::templatesOf(templates)), CauseWords(page::templatesOf(templates))}) {
+  makeFolder(directory);
+}
+
+DiagnosisReport::~DiagnosisReport() = default;
+
+void DiagnosisReport::write(const Diagnosis& diagnosis, const RunDescription& run) const {
   removeEarlier(directory_);
   Findings findings = diagnosis.findings;
   const std::vector<FindingFiles> files = filesOf(findings.findings);
@@ -123,7 +137,12 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const std::vector<std::s
   }
   writeFindings(findings, directory_ + "/findings.json");
   save(directory_ + "/tried.csv", triedCsv(diagnosis.tried));
-  save(directory_ + "/index.html", diagnosisPage(diagnosis, files, command));
+  const nlohmann::json as_written = nlohmann::json::parse(toJson(findings));
+  nlohmann::json summary = diagnosisSummary(diagnosis, run);
+  summary["answer"] = page::shownText(diagnosisAnswer(diagnosis, page_->words, as_written, summary));
+  save(directory_ + "/summary.json", summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  save(directory_ + "/report.html",
+       diagnosisPage(page_->diagnosis, page_->words, diagnosis, as_written, summary, files, run));
 }
 
 }  // namespace mmradartwin

@@ -1,6 +1,7 @@
 #include "diagnosis/report/finding_figure.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <set>
@@ -12,34 +13,43 @@
 namespace mmradartwin::diagnosis::report {
 namespace {
 
-constexpr int kHeight_px = 470, kMargin_px = 34;
-constexpr double kLimit_db = 12;  ///< end of the maps' colour scale
+constexpr int kHeight_px = 470;
+constexpr double kLargeLetters = 1.7;  ///< of the parts one by one, against those of the whole figure
+constexpr double kLimit_db = 12;       ///< end of the maps' colour scale
 const cv::Scalar kPaper(255, 255, 255), kInk(40, 40, 40), kSoft(205, 205, 205), kWall(150, 150, 150),
     kBlue(200, 100, 20), kRed(30, 30, 220), kFaint(170, 170, 240);
 
 /// A part of the map, drawn with x to the right and y up.
 class PlanView {
  public:
-  explicit PlanView(const Eigen::AlignedBox2d& shown)
+  PlanView(const Eigen::AlignedBox2d& shown, double letters)
       : shown_(shown),
-        px_per_m_((kHeight_px - 2 * kMargin_px) / std::max(shown.sizes().x() / kWidest, shown.sizes().y())),
-        picture_(kHeight_px, 2 * kMargin_px + static_cast<int>(px_per_m_ * shown.sizes().x()), CV_8UC3, kPaper) {}
+        letters_(letters),
+        margin_px_(static_cast<int>(34 * letters)),
+        px_per_m_((kHeight_px - 2 * margin_px_) / std::max(shown.sizes().x() / kWidest, shown.sizes().y())),
+        picture_(kHeight_px, 2 * margin_px_ + static_cast<int>(px_per_m_ * shown.sizes().x()), CV_8UC3, kPaper) {}
   cv::Point at(const Eigen::Vector2d& p_m) const {
-    return {kMargin_px + static_cast<int>(std::lround(px_per_m_ * (p_m.x() - shown_.min().x()))),
-            kHeight_px - kMargin_px - static_cast<int>(std::lround(px_per_m_ * (p_m.y() - shown_.min().y())))};
+    return {margin_px_ + static_cast<int>(std::lround(px_per_m_ * (p_m.x() - shown_.min().x()))),
+            kHeight_px - margin_px_ - static_cast<int>(std::lround(px_per_m_ * (p_m.y() - shown_.min().y())))};
   }
   void line(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m, const cv::Scalar& color, int width_px) {
     cv::line(picture_, at(from_m), at(to_m), color, width_px, cv::LINE_AA);
   }
   void text(const std::string& words, const cv::Point& at_px, const cv::Scalar& color) {
-    cv::putText(picture_, words, at_px, cv::FONT_HERSHEY_SIMPLEX, 0.4, color, 1, cv::LINE_AA);
+    cv::putText(picture_, words, at_px, cv::FONT_HERSHEY_SIMPLEX, 0.4 * letters_, color, letters_ > 1.5 ? 2 : 1,
+                cv::LINE_AA);
   }
+  /// A shift of a text by so much at the usual size of letters.
+  cv::Point beside(double x_px, double y_px) const { return {cvRound(x_px * letters_), cvRound(y_px * letters_)}; }
+  int margin_px() const { return margin_px_; }
   double px_per_m() const { return px_per_m_; }
   cv::Mat& picture() { return picture_; }
 
  private:
   static constexpr double kWidest = 1.6;  ///< width over height
   Eigen::AlignedBox2d shown_;
+  double letters_;
+  int margin_px_;
   double px_per_m_;
   cv::Mat picture_;
 };
@@ -57,11 +67,13 @@ void drawGrid(PlanView& view, const Eigen::AlignedBox2d& shown) {
   const double step = std::max(1.0, std::ceil(shown.sizes().maxCoeff() / 12));
   for (double x = shown.min().x(); x <= shown.max().x(); x += step) {
     view.line({x, shown.min().y()}, {x, shown.max().y()}, kSoft, 1);
-    view.text(cv::format("%g", x), view.at({x, shown.min().y()}) + cv::Point(-4, 15), kInk);
+    const std::string number = cv::format("%g", x);
+    const double half_px = 4.0 * static_cast<double>(number.size());
+    view.text(number, view.at({x, shown.min().y()}) + view.beside(-half_px, 15), kInk);
   }
   for (double y = shown.min().y(); y <= shown.max().y(); y += step) {
     view.line({shown.min().x(), y}, {shown.max().x(), y}, kSoft, 1);
-    view.text(cv::format("%g", y), view.at({shown.min().x(), y}) + cv::Point(-20, 4), kInk);
+    view.text(cv::format("%g", y), view.at({shown.min().x(), y}) + view.beside(-20, 4), kInk);
   }
 }
 
@@ -82,7 +94,7 @@ std::set<std::string> actorsOf(const Finding& f) {
   return names;
 }
 
-cv::Mat drawPlan(const Finding& f, const SurveyPlan& plan) {
+cv::Mat drawPlan(const Finding& f, const SurveyPlan& plan, double letters) {
   std::vector<Eigen::Vector2d> places;
   std::set<std::string> poses;
   for (const FindingPlace& place : f.where) {
@@ -91,7 +103,7 @@ cv::Mat drawPlan(const Finding& f, const SurveyPlan& plan) {
   }
   const std::set<std::string> actors = actorsOf(f);
   const Eigen::AlignedBox2d shown = extent(plan, places);
-  PlanView view(shown);
+  PlanView view(shown, letters);
   drawGrid(view, shown);
   for (const SurveyPlan::Wall& w : plan.walls) view.line(w.from_m, w.to_m, kWall, 1);
   const bool moved = traitsOf(f.cause).form == MechanismForm::kActorMoved && f.mechanism && places.size() == 1;
@@ -116,32 +128,45 @@ cv::Mat drawPlan(const Finding& f, const SurveyPlan& plan) {
     cv::ellipse(view.picture(), view.at(p), cv::Size(static_cast<int>(x) + 1, static_cast<int>(y) + 1), 0, 0, 360, kRed,
                 1, cv::LINE_AA);
   }
+  if (letters > 1) return view.picture();  // what the colours mean stands beside it
   view.text(std::string("map [m]") + (poses.empty() ? "" : "; blue: poses that carry it most") +
                 (moved                              ? "; red: where it stands"
                  : actors.empty() && places.empty() ? ""
                                                     : "; red: what it is about"),
-            {kMargin_px, 18}, kInk);
+            {view.margin_px(), 18}, kInk);
   return view.picture();
 }
 
-}  // namespace
-
-cv::Mat drawFinding(const Finding& finding, const SurveyPlan& plan) {
-  const cv::Mat survey = drawPlan(finding, plan);
-  if (!finding.maps) return survey;
+/// Maps without and with the finding; empty ones where it has none.
+std::array<cv::Mat, 2> drawMaps(const Finding& finding, double letters) {
+  if (!finding.maps) return {};
   FanStyle style;
   style.diverging = true;
   style.max_db = kLimit_db;
   style.min_db = -kLimit_db;
   style.height_px = kHeight_px;
+  style.letters = letters;
   style.max_range_m = std::min(10.0, std::ceil(finding.maps->axes.range_m.back()));
-  style.title = "simulated - measured, without it";
+  if (letters == 1) style.title = "simulated - measured, without it";
   const cv::Mat before = drawFan(finding.maps->axes, finding.maps->before_db, style);
-  style.title = "with " + finding.cause;
-  const cv::Mat after = drawFan(finding.maps->axes, finding.maps->after_db, style);
+  if (letters == 1) style.title = "with " + finding.cause;
+  return {before, drawFan(finding.maps->axes, finding.maps->after_db, style)};
+}
+
+}  // namespace
+
+cv::Mat drawFinding(const Finding& finding, const SurveyPlan& plan) {
+  const cv::Mat survey = drawPlan(finding, plan, 1);
+  if (!finding.maps) return survey;
+  const auto [before, after] = drawMaps(finding, 1);
   cv::Mat all;
   cv::hconcat(std::vector<cv::Mat>{before, after, survey}, all);
   return all;
+}
+
+FindingParts drawFindingParts(const Finding& finding, const SurveyPlan& plan) {
+  const auto [before, after] = drawMaps(finding, kLargeLetters);
+  return {before, after, drawPlan(finding, plan, kLargeLetters)};
 }
 
 }  // namespace mmradartwin::diagnosis::report
