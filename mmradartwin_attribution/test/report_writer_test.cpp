@@ -296,7 +296,9 @@ TEST(ReportTemplates, AreThoseOfTheFolder) {
     ReportWriter(out.path(), templates.path());
     FAIL() << "an unknown name";
   } catch (const InputError& error) {
-    EXPECT_EQ(std::string(error.what()).rfind("mine.html:2: there is no name 'nothing'; known here: actors, ", 0), 0u)
+    EXPECT_EQ(std::string(error.what())
+                  .rfind(templates.path() + "/mine.html:2: there is no name 'nothing'; known here: actors, ", 0),
+              0u)
         << error.what();
   }
   std::ofstream(templates.path() + "/mine.html") << "{{version}} of mine";

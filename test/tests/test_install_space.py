@@ -89,6 +89,8 @@ class InstallSpace(unittest.TestCase):
         self.run_there("rosrun mmradartwin_sim simulate session --output simulated")
         self.run_there("rosrun mmradartwin_attribution evaluate session --output report")
         self.assertTrue(os.path.isfile(os.path.join(self.stage, "report", "report.html")))
+        self.run_there('cp -r "$(rospack find mmradartwin_attribution)/report" templates && '
+                       "rosrun mmradartwin_attribution evaluate session --report-templates templates --output again")
 
     def test_a_bag_is_replayed_there(self):
         self.make_session()

@@ -186,6 +186,23 @@ class ReportPage(unittest.TestCase):
                                     ("ink", "warn"), ("paper", "ink")):
                 self.assertGreaterEqual(contrast(color[letters], color[ground]), LEAST_CONTRAST, f"{letters} on {ground}")
 
+    def test_templates_may_be_changed(self):
+        folder = self.at("templates")
+        os.makedirs(folder)
+        evaluate = find_program("mmradartwin_attribution", "evaluate")
+        command = [evaluate, self.at("session"), "--no-bag", "--no-pictures", "--report-templates", folder,
+                   "--output", self.at("mine")]
+        wrong = f"{folder}/evaluation.html:2: there is no name 'anser'; did you mean 'answer'?"
+        for text, status, said in (("<p>{{answer}}</p>\n{{anser}}", 2, wrong), ("<p>mine: {{answer}}</p>", 0, "")):
+            with open(os.path.join(folder, "evaluation.html"), "w", encoding="utf-8") as file:
+                file.write(text)
+            run = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+            self.assertEqual(run.returncode, status, run.stderr)
+            self.assertIn(said, run.stderr)
+            self.assertEqual(os.path.exists(self.at("mine", "report.html")), status == 0)
+        with open(self.at("mine", "report.html"), encoding="utf-8") as file:
+            self.assertTrue(file.read().startswith("<p>mine: The twin explains <data "))
+
     @unittest.skipIf(CHROMIUM is None, "needs Debian's chromium")
     def test_fits_a_phone_and_a_desk(self):
         for name, page in self.pages.items():

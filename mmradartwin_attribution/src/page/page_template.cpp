@@ -61,7 +61,8 @@ class PageTemplate::Reader {
   std::vector<Node> read(const std::string& file) {
     if (++depth_ > kMostIncludes) throw InputError(file + ": includes itself");
     const Place outer = place_;
-    place_ = {file, text_(file), 0, 1};
+    const TemplateFile read = text_(file);
+    place_ = {read.name.empty() ? file : read.name, read.text, 0, 1};
     std::vector<Node> nodes = nodesUpTo("");
     place_ = outer;
     --depth_;

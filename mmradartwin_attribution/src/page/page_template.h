@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "page/glossary.h"
@@ -18,8 +19,14 @@ struct PageNames {
 /// From "title poses[name picture] command": words, those of a list's items in brackets behind it.
 PageNames pageNames(const std::string& text);
 
-/// The text of a template by its file's name. Throws InputError where there is none.
-using TemplateText = std::function<std::string(const std::string& file)>;
+/// What a file of templates holds, and what errors call it; "" for its own name.
+struct TemplateFile {
+  TemplateFile(std::string text, std::string name = "")  // NOLINT(google-explicit-constructor): a text is one
+      : text(std::move(text)), name(std::move(name)) {}
+  std::string text, name;
+};
+/// A template by its file's name. Throws InputError where there is none.
+using TemplateText = std::function<TemplateFile(const std::string& file)>;
 
 /// A page with gaps, as files that a person can edit hold it:
 ///   {{name}}                    a value; a text is escaped for HTML

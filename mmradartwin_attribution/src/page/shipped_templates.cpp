@@ -29,12 +29,13 @@ const Glossary& docsGlossary() {
 TemplateText templatesOf(const std::string& folder) {
   if (folder.empty()) return shippedTemplate;
   if (!std::filesystem::is_directory(folder)) throw InputError(folder + ": is no folder with templates of the report");
-  return [folder](const std::string& file) {
-    std::ifstream in(std::filesystem::path(folder) / file);
+  return [folder](const std::string& file) -> TemplateFile {
+    const std::string path = (std::filesystem::path(folder) / file).string();
+    std::ifstream in(path);
     if (!in) return shippedTemplate(file);
     std::ostringstream text;
     text << in.rdbuf();
-    return text.str();
+    return {text.str(), path};
   };
 }
 

@@ -96,8 +96,9 @@ TEST(ShippedTemplates, AreTakenWhereAFolderLacksAFile) {
   const TemporaryFolder folder;
   std::ofstream(std::filesystem::path(folder.path()) / "run.html") << "mine";
   const TemplateText text = templatesOf(folder.path());
-  EXPECT_EQ(text("run.html"), "mine");
-  EXPECT_EQ(text("head.html"), shippedTemplate("head.html"));
+  EXPECT_EQ(text("run.html").text, "mine");
+  EXPECT_EQ(text("run.html").name, folder.path() + "/run.html") << "what errors call it";
+  EXPECT_EQ(text("head.html").text, shippedTemplate("head.html"));
   EXPECT_THROW(text("other.html"), InputError);
   EXPECT_THROW(templatesOf(folder.path() + "/none"), InputError);
 }

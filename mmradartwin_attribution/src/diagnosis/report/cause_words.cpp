@@ -40,7 +40,8 @@ page::PageNames namesOf(const std::string& cause) {
 }
 
 /// A cell as a template whose errors name its line; `code` in Markdown's way becomes HTML.
-page::PageTemplate cellTemplate(const std::string& cell, int line, const page::PageNames& names) {
+page::PageTemplate cellTemplate(const std::string& cell, const std::string& file, int line,
+                                const page::PageNames& names) {
   std::string text(static_cast<std::size_t>(line - 1), '\n');
   bool code = false;
   for (char c : cell) {
@@ -51,7 +52,7 @@ page::PageTemplate cellTemplate(const std::string& cell, int line, const page::P
       text += c;
     }
   }
-  return {kFile, [&](const std::string&) { return text; }, names, page::docsGlossary()};
+  return {file, [&](const std::string&) { return text; }, names, page::docsGlossary()};
 }
 
 std::string withoutLines(const std::string& text) {
@@ -107,7 +108,9 @@ std::string parameterHtml(const FindingParameter& parameter, std::size_t finding
 }
 
 CauseWords::CauseWords(const page::TemplateText& text) {
-  std::istringstream lines(text(kFile));
+  const page::TemplateFile file = text(kFile);
+  const std::string name = file.name.empty() ? kFile : file.name;
+  std::istringstream lines(file.text);
   bool in_table = false;
   int number = 0;
   for (std::string line; std::getline(lines, line);) {
@@ -115,7 +118,7 @@ CauseWords::CauseWords(const page::TemplateText& text) {
     const std::vector<std::string> cells = cellsOf(line);
     if (line.rfind("|-", 0) == 0) in_table = true;
     if (!in_table || cells.empty()) continue;
-    const std::string place = std::string(kFile) + ":" + std::to_string(number) + ": ";
+    const std::string place = name + ":" + std::to_string(number) + ": ";
     if (cells.size() != 3) throw InputError(place + "a row has three cells: cause, what is wrong, what to do");
     if (cells[0] != kOthers && !isCatalogued(cells[0])) {
       std::vector<std::string> known;
@@ -124,10 +127,11 @@ CauseWords::CauseWords(const page::TemplateText& text) {
                        "known: " + mmradartwin::join(known, ", "));
     }
     const page::PageNames names = namesOf(cells[0]);
-    rows_.insert_or_assign(cells[0], Row{cellTemplate(cells[1], number, names), cellTemplate(cells[2], number, names)});
+    rows_.insert_or_assign(
+        cells[0], Row{cellTemplate(cells[1], name, number, names), cellTemplate(cells[2], name, number, names)});
   }
   if (rows_.count(kOthers) == 0) {
-    throw InputError(std::string(kFile) + ": lacks the row '*', of causes without a row of their own");
+    throw InputError(name + ": lacks the row '*', of causes without a row of their own");
   }
 }
 
