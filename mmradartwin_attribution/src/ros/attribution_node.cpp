@@ -1,6 +1,7 @@
 #include "mmradartwin_attribution/ros/attribution_node.h"
 
 #include <dynamic_reconfigure/Reconfigure.h>
+#include <mmradartwin_msgs/DetectionAgreement.h>
 #include <mmradartwin_msgs/Ledger.h>
 #include <mmradartwin_msgs/Residuals.h>
 #include <visualization_msgs/MarkerArray.h>
@@ -58,6 +59,7 @@ AttributionNode::AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& priv
   scene_markers_ = nh_.advertise<visualization_msgs::MarkerArray>(
       "attribution/scene_markers", 1, [this](const ros::SingleSubscriberPublisher&) { onSceneViewer(); },
       ros::SubscriberStatusCallback(), ros::VoidConstPtr(), true);
+  detections_ = std::make_unique<DetectionPublisher>(nh_, settings_.detections);
   subscribers_.push_back(nh_.subscribe("radar/config", 1, &AttributionNode::onRadar, this));
   subscribers_.push_back(nh_.subscribe("session", 1, &AttributionNode::onSession, this));
   subscribers_.push_back(nh_.subscribe("twin/paths", 10, &AttributionNode::onPaths, this));
@@ -81,6 +83,7 @@ AttributionNode::Settings::Settings(StrictParameters& parameters) {
   map_frame = parameters.text("map_frame", "map", "tf frame of the scene");
   markers_hz = parameters.number("markers_hz", 2, 1e-3, 100, "markers and ledgers come so often at most, Hz");
   max_paths = parameters.integer("max_paths", 60, 0, 2000, "strongest paths that are shown");
+  detections = DetectionPublisher::Settings(parameters);
   parameters.ofDiagnosticUpdater();
 }
 
@@ -102,6 +105,9 @@ NodeDescription AttributionNode::description() {
        topic<visualization_msgs::MarkerArray>("attribution/markers",
                                               "the radar, boxes on the floor and paths for rviz"),
        topic<visualization_msgs::MarkerArray>("attribution/scene_markers", "the scene for rviz; latched"),
+       topic<sensor_msgs::PointCloud2>("radar/points", "what CFAR detects in the measured map"),
+       topic<sensor_msgs::PointCloud2>("twin/points", "what it detects in the simulated map"),
+       topic<mmradartwin_msgs::DetectionAgreement>("attribution/detection_agreement", "how both agree"),
        topic<dynamic_reconfigure::ConfigDescription>("~tuning/parameter_descriptions",
                                                      "what can be tuned by eye; latched"),
        topic<dynamic_reconfigure::Config>("~tuning/parameter_updates", "what it is tuned to; latched"),
@@ -155,6 +161,7 @@ void AttributionNode::onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg
   try {
     radar_ = std::make_unique<RadarConfig>(fromMsg(*msg));
     radar_hash_ = radarHash(*msg);
+    detections_->setRadar(*radar_);
     if (!settings_.scene_file.empty()) {
       setScene(loadScene(settings_.scene_file, radar_->center_frequency_hz()));
       scene_due_ = true;
@@ -233,6 +240,7 @@ void AttributionNode::onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, 
     newest_ns_.reset();
   }
   if (measured) newest_ns_ = std::max(stamp, newest_ns_.value_or(stamp));
+  if (measured) publishPoints(*msg);
   // What is still on its way from before a jump back would stand before all that comes, and push it out.
   if (!measured && newest_ns_ && stamp > *newest_ns_ + kWentBack_ns) return;
   const auto match = other.find(stamp);
@@ -247,10 +255,24 @@ void AttributionNode::onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, 
   last_simulated_ = measured ? sameInOtherList : msg;
   try {
     problem_.clear();
+    if (field_ && last_measured_->radar_hash == radar_hash_ && last_simulated_->radar_hash == radar_hash_) {
+      detections_->publishPair(*field_, *last_measured_, *last_simulated_);
+    }
     compare(measured ? *msg : *sameInOtherList, measured ? *sameInOtherList : *msg);
   } catch (const std::exception& error) {
     problem_ = error.what();
     ROS_WARN_THROTTLE(5, "maps of %s: %s", formatStamp(stamp).c_str(), error.what());
+  }
+}
+
+// Of a map alone: a radar has points without any twin.
+void AttributionNode::publishPoints(const MapMsg& measured_msg) {
+  if (measured_msg.radar_hash != radar_hash_) return;
+  try {
+    detections_->publishMeasured(measured_msg);
+  } catch (const std::exception& error) {
+    ROS_WARN_THROTTLE(5, "points of %s: %s", formatStamp(toNanoseconds(measured_msg.header.stamp)).c_str(),
+                      error.what());
   }
 }
 

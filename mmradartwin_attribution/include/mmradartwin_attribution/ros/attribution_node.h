@@ -23,6 +23,7 @@
 #include "mmradartwin_attribution/live_ledger.h"
 #include "mmradartwin_attribution/response.h"
 #include "mmradartwin_attribution/response_region.h"
+#include "mmradartwin_attribution/ros/detection_publisher.h"
 #include "mmradartwin_attribution/ros/markers.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/ros/node_program.h"
@@ -35,7 +36,8 @@ namespace mmradartwin {
 using TuningConfig = mmradartwin_attribution::TuningConfig;  // made of cfg/Tuning.cfg
 
 /// radar/config, session, twin/scene, twin/moved_scene, twin/paths, radar/range_angle, twin/range_angle ->
-/// attribution/residuals, attribution/residual_map, attribution/ledger, attribution/markers, attribution/scene_markers.
+/// attribution/residuals, attribution/residual_map, attribution/ledger, attribution/markers, attribution/scene_markers,
+/// radar/points, twin/points, attribution/detection_agreement.
 ///
 /// Matches measured and simulated maps by stamp and attributes what differs. Poses are named after the session's
 /// poses.csv; else the ledger names them after their stamp. The scene is that of the parameter `scene`, else of
@@ -58,6 +60,7 @@ class AttributionNode {
     std::string config_file, scene_file, radar_frame, map_frame;
     double markers_hz;
     int max_paths;
+    DetectionPublisher::Settings detections;
   };
 
   void onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg);
@@ -81,6 +84,7 @@ class AttributionNode {
   void beginAnew();
   void publishLedger(const ros::Time& stamp);
   const std::vector<ResponseRegion>& regionsAt(const Eigen::Isometry3d& T);
+  void publishPoints(const MapMsg& measured_msg);
   void compare(const MapMsg& measured_msg, const MapMsg& simulated_msg);
   /// Of the session's pose, empty where none is defined.
   std::string nameAt(std::int64_t stamp_ns) const;
@@ -98,6 +102,7 @@ class AttributionNode {
   std::unique_ptr<dynamic_reconfigure::Server<TuningConfig>> tuning_;
   std::string twin_yaml_;
   ros::Publisher residuals_, residual_map_, ledger_, markers_, scene_markers_;
+  std::unique_ptr<DetectionPublisher> detections_;
   std::vector<ros::Subscriber> subscribers_;
   ros::Subscriber measured_subscriber_, simulated_subscriber_;
   TopicWatch measured_heard_{"the signal chain"}, simulated_heard_{"the twin, and the signal chain"};
