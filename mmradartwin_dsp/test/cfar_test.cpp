@@ -264,13 +264,43 @@ TEST(CfarDetections, SidelobesOfAStrongTargetAreNone) {
   EXPECT_GT(Cfar(settings, radar).detect(map).size(), 3u);
 }
 
+TEST_P(CfarOfKind, DetectionsAreTheLocalMaximaAboveTheThresholds) {
+  const RadarConfig radar = paperRadar();
+  CfarSettings settings = settingsOf(GetParam());
+  settings.false_alarm_rate = 0.02;
+  settings.sidelobe_db = 400;
+  const Cfar cfar(settings, radar);
+  Receiver receiver(radar, 20);
+  ReceiveGrid grid;
+  grid.x = receiver.grid();
+  const RangeAngleMap map = SignalChain(radar).map(grid);
+  const Cfar::Levels levels = cfar.levels(map.power_db);
+  int expected = 0;
+  const std::vector<Detection> found = cfar.detect(map);
+  for (int r = 0; r < 64; ++r) {
+    for (int a = 0; a < 64; ++a) {
+      const int top = std::max(r - 1, 0), left = std::max(a - 4, 0);
+      const double around_db =
+          map.power_db.block(top, left, std::min(r + 1, 63) - top + 1, std::min(a + 4, 63) - left + 1).maxCoeff();
+      if (map.power_db(r, a) < around_db || map.power_db(r, a) <= levels.threshold_db(r, a)) continue;
+      ASSERT_LT(expected, static_cast<int>(found.size()));
+      const Detection& detection = found[static_cast<std::size_t>(expected++)];
+      EXPECT_EQ(detection.range_bin, r);
+      EXPECT_EQ(detection.angle_bin, a);
+      EXPECT_NEAR(detection.snr_db, map.power_db(r, a) - levels.noise_db(r, a), 1e-9);
+    }
+  }
+  EXPECT_GT(expected, 3);
+  EXPECT_EQ(expected, static_cast<int>(found.size()));
+}
+
 TEST(CfarFloor, IsTheReceiversWhereATenthOfTheMapIsNoise) {
   const Cfar cfar(settingsOf(CfarKind::kCellAveraging), paperRadar());
   RangeAngleMap map = flatMap(-60);
   map.power_db.bottomRows(30).setConstant(-95);
-  EXPECT_NEAR(noiseFloor_db(cfar, map.power_db), -95, 1e-9);
+  EXPECT_NEAR(cfar.noiseFloor_db(map.power_db), -95, 1e-9);
   map.power_db.setConstant(std::numeric_limits<double>::quiet_NaN());
-  EXPECT_TRUE(std::isnan(noiseFloor_db(cfar, map.power_db)));
+  EXPECT_TRUE(std::isnan(cfar.noiseFloor_db(map.power_db)));
 }
 
 TEST(CfarSettings, ValuesOutOfRangeAreRefused) {

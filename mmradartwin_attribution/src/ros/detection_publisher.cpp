@@ -92,7 +92,7 @@ void DetectionPublisher::publishPair(const EvaluationField& field, const mmradar
   const bool agreement_wanted = agreement_.getNumSubscribers() > 0;
   if (!cfar_ || (simulated_.getNumSubscribers() == 0 && !agreement_wanted)) return;
   const RangeAngleMap measured = fromMsg(measured_msg), simulated = fromMsg(simulated_msg);
-  const double floor_db = noiseFloor_db(*cfar_, measured.power_db);
+  const double floor_db = cfar_->noiseFloor_db(measured.power_db);
   // One gain lies between the branches, which the peaks tell as they do for residuals.
   const double gain_db = field.normalise(simulated).peak_db - field.normalise(measured).peak_db;
   const std::vector<Detection> simulated_detections = cfar_->detect(simulated, floor_db + gain_db);

@@ -65,6 +65,9 @@ class Cfar {
   /// what the radar resolves. In order of range and angle.
   std::vector<Detection> detect(const RangeAngleMap& map,
                                 double least_noise_db = -std::numeric_limits<double>::infinity()) const;
+  /// The level of noise that a tenth of a map's independent cells stay below: what the receiver's own noise is at most.
+  /// A simulated map has none, and takes it from the measured one. NaN where no cell has a level.
+  double noiseFloor_db(const RealGrid& power_db) const;
   /// Training cells of a cell far from all edges.
   int trainingCells() const { return static_cast<int>(offsets_.size()); }
 
@@ -73,19 +76,22 @@ class Cfar {
     int range_bins, angle_bins;
   };
   struct Factor {
-    int rank = 0;                ///< OS: from 1
-    double noise_per_level = 0;  ///< noise power over the mean, or the cell of that rank
-    double threshold_per_noise = 0;
+    int rank = 0;                   ///< OS: from 1
+    double noise_per_level_db = 0;  ///< noise power over the mean, or the cell of that rank
+    double threshold_per_noise_db = 0;
   };
+  struct Level {
+    double noise_db = std::numeric_limits<double>::quiet_NaN();
+    double threshold_db = std::numeric_limits<double>::quiet_NaN();
+  };
+  /// Of a cell that is not masked, in a map of powers that are no levels; `training` is room for the cells around it.
+  Level levelAt(const RealGrid& power, Eigen::Index range_bin, Eigen::Index angle_bin, double least_noise_db,
+                std::vector<double>& training) const;
 
   CfarSettings settings_;
   std::vector<Offset> offsets_;
-  int peak_angle_bins_;          ///< half a beam
+  int beam_bins_ = 1;
   std::vector<Factor> factors_;  ///< by number of training cells
 };
-
-/// The level of noise that a tenth of the map's cells stay below: what the receiver's own noise is at most. A simulated
-/// map has none, and takes it from the measured one. NaN where no cell has a level.
-double noiseFloor_db(const Cfar& cfar, const RealGrid& power_db);
 
 }  // namespace mmradartwin

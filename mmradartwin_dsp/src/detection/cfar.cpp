@@ -25,6 +25,8 @@ void checkRange(const std::string& key, double value, double low, double high) {
 
 double decibels(double power) { return 10 * std::log10(power); }
 
+RealGrid linear(const RealGrid& power_db) { return (power_db.array() * (std::log(10.0) / 10)).exp(); }
+
 /// True where no cell within a bin of range and so many of angle is stronger; of equal ones the first counts.
 bool isLocalMaximum(const RealGrid& power_db, Eigen::Index r, Eigen::Index a, Eigen::Index angle_bins) {
   const Eigen::Index last_angle = std::min(a + angle_bins, power_db.cols() - 1);
@@ -98,8 +100,7 @@ Cfar::Cfar(const CfarSettings& settings, const RadarConfig& radar) : settings_(s
   check(settings);
   const VirtualLine line = radar.virtualLine();
   const int length = 1 + *std::max_element(line.places.begin(), line.places.end());
-  const int beam_bins = std::max(1, (kAngleBins + length - 1) / length);
-  peak_angle_bins_ = std::max(1, beam_bins / 2);
+  beam_bins_ = std::max(1, (kAngleBins + length - 1) / length);
   const auto bins = [&](double length_m) {
     return static_cast<int>(std::min<long>(std::lround(length_m / radar.range_bin_m()), radar.samples_per_chirp));
   };
@@ -111,53 +112,61 @@ Cfar::Cfar(const CfarSettings& settings, const RadarConfig& radar) : settings_(s
   for (int i = -farthest; i <= farthest; ++i) {
     for (int j = -beams; j <= beams; ++j) {
       if (std::abs(i) < nearest && std::abs(j) <= settings.guard_beams) continue;
-      if (std::abs(j) * beam_bins >= kAngleBins) continue;
-      offsets_.push_back({i * kIndependentRange_bins, j * beam_bins});
+      if (std::abs(j) * beam_bins_ >= kAngleBins) continue;
+      offsets_.push_back({i * kIndependentRange_bins, j * beam_bins_});
     }
   }
   factors_.resize(offsets_.size() + 1);
   for (int cells = 1; cells <= trainingCells(); ++cells) {
     Factor& factor = factors_[static_cast<std::size_t>(cells)];
     if (settings.kind == CfarKind::kCellAveraging) {
-      factor.noise_per_level = 1;
-      factor.threshold_per_noise = cellAveragingFactor(settings.false_alarm_rate, cells);
+      factor.threshold_per_noise_db = decibels(cellAveragingFactor(settings.false_alarm_rate, cells));
     } else {
       factor.rank = std::clamp(static_cast<int>(std::lround(settings.rank_share * cells)), 1, cells);
       const double mean = orderedStatisticMean(cells, factor.rank);
-      factor.noise_per_level = 1 / mean;
-      factor.threshold_per_noise = orderedStatisticFactor(settings.false_alarm_rate, cells, factor.rank) * mean;
+      factor.noise_per_level_db = -decibels(mean);
+      factor.threshold_per_noise_db =
+          decibels(orderedStatisticFactor(settings.false_alarm_rate, cells, factor.rank) * mean);
     }
   }
 }
 
+Cfar::Level Cfar::levelAt(const RealGrid& power, Eigen::Index range_bin, Eigen::Index angle_bin, double least_noise_db,
+                          std::vector<double>& training) const {
+  training.clear();
+  for (const Offset& offset : offsets_) {
+    const Eigen::Index i = range_bin + offset.range_bins, j = angle_bin + offset.angle_bins;
+    if (i < 0 || i >= power.rows() || j < 0 || j >= power.cols() || std::isnan(power(i, j))) continue;
+    training.push_back(power(i, j));
+  }
+  if (training.empty()) return {};
+  const Factor& factor = factors_[training.size()];
+  Level level;
+  if (settings_.kind == CfarKind::kCellAveraging) {
+    const double sum = std::accumulate(training.begin(), training.end(), 0.0);
+    level.noise_db = decibels(sum / static_cast<double>(training.size()));
+  } else {
+    const auto ranked = training.begin() + (factor.rank - 1);
+    std::nth_element(training.begin(), ranked, training.end());
+    level.noise_db = decibels(*ranked);
+  }
+  level.noise_db = std::max(level.noise_db + factor.noise_per_level_db, least_noise_db);
+  level.threshold_db = level.noise_db + factor.threshold_per_noise_db;
+  return level;
+}
+
 Cfar::Levels Cfar::levels(const RealGrid& power_db, double least_noise_db) const {
-  const RealGrid power = (power_db.array() * (std::log(10.0) / 10)).exp();
+  const RealGrid power = linear(power_db);
   Levels levels;
-  levels.noise_db = RealGrid::Constant(power.rows(), power.cols(), kNotANumber);
+  levels.noise_db = RealGrid::Constant(power_db.rows(), power_db.cols(), kNotANumber);
   levels.threshold_db = levels.noise_db;
-  std::vector<double> training(offsets_.size());
-  for (Eigen::Index r = 0; r < power.rows(); ++r) {
-    for (Eigen::Index a = 0; a < power.cols(); ++a) {
-      if (std::isnan(power(r, a))) continue;
-      std::size_t cells = 0;
-      for (const Offset& offset : offsets_) {
-        const Eigen::Index i = r + offset.range_bins, j = a + offset.angle_bins;
-        if (i < 0 || i >= power.rows() || j < 0 || j >= power.cols() || std::isnan(power(i, j))) continue;
-        training[cells++] = power(i, j);
-      }
-      if (cells == 0) continue;
-      const Factor& factor = factors_[cells];
-      const auto begin = training.begin(), end = begin + static_cast<std::ptrdiff_t>(cells);
-      double level;
-      if (settings_.kind == CfarKind::kCellAveraging) {
-        level = std::accumulate(begin, end, 0.0) / static_cast<double>(cells);
-      } else {
-        const auto ranked = begin + (factor.rank - 1);
-        std::nth_element(begin, ranked, end);
-        level = *ranked;
-      }
-      levels.noise_db(r, a) = std::max(decibels(level * factor.noise_per_level), least_noise_db);
-      levels.threshold_db(r, a) = levels.noise_db(r, a) + decibels(factor.threshold_per_noise);
+  std::vector<double> training;
+  for (Eigen::Index r = 0; r < power_db.rows(); ++r) {
+    for (Eigen::Index a = 0; a < power_db.cols(); ++a) {
+      if (std::isnan(power_db(r, a))) continue;
+      const Level level = levelAt(power, r, a, least_noise_db, training);
+      levels.noise_db(r, a) = level.noise_db;
+      levels.threshold_db(r, a) = level.threshold_db;
     }
   }
   return levels;
@@ -165,28 +174,36 @@ Cfar::Levels Cfar::levels(const RealGrid& power_db, double least_noise_db) const
 
 std::vector<Detection> Cfar::detect(const RangeAngleMap& map, double least_noise_db) const {
   const RealGrid& power_db = map.power_db;
-  const Levels found = levels(power_db, least_noise_db);
+  const RealGrid power = linear(power_db);
   const std::vector<double> strongest_db = strongestByRange_db(power_db);
+  const Eigen::Index half_beam_bins = std::max(1, beam_bins_ / 2);
   std::vector<Detection> detections;
+  std::vector<double> training;
   for (Eigen::Index r = 0; r < power_db.rows(); ++r) {
     const double least_db = strongest_db[static_cast<std::size_t>(r)] - settings_.sidelobe_db;
     for (Eigen::Index a = 0; a < power_db.cols(); ++a) {
-      // A masked cell has no threshold, and nothing is greater than that.
-      if (!(power_db(r, a) > found.threshold_db(r, a)) || power_db(r, a) < least_db) continue;
-      if (!isLocalMaximum(power_db, r, a, peak_angle_bins_)) continue;
+      // Few cells are left for the threshold, which takes longest. A masked cell is not at least anything.
+      if (!(power_db(r, a) >= least_db) || !isLocalMaximum(power_db, r, a, half_beam_bins)) continue;
+      const Level level = levelAt(power, r, a, least_noise_db, training);
+      // Without training cells there is no threshold, and nothing is greater than that.
+      if (!(power_db(r, a) > level.threshold_db)) continue;
       detections.push_back({static_cast<int>(r), static_cast<int>(a), map.axes.range_m[static_cast<std::size_t>(r)],
                             map.axes.azimuth_rad[static_cast<std::size_t>(a)], power_db(r, a),
-                            power_db(r, a) - found.noise_db(r, a)});
+                            power_db(r, a) - level.noise_db});
     }
   }
   return detections;
 }
 
-double noiseFloor_db(const Cfar& cfar, const RealGrid& power_db) {
-  const RealGrid noise_db = cfar.levels(power_db).noise_db;
-  std::vector<double> known_db;
-  for (Eigen::Index i = 0; i < noise_db.size(); ++i) {
-    if (!std::isnan(noise_db.data()[i])) known_db.push_back(noise_db.data()[i]);
+double Cfar::noiseFloor_db(const RealGrid& power_db) const {
+  const RealGrid power = linear(power_db);
+  std::vector<double> known_db, training;
+  for (Eigen::Index r = 0; r < power_db.rows(); r += kIndependentRange_bins) {
+    for (Eigen::Index a = 0; a < power_db.cols(); a += beam_bins_) {
+      if (std::isnan(power_db(r, a))) continue;
+      const double noise_db = levelAt(power, r, a, -std::numeric_limits<double>::infinity(), training).noise_db;
+      if (!std::isnan(noise_db)) known_db.push_back(noise_db);
+    }
   }
   return quantile(std::move(known_db), kFloorShare);
 }
