@@ -21,17 +21,6 @@ NamedParameters moved(const std::string& actor, double dx_m, double dy_m) {
   return m;
 }
 
-/// Gives the null these latents as if they had been fitted.
-void setLatents(const SessionLatents& latents, FittedRoom& fitted) {
-  ModelState& null = fitted.null;
-  null.latents = latents;
-  null.actor_range_m = latents.actor_range_m;
-  null.echoes = fitted.source.echoes(null.mechanisms, null.actor_range_m);
-  null.log_likelihood = fitted.model.logLikelihood(null.echoes, latents, &null.by_pose);
-  null.basis = fitted.model.basis(null.echoes, latents);
-  null.covariance = fitted.model.covariance(null.echoes, latents, fitted.everyPose());
-}
-
 TEST(HypothesisScreen, SuspectsAreThoseWithTheLargestErrors) {
   MadeRoom room(4);
   room.measure(firstOrder());
@@ -72,14 +61,17 @@ TEST(HypothesisScreen, AMaterialThatReflectsLessIsPromisedItsLevel) {
   SessionLatents latents = fitted.null.latents;
   latents.actor_gain[1] = 0;
   latents.log_spread = SessionLatents().log_spread;
-  setLatents(latents, fitted);
+  fitted.null.latents = latents;
+  fitted.null.log_likelihood = fitted.model.logLikelihood(fitted.null.echoes, latents, &fitted.null.by_pose);
+  fitted.null.basis = fitted.model.basis(fitted.null.echoes, latents);
+  fitted.null.covariance = fitted.model.covariance(fitted.null.echoes, latents, fitted.everyPose());
   HypothesisScreen screen(fitted.source, fitted.model);
   const Screened plate = screen.screen(fitted.null, reflectivityOf("Plate"), fitted.everyPose());
   const Screened metal = screen.screen(fitted.null, reflectivityOf("Metal"), fitted.everyPose());
   const double start_db = plate.hypothesis.at(plate.starts[0]).values.number("delta_db");
   EXPECT_LT(start_db, -0.5);
   EXPECT_GT(start_db, -10);
-  EXPECT_GT(plate.screened_nats, 0.5);
+  EXPECT_GT(plate.screened_nats, 1);
   // With a gain of the session that nobody knows, all else may as well reflect more.
   EXPECT_GT(metal.hypothesis.at(metal.starts[0]).values.number("delta_db"), 0.5);
 }
@@ -122,10 +114,6 @@ TEST(HypothesisScreen, OfSeveralStartsTheBestComeFirst) {
   truth.push_back(moved("east", 0.2, 0));
   room.measure(truth);
   FittedRoom fitted(room, firstOrder());
-  // As if its actor had no error of its range that could stand in for a part of the way.
-  SessionLatents latents = fitted.null.latents;
-  latents.actor_range_m[static_cast<std::size_t>(room.twin->scene().actorIndex("east"))] = 0;
-  setLatents(latents, fitted);
   const Hypothesis move = hypothesisOf("actor_moved", {{"dx_m", "m", -1, 0, 0.05, -3, 3, {}}}, "actor", "east");
   std::vector<std::vector<double>> starts;
   for (double x : {-4.0, -2.0, 0.5, 4.0, 8.0, 1.0, 2.0, -1.0}) starts.push_back({x});
