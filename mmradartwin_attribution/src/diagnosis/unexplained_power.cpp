@@ -35,19 +35,12 @@ int mostBounces(const std::string& mechanism) {
   return 0;
 }
 
-/// Variance of the power of a path in a right twin, relative: as stated for levels, or as usual where less is stated. A
-/// fit puts what it cannot explain into it, up to 1, where all echoes fade.
-double mostSpread(const StatedAccuracy& accuracy) {
-  return std::max(SessionLatents().log_spread, 2 * std::log(accuracy.level_db / 4.343));
-}
-
 /// Explained power of the data, and of channels drawn from the model, with the interval of their difference. The floor
 /// is left out: a fit puts what it cannot explain into it. echoes: of the twin; shifted: with the actors' range errors.
 GainMetric againstDraw(DiagnosisContext& context, const ModelState& state, const std::vector<CellPowers>& measured,
                        const std::vector<PoseEchoes>& echoes, const std::vector<PoseEchoes>& shifted, unsigned draw) {
   SessionLatents latents = state.latents;
   latents.log_floor = kNoFloor;
-  latents.log_spread = std::min(latents.log_spread, mostSpread(context.accuracy));
   ChannelData drawn = context.data;
   tbb::parallel_for(std::size_t{0}, drawn.poses.size(), [&](std::size_t i) {
     std::mt19937 random(static_cast<unsigned>(i * kDraws) + draw);
