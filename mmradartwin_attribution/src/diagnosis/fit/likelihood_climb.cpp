@@ -24,7 +24,9 @@ constexpr double kSearchTolerance = 0.02;          ///< tolerance of that search
 constexpr int kSearchPlaces = 12;                  ///< evaluations of that search per coordinate
 constexpr double kShareOfPower = 0.125;            ///< step of the derivative by a power, in which all is linear
 constexpr double kLongestStep = 3;                 ///< longest step, scaled
+constexpr double kLongestShare = 8;                ///< of a step that gains more than it promises
 constexpr double kLeastShare = 0.3;                ///< of a logarithmic number that a step leaves
+constexpr double kStepShares[] = {1.0, 0.4, 0.1};  ///< shares of a step that are tried until one gains
 constexpr double kOneSidedFactors[] = {0.4, 2.0};  ///< factors on a one-sided start
 constexpr int kScanned = 12;                       ///< values over the range of a number that is no range
 constexpr double kScanned_bins = 0.5;              ///< between scanned values of a range: its modes are a bin wide
@@ -217,9 +219,7 @@ void LikelihoodClimb::climb() {
         risen > kRising_nats || (best.promised_nats > kRising_nats && risen > kKeptPromise * last_promised_nats);
     const int most = rising ? kRisingFactor * task_.steps : task_.steps;
     if (i >= most || best.promised_nats < kLeastStep_nats || hopeless) return;
-    const Optimum from = optimum_;
-    const double gained = likelihood::gainAlong(best.promised_nats, {1.0, 0.4, 0.1},
-                                                [&](double share) { return tryStep(best.step, from, share); });
+    const double gained = stepBy(best);
     if (!(gained > 0)) return;
     risen = gained;
     last_promised_nats = best.promised_nats;
@@ -282,6 +282,23 @@ std::optional<double> LikelihoodClimb::tryStep(const Eigen::VectorXd& step, cons
   optimum_.state = std::move(s);
   optimum_.scaled_values = std::move(next);
   return gained;
+}
+
+double LikelihoodClimb::stepBy(const BoundedStep& best) {
+  const Optimum from = optimum_;
+  for (double share : kStepShares) {
+    const auto gained = tryStep(best.step, from, share);
+    if (!gained) continue;
+    // A step that gains more than its quadratic promises is too short.
+    double sum = *gained;
+    for (double longer = 2 * share; share == 1 && longer <= kLongestShare && sum > best.promised_nats; longer *= 2) {
+      const auto more = tryStep(best.step, from, longer);
+      if (!more) break;
+      sum += *more;
+    }
+    return sum;
+  }
+  return 0;
 }
 
 bool LikelihoodClimb::spansBins(const Coordinate& c) const {

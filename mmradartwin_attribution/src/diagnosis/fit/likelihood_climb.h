@@ -67,6 +67,9 @@ class LikelihoodClimb {
   /// side, a move and an error of its range are alike, a material's level and its actors' own, and a climb ends early
   /// on the ridge between them.
   void takeOverErrors();
+  /// Takes the longest share of a step that gains, and more of a step that gains more than it promises. Returns the
+  /// gain, 0 where no share gains.
+  double stepBy(const likelihood::BoundedStep& best);
   /// Makes a share of a step the optimum where it is likelier. Returns how much.
   std::optional<double> tryStep(const Eigen::VectorXd& step, const Optimum& from, double share);
   /// Tries values over the whole range of a single number, and climbs from one that is likelier than the optimum.

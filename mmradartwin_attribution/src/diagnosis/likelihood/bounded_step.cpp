@@ -7,8 +7,7 @@
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
 
-constexpr double kLongestShare = 8;  ///< of a step that gains more than it promises
-constexpr int kMostChanges = 4;      ///< of the set of held numbers, for each number: the set seldom changes twice
+constexpr int kMostChanges = 4;  ///< of the set of held numbers, for each number: the set seldom changes twice
 
 /// Maximum over the numbers that are not held.
 Eigen::VectorXd maximumOf(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, Eigen::VectorXd step,
@@ -66,22 +65,6 @@ BoundedStep boundedStep(const Eigen::MatrixXd& information, const Eigen::VectorX
   }
   result.promised_nats = score.dot(step) - 0.5 * step.dot(information * step);
   return result;
-}
-
-double gainAlong(double promised_nats, std::initializer_list<double> shares,
-                 const std::function<std::optional<double>(double share)>& attempt) {
-  for (double share : shares) {
-    const std::optional<double> gained = attempt(share);
-    if (!gained) continue;
-    double sum = *gained;
-    for (double longer = 2; share == 1 && longer <= kLongestShare && sum > promised_nats; longer *= 2) {
-      const std::optional<double> more = attempt(longer);
-      if (!more) break;
-      sum += *more;
-    }
-    return sum;
-  }
-  return 0;
 }
 
 }  // namespace mmradartwin::diagnosis::likelihood

@@ -1,9 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
-#include <initializer_list>
-#include <optional>
 
 namespace mmradartwin::diagnosis::likelihood {
 
@@ -19,12 +16,5 @@ struct BoundedStep {
 /// low <= 0 <= high.
 BoundedStep boundedStep(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, const Eigen::VectorXd& low,
                         const Eigen::VectorXd& high);
-
-/// Goes along a step: by the first of the shares that gains, and from a whole step that gains more than it promises on
-/// to 2, 4 and 8 of it while each gains more: information that is expected overstates curvatures. attempt: takes a
-/// share of the step where it gains over what was taken last, and returns by how many nats. Returns the sum of what was
-/// gained.
-double gainAlong(double promised_nats, std::initializer_list<double> shares,
-                 const std::function<std::optional<double>(double share)>& attempt);
 
 }  // namespace mmradartwin::diagnosis::likelihood

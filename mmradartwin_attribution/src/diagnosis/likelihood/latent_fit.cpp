@@ -2,8 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
-#include <utility>
 
 #include "diagnosis/likelihood/bounded_step.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
@@ -74,22 +72,20 @@ double ChannelLikelihood::fit(const std::vector<PoseEchoes>& echoes, SessionLate
     const Bounds bounds = stepBounds(latents);
     const auto [step, promised_nats] =
         boundedStep(regularised(derivatives.information), derivatives.total, bounds.low, bounds.high);
-    const SessionLatents from = latents;
-    const auto take = [&](SessionLatents next) -> std::optional<double> {
-      const double value = logLikelihood(echoes, next), gained = value - best;
-      if (!(gained > 0)) return std::nullopt;
+    bool better = false;
+    const Eigen::VectorXd none = Eigen::VectorXd::Zero(step.size());
+    // All numbers together; where that fails, headings alone, then globals alone.
+    for (int attempt = 0; attempt < 6 && !better; ++attempt) {
+      constexpr double kShares[] = {1.0, 0.5, 0.2, 0.05};
+      SessionLatents next = attempt < 4    ? stepped(latents, step, derivatives, step, kShares[attempt])
+                            : attempt == 4 ? stepped(latents, none, derivatives, none, 1)
+                                           : stepped(latents, step, derivatives, step, 0.5);
+      if (attempt == 5) next.yaw_rad = latents.yaw_rad;
+      const double value = logLikelihood(echoes, next);
+      if (value <= best) continue;
       latents = std::move(next);
       best = value;
-      return gained;
-    };
-    const double gained = gainAlong(promised_nats, {1.0, 0.5, 0.2, 0.05}, [&, &step = step](double share) {
-      return take(stepped(from, step, derivatives, step, share));
-    });
-    if (!(gained > 0)) {  // headings alone, then globals alone
-      const Eigen::VectorXd none = Eigen::VectorXd::Zero(step.size());
-      SessionLatents globals = stepped(from, step, derivatives, step, 0.5);
-      globals.yaw_rad = from.yaw_rad;
-      if (!take(stepped(from, none, derivatives, none, 1))) take(std::move(globals));
+      better = true;
     }
     if (best - derivatives.log_likelihood < kLeastGain_nats || promised_nats < kLeastStep_nats) break;
   }

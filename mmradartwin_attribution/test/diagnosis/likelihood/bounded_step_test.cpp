@@ -4,8 +4,6 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
-#include <functional>
-#include <optional>
 #include <random>
 
 namespace mmradartwin::diagnosis::likelihood {
@@ -61,37 +59,6 @@ TEST(BoundedStep, IsTheMaximumWithinTheBounds) {
     EXPECT_NEAR(found.promised_nats, quadratic(information, score, found.step), 1e-9);
   }
   EXPECT_GT(at_bounds, 200);
-}
-
-/// Goes along a step of a function of one number from 0, whose quadratic promises 1 for the step 1. Returns where it
-/// ends.
-double endOfStep(const std::function<double(double)>& function, double* gained = nullptr) {
-  double at = 0;
-  const double sum = gainAlong(1, {1.0, 0.5, 0.2}, [&](double share) -> std::optional<double> {
-    const double gain = function(share) - function(at);
-    if (!(gain > 0)) return std::nullopt;
-    at = share;
-    return gain;
-  });
-  EXPECT_DOUBLE_EQ(sum, function(at) - function(0));
-  if (gained != nullptr) *gained = sum;
-  return at;
-}
-
-TEST(GainAlong, TakesTheWholeStepWhereItKeepsItsPromise) {
-  EXPECT_EQ(endOfStep([](double x) { return 2 * x - x * x; }), 1);
-}
-
-TEST(GainAlong, TakesTheFirstShareThatGains) {
-  EXPECT_EQ(endOfStep([](double x) { return x - 1.5 * x * x; }), 0.5);
-  EXPECT_EQ(endOfStep([](double x) { return -x; }), 0);
-}
-
-TEST(GainAlong, GoesOnWhereAStepGainsMoreThanItPromises) {
-  EXPECT_EQ(endOfStep([](double x) { return 2 * x - 0.2 * x * x; }), 4);  // the maximum stands at 5
-  double gained = 0;
-  EXPECT_EQ(endOfStep([](double x) { return 3 * x; }, &gained), 8);  // and no further
-  EXPECT_DOUBLE_EQ(gained, 24);
 }
 
 }  // namespace
