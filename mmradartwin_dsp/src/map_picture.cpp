@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string>
+#include <vector>
 
 namespace mmradartwin {
 namespace {
@@ -252,9 +255,16 @@ void writeMapCsv(const RangeAngleMap& map, const std::string& file) {
 }
 
 void writePicture(const cv::Mat& picture, const std::string& file) {
+  // Encoded in memory: OpenCV's writers print lines of their own where a disk is full.
+  std::vector<unsigned char> bytes;
   bool written = false;
   try {
-    written = cv::imwrite(file, picture);
+    if (cv::imencode(std::filesystem::path(file).extension().string(), picture, bytes)) {
+      std::ofstream out(file, std::ios::trunc | std::ios::binary);
+      out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+      out.close();
+      written = static_cast<bool>(out);
+    }
   } catch (const cv::Exception&) {  // an unknown extension
   }
   if (!written) throw std::runtime_error(file + ": picture cannot be written; check folder, rights and free space");
