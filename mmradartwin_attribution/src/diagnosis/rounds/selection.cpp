@@ -76,9 +76,7 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
   }
   exchangeNames();
   takeOutImage();
-  context_.echoes.setBaseline(mechanisms_);
-  const SessionLatents latents = state_.latents;
-  state_ = context_.fitter.state(mechanisms_, &latents);
+  refitState();
   return "";
 }
 
@@ -338,8 +336,18 @@ void Selection::exchangeNames() {
 }
 
 void Selection::finish() {
-  if (!all_profiled_) profileFound(std::nullopt);
+  if (!all_profiled_) {
+    profileFound(std::nullopt);
+    refitState();
+  }
   orderByGain();
+}
+
+/// Fits the latents given all findings.
+void Selection::refitState() {
+  context_.echoes.setBaseline(mechanisms_);
+  const SessionLatents latents = state_.latents;
+  state_ = context_.fitter.state(mechanisms_, &latents);
 }
 
 /// Sorts what was found by its gain, and measures gains again where the order changed.
@@ -374,18 +382,14 @@ void Selection::orderByGain() {
   }
   state_.latents = found;
   if (!measured) return;
-  // The state is that of all findings again, by which the rest of the session is judged.
-  context_.echoes.setBaseline(mechanisms_);
-  state_ = context_.fitter.state(mechanisms_, &found);
+  refitState();  // by it the rest of the session is judged
 }
 
 /// Measures a finding's gain over mechanisms_ again, in nats, explained power and metrics.
 void Selection::measureAgain(const Accepted& a) {
   context_.report("gain of " + a.hypothesis.label() + " beside those before it", 0);
   Finding& finding = findings_[a.finding];
-  context_.echoes.setBaseline(mechanisms_);
-  const SessionLatents latents = state_.latents;
-  state_ = context_.fitter.state(mechanisms_, &latents);
+  refitState();
   HypothesisFit fit = context_.fitter.fit(state_, a.hypothesis, {a.scaled_values});
   context_.fitter.judge(fit, family_);
   describeGain(fit, state_, context_.data, finding);

@@ -69,6 +69,7 @@ class Selection {
   void refitAndProfile();
   void renameVerdict(const std::string& label, const std::string& verdict);
   void profileFound(std::optional<std::size_t> only);
+  void refitState();
   void orderByGain();
   bool mayBeNothing(const Hypothesis& hypothesis) const;
   bool isWithinErrors(const HypothesisFit& fit) const;
