@@ -1,287 +1,28 @@
 #include "settings/lua_script.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <lua.hpp>
-#include <map>
 #include <memory>
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/text.h"
+#include "settings/lua_part.h"
+#include "settings/lua_sandbox.h"
 #include "settings/lua_source.h"
+#include "settings/lua_unknown.h"
 
-// Functions of Lua that raise an error do not return, and no destructor runs: where one is called, no object that has
-// to be destroyed is alive.
 namespace mmradartwin {
 namespace {
 
-constexpr int kStepsPerCheck = 1000;
-constexpr double kMostSteps = 1e7;
-constexpr double kStepsOfACall = 100;  ///< of a function that costs more than a step of Lua
-constexpr std::size_t kMostBytes = 64u << 20;
+using namespace lua;
+
 constexpr std::size_t kMostCalls = 20000;
 constexpr std::size_t kMostArguments = 64;
-constexpr int kDeepestFrame = 100;  ///< of those that are searched for a line
 
-constexpr char kChunk[] = "=lua";
-constexpr char kUnknown[] = "mmradartwin.unknown";
 constexpr char kExit = 0;  ///< its address is the error that ends the script
-
-/// What unknown functions and comparisons answer in a run.
-struct Answers {
-  bool calls_give_zero = false;
-  bool first_comparison = false;  ///< those of a line alternate, so that loops end
-};
-
-struct Sandbox {
-  std::string file;
-  std::string part;
-  double part_number = 0;  ///< 0: the script compares with no such number
-  std::string part_text;   ///< empty: the script compares with no such text
-  std::string part_name;   ///< where it compares with neither
-  std::uint32_t fuse_code = 0;
-  Answers answers;
-
-  ScriptRecord record;
-  std::vector<std::string> unknown_called, unknown_compared;  ///< where, and what
-  std::size_t bytes = 0;
-  double steps = 0;
-  std::map<int, bool> next_comparison;  ///< by line
-  double clock_s = 0;
-  bool ran_too_long = false;
-  int error_line = 0;
-};
-
-Sandbox& sandboxOf(lua_State* L) { return **static_cast<Sandbox**>(lua_getextraspace(L)); }
-
-void* allocate(void* user, void* block, std::size_t old_bytes, std::size_t new_bytes) {
-  Sandbox& sandbox = *static_cast<Sandbox*>(user);
-  const std::size_t old = block ? old_bytes : 0;
-  if (new_bytes == 0) {
-    std::free(block);
-    sandbox.bytes -= old;
-    return nullptr;
-  }
-  if (new_bytes > old && sandbox.bytes - old + new_bytes > kMostBytes) return nullptr;
-  void* fresh = std::realloc(block, new_bytes);
-  if (fresh) sandbox.bytes += new_bytes - old;
-  return fresh;
-}
-
-void countSteps(lua_State* L, lua_Debug*);
-
-/// Ends the script where it has taken too many steps, whatever it catches.
-void addSteps(lua_State* L, double steps) {
-  Sandbox& sandbox = sandboxOf(L);
-  sandbox.steps += steps;
-  if (sandbox.steps <= kMostSteps) return;
-  sandbox.ran_too_long = true;
-  lua_sethook(L, countSteps, LUA_MASKCOUNT, 1);
-  luaL_error(L, "too many steps");
-}
-
-void countSteps(lua_State* L, lua_Debug*) { addSteps(L, kStepsPerCheck); }
-
-struct Lines {
-  int innermost = 0, outermost = 0;  ///< of the script; 0: none
-};
-
-Lines linesOf(lua_State* L) {
-  Lines lines;
-  lua_Debug frame;
-  for (int level = 0; level < kDeepestFrame && lua_getstack(L, level, &frame); ++level) {
-    lua_getinfo(L, "Sl", &frame);
-    if (frame.currentline <= 0 || std::strcmp(frame.source, kChunk) != 0) continue;
-    if (lines.innermost == 0) lines.innermost = frame.currentline;
-    lines.outermost = frame.currentline;
-  }
-  return lines;
-}
-
-std::string placeOf(lua_State* L) {
-  const Lines lines = linesOf(L);
-  std::string place = sandboxOf(L).file + ":" + std::to_string(lines.innermost);
-  if (lines.outermost != lines.innermost) place += " (called from line " + std::to_string(lines.outermost) + ")";
-  return place;
-}
-
-bool isUnknown(lua_State* L, int index) { return luaL_testudata(L, index, kUnknown) != nullptr; }
-
-/// Where an unknown value comes from. The text lives as long as the value.
-const char* originOf(lua_State* L, int index) {
-  lua_getiuservalue(L, index, 1);
-  const char* origin = lua_tostring(L, -1);
-  lua_pop(L, 1);
-  return origin ? origin : "?";
-}
-
-int pushUnknown(lua_State* L, const char* origin) {
-  lua_newuserdatauv(L, 0, 1);
-  lua_pushstring(L, origin);
-  lua_setiuservalue(L, -2, 1);
-  luaL_setmetatable(L, kUnknown);
-  return 1;
-}
-
-int answerNothing(lua_State*) { return 0; }
-int answerNil(lua_State* L) {
-  lua_pushnil(L);
-  return 1;
-}
-int answerZero(lua_State* L) {
-  lua_pushinteger(L, 0);
-  return 1;
-}
-int answerItself(lua_State* L) {
-  lua_settop(L, 1);
-  return 1;
-}
-
-/// What stands in nothing: unknown by its name. A list ends, so that loops over it do.
-int indexNothing(lua_State* L) {
-  if (lua_type(L, 2) == LUA_TNUMBER) return answerNil(L);
-  const char* key = lua_type(L, 2) == LUA_TSTRING ? lua_tostring(L, 2) : "?";
-  const char* holder = isUnknown(L, 1) ? originOf(L, 1) : "";
-  if (*holder && std::strlen(holder) < 100) key = lua_pushfstring(L, "%s.%s", holder, key);
-  return pushUnknown(L, key);
-}
-
-void noteUnknown(lua_State* L, std::vector<std::string>& notes, const char* what) {
-  if (notes.size() >= 8) return;
-  const std::string note = placeOf(L) + ": " + what;
-  if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
-}
-
-int callNothing(lua_State* L) {
-  Sandbox& sandbox = sandboxOf(L);
-  lua_Debug frame;
-  const char* name = "a function";
-  if (isUnknown(L, 1)) {
-    name = originOf(L, 1);
-  } else if (lua_getstack(L, 0, &frame) && lua_getinfo(L, "n", &frame) && frame.name) {
-    name = frame.name;
-  }
-  const std::size_t size = std::strlen(name);
-  if (size >= 5 && std::strcmp(name + size - 5, "lines") == 0) {  // an iterator
-    lua_pushcfunction(L, answerNil);
-    return 1;
-  }
-  addSteps(L, kStepsOfACall);
-  const char* origin = size < 100 ? lua_pushfstring(L, "%s()", name) : name;
-  noteUnknown(L, sandbox.unknown_called, origin);
-  return sandbox.answers.calls_give_zero ? answerZero(L) : pushUnknown(L, origin);
-}
-
-/// Arithmetic and joining of texts where a part is unknown.
-int operateOnUnknown(lua_State* L) {
-  for (int i = 1; i <= 2; ++i) {
-    if (!isUnknown(L, i)) continue;
-    lua_pushvalue(L, i);
-    return 1;
-  }
-  return pushUnknown(L, "a name without a value");
-}
-
-int compareUnknown(lua_State* L) {
-  Sandbox& sandbox = sandboxOf(L);
-  noteUnknown(L, sandbox.unknown_compared, originOf(L, isUnknown(L, 1) ? 1 : 2));
-  bool& next = sandbox.next_comparison.emplace(linesOf(L).innermost, sandbox.answers.first_comparison).first->second;
-  lua_pushboolean(L, next);
-  next = !next;
-  return 1;
-}
-
-int iterateNothing(lua_State* L) {
-  lua_pushcfunction(L, answerNil);
-  return 1;
-}
-
-/// Whether a name asks which part this is: partId, ar1.GetPartNumber, DEVICE, radarType.
-bool asksForPart(const char* name) {
-  std::string plain;
-  for (const char* c = name; *c && plain.size() < 40; ++c) {
-    if (*c != '_') plain += static_cast<char>(std::tolower(static_cast<unsigned char>(*c)));
-  }
-  for (const char* verb : {"get", "read", "query"}) {
-    if (plain.compare(0, std::strlen(verb), verb) == 0) plain.erase(0, std::strlen(verb));
-  }
-  const std::size_t whole = plain.size();
-  for (const char* kind : {"id", "number", "num", "no", "name", "type", "variant", "model"}) {
-    const std::size_t size = std::strlen(kind);
-    if (plain.size() > size && plain.compare(plain.size() - size, size, kind) == 0) plain.erase(plain.size() - size);
-  }
-  const auto isOneOf = [&plain](std::initializer_list<const char*> things) {
-    return std::any_of(things.begin(), things.end(), [&plain](const char* thing) { return plain == thing; });
-  };
-  if (isOneOf({"part", "device", "chip", "chipversion", "platform", "devicepart", "radarpart"})) return true;
-  return plain.size() < whole && isOneOf({"radar", "sensor", "board", "evm", "soc"});
-}
-
-/// Notes that the part was asked for. Whether it is known.
-bool knowsPart(lua_State* L) {
-  Sandbox& sandbox = sandboxOf(L);
-  if (sandbox.part.empty() && sandbox.record.part_asked.empty()) sandbox.record.part_asked = placeOf(L);
-  return !sandbox.part.empty();
-}
-
-/// As the script spells it where it compares: names and types are sooner text, all else a number.
-int answerPart(lua_State* L, const char* question) {
-  if (!knowsPart(L)) return answerNil(L);
-  const Sandbox& sandbox = sandboxOf(L);
-  bool is_text = sandbox.part_number == 0;
-  for (const char* part : {"ame", "ype", "ariant", "NAME", "TYPE", "VARIANT"}) {
-    if (std::strstr(question, part) && !sandbox.part_text.empty()) is_text = true;
-  }
-  if (is_text) {
-    lua_pushstring(L, sandbox.part_text.empty() ? sandbox.part_name.c_str() : sandbox.part_text.c_str());
-  } else {
-    lua_pushinteger(L, static_cast<lua_Integer>(sandbox.part_number));
-  }
-  return 1;
-}
-
-int indexGlobals(lua_State* L) {
-  if (lua_type(L, 2) == LUA_TSTRING && asksForPart(lua_tostring(L, 2))) return answerPart(L, lua_tostring(L, 2));
-  return answerNil(L);
-}
-
-/// Codes of the parts in their fuses, the usual one first.
-const std::map<std::string, std::vector<std::uint32_t>>& fuseCodes() {
-  static const std::map<std::string, std::vector<std::uint32_t>> codes = {
-      {"1243", {0x20, 0x21, 0x80}},
-      {"1443", {0xa0, 0x40}},
-      {"1642", {0x60, 0x61, 0x04, 0x62, 0x67, 0x66, 0x01, 0xc0, 0xc1}},
-      {"1843", {0x70, 0x71, 0xd0, 0x05}},
-      {"2243", {0x31, 0x32, 0x30, 0x06}},
-      {"6443", {0xe0, 0xe1, 0xe2, 0xe3, 0xe4}},
-      {"6843", {0xe0, 0xe1, 0xe2, 0xe3, 0xe4}}};
-  return codes;
-}
-
-/// The registers by which TI's scripts tell parts apart. Bits 25:18 of the first hold the part's code; the second tells
-/// the first silicon's parts apart, the third holds the silicon's version.
-std::uint32_t registerValue(const Sandbox& sandbox, std::uint32_t address) {
-  if (address == 0xffffe214) return sandbox.fuse_code << 18;
-  if (address == 0xffffe210) return sandbox.part == "1243" ? 0 : sandbox.part == "1443" ? 1 : 2;
-  if (address == 0xffffe218) return 3;
-  return 0;
-}
-
-int readRegister(lua_State* L) {
-  const auto address = static_cast<std::uint32_t>(lua_tointeger(L, 1));
-  const auto first = std::clamp<lua_Integer>(luaL_optinteger(L, 2, 0), 0, 31);
-  const auto last = std::clamp<lua_Integer>(luaL_optinteger(L, 3, 31), first, 31);
-  if (address == 0xffffe214 || address == 0xffffe210) knowsPart(L);
-  const std::uint64_t mask = (std::uint64_t{1} << (last - first + 1)) - 1;
-  const std::uint64_t value = registerValue(sandboxOf(L), address) >> first & mask;
-  lua_pushinteger(L, 0);
-  lua_pushinteger(L, static_cast<lua_Integer>(value));
-  return 2;
-}
 
 ScriptArgument argumentAt(lua_State* L, int index) {
   ScriptArgument argument;
@@ -459,11 +200,6 @@ bit = {band = bit_and, bor = bit_or, bxor = bit_xor, bnot = bit_not, lshift = bi
 bit32 = bit
 )";
 
-void setFunction(lua_State* L, const char* name, lua_CFunction function) {
-  lua_pushcfunction(L, function);
-  lua_setfield(L, -2, name);
-}
-
 /// Puts a guard before each function of the table on top of the stack.
 void guardFunctions(lua_State* L) {
   lua_pushnil(L);
@@ -524,48 +260,6 @@ void openLibraries(lua_State* L) {
   lua_setfield(L, -2, "setmetatable");
   setFunction(L, "print", answerNothing);
   setFunction(L, "WriteToLog", answerNothing);
-  lua_pop(L, 4);
-}
-
-/// What can be done with a value that is not there: the table on top of the stack.
-void describeNothing(lua_State* L) {
-  setFunction(L, "__index", indexNothing);
-  setFunction(L, "__newindex", answerNothing);
-  setFunction(L, "__call", callNothing);
-  setFunction(L, "__concat", operateOnUnknown);
-  setFunction(L, "__pairs", iterateNothing);
-  lua_pushboolean(L, 0);
-  lua_setfield(L, -2, "__metatable");
-}
-
-void describeValues(lua_State* L) {
-  luaL_newmetatable(L, kUnknown);
-  describeNothing(L);
-  for (const char* operation : {"__add", "__sub", "__mul", "__div", "__mod", "__pow", "__unm", "__idiv", "__band",
-                                "__bor", "__bxor", "__shl", "__shr", "__bnot"}) {
-    setFunction(L, operation, operateOnUnknown);
-  }
-  setFunction(L, "__lt", compareUnknown);
-  setFunction(L, "__le", compareUnknown);
-  setFunction(L, "__len", answerZero);
-  lua_pop(L, 1);
-  lua_pushnil(L);
-  lua_newtable(L);
-  describeNothing(L);
-  lua_setmetatable(L, -2);
-  // ar1.partNumber and ar1.partNumber() are the same.
-  lua_pushinteger(L, 0);
-  lua_newtable(L);
-  setFunction(L, "__call", answerItself);
-  setFunction(L, "__index", indexNothing);
-  lua_pushboolean(L, 0);
-  lua_setfield(L, -2, "__metatable");
-  lua_setmetatable(L, -2);
-  lua_pushliteral(L, "");
-  lua_getmetatable(L, -1);
-  setFunction(L, "__call", answerItself);
-  lua_pushboolean(L, 0);
-  lua_setfield(L, -2, "__metatable");
   lua_pop(L, 4);
 }
 
@@ -642,37 +336,6 @@ void runScript(Sandbox& sandbox, const std::string& text) {
   lua_sethook(L, nullptr, 0, 0);
   if (status == LUA_OK || (lua_islightuserdata(L, -1) && lua_touserdata(L, -1) == &kExit)) return;
   throw describeError(L, status, sandbox);
-}
-
-/// Whether a word of the script means the part: "AWR1843", "xwr18xx".
-bool spells(std::string word, const std::string& part) {
-  std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::tolower(c); });
-  const bool one_word =
-      std::all_of(word.begin(), word.end(), [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
-  return one_word && (word.find(part) != std::string::npos || word.find(part.substr(0, 2) + "xx") != std::string::npos);
-}
-
-/// How the script spells its part where it compares with it.
-void spellPart(Sandbox& sandbox, const LuaSource& source) {
-  if (sandbox.part.empty()) return;
-  const auto compares = [&](double value) {
-    return std::any_of(source.compared_numbers.begin(), source.compared_numbers.end(),
-                       [&](const std::string& number) { return std::strtod(number.c_str(), nullptr) == value; });
-  };
-  const double part = std::strtod(sandbox.part.c_str(), nullptr);
-  if (compares(part)) sandbox.part_number = part;
-  if (const auto codes = fuseCodes().find(sandbox.part); codes != fuseCodes().end()) {
-    const auto used = std::find_if(codes->second.begin(), codes->second.end(), compares);
-    sandbox.fuse_code = used == codes->second.end() ? codes->second.front() : *used;
-  }
-  const auto firstOf = [&](const std::vector<std::string>& words) {
-    const auto found =
-        std::find_if(words.begin(), words.end(), [&](const std::string& word) { return spells(word, sandbox.part); });
-    return found == words.end() ? std::string() : *found;
-  };
-  sandbox.part_text = firstOf(source.compared_texts);
-  if (sandbox.part_text.empty()) sandbox.part_text = firstOf(source.assigned_names);
-  sandbox.part_name = "XWR" + sandbox.part;
 }
 
 /// Whether both runs configure the same, apart from what is unknown in the first.
