@@ -169,7 +169,7 @@ Profile::Profile(const ProfiledModel& model, const std::vector<Hypothesis>& part
   }
   const bool rough = std::count(traces_.begin(), traces_.end(), 1) > 0;
   here_.latents = start;
-  here_ = pointAt(fit.scaled_values, start);
+  here_ = pointAt(fit.scaled_values, here_.latents);
   highest_ = here_.log_likelihood;
   for (std::size_t j = 0; j < coordinates_.size(); ++j) steps_.push_back(stepAlong(j, rough ? kRough : kSmooth));
   evaluateCorners();
@@ -181,8 +181,8 @@ ProfilePoint Profile::pointAt(const std::vector<double>& scaled_values, const Se
   const LatentSpread& spread = model_.likelihood.spread();
   const std::vector<PoseEchoes> echoes =
       model_.source.echoes(mechanismsAt(scaled_values), model_.latents.actor_range_m);
-  const bool likelier =
-      model_.likelihood.logLikelihood(echoes, start) > model_.likelihood.logLikelihood(echoes, here_.latents);
+  const bool likelier = &start != &here_.latents && model_.likelihood.logLikelihood(echoes, start) >
+                                                        model_.likelihood.logLikelihood(echoes, here_.latents);
   SessionLatents fitted = likelier ? start : here_.latents;
   model_.likelihood.fit(echoes, fitted, kRefits);
   std::vector<double> by_pose;
@@ -220,12 +220,14 @@ Step Profile::stepAlong(std::size_t j, const Fall& wanted) {
   Step step;
   step.width = std::max(wanted.narrowest, 2 * fit_.standard_error[j] / slope);
   if (traces_[j]) step.width = std::min(step.width, kWidest);
+  const auto within = [&](double width) { return widest > 0 ? std::min(width, widest) : width; };
+  step.width = within(step.width);
   std::vector<double> moved = fitted;
   double last_width = 0;
   for (int i = 1;; ++i) {
-    if (widest > 0) step.width = std::min(step.width, widest);
     moved[j] = fitted[j] + step.width;
-    step.ahead = pointAt(moved, i == 1 ? here_.latents : beyond(here_.latents, step.ahead, step.width / last_width));
+    step.ahead = i == 1 ? pointAt(moved, here_.latents)
+                        : pointAt(moved, beyond(here_.latents, step.ahead, step.width / last_width));
     moved[j] = fitted[j] - step.width;
     step.behind = pointAt(moved, beyond(here_.latents, step.ahead, -1));
     last_width = step.width;
@@ -234,8 +236,8 @@ Step Profile::stepAlong(std::size_t j, const Fall& wanted) {
     const bool narrower = fall > wanted.most && step.width > wanted.narrowest;
     if (i == kWidths || (fall >= wanted.least && !narrower)) break;
     const double other = step.width * std::clamp(std::sqrt(wanted.wanted / std::max(fall, 0.1)), 0.1, 4.0);
-    const double next = std::max(other, wanted.narrowest);
-    if ((widest > 0 ? std::min(next, widest) : next) == step.width) break;
+    const double next = within(std::max(other, wanted.narrowest));
+    if (next == step.width) break;
     step.width = next;
   }
   const double least = 0.2 / (step.width * step.width);
