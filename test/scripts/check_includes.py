@@ -28,7 +28,8 @@ ROS_HEADERS = re.compile(
 ROOMS = {
     "mmradartwin_sim/src": {
         "scene": set(),
-        "records": {"scene"},
+        "mesh": {"scene"},
+        "records": {"mesh"},
         "rays": {"records"},
         "physics": {"rays"},
         "corners": {"physics"},
@@ -55,7 +56,8 @@ ROOMS = {
         "numbers": {"catalogue"},
         "frames": {"catalogue"},
         "channels": {"numbers", "frames"},
-        "likelihood": {"channels"},
+        "echoes": {"channels"},
+        "likelihood": {"echoes"},
         "hypotheses": {"likelihood"},
         "fit": {"hypotheses"},
         "receiver": {"fit"},

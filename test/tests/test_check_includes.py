@@ -9,10 +9,10 @@ from pathlib import Path
 HERE = Path(os.path.realpath(__file__)).parent
 PROGRAM = HERE.parent / "scripts" / "check_includes.py"
 DIAGNOSIS = "mmradartwin_attribution/src/diagnosis"
-ROOM_NAMES = ("catalogue", "numbers", "frames", "channels", "likelihood", "hypotheses", "fit", "receiver", "search", "gain",
-              "rounds", "report")
+ROOM_NAMES = ("catalogue", "numbers", "frames", "channels", "echoes", "likelihood", "hypotheses", "fit", "receiver", "search",
+              "gain", "rounds", "report")
 SIM = "mmradartwin_sim/src"
-SIM_ROOM_NAMES = ("scene", "records", "rays", "physics", "corners", "edges", "echoes", "stages", "twin", "room", "ros")
+SIM_ROOM_NAMES = ("scene", "mesh", "records", "rays", "physics", "corners", "edges", "echoes", "stages", "twin", "room", "ros")
 MECHANISM_ROOM_NAMES = ("base", "scene", "mounting", "propagation", "array", "receiver", "frames", "empirical")
 
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "diagnosis/catalogue/bounds.h"
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/gain/held_out_gain.h"
-#include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/numbers/number_text.h"
 #include "diagnosis/scene_match.h"
 #include "mmradartwin_dsp/input_error.h"

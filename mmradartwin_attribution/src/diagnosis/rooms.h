@@ -18,9 +18,13 @@ namespace channels {
 using namespace numbers;
 using namespace frames;
 }  // namespace channels
-/// Echoes expected of a twin and how likely the channels are under them.
-namespace likelihood {
+/// Echoes expected of a twin: paths, their values and spreads in each range bin, what receivers mix of them.
+namespace echoes {
 using namespace channels;
+}
+/// How likely the channels are under the echoes expected.
+namespace likelihood {
+using namespace echoes;
 }
 /// What may be wrong with a twin: a mechanism with free numbers, and what evidence it needs.
 namespace hypotheses {

@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/gain/held_out_gain.h"
-#include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/receiver/receiver_findings.h"
 #include "diagnosis/receiver/strongest_echo.h"
 

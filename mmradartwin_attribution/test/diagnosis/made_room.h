@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/fit/hypothesis_fitter.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/likelihood/clutter_field.h"
-#include "diagnosis/likelihood/expected_echoes.h"
 #include "mmradartwin_dsp/paper_radar.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_dsp/temporary_folder.h"

@@ -4,8 +4,8 @@
 
 #include "cabinet_twin.h"
 #include "diagnosis/catalogue/default_mechanism.h"
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/gain/held_out_gain.h"
-#include "diagnosis/likelihood/expected_echoes.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin::diagnosis {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <sstream>
 
+#include "mesh/far_vertices.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "scene/declared_frame.h"
-#include "scene/far_vertices.h"
 
 namespace mmradartwin {
 namespace {

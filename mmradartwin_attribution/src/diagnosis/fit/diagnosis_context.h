@@ -4,9 +4,9 @@
 
 #include "diagnosis/catalogue/stated_bounds.h"
 #include "diagnosis/channels/channel_data.h"
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/fit/hypothesis_fitter.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
-#include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_attribution/diagnosis_options.h"
 #include "mmradartwin_dsp/session.h"

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "diagnosis/catalogue/stated_bounds.h"
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/fit/hypothesis_fit.h"
 #include "diagnosis/hypotheses/hypothesis.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
-#include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/likelihood/profiled_scores.h"
 #include "diagnosis/rooms.h"
 

@@ -4,11 +4,11 @@
 #include <optional>
 #include <vector>
 
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/fit/hypothesis_fit.h"
 #include "diagnosis/hypotheses/hypothesis.h"
 #include "diagnosis/likelihood/bounded_step.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
-#include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/rooms.h"
 
 namespace mmradartwin::diagnosis::fit {

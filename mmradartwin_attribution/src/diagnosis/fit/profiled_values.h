@@ -4,9 +4,9 @@
 #include <optional>
 #include <vector>
 
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/hypotheses/hypothesis.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
-#include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/rooms.h"
 
 namespace mmradartwin::diagnosis::fit {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "diagnosis/channels/channel_data.h"
-#include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/echoes/echo_field.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_attribution/finding.h"
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <set>
 
-#include "diagnosis/likelihood/expected_echoes.h"
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/numbers/number_text.h"
 #include "mmradartwin_attribution/finding.h"
 #include "mmradartwin_dsp/input_error.h"

@@ -10,9 +10,9 @@
 
 #include "diagnosis/catalogue/stated_bounds.h"
 #include "diagnosis/channels/channel_data.h"
-#include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/echoes/echo_field.h"
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/likelihood/echo_level.h"
-#include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/likelihood/session_latents.h"
 #include "diagnosis/numbers/packed_hermitian.h"
 #include "diagnosis/rooms.h"

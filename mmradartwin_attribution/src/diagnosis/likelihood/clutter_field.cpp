@@ -5,7 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/echoes/echo_field.h"
 #include "mmradartwin_sim/mechanism.h"
 
 namespace mmradartwin::diagnosis::likelihood {

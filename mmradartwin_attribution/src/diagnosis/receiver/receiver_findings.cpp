@@ -9,7 +9,7 @@
 
 #include "diagnosis/catalogue/bounds.h"
 #include "diagnosis/catalogue/default_mechanism.h"
-#include "diagnosis/likelihood/expected_echoes.h"
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/receiver/strongest_echo.h"
 #include "mmradartwin_dsp/units.h"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "diagnosis/channels/channel_data.h"
-#include "diagnosis/likelihood/expected_echoes.h"
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/rooms.h"
 
 namespace mmradartwin::diagnosis::receiver {

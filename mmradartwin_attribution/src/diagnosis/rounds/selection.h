@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "diagnosis/channels/channel_data.h"
+#include "diagnosis/echoes/expected_echoes.h"
 #include "diagnosis/fit/diagnosis_context.h"
 #include "diagnosis/fit/hypothesis_fit.h"
 #include "diagnosis/gain/gain_measurement.h"
 #include "diagnosis/likelihood/channel_likelihood.h"
-#include "diagnosis/likelihood/expected_echoes.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_attribution/diagnosis_result.h"
 #include "mmradartwin_attribution/finding.h"

@@ -5,7 +5,7 @@
 #include <complex>
 #include <map>
 
-#include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/echoes/echo_field.h"
 
 namespace mmradartwin::diagnosis::search {
 namespace {

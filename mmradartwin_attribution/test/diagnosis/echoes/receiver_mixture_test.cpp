@@ -1,4 +1,4 @@
-#include "diagnosis/likelihood/receiver_mixture.h"
+#include "diagnosis/echoes/receiver_mixture.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "scene/obj_numbers.h"
+#include "mesh/obj_numbers.h"
 
 #include <cctype>
 

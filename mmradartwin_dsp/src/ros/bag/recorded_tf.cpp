@@ -1,4 +1,4 @@
-#include "ros/recorded_tf.h"
+#include "ros/bag/recorded_tf.h"
 
 #include <algorithm>
 #include <cmath>

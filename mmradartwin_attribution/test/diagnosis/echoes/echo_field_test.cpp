@@ -1,4 +1,4 @@
-#include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/echoes/echo_field.h"
 
 #include <gtest/gtest.h>
 

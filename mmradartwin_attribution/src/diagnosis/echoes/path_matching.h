@@ -9,7 +9,7 @@
 #include "mmradartwin_sim/path_record.h"
 #include "mmradartwin_sim/twin.h"
 
-namespace mmradartwin::diagnosis::likelihood {
+namespace mmradartwin::diagnosis::echoes {
 
 /// Change of one echo by a change of mechanisms.
 struct PathShift {
@@ -45,4 +45,4 @@ void addShifts(std::size_t place, const std::vector<PathRecord>& there, std::vec
 /// Means over the shifts of paths that meet one actor.
 EchoShift meanShift(const std::vector<PathShift>& shifts, std::size_t actors, std::size_t poses);
 
-}  // namespace mmradartwin::diagnosis::likelihood
+}  // namespace mmradartwin::diagnosis::echoes

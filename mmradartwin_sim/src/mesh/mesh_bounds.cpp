@@ -1,4 +1,4 @@
-#include "scene/mesh_bounds.h"
+#include "mesh/mesh_bounds.h"
 
 #include <assimp/mesh.h>
 #include <assimp/scene.h>

@@ -1,4 +1,4 @@
-#include "diagnosis/likelihood/expected_echoes.h"
+#include "diagnosis/echoes/expected_echoes.h"
 
 #include <gtest/gtest.h>
 

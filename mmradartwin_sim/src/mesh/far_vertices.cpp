@@ -1,4 +1,4 @@
-#include "scene/far_vertices.h"
+#include "mesh/far_vertices.h"
 
 #include <cmath>
 #include <sstream>

@@ -1,11 +1,11 @@
-#include "diagnosis/likelihood/path_matching.h"
+#include "diagnosis/echoes/path_matching.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/echoes/echo_field.h"
 
-namespace mmradartwin::diagnosis::likelihood {
+namespace mmradartwin::diagnosis::echoes {
 namespace {
 
 using PathKey = std::tuple<const std::string*, PerInteraction<int>>;
@@ -82,4 +82,4 @@ EchoShift meanShift(const std::vector<PathShift>& shifts, std::size_t actors, st
   return mean;
 }
 
-}  // namespace mmradartwin::diagnosis::likelihood
+}  // namespace mmradartwin::diagnosis::echoes

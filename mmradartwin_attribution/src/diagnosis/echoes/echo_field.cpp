@@ -1,4 +1,4 @@
-#include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/echoes/echo_field.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 
 #include "diagnosis/numbers/packed_hermitian.h"
 
-namespace mmradartwin::diagnosis::likelihood {
+namespace mmradartwin::diagnosis::echoes {
 namespace {
 
 constexpr int kLobe_bins = 2;   ///< reach of a weak path to either side
@@ -463,4 +463,4 @@ std::vector<std::shared_ptr<const EchoGroup>> EchoCollector::take() {
   return std::exchange(groups_, {});
 }
 
-}  // namespace mmradartwin::diagnosis::likelihood
+}  // namespace mmradartwin::diagnosis::echoes

@@ -1,4 +1,4 @@
-#include "ros/bag_set.h"
+#include "ros/bag/bag_set.h"
 
 #include <mmradartwin_msgs/AdcCube.h>
 #include <tf2_msgs/TFMessage.h>
@@ -12,7 +12,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/input_file.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
-#include "ros/bag_index.h"
+#include "ros/bag/bag_index.h"
 #include "ros/message_lengths.h"
 
 namespace mmradartwin {

@@ -1,4 +1,4 @@
-#include "scene/gltf_extensions.h"
+#include "mesh/gltf_extensions.h"
 
 #include <algorithm>
 #include <array>

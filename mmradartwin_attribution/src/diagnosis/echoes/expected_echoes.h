@@ -9,15 +9,15 @@
 
 #include "diagnosis/catalogue/default_mechanism.h"
 #include "diagnosis/channels/channel_data.h"
-#include "diagnosis/likelihood/echo_field.h"
-#include "diagnosis/likelihood/path_matching.h"
-#include "diagnosis/likelihood/receiver_mixture.h"
-#include "diagnosis/likelihood/traced_paths.h"
+#include "diagnosis/echoes/echo_field.h"
+#include "diagnosis/echoes/path_matching.h"
+#include "diagnosis/echoes/receiver_mixture.h"
+#include "diagnosis/echoes/traced_paths.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_dsp/stated_accuracy.h"
 #include "mmradartwin_sim/twin.h"
 
-namespace mmradartwin::diagnosis::likelihood {
+namespace mmradartwin::diagnosis::echoes {
 
 /// Accuracy of poses and of single paths; standard deviations.
 struct PoseAccuracy {
@@ -114,4 +114,4 @@ class ExpectedEchoes {
   std::vector<ReceiverMixture::Cache> mixed_;
 };
 
-}  // namespace mmradartwin::diagnosis::likelihood
+}  // namespace mmradartwin::diagnosis::echoes

@@ -1,4 +1,4 @@
-#include "diagnosis/likelihood/path_matching.h"
+#include "diagnosis/echoes/path_matching.h"
 
 #include <gtest/gtest.h>
 

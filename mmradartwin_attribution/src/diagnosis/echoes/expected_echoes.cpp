@@ -1,4 +1,4 @@
-#include "diagnosis/likelihood/expected_echoes.h"
+#include "diagnosis/echoes/expected_echoes.h"
 
 #include <tbb/parallel_for.h>
 
@@ -11,7 +11,7 @@
 #include "mmradartwin_sim/mechanism.h"
 #include "mmradartwin_sim/mechanism_registry.h"
 
-namespace mmradartwin::diagnosis::likelihood {
+namespace mmradartwin::diagnosis::echoes {
 namespace {
 
 constexpr double kNoFarSkirt = 1e3;  ///< factor on the strongest power beside which no echo is strong
@@ -246,4 +246,4 @@ void ExpectedEchoes::pointBeams(ChannelData& data, const std::vector<NamedParame
   mixed_.clear();
 }
 
-}  // namespace mmradartwin::diagnosis::likelihood
+}  // namespace mmradartwin::diagnosis::echoes

@@ -28,10 +28,10 @@
 #include "mmradartwin_dsp/stationary_poses.h"
 #include "mmradartwin_dsp/temporary_folder.h"
 #include "mmradartwin_dsp/text.h"
-#include "ros/bag_set.h"
+#include "ros/bag/bag_set.h"
+#include "ros/bag/recorded_tf.h"
 #include "ros/frame_sources.h"
 #include "ros/message_lengths.h"
-#include "ros/recorded_tf.h"
 
 namespace mmradartwin {
 namespace {

@@ -1,4 +1,4 @@
-#include "diagnosis/likelihood/traced_paths.h"
+#include "diagnosis/echoes/traced_paths.h"
 
 #include <tbb/parallel_for.h>
 
@@ -14,7 +14,7 @@
 #include "mmradartwin_sim/mechanism_registry.h"
 #include "mmradartwin_sim/mechanism_stages.h"
 
-namespace mmradartwin::diagnosis::likelihood {
+namespace mmradartwin::diagnosis::echoes {
 namespace {
 
 /// Limit of the amplitude's relative change within the pose's accuracy, for a steady path.
@@ -336,4 +336,4 @@ void TracedPaths::setBaseline(const std::vector<NamedParameters>& mechanisms) {
   }
 }
 
-}  // namespace mmradartwin::diagnosis::likelihood
+}  // namespace mmradartwin::diagnosis::echoes

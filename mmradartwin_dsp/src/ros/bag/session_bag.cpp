@@ -18,7 +18,7 @@
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/session_files.h"
 #include "mmradartwin_dsp/sha256.h"
-#include "ros/bag_set.h"
+#include "ros/bag/bag_set.h"
 #include "ros/message_lengths.h"
 
 namespace mmradartwin {

@@ -16,17 +16,17 @@
 #include <sstream>
 #include <unordered_map>
 
+#include "mesh/far_vertices.h"
+#include "mesh/gltf_extensions.h"
+#include "mesh/mesh_bounds.h"
+#include "mesh/obj_numbers.h"
+#include "mesh/ply_reader.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/input_file.h"
 #include "mmradartwin_dsp/session.h"
 #include "mmradartwin_sim/mesh_frame.h"
 #include "mmradartwin_sim/scene.h"
 #include "scene/declared_frame.h"
-#include "scene/far_vertices.h"
-#include "scene/gltf_extensions.h"
-#include "scene/mesh_bounds.h"
-#include "scene/obj_numbers.h"
-#include "scene/ply_reader.h"
 
 namespace mmradartwin {
 namespace {

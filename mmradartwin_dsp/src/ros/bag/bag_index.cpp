@@ -1,4 +1,4 @@
-#include "ros/bag_index.h"
+#include "ros/bag/bag_index.h"
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -17,7 +17,7 @@
 #include "mmradartwin_dsp/ros/transform_record.h"
 #include "mmradartwin_dsp/stationary_poses.h"
 #include "mmradartwin_dsp/text.h"
-#include "ros/bag_set.h"
+#include "ros/bag/bag_set.h"
 #include "ros/message_lengths.h"
 
 namespace mmradartwin {

@@ -12,7 +12,7 @@
 #include "diagnosis/rooms.h"
 #include "mmradartwin_sim/twin.h"
 
-namespace mmradartwin::diagnosis::likelihood {
+namespace mmradartwin::diagnosis::echoes {
 
 /// Text that is equal for lists of mechanisms which trace the same paths.
 std::string traceKeyOf(const std::vector<NamedParameters>& mechanisms);
@@ -97,4 +97,4 @@ class TracedPaths {
   std::vector<std::string> baseline_;                                       // keys into known_
 };
 
-}  // namespace mmradartwin::diagnosis::likelihood
+}  // namespace mmradartwin::diagnosis::echoes

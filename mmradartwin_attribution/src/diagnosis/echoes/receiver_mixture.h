@@ -6,11 +6,11 @@
 #include <unordered_map>
 #include <vector>
 
-#include "diagnosis/likelihood/echo_field.h"
+#include "diagnosis/echoes/echo_field.h"
 #include "diagnosis/rooms.h"
 #include "mmradartwin_sim/twin.h"
 
-namespace mmradartwin::diagnosis::likelihood {
+namespace mmradartwin::diagnosis::echoes {
 
 /// Echoes that a receiver which mixes ranges (images, harmonics) generates from one pose's paths, besides their own
 /// tones. Each strong path is sent through the receiver alone. The strongest ones are also sent in pairs, as products
@@ -59,4 +59,4 @@ class ReceiverMixture {
   std::vector<Alone> alone_;
 };
 
-}  // namespace mmradartwin::diagnosis::likelihood
+}  // namespace mmradartwin::diagnosis::echoes

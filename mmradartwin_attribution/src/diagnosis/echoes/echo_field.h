@@ -12,7 +12,7 @@
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_sim/path_record.h"
 
-namespace mmradartwin::diagnosis::likelihood {
+namespace mmradartwin::diagnosis::echoes {
 
 /// Echoes that meet the same actors, summed as powers. The phase between separate paths cannot be predicted, so that
 /// the channels of a range bin have the covariance sum |W|^2 c c^H over paths; W is the window's response in the bin.
@@ -139,4 +139,4 @@ void addToSignature(const PathRecord& record, std::size_t& signature);
 /// below 1e-3 within three bins of 64 samples).
 double hannResponse(double offset);
 
-}  // namespace mmradartwin::diagnosis::likelihood
+}  // namespace mmradartwin::diagnosis::echoes

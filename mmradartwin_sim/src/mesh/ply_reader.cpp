@@ -1,4 +1,4 @@
-#include "scene/ply_reader.h"
+#include "mesh/ply_reader.h"
 
 #include <algorithm>
 #include <cmath>

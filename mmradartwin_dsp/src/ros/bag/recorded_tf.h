@@ -9,7 +9,7 @@
 
 #include "mmradartwin_dsp/ros/transform_record.h"
 #include "mmradartwin_dsp/ros/transform_sources.h"
-#include "ros/stamp_record.h"
+#include "ros/bag/stamp_record.h"
 
 namespace mmradartwin {
 

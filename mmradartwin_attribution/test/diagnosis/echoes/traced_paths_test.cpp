@@ -1,4 +1,4 @@
-#include "diagnosis/likelihood/traced_paths.h"
+#include "diagnosis/echoes/traced_paths.h"
 
 #include <gtest/gtest.h>
 

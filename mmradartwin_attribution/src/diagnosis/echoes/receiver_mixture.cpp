@@ -1,4 +1,4 @@
-#include "diagnosis/likelihood/receiver_mixture.h"
+#include "diagnosis/echoes/receiver_mixture.h"
 
 #include <algorithm>
 #include <boost/functional/hash.hpp>
@@ -7,7 +7,7 @@
 
 #include "mmradartwin_dsp/range_angle.h"
 
-namespace mmradartwin::diagnosis::likelihood {
+namespace mmradartwin::diagnosis::echoes {
 namespace {
 
 /// Power over that of the pose's strongest echo from which a path is sent through the receiver. Products of weaker
@@ -153,4 +153,4 @@ void ReceiverMixture::addTo(EchoCollector& collector) {
   }
 }
 
-}  // namespace mmradartwin::diagnosis::likelihood
+}  // namespace mmradartwin::diagnosis::echoes

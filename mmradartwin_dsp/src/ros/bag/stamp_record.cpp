@@ -1,4 +1,4 @@
-#include "ros/stamp_record.h"
+#include "ros/bag/stamp_record.h"
 
 #include <algorithm>
 #include <cmath>
