@@ -375,6 +375,7 @@ TEST_F(FramesTest, EveryMechanismCanBeSwitchedOn) {
       {"edge_diffraction", "level: 20"},
       {"element_pattern", "cos_exponent: 2.1"},
       {"elevation_pattern", "cos_exponent: 8"},
+      {"empirical_clutter", "actor: floor, level_db: 0"},
       {"empirical_echo", "x_m: 1.2, y_m: -0.8, rcs_dbsm: 0, height_m: 0"},
       {"empirical_frame_gain", "gain_db: [3, 0]"},
       {"empirical_law", "variable: range_m, at: [0, 10], gain_db: [-3, -3]"},

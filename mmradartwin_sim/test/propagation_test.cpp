@@ -574,6 +574,30 @@ TEST_F(Propagation, AnEmpiricalLawIsItsTable) {
   }
 }
 
+TEST_F(Propagation, ClutterOnATableIsASumOfPointsThatEchoAlike) {
+  addBox("table", "Concrete", {2.5, -0.4, -0.5}, {3.5, 0.4, -0.45});
+  addWall("wall", "Metal", {8, -3}, {8, 3}, -2, 2);
+  writeScene();
+  const std::vector<PathRecord> found =
+      of(run("  empirical_clutter: {actor: table, level_db: -20, spacing_m: 0.02}\n"), "empirical_clutter");
+  EXPECT_EQ(found.size(), 50u * 40u);
+  double power = 0, expected = 0;
+  for (const PathRecord& r : found) {
+    EXPECT_NEAR(r.vertices[0].z(), -0.4, 1e-9);  // things stand a little above the table
+    power += r.amplitude * r.amplitude;
+  }
+  // The radar equation over the table's area, in strips of a centimetre.
+  for (int i = 0; i < 100; ++i) {
+    for (int j = 0; j < 80; ++j) {
+      const double x = 2.505 + 0.01 * i, y = -0.395 + 0.01 * j, r2 = x * x + y * y + 0.4 * 0.4;
+      expected += kLambda77_m * kLambda77_m * 0.01 * 1e-4 / (std::pow(4 * M_PI, 3) * r2 * r2);
+    }
+  }
+  expectForm("power of clutter on a table", "sum lambda^2 sigma_0 dA/((4 pi)^3 r^4)", expected, power, 0.02 * expected);
+  EXPECT_NE(errorOf([&] { run("  empirical_clutter: {actor: wall, level_db: -20}\n"); }).find("faces up"),
+            std::string::npos);
+}
+
 TEST_F(Propagation, ALateEchoIsAPointFartherAway) {
   addWall("wall", "Metal", {8, -3}, {8, 3}, -2, 2);
   writeScene();

@@ -9,7 +9,7 @@ from mmradartwin_tests.session import Measurement, Settings
 PROGRAM = find_program("mmradartwin_sim", "simulate")
 # What every twin has, what an unknown is written as, and what is simulated and never named.
 NO_CAUSES = {"specular", "corner", "diffuse",
-             "empirical_echo", "empirical_frame_gain", "empirical_law", "empirical_tone", "echo_replica",
+             "empirical_clutter", "empirical_echo", "empirical_frame_gain", "empirical_law", "empirical_tone", "echo_replica",
              "transmitter_coupling",
              "chirp_nonlinearity", "mutual_coupling", "phase_noise", "quantisation"}
 

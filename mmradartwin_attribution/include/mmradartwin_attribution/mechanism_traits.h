@@ -14,6 +14,7 @@ enum class MechanismForm {
   kUnmodelledObject,  ///< an object that the scene lacks: x_m, y_m, size_m
   kLateEcho,          ///< an echo from a place where nothing stands: x_m, y_m
   kLaw,               ///< a law without a name, of a variable
+  kSurfaceClutter,    ///< small things that lie about on an actor: actor
   kReplica,           ///< a second echo behind each echo
   kLossOverRange,     ///< levels that fall with range
   kGainOverTime,      ///< levels that change with time

@@ -64,20 +64,29 @@ double ScatterPoint::phase_rad(std::uint64_t seed) const {
   return 2 * M_PI * unitInterval(scramble(hash ^ scramble(seed)));
 }
 
-std::vector<ScatterPoint> makeScatterPoints(const Scene& scene, double spacing_m, double frequency_hz,
-                                            const std::string& mechanism,
-                                            const std::function<bool(const Facet&)>& accepted) {
+std::vector<ScatterPoint> pointsOnFacets(const Scene& scene, double spacing_m, const std::string& mechanism,
+                                         const std::function<bool(const Facet&)>& accepted) {
   std::vector<ScatterPoint> points;
   for (const Actor& actor : scene.actors) {
-    if (!actor.present || backscatterAmplitude(actor.material, 1, 1, frequency_hz) <= 0) continue;
     const std::uint64_t actor_hash = hashText(actor.name);
     for (std::size_t i = 0; i < actor.facets.size(); ++i) {
       const Facet& facet = scene.facets[actor.facets[i]];
-      if (facet.reflects && facet.present && accepted(facet))
-        addPoints(facet, scramble(actor_hash + i), spacing_m, mechanism, points);
+      if (accepted(facet)) addPoints(facet, scramble(actor_hash + i), spacing_m, mechanism, points);
     }
   }
   return points;
+}
+
+std::vector<ScatterPoint> makeScatterPoints(const Scene& scene, double spacing_m, double frequency_hz,
+                                            const std::string& mechanism,
+                                            const std::function<bool(const Facet&)>& accepted) {
+  std::vector<bool> scatters;
+  for (const Actor& actor : scene.actors) {
+    scatters.push_back(actor.present && backscatterAmplitude(actor.material, 1, 1, frequency_hz) > 0);
+  }
+  return pointsOnFacets(scene, spacing_m, mechanism, [&](const Facet& f) {
+    return scatters[static_cast<std::size_t>(f.actor)] && f.reflects && f.present && accepted(f);
+  });
 }
 
 }  // namespace mmradartwin

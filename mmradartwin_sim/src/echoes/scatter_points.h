@@ -21,8 +21,12 @@ struct ScatterPoint {
   double phase_rad(std::uint64_t seed) const;
 };
 
-/// Points on all facets of the scene that scatter at this frequency, take part and are accepted; about one per
-/// spacing_m squared. Throws InputError naming the mechanism where that is millions of points.
+/// Points on all accepted facets of the scene, about one per spacing_m squared. Throws InputError naming the mechanism
+/// where that is millions of points.
+std::vector<ScatterPoint> pointsOnFacets(const Scene& scene, double spacing_m, const std::string& mechanism,
+                                         const std::function<bool(const Facet&)>& accepted);
+/// Points on all facets of the scene that scatter at this frequency, take part and are accepted, see
+/// pointsOnFacets().
 std::vector<ScatterPoint> makeScatterPoints(const Scene& scene, double spacing_m, double frequency_hz,
                                             const std::string& mechanism,
                                             const std::function<bool(const Facet&)>& accepted);

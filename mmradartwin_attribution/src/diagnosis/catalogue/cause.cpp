@@ -149,6 +149,7 @@ const std::vector<Nameless>& namelessMechanisms() {
   static const std::vector<Nameless> all = {
       {"empirical_law", {Form::kLaw}},
       {"empirical_echo", {Form::kLateEcho, Experiment::kAbsorber, Clutter::kUnlessMapsGain}},
+      {"empirical_clutter", {Form::kSurfaceClutter}},
       {"echo_replica",
        {Form::kReplica, Experiment::kAbsorber, Clutter::kUnlessMapsGainOrLoud, "level_db", bounds::kLoudReplica_db}}};
   return all;

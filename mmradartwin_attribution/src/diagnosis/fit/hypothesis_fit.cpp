@@ -23,10 +23,11 @@ double HypothesisFit::ranking() const {
   const NamedParameters& m = hypothesis.mechanism;
   const bool nests = hypothesis.form() == MechanismForm::kLaw &&
                      !(m.values.numbers("channels").empty() && m.values.numbers("angle_deg").empty());
-  const double share = nests                        ? bounds::kRankedShareOfNestingLaw
-                       : !isCatalogued(m.mechanism) ? bounds::kRankedShareOfLaw
-                       : hypothesis.searched > 1    ? bounds::kRankedShareOfSteps
-                                                    : 1;
+  const bool adapts = !isCatalogued(m.mechanism) && hypothesis.form() != MechanismForm::kSurfaceClutter;
+  const double share = nests                     ? bounds::kRankedShareOfNestingLaw
+                       : adapts                  ? bounds::kRankedShareOfLaw
+                       : hypothesis.searched > 1 ? bounds::kRankedShareOfSteps
+                                                 : 1;
   double nats = share * gain - bounds::kPriceOfNumber_nats * static_cast<double>(numbers());
   if (hypothesis.form() == MechanismForm::kUnmodelledObject) nats -= bounds::kPriceOfPlace_nats;
   if (hypothesis.isMove() && moved_m() < stated.leastMove_m()) nats -= bounds::kPriceOfNumber_nats;

@@ -75,7 +75,9 @@ void addSubjects(const Twin& twin, const Hypothesis& bare, const std::vector<Par
   }
   if (actor) {
     for (const Actor& a : scene.actors) {
-      if (a.present && takesPart(scene, a)) with("actor", a.name, a.name);
+      // Things lie on tables and floors, which are no echoes' mirrors.
+      const bool may_be_named = bare.form() == MechanismForm::kSurfaceClutter || takesPart(scene, a);
+      if (a.present && may_be_named) with("actor", a.name, a.name);
     }
   }
   if (spec("walls") != specs.end()) {

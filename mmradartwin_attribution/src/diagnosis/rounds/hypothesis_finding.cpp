@@ -155,6 +155,7 @@ std::string rejectionReason(const HypothesisFit& fit, const std::vector<FrameFin
     if (value < range.low) return range.too_low + number(value) + range.unit;
     if (value > range.high) return range.too_high + number(value) + range.unit;
   }
+  if (traits.form == MechanismForm::kSurfaceClutter) return "what lies on " + values.text("actor") + " is clutter";
   return traits.form == MechanismForm::kUnmodelledObject ? rejectionOfObject(values, walkers) : "";
 }
 
@@ -244,6 +245,29 @@ void preferSimplerGeometry(std::vector<HypothesisFit>& fits, const ChannelData& 
     }
   }
   if (simplest != fits.end()) std::rotate(best, simplest, simplest + 1);
+}
+
+void preferSimplerNames(std::vector<HypothesisFit>& fits, const ModelState& before, const ChannelData& data) {
+  const auto is_name = [](const HypothesisFit& f) {
+    return isCatalogued(f.hypothesis.mechanism.mechanism) && !f.hypothesis.isGeometry() && f.ranking() > 0 &&
+           f.false_alarm_rate <= bounds::kFalseAlarmRateOfRound;
+  };
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    if (!is_name(fits[i])) continue;
+    const Eigen::VectorXd gained = gainByPose(fits[i], before);
+    for (std::size_t j = i + 1; j < fits.size(); ++j) {
+      const HypothesisFit& simpler = fits[j];
+      if (!is_name(simpler) || simpler.numbers() >= fits[i].numbers() ||
+          simpler.gain < bounds::kShareOfMoveInstead * fits[i].gain ||
+          correlation(gained, gainByPose(simpler, before)) < bounds::kCorrelationOfSameName ||
+          natsApart(fits[i], simpler, data) > bounds::kNotToldApart_nats) {
+        continue;
+      }
+      std::rotate(fits.begin() + static_cast<std::ptrdiff_t>(i), fits.begin() + static_cast<std::ptrdiff_t>(j),
+                  fits.begin() + static_cast<std::ptrdiff_t>(j) + 1);
+      break;
+    }
+  }
 }
 
 void preferBetterNames(std::vector<HypothesisFit>& fits, const ModelState& before) {

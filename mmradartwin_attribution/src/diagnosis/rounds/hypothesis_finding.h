@@ -55,6 +55,9 @@ double natsApart(const HypothesisFit& a, const HypothesisFit& b, const ChannelDa
 /// that look one way, a bias of all ranges and a shift of the scene are alike, and more numbers take in more of what
 /// the model lacks.
 void preferSimplerGeometry(std::vector<HypothesisFit>& fits, const ChannelData& data);
+/// Moves a name of fewer numbers before a likelier one that explains the same poses, and not much more of them, where
+/// places do not tell the two apart.
+void preferSimplerNames(std::vector<HypothesisFit>& fits, const ModelState& before, const ChannelData& data);
 /// Gives the better of two causes of all echoes that gain alike over poses the lower false-alarm rate of the two. How
 /// sure an error of all echoes is follows from its surest name; which name it has follows from the likelihood.
 void preferBetterNames(std::vector<HypothesisFit>& fits, const ModelState& before);

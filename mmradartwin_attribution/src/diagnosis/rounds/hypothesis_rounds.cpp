@@ -18,7 +18,8 @@ namespace mmradartwin::diagnosis::rounds {
 namespace {
 
 constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is searched for in a round
-constexpr std::size_t kMostClutter = 4;      ///< things that stand out of the clutter, beside which a fit is judged
+constexpr std::size_t kMostAllowedFor = 12;  ///< things that stand out of the clutter, allowed for in a session
+constexpr double kThingsApart_m = 0.5;       ///< nearer ones are the same thing
 
 /// True of a transmitter's delay that is no larger than its error: its phase alone is another cause's.
 bool isPhaseOnly(const HypothesisFit& fit) {
@@ -30,6 +31,15 @@ bool isPhaseOnly(const HypothesisFit& fit) {
            std::max(bounds::kLeastDelay_m, bounds::kLeastDelay_sigmas * fit.standard_error[j]);
   }
   return false;
+}
+
+/// True of two small things at one place. What lies about on an actor is at no place.
+bool isSameThing(const HypothesisFit& a, const HypothesisFit& b) {
+  if (a.hypothesis.form() != MechanismForm::kUnmodelledObject || b.hypothesis.form() != a.hypothesis.form()) {
+    return false;
+  }
+  const Parameters p = a.hypothesis.at(a.scaled_values).values, q = b.hypothesis.at(b.scaled_values).values;
+  return std::hypot(p.number("x_m") - q.number("x_m"), p.number("y_m") - q.number("y_m")) < kThingsApart_m;
 }
 
 /// Gives a receiver's image the pattern over the receivers that the data show, where they differ. One level is fitted.
@@ -85,8 +95,11 @@ std::vector<RangeShift> HypothesisRounds::takeRangeErrors(ModelState& state) {
 void HypothesisRounds::run(const std::vector<NamedParameters>& mechanisms, const std::vector<NamedParameters>& extended,
                            ModelState state, int most_rounds) {
   selection_.begin(mechanisms, extended, std::move(state));
-  for (int round = 0; round < most_rounds; ++round) {
-    if (!findOne(round)) break;
+  int found = 0;
+  for (int round = 0; found < most_rounds; ++round) {
+    const RoundEnd end = findOne(round);
+    if (end == RoundEnd::kNothing) break;
+    if (end == RoundEnd::kFound) ++found;
   }
   selection_.finish();
 }
@@ -115,23 +128,19 @@ std::string HypothesisRounds::rejectionByLikelihood(const HypothesisFit& fit) co
 }
 
 bool HypothesisRounds::isClutter(const HypothesisFit& fit) const {
-  return fit.hypothesis.form() == MechanismForm::kUnmodelledObject && fit.size_m() <= bounds::kLeastSize_m &&
-         fit.ranking() > 0 && fit.false_alarm_rate <= bounds::kFalseAlarmRateOfRound && fit.held_out_gain > 0;
+  const bool thing = fit.hypothesis.form() == MechanismForm::kUnmodelledObject && fit.size_m() <= bounds::kLeastSize_m;
+  return (thing || fit.hypothesis.form() == MechanismForm::kSurfaceClutter) && fit.ranking() > 0 &&
+         fit.false_alarm_rate <= bounds::kFalseAlarmRateOfRound && fit.held_out_gain > 0;
 }
 
-bool HypothesisRounds::standsBeside(const std::vector<HypothesisFit>& clutter, const HypothesisFit& fit) {
-  context_.report(fit.hypothesis.label() + " beside clutter that stands out", 0);
-  const ModelState& state = selection_.state();
-  std::vector<NamedParameters> mechanisms = state.mechanisms;
+std::vector<HypothesisFit> HypothesisRounds::newClutter(const std::vector<HypothesisFit>& clutter) const {
+  std::vector<HypothesisFit> apart;
   for (const HypothesisFit& thing : clutter) {
-    replaceOrAppend(thing.hypothesis.at(thing.scaled_values), mechanisms);
+    const bool is_new =
+        std::none_of(apart.begin(), apart.end(), [&](const HypothesisFit& other) { return isSameThing(thing, other); });
+    if (is_new && allowed_for_ + apart.size() < kMostAllowedFor) apart.push_back(thing);
   }
-  context_.echoes.setBaseline(mechanisms);
-  const ModelState beside = context_.fitter.state(mechanisms, &state.latents);
-  HypothesisFit again = context_.fitter.fit(beside, fit.hypothesis, {fit.scaled_values});
-  context_.fitter.judge(again, family_);
-  context_.echoes.setBaseline(state.mechanisms);
-  return rejectionByLikelihood(again).empty();
+  return apart;
 }
 
 std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<HypothesisFit>& fits, std::size_t best) {
@@ -149,25 +158,34 @@ std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<Hypothesis
   return std::nullopt;
 }
 
-bool HypothesisRounds::findOne(int round) {
+HypothesisRounds::RoundEnd HypothesisRounds::findOne(int round) {
   std::vector<HypothesisFit> fits = fitBest(round);
   const ModelState& state = selection_.state();
   preferAbsences(fits);
   preferMoves(fits, context_.twin.scene());
   preferSimplerGeometry(fits, context_.data);
   preferBetterNames(fits, state);
+  preferSimplerNames(fits, state, context_.data);
   MapEvidence maps(context_, state);
   std::vector<HypothesisFit> clutter;  // likelier than the fits that follow
   for (std::size_t i = 0; i < fits.size(); ++i) {
     HypothesisFit& fit = fits[i];
     std::string& verdict = triedAs(fit, round, result_.tried).verdict;
     verdict = rejectionByLikelihood(fit);
-    if (isClutter(fit) && clutter.size() < kMostClutter) clutter.push_back(fit);
+    if (isClutter(fit)) clutter.push_back(fit);
     if (!verdict.empty()) continue;
     const bool placed = placeOf(fit.hypothesis.at(fit.scaled_values), context_.twin.scene()).has_value();
-    if (!clutter.empty() && !placed && !standsBeside(clutter, fit)) {
-      verdict = "clutter that stands out explains it";
-      continue;
+    const std::vector<HypothesisFit> things = placed ? std::vector<HypothesisFit>() : newClutter(clutter);
+    if (!things.empty()) {
+      verdict = "judged again beside clutter that stands out";
+      for (const HypothesisFit& thing : things) {
+        triedAs(thing, round, result_.tried).verdict += ", allowed for in what follows";
+      }
+      context_.report("clutter that stands out", 1);
+      selection_.allowFor(things);
+      allowed_for_ += things.size();
+      ranking_.tryAllAgain();
+      return RoundEnd::kAllowedForClutter;
     }
     Finding finding = findingOf(fit, fits, state, context_.twin.scene(), context_.data);
     if (context_.data.locations.size() > 1) {
@@ -189,13 +207,13 @@ bool HypothesisRounds::findOne(int round) {
     verdict = selection_.take(fit, fits, std::move(finding), family_);
     if (verdict.empty()) {
       verdict = "found";
-      return true;
+      return RoundEnd::kFound;
     }
     context_.report("taken back: " + fit.hypothesis.label(), 1);
     // An effect that looks like an actor's own error may have another cause.
     if (!fit.hypothesis.isMove()) maps.addRejected(fit);
   }
-  return false;
+  return RoundEnd::kNothing;
 }
 
 }  // namespace mmradartwin::diagnosis::rounds

@@ -39,15 +39,18 @@ class HypothesisRounds {
   const std::vector<RangeShift>& elsewhere() const { return elsewhere_; }
 
  private:
-  /// Runs one round; true where it found something.
-  bool findOne(int round);
+  enum class RoundEnd { kNothing, kFound, kAllowedForClutter };
+  /// Runs one round. Where clutter that stands out is likelier than a cause that the scene does not place, the clutter
+  /// is allowed for and the round ends: the next one judges all causes beside it.
+  RoundEnd findOne(int round);
   std::vector<HypothesisFit> fitBest(int round);
   /// Reason why a fit is no finding by its likelihood alone, "" where it may be one.
   std::string rejectionByLikelihood(const HypothesisFit& fit) const;
-  /// True of an object with all the evidence that one needs, but no larger than clutter is.
+  /// True of what lies about on an actor, and of an object no larger than clutter is, with all the evidence that a
+  /// finding needs.
   bool isClutter(const HypothesisFit& fit) const;
-  /// True of a fit that would also be one where the twin has this clutter.
-  bool standsBeside(const std::vector<HypothesisFit>& clutter, const HypothesisFit& fit);
+  /// Those of these things, likeliest first, that stand apart from each other, as many as may still be allowed for.
+  std::vector<HypothesisFit> newClutter(const std::vector<HypothesisFit>& clutter) const;
   /// Index of the likeliest named fit after fits[best] that is about as likely and explains clearly more power on
   /// held-out places; nothing where there is none.
   std::optional<std::size_t> betterByMaps(std::vector<HypothesisFit>& fits, std::size_t best);
@@ -59,7 +62,8 @@ class HypothesisRounds {
   HypothesisRanking ranking_;
   Selection selection_;
   std::vector<RangeShift> elsewhere_;
-  std::size_t family_ = 1;  ///< number of hypotheses of a round
+  std::size_t family_ = 1;       ///< number of hypotheses of a round
+  std::size_t allowed_for_ = 0;  ///< number of things that stand out of the clutter, taken for granted
 };
 
 }  // namespace mmradartwin::diagnosis::rounds

@@ -80,6 +80,12 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
   return "";
 }
 
+void Selection::allowFor(const std::vector<HypothesisFit>& things) {
+  for (const HypothesisFit& thing : things) before_rounds_.push_back(thing.hypothesis.at(thing.scaled_values));
+  writeBackFindings();
+  refitState();
+}
+
 /// Fits all findings of rounds jointly, and withdraws findings that then gain nothing given the others.
 void Selection::refitTogether() {
   while (true) {

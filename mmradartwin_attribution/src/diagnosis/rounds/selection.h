@@ -42,6 +42,9 @@ class Selection {
   /// changed; "" where it stands.
   std::string take(const HypothesisFit& fit, const std::vector<HypothesisFit>& fits, Finding finding,
                    std::size_t family);
+  /// Takes things that the twin lacks for granted: all that follows is judged beside them. They are no findings, and
+  /// the extended twin has them not.
+  void allowFor(const std::vector<HypothesisFit>& things);
   /// Profiles what was found, and sorts it by falling gain, an unknown last. Gains are measured again where other
   /// findings now precede them.
   void finish();
@@ -83,7 +86,7 @@ class Selection {
   std::vector<Finding>& findings_;
   std::vector<TriedHypothesis>& tried_;
   std::vector<NamedParameters> mechanisms_, extended_;
-  /// Mechanisms without the findings of rounds.
+  /// Mechanisms without the findings of rounds, but with what was allowed for.
   std::vector<NamedParameters> before_rounds_, extended_before_rounds_;
   ModelState state_;
   std::vector<Accepted> accepted_;

@@ -144,6 +144,33 @@ TEST(Preference, ASimplerGeometryComesFirstWherePlacesDoNotTellItApart) {
   EXPECT_EQ(firstOf({110, 111, 109, 110}), "scene_registration") << "40 nats, alike at all places";
 }
 
+TEST(Preference, ASimplerNameComesFirstWherePlacesDoNotTellItApart) {
+  ChannelData data;
+  for (int i = 0; i < 4; ++i) {
+    data.locations.push_back(std::to_string(i));
+    data.poses.emplace_back().location = i;
+  }
+  ModelState before;
+  before.by_pose = {0, 0, 0, 0};
+  const auto firstOf = [&](const std::vector<double>& by_pose, const std::vector<double>& simpler_by_pose) {
+    std::vector<HypothesisFit> fits = {fitOf("wall_ghost", 0, "wall"), fitOf("corner_reflection", 0, "wall;cabinet")};
+    fits[0].hypothesis.coordinates.assign(2, Coordinate{"gain_db", "dB", -1, 0, 1, -60, 0, {}});
+    fits[0].state.by_pose = by_pose;
+    fits[1].state.by_pose = simpler_by_pose;
+    for (HypothesisFit& f : fits) {
+      for (double nats : f.state.by_pose) f.gain += nats;
+      f.state.log_likelihood = f.gain;
+      f.false_alarm_rate = 1e-4;
+    }
+    preferSimplerNames(fits, before, data);
+    return fits[0].hypothesis.mechanism.mechanism;
+  };
+  EXPECT_EQ(firstOf({90, 20, 40, 10}, {75, 25, 25, 15}), "corner_reflection") << "20 nats, scattered by 11";
+  EXPECT_EQ(firstOf({95, 25, 40, 20}, {88, 19, 32, 13}), "wall_ghost") << "28 nats, alike at all places";
+  EXPECT_EQ(firstOf({90, 20, 40, 10}, {15, 75, 25, 25}), "wall_ghost") << "other poses";
+  EXPECT_EQ(firstOf({90, 20, 40, 10}, {60, 25, 15, 5}), "wall_ghost") << "far less";
+}
+
 TEST(GainByPose, IsTheDifferenceAndItsCorrelationPearsons) {
   ModelState before;
   before.by_pose = {1, 1, 1};

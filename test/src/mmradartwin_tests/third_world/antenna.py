@@ -8,6 +8,7 @@ C = 299792458.0
 PITCH_M = 0.0019467
 EDGE_SINE = math.sin(math.radians(20.0))     # flat in elevation up to here
 END_SINE = math.sin(math.radians(24.0))      # nothing from here on
+FADE_DEG = 2.0                               # before the plane of the array, where elements fall off
 
 
 @dataclasses.dataclass
@@ -33,7 +34,7 @@ class Front:
         common = self.ripple_db * self._ripple(rng)
         self.table = np.array([10**((common + self.own_ripple_db * self._ripple(rng)) / 20) *
                                np.exp(1j * np.radians(self.own_ripple_deg) * self._ripple(rng)) for _ in range(6)])
-        edge = np.clip((np.radians(90) - np.abs(self.azimuth)) / np.radians(8), 0, 1)
+        edge = np.clip((np.radians(90) - np.abs(self.azimuth)) / np.radians(FADE_DEG), 0, 1)
         self.table *= np.sin(np.pi / 2 * edge)**2 * np.maximum(np.cos(self.azimuth), 0)**(self.cos_exponent / 2)
 
     def _ripple(self, rng):

@@ -11,6 +11,8 @@ from mmradartwin_tests.third_world import hidden, rooms
 from mmradartwin_tests.third_world.measured import ThirdWorld
 
 IMAGE_DB = 3.0      # an image of the world's own receivers is told right within
+CORNER_DB = 20.0    # over the noise of a sample: a corner that stands out in this world
+CORNER_POSES = 3    # to which a corner of this world answers at least
 NEAR_NATS = 3.0     # a twin that is told a cause which is not there may be ahead by so much
 
 
@@ -54,6 +56,9 @@ def run_trial(seed, what, program, folder, jobs, without=(), limit_s=3600.0, tol
         expected = truths or absent(seed, world.plan)
         answers = trials.told(program, session, expected, folder, limit_s, jobs)
         record["told"] = [{"cause": t["cause"], **a} for t, a in zip(expected, answers) if a]
+    record["corners"] = [f["parameters"]["actors"]["value"] for f in record["findings"]
+                         if f["cause"] == "corner_reflection" and
+                         sum(v > CORNER_DB for v in world.corner_over_noise_db(f["parameters"]["actors"]["value"])) >= CORNER_POSES]
     record["image_db"] = [20 * float(np.log10(max(abs(v), 1e-9))) for v in world.images()]
     record.update(key=f"{what}-{seed}", seed=seed, row="clean" if cause is None else "single", kind=kind, truths=truths,
                   poses=len(world.stations), places=world.places, made_s=round(made_s, 1), without=sorted(without))
@@ -61,8 +66,11 @@ def run_trial(seed, what, program, folder, jobs, without=(), limit_s=3600.0, tol
 
 
 def is_true_of_the_world(finding, record):
-    """A finding that tells the images of the world's receivers, which every session has."""
+    """A finding that tells what the world has and the twin has not: the images of its receivers, which every session has,
+    or a corner across a gap that its second order returns (CORNER_DB)."""
     told = finding["parameters"].get("image_db", {}).get("value")
+    if finding["cause"] == "corner_reflection":
+        return finding["parameters"]["actors"]["value"] in record.get("corners", [])
     return (finding["cause"] == "iq_imbalance" and isinstance(told, list) and
             all(abs(a - b) <= IMAGE_DB for a, b in zip(told, record["image_db"])))
 

@@ -136,6 +136,7 @@ class ThirdWorld:
                  "wall_north": ((low[0], high[1], 0), (1, 0, 0), z, lx, lz),
                  "wall_west": ((*low, 0), (0, 1, 0), z, ly, lz), "wall_east": ((high[0], low[1], 0), z, (0, 1, 0), lz, ly)}
         faces = [self._face(name, tag, sides[name], nature, 0) for name, tag in plan.walls.items()]
+        names = list(plan.walls)
         boxes = []
         for piece in plan.pieces:
             own = np.random.default_rng([self.seed, 6, *piece.name.encode()])
@@ -149,6 +150,7 @@ class ThirdWorld:
             box = Box(piece.box.center + shift, piece.box.size, piece.box.yaw_rad + lean)
             boxes.append(box)
             faces += [self._face(piece.name, piece.tag, side, nature, i) for i, side in enumerate(box.sides())]
+            names += [piece.name] * (len(faces) - len(names))
         if self.cause == "actor_unmodelled":
             size, height = self.hidden["size_m"], hidden.UNMODELLED_HEIGHT_M
             box = Box(np.array([self.hidden["x_m"], self.hidden["y_m"], 0.01 + height / 2]), np.array([size, size, height]),
@@ -161,6 +163,9 @@ class ThirdWorld:
                            own_ripple_deg=Front.own_ripple_deg * ripple, seed=self.seed,
                            cos_exponent=self.of("element_pattern", "cos_exponent"),
                            pitch_scale=self.of("carrier_scale", "scale"))
+        self.faces_of = {}
+        for i, name in enumerate(names):
+            self.faces_of.setdefault(name, set()).add(i)
         self.world = World(faces, boxes, [Wire(*t) for t in things], self.front)
         self._describe()
 
@@ -270,6 +275,13 @@ class ThirdWorld:
         session.write_description(directory, self)
         with open(os.path.join(directory, "session.yaml"), "a", encoding="ascii") as out:
             out.write(STATED)
+
+    def corner_over_noise_db(self, actors):
+        """[stations] level of the ways over two faces of one or two actors, over the noise of a sample; -99 where there
+        are none."""
+        first, second = self.faces_of.get(actors[0], set()), self.faces_of.get(actors[-1], set())
+        levels = [self.world.corner(s.true.position, s.true.rotation, first, second) for s in self.stations]
+        return [20 * math.log10(max(a / NOISE_RMS, 1e-5)) for a in levels]
 
     def images(self):
         """[4] complex shares of the conjugate signal that receivers add, the hidden cause's among them."""

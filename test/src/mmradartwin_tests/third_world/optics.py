@@ -68,17 +68,30 @@ class World:
 
     def profile(self, position, rotation):
         """[M, L] complex echo over the delay axis of one pose; the rotation takes radar axes into map."""
-        self.rotation = np.asarray(rotation, float)
-        self.tx = np.asarray(position, float) + self.front.tx @ self.rotation.T
-        self.rx = np.asarray(position, float) + self.front.rx @ self.rotation.T
-        self.position = (self.tx.mean(axis=0) + self.rx.mean(axis=0)) / 2     # the array's middle
-        found = np.zeros((8, int(LONGEST_M / STEP_M) + 2), complex)
+        found = self._stand(position, rotation)
         self._first_order(found)
         self._small_things(found)
         for order in range(2, MAX_ORDER + 1):
             for sequence, stationary in self._sequences(order):
                 self._higher_order(found, sequence, stationary)
         return found
+
+    def _stand(self, position, rotation):
+        """Takes the radar to a pose. [M, L] zeros for its echo."""
+        self.rotation = np.asarray(rotation, float)
+        self.tx = np.asarray(position, float) + self.front.tx @ self.rotation.T
+        self.rx = np.asarray(position, float) + self.front.rx @ self.rotation.T
+        self.position = (self.tx.mean(axis=0) + self.rx.mean(axis=0)) / 2     # the array's middle
+        return np.zeros((8, int(LONGEST_M / STEP_M) + 2), complex)
+
+    def corner(self, position, rotation, first, second):
+        """Largest amplitude of a channel over the delay axis by the ways over one face of each of two sets of faces."""
+        found = self._stand(position, rotation)
+        for sequence, stationary in self._sequences(2):
+            ends = {int(f) for f in sequence}
+            if ends & first and ends & second:
+                self._higher_order(found, sequence, stationary)
+        return float(np.abs(found).max())
 
     def _add(self, found, tx_m, rx_m, gains_out, gains_back, weight, shorter_m=0.0):
         """Adds waves: legs [2, P] and [4, P], element gains, weights [P] before spreading."""
