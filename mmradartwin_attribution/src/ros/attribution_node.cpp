@@ -54,12 +54,14 @@ AttributionNode::AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& priv
   if (!settings_.config_file.empty()) config_ = loadAttributionConfig(settings_.config_file);
   residuals_ = nh_.advertise<mmradartwin_msgs::Residuals>("attribution/residuals", 10);
   residual_map_ = nh_.advertise<MapMsg>("attribution/residual_map", 10);
+  pose_figures_ = nh_.advertise<mmradartwin_msgs::PoseFigures>("attribution/pose", 10);
   ledger_ = nh_.advertise<mmradartwin_msgs::Ledger>("attribution/ledger", 1, true);
   markers_ = nh_.advertise<visualization_msgs::MarkerArray>("attribution/markers", 2);
   scene_markers_ = nh_.advertise<visualization_msgs::MarkerArray>(
       "attribution/scene_markers", 1, [this](const ros::SingleSubscriberPublisher&) { onSceneViewer(); },
       ros::SubscriberStatusCallback(), ros::VoidConstPtr(), true);
   detections_ = std::make_unique<DetectionPublisher>(nh_, settings_.detections);
+  why_ = std::make_unique<WhyServer>(nh_, settings_.map_frame);
   subscribers_.push_back(nh_.subscribe("radar/config", 1, &AttributionNode::onRadar, this));
   subscribers_.push_back(nh_.subscribe("session", 1, &AttributionNode::onSession, this));
   subscribers_.push_back(nh_.subscribe("twin/paths", 10, &AttributionNode::onPaths, this));
@@ -98,13 +100,19 @@ NodeDescription AttributionNode::description() {
        topic<mmradartwin_msgs::Scene>("twin/moved_scene", "the scene with actors where they are simulated; latched"),
        topic<mmradartwin_msgs::PathRecords>("twin/paths", "paths of the simulation"),
        topic<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", "measured map"),
-       topic<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", "simulated map")},
+       topic<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", "simulated map"),
+       topic<geometry_msgs::PointStamped>("clicked_point", "a place to explain, in map or in the radar's frame")},
       {topic<mmradartwin_msgs::Residuals>("attribution/residuals", "what differs in a pair of maps"),
        topic<MapMsg>("attribution/residual_map", "the difference itself, simulated - measured, as a map"),
+       topic<mmradartwin_msgs::PoseFigures>("attribution/pose", "how well both maps of a pair agree"),
        topic<mmradartwin_msgs::Ledger>("attribution/ledger", "metrics over all poses so far; latched"),
        topic<visualization_msgs::MarkerArray>("attribution/markers",
                                               "the radar, boxes on the floor and paths for rviz"),
        topic<visualization_msgs::MarkerArray>("attribution/scene_markers", "the scene for rviz; latched"),
+       topic<mmradartwin_msgs::Explanation>("attribution/explanation",
+                                            "what stands behind the place that was asked for; latched"),
+       topic<visualization_msgs::MarkerArray>("attribution/explanation_markers",
+                                              "that place, its actor and paths for rviz; latched"),
        topic<sensor_msgs::PointCloud2>("radar/points", "what CFAR detects in the measured map"),
        topic<sensor_msgs::PointCloud2>("twin/points", "what it detects in the simulated map"),
        topic<mmradartwin_msgs::DetectionAgreement>("attribution/detection_agreement", "how both agree"),
@@ -112,7 +120,8 @@ NodeDescription AttributionNode::description() {
                                                      "what can be tuned by eye; latched"),
        topic<dynamic_reconfigure::Config>("~tuning/parameter_updates", "what it is tuned to; latched"),
        topic<diagnostic_msgs::DiagnosticArray>("/diagnostics", "whether maps come and are compared, and why not")},
-      {service<dynamic_reconfigure::Reconfigure>("~tuning/set_parameters", "changes what is tuned by eye")},
+      {service<mmradartwin_msgs::Why>("attribution/why", "what stands behind a place"),
+       service<dynamic_reconfigure::Reconfigure>("~tuning/set_parameters", "changes what is tuned by eye")},
       [](StrictParameters& parameters) { const Settings settings(parameters); }};
 }
 
@@ -279,7 +288,7 @@ void AttributionNode::publishPoints(const MapMsg& measured_msg) {
 void AttributionNode::setScene(Scene scene) {
   regions_.reset();
   rays_.reset();
-  scene_ = std::make_unique<Scene>(std::move(scene));
+  scene_ = std::make_shared<const Scene>(std::move(scene));
   rays_ = std::make_unique<RayCaster>(*scene_);
 }
 
@@ -308,7 +317,7 @@ void AttributionNode::publishScene() {
 void AttributionNode::rebuild() {
   if (!radar_) return;
   const SignalChain chain(*radar_);
-  field_ = std::make_unique<EvaluationField>(config_, *radar_, chain.axes());
+  field_ = std::make_shared<const EvaluationField>(config_, *radar_, chain.axes());
   builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.map_frame, tuned_.max_paths);
   slow_ = true;  // until it is known
   if (scene_) regions_ = std::make_unique<RegionModel>(*scene_, *rays_, *field_, *radar_);
@@ -372,28 +381,22 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
   if (paths_ && (paths_->header.stamp == simulated_msg.header.stamp ||
                  fromMsg(paths_->T_map_radar).isApprox(simulated.T_map_radar, 1e-6))) {
     if (paths_ != records_of_) {
-      records_ = pathsFromMsg(*paths_, *scene_);
+      records_ = std::make_shared<std::vector<PathRecord>>(pathsFromMsg(*paths_, *scene_));
       records_of_ = paths_;
     }
   } else {
-    records_.clear();
+    records_ = std::make_shared<std::vector<PathRecord>>();
     records_of_.reset();
   }
   showSceneToNewViewer();
-  const PoseAttribution pose = attributePose(*field_, measured, simulated, regionsAt(T), records_);
+  PoseAttribution pose = attributePose(*field_, measured, simulated, regionsAt(T), *records_);
   const std::string name = nameAt(measured.stamp_ns);
 
   mmradartwin_msgs::Residuals residuals = toMsg(*field_, pose, name, T);
   residuals.header.stamp = measured_msg.header.stamp;
   residuals.header.frame_id = settings_.radar_frame;
   residuals_.publish(residuals);
-  if (residual_map_.getNumSubscribers() > 0) {
-    MapMsg map = residualMapMsg(*field_, pose, T);
-    map.header = residuals.header;
-    map.radar_hash = radar_hash_;
-    map.frames = measured_msg.frames;
-    residual_map_.publish(map);
-  }
+  publishFigures(pose, residuals, T, measured_msg.frames);
 
   live_ledger_.add(measured.stamp_ns, T, name.empty() ? formatStamp(measured.stamp_ns) : name, measured.frames,
                    pose.central);
@@ -404,11 +407,29 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
     if (markers_.getNumSubscribers() > 0) {
       if (had_subscribers_ == 0)
         builder_ = std::make_unique<MarkerBuilder>(*field_, settings_.map_frame, tuned_.max_paths);
-      markers_.publish(builder_->build(pose, records_, T, name));
+      markers_.publish(builder_->build(pose, *records_, T, name));
     }
     had_subscribers_ = markers_.getNumSubscribers();
   }
+  why_->setPose({residuals.header, name, T, std::move(pose), records_, field_, scene_});
   ++pairs_;
+}
+
+// What costs something and is for few.
+void AttributionNode::publishFigures(const PoseAttribution& pose, const mmradartwin_msgs::Residuals& residuals,
+                                     const Eigen::Isometry3d& T, std::uint32_t frames) {
+  if (residual_map_.getNumSubscribers() > 0) {
+    MapMsg map = residualMapMsg(*field_, pose, T);
+    map.header = residuals.header;
+    map.radar_hash = radar_hash_;
+    map.frames = frames;
+    residual_map_.publish(map);
+  }
+  if (pose_figures_.getNumSubscribers() > 0) {
+    mmradartwin_msgs::PoseFigures figures = poseFiguresMsg(pose, residuals.pose);
+    figures.header = residuals.header;
+    pose_figures_.publish(figures);
+  }
 }
 
 std::string AttributionNode::nameAt(std::int64_t stamp_ns) const {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <mutex>
 #include <set>
+#include <sstream>
 #include <string_view>
 
 #include "ledger_fields.h"
@@ -86,6 +87,42 @@ mmradartwin_msgs::RangeAngleMap mapOf(const EvaluationField& field, const RealGr
   msg.pose_valid = true;
   msg.T_map_radar = mmradartwin::toMsg(T_map_radar);
   return msg;
+}
+
+RegionKind regionKindOf(const std::string& name) {
+  for (RegionKind kind : {RegionKind::kFacing, RegionKind::kCorner, RegionKind::kEdge, RegionKind::kImage}) {
+    if (regionKindName(kind) == name) return kind;
+  }
+  return RegionKind::kExtent;
+}
+
+/// Tags of the materials of actors joined with ";", joined alike.
+std::string materialsOf(const Scene& scene, const std::string& actors) {
+  std::string materials;
+  std::istringstream names(actors);
+  for (std::string name; std::getline(names, name, ';');) {
+    const int index = scene.actorIndex(name);
+    if (index < 0) continue;
+    if (!materials.empty()) materials += ';';
+    materials += scene.actors[static_cast<std::size_t>(index)].material_tag;
+  }
+  return materials;
+}
+
+/// Index of the region that a residual names by its actor, the nearest of those; -1 where it names none.
+int regionOf(const mmradartwin_msgs::Residuals& msg, const mmradartwin_msgs::Residual& residual) {
+  int nearest = -1;
+  double nearest_distance = 0;
+  for (std::size_t i = 0; i < msg.regions.size() && !residual.actor.empty(); ++i) {
+    const mmradartwin_msgs::ResponseRegion& region = msg.regions[i];
+    if (region.actor != residual.actor) continue;
+    const double distance = std::hypot((residual.range_m - region.range_m) / region.half_range_m,
+                                       (residual.azimuth_rad - region.azimuth_rad) / region.half_azimuth_rad);
+    if (nearest >= 0 && distance >= nearest_distance) continue;
+    nearest = static_cast<int>(i);
+    nearest_distance = distance;
+  }
+  return nearest;
 }
 
 Eigen::Vector3d vector(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
@@ -174,12 +211,59 @@ mmradartwin_msgs::Ledger toMsg(const LedgerSummary& s, const std::vector<std::st
   return msg;
 }
 
+mmradartwin_msgs::PoseFigures poseFiguresMsg(const PoseAttribution& pose, const std::string& name) {
+  Ledger ledger;
+  ledger.add(pose.central);
+  mmradartwin_msgs::PoseFigures msg;
+  msg.name = name;
+  msg.figures = toMsg(ledger.summary(), {});
+  double sum = 0;
+  int cells = 0;
+  for (const double* db = pose.residual_db.data(); db != pose.residual_db.data() + pose.residual_db.size(); ++db) {
+    if (!std::isfinite(*db)) continue;
+    sum += *db * *db;
+    ++cells;
+  }
+  msg.residual_rms_db = cells > 0 ? std::sqrt(sum / cells) : std::numeric_limits<double>::quiet_NaN();
+  return msg;
+}
+
 mmradartwin_msgs::Findings toMsg(const Findings& findings) {
   mmradartwin_msgs::Findings msg;
   msg.verdict = findings.verdict();
   for (const Finding& finding : findings.findings) msg.findings.push_back(toMsg(finding));
   msg.json = toJson(findings);
   return msg;
+}
+
+PoseAttribution attributionFromMsg(const mmradartwin_msgs::Residuals& msg, const Scene* scene) {
+  PoseAttribution pose;
+  for (const mmradartwin_msgs::ResponseRegion& m : msg.regions) {
+    ResponseRegion region;
+    region.range_m = m.range_m;
+    region.azimuth_rad = m.azimuth_rad;
+    region.kind = regionKindOf(m.kind);
+    region.actor = m.actor;
+    if (scene) region.material = materialsOf(*scene, m.actor);
+    region.measured_strong = m.measured_strong;
+    region.simulated_strong = m.simulated_strong;
+    pose.regions.push_back(region);
+  }
+  for (const mmradartwin_msgs::Residual& m : msg.residuals) {
+    Residual residual;
+    residual.residual_class = static_cast<ResidualClass>(std::clamp<int>(m.residual_class, 1, 5));
+    residual.measured_stronger = m.measured_stronger;
+    residual.range_m = m.range_m;
+    residual.azimuth_rad = m.azimuth_rad;
+    residual.measured_db = m.measured_db;
+    residual.simulated_db = m.simulated_db;
+    residual.actor = m.actor;
+    residual.material = m.material;
+    residual.records.assign(m.records.begin(), m.records.end());
+    residual.region = regionOf(msg, m);
+    pose.residuals.push_back(std::move(residual));
+  }
+  return pose;
 }
 
 std::vector<PathRecord> pathsFromMsg(const mmradartwin_msgs::PathRecords& msg, const Scene& scene) {

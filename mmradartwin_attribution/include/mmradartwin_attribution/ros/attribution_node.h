@@ -6,6 +6,7 @@
 #include <mmradartwin_msgs/PathRecords.h>
 #include <mmradartwin_msgs/RadarConfig.h>
 #include <mmradartwin_msgs/RangeAngleMap.h>
+#include <mmradartwin_msgs/Residuals.h>
 #include <mmradartwin_msgs/Scene.h>
 #include <mmradartwin_msgs/Session.h>
 #include <ros/ros.h>
@@ -25,6 +26,7 @@
 #include "mmradartwin_attribution/response_region.h"
 #include "mmradartwin_attribution/ros/detection_publisher.h"
 #include "mmradartwin_attribution/ros/markers.h"
+#include "mmradartwin_attribution/ros/why_server.h"
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/ros/node_program.h"
 #include "mmradartwin_dsp/ros/topic_watch.h"
@@ -37,7 +39,8 @@ using TuningConfig = mmradartwin_attribution::TuningConfig;  // made of cfg/Tuni
 
 /// radar/config, session, twin/scene, twin/moved_scene, twin/paths, radar/range_angle, twin/range_angle ->
 /// attribution/residuals, attribution/residual_map, attribution/ledger, attribution/markers, attribution/scene_markers,
-/// radar/points, twin/points, attribution/detection_agreement.
+/// radar/points, twin/points, attribution/detection_agreement, attribution/pose; and answers what stands behind a place
+/// (why_server.h).
 ///
 /// Matches measured and simulated maps by stamp and attributes what differs. Poses are named after the session's
 /// poses.csv; else the ledger names them after their stamp. The scene is that of the parameter `scene`, else of
@@ -85,6 +88,8 @@ class AttributionNode {
   void publishLedger(const ros::Time& stamp);
   const std::vector<ResponseRegion>& regionsAt(const Eigen::Isometry3d& T);
   void publishPoints(const MapMsg& measured_msg);
+  void publishFigures(const PoseAttribution& pose, const mmradartwin_msgs::Residuals& residuals,
+                      const Eigen::Isometry3d& T, std::uint32_t frames);
   void compare(const MapMsg& measured_msg, const MapMsg& simulated_msg);
   /// Of the session's pose, empty where none is defined.
   std::string nameAt(std::int64_t stamp_ns) const;
@@ -101,8 +106,9 @@ class AttributionNode {
   boost::recursive_mutex tuning_mutex_;  ///< of tuning_, which wants one
   std::unique_ptr<dynamic_reconfigure::Server<TuningConfig>> tuning_;
   std::string twin_yaml_;
-  ros::Publisher residuals_, residual_map_, ledger_, markers_, scene_markers_;
+  ros::Publisher residuals_, residual_map_, pose_figures_, ledger_, markers_, scene_markers_;
   std::unique_ptr<DetectionPublisher> detections_;
+  std::unique_ptr<WhyServer> why_;
   std::vector<ros::Subscriber> subscribers_;
   ros::Subscriber measured_subscriber_, simulated_subscriber_;
   TopicWatch measured_heard_{"the signal chain"}, simulated_heard_{"the twin, and the signal chain"};
@@ -120,16 +126,16 @@ class AttributionNode {
   std::optional<std::int64_t> newest_ns_;                          // of the measured maps
   MapMsg::ConstPtr last_measured_, last_simulated_;                // the last pair
   mmradartwin_msgs::PathRecords::ConstPtr paths_, records_of_;
-  std::vector<PathRecord> records_;
+  std::shared_ptr<const std::vector<PathRecord>> records_ = std::make_shared<std::vector<PathRecord>>();
   std::map<std::int64_t, std::string> pose_names_;
 
   std::unique_ptr<RadarConfig> radar_;
   std::uint64_t radar_hash_ = 0;
-  std::unique_ptr<Scene> scene_;
+  std::shared_ptr<const Scene> scene_;
   std::unique_ptr<Scene> moved_scene_;  ///< as it is simulated, where actors stand elsewhere than in scene_
   ros::Time scene_stamp_, moved_scene_stamp_;
   std::unique_ptr<RayCaster> rays_;
-  std::unique_ptr<EvaluationField> field_;
+  std::shared_ptr<const EvaluationField> field_;
   std::unique_ptr<RegionModel> regions_;
   std::unique_ptr<MarkerBuilder> builder_;
   std::vector<ResponseRegion> regions_of_pose_;
