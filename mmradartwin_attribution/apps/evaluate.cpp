@@ -59,7 +59,15 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
 
   const ReportWriter report(output.path(), arguments.input.templates);
   std::unique_ptr<ResultsBag> bag;
-  if (!arguments.no_bag) bag = std::make_unique<ResultsBag>(output.path() + "/results.bag", field, twin.scene());
+  std::string twin_yaml;
+  if (from_twin) {
+    TwinDescription written = twin.description();
+    RecordingArguments::leaveOutTemporary(written);
+    twin_yaml = written.toYaml();
+  }
+  if (!arguments.no_bag) {
+    bag = std::make_unique<ResultsBag>(output.path() + "/results.bag", field, recording.radar, twin.scene(), twin_yaml);
+  }
   options.on_pose = [&](const PoseResult& pose) {
     if (!arguments.no_pictures) writePicture(drawPose(field, pose), report.pictureFile(pose.pose.name));
     if (bag) bag->add(pose);
@@ -92,11 +100,8 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   std::vector<std::string> more = {arguments.config, arguments.input.radarFile(), arguments.input.channels,
                                    twin.description().file, twin.description().scene_file};
   more.insert(more.end(), arguments.input.recordings.begin() + 1, arguments.input.recordings.end());
-  if (from_twin) {
-    TwinDescription written = twin.description();
-    RecordingArguments::leaveOutTemporary(written);
-    description.twin_yaml = written.toYaml();
-  } else {
+  description.twin_yaml = twin_yaml;
+  if (!from_twin) {
     const std::vector<std::string> files = inputFiles(arguments.simulated, other, {});
     more.insert(more.end(), files.begin(), files.end());
   }

@@ -2,6 +2,7 @@
 """Starts live, replay, inspect and record as a user would (demo has a test of its own) and looks at what runs and flows."""
 import glob
 import os
+import re
 import shutil
 import signal
 import socket
@@ -249,10 +250,46 @@ class LaunchFiles(unittest.TestCase):
 
     def test_inspect_shows_stored_results(self):
         with Launched("inspect.launch", "results:=" + self.results, "rviz:=false") as launched:
-            nodes = launched.wait_for_nodes({"/player"})
+            nodes = launched.wait_for_nodes({"/inspect"})
             self.assertFalse({"/driver", "/signal_chain", "/twin"} & nodes)
             counts = launched.record({"/attribution/markers": 1, "/attribution/residuals": 1}, self.path("inspected.bag"))
             self.assertGreater(counts.get("/attribution/markers", 0), 0)
+            self.check_help_of_inspect(launched)
+
+    def check_help_of_inspect(self, launched):
+        """The node has the topics and services of its help."""
+        text = subprocess.run([find_program("mmradartwin_attribution", "inspect_node"), "--help"], check=True,
+                              capture_output=True, text=True, timeout=120).stdout
+        told = {title: set(re.findall(r"^  (\S+) \(", part, re.M)) for title, part in
+                re.findall(r"^(Subscribes|Publishes|Services):\n((?:  .*\n)*)", text, re.M)}
+        graph = rosgraph.Master("/test", launched.environment["ROS_MASTER_URI"]).getSystemState()
+        for title, entries, more in zip(("Publishes", "Subscribes", "Services"), graph,
+                                        ({"rosout"}, set(), {"inspect/get_loggers", "inspect/set_logger_level"})):
+            names = {name.lstrip("/") for name, nodes in entries if "/inspect" in nodes}
+            self.assertEqual(names, {name.lstrip("/") for name in told[title]} | more, title)
+
+    def test_a_pose_is_shown_on_request(self):
+        with Launched("inspect.launch", "results:=" + self.results, "rviz:=false", "pause:=true") as launched:
+            launched.wait_for_nodes({"/inspect"})
+            with rosbag.Bag(os.path.join(self.results, "results.bag")) as bag:
+                poses = next(m for _, m, _ in bag.read_messages("inspect/poses")).poses
+
+            def call(request):
+                run = subprocess.run(["rosservice", "call", "/inspect/show", request], env=launched.environment,
+                                     capture_output=True, text=True, timeout=120, check=False)
+                return run.stdout
+
+            wait_for(lambda: "success: True" in call("{order: residual_rms_db, pose: first, step: 0}"), "an answer")
+            launched.record({"/attribution/pose": 1, "/attribution/residuals": 1, "/inspect/shown": 1},
+                            self.path("worst.bag"))
+            with rosbag.Bag(self.path("worst.bag")) as bag:
+                shown = {topic: message for topic, message, _ in bag.read_messages()}
+            worst = max(poses, key=lambda pose: pose.residual_rms_db)
+            self.assertEqual(shown["/attribution/pose"].name, worst.name)
+            self.assertEqual(shown["/attribution/residuals"].pose, worst.name)
+            self.assertEqual((shown["/inspect/shown"].rank, shown["/inspect/shown"].name), (0, worst.name))
+            self.assertIn("success: False", call("{order: '', pose: nowhere, step: 0}"))
+            self.assertIn("beauty", call("{order: beauty, pose: '', step: 0}"))
 
     def test_record_writes_bags_that_stand_alone(self):
         with Launched("replay.launch", "bag:=" + self.bag, "rviz:=false", "rate:=0.3", "diagnosis:=false") as replay:

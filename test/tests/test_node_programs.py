@@ -25,6 +25,7 @@ NODES = {
     ("mmradartwin_driver", "driver_node"): ["_radar:=" + RADAR, "_card_ip:=127.77.9.2", "_host_ip:=127.77.9.1"],
 }
 PLAYER = ("mmradartwin_driver", "session_player")
+INSPECT = ("mmradartwin_attribution", "inspect_node")  # its graph: test_launch_files
 OTHERS = [("mmradartwin_attribution", "request_diagnosis"), ("mmradartwin_driver", "with_emulated_usb"),
           ("mmradartwin_launch", "emulated_rig.sh"), ("mmradartwin_launch", "demo.sh"),
           ("mmradartwin_launch", "recorder.py"), ("mmradartwin_launch", "play_bag.py"),
@@ -60,7 +61,7 @@ def sections(text):
 
 class Help(unittest.TestCase):
     def test_every_program_helps_and_tells_its_version_without_a_master(self):
-        for program in [*NODES, PLAYER, *OTHERS]:
+        for program in [*NODES, PLAYER, INSPECT, *OTHERS]:
             with self.subTest(program=program):
                 helped = run(program, "--help")
                 self.assertEqual(helped.returncode, 0, helped.stdout + helped.stderr)
@@ -70,7 +71,7 @@ class Help(unittest.TestCase):
                 self.assertRegex(version.stdout, rf"\A{re.escape(program[1])} \d+\.\d+\.\d+")
 
     def test_nodes_have_the_same_sections_in_the_same_order(self):
-        for program in [*NODES, PLAYER]:
+        for program in [*NODES, PLAYER, INSPECT]:
             with self.subTest(program=program):
                 text = run(program, "--help").stdout
                 self.assertEqual(list(sections(text)), SECTIONS, text)
@@ -134,7 +135,8 @@ class Graph(InFolder):
                 self.check_graph(program, arguments)
 
     def test_parameters_are_those_of_the_help(self):
-        for program, arguments in {**NODES, PLAYER: ["_session:=" + self.folder]}.items():
+        folders = {PLAYER: ["_session:=" + self.folder], INSPECT: ["_results:=" + self.folder]}
+        for program, arguments in {**NODES, **folders}.items():
             with self.subTest(program=program):
                 said = subprocess.run([find_program(*program), *arguments, "_no_such:=1"], env=self.environment,
                                       capture_output=True, text=True, timeout=120, check=False)

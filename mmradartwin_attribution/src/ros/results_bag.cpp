@@ -1,5 +1,6 @@
 #include "mmradartwin_attribution/ros/results_bag.h"
 
+#include <mmradartwin_msgs/StoredPoses.h>
 #include <rosbag/bag.h>
 #include <tf2_eigen/tf2_eigen.h>
 #include <tf2_msgs/TFMessage.h>
@@ -12,6 +13,7 @@
 #include "mmradartwin_attribution/ros/markers.h"
 #include "mmradartwin_dsp/ros/bag_writer.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_sim/ros/conversions.h"
 
 namespace mmradartwin {
 namespace {
@@ -32,7 +34,8 @@ boost::shared_ptr<ros::M_string> latched() {
 }  // namespace
 
 struct ResultsBag::Impl {
-  Impl(const std::string& file, const EvaluationField& f) : field(f), writer(file), bag(writer.bag()) {
+  Impl(const std::string& file, const EvaluationField& f, const RadarConfig& radar, const Scene& s)
+      : field(f), radar_hash(radarHash(radar)), scene(s), writer(file), bag(writer.bag()) {
     bag.setCompression(rosbag::compression::LZ4);
   }
   ros::Time time(std::size_t pose, double after_s = 0) const {
@@ -40,6 +43,8 @@ struct ResultsBag::Impl {
   }
 
   EvaluationField field;
+  std::uint64_t radar_hash;
+  const Scene& scene;
   BagWriter writer;
   rosbag::Bag& bag;
   std::mutex mutex;
@@ -47,9 +52,16 @@ struct ResultsBag::Impl {
   std::optional<tf2_msgs::TFMessage> last_tf;  ///< of that pose
 };
 
-ResultsBag::ResultsBag(const std::string& file, const EvaluationField& field, const Scene& scene)
-    : impl_(std::make_unique<Impl>(file, field)) {
+ResultsBag::ResultsBag(const std::string& file, const EvaluationField& field, const RadarConfig& radar,
+                       const Scene& scene, const std::string& twin_yaml)
+    : impl_(std::make_unique<Impl>(file, field, radar, scene)) {
   try {
+    mmradartwin_msgs::RadarConfig config = toMsg(radar);
+    config.header.frame_id = "radar_link";
+    impl_->bag.write("radar/config", impl_->time(0), config, latched<mmradartwin_msgs::RadarConfig>());
+    mmradartwin_msgs::Scene twin = toMsg(scene, twin_yaml);
+    twin.header.frame_id = "map";
+    impl_->bag.write("twin/scene", impl_->time(0), twin, latched<mmradartwin_msgs::Scene>());
     impl_->bag.write("attribution/scene_markers", impl_->time(0), sceneMarkers(scene, "map"),
                      latched<visualization_msgs::MarkerArray>());
   } catch (const rosbag::BagException& error) {
@@ -87,8 +99,17 @@ void ResultsBag::add(const PoseResult& pose) try {
     tf.transforms.push_back(transform);
     impl_->bag.write("/tf", time, tf);
   }
+  if (!pose.records.empty()) {
+    Simulation simulation;
+    simulation.T_map_radar = pose.pose.T_map_radar;
+    mmradartwin_msgs::PathRecords paths = toMsg(simulation, pose.records, impl_->scene, impl_->radar_hash);
+    paths.header.stamp = residuals.header.stamp;
+    paths.header.frame_id = "map";
+    impl_->bag.write("twin/paths", impl_->time(pose.index, 0.05), paths);
+  }
   for (auto& [topic, map] : maps) {
     map.header = residuals.header;
+    map.radar_hash = impl_->radar_hash;
     map.frames = static_cast<std::uint32_t>(pose.frames);
     impl_->bag.write(topic, impl_->time(pose.index, 0.05), map);
   }
@@ -103,6 +124,16 @@ void ResultsBag::finish(const Evaluation& evaluation) try {
   ledger.header.frame_id = "radar_link";
   ledger.header.stamp = impl_->time(0);
   impl_->bag.write("attribution/ledger", impl_->time(0), ledger, latched<mmradartwin_msgs::Ledger>());
+  mmradartwin_msgs::StoredPoses poses;
+  poses.header = ledger.header;
+  poses.attribution_yaml = toYaml(impl_->field.config());
+  for (const PoseResult& pose : evaluation.poses) {
+    if (!pose.used) continue;
+    poses.poses.push_back(poseFiguresMsg(pose.attribution, pose.pose.name));
+    poses.poses.back().header.frame_id = "radar_link";
+    poses.poses.back().header.stamp = impl_->time(pose.index);
+  }
+  impl_->bag.write("inspect/poses", impl_->time(0), poses, latched<mmradartwin_msgs::StoredPoses>());
   // The end of the last pose's time, in the file's last chunk: from there readers take the bag's end.
   if (impl_->last_tf) {
     const ros::Time end = impl_->time(impl_->last_pose + 1);
