@@ -1,5 +1,6 @@
 #include "map_panel.h"
 
+#include <QMouseEvent>
 #include <QPainter>
 #include <QPainterPath>
 #include <algorithm>
@@ -62,6 +63,23 @@ void MapPanel::setMarks(std::vector<MapMark> marks) {
   if (std::equal(marks.begin(), marks.end(), marks_.begin(), marks_.end(), alike)) return;
   marks_ = std::move(marks);
   over_due_ = paint_due_ = true;
+}
+
+void MapPanel::setOnClick(std::function<void(double range_m, double azimuth_rad)> on_click) {
+  on_click_ = std::move(on_click);
+  setCursor(Qt::PointingHandCursor);
+  setToolTip("click: what stands behind this place?");
+}
+
+void MapPanel::mousePressEvent(QMouseEvent* event) {
+  const QPointF away = apex_px_ - event->localPos();
+  const double range_m = scale_px_ > 0 ? std::hypot(away.x(), away.y()) / scale_px_ : 0;
+  const double azimuth_rad = std::atan2(away.x(), away.y());
+  if (event->button() != Qt::LeftButton || !on_click_ || !geometry_ || range_m > up_to_m_ ||
+      std::abs(azimuth_rad) > up_to_rad_) {
+    return event->ignore();
+  }
+  on_click_(range_m, azimuth_rad);
 }
 
 double MapPanel::takePainting_s() { return std::exchange(painting_s_, 0); }

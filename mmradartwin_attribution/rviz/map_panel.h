@@ -4,6 +4,7 @@
 #include <QPixmap>
 #include <QString>
 #include <QWidget>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -30,6 +31,8 @@ class MapPanel : public QWidget {
   void setMap(const ShadedMap& map, const QString& unit);
   void setWords(const QString& title, const QString& note);
   void setMarks(std::vector<MapMark> marks);
+  /// Is told where in the fan a click with the left button was.
+  void setOnClick(std::function<void(double range_m, double azimuth_rad)> on_click);
   /// Has what was set painted.
   void refresh();
   /// Seconds of the processor that painting has taken since the last call.
@@ -39,6 +42,7 @@ class MapPanel : public QWidget {
 
  protected:
   void paintEvent(QPaintEvent* event) override;
+  void mousePressEvent(QMouseEvent* event) override;
 
  private:
   void lookUpCells();
@@ -51,6 +55,7 @@ class MapPanel : public QWidget {
   ShadedMap map_;
   QString unit_, title_, note_;
   std::vector<MapMark> marks_;
+  std::function<void(double, double)> on_click_;
   QPointF apex_px_;
   double scale_px_ = 0;                      ///< pixels of a metre
   std::vector<std::int32_t> cell_of_pixel_;  ///< of image_, -1: none

@@ -3,6 +3,7 @@
 #include <OGRE/OgreQuaternion.h>
 #include <OGRE/OgreSceneNode.h>
 #include <OGRE/OgreVector3.h>
+#include <geometry_msgs/PointStamped.h>
 #include <mmradartwin_msgs/ReceiveGrid.h>
 #include <rviz/display_context.h>
 #include <rviz/frame_manager.h>
@@ -111,6 +112,8 @@ void RangeAngleDisplay::addProperties() {
 void RangeAngleDisplay::onInitialize() {
   floor_frame_->setFrameManager(context_->getFrameManager());
   panel_ = new MapPanel;
+  clicked_ = update_nh_.advertise<geometry_msgs::PointStamped>("clicked_point", 2);
+  panel_->setOnClick([this](double range_m, double azimuth_rad) { askAbout(range_m, azimuth_rad); });
   setAssociatedWidget(panel_);
   visual_ = std::make_unique<FanVisual>(*scene_manager_, *scene_node_);
   visual_->setVisible(false);
@@ -258,7 +261,18 @@ void RangeAngleDisplay::showWords() {
     if (isResidual()) note = QString::fromUtf8("red: the twin is stronger, blue: the measurement");
   }
   panel_->setWords(title, note);
+  panel_->setObjectName("map_of_" + getName());
   if (visual_) visual_->setTitle(getName());
+}
+
+// Whoever compares the maps answers what stands there.
+void RangeAngleDisplay::askAbout(double range_m, double azimuth_rad) {
+  if (!map_) return;
+  geometry_msgs::PointStamped point;
+  point.header = map_->header;
+  point.point.x = range_m * std::cos(azimuth_rad);
+  point.point.y = range_m * std::sin(azimuth_rad);
+  clicked_.publish(point);
 }
 
 void RangeAngleDisplay::showMarks() {

@@ -2,6 +2,7 @@
 
 #include <mmradartwin_msgs/RangeAngleMap.h>
 #include <mmradartwin_msgs/Residuals.h>
+#include <ros/publisher.h>
 #include <ros/subscriber.h>
 #include <rviz/display.h>
 
@@ -52,6 +53,7 @@ class RangeAngleDisplay : public rviz::Display {
   void show();
   void showWords();
   void showMarks();
+  void askAbout(double range_m, double azimuth_rad);
   bool isResidual() const;
   MapShading shading() const;
   /// Up to where the fan is drawn: the property, or what all displays together need.
@@ -70,6 +72,7 @@ class RangeAngleDisplay : public rviz::Display {
   rviz::TfFrameProperty* floor_frame_;
 
   ros::Subscriber map_subscriber_, residuals_subscriber_;
+  ros::Publisher clicked_;
   mmradartwin_msgs::RangeAngleMap::ConstPtr map_;
   mmradartwin_msgs::Residuals::ConstPtr residuals_;
   std::shared_ptr<const FanGeometry> geometry_;

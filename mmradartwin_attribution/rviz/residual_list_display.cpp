@@ -1,9 +1,11 @@
 #include "residual_list_display.h"
 
+#include <geometry_msgs/PointStamped.h>
 #include <rviz/properties/ros_topic_property.h>
 
 #include <QRegularExpression>
 #include <QStringList>
+#include <QUrl>
 #include <cmath>
 #include <pluginlib/class_list_macros.hpp>
 
@@ -28,8 +30,8 @@ QString rowOf(int number, const mmradartwin_msgs::Residual& r) {
   const QString class_name = QString::fromStdString(className(c) + " " + classLabel(c));
   QString actor = QString::fromStdString(r.actor).replace(';', " + ").toHtmlEscaped();
   if (!r.material.empty()) actor += " (" + QString::fromStdString(r.material).replace(';', " + ").toHtmlEscaped() + ")";
-  return "<tr>" + cell(QString("<b>%1</b>").arg(number), true) + cell(class_name) + cell(actor) +
-         cell(signedNumber(r.range_m, 2) + " m", true) +
+  return "<tr>" + cell(QString("<a href='%1' style='color: #ff8cff'><b>%1</b></a>").arg(number), true) +
+         cell(class_name) + cell(actor) + cell(signedNumber(r.range_m, 2) + " m", true) +
          cell(signedNumber(r.azimuth_rad * 180 / M_PI, 0) + QChar(0xb0), true) +
          cell(signedNumber(r.measured_db, 1), true) + cell(signedNumber(r.simulated_db, 1), true) + "</tr>";
 }
@@ -85,8 +87,22 @@ ResidualListDisplay::~ResidualListDisplay() { delete panel_; }
 
 void ResidualListDisplay::onInitialize() {
   panel_ = new WordsPanel(getName());
+  panel_->setObjectName("residual_list");
   panel_->setWords("What the numbers on the maps stand for. No comparison has come yet.");
   setAssociatedWidget(panel_);
+  clicked_ = update_nh_.advertise<geometry_msgs::PointStamped>("clicked_point", 2);
+  connect(panel_, &QTextBrowser::anchorClicked, this, [this](const QUrl& url) { askAbout(url.toString().toInt()); });
+}
+
+// Whoever compares the maps answers what stands behind the line.
+void ResidualListDisplay::askAbout(int number) {
+  if (!residuals_ || number < 1 || number > static_cast<int>(residuals_->residuals.size())) return;
+  const mmradartwin_msgs::Residual& residual = residuals_->residuals[static_cast<std::size_t>(number) - 1];
+  geometry_msgs::PointStamped point;
+  point.header = residuals_->header;
+  point.point.x = residual.range_m * std::cos(residual.azimuth_rad);
+  point.point.y = residual.range_m * std::sin(residual.azimuth_rad);
+  clicked_.publish(point);
 }
 
 void ResidualListDisplay::onDisable() {

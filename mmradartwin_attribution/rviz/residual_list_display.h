@@ -2,6 +2,7 @@
 
 #include <mmradartwin_msgs/Residuals.h>
 #include <mmradartwin_msgs/Scene.h>
+#include <ros/publisher.h>
 #include <ros/subscriber.h>
 #include <ros/time.h>
 #include <rviz/display.h>
@@ -31,8 +32,10 @@ class ResidualListDisplay : public rviz::Display {
 
  private:
   void subscribe();
+  void askAbout(int number);
   rviz::RosTopicProperty *topic_, *scene_topic_;
   ros::Subscriber subscriber_, scene_subscriber_;
+  ros::Publisher clicked_;
   QString twin_;  ///< its scene and mechanisms
   mmradartwin_msgs::Residuals::ConstPtr residuals_;
   bool due_ = false;

@@ -7,6 +7,7 @@ namespace mmradartwin {
 WordsPanel::WordsPanel(const QString& title) {
   setWindowTitle(title);
   setFrameShape(QFrame::NoFrame);
+  setOpenLinks(false);
   setFont(labelFont());
   QPalette colors = palette();
   colors.setColor(QPalette::Base, toQColor(kBackground));
