@@ -88,7 +88,8 @@ class Driven(unittest.TestCase):
         cls.folder = kept.name
         cls.session, cls.bag, cls.results = (os.path.join(cls.folder, n) for n in ("session", "lab.bag", "report"))
         for command in ([find_program("mmradartwin_tests", "make_session.py"), "--output", cls.session, "--locations",
-                         cls.locations, "--headings", "1", "--frames", cls.frames, "--seed", "3", "--effect", cls.effect],
+                         cls.locations, "--headings", "1", "--frames", cls.frames, "--pause", "1", "--seed", "3",
+                         "--effect", cls.effect],
                         [find_program("mmradartwin_dsp", "session_to_bag"), cls.session, cls.bag],
                         [find_program("mmradartwin_attribution", "evaluate"), cls.session, "--output", cls.results,
                          "--quiet"]):
