@@ -27,14 +27,21 @@ QString measured(double value) {
   return QString::number(value, 'g', 4).replace('-', QChar(0x2212));
 }
 
+/// In dB; a dash where there is none.
+QString level(double value) { return std::isfinite(value) ? number(value, 1) + " dB" : number(value, 1); }
+
 QString percent(double share) { return std::isfinite(share) ? number(100 * share, 0) + " %" : number(share, 0); }
 
-QString right(const QString& words) { return "<td align='right'>&nbsp;" + words + "&nbsp;</td>"; }
+QString right(const QString& words) {
+  return "<td align='right' style='white-space: nowrap'>&nbsp;" + words + "&nbsp;</td>";
+}
 
-QString head(const QString& words) { return "<th align='right'>&nbsp;" + words + "&nbsp;</th>"; }
+QString head(const QString& words) {
+  return "<th align='right' style='white-space: nowrap'>&nbsp;" + words + "&nbsp;</th>";
+}
 
 QString line(const QString& label, const QStringList& cells) {
-  QString html = "<tr><td>" + label + "</td>";
+  QString html = "<tr><td style='white-space: nowrap'>" + label + "</td>";
   for (const QString& c : cells) html += right(c);
   return html + "</tr>";
 }
@@ -77,7 +84,13 @@ QString parameterWords(const mmradartwin_msgs::FindingParameter& p) {
     values << words;
   }
   for (const std::string& text : p.text) values << plain(text);
-  QString words = spokenName(p.name) + " <b>" + values.join(", ") + "</b>";
+  // "range_m" in metres is "range".
+  std::string name = p.name;
+  const std::string end = "_" + QString::fromStdString(p.unit).toLower().toStdString();
+  if (name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0) {
+    name.resize(name.size() - end.size());
+  }
+  QString words = spokenName(name) + " <b>" + values.join(", ") + "</b>";
   if (!p.unit.empty() && p.unit != "1") words += " " + plain(p.unit);
   return words;
 }
@@ -119,17 +132,17 @@ QString wordsOf(const TwinFigures& now, const TwinFigures& before) {
   using L = mmradartwin_msgs::Ledger;
   html += figureLine("poses", columns, [](const L& l) { return QString::number(l.poses); });
   html += figureLine("recall", columns, [](const L& l) { return percent(l.recall); });
-  html += figureLine("Q1, measured alone", columns, [](const L& l) { return percent(l.q1_energy); });
-  html += figureLine("Q2, twin alone", columns, [](const L& l) { return percent(l.q2_energy); });
-  html += figureLine("Q3, both: median", columns, [](const L& l) { return number(l.q3_median_db, 1) + " dB"; });
-  html += figureLine("Q4, background", columns, [](const L& l) { return number(l.q4_mae_db, 1) + " dB"; });
+  html += figureLine("Q1 energy", columns, [](const L& l) { return percent(l.q1_energy); });
+  html += figureLine("Q2 energy", columns, [](const L& l) { return percent(l.q2_energy); });
+  html += figureLine("Q3 median", columns, [](const L& l) { return level(l.q3_median_db); });
+  html += figureLine("Q4 error", columns, [](const L& l) { return level(l.q4_mae_db); });
   html += figureLine("C1 … C5", columns, [](const L& l) {
     QStringList counts;
     for (unsigned count : l.class_count) counts << QString::number(count);
     return counts.join(QChar(0xb7));
   });
   const auto rms = [](const TwinFigures& f) {
-    return f.pose ? number(f.pose->residual_rms_db, 1) + " dB" : QString::fromUtf8("–");
+    return f.pose ? level(f.pose->residual_rms_db) : QString::fromUtf8("–");
   };
   QStringList differences = {rms(now), ""};
   if (two) differences = QStringList{rms(now), rms(before), "", ""};

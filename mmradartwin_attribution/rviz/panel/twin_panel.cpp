@@ -68,7 +68,7 @@ TwinPanel::TwinPanel(QWidget* parent) : rviz::Panel(parent) {
   parts->addWidget(figures_);
   parts->addWidget(tabs);
   parts->setStretchFactor(1, 1);
-  parts->setSizes({190, 400});
+  parts->setSizes({200, 400});
   all->addWidget(parts, 1);
   said_ = new QLabel;
   said_->setObjectName("said");
