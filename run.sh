@@ -14,7 +14,7 @@ packages=(
   rosbash rospack-tools rosout rviz librviz-dev qtbase5-dev tf2-tools libnodeletlib-tools python3-actionlib python3-rosbag python3-roslaunch
   python3-rosmsg python3-rosnode python3-rosparam python3-rosservice python3-rostopic python3-rospy
   catkin ros-message-generation libactionlib-dev libclass-loader-dev libdiagnostic-updater-dev
-  libdynamic-reconfigure-config-init-mutex-dev libnodeletlib-dev librosbag-dev python3-dynamic-reconfigure libroscpp-dev librostest-dev libtf2-eigen-dev libtf2-ros-dev pluginlib-dev python3-rostest
+  libdynamic-reconfigure-config-init-mutex-dev libinteractive-markers-dev libnodeletlib-dev librosbag-dev python3-dynamic-reconfigure libroscpp-dev librostest-dev libtf2-eigen-dev libtf2-ros-dev pluginlib-dev python3-rostest
   libactionlib-msgs-dev libdiagnostic-msgs-dev libgeometry-msgs-dev libros-rosgraph-msgs-dev libsensor-msgs-dev libstd-msgs-dev
   libstd-srvs-dev libtf2-msgs-dev libvisualization-msgs-dev python3-actionlib-msgs python3-diagnostic-msgs
   python3-geometry-msgs python3-rosgraph-msgs python3-sensor-msgs python3-std-msgs python3-std-srvs python3-tf2-msgs

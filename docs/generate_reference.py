@@ -370,8 +370,10 @@ def yaml_rows(name, sources, headers):
         plausible[match.group(1)] = (match.group(2), match.group(3))
     for source in sources:
         text = read(ROOT / source)
-        for key, unit, least, most in re.findall(r'\{"(\w+)", "(\w+)", &\w+::\w+, ([-\d.]+), ([-\d.]+)\}', text):
-            rows[key] = [f"`{key}`", "number", f"{least} to {most} {unit}", ""]
+        for key, unit, least, most, required in re.findall(
+                r'\{\s*"(\w+)", "([\w/]+)", &\w+::\w+, ([-\d.e]+), ([-\d.e]+)(?:, (true|false))?\}', text):
+            allowed = f"{least} to {most}" + (f" {unit}" if not required else "")
+            rows[key] = [f"`{key}`", "number", allowed, "yes" if required == "true" else ""]
         methods = "|".join(KINDS)
         for call, arguments, place in calls(text, rf"\b(?:\w+\.)?(?:{methods})"):
             kind = call.split(".")[-1]

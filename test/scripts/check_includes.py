@@ -38,6 +38,7 @@ ROOMS = {
         "stages": {"echoes"},
         "mechanisms": {"stages"},
         "twin": {"stages"},
+        "what_if": {"twin"},
         "room": {"rays"},
         "ros": {"twin", "room"},
     },
@@ -73,6 +74,7 @@ HEADERS_WITHOUT_SOURCE = {
     "mmradartwin_sim/include/mmradartwin_sim/mechanism.h": "mmradartwin_sim/src/stages",
     "mmradartwin_sim/include/mmradartwin_sim/mechanism_stages.h": "mmradartwin_sim/src/stages",
     "mmradartwin_sim/include/mmradartwin_sim/register_mechanism.h": "mmradartwin_sim/src/stages",
+    "mmradartwin_sim/include/mmradartwin_sim/what_if_entry.h": "mmradartwin_sim/src/what_if",
 }
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]', re.MULTILINE)

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <string>
+#include <vector>
 
 namespace mmradartwin {
 
@@ -48,6 +49,21 @@ double specularShare(const Material& material);
 /// the share mix falls off like the lobe; norm_exp = 1 is Lambert's projected area. diff_back_db <= -90 means none.
 /// Signs are those of a conductor (TE -, TM +).
 double scalarReflection(const Material& material, double cos_theta);
+
+/// A number of a material that materials.yaml may state.
+struct MaterialNumber {
+  const char* key;
+  const char* unit;  ///< "1" where it has none
+  double Material::*member;
+  double min, max;
+  bool required;
+};
+/// Those of a model, in the order in which they are written.
+const std::vector<MaterialNumber>& materialNumbers(MaterialModel model);
+/// True where both reflect and scatter alike, whatever they are called.
+bool sameSurface(const Material& a, const Material& b);
+/// What stands behind a material's name in materials.yaml; reads back as the same material.
+std::string toYaml(const Material& material);
 
 /// Reads materials.yaml strictly. Throws InputError.
 std::map<std::string, Material> loadMaterials(const std::string& file);

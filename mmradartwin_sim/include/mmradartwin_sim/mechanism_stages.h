@@ -9,6 +9,7 @@
 
 #include "mmradartwin_dsp/radar_config.h"
 #include "mmradartwin_dsp/receive_grid.h"
+#include "mmradartwin_sim/material.h"
 #include "mmradartwin_sim/path_record.h"
 #include "mmradartwin_sim/pose_context.h"
 #include "mmradartwin_sim/scene.h"
@@ -55,6 +56,13 @@ class PathStage {
   virtual bool tracesChanges() const { return false; }
   /// Mechanisms whose records addPaths() looks at: where a mechanism is traced alone, it is traced beside these.
   virtual std::vector<std::string> looksAtPathsOf() const { return {}; }
+  /// Gives paths that it found, before any weight, the levels that they have with the materials of context.scene.
+  /// before: what each actor was made of when they were found; the geometry is the same. False where levels do not
+  /// follow from the paths: they have to be found again.
+  virtual bool changeMaterials(const PoseContext&, const std::vector<Material>& /*before*/,
+                               std::vector<PathRecord>&) const {
+    return false;
+  }
 
  protected:
   ~PathStage() = default;

@@ -141,6 +141,7 @@ class Twin {
   void forEachChirp(const Simulation& pose, int frames,
                     const std::function<void(const ChirpContext&, ComplexGrid&)>& visit) const;
   friend class MovingTwin;
+  friend class WhatIf;
   explicit Twin(std::unique_ptr<AssembledTwin> impl);
   std::unique_ptr<AssembledTwin> impl_;
 };

@@ -36,4 +36,39 @@ std::complex<double> reflectAlong(const PoseContext& context, const ElementsInMa
   return weight * (verticalField(elements.up, arrival).cast<std::complex<double>>().transpose() * field)(0);
 }
 
+std::complex<double> perpendicularReflection(const Material& material, double frequency_hz) {
+  return specularShare(material) * fresnel(material, 1, frequency_hz).te;
+}
+
+std::complex<double> reflectionOf(const Eigen::Vector3d& up, const Eigen::Vector3d& out, const Eigen::Vector3d& arrival,
+                                  const PerInteraction<Eigen::Vector3d>& normals,
+                                  const PerInteraction<const Material*>& materials, double frequency_hz) {
+  Eigen::Vector3d in = out;
+  ComplexVector field = verticalField(up, in).cast<std::complex<double>>();
+  double share = 1;
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    field = reflectField(field, in, normals[i], *materials[i], frequency_hz);
+    in -= 2 * in.dot(normals[i]) * normals[i];
+    share *= specularShare(*materials[i]);
+  }
+  return share * (verticalField(up, arrival).cast<std::complex<double>>().transpose() * field)(0);
+}
+
+bool replaceReflection(std::complex<double> before, std::complex<double> now, PathRecord& record) {
+  constexpr double kNothing = 1e-6;  // what is left of less has too few digits, or was not recorded
+  if (!(std::abs(before) > kNothing)) return false;
+  scaleRecord(std::conj(now / before), record);
+  return true;
+}
+
+MaterialsOfPath::MaterialsOfPath(const Scene& scene, const std::vector<Material>& of_actors_before,
+                                 const PathRecord& record) {
+  for (int actor : record.actors) {
+    const auto a = static_cast<std::size_t>(actor);
+    before.push_back(&of_actors_before[a]);
+    now.push_back(&scene.actors[a].material);
+    changed = changed || !sameSurface(*before.back(), *now.back());
+  }
+}
+
 }  // namespace mmradartwin

@@ -1,5 +1,6 @@
 #include "mmradartwin_sim/material.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "mmradartwin_dsp/input_error.h"
@@ -11,29 +12,17 @@ namespace {
 
 constexpr double kVacuumPermittivity = 8.8541878128e-12;
 
+const std::map<std::string, MaterialModel> kModels = {{"dielectric", MaterialModel::kDielectric},
+                                                      {"conductor", MaterialModel::kConductor},
+                                                      {"scalar", MaterialModel::kScalar}};
+
 Material readMaterial(const std::string& name, YamlMap yaml) {
   Material m;
   m.name = name;
-  const std::string model = yaml.choice("model", {"dielectric", "conductor", "scalar"});
-  if (model == "dielectric") {
-    m.model = MaterialModel::kDielectric;
-    m.relative_permittivity = yaml.number("relative_permittivity", 1, 1000);
-    if (yaml.has("conductivity_s_per_m")) m.conductivity_s_per_m = yaml.number("conductivity_s_per_m", 0, 1e9);
-  } else if (model == "conductor") {
-    m.model = MaterialModel::kConductor;
-  } else {
-    m.model = MaterialModel::kScalar;
-    m.base_rcs_db = yaml.number("base_rcs_db", -200, 0);
-    m.back_exp = yaml.number("back_exp", 0, 1000);
-    m.mix = yaml.number("mix", 0, 1);
-    m.diff_back_db = yaml.number("diff_back_db", -200, 0);
-    m.norm_exp = yaml.number("norm_exp", 0, 1000);
+  m.model = kModels.at(yaml.choice("model", {"dielectric", "conductor", "scalar"}));
+  for (const MaterialNumber& n : materialNumbers(m.model)) {
+    if (n.required || yaml.has(n.key)) m.*n.member = yaml.number(n.key, n.min, n.max);
   }
-  if (m.model != MaterialModel::kScalar) {
-    if (yaml.has("roughness_rms_m")) m.roughness_rms_m = yaml.number("roughness_rms_m", 0, 0.1);
-    if (yaml.has("scattering_coefficient")) m.scattering_coefficient = yaml.number("scattering_coefficient", 0, 1);
-  }
-  if (yaml.has("thickness_m")) m.thickness_m = yaml.number("thickness_m", 1e-6, 10);
   if (yaml.has("color")) {
     const std::vector<double> rgb = yaml.numbers("color", 0, 1);
     if (rgb.size() != 3) yaml.fail("color", "needs three numbers r, g, b from 0 to 1");
@@ -51,6 +40,51 @@ Material readMaterial(const std::string& name, YamlMap yaml) {
 }
 
 }  // namespace
+
+const std::vector<MaterialNumber>& materialNumbers(MaterialModel model) {
+  static const MaterialNumber kRoughness = {"roughness_rms_m", "m", &Material::roughness_rms_m, 0, 0.1, false},
+                              kScattering =
+                                  {"scattering_coefficient", "1", &Material::scattering_coefficient, 0, 1, false},
+                              kThickness = {"thickness_m", "m", &Material::thickness_m, 1e-6, 10, false};
+  static const std::vector<MaterialNumber> kDielectric = {
+      {"relative_permittivity", "1", &Material::relative_permittivity, 1, 1000, true},
+      {"conductivity_s_per_m", "S/m", &Material::conductivity_s_per_m, 0, 1e9, false},
+      kRoughness,
+      kScattering,
+      kThickness};
+  static const std::vector<MaterialNumber> kConductor = {kRoughness, kScattering, kThickness};
+  static const std::vector<MaterialNumber> kScalar = {{"base_rcs_db", "dB", &Material::base_rcs_db, -200, 0, true},
+                                                      {"back_exp", "1", &Material::back_exp, 0, 1000, true},
+                                                      {"mix", "1", &Material::mix, 0, 1, true},
+                                                      {"diff_back_db", "dB", &Material::diff_back_db, -200, 0, true},
+                                                      {"norm_exp", "1", &Material::norm_exp, 0, 1000, true},
+                                                      kThickness};
+  return model == MaterialModel::kDielectric ? kDielectric : model == MaterialModel::kConductor ? kConductor : kScalar;
+}
+
+bool sameSurface(const Material& a, const Material& b) {
+  if (a.model != b.model) return false;
+  const std::vector<MaterialNumber>& numbers = materialNumbers(a.model);
+  return std::all_of(numbers.begin(), numbers.end(), [&](const MaterialNumber& n) {
+    return a.*n.member == b.*n.member || (std::isnan(a.*n.member) && std::isnan(b.*n.member));
+  });
+}
+
+std::string toYaml(const Material& material) {
+  std::string text = "{model: ";
+  for (const auto& [name, model] : kModels) text += model == material.model ? name : "";
+  for (const MaterialNumber& n : materialNumbers(material.model)) {
+    if (!std::isnan(material.*n.member)) text += std::string(", ") + n.key + ": " + yamlNumber(material.*n.member);
+  }
+  if (material.valid_hz_min > 0 || std::isfinite(material.valid_hz_max)) {
+    text += ", valid_hz: [" + yamlNumber(material.valid_hz_min) + ", " +
+            yamlNumber(std::min(material.valid_hz_max, 1e15)) + "]";
+  }
+  if (material.extrapolated) text += ", extrapolated: true";
+  text += ", color: [";
+  for (std::size_t i = 0; i < 3; ++i) text += (i ? ", " : "") + yamlNumber(material.color[i]);
+  return text + "]}";
+}
 
 std::complex<double> Material::permittivity(double frequency_hz) const {
   return {relative_permittivity, -conductivity_s_per_m / (2 * M_PI * frequency_hz * kVacuumPermittivity)};

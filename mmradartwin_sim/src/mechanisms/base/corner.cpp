@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <array>
 
 #include "corners/trihedral.h"
 #include "mechanisms/base/built_in_mechanism.h"
 #include "physics/elements_in_map.h"
+#include "physics/reflections.h"
 
 namespace mmradartwin {
 namespace {
@@ -53,7 +55,48 @@ class Corner : public Mechanism, public PathStage {
     for (const Trihedral& t : trihedra_) addTrihedralPath(context, elements, t, {kCorner, 1}, records);
   }
 
+  bool changeMaterials(const PoseContext& context, const std::vector<Material>& before,
+                       std::vector<PathRecord>& records) const override {
+    const ElementsInMap elements(context);
+    return std::all_of(records.begin(), records.end(), [&](PathRecord& record) {
+      const MaterialsOfPath materials(context.scene, before, record);
+      if (!materials.changed) return true;
+      PerInteraction<Eigen::Vector3d> normals;
+      for (int id : record.facets) normals.push_back(context.scene.facets[static_cast<std::size_t>(id)].normal);
+      const auto level = [&](const PerInteraction<const Material*>& of) {
+        return normals.size() == 2
+                   ? dihedralReflection(elements, record.vertices[0], normals, of, context.frequency_hz)
+                   : trihedralReflection(elements, record.vertices[0], normals, of, context.frequency_hz);
+      };
+      return replaceReflection(level(materials.before), level(materials.now), record);
+    });
+  }
+
  private:
+  /// Levels as addCornerPath() and addTrihedralPath() have them.
+  static std::complex<double> dihedralReflection(const ElementsInMap& elements, const Eigen::Vector3d& on_edge,
+                                                 const PerInteraction<Eigen::Vector3d>& normals,
+                                                 const PerInteraction<const Material*>& materials,
+                                                 double frequency_hz) {
+    const Eigen::Vector3d along = normals[0].cross(normals[1]).normalized();
+    const Eigen::Vector3d foot = on_edge + (elements.p - on_edge).dot(along) * along;
+    const Eigen::Vector3d out = (foot - elements.p).normalized();
+    return reflectionOf(elements.up, out, out, normals, materials, frequency_hz);
+  }
+  static std::complex<double> trihedralReflection(const ElementsInMap& elements, const Eigen::Vector3d& apex,
+                                                  const PerInteraction<Eigen::Vector3d>& normals,
+                                                  const PerInteraction<const Material*>& materials,
+                                                  double frequency_hz) {
+    const Eigen::Vector3d out = (apex - elements.p).normalized();
+    std::complex<double> sum = 0;
+    std::array<std::size_t, 3> order = {0, 1, 2};
+    do {
+      sum += reflectionOf(elements.up, out, out, {normals[order[0]], normals[order[1]], normals[order[2]]},
+                          {materials[order[0]], materials[order[1]], materials[order[2]]}, frequency_hz);
+    } while (std::next_permutation(order.begin(), order.end()));
+    return sum;
+  }
+
   CornerAperture aperture_ = CornerAperture::kBothFaces;
   std::vector<CornerEdge> edges_;
   std::vector<Trihedral> trihedra_;

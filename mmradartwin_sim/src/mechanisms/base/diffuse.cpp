@@ -9,6 +9,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "physics/elements_in_map.h"
 #include "physics/polarisation.h"
+#include "physics/reflections.h"
 #include "rays/view_cone.h"
 
 namespace mmradartwin {
@@ -148,6 +149,28 @@ class Diffuse : public Mechanism, public PathStage {
       setContribution(context.radar, std::polar(level[i], lit[i]->phase_rad(context.seed)), record);
       records.push_back(std::move(record));
     }
+  }
+
+  bool changeMaterials(const PoseContext& context, const std::vector<Material>& before,
+                       std::vector<PathRecord>& records) const override {
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      const auto scatters = [&](const Material& m) { return backscatterAmplitude(m, 1, 1, context.frequency_hz) > 0; };
+      if (scatters(context.scene.actors[i].material) != scatters(before[i])) return false;
+    }
+    const ElementsInMap elements(context);
+    for (PathRecord& record : records) {
+      const MaterialsOfPath materials(context.scene, before, record);
+      if (!materials.changed) continue;
+      const Eigen::Vector3d in = (record.vertices[0] - elements.p).normalized();
+      const Eigen::Vector3d& normal = context.scene.facets[static_cast<std::size_t>(record.facets[0])].normal;
+      const double cosine = std::min(1.0, std::abs(in.dot(normal)));
+      const double te = verticalField(elements.up, in).dot(transverse(in, normal));
+      const auto level = [&](const Material& m) {
+        return backscatterAmplitude(m, cosine, std::min(1.0, te * te), context.frequency_hz);
+      };
+      scaleRecord(level(*materials.now[0]) / level(*materials.before[0]), record);
+    }
+    return true;
   }
 
  private:

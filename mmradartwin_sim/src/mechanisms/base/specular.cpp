@@ -9,6 +9,7 @@
 #include "physics/aperture.h"
 #include "physics/elements_in_map.h"
 #include "physics/polarisation.h"
+#include "physics/reflections.h"
 #include "rays/image_paths.h"
 #include "records/path_phase.h"
 
@@ -18,7 +19,8 @@ namespace {
 const std::string kSpecular = "specular";
 constexpr double kInset_m = 0.01;  // where a return beside a facet is taken to come from
 constexpr double kSmallestFactor = 0.01;
-constexpr double kMostWays = 2e6;  // edges times sequences of mirrors that are tried at a pose
+constexpr double kNegligible = 1e-9;  // amplitude of a path that no map shows
+constexpr double kMostWays = 2e6;     // edges times sequences of mirrors that are tried at a pose
 
 class Specular : public Mechanism, public PathStage {
  public:
@@ -131,6 +133,40 @@ class Specular : public Mechanism, public PathStage {
         late_paths_ += !by_half;
       }
     }
+  }
+
+  bool changeMaterials(const PoseContext& context, const std::vector<Material>& before,
+                       std::vector<PathRecord>& records) const override {
+    if (cutoff_ > kNegligible) return false;  // paths that were too weak may be there now
+    const ElementsInMap elements(context);
+    for (PathRecord& record : records) {
+      const MaterialsOfPath materials(context.scene, before, record);
+      if (!materials.changed) continue;
+      if (record.facets.size() == 1) {
+        // Also beside a facet and on a curved surface the level is that of the perpendicular.
+        if (!replaceReflection(perpendicularReflection(*materials.before[0], context.frequency_hz),
+                               perpendicularReflection(*materials.now[0], context.frequency_hz), record)) {
+          return false;
+        }
+        continue;
+      }
+      PerInteraction<Eigen::Vector3d> normals;
+      Eigen::Vector3d from = elements.p, to = elements.p;  // the radar as its first and its last mirror shows it
+      for (std::size_t i = 0; i < record.facets.size(); ++i) {
+        const Facet& facet = context.scene.facets[static_cast<std::size_t>(record.facets[i])];
+        if (i > 0 && record.vertices[i] == record.vertices[i - 1]) return false;  // a corner's edge is one mirror
+        normals.push_back(facet.normal);
+        to = mirror(to, facet);
+        from =
+            mirror(from, context.scene.facets[static_cast<std::size_t>(record.facets[record.facets.size() - 1 - i])]);
+      }
+      const auto level = [&](const PerInteraction<const Material*>& of) {
+        return reflectionOf(elements.up, (from - elements.p).normalized(), (to - elements.p).normalized(), normals, of,
+                            context.frequency_hz);
+      };
+      if (!replaceReflection(level(materials.before), level(materials.now), record)) return false;
+    }
+    return true;
   }
 
  private:
