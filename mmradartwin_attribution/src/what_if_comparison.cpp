@@ -42,7 +42,10 @@ ComparedTwin WhatIfComparison::compared(const Simulation& simulation) {
 
 const ComparedTwin& WhatIfComparison::given() {
   if (!given_simulation_) {
-    given_simulation_ = what_if_.given().simulate(measured_->T_map_radar, measured_->stamp_ns);
+    // What is found for the twin as given is there for the first change.
+    given_simulation_ = &what_if_.now() == &what_if_.given()
+                            ? what_if_.simulate(measured_->T_map_radar, measured_->stamp_ns)
+                            : what_if_.given().simulate(measured_->T_map_radar, measured_->stamp_ns);
   }
   if (!given_) given_ = compared(*given_simulation_);
   return *given_;

@@ -93,6 +93,7 @@ QWidget* WhatIfPanel::makeActors() {
   actors_->setObjectName("actors");
   actors_->setHorizontalHeaderLabels({"actor", "material", "hide"});
   actors_->horizontalHeader()->setSectionResizeMode(0, QHeaderView::Stretch);
+  for (int column : {1, 2}) actors_->horizontalHeader()->setSectionResizeMode(column, QHeaderView::ResizeToContents);
   actors_->verticalHeader()->hide();
   actors_->setSelectionBehavior(QAbstractItemView::SelectRows);
   actors_->setSelectionMode(QAbstractItemView::SingleSelection);
@@ -102,6 +103,7 @@ QWidget* WhatIfPanel::makeActors() {
   x_m_ = new ValueKnob("x_m", -kFarthest_m, kFarthest_m, place);
   y_m_ = new ValueKnob("y_m", -kFarthest_m, kFarthest_m, place);
   yaw_deg_ = new ValueKnob("yaw_deg", -180, 180, place);
+  for (ValueKnob* knob : {x_m_, y_m_, yaw_deg_}) knob->show(0);
   auto* form = new QWidget;
   auto* rows = new QFormLayout(form);
   rows->addRow("moved along x [m]", x_m_);
