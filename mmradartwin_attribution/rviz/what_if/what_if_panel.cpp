@@ -112,6 +112,7 @@ QWidget* WhatIfPanel::makeActors() {
   auto* material = new QWidget;
   material_form_ = new QFormLayout(material);
   material_form_->setContentsMargins(0, 0, 0, 0);
+  material_form_->setRowWrapPolicy(QFormLayout::WrapAllRows);  // a panel is narrow
   rows->addRow(material);
   auto* halves = new QSplitter(Qt::Vertical);
   halves->addWidget(actors_);
@@ -139,6 +140,7 @@ QWidget* WhatIfPanel::makeMechanisms() {
   });
   auto* form = new QWidget;
   mechanism_form_ = new QFormLayout(form);
+  mechanism_form_->setRowWrapPolicy(QFormLayout::WrapAllRows);
   auto* halves = new QSplitter(Qt::Vertical);
   halves->addWidget(mechanisms_);
   halves->addWidget(scrolled(form));
