@@ -21,6 +21,7 @@ import json, math, sys, threading, rospy
 from mmradartwin_msgs.msg import RangeAngleMap, WhatIf
 from mmradartwin_msgs.srv import EditTwin, EditTwinRequest, SaveTwin
 from std_srvs.srv import Trigger
+from visualization_msgs.msg import InteractiveMarkerFeedback as Feedback
 rospy.init_node("hand")
 news, seen = threading.Condition(), {}
 def keep(key, message):
@@ -35,6 +36,20 @@ for name in types:
     rospy.wait_for_service("/what_if/" + name, 60)
 def numbers(n):
     return {k: None if math.isnan(getattr(n, k)) else getattr(n, k) for k in n.__slots__}
+handles = rospy.Publisher("/what_if/handles/feedback", Feedback, queue_size=10)
+def drag(actor, steps_m):
+    center = next(a.center for a in seen["state"].actors if a.name == actor)
+    def tell(event, x_m):
+        f = Feedback(client_id="hand", marker_name=actor, event_type=event)
+        f.header.frame_id, f.pose.orientation.w = "map", 1
+        f.pose.position.x, f.pose.position.y, f.pose.position.z = center.x + x_m, center.y, center.z
+        handles.publish(f)
+    tell(Feedback.MOUSE_DOWN, 0)
+    for x_m in steps_m:
+        tell(Feedback.POSE_UPDATE, x_m)
+        rospy.rostime.wallsleep(0.1)
+    tell(Feedback.MOUSE_UP, steps_m[-1])
+    wait(lambda: any(a.name == actor and abs(a.shift_m[0] - steps_m[-1]) < 1e-9 for a in seen["state"].actors))
 def wait(when):
     with news:
         if not news.wait_for(when, 60):
@@ -43,6 +58,9 @@ for line in sys.stdin:
     name, request = json.loads(line)
     if name == "wait":
         wait(lambda: len(seen) == 3 and not seen["state"].problem)
+        answer = None
+    elif name == "drag":
+        drag(**request)
         answer = None
     else:
         if "kind" in request:
@@ -112,7 +130,7 @@ class WhatIf(InFolder):
         self.assertFalse(begin["mechanisms"]["element_pattern"])
 
         # What the session's radar has and the twin lacks explains more of the power.
-        hand.edit("MECHANISM", mechanism="element_pattern", entry=0, on=True)
+        hand.edit("MECHANISM", mechanism="element_pattern", entry=0, enabled=True)
         pattern = hand.edit("PARAMETER", mechanism="element_pattern", entry=0, key="cos_exponent", value=2.0)
         self.assertFalse(pattern["traced"])
         self.assertGreater(pattern["now"]["explained_power"], pattern["given"]["explained_power"])
@@ -125,7 +143,7 @@ class WhatIf(InFolder):
         moved = hand.edit("MOVE", actor="tv", shift_m=[0.5, 0.2, 0], yaw_deg=30)
         self.assertTrue(moved["traced"])
         self.assertEqual(moved["actors"]["tv"][2:], [[0.5, 0.2, 0], 30])
-        hidden = hand.edit("HIDE", actor="tv", on=True)
+        hidden = hand.edit("HIDE", actor="tv", enabled=True)
         self.assertTrue(hidden["actors"]["tv"][1])
         turned = hand.edit("RADAR", shift_m=[0, 0, 0], yaw_deg=20, pitch_deg=0)
         self.assertGreater(largest_difference(turned["map"], hidden["map"]), 3)
@@ -139,6 +157,9 @@ class WhatIf(InFolder):
         undone = hand("undo")
         self.assertEqual(undone["edits"], hidden["edits"])
         self.assertLess(largest_difference(undone["map"], hidden["map"]), 1e-3)
+        dragged = hand("drag", actor="bin", steps_m=[0.1, 0.2, 0.3])  # by the mouse, in rviz
+        self.assertEqual(len(dragged["edits"]), len(hidden["edits"]) + 1, dragged["edits"])
+        self.assertEqual(hand("undo")["edits"], hidden["edits"])
         saved = hand("save", folder=self.at("saved"), overwrite=False)
         self.assertTrue(saved["success"], saved["message"])
         self.assertFalse(hand("save", folder=self.at("saved"), overwrite=False)["success"])

@@ -131,9 +131,9 @@ QWidget* WhatIfPanel::makeMechanisms() {
     edit.kind = Edit::MECHANISM;
     edit.mechanism = state_->mechanisms[row].name;
     edit.entry = state_->mechanisms[row].entry;
-    edit.on = item->checkState() == Qt::Checked;
+    edit.enabled = item->checkState() == Qt::Checked;
     // One that asks for something in the room is about the chosen actor.
-    if (const auto* actor = chosenActor(); actor && edit.on && state_->mechanisms[row].subject.empty()) {
+    if (const auto* actor = chosenActor(); actor && edit.enabled && state_->mechanisms[row].subject.empty()) {
       edit.actor = state_->mechanisms[row].given ? "" : actor->name;
     }
     calls_->edit("", edit);
@@ -266,7 +266,7 @@ void WhatIfPanel::showActors() {
         Edit edit;
         edit.kind = Edit::HIDE;
         edit.actor = name.toStdString();
-        edit.on = static_cast<std::uint8_t>(hidden);
+        edit.enabled = static_cast<std::uint8_t>(hidden);
         calls_->edit("", edit);
       });
       actors_->setCellWidget(i, 2, hide);

@@ -1,5 +1,6 @@
 #include "mmradartwin_attribution/ros/actor_handles.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -79,7 +80,7 @@ void ActorHandles::show(const WhatIf& what_if) {
     handle.name = actor.name;
     handle.description = actor.name;
     handle.pose = poseOf(center, what_if.placement(actor.name));
-    handle.scale = static_cast<float>(std::max(0.4, 1.2 * actor.bounds.sizes().head<2>().maxCoeff()));
+    handle.scale = static_cast<float>(std::clamp(0.7 * actor.bounds.sizes().head<2>().maxCoeff(), 0.25, 0.8));
     visualization_msgs::InteractiveMarkerControl control;
     control.name = "move";
     control.orientation.w = control.orientation.y = std::sqrt(0.5);  // its x axis, the plane's normal, is map's z

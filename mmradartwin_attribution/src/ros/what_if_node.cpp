@@ -326,9 +326,9 @@ void WhatIfNode::apply(const Edit::Request& r) {
     case Edit::Request::MOVE:
       return twin.moveActor(r.actor, shift, r.yaw_deg);
     case Edit::Request::HIDE:
-      return twin.hideActor(r.actor, r.on);
+      return twin.hideActor(r.actor, r.enabled);
     case Edit::Request::MECHANISM:
-      return twin.switchMechanism(r.mechanism, r.entry, r.on, r.actor.empty() ? r.material : r.actor);
+      return twin.switchMechanism(r.mechanism, r.entry, r.enabled, r.actor.empty() ? r.material : r.actor);
     case Edit::Request::PARAMETER:
       return twin.setParameter(r.mechanism, r.entry, r.key, r.value);
     case Edit::Request::RADAR:

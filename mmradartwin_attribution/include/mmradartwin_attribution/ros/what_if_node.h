@@ -28,8 +28,8 @@
 namespace mmradartwin {
 
 /// radar/config, session, twin/scene, radar/range_angle -> what_if/range_angle, what_if/residual_map,
-/// what_if/residuals, what_if/scene_markers, what_if/state; services what_if/edit, what_if/undo, what_if/revert, what_if/save;
-/// interactive markers what_if/handles.
+/// what_if/residuals, what_if/scene_markers, what_if/state; services what_if/edit, what_if/undo, what_if/revert,
+/// what_if/save; interactive markers what_if/handles.
 ///
 /// A twin that is changed by hand, beside the one as given, at the pose of the last measured map. What it is compared
 /// with comes from a radar, a bag or stored results alike, and the twin that these simulate stays as it is. The twin as
