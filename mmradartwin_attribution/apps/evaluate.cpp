@@ -29,6 +29,29 @@ struct Arguments {
   bool no_pictures = false, no_bag = false;
 };
 
+/// What was run, with what. other: the simulated recording, empty where a twin was simulated.
+RunDescription describeRun(const Arguments& arguments, const std::vector<std::string>& command,
+                           const Recording& recording, const Recording& other, const EvaluationOptions& options,
+                           const TwinDescription& twin) {
+  const bool from_twin = arguments.simulated.empty();
+  RunDescription description;
+  description.command = command;
+  description.recording = arguments.input.recording();
+  description.simulated = from_twin ? "twin" : arguments.simulated;
+  description.version = packageVersion();
+  description.attribution_yaml = toYaml(options.config);
+  description.radar_yaml = toYaml(recording.radar);
+  std::vector<std::string> more = {arguments.config, arguments.input.radarFile(), arguments.input.channels, twin.file,
+                                   twin.scene_file};
+  more.insert(more.end(), arguments.input.recordings.begin() + 1, arguments.input.recordings.end());
+  if (!from_twin) {
+    const std::vector<std::string> files = inputFiles(arguments.simulated, other, {});
+    more.insert(more.end(), files.begin(), files.end());
+  }
+  description.inputs = hashFiles(inputFiles(arguments.input.recording(), recording, more));
+  return description;
+}
+
 int run(const Arguments& arguments, const std::vector<std::string>& command) {
   std::vector<std::string> inputs = arguments.input.inputs();
   inputs.insert(inputs.end(), {arguments.simulated, arguments.config});
@@ -90,22 +113,8 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   writePicture(pictures.coverage, output.path() + "/coverage.png");
   if (bag) bag->finish(evaluation);
 
-  RunDescription description;
-  description.command = command;
-  description.recording = arguments.input.recording();
-  description.simulated = from_twin ? "twin" : arguments.simulated;
-  description.version = packageVersion();
-  description.attribution_yaml = toYaml(options.config);
-  description.radar_yaml = toYaml(recording.radar);
-  std::vector<std::string> more = {arguments.config, arguments.input.radarFile(), arguments.input.channels,
-                                   twin.description().file, twin.description().scene_file};
-  more.insert(more.end(), arguments.input.recordings.begin() + 1, arguments.input.recordings.end());
+  RunDescription description = describeRun(arguments, command, recording, other, options, twin.description());
   description.twin_yaml = twin_yaml;
-  if (!from_twin) {
-    const std::vector<std::string> files = inputFiles(arguments.simulated, other, {});
-    more.insert(more.end(), files.begin(), files.end());
-  }
-  description.inputs = hashFiles(inputFiles(arguments.input.recording(), recording, more));
   report.write(evaluation, options.config, description, pictures);
   output.complete();
 

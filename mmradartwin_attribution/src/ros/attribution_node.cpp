@@ -344,15 +344,15 @@ void AttributionNode::publishLedger(const ros::Time& stamp) {
 
 const std::vector<ResponseRegion>& AttributionNode::regionsAt(const Eigen::Isometry3d& T) {
   // A radar that stands keeps its regions.
-  const bool same = regions_valid_ && (T.translation() - regions_T_.translation()).norm() < 1e-3 &&
-                    (T.linear() - regions_T_.linear()).norm() < 1e-3;
+  const bool same = regions_valid_ && (T.translation() - regions_at_.translation()).norm() < 1e-3 &&
+                    (T.linear() - regions_at_.linear()).norm() < 1e-3;
   if (!same) {
     const ros::WallTime begin = ros::WallTime::now();
     if (slow_) announce("looking for the regions that the scene is expected to answer from");
     regions_of_pose_ = regions_->regions(T);
     slow_ = (ros::WallTime::now() - begin).toSec() > kSlow_s;
     announceEnd(begin);
-    regions_T_ = T;
+    regions_at_ = T;
     regions_valid_ = true;
   }
   return regions_of_pose_;

@@ -139,7 +139,7 @@ class AttributionNode {
   std::unique_ptr<RegionModel> regions_;
   std::unique_ptr<MarkerBuilder> builder_;
   std::vector<ResponseRegion> regions_of_pose_;
-  Eigen::Isometry3d regions_T_ = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d regions_at_ = Eigen::Isometry3d::Identity();
   bool regions_valid_ = false;
   LiveLedger live_ledger_;
 };

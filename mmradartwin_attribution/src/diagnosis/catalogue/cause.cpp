@@ -16,7 +16,7 @@ namespace bounds = diagnosis::bounds;
 
 constexpr double kAny = std::numeric_limits<double>::infinity();
 
-std::vector<CauseDescription> builtInCauses() {
+std::vector<CauseDescription> builtInCauses() {  // NOLINT(readability-function-size): a table
   constexpr ResidualClass kC1 = ResidualClass::kMissingSupport, kC2 = ResidualClass::kWeakSupport,
                           kC3 = ResidualClass::kUnsupportedAnchor, kC4 = ResidualClass::kShiftedResponse,
                           kC5 = ResidualClass::kMissingMechanism;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace mmradartwin::diagnosis::likelihood {
 namespace {
@@ -374,7 +375,7 @@ void ChannelLikelihood::addBasis(const PoseEchoes& echoes, const SessionLatents&
     addProducts(directions, basis, out);
     if (!keep) continue;
     basis.whitened = directions.whitened.leftCols(static_cast<Eigen::Index>(basis.active.size())).cast<float>();
-    out.bins.push_back(std::move(basis));
+    out.bins.push_back(std::exchange(basis, {}));
   }
   out.log_likelihood *= weight();
 }
