@@ -135,7 +135,7 @@ mmradartwin_msgs::Residuals toMsg(const EvaluationField& field, const PoseAttrib
   const MatchWindow& tight = field.config().tight;
   mmradartwin_msgs::Residuals msg;
   msg.pose = name;
-  msg.T_map_radar = toMsg(T_map_radar);
+  msg.T_map_radar = mmradartwin::toMsg(T_map_radar);
   for (const ResponseRegion& r : pose.regions) {
     mmradartwin_msgs::ResponseRegion region;
     region.range_m = r.range_m;

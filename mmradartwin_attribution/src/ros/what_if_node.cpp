@@ -300,7 +300,7 @@ void WhatIfNode::publishState() {
   if (compared_) {
     const auto name = pose_names_.upper_bound(toNanoseconds(measured_->header.stamp));
     msg.pose = name == pose_names_.begin() ? "" : std::prev(name)->second;
-    msg.T_map_radar = toMsg(comparison_->measured().T_map_radar);
+    msg.T_map_radar = mmradartwin::toMsg(comparison_->measured().T_map_radar);
     msg.given = toMsg(comparison_->given().numbers);
     msg.now = toMsg(comparison_->last().numbers);
     msg.simulated_ms = changed_ms_ + comparison_->simulated_ms();
