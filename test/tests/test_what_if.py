@@ -177,12 +177,6 @@ class WhatIf(InFolder):
         subprocess.run([find_program("mmradartwin_attribution", "evaluate"), self.at("session"), "--output",
                         self.at("report"), "--quiet", "--no-pictures"], check=True, capture_output=True, timeout=300)
         with Launched("inspect.launch", "results:=" + self.at("report"), "rviz:=false", "pause:=true") as launched:
-            subprocess.run(["rosservice", "call", "--wait", "/player/pause_playback", "data: false"], check=True,
-                           env=launched.environment, capture_output=True, timeout=120)
-            subprocess.run(["rostopic", "echo", "-n", "1", "/radar/range_angle/header"], check=True,
-                           env=launched.environment, capture_output=True, timeout=120)
-            subprocess.run(["rosservice", "call", "/player/pause_playback", "data: true"], check=True,
-                           env=launched.environment, capture_output=True, timeout=120)
             self.check_changes(launched)
         # The saved twin is one that evaluate takes.
         subprocess.run([find_program("mmradartwin_attribution", "evaluate"), self.at("session"), "--twin",
