@@ -128,7 +128,7 @@ void addCornerInWalls(const PoseContext& context, const ElementsInMap& elements,
   const int turn = static_cast<int>(corner.walls.size());
   const std::complex<double> at_edge =
       event.level * wavelength / (4 * M_PI * 2 * R) * cornerFactor(edge, way->image, wavelength);
-  const std::complex<double> weight = at_edge * reflectAlong(context, elements, record.vertices, 2 * R, turn, record);
+  const std::complex<double> weight = reflectAlong(context, elements, record.vertices, 2 * R, turn, at_edge, record);
   if (std::abs(weight) < cutoff || !(std::abs(weight) > 0)) return;
   record.event = &event.name;
   record.departure = record.arrival =

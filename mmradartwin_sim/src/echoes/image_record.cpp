@@ -13,7 +13,7 @@ void addImageRecord(const PoseContext& context, const ElementsInMap& elements, c
   PathRecord record;
   record.facets = path.facets;
   std::complex<double> weight =
-      event.level * wavelength / (4 * M_PI * total) * reflectAlong(context, elements, path.vertices, total, -1, record);
+      reflectAlong(context, elements, path.vertices, total, -1, event.level * wavelength / (4 * M_PI * total), record);
   if (edges) weight *= edges->factor(context, legsOf(context.scene, elements.p, path.facets, path.met));
   if (std::abs(weight) < cutoff || !(std::abs(weight) > 0)) return;
   record.event = &event.name;

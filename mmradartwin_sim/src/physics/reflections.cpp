@@ -10,11 +10,10 @@ namespace mmradartwin {
 
 std::complex<double> reflectAlong(const PoseContext& context, const ElementsInMap& elements,
                                   const PerInteraction<Eigen::Vector3d>& vertices, double total_m, int corner,
-                                  PathRecord& record) {
+                                  std::complex<double> weight, PathRecord& record) {
   const double wavelength = context.radar.wavelength_m();
   Eigen::Vector3d from = elements.p, in = (vertices.front() - from).normalized();
   ComplexVector field = verticalField(elements.up, in).cast<std::complex<double>>();
-  std::complex<double> weight = 1;
   double before_m = 0;
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const Facet& facet = context.scene.facets[static_cast<std::size_t>(record.facets[i])];

@@ -6,14 +6,14 @@
 
 namespace mmradartwin {
 
-/// What reflections leave of a closed path of total_m over record.facets, met at `vertices`, in the
+/// `weight` times what reflections leave of a closed path of total_m over record.facets, met at `vertices`, in the
 /// exp(-jkL) convention: Fresnel coefficients with polarisation between vertical antennas, sqrt(1 - S^2) of each facet
 /// and its aperture factor; not the apertures of the two facets of a corner, the first of which is met after `corner`
 /// others
 /// (-1: there is none). Fills the record's actors and reflection_cosine.
 std::complex<double> reflectAlong(const PoseContext& context, const ElementsInMap& elements,
                                   const PerInteraction<Eigen::Vector3d>& vertices, double total_m, int corner,
-                                  PathRecord& record);
+                                  std::complex<double> weight, PathRecord& record);
 
 /// What an echo from a perpendicular reflection at a surface leaves of the amplitude; exp(-jkL).
 std::complex<double> perpendicularReflection(const Material& material, double frequency_hz);
