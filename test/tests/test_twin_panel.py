@@ -250,8 +250,7 @@ class Replay(Driven):
         window.wait_for_text("source", "replay")
         self.assertIn("grey: a replay goes on by itself", window.text("next"))
         window.wait_for_text("play", "Play")
-        window.do("click play")
-        window.wait_for_text("play", "Pause")
+        window.do("click play")  # the bag is short: whoever looks at the button later finds it over
         window.do("tab tabs Diagnosis")
         self.assertIn("grey: no diagnosis has found anything yet", window.text("apply"))
         self.launched.wait_for_text("the bag is over")
