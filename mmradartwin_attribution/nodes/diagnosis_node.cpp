@@ -12,8 +12,6 @@
 #include <tf2_ros/message_filter.h>
 #include <visualization_msgs/MarkerArray.h>
 
-#include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -23,6 +21,7 @@
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/diagnosis_report.h"
 #include "mmradartwin_attribution/ros/conversions.h"
+#include "mmradartwin_attribution/ros/left_behind_folder.h"
 #include "mmradartwin_attribution/ros/markers.h"
 #include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/input_error.h"
@@ -95,22 +94,6 @@ NodeDescription description() {
            topic<diagnostic_msgs::DiagnosticArray>("/diagnostics", "whether frames are kept, and why not")},
           {service<std_srvs::Trigger>("attribution/forget_poses", "forget all frames: poses begin anew")},
           [](StrictParameters& parameters) { const Settings settings(parameters); }};
-}
-
-/// Where ROS keeps what nodes leave behind.
-fs::path rosHome() {
-  if (const char* home = std::getenv("ROS_HOME")) return home;
-  if (const char* home = std::getenv("HOME")) return fs::path(home) / ".ros";
-  return fs::temp_directory_path();
-}
-
-std::string newFolderName() {
-  const std::time_t now = std::time(nullptr);
-  char text[40];
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  std::strftime(text, sizeof text, "diagnosis_%Y%m%d_%H%M%S", &utc);
-  return text;
 }
 
 bool sameBytes(const std::string& a, const std::string& b) {
@@ -237,7 +220,7 @@ class DiagnosisNode {
   std::string outputFolder(const std::string& asked) const {
     if (asked.empty()) {
       const fs::path given = settings_.output_folder;
-      return ((given.empty() ? rosHome() / "mmradartwin" : given) / newFolderName()).string();
+      return ((given.empty() ? leftBehindFolder() : given) / nameWithTime("diagnosis")).string();
     }
     if (asked.front() != '/') throw InputError("output '" + asked + "': give an absolute path, or none");
     return asked;

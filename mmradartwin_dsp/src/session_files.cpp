@@ -228,6 +228,14 @@ std::vector<StoredFile> gatherSessionFiles(const std::string& session_file) {
   return files;
 }
 
+std::optional<std::string> absolutePathOf(const StoredFile& file) {
+  Place root;
+  root.root = Place::Root::kAbsolute;
+  const std::string below = root.storedName();
+  if (file.name.compare(0, below.size() + 1, below + "/") != 0) return std::nullopt;
+  return file.name.substr(below.size());
+}
+
 void restoreSessionFiles(const std::vector<StoredFile>& files, const std::string& directory) {
   std::map<std::string, const StoredFile*> stored;
   refuseNames(files);

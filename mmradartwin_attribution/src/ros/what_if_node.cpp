@@ -7,13 +7,12 @@
 #include <visualization_msgs/MarkerArray.h>
 
 #include <algorithm>
-#include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <utility>
 
 #include "mmradartwin_attribution/ros/conversions.h"
+#include "mmradartwin_attribution/ros/left_behind_folder.h"
 #include "mmradartwin_attribution/ros/markers.h"
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/output.h"
@@ -29,21 +28,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kLook_s = 0.01;
-
-fs::path rosHome() {
-  if (const char* home = std::getenv("ROS_HOME")) return home;
-  if (const char* home = std::getenv("HOME")) return fs::path(home) / ".ros";
-  return fs::temp_directory_path();
-}
-
-std::string newFolderName() {
-  const std::time_t now = std::time(nullptr);
-  char text[40];
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  std::strftime(text, sizeof text, "what_if_%Y%m%d_%H%M%S", &utc);
-  return text;
-}
 
 /// Whether a scene was unpacked from a bag, by this process or another.
 bool isTemporary(const std::string& file) {
@@ -383,11 +367,11 @@ void WhatIfNode::moveByHandle() {
   if (!response.success) ROS_WARN("%s", response.message.c_str());
 }
 
-bool WhatIfNode::onUndo(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+bool WhatIfNode::goBack(bool (WhatIf::*how)(), const std::string& done, std_srvs::Trigger::Response& response) {
   edited_at_ = ros::WallTime::now();
   try {
-    response.success = whatIf().undo();
-    response.message = response.success ? "the last change is taken back" : "nothing was changed";
+    response.success = (whatIf().*how)();
+    response.message = response.success ? done : "nothing was changed";
     show(true);
     publishScene();
     handles_->place(*what_if_);
@@ -398,19 +382,12 @@ bool WhatIfNode::onUndo(std_srvs::Trigger::Request&, std_srvs::Trigger::Response
   return true;
 }
 
+bool WhatIfNode::onUndo(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  return goBack(&WhatIf::undo, "the last change is taken back", response);
+}
+
 bool WhatIfNode::onRevert(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-  edited_at_ = ros::WallTime::now();
-  try {
-    response.success = whatIf().revert();
-    response.message = response.success ? "the twin is as it was given" : "nothing was changed";
-    show(true);
-    publishScene();
-    handles_->place(*what_if_);
-  } catch (const std::exception& error) {
-    response.success = false;
-    response.message = error.what();
-  }
-  return true;
+  return goBack(&WhatIf::revert, "the twin is as it was given", response);
 }
 
 bool WhatIfNode::onSave(mmradartwin_msgs::SaveTwin::Request& request, mmradartwin_msgs::SaveTwin::Response& response) {
@@ -419,9 +396,8 @@ bool WhatIfNode::onSave(mmradartwin_msgs::SaveTwin::Request& request, mmradartwi
     if (!request.folder.empty() && request.folder.front() != '/') {
       throw InputError("folder '" + request.folder + "': give an absolute path, or none");
     }
-    const fs::path below =
-        settings_.output_folder.empty() ? rosHome() / "mmradartwin" : fs::path(settings_.output_folder);
-    const std::string folder = request.folder.empty() ? (below / newFolderName()).string() : request.folder;
+    const fs::path below = settings_.output_folder.empty() ? leftBehindFolder() : fs::path(settings_.output_folder);
+    const std::string folder = request.folder.empty() ? (below / nameWithTime("what_if")).string() : request.folder;
     const std::string& scene = twin.given().description().scene_file;
     Output output = Output::folder({folder, static_cast<bool>(request.overwrite)}, {scene}, "twin.yaml");
     std::string names;

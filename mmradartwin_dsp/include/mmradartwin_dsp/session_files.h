@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,8 @@ struct StoredFile {
 /// Files outside of the directory get names below external/: package/PKG/... for package://, root/... for absolute
 /// paths, session/up/... for ../. Throws InputError for a YAML reference that leads nowhere.
 std::vector<StoredFile> gatherSessionFiles(const std::string& session_file);
+/// The absolute path by which a stored file was named; nothing where it was named otherwise.
+std::optional<std::string> absolutePathOf(const StoredFile& file);
 
 /// Where a session's captures stand relative to its directory, with {pose} for the name: as its session.yaml says, or
 /// captures/{pose}.bin where that leads out of the directory.

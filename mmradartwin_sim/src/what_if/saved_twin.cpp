@@ -63,8 +63,7 @@ void WhatIf::writeScene(const std::string& folder, bool copy_meshes, std::vector
       writeText(folder + "/" + file.name, file.bytes);
       files.push_back(file.name);
       copies[inside] = file.name;
-      if (file.name.rfind("external/root/", 0) == 0)
-        copies[file.name.substr(std::string("external/root").size())] = file.name;
+      if (const std::optional<std::string> absolute = absolutePathOf(file)) copies[*absolute] = file.name;
     }
   }
   YamlMap yaml = YamlMap::load(given);

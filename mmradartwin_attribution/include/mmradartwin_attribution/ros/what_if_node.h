@@ -60,6 +60,8 @@ class WhatIfNode {
   void onMeasured(const MapMsg::ConstPtr& msg);
   void onTimer(const ros::WallTimerEvent&);
   bool onEdit(Edit::Request& request, Edit::Response& response);
+  /// Calls undo() or revert() and shows what is left; done: what to say then.
+  bool goBack(bool (WhatIf::*how)(), const std::string& done, std_srvs::Trigger::Response& response);
   bool onUndo(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool onRevert(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool onSave(mmradartwin_msgs::SaveTwin::Request& request, mmradartwin_msgs::SaveTwin::Response& response);

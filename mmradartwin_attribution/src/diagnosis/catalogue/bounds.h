@@ -315,9 +315,10 @@ inline constexpr double kFalseAlarmRateOfRound = 0.01;
 inline constexpr double kNotToldApart_nats = 5;
 /// Correlation over poses of the gains of two names from which on they explain the same.
 inline constexpr double kCorrelationOfSameName = 0.7;
-/// Share of an object's gain from which on the move of an actor to its place explains as much, and the distance from
-/// that actor's plan within which the object stands there.
-inline constexpr double kShareOfMoveInstead = 0.8, kStandsThere_m = 0.1;
+/// Share of a likelier fit's gain from which on a simpler one explains as much: the move of an actor for an object at
+/// its new place, or a name of fewer numbers; and the distance from that actor's plan within which the object stands
+/// there.
+inline constexpr double kShareOfSimpler = 0.8, kStandsThere_m = 0.1;
 /// Size of an object up to which it may be a person, and the distance from the middle of a walk within which it is what
 /// is left of the walker.
 inline constexpr double kMostPersonSize_m = 0.3, kWalkReach_m = 0.6;

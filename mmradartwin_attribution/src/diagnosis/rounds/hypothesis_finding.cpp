@@ -199,7 +199,7 @@ void preferMoves(std::vector<HypothesisFit>& fits, const Scene& scene) {
     if (traitsOf(object.mechanism).form != MechanismForm::kUnmodelledObject) continue;
     const Eigen::Vector2d at(object.values.number("x_m"), object.values.number("y_m"));
     for (std::size_t j = i + 1; j < fits.size(); ++j) {
-      if (!fits[j].hypothesis.isMove() || fits[j].gain < bounds::kShareOfMoveInstead * fits[i].gain) continue;
+      if (!fits[j].hypothesis.isMove() || fits[j].gain < bounds::kShareOfSimpler * fits[i].gain) continue;
       const NamedParameters move = fits[j].hypothesis.at(fits[j].scaled_values);
       const Actor& actor = scene.actors[static_cast<std::size_t>(scene.actorIndex(fits[j].hypothesis.subject))];
       const Eigen::Vector2d by(move.values.number("dx_m"), move.values.number("dy_m"));
@@ -258,7 +258,7 @@ void preferSimplerNames(std::vector<HypothesisFit>& fits, const ModelState& befo
     for (std::size_t j = i + 1; j < fits.size(); ++j) {
       const HypothesisFit& simpler = fits[j];
       if (!is_name(simpler) || simpler.numbers() >= fits[i].numbers() ||
-          simpler.gain < bounds::kShareOfMoveInstead * fits[i].gain ||
+          simpler.gain < bounds::kShareOfSimpler * fits[i].gain ||
           correlation(gained, gainByPose(simpler, before)) < bounds::kCorrelationOfSameName ||
           natsApart(fits[i], simpler, data) > bounds::kNotToldApart_nats) {
         continue;

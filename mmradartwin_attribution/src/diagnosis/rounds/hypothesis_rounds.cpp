@@ -13,13 +13,13 @@
 #include "diagnosis/rounds/hypothesis_finding.h"
 #include "diagnosis/rounds/map_evidence.h"
 #include "diagnosis/search/law_screen.h"
+#include "diagnosis/search/places_apart.h"
 
 namespace mmradartwin::diagnosis::rounds {
 namespace {
 
 constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is searched for in a round
 constexpr std::size_t kMostAllowedFor = 12;  ///< things that stand out of the clutter, allowed for in a session
-constexpr double kThingsApart_m = 0.5;       ///< nearer ones are the same thing
 
 /// True of a transmitter's delay that is no larger than its error: its phase alone is another cause's.
 bool isPhaseOnly(const HypothesisFit& fit) {
@@ -39,7 +39,7 @@ bool isSameThing(const HypothesisFit& a, const HypothesisFit& b) {
     return false;
   }
   const Parameters p = a.hypothesis.at(a.scaled_values).values, q = b.hypothesis.at(b.scaled_values).values;
-  return std::hypot(p.number("x_m") - q.number("x_m"), p.number("y_m") - q.number("y_m")) < kThingsApart_m;
+  return std::hypot(p.number("x_m") - q.number("x_m"), p.number("y_m") - q.number("y_m")) < kPlacesApart_m;
 }
 
 /// Gives a receiver's image the pattern over the receivers that the data show, where they differ. One level is fitted.
