@@ -1,9 +1,11 @@
 #include "diagnosis/likelihood/channel_draw.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <map>
+#include <vector>
 
 namespace mmradartwin::diagnosis::likelihood {
 
@@ -14,14 +16,19 @@ Eigen::MatrixXcd drawnChannels(const ChannelLikelihood& model, const PoseEchoes&
   const int channels = model.data().radar.channels(), samples = model.data().radar.samples_per_chirp;
   Eigen::MatrixXcd drawn = Eigen::MatrixXcd::Zero(channels, samples);
   std::map<int, double> level;  // of each group's echo, about its mean
-  const double spread = std::exp(0.5 * latents.log_spread);
+  std::vector<double> shares;
+  for (const SpreadScale& scale : kSpreadScales) shares.push_back(scale.share);
+  std::discrete_distribution<std::size_t> drawn_scale(shares.begin(), shares.end());
   for (const ChannelLikelihood::ExpectedBin& bin : model.expectedBins(echoes, latents, pose)) {
     Eigen::MatrixXcd rest = bin.covariance;
     if (bin.echo.power > 0) {
       const Eigen::Map<const Eigen::VectorXcd> s(bin.echo.direction.data(), channels);
       rest -= bin.echo.power * s * s.adjoint();
       const auto [known, fresh] = level.try_emplace(bin.group, 0);
-      if (fresh) known->second = std::exp(0.5 * spread * normal(random));
+      if (fresh) {
+        const double variance = kSpreadScales[drawn_scale(random)].factor * std::exp(latents.log_spread);
+        known->second = std::exp(0.5 * std::sqrt(std::min(variance, kMostSpread)) * normal(random));
+      }
       drawn.col(bin.bin) += std::polar(std::sqrt(bin.echo.power) * known->second, turn(random)) * s;
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXcd> parts(rest);

@@ -10,9 +10,10 @@ constexpr double kUnknownShare = 0.05;                     ///< of the echoes: t
 constexpr double kLeftOfHidden[] = {0, 1e-4, 1e-3, 1e-2};  ///< power that edges and weaker ways leave of a hidden echo
 constexpr double kLeastRest = 1e-9;
 constexpr double kLeastSpread = 1e-5;  ///< a level known to 0.014 dB
-/// Beyond it an echo fades as a sum of phasors does. A log-normal law of a larger variance v has its mode at exp(-v),
-/// where its density is exp(v / 2): it would reward parameters that let the measured echo vanish.
-constexpr double kMostSpread = 1;
+
+/// Information that is left where it is not known which scale an echo has: 5/7 in Student's law (Lange, Little, Taylor
+/// 1989).
+constexpr double kShareOfInformation = 5.0 / 7;
 
 /// Square of the echo's share of a cell from which on the level of a path is log-normal, and up to which it is that of
 /// a sum of phasors; between them the law is a mixture.
@@ -38,7 +39,8 @@ LevelLaw logNormal(double x, double share, double spread) {
   const double variance = spread + 2 * (1 - share) / share, off = std::log(x / share);
   const double part = spread < kMostSpread ? spread / variance : 0;
   return {-std::log(x) - 0.5 * std::log(2 * M_PI * variance) - 0.5 * off * off / variance, off / variance,
-          0.5 * part * (off * off / variance - 1), 1 / variance, 0.5 * part * part};
+          0.5 * part * (off * off / variance - 1), kShareOfInformation / variance,
+          kShareOfInformation * 0.5 * part * part};
 }
 
 /// Writes the Hermitian a b^H + b a^H (or a a^H where both are the same) times f, added to `to`.
@@ -84,7 +86,7 @@ CellLikelihood::CellLikelihood(const InverseFactor& factor, const std::complex<d
   echo_share_ = std::min(1.0, echo.power * g);
   along_squares_ = x;
   across_weight_ = (freedom - 1) / (kTailFreedom + across);
-  const double squares = echo_share_ * echo_share_, spread = std::clamp(echo.spread, kLeastSpread, kMostSpread);
+  const double squares = echo_share_ * echo_share_;
   usual_ = (1 - kUnknownShare) * squares;
   const double faded =
       std::log((freedom - 1) / (kTailFreedom + across)) - freedom * std::log1p(x / (kTailFreedom + across));
@@ -97,8 +99,11 @@ CellLikelihood::CellLikelihood(const InverseFactor& factor, const std::complex<d
     level_information_ += ratio * law.level_information;
     spread_information_ += ratio * law.spread_information;
   };
-  if (normal < 1) add(1 - normal, sumOfPhasors(x, squares, spread));
-  if (normal > 0) add(normal, logNormal(x, echo_share_, spread));
+  for (const auto [factor, share] : kSpreadScales) {
+    const double spread = std::clamp(factor * echo.spread, kLeastSpread, kMostSpread);
+    if (normal < 1) add((1 - normal) * share, sumOfPhasors(x, squares, spread));
+    if (normal > 0) add(normal * share, logNormal(x, echo_share_, spread));
+  }
   const double both = 1 - usual_ + known_;
   log_likelihood_ += std::log(both);
   for (double* v : {&known_, &by_level_, &spread_score_, &level_information_, &spread_information_}) *v /= both;

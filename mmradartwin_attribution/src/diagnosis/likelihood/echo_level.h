@@ -10,6 +10,19 @@ namespace mmradartwin::diagnosis::likelihood {
 
 constexpr double kTailFreedom = 4;  ///< degrees of freedom of a cell's complex t distribution
 
+/// Spreads differ from echo to echo: some levels are known better than the session's spread says, a few much worse. The
+/// shares are those that an inverse gamma law of 4 degrees of freedom has up to 1, 4 and beyond, so that the level's
+/// logarithm follows nearly Student's law. Levels that scatter normally are likeliest with their own variance as the
+/// spread: the factors are 1/2, 2 and 8 of 0.669, which is the maximum of the likelihood on a normal law.
+struct SpreadScale {
+  double factor, share;  ///< on the variance of the level; of the echoes
+};
+constexpr SpreadScale kSpreadScales[] = {{0.334, 0.406}, {1.338, 0.504}, {5.352, 0.090}};
+
+/// Beyond it an echo fades as a sum of phasors does. A log-normal law of a larger variance v has its mode at exp(-v),
+/// where its density is exp(v / 2): it would reward parameters that let the measured echo vanish.
+constexpr double kMostSpread = 1;
+
 /// The strongest echo of a cell.
 struct CellEcho {
   double power = 0;                                          ///< root of the sum of its paths' squared powers
@@ -24,8 +37,8 @@ struct CellEcho {
 /// distributed about its mean V = 1 / s^H Sigma^-1 s as an exponential is, however well P is known. Here b has the
 /// distribution of a sum of phasors of known lengths, matched by two moments: |b|^2 is Gamma-distributed with shape
 /// k = V^2 / variance, where the variance is V^2 less the squares of the paths' powers, plus the spread of the level.
-/// Where one path stands alone, its level is normal in dB. Then it gives the information 1 / spread about the logarithm
-/// of its power; many paths give 1, as fading does. What of y is uncorrelated with b keeps the t distribution, of one
+/// Where one path stands alone, its level is nearly Student-distributed in dB (kSpreadScales). Then it gives about the
+/// information 1 / spread about the logarithm of its power; many paths give 1, as fading does. What of y is uncorrelated with b keeps the t distribution, of one
 /// dimension less, so that clutter of another level than expected does not move the level of an echo. A share of echoes
 /// follows no known level and fades. See docs/reference/diagnosis.md.
 class CellLikelihood {

@@ -138,6 +138,22 @@ TEST(EchoLevel, IsKnownByItsSpread) {
   }
 }
 
+TEST(EchoLevel, HasTheSpreadOfLevelsThatScatterNormally) {
+  for (double spread_db : {0.5, 1.5}) {
+    const std::vector<Vector> cells = measured(2000, 0, spread_db, -35);
+    double best = -1e300, at = 0;
+    for (double factor = 0.7; factor < 1.4; factor += 0.05) {
+      Cell model;
+      model.spread_db = factor * spread_db;
+      const double value = sum(cells, model);
+      if (value <= best) continue;
+      best = value;
+      at = factor;
+    }
+    EXPECT_NEAR(at, 1, 0.08) << spread_db << " dB";
+  }
+}
+
 TEST(EchoLevel, TellsWeakEffects) {
   // Nats of ten echoes for the truth over none; the exponential of fading gave 1.6 for -3 dB at 1.5 dB.
   const auto nats = [](double effect_db, double spread_db) {
