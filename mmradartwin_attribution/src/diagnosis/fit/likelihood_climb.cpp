@@ -16,7 +16,8 @@ namespace {
 
 constexpr int kRisingFactor = 12;        ///< factor on the number of steps while each gains kRising_nats
 constexpr double kLeastStep_nats = 0.2;  ///< expected gain of a step below which a climb ends
-constexpr double kRising_nats = 5;       ///< gain of a step, or promise of the next one, for which a climb goes on
+constexpr double kRising_nats = 0.5;     ///< gain of a step, or promise of the next one, for which a climb goes on
+constexpr double kSearched_nats = 5;     ///< gain of a search without slopes for which another one follows
 constexpr double kKeptPromise = 0.1;     ///< share of its promise that such a step keeps at least
 constexpr double kClimb_steps = 4;       ///< steps as good as the last one within which a climb has to reach least_nats
 constexpr double kSearched[] = {0.3, 0.15};        ///< first steps of the search without slopes, scaled
@@ -398,7 +399,7 @@ bool LikelihoodClimb::needsSearch() const {
   for (std::size_t j = 0; j < optimum_.scaled_values.size(); ++j) {
     apart = std::max(apart, std::abs(optimum_.scaled_values[j] - task_.known->scaled_values[j]));
   }
-  return !(higher < -kLeastForSearch_nats || (apart < kSearched[1] && higher < kRising_nats));
+  return !(higher < -kLeastForSearch_nats || (apart < kSearched[1] && higher < kSearched_nats));
 }
 
 void LikelihoodClimb::search(double first_step) {
@@ -437,7 +438,7 @@ Optimum LikelihoodClimb::run() {
   for (double first_step : kSearched) {
     const double before = optimum_.state.log_likelihood;
     search(first_step);
-    if (optimum_.state.log_likelihood - before < kRising_nats) break;
+    if (optimum_.state.log_likelihood - before < kSearched_nats) break;
   }
   takeOverErrors();
   return std::move(optimum_);
