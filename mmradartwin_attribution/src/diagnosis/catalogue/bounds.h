@@ -260,9 +260,6 @@ inline constexpr double kFarWorse = 1.5;
 /// Share of the stated error of levels below which no estimate is believed; see
 /// docs/verification/calibration_of_bounds.md#errors-of-the-ground
 inline constexpr double kLeastShareOfStated = 0.2;
-/// Share of the best fit's gain, less the price of its numbers, from which on another fit is about as likely; see
-/// docs/verification/calibration_of_bounds.md#kaboutaslikely
-inline constexpr double kAboutAsLikely = 0.95;
 /// Least standard error of an image's level, dB; see docs/verification/calibration_of_bounds.md#kimageerror_db
 inline constexpr double kImageError_db = 0.03;
 /// Difference between the noise and what the twin states, from which on it is told, dB; see

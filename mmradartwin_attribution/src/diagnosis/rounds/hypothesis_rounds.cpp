@@ -148,12 +148,18 @@ std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<Hypothesis
   std::optional<std::vector<CellPowers>> of_best;
   for (std::size_t i = best + 1; i < fits.size(); ++i) {
     HypothesisFit& rival = fits[i];
-    if (rival.ranking() < bounds::kAboutAsLikely * fits[best].ranking()) break;
+    const double likelier_nats = natsApart(fits[best], rival, context_.data);
+    if (likelier_nats > bounds::kNotToldApart_nats || rival.ranking() < bounds::kShareOfSimpler * fits[best].ranking())
+      continue;
     if (!isCatalogued(rival.hypothesis.mechanism.mechanism) || !rejectionByLikelihood(rival).empty()) continue;
     // Both are read from the same places, so that their difference is surer than either.
     if (!of_best) of_best = gains_.heldOutPowers(state, fits[best]);
     const GainMetric gain = explainedPowerGain(context_.data, *of_best, gains_.heldOutPowers(state, rival));
-    if ((*gain.difference_ci95)[0] > bounds::kLeastExplainedMore) return i;
+    const double more = gain.after - gain.before;
+    const auto [low, high] = *gain.difference_ci95;
+    // Each witness by its own standard error; an interval of 95 % is 2 * 1.96 of them wide.
+    const double by_maps = 2 * 1.96 * more / std::max(1e-9, high - low), by_likelihood = std::sqrt(2 * likelier_nats);
+    if (more > bounds::kLeastExplainedMore && low > 0 && by_maps > by_likelihood) return i;
   }
   return std::nullopt;
 }
