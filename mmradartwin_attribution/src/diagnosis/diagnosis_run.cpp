@@ -26,6 +26,9 @@ namespace mmradartwin::diagnosis {
 namespace {
 
 constexpr int kFolds = 5;
+/// The scene's error over the one that actors are judged by, from which on they are let farther; and how often.
+constexpr double kWider = 1.2;
+constexpr int kMostWidenings = 3;
 
 }  // namespace
 
@@ -240,7 +243,25 @@ void DiagnosisRun::takeSmallerErrors() {
 }
 
 void DiagnosisRun::estimateAccuracy() {
-  if (!session_.few) result_.findings.estimated = spreadsUnder(rounds_.state(), rounds_.elsewhere());
+  if (session_.few) return;
+  const StatedAccuracy judged = context_.accuracy;
+  ModelState state = rounds_.state();
+  std::map<std::string, SpreadEstimate>& spreads = result_.findings.estimated;
+  spreads = spreadsUnder(state, rounds_.elsewhere());
+  // Errors stand no farther than the spread lets them: one that turns out larger lets them farther.
+  for (int i = 0; i < kMostWidenings; ++i) {
+    const auto found = spreads.find("scene_m");
+    if (found == spreads.end() || found->second.value < kWider * context_.accuracy.scene_m) break;
+    context_.report("errors of the scene, which are larger than stated", 0);
+    StatedAccuracy wider = context_.accuracy;
+    wider.scene_m = found->second.high;
+    context_.judgeActorsBy(wider);
+    context_.echoes.setBaseline(state.mechanisms);
+    state = context_.fitter.state(state.mechanisms, &state.latents);
+    rounds_.takeRangeErrors(state);
+    spreads = spreadsUnder(state, rounds_.elsewhere());
+  }
+  context_.judgeActorsBy(judged);
 }
 
 void DiagnosisRun::judgeRest() {
