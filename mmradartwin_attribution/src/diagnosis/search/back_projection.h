@@ -15,7 +15,7 @@ struct ProjectedPlace {
   double size_m = 0;         ///< diameter of an upright metal cylinder; 0: a point
   double behind_m = 0;       ///< of a point: how much later than its distance its echo arrives, as one-way range
   double rcs_dbsm = 0;       ///< of a point: its radar cross-section
-  std::vector<int> faced;    ///< poses that a flat side faces, those that gain most first
+  std::vector<int> faced{};  ///< poses that a flat side faces, those that gain most first
 };
 
 /// Unit vector in map's plane from the radar's mean position to a place.
