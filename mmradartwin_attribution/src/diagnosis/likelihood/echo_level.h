@@ -38,9 +38,10 @@ struct CellEcho {
 /// distribution of a sum of phasors of known lengths, matched by two moments: |b|^2 is Gamma-distributed with shape
 /// k = V^2 / variance, where the variance is V^2 less the squares of the paths' powers, plus the spread of the level.
 /// Where one path stands alone, its level is nearly Student-distributed in dB (kSpreadScales). Then it gives about the
-/// information 1 / spread about the logarithm of its power; many paths give 1, as fading does. What of y is uncorrelated with b keeps the t distribution, of one
-/// dimension less, so that clutter of another level than expected does not move the level of an echo. A share of echoes
-/// follows no known level and fades. See docs/reference/diagnosis.md.
+/// information 1 / spread about the logarithm of its power; many paths give 1, as fading does. What of y is
+/// uncorrelated with b keeps the t distribution, of one dimension less, so that clutter of another level than expected
+/// does not move the level of an echo. A share of echoes follows no known level and fades. See
+/// docs/reference/diagnosis.md.
 class CellLikelihood {
  public:
   /// z: [channels] L^-1 y, with Sigma = L L^H as factor has it.
