@@ -5,6 +5,7 @@
 #include "mmradartwin_dsp/average_pose.h"
 #include "mmradartwin_dsp/capture.h"
 #include "mmradartwin_dsp/cfar.h"
+#include "mmradartwin_dsp/point_detector.h"
 #include "mmradartwin_dsp/session.h"
 #include "test_radar.h"
 
@@ -108,6 +109,37 @@ TEST_P(CfarOnARealCapture, BothPeopleAreTheStrongestThatMove) {
   EXPECT_NEAR(away_and_towards[-1].range_m, 2.97, 0.1);
   EXPECT_NEAR(away_and_towards[-1].azimuth_rad, 13 * M_PI / 180, 0.06);
   EXPECT_NEAR(speedOf(bins[-1]), -0.63, 0.16);
+}
+
+// What radar/points holds of this frame: of each sign of the speed the strongest is one of both people.
+TEST_P(CfarOnARealCapture, PointsHaveTheSpeedsOfBothPeople) {
+  const AdcCube cube = CaptureReader(radar_, capture_.string()).frame(0, 0);
+  const Recording recording = openCapture(capture_.string(), radar_);
+  CfarSettings settings;
+  settings.kind = GetParam();
+  const std::vector<Detection> points = PointDetector(settings, radar_)
+                                            .all(*chain_, chain_->map(averagePose(recording, recording.poses.front())),
+                                                 dopplerGrids(radar_, cube, nullptr));
+  const Detection *away = nullptr, *towards = nullptr, *still = nullptr;
+  int moving = 0;
+  for (const Detection& point : points) {
+    if (!isInFront(point.range_m, point.azimuth_rad)) continue;
+    ASSERT_FALSE(std::isnan(point.radial_speed_m_per_s));
+    const Detection*& best = point.radial_speed_m_per_s > 0 ? away : point.radial_speed_m_per_s < 0 ? towards : still;
+    if (!best || point.power_db > best->power_db) best = &point;
+    moving += point.radial_speed_m_per_s != 0 ? 1 : 0;
+  }
+  ASSERT_TRUE(away && towards && still);
+  RecordProperty("moving", moving);
+  RecordProperty("away", std::to_string(away->radial_speed_m_per_s) + " m/s, " + text(*away));
+  RecordProperty("towards", std::to_string(towards->radial_speed_m_per_s) + " m/s, " + text(*towards));
+  EXPECT_NEAR(away->range_m, 2.93, 0.03);
+  EXPECT_NEAR(away->azimuth_rad * 180 / M_PI, -7, 1);
+  EXPECT_NEAR(away->radial_speed_m_per_s, 0.56, 0.01);
+  EXPECT_NEAR(towards->range_m, 2.98, 0.03);
+  EXPECT_NEAR(towards->azimuth_rad * 180 / M_PI, 15.9, 1);
+  EXPECT_NEAR(towards->radial_speed_m_per_s, -0.48, 0.01);
+  EXPECT_NEAR(still->range_m, 5.2, 0.05);
 }
 
 // Nobody in the room is faster than 2.5 m/s: what lies there is the receiver's noise, of real silicon.

@@ -39,6 +39,8 @@ struct Detection {
   double range_m = 0, azimuth_rad = 0;
   double power_db = 0;  ///< dBFS
   double snr_db = 0;    ///< power of the cell over that of the noise around it, (S+N)/N
+  /// Positive: the range grows. NaN where no frame told it.
+  double radial_speed_m_per_s = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// Cells that stand above what is around them, at a constant rate of false alarms (CFAR).
@@ -68,6 +70,8 @@ class Cfar {
   /// The level of noise that a tenth of a map's independent cells stay below: what the receiver's own noise is at most.
   /// A simulated map has none, and takes it from the measured one. NaN where no cell has a level.
   double noiseFloor_db(const RealGrid& power_db) const;
+  /// Bins of angle from one beam to the next, of which a line has one per pitch.
+  int beamBins() const { return beam_bins_; }
   /// Training cells of a cell far from all edges.
   int trainingCells() const { return static_cast<int>(offsets_.size()); }
 
@@ -87,11 +91,16 @@ class Cfar {
   /// Of a cell that is not masked, in a map of powers that are no levels; `training` is room for the cells around it.
   Level levelAt(const RealGrid& power, Eigen::Index range_bin, Eigen::Index angle_bin, double least_noise_db,
                 std::vector<double>& training) const;
+  /// False where a few training cells tell already that the cell does not exceed its threshold.
+  bool mayExceed(const RealGrid& power, Eigen::Index range_bin, Eigen::Index angle_bin) const;
 
   CfarSettings settings_;
   std::vector<Offset> offsets_;
   int beam_bins_ = 1;
   std::vector<Factor> factors_;  ///< by number of training cells
+  double least_threshold_ =
+      0;  ///< over the sum of the training cells (CA), or the ranked one (OS), for any number of them
+  int most_above_rank_ = 0;  ///< OS: training cells above the ranked one, for any number of them
 };
 
 }  // namespace mmradartwin

@@ -127,7 +127,11 @@ Cfar::Cfar(const CfarSettings& settings, const RadarConfig& radar) : settings_(s
       factor.noise_per_level_db = -decibels(mean);
       factor.threshold_per_noise_db =
           decibels(orderedStatisticFactor(settings.false_alarm_rate, cells, factor.rank) * mean);
+      most_above_rank_ = std::max(most_above_rank_, cells - factor.rank);
     }
+    const double threshold = std::pow(10, (factor.noise_per_level_db + factor.threshold_per_noise_db) / 10) /
+                             (settings.kind == CfarKind::kCellAveraging ? cells : 1);
+    least_threshold_ = cells == 1 ? threshold : std::min(least_threshold_, threshold);
   }
 }
 
@@ -153,6 +157,21 @@ Cfar::Level Cfar::levelAt(const RealGrid& power, Eigen::Index range_bin, Eigen::
   level.noise_db = std::max(level.noise_db + factor.noise_per_level_db, least_noise_db);
   level.threshold_db = level.noise_db + factor.threshold_per_noise_db;
   return level;
+}
+
+bool Cfar::mayExceed(const RealGrid& power, Eigen::Index range_bin, Eigen::Index angle_bin) const {
+  const double most = power(range_bin, angle_bin) / least_threshold_;
+  const bool averages = settings_.kind == CfarKind::kCellAveraging;
+  double sum = 0;
+  int above = 0;
+  for (const Offset& offset : offsets_) {
+    const Eigen::Index i = range_bin + offset.range_bins, j = angle_bin + offset.angle_bins;
+    if (i < 0 || i >= power.rows() || j < 0 || j >= power.cols() || std::isnan(power(i, j))) continue;
+    sum += power(i, j);
+    above += power(i, j) > most * (1 + 1e-9) ? 1 : 0;
+    if (averages ? sum > most * (1 + 1e-9) : above > most_above_rank_) return false;
+  }
+  return true;
 }
 
 Cfar::Levels Cfar::levels(const RealGrid& power_db, double least_noise_db) const {
@@ -183,13 +202,15 @@ std::vector<Detection> Cfar::detect(const RangeAngleMap& map, double least_noise
     const double least_db = strongest_db[static_cast<std::size_t>(r)] - settings_.sidelobe_db;
     for (Eigen::Index a = 0; a < power_db.cols(); ++a) {
       // Few cells are left for the threshold, which takes longest. A masked cell is not at least anything.
-      if (!(power_db(r, a) >= least_db) || !isLocalMaximum(power_db, r, a, half_beam_bins)) continue;
+      if (!(power_db(r, a) >= least_db) || !isLocalMaximum(power_db, r, a, half_beam_bins) || !mayExceed(power, r, a)) {
+        continue;
+      }
       const Level level = levelAt(power, r, a, least_noise_db, training);
       // Without training cells there is no threshold, and nothing is greater than that.
       if (!(power_db(r, a) > level.threshold_db)) continue;
       detections.push_back({static_cast<int>(r), static_cast<int>(a), map.axes.range_m[static_cast<std::size_t>(r)],
                             map.axes.azimuth_rad[static_cast<std::size_t>(a)], power_db(r, a),
-                            power_db(r, a) - level.noise_db});
+                            power_db(r, a) - level.noise_db, kNotANumber});
     }
   }
   return detections;
