@@ -7,12 +7,59 @@
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
 #include <utility>
+#include <vector>
 
+#include "mmradartwin_attribution/mover_mask.h"
 #include "mmradartwin_dsp/average_pose.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/point_detector.h"
 
 namespace mmradartwin {
+namespace {
+
+/// Frames of a pose that are searched for walkers, from first to last.
+constexpr int kSearchedFrames = 16;
+
+/// Masks what walkers may have changed in the average of a pose. Nothing where frames tell no speeds.
+class WalkerSearch {
+ public:
+  explicit WalkerSearch(const Recording& recording) : recording_(recording) {
+    if (whyNoSpeeds(recording.radar).empty()) detector_.emplace(CfarSettings(), recording.radar);
+  }
+  /// The frames that mask() takes, of so many; who calls it reads the recording one at a time.
+  std::vector<AdcCube> frames(const Pose& pose, int averaged) const {
+    std::vector<AdcCube> kept;
+    if (!detector_) return kept;
+    const int step = (averaged + kSearchedFrames - 1) / kSearchedFrames;
+    int number = 0;
+    recording_.forEachFrame(pose, [&](const AdcCube& cube) {
+      if (number++ % std::max(1, step) == 0) kept.push_back(cube);
+    });
+    return kept;
+  }
+  void mask(const SignalChain& chain, const EvaluationField& field, const std::vector<AdcCube>& frames,
+            RangeAngleMap& map) const {
+    if (frames.empty()) return;
+    MoverMask mask(recording_.radar);
+    for (const AdcCube& frame : frames) {
+      try {
+        const DopplerGrids speeds =
+            dopplerGrids(recording_.radar, frame, recording_.channels ? &*recording_.channels : nullptr);
+        mask.add(frame.stamp_ns, detector_->moving(chain, speeds));
+      } catch (const InputError&) {  // a frame may have lost all chirps of a slot that the average has
+      }
+    }
+    mask.apply(field, map);
+  }
+
+ private:
+  const Recording& recording_;
+  std::optional<PointDetector> detector_;
+};
+
+}  // namespace
 
 RangeAngleMap averagedMap(const Recording& recording, const SignalChain& chain, const Pose& pose) {
   return chain.map(averagePose(recording, pose));
@@ -63,6 +110,7 @@ Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated
   const SignalChain chain(recording.radar);
   const EvaluationField field(options.config, recording.radar, chain.axes());
   const RegionModel regions(scene, rays, field, recording.radar);
+  const WalkerSearch walkers(recording);
 
   Evaluation result;
   result.duplicates = recording.duplicates;
@@ -79,8 +127,13 @@ Evaluation evaluate(const Recording& recording, const SimulatedBranch& simulated
       if (measured) {
         map = measured(out.pose);
       } else {
-        const std::lock_guard<std::mutex> lock(reading);
-        map = averagedMap(recording, chain, out.pose);
+        std::vector<AdcCube> frames;
+        {
+          const std::lock_guard<std::mutex> lock(reading);
+          map = averagedMap(recording, chain, out.pose);
+          frames = walkers.frames(out.pose, map.frames);
+        }
+        walkers.mask(chain, field, frames, map);
       }
       out.frames = map.frames;
       SimulatedPose other = simulated(out.pose);

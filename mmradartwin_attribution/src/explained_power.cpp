@@ -67,7 +67,7 @@ ExplainedPower explainedPower(const EvaluationField& field, const RangeAngleMap&
   ExplainedPower sums;
   for (int r = 0; r < measured.power_db.rows(); ++r) {
     for (int a = 0; a < measured.power_db.cols(); ++a) {
-      if (field.field(r, a) != Field::kCentral) continue;
+      if (field.field(r, a) != Field::kCentral || std::isnan(measured.power_db(r, a))) continue;
       const double of_measured = powerOf(measured.power_db(r, a));
       const double of_expected = expected.size() > 0 ? expected(r, a) : powerOf(simulated.power_db(r, a));
       sums.measured += of_measured;

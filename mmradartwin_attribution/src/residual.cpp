@@ -10,11 +10,19 @@ namespace {
 
 double power(double level_db) { return std::pow(10.0, level_db / 10); }
 
+using CellFlags = Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// Cells whose level is known in both maps.
+CellFlags knownInBoth(const RangeAngleMap& measured, const RangeAngleMap& simulated) {
+  return !(measured.power_db.array().isNaN() || simulated.power_db.array().isNaN());
+}
+
 // Assigns each response that the branches do not share to one residual class (docs/reference/contracts.md section 6).
 class ResidualClassifier {
  public:
-  ResidualClassifier(const EvaluationField& field, const std::vector<PathRecord>& records, PoseAttribution& pose)
-      : field_(field), config_(field.config()), records_(records), pose_(pose) {}
+  ResidualClassifier(const EvaluationField& field, const CellFlags& known, const std::vector<PathRecord>& records,
+                     PoseAttribution& pose)
+      : field_(field), config_(field.config()), known_(known), records_(records), pose_(pose) {}
 
   void run() {
     for (const Response& m : pose_.measured.responses) {
@@ -48,6 +56,7 @@ class ResidualClassifier {
   }
 
   void classifyMeasured(const Response& m) {
+    if (!known_(m.range_bin, m.angle_bin)) return;
     for (const Response& s : pose_.simulated.responses) {
       if (s.level_db >= config_.strong_db &&
           field_.inWindow(config_.tight, m.range_m, m.azimuth_rad, s.range_m, s.azimuth_rad)) {
@@ -78,6 +87,7 @@ class ResidualClassifier {
   }
 
   void classifySimulated(const Response& s) {
+    if (!known_(s.range_bin, s.angle_bin)) return;
     if (pose_.measured.level_db(s.range_bin, s.angle_bin) >= config_.weak_db) return;
     int nearest = -1;
     for (std::size_t i = 0; i < pose_.regions.size(); ++i) {
@@ -118,6 +128,7 @@ class ResidualClassifier {
 
   const EvaluationField& field_;
   const AttributionConfig& config_;
+  const CellFlags& known_;
   const std::vector<PathRecord>& records_;
   PoseAttribution& pose_;
 };
@@ -141,14 +152,15 @@ void markRegions(const EvaluationField& field, PoseAttribution& pose) {
   }
 }
 
-void compareCells(const EvaluationField& field, Field which, const PoseAttribution& pose, FieldMetrics& metrics) {
+void compareCells(const EvaluationField& field, Field which, const CellFlags& known, const PoseAttribution& pose,
+                  FieldMetrics& metrics) {
   const AttributionConfig& config = field.config();
   const RangeAngleAxes& axes = field.axes();
   double measured_all = 0, simulated_all = 0, q1 = 0, q2 = 0;
   metrics.measured_peak_db = config.floor_db;
   for (int r = 0; r < pose.measured.level_db.rows(); ++r) {
     for (int a = 0; a < pose.measured.level_db.cols(); ++a) {
-      if (field.field(r, a) != which) continue;
+      if (field.field(r, a) != which || !known(r, a)) continue;
       const double m = pose.measured.level_db(r, a), s = pose.simulated.level_db(r, a);
       metrics.measured_peak_db = std::max(metrics.measured_peak_db, m);
       measured_all += power(m);
@@ -266,15 +278,17 @@ PoseAttribution attributePose(const EvaluationField& field, const RangeAngleMap&
   pose.simulated = field.normalise(simulated);
   pose.regions = std::move(regions);
   markRegions(field, pose);
-  compareCells(field, Field::kCentral, pose, pose.central);
-  compareCells(field, Field::kOuter, pose, pose.outer);
+  const CellFlags known = knownInBoth(measured, simulated);
+  compareCells(field, Field::kCentral, known, pose, pose.central);
+  compareCells(field, Field::kOuter, known, pose, pose.outer);
   compareTop(field, Field::kCentral, pose, pose.central);
   compareTop(field, Field::kOuter, pose, pose.outer);
-  ResidualClassifier(field, records, pose).run();
+  ResidualClassifier(field, known, records, pose).run();
   pose.residual_db = pose.simulated.level_db - pose.measured.level_db;
   for (int r = 0; r < pose.residual_db.rows(); ++r) {
     for (int a = 0; a < pose.residual_db.cols(); ++a) {
-      if (field.field(r, a) != Field::kCentral) pose.residual_db(r, a) = std::numeric_limits<double>::quiet_NaN();
+      if (field.field(r, a) == Field::kCentral && known(r, a)) continue;
+      pose.residual_db(r, a) = std::numeric_limits<double>::quiet_NaN();
     }
   }
   pose.convention = checkConvention(field, measured, simulated);

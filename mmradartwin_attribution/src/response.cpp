@@ -147,16 +147,20 @@ std::vector<Response> EvaluationField::findResponses(const RealGrid& relative_db
   };
   const int ranges = static_cast<int>(relative_db.rows()), angles = static_cast<int>(relative_db.cols());
   const double lowest = -1e9;
+  const double highest = 1e9;
   const auto at = [&](int r, int a) {
     if (r < 0 || r >= ranges) return lowest;
-    const double v = relative_db(r, (a + angles) % angles);  // the sine axis is periodic
+    const int column = (a + angles) % angles;  // the sine axis is periodic
+    const double v = relative_db(r, column);
+    // Beside a cell that is masked nothing is known to be a maximum; a column without an angle has no cells.
+    if (std::isnan(v) && !std::isnan(axes_.azimuth_rad[column])) return highest;
     return std::isfinite(v) ? v : lowest;
   };
   std::vector<Candidate> candidates;
   for (int r = 0; r < ranges; ++r) {
     for (int a = 0; a < angles; ++a) {
       const double v = at(r, a);
-      if (v < config_.floor_db) continue;
+      if (v < config_.floor_db || v == highest) continue;
       bool maximum = true;
       for (int dr = -1; dr <= 1 && maximum; ++dr) {
         for (int da = -1; da <= 1 && maximum; ++da) {

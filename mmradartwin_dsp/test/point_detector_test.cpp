@@ -64,9 +64,10 @@ TEST(PointDetector, WalkerIsNoStandingPointToo) {
   const RangeAngleMap average = averageOf(chain, cube);
   EXPECT_TRUE(nearest(detector.still(average), walker));
   const std::vector<Detection> found = detector.all(chain, average, dopplerGrids(radar, cube, nullptr));
-  int still = 0;
-  for (const Detection& detection : found) still += detection.radial_speed_m_per_s == 0 ? 1 : 0;
-  EXPECT_EQ(still, 1);
+  for (const Detection& detection : found) {
+    if (detection.radial_speed_m_per_s != 0) continue;
+    EXPECT_GT(std::abs(detection.azimuth_rad - walker.azimuth_rad), 0.25);
+  }
   ASSERT_TRUE(nearest(found, pillar));
   EXPECT_EQ(nearest(found, pillar)->radial_speed_m_per_s, 0);
   EXPECT_NEAR(nearest(found, walker)->radial_speed_m_per_s, 1.9, 0.26);

@@ -1,5 +1,8 @@
 """Who walks: speed, sign and way of points that cross frames of many loops, from bytes that know only distances."""
+import csv
 import math
+import os
+import subprocess
 import unittest
 
 import numpy as np
@@ -7,9 +10,12 @@ import numpy as np
 from diagnose_program import PROGRAM, diagnose
 from in_folder import InFolder
 from made_wall import WALL
+from mmradartwin_tests.installed_programs import find_program
 from walking_points import Recording, polar, write_session
 
 WAVELENGTH_M = 299792458.0 / 77.93e9    # at the middle of the samples
+
+EVALUATE = find_program("mmradartwin_attribution", "evaluate")
 
 SCENE = """meshes:
   - {file: wall.ply}
@@ -173,6 +179,31 @@ class Walkers(MadeRecordings):
     def test_where_nobody_walks_nobody_is_found(self):
         for frames, loops in ((6, 48), (60, 16)):
             self.walkers([Recording(frames, loops, seed=9).stands(5.0, -10, 4000).stands(2.0, 30, 3000)], 0)
+
+
+@unittest.skipIf(EVALUATE is None, "mmradartwin_attribution evaluate is not built in this workspace")
+class ComparedMaps(InFolder):
+    """A wall that the twin has, and a walker whose echo is as strong in the average."""
+
+    def residual_ranges_m(self, loops, walker_amplitude):
+        recording = Recording(1, loops, seed=7, chirp_s=500e-6)
+        recording.stands(5.22, 0, 400).walks(3.0, -25, 0.66, walker_amplitude)
+        session, output = self.at(f"session{loops}_{walker_amplitude}"), self.at(f"out{loops}_{walker_amplitude}")
+        write_session(session, [recording], scene_files={"wall.ply": WALL, "scene.yaml": SCENE,
+                                                         "materials.yaml": MATERIALS})
+        done = subprocess.run([EVALUATE, session, "--output", output, "--quiet"], capture_output=True, text=True,
+                              check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with open(os.path.join(output, "residuals.csv"), encoding="utf-8") as file:
+            return [float(row["range_m"]) for row in csv.DictReader(file) if row["stronger"] == "measured"]
+
+    def test_walkers_are_not_compared_where_frames_tell_speeds(self):
+        self.assertEqual(self.residual_ranges_m(16, 4000), [])
+        # In frames of four loops nothing tells the same walker from a cabinet.
+        found_m = self.residual_ranges_m(4, 1500)
+        self.assertTrue(found_m)
+        for range_m in found_m:
+            self.assertAlmostEqual(range_m, 3.0, delta=0.16)
 
 
 @unittest.skipIf(PROGRAM is None, "mmradartwin_attribution diagnose is not built in this workspace")

@@ -61,12 +61,12 @@ struct PoseAttribution {
   std::vector<ResponseRegion> regions;
   std::vector<Residual> residuals;
   FieldMetrics central, outer;  ///< outer: beyond the evaluated field, not routed to classes
-  RealGrid residual_db;         ///< simulated - measured; NaN outside the evaluated field
+  RealGrid residual_db;         ///< simulated - measured; NaN outside the evaluated field and where a map is
   ConventionCheck convention;
 };
 
-/// Compares a measured with a simulated map of one pose. `regions` come from RegionModel; `records` are the paths
-/// behind the simulated map (may be empty). Both maps need the field's axes; throws InputError otherwise.
+/// Compares maps of one pose where none is NaN. `regions` come from RegionModel; `records` are the paths behind the
+/// simulated map (may be empty). Both maps need the field's axes; throws InputError otherwise.
 PoseAttribution attributePose(const EvaluationField& field, const RangeAngleMap& measured,
                               const RangeAngleMap& simulated, std::vector<ResponseRegion> regions,
                               const std::vector<PathRecord>& records);
