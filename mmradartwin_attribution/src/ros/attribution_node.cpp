@@ -12,7 +12,9 @@
 #include "mmradartwin_attribution/residual.h"
 #include "mmradartwin_attribution/ros/conversions.h"
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_dsp/range_doppler.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/point_cloud.h"
 #include "mmradartwin_dsp/session.h"
 
 namespace mmradartwin {
@@ -53,7 +55,7 @@ AttributionNode::AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& priv
       }()) {
   if (!settings_.config_file.empty()) config_ = loadAttributionConfig(settings_.config_file);
   residuals_ = nh_.advertise<mmradartwin_msgs::Residuals>("attribution/residuals", 10);
-  residual_map_ = nh_.advertise<MapMsg>("attribution/residual_map", 10);
+  residual_map_ = {nh_, "attribution/residual_map", 10};
   pose_figures_ = nh_.advertise<mmradartwin_msgs::PoseFigures>("attribution/pose", 10);
   ledger_ = nh_.advertise<mmradartwin_msgs::Ledger>("attribution/ledger", 1, true);
   markers_ = nh_.advertise<visualization_msgs::MarkerArray>("attribution/markers", 2);
@@ -100,10 +102,12 @@ NodeDescription AttributionNode::description() {
        topic<mmradartwin_msgs::Scene>("twin/moved_scene", "the scene with actors where they are simulated; latched"),
        topic<mmradartwin_msgs::PathRecords>("twin/paths", "paths of the simulation"),
        topic<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", "measured map"),
+       topic<sensor_msgs::PointCloud2>("radar/points", "what moves in it, where frames tell speeds"),
        topic<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", "simulated map"),
        topic<geometry_msgs::PointStamped>("clicked_point", "a place to explain, in map or in the radar's frame")},
       {topic<mmradartwin_msgs::Residuals>("attribution/residuals", "what differs in a pair of maps"),
        topic<MapMsg>("attribution/residual_map", "the difference itself, simulated - measured, as a map"),
+       topic<sensor_msgs::Image>("attribution/residual_map/image", "the same as a picture: dB, a row per range bin"),
        topic<mmradartwin_msgs::PoseFigures>("attribution/pose", "how well both maps of a pair agree"),
        topic<mmradartwin_msgs::Ledger>("attribution/ledger", "metrics over all poses so far; latched"),
        topic<visualization_msgs::MarkerArray>("attribution/markers",
@@ -113,9 +117,9 @@ NodeDescription AttributionNode::description() {
                                             "what stands behind the place that was asked for; latched"),
        topic<visualization_msgs::MarkerArray>("attribution/explanation_markers",
                                               "that place, its actor and paths for rviz; latched"),
-       topic<sensor_msgs::PointCloud2>("radar/points", "what CFAR detects in the measured map"),
-       topic<sensor_msgs::PointCloud2>("twin/points", "what it detects in the simulated map"),
-       topic<mmradartwin_msgs::DetectionAgreement>("attribution/detection_agreement", "how both agree"),
+       topic<sensor_msgs::PointCloud2>("twin/points", "what CFAR detects in the simulated map"),
+       topic<mmradartwin_msgs::DetectionAgreement>("attribution/detection_agreement",
+                                                   "how that agrees with what it detects in the measured map"),
        topic<dynamic_reconfigure::ConfigDescription>("~tuning/parameter_descriptions",
                                                      "what can be tuned by eye; latched"),
        topic<dynamic_reconfigure::Config>("~tuning/parameter_updates", "what it is tuned to; latched"),
@@ -171,6 +175,7 @@ void AttributionNode::onRadar(const mmradartwin_msgs::RadarConfig::ConstPtr& msg
     radar_ = std::make_unique<RadarConfig>(fromMsg(*msg));
     radar_hash_ = radarHash(*msg);
     detections_->setRadar(*radar_);
+    followMovers();
     if (!settings_.scene_file.empty()) {
       setScene(loadScene(settings_.scene_file, radar_->center_frequency_hz()));
       scene_due_ = true;
@@ -229,6 +234,24 @@ void AttributionNode::onMeasured(const MapMsg::ConstPtr& msg) { onMap(msg, measu
 
 void AttributionNode::onSimulated(const MapMsg::ConstPtr& msg) { onMap(msg, simulated_, measured_, false); }
 
+void AttributionNode::followMovers() {
+  movers_ = std::make_unique<MoverMask>(*radar_);
+  if (whyNoSpeeds(*radar_).empty()) {
+    points_subscriber_ = nh_.subscribe("radar/points", 50, &AttributionNode::onPoints, this);
+  } else {
+    points_subscriber_.shutdown();
+  }
+}
+
+void AttributionNode::onPoints(const sensor_msgs::PointCloud2::ConstPtr& msg) {
+  if (!field_ || !movers_ || !usableStamp(msg->header.stamp)) return;
+  try {
+    movers_->add(toNanoseconds(msg->header.stamp), fromCloud(*msg, field_->axes()));
+  } catch (const std::exception& error) {
+    ROS_WARN_THROTTLE(5, "radar/points: %s", error.what());
+  }
+}
+
 void AttributionNode::onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, MapMsg::ConstPtr>& own,
                             std::map<std::int64_t, MapMsg::ConstPtr>& other, bool measured) {
   (measured ? measured_heard_ : simulated_heard_).heard();
@@ -249,7 +272,6 @@ void AttributionNode::onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, 
     newest_ns_.reset();
   }
   if (measured) newest_ns_ = std::max(stamp, newest_ns_.value_or(stamp));
-  if (measured) publishPoints(*msg);
   // What is still on its way from before a jump back would stand before all that comes, and push it out.
   if (!measured && newest_ns_ && stamp > *newest_ns_ + kWentBack_ns) return;
   const auto match = other.find(stamp);
@@ -271,17 +293,6 @@ void AttributionNode::onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, 
   } catch (const std::exception& error) {
     problem_ = error.what();
     ROS_WARN_THROTTLE(5, "maps of %s: %s", formatStamp(stamp).c_str(), error.what());
-  }
-}
-
-// Of a map alone: a radar has points without any twin.
-void AttributionNode::publishPoints(const MapMsg& measured_msg) {
-  if (measured_msg.radar_hash != radar_hash_) return;
-  try {
-    detections_->publishMeasured(measured_msg);
-  } catch (const std::exception& error) {
-    ROS_WARN_THROTTLE(5, "points of %s: %s", formatStamp(toNanoseconds(measured_msg.header.stamp)).c_str(),
-                      error.what());
   }
 }
 
@@ -375,7 +386,9 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
     ROS_WARN_THROTTLE(5, "no pose at %f; is the radar's tf published?", measured_msg.header.stamp.toSec());
     return;
   }
-  const RangeAngleMap measured = fromMsg(measured_msg), simulated = fromMsg(simulated_msg);
+  RangeAngleMap measured = fromMsg(measured_msg);
+  const RangeAngleMap simulated = fromMsg(simulated_msg);
+  masked_cells_ = movers_->apply(*field_, measured);
   const Eigen::Isometry3d T = measured.pose_valid ? measured.T_map_radar : simulated.T_map_radar;
   // The records of this stamp; where none came for it, those of the same place (a standing radar re-uses them).
   if (paths_ && (paths_->header.stamp == simulated_msg.header.stamp ||
@@ -418,11 +431,11 @@ void AttributionNode::compare(const MapMsg& measured_msg, const MapMsg& simulate
 // What costs something and is for few.
 void AttributionNode::publishFigures(const PoseAttribution& pose, const mmradartwin_msgs::Residuals& residuals,
                                      const Eigen::Isometry3d& T, std::uint32_t frames) {
-  if (residual_map_.getNumSubscribers() > 0) {
-    MapMsg map = residualMapMsg(*field_, pose, T);
-    map.header = residuals.header;
-    map.radar_hash = radar_hash_;
-    map.frames = frames;
+  if (residual_map_.isWanted()) {
+    const auto map = boost::make_shared<MapMsg>(residualMapMsg(*field_, pose, T));
+    map->header = residuals.header;
+    map->radar_hash = radar_hash_;
+    map->frames = frames;
     residual_map_.publish(map);
   }
   if (pose_figures_.getNumSubscribers() > 0) {
@@ -480,6 +493,7 @@ void AttributionNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& stat
   status.add("pairs compared", pairs_);
   status.add("measured maps that wait", measured_.size());
   status.add("simulated maps that wait", simulated_.size());
+  status.add("cells left out for what moves", masked_cells_);
   status.add("actors of the scene", scene_ ? scene_->actors.size() : 0);
 }
 

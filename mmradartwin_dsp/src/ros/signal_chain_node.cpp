@@ -6,6 +6,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/point_cloud.h"
 #include "mmradartwin_dsp/ros/tf_warning_count.h"
 #include "mmradartwin_dsp/stationary_poses.h"
 
@@ -26,8 +27,9 @@ SignalChainNode::SignalChainNode(ros::NodeHandle nh, const ros::NodeHandle& priv
   countTfWarningsOfProcess();
   // A pose that comes late lets all frames go that waited for it; the answers to none of them may be pushed out.
   grid_publisher_ = nh.advertise<mmradartwin_msgs::ReceiveGrid>("radar/grid", kLongestQueue);
-  map_publisher_ = nh.advertise<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", kLongestQueue);
-  twin_map_publisher_ = nh.advertise<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", kLongestQueue);
+  map_publisher_ = {nh, "radar/range_angle", kLongestQueue};
+  twin_map_publisher_ = {nh, "twin/range_angle", kLongestQueue};
+  frame_publisher_ = std::make_unique<FramePublisher>(nh, settings_.cfar);
   config_subscriber_ = nh.subscribe("radar/config", 2, &SignalChainNode::onConfig, this);
   cube_subscriber_ = nh.subscribe("radar/adc", 200, &SignalChainNode::onCube, this);
   twin_subscriber_ = nh.subscribe("twin/grid", 50, &SignalChainNode::onTwinGrid, this);
@@ -64,6 +66,7 @@ SignalChainNode::Settings::Settings(StrictParameters& parameters) {
   radar_frame = parameters.text("radar_frame", kRadarFrame, "tf frame of the radar");
   channels_file = parameters.existingPath(
       "channels", "channels.yaml of calibrate, by which the measured branch is corrected; empty: none");
+  cfar = readCfarSettings(parameters);
   parameters.ofDiagnosticUpdater();
 }
 
@@ -72,7 +75,7 @@ NodeDescription SignalChainNode::description() {
       "dsp_node",
       "signal_chain",
       "Makes a grid of channels and a range-angle map of each frame, averaged coherently while the radar stands, and a "
-      "map of each simulated grid.",
+      "map of each simulated grid. Of frames with eight loops or more it tells radial speeds, too.",
       {topic<mmradartwin_msgs::RadarConfig>("radar/config", "the radar; latched"),
        topic<mmradartwin_msgs::AdcCube>("radar/adc", "raw samples, a message per frame"),
        topic<mmradartwin_msgs::ReceiveGrid>("twin/grid", "what the twin receives"),
@@ -80,7 +83,12 @@ NodeDescription SignalChainNode::description() {
        topic<tf2_msgs::TFMessage>("/tf_static", "the same of what does not move")},
       {topic<mmradartwin_msgs::ReceiveGrid>("radar/grid", "averaged channels, with the radar's pose where it is known"),
        topic<mmradartwin_msgs::RangeAngleMap>("radar/range_angle", "map of radar/grid"),
+       topic<sensor_msgs::Image>("radar/range_angle/image", "the same as a picture: dBFS, a row per range bin"),
+       topic<mmradartwin_msgs::RangeDopplerMap>("radar/range_doppler", "levels by range and radial speed, of a frame"),
+       topic<sensor_msgs::Image>("radar/range_doppler/image", "the same as a picture: dBFS, a row per range bin"),
+       topic<sensor_msgs::PointCloud2>("radar/points", "what CFAR detects in map and frame"),
        topic<mmradartwin_msgs::RangeAngleMap>("twin/range_angle", "map of twin/grid"),
+       topic<sensor_msgs::Image>("twin/range_angle/image", "the same as a picture: dBFS, a row per range bin"),
        topic<diagnostic_msgs::DiagnosticArray>("/diagnostics", "whether frames and poses come, and why not")},
       {},
       [](StrictParameters& parameters) { const Settings settings(parameters); }};
@@ -95,6 +103,7 @@ void SignalChainNode::onConfig(const mmradartwin_msgs::RadarConfig::ConstPtr& co
     if (channels_) requireChannelsOf(radar, *channels_);
     chain_.emplace(std::move(chain));
     average_.emplace(radar, settings_.average_frames);
+    frame_publisher_->setRadar(radar);
     radar_hash_ = hash;
     restart();
   } catch (const std::exception& error) {
@@ -233,14 +242,14 @@ void SignalChainNode::process(const mmradartwin_msgs::AdcCube& msg,
                         average_->frames());
       return;
     }
-    publish(T_map_radar);
+    publish(cube, T_map_radar);
   } catch (const std::exception& error) {
     ++refused_;
     ROS_WARN_THROTTLE(kWarnEvery_s, "frame refused: %s", error.what());
   }
 }
 
-void SignalChainNode::publish(const std::optional<Eigen::Isometry3d>& T_map_radar) {
+void SignalChainNode::publish(const AdcCube& cube, const std::optional<Eigen::Isometry3d>& T_map_radar) {
   ReceiveGrid grid = average_->grid();
   if (channels_) correctChannels(*channels_, grid.x);
   grid.pose_valid = T_map_radar.has_value();
@@ -250,11 +259,11 @@ void SignalChainNode::publish(const std::optional<Eigen::Isometry3d>& T_map_rada
     msg->header.frame_id = settings_.radar_frame;
     grid_publisher_.publish(msg);
   }
-  if (map_publisher_.getNumSubscribers() > 0) {
-    const auto msg = boost::make_shared<mmradartwin_msgs::RangeAngleMap>(toMsg(chain_->map(grid), radar_hash_));
-    msg->header.frame_id = settings_.radar_frame;
-    map_publisher_.publish(msg);
-  }
+  if (!map_publisher_.isWanted() && !frame_publisher_->isWanted()) return;
+  const auto map = boost::make_shared<mmradartwin_msgs::RangeAngleMap>(toMsg(chain_->map(grid), radar_hash_));
+  map->header.frame_id = settings_.radar_frame;
+  map_publisher_.publish(map);
+  frame_publisher_->publish(*chain_, cube, channels_ ? &*channels_ : nullptr, *map);
 }
 
 void SignalChainNode::onTwinGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& msg) {
@@ -262,7 +271,7 @@ void SignalChainNode::onTwinGrid(const mmradartwin_msgs::ReceiveGrid::ConstPtr& 
     ROS_WARN_THROTTLE(kWarnEvery_s, "twin/grid comes, but no radar/config: it is left out until it does");
     return;
   }
-  if (twin_map_publisher_.getNumSubscribers() == 0) return;
+  if (!twin_map_publisher_.isWanted()) return;
   if (msg->radar_hash != radar_hash_) {
     // A twin may model another radar than the one that measures; both are drawn on the measured one's axes.
     ROS_WARN_THROTTLE(
@@ -294,6 +303,8 @@ void SignalChainNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& stat
   status.add("frames without a pose", without_pose_);
   status.add("frames refused", refused_);
   status.add("frames that wait for tf", queue_.size());
+  if (chain_)
+    status.add("radial speeds", frame_publisher_->whyNoSpeeds().empty() ? "told" : frame_publisher_->whyNoSpeeds());
   status.add("transforms of the future left out", future_transforms_.count());
 }
 

@@ -10,6 +10,7 @@
 #include <mmradartwin_msgs/Scene.h>
 #include <mmradartwin_msgs/Session.h>
 #include <ros/ros.h>
+#include <sensor_msgs/PointCloud2.h>
 
 #include <Eigen/Geometry>
 #include <boost/thread/recursive_mutex.hpp>
@@ -22,12 +23,14 @@
 
 #include "mmradartwin_attribution/attribution_config.h"
 #include "mmradartwin_attribution/live_ledger.h"
+#include "mmradartwin_attribution/mover_mask.h"
 #include "mmradartwin_attribution/response.h"
 #include "mmradartwin_attribution/response_region.h"
 #include "mmradartwin_attribution/ros/detection_publisher.h"
 #include "mmradartwin_attribution/ros/markers.h"
 #include "mmradartwin_attribution/ros/why_server.h"
 #include "mmradartwin_dsp/radar_config.h"
+#include "mmradartwin_dsp/ros/map_publisher.h"
 #include "mmradartwin_dsp/ros/node_program.h"
 #include "mmradartwin_dsp/ros/topic_watch.h"
 #include "mmradartwin_sim/path_record.h"
@@ -37,10 +40,10 @@ namespace mmradartwin {
 
 using TuningConfig = mmradartwin_attribution::TuningConfig;  // made of cfg/Tuning.cfg
 
-/// radar/config, session, twin/scene, twin/moved_scene, twin/paths, radar/range_angle, twin/range_angle ->
-/// attribution/residuals, attribution/residual_map, attribution/ledger, attribution/markers, attribution/scene_markers,
-/// radar/points, twin/points, attribution/detection_agreement, attribution/pose; and answers what stands behind a place
-/// (why_server.h).
+/// radar/config, session, twin/scene, twin/moved_scene, twin/paths, radar/range_angle, radar/points, twin/range_angle
+/// -> attribution/residuals, attribution/residual_map, attribution/ledger, attribution/markers,
+/// attribution/scene_markers, twin/points, attribution/detection_agreement, attribution/pose; and answers what stands
+/// behind a place (why_server.h).
 ///
 /// Matches measured and simulated maps by stamp and attributes what differs. Poses are named after the session's
 /// poses.csv; else the ledger names them after their stamp. The scene is that of the parameter `scene`, else of
@@ -73,6 +76,8 @@ class AttributionNode {
   void onPaths(const mmradartwin_msgs::PathRecords::ConstPtr& msg);
   void onMeasured(const MapMsg::ConstPtr& msg);
   void onSimulated(const MapMsg::ConstPtr& msg);
+  void followMovers();
+  void onPoints(const sensor_msgs::PointCloud2::ConstPtr& msg);
   void onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, MapMsg::ConstPtr>& own,
              std::map<std::int64_t, MapMsg::ConstPtr>& other, bool measured);
   void startTuning(const ros::NodeHandle& private_nh);
@@ -87,7 +92,6 @@ class AttributionNode {
   void beginAnew();
   void publishLedger(const ros::Time& stamp);
   const std::vector<ResponseRegion>& regionsAt(const Eigen::Isometry3d& T);
-  void publishPoints(const MapMsg& measured_msg);
   void publishFigures(const PoseAttribution& pose, const mmradartwin_msgs::Residuals& residuals,
                       const Eigen::Isometry3d& T, std::uint32_t frames);
   void compare(const MapMsg& measured_msg, const MapMsg& simulated_msg);
@@ -106,11 +110,13 @@ class AttributionNode {
   boost::recursive_mutex tuning_mutex_;  ///< of tuning_, which wants one
   std::unique_ptr<dynamic_reconfigure::Server<TuningConfig>> tuning_;
   std::string twin_yaml_;
-  ros::Publisher residuals_, residual_map_, pose_figures_, ledger_, markers_, scene_markers_;
+  MapPublisher<MapMsg> residual_map_;
+  ros::Publisher residuals_, pose_figures_, ledger_, markers_, scene_markers_;
   std::unique_ptr<DetectionPublisher> detections_;
   std::unique_ptr<WhyServer> why_;
   std::vector<ros::Subscriber> subscribers_;
   ros::Subscriber measured_subscriber_, simulated_subscriber_;
+  ros::Subscriber points_subscriber_;  ///< while frames tell speeds
   TopicWatch measured_heard_{"the signal chain"}, simulated_heard_{"the twin, and the signal chain"};
   std::unique_ptr<diagnostic_updater::Updater> updater_;
   ros::WallTimer diagnostics_timer_;
@@ -136,6 +142,8 @@ class AttributionNode {
   ros::Time scene_stamp_, moved_scene_stamp_;
   std::unique_ptr<RayCaster> rays_;
   std::shared_ptr<const EvaluationField> field_;
+  std::unique_ptr<MoverMask> movers_;
+  int masked_cells_ = 0;  ///< of the last pair
   std::unique_ptr<RegionModel> regions_;
   std::unique_ptr<MarkerBuilder> builder_;
   std::vector<ResponseRegion> regions_of_pose_;

@@ -13,10 +13,13 @@
 #include <optional>
 #include <string>
 
+#include "mmradartwin_dsp/cfar.h"
 #include "mmradartwin_dsp/channel_correction.h"
 #include "mmradartwin_dsp/coherent_average.h"
 #include "mmradartwin_dsp/range_angle.h"
+#include "mmradartwin_dsp/ros/frame_publisher.h"
 #include "mmradartwin_dsp/ros/future_transforms.h"
+#include "mmradartwin_dsp/ros/map_publisher.h"
 #include "mmradartwin_dsp/ros/node_program.h"
 #include "mmradartwin_dsp/ros/topic_watch.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
@@ -24,8 +27,8 @@
 
 namespace mmradartwin {
 
-/// radar/config, radar/adc, twin/grid -> radar/grid, radar/range_angle, twin/range_angle. The same class runs as a node
-/// and as a nodelet; callbacks must come one at a time.
+/// radar/config, radar/adc, twin/grid -> radar/grid, radar/range_angle, radar/range_doppler, radar/points,
+/// twin/range_angle. The same class runs as a node and as a nodelet; callbacks must come one at a time.
 ///
 /// A frame waits until tf knows T_map_radar at its stamp, `pose_timeout_s` at most; without a pose it goes on with
 /// pose_valid = false. So does a frame within a jump of tf, or within more than `tf_gap_s` without transforms at whose
@@ -47,6 +50,7 @@ class SignalChainNode {
     int average_frames, publish_every;
     double moved_m, moved_rad, pose_timeout_s;
     TransformLimits tf_limits;
+    CfarSettings cfar;
     std::string map_frame, radar_frame, channels_file;
   };
 
@@ -65,7 +69,7 @@ class SignalChainNode {
   /// Takes all frames from the queue whose pose is known or will not come.
   void drain();
   void process(const mmradartwin_msgs::AdcCube& cube, const std::optional<Eigen::Isometry3d>& T_map_radar);
-  void publish(const std::optional<Eigen::Isometry3d>& T_map_radar);
+  void publish(const AdcCube& cube, const std::optional<Eigen::Isometry3d>& T_map_radar);
   void restart();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
@@ -75,7 +79,9 @@ class SignalChainNode {
   TransformSources tf_sources_;
   FutureTransforms future_transforms_;
   ros::Time tf_heard_, newest_transform_;
-  ros::Publisher grid_publisher_, map_publisher_, twin_map_publisher_;
+  ros::Publisher grid_publisher_;
+  MapPublisher<mmradartwin_msgs::RangeAngleMap> map_publisher_, twin_map_publisher_;
+  std::unique_ptr<FramePublisher> frame_publisher_;
   ros::Subscriber config_subscriber_, cube_subscriber_, twin_subscriber_, tf_subscriber_, tf_static_subscriber_;
   ros::WallTimer timer_;
 
