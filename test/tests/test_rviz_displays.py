@@ -56,6 +56,26 @@ while not rospy.is_shutdown():
     residuals.publish(r)
     rate.sleep()
 """
+# The same of range-Doppler maps; each line of standard input is the echo's speed from then on, in m/s.
+PUBLISH_SPEEDS = """
+import sys, threading, rospy
+from mmradartwin_msgs.msg import RangeDopplerMap
+rospy.init_node("maps")
+echo = [0.0]
+def listen():
+    for line in sys.stdin:
+        echo[0] = float(line)
+threading.Thread(target=listen, daemon=True).start()
+publisher = rospy.Publisher("/radar/range_doppler", RangeDopplerMap, queue_size=1)
+ranges, speeds = [0.1 * r for r in range(60)], [0.1 * d for d in range(-32, 32)]
+rate = rospy.Rate(10)
+while not rospy.is_shutdown():
+    m = RangeDopplerMap(range_m=ranges, radial_speed_m_s=speeds)
+    m.header.stamp, m.header.frame_id = rospy.Time.now(), "radar_link"
+    m.power_db = [-20 - min(60, (r - 3) ** 2 / 0.1 + (v - echo[0]) ** 2 / 0.01) for r in ranges for v in speeds]
+    publisher.publish(m)
+    rate.sleep()
+"""
 # rviz itself says so on this Debian, whatever it shows.
 USUAL = ("media_export", "error while executing command", "XDG_RUNTIME_DIR")
 
@@ -65,7 +85,13 @@ def yellow(pixels):
     return numpy.abs(pixels - numpy.array([253, 231, 37])).sum(axis=2) < 60
 
 
-class Displays(InFolder):
+class Rviz(InFolder):
+    """rviz and a publisher, which is told something by its standard input."""
+    publish = PUBLISH
+
+    def layout(self):
+        return os.path.join(rospkg.RosPack().get_path("mmradartwin_config"), "rviz", "twin.rviz")
+
     def setUp(self):
         super().setUp()
         self.screen = VirtualScreen(1920, 1080)
@@ -73,13 +99,12 @@ class Displays(InFolder):
         self.environment = dict(self.screen.environment, ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}",
                                 ROS_IP="127.0.0.1", ROS_HOME=self.folder, ROSCONSOLE_STDOUT_LINE_BUFFERED="1")
         self.addCleanup(end, start_master(self.environment))
-        layout = os.path.join(rospkg.RosPack().get_path("mmradartwin_config"), "rviz", "twin.rviz")
         self.log = open(self.at("rviz.log"), "w+", encoding="utf-8")
         self.addCleanup(self.log.close)
-        self.rviz = subprocess.Popen(["rosrun", "rviz", "rviz", "-d", layout], env=self.environment, stdout=self.log,
+        self.rviz = subprocess.Popen(["rosrun", "rviz", "rviz", "-d", self.layout()], env=self.environment, stdout=self.log,
                                      stderr=subprocess.STDOUT, start_new_session=True)
         self.addCleanup(end, self.rviz)
-        self.maps = subprocess.Popen([sys.executable, "-c", PUBLISH], env=self.environment, stdin=subprocess.PIPE,
+        self.maps = subprocess.Popen([sys.executable, "-c", self.publish], env=self.environment, stdin=subprocess.PIPE,
                                      text=True)
         self.addCleanup(end, self.maps)
         self.addCleanup(self.maps.stdin.close)
@@ -91,27 +116,37 @@ class Displays(InFolder):
     def picture(self):
         return picture_pixels(self.screen.picture(self.at("screen.png")))
 
-    def column_of_echo(self):
+    def tell(self, value):
+        self.maps.stdin.write(f"{value}\n")
+        self.maps.stdin.flush()
+
+    def yellow_column(self, rows):
         """Mean column of the window's right part, where the panels are, that holds a map's strongest level; None before."""
         self.assertIsNone(self.rviz.poll(), self.said())
-        panels = self.picture()[:680, 1470:1850]
-        columns = numpy.flatnonzero(yellow(panels).sum(axis=0) > 3)
+        columns = numpy.flatnonzero(yellow(self.picture()[rows, 1470:1850]).sum(axis=0) > 3)
         return float(columns.mean()) if len(columns) > 3 else None
+
+    def assert_no_problems(self):
+        problems = [line for line in self.said().splitlines()
+                    if re.search(r"error|exception|warn|fail", line, re.I) and not any(u in line for u in USUAL)]
+        self.assertEqual(problems, [])
+
+
+class Displays(Rviz):
+    def column_of_echo(self):
+        return self.yellow_column(slice(0, 680))
 
     def test_maps_are_shown_as_they_come(self):
         ahead = wait_for(self.column_of_echo, lambda: f"an echo in a panel; rviz: {self.said()[-2000:]}")
         for angle_deg in (30, -30):
-            self.maps.stdin.write(f"{angle_deg}\n")
-            self.maps.stdin.flush()
+            self.tell(angle_deg)
 
             def moved(angle_deg=angle_deg):
                 column = self.column_of_echo()
                 return column is not None and (column - ahead) * angle_deg < -30 * 30  # left is left
             wait_for(moved, f"the echo at {angle_deg} degrees")
         self.assert_scene_and_boxes()
-        problems = [line for line in self.said().splitlines()
-                    if re.search(r"error|exception|warn|fail", line, re.I) and not any(u in line for u in USUAL)]
-        self.assertEqual(problems, [])
+        self.assert_no_problems()
 
     def assert_scene_and_boxes(self):
         pixels = self.picture()
@@ -122,6 +157,36 @@ class Displays(InFolder):
         self.assertGreater(magenta[80:400].sum(), 30)
         self.assertEqual(magenta[430:720].sum(), 0)
         self.assertGreater(magenta[760:].sum(), 30)
+
+
+class RangeAndSpeed(Rviz):
+    publish = PUBLISH_SPEEDS
+
+    def layout(self):
+        """The shipped layout with this display switched on."""
+        with open(super().layout(), encoding="utf-8") as file:
+            before, found, after = file.read().partition("Class: mmradartwin_attribution/RangeDoppler\n")
+        self.assertTrue(found)
+        # Qt's state of the window has its panel by name, and then whether it is visible.
+        panel = "Range and speed".encode("utf-16-be").hex()
+        self.assertIn(panel + "00", after)
+        after = after.replace("Enabled: false", "Enabled: true", 1).replace(panel + "00", panel + "01")
+        with open(self.at("layout.rviz"), "w", encoding="utf-8") as file:
+            file.write(before + found + after)
+        return self.at("layout.rviz")
+
+    def test_echo_stands_at_its_speed(self):
+        def column():
+            return self.yellow_column(slice(820, 1040))
+        still = wait_for(column, lambda: f"an echo in the panel; rviz: {self.said()[-2000:]}")
+        for speed_m_s in (0.6, -0.6):
+            self.tell(speed_m_s)
+
+            def moved(speed_m_s=speed_m_s):
+                place = column()
+                return place is not None and (place - still) * speed_m_s > 10  # away from the radar is right
+            wait_for(moved, f"the echo at {speed_m_s} m/s")
+        self.assert_no_problems()
 
 
 if __name__ == "__main__":

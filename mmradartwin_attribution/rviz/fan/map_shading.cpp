@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "level_colors.h"
 #include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
 namespace {
-
-std::uint32_t argb(Rgb c) { return 0xff000000U | (std::uint32_t{c.r} << 16) | (std::uint32_t{c.g} << 8) | c.b; }
 
 bool within(const FanGeometry::Sector& s, double azimuth_rad) {
   return std::abs(s.from_rad + s.to_rad) / 2 <= azimuth_rad;  // no, where there is no angle
@@ -41,25 +40,16 @@ void shade(const FanGeometry& geometry, const std::vector<float>& power_db, cons
     shaded.reference_db = shading.reference_db ? 0 : top;  // levels are told as they are, or below the peak
     shaded.scale = {shading.level_map, top - shading.level_span_db, top};
   }
-  std::vector<std::uint32_t> colors;
-  for (Rgb c : colorsOf(shaded.scale.map)) colors.push_back(argb(c));
-  const std::uint32_t none = argb(kNoData);
+  const LevelColors colors(shaded.scale);
   std::vector<std::uint32_t> mask;
   for (const FanGeometry::Sector& s : geometry.sectors()) {
     mask.push_back(within(s, shading.mask_azimuth_rad) ? 0xffffffffU : 0);
   }
-  const auto low = static_cast<float>(shaded.scale.low_db);
-  const auto last = static_cast<float>(colors.size() - 1);
-  const float step = last / static_cast<float>(shaded.scale.high_db - shaded.scale.low_db);
   shaded.argb.resize(rows * columns);
   for (std::size_t r = 0; r < rows; ++r) {
     const float* levels = power_db.data() + r * columns;
     std::uint32_t* out = shaded.argb.data() + r * columns;
-    for (std::size_t a = 0; a < columns; ++a) {
-      const bool known = !std::isnan(levels[a]);
-      const float place = known ? std::clamp((levels[a] - low) * step + 0.5F, 0.0F, last) : 0;
-      out[a] = (known ? colors[static_cast<std::size_t>(place)] : none) & mask[a];
-    }
+    for (std::size_t a = 0; a < columns; ++a) out[a] = colors.argb(levels[a]) & mask[a];
   }
 }
 
