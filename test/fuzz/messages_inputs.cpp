@@ -10,6 +10,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/paper_radar.h"
 #include "mmradartwin_dsp/ros/conversions.h"
+#include "mmradartwin_dsp/ros/point_cloud.h"
 #include "mmradartwin_dsp/ros/transform_record.h"
 #include "mmradartwin_dsp/ros/transform_sources.h"
 #include "mmradartwin_dsp/session.h"
@@ -80,6 +81,22 @@ void useTransforms(const tf2_msgs::TFMessage& message) {
   for (const geometry_msgs::TransformStamped& T : message.transforms) fromMsg(T.transform);
 }
 
+void usePoints(const sensor_msgs::PointCloud2& message) {
+  static const RangeAngleAxes axes = SignalChain(paperRadar()).axes();
+  for (const Detection& detection : fromCloud(message, axes)) {
+    if (detection.range_bin < 0 || detection.range_bin > 63 || detection.angle_bin < 0 || detection.angle_bin > 63) {
+      throw std::logic_error("no cell of the map");
+    }
+  }
+}
+
+sensor_msgs::PointCloud2 points() {
+  Detection detection;
+  detection.range_m = 3;
+  detection.radial_speed_m_per_s = 0.5;
+  return toCloud({detection, detection}, std_msgs::Header());
+}
+
 mmradartwin_msgs::AdcCube cube() {
   AdcCube cube;
   cube.chirps = 2, cube.samples = 4, cube.receivers = 2;
@@ -136,6 +153,7 @@ std::vector<HostileInput> hostileInputs() {
        message<mmradartwin_msgs::Session>(useSession),
        {bytesOf(session(files)), bytesOf(session({{"session.yaml", yaml}, {"a", "1"}, {"a/b", "2"}})),
         bytesOf(session({{".", ""}})), bytesOf(session({{std::string(5000, 'x'), "1"}, {"../out", "2"}}))}},
+      {"points_message", message<sensor_msgs::PointCloud2>(usePoints), {bytesOf(points())}},
       {"tf_message", message<tf2_msgs::TFMessage>(useTransforms), {bytesOf(transforms())}},
   };
 }

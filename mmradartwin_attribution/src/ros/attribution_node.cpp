@@ -69,6 +69,7 @@ AttributionNode::AttributionNode(ros::NodeHandle nh, const ros::NodeHandle& priv
   subscribers_.push_back(nh_.subscribe("twin/paths", 10, &AttributionNode::onPaths, this));
   measured_subscriber_ = nh_.subscribe("radar/range_angle", 50, &AttributionNode::onMeasured, this);
   simulated_subscriber_ = nh_.subscribe("twin/range_angle", 50, &AttributionNode::onSimulated, this);
+  subscribeToPoints();
   subscribers_.push_back(nh_.subscribe("twin/scene", 1, &AttributionNode::onScene, this));
   subscribers_.push_back(nh_.subscribe("twin/moved_scene", 1, &AttributionNode::onMovedScene, this));
   updater_ = std::make_unique<diagnostic_updater::Updater>(nh_, private_nh, ros::this_node::getName());
@@ -236,11 +237,13 @@ void AttributionNode::onSimulated(const MapMsg::ConstPtr& msg) { onMap(msg, simu
 
 void AttributionNode::followMovers() {
   movers_ = std::make_unique<MoverMask>(*radar_);
-  if (whyNoSpeeds(*radar_).empty()) {
-    points_subscriber_ = nh_.subscribe("radar/points", 50, &AttributionNode::onPoints, this);
-  } else {
-    points_subscriber_.shutdown();
-  }
+  // Where nothing moves in them, points are for others.
+  points_subscriber_.shutdown();
+  if (whyNoSpeeds(*radar_).empty()) subscribeToPoints();
+}
+
+void AttributionNode::subscribeToPoints() {
+  points_subscriber_ = nh_.subscribe("radar/points", 50, &AttributionNode::onPoints, this);
 }
 
 void AttributionNode::onPoints(const sensor_msgs::PointCloud2::ConstPtr& msg) {

@@ -22,9 +22,8 @@ using ReadField = sensor_msgs::PointCloud2ConstIterator<float>;
 ReadField fieldOf(const sensor_msgs::PointCloud2& cloud, const std::string& name) {
   for (const sensor_msgs::PointField& field : cloud.fields) {
     if (field.name != name) continue;
-    const std::size_t needed = static_cast<std::size_t>(cloud.point_step) * cloud.width * cloud.height;
-    if (field.datatype == sensor_msgs::PointField::FLOAT32 && field.offset + sizeof(float) <= cloud.point_step &&
-        cloud.data.size() >= needed) {
+    if (field.datatype == sensor_msgs::PointField::FLOAT32 && cloud.point_step >= sizeof(float) &&
+        field.offset <= cloud.point_step - sizeof(float) && cloud.data.size() % cloud.point_step == 0) {
       return ReadField(cloud, name);
     }
     throw InputError("points: field " + name + " is no float32 of each point");
@@ -97,10 +96,11 @@ sensor_msgs::PointCloud2 toCloud(const std::vector<Detection>& detections, const
 }
 
 std::vector<Detection> fromCloud(const sensor_msgs::PointCloud2& cloud, const RangeAngleAxes& axes) {
+  std::vector<Detection> detections;
+  if (cloud.data.empty()) return detections;
   ReadField range_m = fieldOf(cloud, "range_m"), azimuth_deg = fieldOf(cloud, "azimuth_deg"),
             snr_db = fieldOf(cloud, "snr_db"), power_db = fieldOf(cloud, "power_db"),
             speed = fieldOf(cloud, "radial_speed_m_s");
-  std::vector<Detection> detections;
   for (; range_m != range_m.end(); ++range_m, ++azimuth_deg, ++snr_db, ++power_db, ++speed) {
     Detection detection;
     detection.range_m = *range_m;

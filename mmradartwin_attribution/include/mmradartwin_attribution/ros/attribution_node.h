@@ -77,6 +77,7 @@ class AttributionNode {
   void onMeasured(const MapMsg::ConstPtr& msg);
   void onSimulated(const MapMsg::ConstPtr& msg);
   void followMovers();
+  void subscribeToPoints();
   void onPoints(const sensor_msgs::PointCloud2::ConstPtr& msg);
   void onMap(const MapMsg::ConstPtr& msg, std::map<std::int64_t, MapMsg::ConstPtr>& own,
              std::map<std::int64_t, MapMsg::ConstPtr>& other, bool measured);
@@ -116,7 +117,7 @@ class AttributionNode {
   std::unique_ptr<WhyServer> why_;
   std::vector<ros::Subscriber> subscribers_;
   ros::Subscriber measured_subscriber_, simulated_subscriber_;
-  ros::Subscriber points_subscriber_;  ///< while frames tell speeds
+  ros::Subscriber points_subscriber_;  ///< until it is known that frames tell no speeds
   TopicWatch measured_heard_{"the signal chain"}, simulated_heard_{"the twin, and the signal chain"};
   std::unique_ptr<diagnostic_updater::Updater> updater_;
   ros::WallTimer diagnostics_timer_;
