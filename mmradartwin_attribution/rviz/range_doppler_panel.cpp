@@ -59,16 +59,14 @@ void RangeDopplerPanel::drawAxes(QPainter& painter, const QRectF& area) const {
   QColor grid = toQColor(kGrid);
   grid.setAlpha(110);
   const double line = textSize("0").height();
-  double free_from_px = 0;
-  for (double speed : ticks(-view_.up_to_m_per_s, view_.up_to_m_per_s, 9)) {
+  const double widest_px = textSize(signedText(-0.25)).width() + 10;
+  for (double speed :
+       ticks(-view_.up_to_m_per_s, view_.up_to_m_per_s, std::max(3, static_cast<int>(area.width() / widest_px)))) {
     const double x = area.center().x() + speed / view_.up_to_m_per_s * area.width() / 2;
     painter.setPen(QPen(speed == 0 ? toQColor(kGrid) : grid, 1));
     painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom() + kAboveTicks_px));
     const QString text = signedText(speed);
-    const double half = textSize(text).width() / 2;
-    if (x - half < free_from_px) continue;
-    free_from_px = x + half + 4;
-    drawRimmedText(painter, {x - half, area.bottom() + line}, text);
+    drawRimmedText(painter, {x - textSize(text).width() / 2, area.bottom() + line}, text);
   }
   for (double range : ticks(0, view_.up_to_m, std::max(2, static_cast<int>(area.height() / (1.3 * line))))) {
     const double y = area.bottom() - range / view_.up_to_m * area.height();
