@@ -17,6 +17,7 @@ namespace {
 
 using StatusProperty = rviz::StatusProperty;
 
+constexpr const char* kNoMap = "No map yet; it takes frames of eight loops or more.";
 /// The axis of speeds follows what lies in the upper part of the colours, and is never narrower than this.
 constexpr double kFollowedShare = 0.9, kLeastSpeed_m_per_s = 1;
 
@@ -93,7 +94,8 @@ void RangeDopplerDisplay::subscribe() {
   try {
     // Of maps that come faster than they are drawn the last one counts.
     subscriber_ = update_nh_.subscribe(topic_->getTopicStd(), 1, &RangeDopplerDisplay::onMap, this);
-    setStatus(StatusProperty::Warn, "Map", "no map yet: frames need eight loops or more");
+    setStatus(StatusProperty::Warn, "Map", kNoMap);
+    panel_->setWords(getName(), kNoMap);
   } catch (const ros::Exception& error) {
     setStatus(StatusProperty::Error, "Map", error.what());
   }
