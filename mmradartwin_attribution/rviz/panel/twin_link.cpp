@@ -17,13 +17,6 @@ constexpr const char* kPlayer = "player/pause_playback";
 constexpr double kPlayerEvery_s = 2;
 constexpr double kClockStands_s = 1;
 
-/// The answer of a service, filled in the thread that calls it.
-template <typename Service>
-struct Answer {
-  Service service;
-  bool came = false;
-};
-
 }  // namespace
 
 TwinLink::TwinLink(std::function<void()> on_change) : on_change_(std::move(on_change)) {
@@ -111,28 +104,27 @@ void TwinLink::say(const QString& words) {
 }
 
 void TwinLink::showPose(const std::string& order, const std::string& pose, int step) {
-  const auto answer = std::make_shared<Answer<mmradartwin_msgs::ShowPose>>();
-  answer->service.request.order = order;
-  answer->service.request.pose = pose;
-  answer->service.request.step = step;
-  services_.call([answer] { answer->came = ros::service::call("inspect/show", answer->service); }, this,
-                 [this, answer] {
-                   const auto& response = answer->service.response;
-                   const QString problem = response.success ? "" : QString::fromStdString(response.message);
-                   say(answer->came ? problem : "inspect/show does not answer");
-                 });
+  using Show = mmradartwin_msgs::ShowPose;
+  Show::Request request;
+  request.order = order;
+  request.pose = pose;
+  request.step = step;
+  services_.callService<Show>("inspect/show", request, this, [this](bool reached, const Show::Response& response) {
+    const QString problem = response.success ? "" : QString::fromStdString(response.message);
+    say(reached ? problem : "inspect/show does not answer");
+  });
 }
 
 void TwinLink::play(bool on) {
-  const auto answer = std::make_shared<Answer<std_srvs::SetBool>>();
+  using Switch = std_srvs::SetBool;
   const bool stored = source() == Source::kStored;
   const std::string service = stored ? "inspect/play" : kPlayer;
-  answer->service.request.data = stored ? on : !on;  // the player's is whether to pause
-  services_.call([answer, service] { answer->came = ros::service::call(service, answer->service); }, this,
-                 [this, answer, service] {
-                   say(answer->came ? QString::fromStdString(answer->service.response.message)
-                                    : QString::fromStdString(service) + " does not answer");
-                 });
+  Switch::Request request;
+  request.data = stored ? on : !on;  // the player's is whether to pause
+  services_.callService<Switch>(
+      service, request, this, [this, service](bool reached, const Switch::Response& response) {
+        say(reached ? QString::fromStdString(response.message) : QString::fromStdString(service) + " does not answer");
+      });
 }
 
 void TwinLink::diagnose() {
@@ -179,19 +171,19 @@ void TwinLink::apply() { applyTwin(extended_twin_file_, true); }
 void TwinLink::revert() { applyTwin("", false); }
 
 void TwinLink::applyTwin(const std::string& file, bool extended) {
-  const auto answer = std::make_shared<Answer<mmradartwin_msgs::ApplyTwin>>();
-  answer->service.request.file = file;
+  using Apply = mmradartwin_msgs::ApplyTwin;
+  Apply::Request request;
+  request.file = file;
   TwinFigures before = figures();
   before.label = extended ? "as given" : "with findings";
-  services_.call(
-      [answer] { answer->came = ros::service::call("twin/apply", answer->service); }, this,
-      [this, answer, extended, before] {
-        if (answer->came && answer->service.response.success) {
-          applied_ = extended;
-          other_ = before;
-        }
-        say(answer->came ? QString::fromStdString(answer->service.response.message) : "twin/apply does not answer");
-      });
+  services_.callService<Apply>("twin/apply", request, this,
+                               [this, extended, before](bool reached, const Apply::Response& response) {
+                                 if (reached && response.success) {
+                                   applied_ = extended;
+                                   other_ = before;
+                                 }
+                                 say(reached ? QString::fromStdString(response.message) : "twin/apply does not answer");
+                               });
 }
 
 QString TwinLink::saveTwin(const QString& name) const {

@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "service_thread.h"
+#include "../service_thread.h"
 
 namespace mmradartwin {
 

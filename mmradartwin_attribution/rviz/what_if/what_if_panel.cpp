@@ -1,5 +1,8 @@
 #include "what_if_panel.h"
 
+#include <mmradartwin_msgs/SaveTwin.h>
+#include <std_srvs/Trigger.h>
+
 #include <QCheckBox>
 #include <QComboBox>
 #include <QFileDialog>
@@ -71,17 +74,15 @@ WhatIfPanel::WhatIfPanel(QWidget* parent) : rviz::Panel(parent) {
   all->addWidget(answer_);
   all->addWidget(tabs, 1);
 
-  connect(undo_, &QPushButton::clicked, [this] { calls_->trigger("what_if/undo"); });
-  connect(revert_, &QPushButton::clicked, [this] { calls_->trigger("what_if/revert"); });
+  connect(undo_, &QPushButton::clicked, [this] { send<std_srvs::Trigger>("what_if/undo", {}); });
+  connect(revert_, &QPushButton::clicked, [this] { send<std_srvs::Trigger>("what_if/revert", {}); });
   connect(save_, &QPushButton::clicked, [this] {
     const QString folder = QFileDialog::getExistingDirectory(this, "Folder of the twin: an empty one", QString(),
                                                              QFileDialog::ShowDirsOnly);
-    if (!folder.isEmpty()) calls_->save(folder.toStdString(), false);
-  });
-  calls_ = std::make_unique<ServiceCalls>([this](bool success, const std::string& message) {
-    const QString text = QString::fromStdString(message);
-    QMetaObject::invokeMethod(
-        this, [this, success, text] { say(success, text); }, Qt::QueuedConnection);
+    if (folder.isEmpty()) return;
+    mmradartwin_msgs::SaveTwin::Request request;
+    request.folder = folder.toStdString();
+    send<mmradartwin_msgs::SaveTwin>("what_if/save", request);
   });
   subscriber_ = nh_.subscribe("what_if/state", 1, &WhatIfPanel::onState, this);
 }
@@ -136,7 +137,7 @@ QWidget* WhatIfPanel::makeMechanisms() {
     if (const auto* actor = chosenActor(); actor && edit.enabled && state_->mechanisms[row].subject.empty()) {
       edit.actor = state_->mechanisms[row].given ? "" : actor->name;
     }
-    calls_->edit("", edit);
+    sendEdit("", edit);
   });
   auto* form = new QWidget;
   mechanism_form_ = new QFormLayout(form);
@@ -161,6 +162,23 @@ QWidget* WhatIfPanel::makeRadar() {
   rows->addRow("turned to the left [deg]", radar_yaw_deg_);
   rows->addRow("nose down [deg]", radar_pitch_deg_);
   return form;
+}
+
+template <typename Service>
+void WhatIfPanel::send(const std::string& service, const typename Service::Request& request, const std::string& knob) {
+  services_.callService<Service>(
+      service, request, this,
+      [this, service](bool reached, const typename Service::Response& response) {
+        say(reached && response.success,
+            QString::fromStdString(reached ? response.message
+                                           : "nobody offers " + service + ": is what_if_node running?"));
+      },
+      knob);
+}
+
+void WhatIfPanel::sendEdit(const std::string& knob, const Edit& edit) {
+  // The first of a drag begins a step of undo, and is not replaced.
+  send<mmradartwin_msgs::EditTwin>("what_if/edit", edit, edit.continues ? knob : "");
 }
 
 void WhatIfPanel::say(bool success, const QString& message) {
@@ -191,7 +209,7 @@ void WhatIfPanel::sendPlace(bool continues) {
   edit.shift_m = {x_m_->box().value(), y_m_->box().value(), actor->shift_m[2]};
   edit.yaw_deg = yaw_deg_->box().value();
   edit.continues = static_cast<std::uint8_t>(continues);
-  calls_->edit("place " + actor->name, edit);
+  sendEdit("place " + actor->name, edit);
 }
 
 void WhatIfPanel::sendRadar(bool continues) {
@@ -201,7 +219,7 @@ void WhatIfPanel::sendRadar(bool continues) {
   edit.yaw_deg = radar_yaw_deg_->box().value();
   edit.pitch_deg = radar_pitch_deg_->box().value();
   edit.continues = static_cast<std::uint8_t>(continues);
-  calls_->edit("radar", edit);
+  sendEdit("radar", edit);
 }
 
 void WhatIfPanel::onState(const mmradartwin_msgs::WhatIf::ConstPtr& state) {
@@ -257,7 +275,7 @@ void WhatIfPanel::showActors() {
         edit.kind = Edit::MATERIAL;
         edit.actor = name.toStdString();
         edit.material = material->currentText().toStdString();
-        calls_->edit("", edit);
+        sendEdit("", edit);
       });
       actors_->setCellWidget(i, 1, material);
       auto* hide = new QCheckBox;
@@ -267,7 +285,7 @@ void WhatIfPanel::showActors() {
         edit.kind = Edit::HIDE;
         edit.actor = name.toStdString();
         edit.enabled = static_cast<std::uint8_t>(hidden);
-        calls_->edit("", edit);
+        sendEdit("", edit);
       });
       actors_->setCellWidget(i, 2, hide);
     }
@@ -322,7 +340,7 @@ void WhatIfPanel::showActor() {
            edit.key = key;
            edit.value = value;
            edit.continues = static_cast<std::uint8_t>(continues);
-           calls_->edit("value " + name + " " + key, edit);
+           sendEdit("value " + name + " " + key, edit);
          });
   }
   for (const auto& p : actor->material_values) material_knobs_.at(p.key)->show(p.value);
@@ -361,7 +379,7 @@ void WhatIfPanel::showMechanism() {
            edit.key = key;
            edit.value = value;
            edit.continues = static_cast<std::uint8_t>(continues);
-           calls_->edit("parameter " + of.toStdString() + " " + key, edit);
+           sendEdit("parameter " + of.toStdString() + " " + key, edit);
          });
   }
   if (!m) return;

@@ -1,6 +1,7 @@
 #pragma once
 
 #ifndef Q_MOC_RUN
+#include <mmradartwin_msgs/EditTwin.h>
 #include <mmradartwin_msgs/WhatIf.h>
 #include <ros/ros.h>
 #include <rviz/panel.h>
@@ -11,12 +12,12 @@
 #include <QListWidget>
 #include <QPushButton>
 #include <QTableWidget>
+#include <functional>
 #include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "service_calls.h"
+#include "../service_thread.h"
 #include "value_knob.h"
 
 namespace mmradartwin {
@@ -40,6 +41,10 @@ class WhatIfPanel : public rviz::Panel {
   void showActor();
   void showMechanisms();
   void showMechanism();
+  /// knob: what is drawn; of its changes that continue one another and wait still the newest counts.
+  void sendEdit(const std::string& knob, const Edit& edit);
+  template <typename Service>
+  void send(const std::string& service, const typename Service::Request& request, const std::string& knob = "");
   void say(bool success, const QString& message);
   void sendRadar(bool continues);
   void sendPlace(bool continues);
@@ -53,7 +58,7 @@ class WhatIfPanel : public rviz::Panel {
   mmradartwin_msgs::WhatIf::ConstPtr state_;
   ros::NodeHandle nh_;
   ros::Subscriber subscriber_;
-  std::unique_ptr<ServiceCalls> calls_;
+  ServiceThread services_;
 
   QLabel *numbers_, *words_, *answer_;
   QPushButton *undo_, *revert_, *save_;

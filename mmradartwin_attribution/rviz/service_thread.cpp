@@ -17,9 +17,12 @@ ServiceThread::~ServiceThread() {
   queue_->changed.notify_all();
 }
 
-void ServiceThread::call(std::function<void()> work, QObject* receiver, std::function<void()> done) {
+void ServiceThread::call(std::function<void()> work, QObject* receiver, std::function<void()> done,
+                         const std::string& knob) {
   const std::lock_guard<std::mutex> lock(queue_->mutex);
-  queue_->jobs.push_back({std::move(work), std::move(done), receiver});
+  std::deque<Job>& jobs = queue_->jobs;
+  if (!knob.empty() && !jobs.empty() && jobs.back().knob == knob) jobs.pop_back();
+  jobs.push_back({std::move(work), std::move(done), receiver, knob});
   queue_->changed.notify_all();
 }
 
