@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "mmradartwin_attribution/diagnosed_poses.h"
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/diagnosis_report.h"
 #include "mmradartwin_attribution/report.h"
@@ -50,6 +51,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   if (!arguments.config.empty()) options.config = loadAttributionConfig(arguments.config);
   if (!arguments.diagnosis_config.empty()) options.accuracy = loadStatedAccuracy(arguments.diagnosis_config);
   Diagnosis diagnosis;
+  std::optional<DiagnosedPoses> poses;
   std::string given_twin_yaml;
   {
     ProgressLine line;
@@ -73,6 +75,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
         requireSameScene(options.compared.back(), twin.description());
       }
       diagnosis = diagnose(recording, twin, options);
+      poses = compareDiagnosedPoses(recording, twin, diagnosis, options);
     }
   }
   // Scene and radar are the recording's wherever it is read from: a bag's stand in a temporary folder.
@@ -97,7 +100,7 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
   more.insert(more.end(), arguments.compared.begin(), arguments.compared.end());
   more.insert(more.end(), arguments.input.recordings.begin() + 1, arguments.input.recordings.end());
   description.inputs = hashFiles(inputFiles(arguments.input.recording(), recording, more));
-  report.write(diagnosis, description);
+  report.write(diagnosis, description, poses ? &*poses : nullptr);
   output.complete();
   sayProblems(diagnosis.problems);
   std::cout << diagnosisText(diagnosis) << "Findings: " << output.name() << "/findings.json\n"

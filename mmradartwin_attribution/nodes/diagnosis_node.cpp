@@ -18,6 +18,7 @@
 #include <memory>
 #include <sstream>
 
+#include "mmradartwin_attribution/diagnosed_poses.h"
 #include "mmradartwin_attribution/diagnosis.h"
 #include "mmradartwin_attribution/diagnosis_report.h"
 #include "mmradartwin_attribution/ros/conversions.h"
@@ -262,7 +263,13 @@ class DiagnosisNode {
     return twin;
   }
 
-  Diagnosis diagnosePoses(const Recording& recording, const std::string& asked_twin) {
+  /// What a report is written of.
+  struct Diagnosed {
+    Diagnosis diagnosis;
+    std::optional<DiagnosedPoses> poses;
+  };
+
+  Diagnosed diagnosePoses(const Recording& recording, const std::string& asked_twin) {
     DiagnosisOptions options;
     options.jobs = settings_.jobs;
     options.config = config_;
@@ -270,12 +277,13 @@ class DiagnosisNode {
     options.cancelled = [this] { return server_.isPreemptRequested() || !ros::ok(); };
     options.on_progress = [this](const DiagnosisProgress& p) { tell(p.stage, p.share); };
     const std::optional<ChosenTwin> chosen = chooseTwin(asked_twin, recording);
-    if (!chosen) return diagnoseReceiver(recording, options);
+    if (!chosen) return {diagnoseReceiver(recording, options), std::nullopt};
     if (recording.channels) refuseSameChannelError(chosen->description, *recording.channels);
     Twin twin = twinAt(chosen->description, recording.poses, recording.source);
-    Diagnosis diagnosis = diagnose(recording, twin, options);
-    if (chosen->scene_of_session) diagnosis.extended.scene_file.clear();
-    return diagnosis;
+    Diagnosed diagnosed{diagnose(recording, twin, options), std::nullopt};
+    diagnosed.poses = compareDiagnosedPoses(recording, twin, diagnosed.diagnosis, options);
+    if (chosen->scene_of_session) diagnosed.diagnosis.extended.scene_file.clear();
+    return diagnosed;
   }
 
   void tell(const std::string& stage, double share) {
@@ -295,14 +303,14 @@ class DiagnosisNode {
       Recording recording = spool_.recording();
       if (channels_) requireChannelsOf(recording.radar, *channels_);
       recording.channels = channels_;
-      const Diagnosis diagnosis = diagnosePoses(recording, goal->twin);
+      const auto [diagnosis, poses] = diagnosePoses(recording, goal->twin);
       RunDescription run;
       run.command = {"attribution/diagnose", output, goal->twin};
       run.recording = recording.source;
       run.version = packageVersion();
       run.attribution_yaml = toYaml(config_);
       run.radar_yaml = toYaml(recording.radar);
-      DiagnosisReport(output).write(diagnosis, run);
+      DiagnosisReport(output).write(diagnosis, run, poses ? &*poses : nullptr);
       result.findings_file = output + "/findings.json";
       result.report_file = output + "/report.html";
       const Findings written = readFindings(result.findings_file);

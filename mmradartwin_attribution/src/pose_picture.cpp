@@ -79,20 +79,6 @@ std::vector<FanBox> boxes(const EvaluationField& field, const PoseAttribution& p
   return result;
 }
 
-// Whole metres up to beyond the last response that matters.
-double shownRange_m(const EvaluationField& field, const PoseAttribution& pose) {
-  double last = 0;
-  for (const NormalisedMap* map : {&pose.measured, &pose.simulated}) {
-    for (const Response& r : map->responses) {
-      if (r.level_db >= field.config().weak_db) last = std::max(last, r.range_m);
-    }
-  }
-  for (const ResponseRegion& r : pose.regions) {
-    if (r.measured_strong) last = std::max(last, r.range_m);
-  }
-  return std::clamp(std::ceil(last + 1), 4.0, std::max(4.0, std::ceil(field.axes().range_m.back())));
-}
-
 void put(cv::Mat& picture, const std::string& words, int x, int y, double size, const cv::Scalar& color) {
   cv::putText(picture, words, {x, y}, kFont, size, color, 1, cv::LINE_AA);
 }
@@ -245,12 +231,26 @@ cv::Scalar classColor_bgr(ResidualClass c) {
   return colors[static_cast<int>(c) - 1];
 }
 
+double shownRange_m(const EvaluationField& field, const PoseResult& result) {
+  const PoseAttribution& pose = result.attribution;
+  double last = 0;
+  for (const NormalisedMap* map : {&pose.measured, &pose.simulated}) {
+    for (const Response& r : map->responses) {
+      if (r.level_db >= field.config().weak_db) last = std::max(last, r.range_m);
+    }
+  }
+  for (const ResponseRegion& r : pose.regions) {
+    if (r.measured_strong) last = std::max(last, r.range_m);
+  }
+  return std::clamp(std::ceil(last + 1), 4.0, std::max(4.0, std::ceil(field.axes().range_m.back())));
+}
+
 cv::Mat drawPose(const EvaluationField& field, const PoseResult& result) {
   const PoseAttribution& pose = result.attribution;
   FanStyle style;
   style.min_db = field.config().floor_db;
   style.height_px = kFanHeight_px;
-  style.max_range_m = shownRange_m(field, pose);
+  style.max_range_m = shownRange_m(field, result);
   style.title = "measured";
   const cv::Mat measured =
       drawFan(field.axes(), pose.measured.level_db, style, boxes(field, pose, true, style.max_range_m));
@@ -301,7 +301,8 @@ cv::Mat drawPose(const EvaluationField& field, const PoseResult& result) {
   return picture;
 }
 
-std::array<cv::Mat, 3> drawPoseFans(const EvaluationField& field, const PoseResult& result) {
+std::array<cv::Mat, 3> drawPoseFans(const EvaluationField& field, const PoseResult& result,
+                                    const PoseFanStyle& fan_style) {
   const PoseAttribution& pose = result.attribution;
   std::array<std::vector<FanBox>, 3> boxes_of;  // of matches, then of residuals: these are drawn over those
   const MatchWindow& tight = field.config().tight;
@@ -315,14 +316,15 @@ std::array<cv::Mat, 3> drawPoseFans(const EvaluationField& field, const PoseResu
   }
   for (std::size_t i = 0; i < pose.residuals.size(); ++i) {
     const Residual& r = pose.residuals[i];
-    boxes_of[r.measured_stronger ? 0 : 1].push_back(box(r.range_m, r.azimuth_rad, kMagenta, std::to_string(i + 1)));
-    boxes_of[2].push_back(box(r.range_m, r.azimuth_rad, kInk, std::to_string(i + 1)));
+    const std::string number = fan_style.numbers ? std::to_string(i + 1) : "";
+    boxes_of[r.measured_stronger ? 0 : 1].push_back(box(r.range_m, r.azimuth_rad, kMagenta, number));
+    boxes_of[2].push_back(box(r.range_m, r.azimuth_rad, kInk, number));
   }
   FanStyle style;
   style.height_px = kSmallFanHeight_px;
   style.letters = kSmallFanLetters;
   style.min_db = field.config().floor_db;
-  style.max_range_m = shownRange_m(field, pose);
+  style.max_range_m = fan_style.range_m > 0 ? fan_style.range_m : shownRange_m(field, result);
   std::array<cv::Mat, 3> fans;
   fans[0] = drawFan(field.axes(), pose.measured.level_db, style, boxes_of[0]);
   fans[1] = drawFan(field.axes(), pose.simulated.level_db, style, boxes_of[1]);

@@ -20,6 +20,7 @@ from doc_pages import ROOT
 CHROMIUM = shutil.which("chromium")
 WIDTHS_PX = 390, 1200
 LEAST_CONTRAST = 4.5    # of letters, WCAG 2.2 AA
+POPPLER = all(shutil.which(program) for program in ("pdfimages", "pdftotext", "pdftoppm"))
 
 PROBE = """<script>
 document.querySelectorAll("details").forEach(d => d.open = true);
@@ -48,6 +49,20 @@ def luminance(color):
 def contrast(first, second):
     light, dark = sorted((luminance(first), luminance(second)), reverse=True)
     return (light + 0.05) / (dark + 0.05)
+
+
+def lines_of(element):
+    """Its words without blanks, as a page that is printed shows them: meanings of words are left out."""
+    if element.get("class") == "meaning":
+        return ""
+    inside = "".join(lines_of(child) + (child.tail or "") for child in element)
+    return re.sub(r"\s", "", (element.text or "") + inside)
+
+
+def folded(root):
+    """Elements within what is folded, which is not printed."""
+    return {inside for details in root.iter("details") if details.get("class") != "printed" for child in details
+            if child.tag != "summary" for inside in child.iter()}
 
 
 def value_at(folder, of):
@@ -156,6 +171,33 @@ class ReportPage(unittest.TestCase):
             for i in range(1, 6):
                 self.assertEqual(int(row[f"c{i}"]), pose["classes"][f"C{i}"])
 
+    def test_poses_of_a_diagnosis_are_those_of_evaluate(self):
+        """As given and corrected; the page shows the worst two and the best with both twins."""
+        evaluate = find_program("mmradartwin_attribution", "evaluate")
+        subprocess.run([evaluate, self.at("session"), "--twin", self.at("diagnose", "twin.extended.yaml"), "--output",
+                        self.at("corrected"), "--no-bag", "--no-pictures"], check=True, capture_output=True, timeout=300)
+
+        def summary(folder):
+            with open(self.at(folder, "summary.json"), encoding="utf-8") as file:
+                return json.load(file)
+        said = summary("diagnose")
+        self.assertEqual(said["worst_first"], summary("evaluate")["worst_first"])
+        for twin, folder in (("given", "evaluate"), ("corrected", "corrected")):
+            told = {pose["pose"]: pose for pose in summary(folder)["poses"]}
+            self.assertEqual([pose["pose"] for pose in said["poses"]], list(told))
+            for pose in said["poses"]:
+                for key in ("active", "recalled"):
+                    self.assertEqual(pose[twin][key], told[pose["pose"]][key], pose["pose"])
+                self.assertAlmostEqual(pose[twin]["explained_power"], told[pose["pose"]]["explained_power"], delta=1e-4)
+        shown = ["".join(head.itertext()) for head in self.elements("diagnose", "h3")]
+        worst = said["worst_first"]
+        for rank, pose in (("worst", worst[0]), ("second worst", worst[1]), ("best", worst[-1])):
+            self.assertIn(f"The {rank}: pose {pose}", shown)
+        pictures = [image.get("alt") for image in self.elements("diagnose", "img")]
+        for what in ("measured map", "map of the twin as given", "map of the corrected twin", "twin as given minus measured",
+                     "corrected twin minus measured"):
+            self.assertIn(f"{what} of pose {worst[0]}", pictures)
+
     def test_table_cells_with_digits_are_numbers_of_a_file(self):
         """No number of a table is written beside the files; the paper's stand in summary.json, or in the column that says so."""
         for name in self.pages:
@@ -220,6 +262,56 @@ class ReportPage(unittest.TestCase):
                 self.assertLessEqual(said["width"], width, f"{name}: {said['outside'][:3]}")
                 self.assertEqual(said["outside"][:3], [], name)
                 self.assertEqual(said["shown"], said["words"], f"{name}: meanings at {width} px")
+
+    def printed(self, name):
+        """The page as Chromium prints it for somebody whose screen is dark."""
+        pdf = self.at(name + ".pdf")
+        subprocess.run([CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer",
+                        "--blink-settings=preferredColorScheme=0", f"--user-data-dir={self.at('chromium')}",
+                        "--print-to-pdf=" + pdf, "file://" + os.path.join(self.folders[name], "report.html")],
+                       capture_output=True, check=True, timeout=120)
+        return pdf
+
+    @unittest.skipIf(CHROMIUM is None or not POPPLER, "needs Debian's chromium and poppler-utils")
+    def test_prints_without_cuts_on_white_paper(self):
+        for name in self.pages:
+            pdf = self.printed(name)
+
+            def told(*command, **options):
+                return subprocess.run(command, capture_output=True, check=True, timeout=120, **options).stdout
+            root = xml.etree.ElementTree.fromstring(self.pages[name])
+            hidden = folded(root)
+            self.check_pictures(name, root, told("pdfimages", "-list", pdf, text=True))
+            pages = [re.sub(r"\s", "", page) for page in told("pdftotext", "-raw", pdf, "-", text=True).split("\f")]
+            rows = [lines_of(row) for row in root.iter("tr") if row not in hidden]
+            self.assertGreater(len(rows), 5)
+            for row in rows:
+                self.assertTrue(any(row in page for page in pages), f"{name}: the row {row} is cut")
+            heads = [lines_of(head) for tag in ("h2", "h3") for head in root.iter(tag) if head not in hidden]
+            for head in heads:
+                self.assertFalse(any(page.endswith(head) for page in pages), f"{name}: {head} is the last of a page")
+            for width, right in self.rights(told("pdftotext", "-bbox", pdf, "-", text=True)):
+                self.assertAlmostEqual(width, 595, delta=1)    # A4 upright, in points
+                self.assertLess(right, width - 20, name)
+            paper = told("pdftoppm", "-r", "30", "-gray", pdf)
+            self.assertGreater(paper.count(b"\xff"), 0.5 * len(paper), f"{name}: the paper is not white")
+
+    def check_pictures(self, name, root, listed):
+        """Each stands on one page, as wide as its letters can be read."""
+        pages_of = {}
+        for line in listed.splitlines()[2:]:
+            page, _, kind, width, _, *rest = line.split()
+            if kind == "image":
+                pages_of.setdefault(rest[5], set()).add(page)
+                self.assertLess(float(rest[7]), 400, "dots per inch: a picture as small as a stamp")
+        self.assertEqual({len(pages) for pages in pages_of.values()}, {1}, f"{name}: a picture is cut")
+        self.assertEqual(len(pages_of), len({image.get("src") for image in root.iter("img")}), name)
+
+    @staticmethod
+    def rights(boxes):
+        """[(width of the page, right edge of a word)]."""
+        return [(float(page), float(right)) for page, words in re.findall(r'<page width="([\d.]+)"(.*?)</page>', boxes, re.S)
+                for right in re.findall(r'xMax="([\d.]+)"', words)]
 
 
 if __name__ == "__main__":

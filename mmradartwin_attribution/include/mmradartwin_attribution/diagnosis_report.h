@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "mmradartwin_attribution/diagnosed_poses.h"
 #include "mmradartwin_attribution/diagnosis_result.h"
 #include "mmradartwin_attribution/run_description.h"
 
@@ -18,7 +19,8 @@ class DiagnosisReport {
   ~DiagnosisReport();
   DiagnosisReport(const DiagnosisReport&) = delete;
   DiagnosisReport& operator=(const DiagnosisReport&) = delete;
-  void write(const Diagnosis& diagnosis, const RunDescription& run) const;
+  /// poses: whose maps the page shows; nullptr: none.
+  void write(const Diagnosis& diagnosis, const RunDescription& run, const DiagnosedPoses* poses = nullptr) const;
 
  private:
   struct Page;

@@ -17,9 +17,19 @@ cv::Scalar classColor_bgr(ResidualClass c);
 /// list of the residuals with class and levels.
 cv::Mat drawPose(const EvaluationField& field, const PoseResult& result);
 
+/// How drawPoseFans() draws.
+struct PoseFanStyle {
+  bool numbers = true;  ///< boxes of residuals bear their number in PoseAttribution::residuals, from 1 on
+  double range_m = 0;   ///< that is shown; 0: shownRange_m()
+};
+
+/// Whole metres up to beyond the last response of a pose that matters.
+double shownRange_m(const EvaluationField& field, const PoseResult& result);
+
 /// The three fans of drawPose(), one by one and with letters that stay readable when they are shown small: measured,
-/// simulated, difference. Boxes of residuals bear their number in PoseAttribution::residuals, from 1 on.
-std::array<cv::Mat, 3> drawPoseFans(const EvaluationField& field, const PoseResult& result);
+/// simulated, difference.
+std::array<cv::Mat, 3> drawPoseFans(const EvaluationField& field, const PoseResult& result,
+                                    const PoseFanStyle& fan_style = {});
 
 /// Acquisition coverage: the scene from above, coloured by material, with the radar's places and headings. Horizontal
 /// surfaces above `cut_height_m` (a ceiling) are left out.

@@ -7,6 +7,7 @@
 #include "diagnosis/report/diagnosis_answer.h"
 #include "diagnosis/report/finding_figure.h"
 #include "diagnosis/report/finding_words.h"
+#include "diagnosis/report/pose_section.h"
 #include "mmradartwin_dsp/text.h"
 #include "page/page_picture.h"
 #include "page/paper_figures.h"
@@ -263,7 +264,7 @@ std::vector<PageValues> stepItems(const Diagnosis& diagnosis, const CauseWords& 
 
 }  // namespace
 
-nlohmann::json diagnosisSummary(const Diagnosis& diagnosis, const RunDescription& run) {
+nlohmann::json diagnosisSummary(const Diagnosis& diagnosis, const RunDescription& run, const DiagnosedPoses* poses) {
   nlohmann::json j;
   j["format"] = "mmradartwin_diagnosis_summary/1";
   j["version"] = run.version;
@@ -280,6 +281,7 @@ nlohmann::json diagnosisSummary(const Diagnosis& diagnosis, const RunDescription
                              {"log_likelihood_gain_ci95", twin.log_likelihood_gain_ci95},
                              {"explained_power", twin.explained_power}});
   }
+  if (poses) addPoseSummary(*poses, j);
   j["problems"] = nlohmann::json::array();
   for (const PoseProblem& p : diagnosis.problems) j["problems"].push_back({{"pose", p.pose}, {"message", p.message}});
   j["inputs"] = nlohmann::json::array();
@@ -288,17 +290,17 @@ nlohmann::json diagnosisSummary(const Diagnosis& diagnosis, const RunDescription
 }
 
 page::PageTemplate diagnosisTemplate(const page::TemplateText& text) {
-  return {"diagnosis.html", text, page::pageNames(std::string(kNames) + page::kRunNames), page::docsGlossary()};
+  return {"diagnosis.html", text, page::pageNames(std::string(kNames) + kPoseNames + page::kRunNames),
+          page::docsGlossary()};
 }
 
-std::string diagnosisPage(const page::PageTemplate& page, const CauseWords& words, const Diagnosis& diagnosis,
-                          const nlohmann::json& findings, const nlohmann::json& summary,
-                          const std::vector<FindingFiles>& files, const RunDescription& run) {
-  const PageNumbers numbers(findings, "findings.json"), of_summary(summary, "summary.json");
+std::string diagnosisPage(const page::PageTemplate& page, const CauseWords& words, const DiagnosisPageInput& input) {
+  const Diagnosis& diagnosis = input.diagnosis;
+  const PageNumbers numbers(input.findings, "findings.json"), of_summary(input.summary, "summary.json");
   PageValues values;
-  page::addRunValues(run, diagnosis.problems, values);
-  values["recording_word"] = page::shellWord(run.recording);
-  values["answer"] = PageValue::html(diagnosisAnswer(diagnosis, words, findings, summary));
+  page::addRunValues(input.run, diagnosis.problems, values);
+  values["recording_word"] = page::shellWord(input.run.recording);
+  values["answer"] = PageValue::html(diagnosisAnswer(diagnosis, words, input.findings, input.summary));
   values["pose_count"] = PageValue::html(numbers.count("/poses/count"));
   values["location_count"] = PageValue::html(numbers.count("/poses/locations"));
   values["held_out"] = diagnosis.findings.held_out;
@@ -306,7 +308,9 @@ std::string diagnosisPage(const page::PageTemplate& page, const CauseWords& word
   values["no_twin"] = !diagnosis.has_twin;
   values["steps"] = stepItems(diagnosis, words, numbers);
   std::vector<PageValues> items;
-  for (std::size_t i = 0; i < files.size(); ++i) items.push_back(findingItem(diagnosis, i, words, numbers, files[i]));
+  for (std::size_t i = 0; i < input.files.size(); ++i) {
+    items.push_back(findingItem(diagnosis, i, words, numbers, input.files[i]));
+  }
   values["has_findings"] = !items.empty();
   values["findings"] = std::move(items);
   std::vector<PageValues> tried = triedRows(diagnosis.tried);
@@ -319,6 +323,7 @@ std::string diagnosisPage(const page::PageTemplate& page, const CauseWords& word
   values["far_worse"] = std::move(far_worse);
   values["has_compared"] = !compared.empty();
   values["compared"] = std::move(compared);
+  addPoseValues(input.poses, of_summary, values);
   return page.render(values);
 }
 

@@ -6,6 +6,7 @@
 
 #include "diagnosis/report/cause_words.h"
 #include "diagnosis/rooms.h"
+#include "mmradartwin_attribution/diagnosed_poses.h"
 #include "mmradartwin_attribution/diagnosis_result.h"
 #include "mmradartwin_attribution/run_description.h"
 #include "page/page_template.h"
@@ -18,15 +19,23 @@ struct FindingFiles {
   std::string records;  ///< "" where it changes no path records
 };
 
-/// summary.json of a diagnosis: what findings.json does not hold.
-nlohmann::json diagnosisSummary(const Diagnosis& diagnosis, const RunDescription& run);
+/// summary.json of a diagnosis: what findings.json does not hold. poses: nullptr where they were not compared.
+nlohmann::json diagnosisSummary(const Diagnosis& diagnosis, const RunDescription& run, const DiagnosedPoses* poses);
 
 /// The template diagnosis.html. Throws InputError as PageTemplate does.
 page::PageTemplate diagnosisTemplate(const page::TemplateText& text);
 
-/// Report of a diagnosis (HTML) for a person. findings: findings.json, summary: diagnosisSummary(); files: by finding.
-std::string diagnosisPage(const page::PageTemplate& page, const CauseWords& words, const Diagnosis& diagnosis,
-                          const nlohmann::json& findings, const nlohmann::json& summary,
-                          const std::vector<FindingFiles>& files, const RunDescription& run);
+/// What the report of a diagnosis is made of.
+struct DiagnosisPageInput {
+  const Diagnosis& diagnosis;
+  const nlohmann::json& findings;          ///< findings.json
+  const nlohmann::json& summary;           ///< diagnosisSummary()
+  const std::vector<FindingFiles>& files;  ///< by finding
+  const RunDescription& run;
+  const DiagnosedPoses* poses;  ///< nullptr where they were not compared
+};
+
+/// Report of a diagnosis (HTML) for a person.
+std::string diagnosisPage(const page::PageTemplate& page, const CauseWords& words, const DiagnosisPageInput& input);
 
 }  // namespace mmradartwin::diagnosis::report

@@ -118,7 +118,7 @@ DiagnosisReport::DiagnosisReport(const std::string& directory, const std::string
 
 DiagnosisReport::~DiagnosisReport() = default;
 
-void DiagnosisReport::write(const Diagnosis& diagnosis, const RunDescription& run) const {
+void DiagnosisReport::write(const Diagnosis& diagnosis, const RunDescription& run, const DiagnosedPoses* poses) const {
   removeEarlier(directory_);
   Findings findings = diagnosis.findings;
   const std::vector<FindingFiles> files = filesOf(findings.findings);
@@ -138,11 +138,11 @@ void DiagnosisReport::write(const Diagnosis& diagnosis, const RunDescription& ru
   writeFindings(findings, directory_ + "/findings.json");
   save(directory_ + "/tried.csv", triedCsv(diagnosis.tried));
   const nlohmann::json as_written = nlohmann::json::parse(toJson(findings));
-  nlohmann::json summary = diagnosisSummary(diagnosis, run);
+  nlohmann::json summary = diagnosisSummary(diagnosis, run, poses);
   summary["answer"] = page::shownText(diagnosisAnswer(diagnosis, page_->words, as_written, summary));
   save(directory_ + "/summary.json", summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   save(directory_ + "/report.html",
-       diagnosisPage(page_->diagnosis, page_->words, diagnosis, as_written, summary, files, run));
+       diagnosisPage(page_->diagnosis, page_->words, {diagnosis, as_written, summary, files, run, poses}));
 }
 
 }  // namespace mmradartwin
