@@ -1,4 +1,5 @@
 // What the window's thread does for each message of a range-angle map: three maps at 20 Hz are 60 of these in a second.
+// And what the panel Twin does when maps and figures have come: at most 20 times a second, whatever comes.
 #include <benchmark/benchmark.h>
 
 #include <QApplication>
@@ -8,6 +9,9 @@
 #include <random>
 
 #include "map_panel.h"
+#include "panel/before_after.h"
+#include "panel/panel_words.h"
+#include "words_panel.h"
 
 namespace mmradartwin {
 namespace {
@@ -75,6 +79,49 @@ BENCHMARK(BM_ShadeAndPaint)
     ->Args({64, 8, 1})
     ->Args({181, 8, 0})
     ->Unit(benchmark::kMillisecond);
+
+TwinFigures madeFigures(unsigned poses) {
+  const Map map = madeMap(256, 64);
+  auto levels = boost::make_shared<mmradartwin_msgs::RangeAngleMap>();
+  for (int r = 0; r < 256; ++r) levels->range_m.push_back(0.04 * r);
+  for (int a = 0; a < 64; ++a) levels->azimuth_rad.push_back(std::asin((2.0 * a - 64) / 64));
+  levels->power_db = map.power_db;
+  auto residual = boost::make_shared<mmradartwin_msgs::RangeAngleMap>(*levels);
+  residual->source = kResidualSource;
+  auto pose = boost::make_shared<mmradartwin_msgs::PoseFigures>();
+  pose->figures.poses = poses;
+  auto all = boost::make_shared<mmradartwin_msgs::Ledger>(pose->figures);
+  return {"as given", pose, all, levels, residual};
+}
+
+// The window "Before and after", open, with new maps of the twin that is simulated.
+void BM_BeforeAndAfter(benchmark::State& state) {
+  BeforeAfter window(nullptr);
+  window.show();
+  const TwinFigures given = madeFigures(1), other = madeFigures(2), third = madeFigures(3);
+  QImage shown(window.size(), QImage::Format_RGB32);
+  int i = 0;
+  for (auto _ : state) {
+    window.showTwins(given, ++i % 2 == 0 ? other : third);
+    window.render(&shown);
+  }
+}
+BENCHMARK(BM_BeforeAndAfter)->Unit(benchmark::kMillisecond);
+
+// The panel's table of figures, which change with each pair of maps.
+void BM_PanelFigures(benchmark::State& state) {
+  WordsPanel words("Figures");
+  words.resize(340, 220);
+  words.show();
+  const TwinFigures before = madeFigures(1), other = madeFigures(2), third = madeFigures(3);
+  QImage shown(words.size(), QImage::Format_RGB32);
+  int i = 0;
+  for (auto _ : state) {
+    words.setWords(wordsOf(++i % 2 == 0 ? other : third, before));
+    words.render(&shown);
+  }
+}
+BENCHMARK(BM_PanelFigures)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace mmradartwin

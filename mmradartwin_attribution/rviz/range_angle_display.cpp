@@ -206,17 +206,7 @@ MapShading RangeAngleDisplay::shading() const {
 }
 
 double RangeAngleDisplay::neededRange_m() const {
-  if (isResidual()) return 0;
-  const std::size_t angles = geometry_->angles();
-  const double from_db = shaded_.scale.high_db - kFollowed_db;
-  for (std::size_t r = geometry_->ranges(); r-- > 0;) {
-    for (std::size_t a = 0; a < angles; ++a) {
-      if (map_->power_db[r * angles + a] >= from_db && shaded_.argb[r * angles + a] != 0) {
-        return geometry_->rangeEdges_m()[r + 1];
-      }
-    }
-  }
-  return 0;
+  return isResidual() ? 0 : farthestOver_m(*geometry_, map_->power_db, shaded_, kFollowed_db);
 }
 
 double RangeAngleDisplay::range_m() {

@@ -3,6 +3,7 @@
 import math
 import os
 import queue
+import re
 import subprocess
 import tempfile
 import threading
@@ -10,26 +11,30 @@ import time
 import unittest
 import unittest.mock
 
+import numpy
 import rosbag
 import rosgraph
 import rospkg
 
 from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.virtual_screen import VirtualScreen
+from test_demo_loop import picture_pixels
+from test_emulated_rig import Rig
 from test_launch_files import Launched, end
 from wait_for import PATIENCE_S, wait_for
 
 # With pictures of what was driven in this folder; else none are kept.
 PICTURES = os.environ.get("MMRADARTWIN_PICTURES", "")
+LEAST_CONTRAST = 3    # of letters with what lies under them, WCAG 2
 
 
 class Window:
     """drive_rviz with the shipped layout on a screen of its own."""
 
-    def __init__(self, environment, folder, **more):
+    def __init__(self, environment, folder, layout="twin", **more):
         self.screen = VirtualScreen(1920, 1080)
         self.folder = folder
-        layout = os.path.join(rospkg.RosPack().get_path("mmradartwin_config"), "rviz", "twin.rviz")
+        layout = os.path.join(rospkg.RosPack().get_path("mmradartwin_config"), "rviz", layout + ".rviz")
         self.log = open(os.path.join(folder, "drive.log"), "w", encoding="utf-8")
         keys = ("ROS_MASTER_URI", "ROS_IP")
         self.process = subprocess.Popen([find_program("mmradartwin_attribution", "drive_rviz"), layout],
@@ -65,6 +70,17 @@ class Window:
         return wait_for(lambda: (text := self.text(name)) and words in text and text,
                         lambda: f"\"{words}\" in {name}: {self.text(name)}; it says {self.text('said')}")
 
+    def pixels(self, name):
+        """What a widget shows, [rows][columns][red, green, blue]."""
+        file = os.path.join(self.folder, "widget.png")
+        self.do(f"grab {name} {file}")
+        return picture_pixels(file)
+
+    def faintest_label(self, name):
+        """Of all words in a widget: how many there are, and the least contrast with what lies under them."""
+        count, ratio = re.match(r"(\d+) labels, the faintest ([\d.]+)", self.do("contrast " + name)).groups()
+        return int(count), float(ratio)
+
     def picture(self, name):
         if PICTURES:
             time.sleep(2)  # rviz draws what it has
@@ -95,11 +111,14 @@ class Driven(unittest.TestCase):
                          "--quiet"]):
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=600)
 
-    def start(self, *arguments, **environment):
-        self.launched = Launched(*arguments, "rviz:=false")
+    def start(self, *arguments, **of_window):
+        self.open_window(Launched(*arguments, "rviz:=false"), **of_window)
+
+    def open_window(self, launched, **of_window):
+        self.launched = launched
         self.addCleanup(self.launched.__exit__)
         wait_for(lambda: rosgraph.is_master_online(self.launched.environment["ROS_MASTER_URI"]), "a master")
-        self.window = Window(self.launched.environment, self.folder, **environment)
+        self.window = Window(self.launched.environment, self.folder, **of_window)
         self.addCleanup(self.window.close)
 
     def last(self, topic):
@@ -108,6 +127,37 @@ class Driven(unittest.TestCase):
         self.launched.record({topic: 1}, file)
         with rosbag.Bag(file) as bag:
             return [message for _, message, _ in bag.read_messages()][-1]
+
+
+    def assert_labels_stand_out(self, name):
+        """Also of buttons that are switched off."""
+        said = self.window.do("contrast " + name)
+        count, ratio = self.window.faintest_label(name)
+        self.assertGreater(count, 8, said)
+        self.assertGreaterEqual(ratio, LEAST_CONTRAST, said)
+
+    def findings_are(self, cause):
+        self.window.wait_for_text("findings", cause.replace("_", " "))
+        findings = self.last("/attribution/findings")
+        self.assertEqual(findings.findings[0].cause, cause)
+        self.assertIn(f"{findings.findings[0].log_likelihood_gain:.0f} nats", self.window.text("findings"))
+
+    def apply(self, cause):
+        """Has what was found simulated; gives the twin as given and the new one."""
+        given = self.last("/twin/scene").twin_yaml
+        self.assertNotIn(cause, given)
+        self.window.do("click apply")
+        self.window.wait_for_text("apply", "grey: is simulated")
+        extended = self.last("/twin/scene").twin_yaml
+        self.assertIn(cause, extended)
+        self.window.wait_for_text("figures", "as given")
+        return given, extended
+
+    def revert(self, given):
+        self.window.do("click revert")
+        self.window.wait_for_text("revert", "grey: the twin is the first one")
+        self.assertEqual(self.last("/twin/scene").twin_yaml, given)
+        self.window.wait_for_text("figures", "with findings")
 
 
 class Inspect(Driven):
@@ -139,8 +189,9 @@ class Inspect(Driven):
         self.shown_is(worst)
         self.assertEqual(self.last("/attribution/pose").name, worst)
         self.assertEqual(window.text("order"), "worst recall first")
-        for _ in range(3):
+        for order in ("q1_energy", "q2_energy", "residual_rms_db"):
             window.do("key order Down")
+            wait_for(lambda order=order: self.last("/inspect/shown").order == order, order)
         worst = max(self.poses, key=lambda pose: pose.residual_rms_db).name
         window.wait_for_text("order", "greatest difference first")
         self.shown_is(worst)
@@ -233,6 +284,27 @@ class Inspect(Driven):
         window.do("key layers Space")
 
 
+class WhatIf(Driven):
+    """The twin of stored results is changed by hand."""
+
+    def test_an_actor_is_moved_and_put_back(self):
+        self.start("inspect.launch", "results:=" + self.results, "pause:=true", layout="what_if")
+        window = self.window
+        window.wait_for_text("words", "nothing is changed")
+        self.assert_labels_stand_out("what_if_panel")
+        window.picture("what_if_before")
+        window.do("row actors sofa")
+        for keys in ("0.5", "Return"):
+            window.do("key x_m_value " + keys)
+        window.wait_for_text("words", "1 change(s)")
+        state = self.last("/what_if/state")
+        self.assertEqual({actor.name: actor.shift_m[0] for actor in state.actors if actor.shift_m[0]}, {"sofa": 0.5})
+        self.assertNotEqual(state.now.explained_power, state.given.explained_power)
+        window.picture("what_if_after")
+        window.do("click undo")
+        window.wait_for_text("words", "nothing is changed")
+
+
 class Replay(Driven):
     """A bag is played, judged, and simulated anew with what was found."""
     effect, frames, locations = "tx_rx_leakage", "30", "6"
@@ -256,10 +328,8 @@ class Replay(Driven):
         self.launched.wait_for_text("the bag is over")
         self.cancel_one()
         window.do("click diagnose")
-        window.wait_for_text("findings", "tx rx leakage")
-        findings = self.last("/attribution/findings")
-        self.assertEqual(findings.findings[0].cause, "tx_rx_leakage")
-        self.assertIn(f"{findings.findings[0].log_likelihood_gain:.0f} nats", window.text("findings"))
+        self.findings_are(self.effect)
+        self.assert_labels_stand_out("twin_panel")
         window.picture("findings")
         self.apply_save_and_revert()
 
@@ -273,14 +343,9 @@ class Replay(Driven):
 
     def apply_save_and_revert(self):
         window = self.window
-        given = self.last("/twin/scene").twin_yaml
-        self.assertNotIn("tx_rx_leakage", given)
-        window.do("click apply")
-        window.wait_for_text("apply", "grey: is simulated")
-        extended = self.last("/twin/scene").twin_yaml
-        self.assertIn("tx_rx_leakage", extended)
-        window.wait_for_text("figures", "as given")
-        window.picture("applied")
+        given, extended = self.apply(self.effect)
+        self.before_and_after()
+        window.picture("after_a_diagnosis")
         file = os.path.join(self.folder, "saved.yaml")
         window.do("click save")
         window.wait_for_text("fileNameEdit", "twin.yaml")
@@ -289,10 +354,87 @@ class Replay(Driven):
         window.wait_for_text("said", "written: " + file)
         with open(file, encoding="utf-8") as text:
             self.assertEqual(text.read(), extended)
-        window.do("click revert")
-        window.wait_for_text("revert", "grey: the twin is the first one")
-        self.assertEqual(self.last("/twin/scene").twin_yaml, given)
-        window.wait_for_text("figures", "with findings")
+        self.revert(given)
+        window.do("close before_after_window")
+        window.do("click before_after")
+        window.wait_for_text("before_after_words", "left")
+
+    def before_and_after(self):
+        """The window that opens shows both twins at one place; less differs with what was found."""
+        window = self.window
+        self.assertIn("as given at the left", window.wait_for_text("before_after_words", "left"))
+
+        def colour(name):
+            pixels = window.pixels(name)[45:, :-70]  # without title and colour bar
+            return (pixels.max(axis=2) - pixels.min(axis=2)).mean()
+        wait_for(lambda: colour("residual_corrected") < 0.9 * colour("residual_given"),
+                 lambda: f"a fainter residual: {colour('residual_given')}, {colour('residual_corrected')}")
+        self.assertGreater(numpy.abs(window.pixels("simulated_given") - window.pixels("simulated_corrected")).max(), 30)
+        self.assertGreaterEqual(window.faintest_label("before_after_window")[1], LEAST_CONTRAST)
+        if PICTURES:
+            window.do(f"grab before_after_window {PICTURES}/before_after.png")
+
+
+@unittest.skipUnless(os.geteuid() == 0, "an emulated card's network needs root")
+class Live(Driven):
+    """An emulated radar is watched, asked, judged, and simulated anew with what was found. It moves on after some seconds,
+    and then what was asked of a place is forgotten."""
+    effect, frames, locations = "tx_rx_leakage", "120", "5"
+
+    def test_a_live_radar_is_asked_and_judged(self):
+        changed = unittest.mock.patch.dict(os.environ)
+        changed.start()
+        self.addCleanup(changed.stop)
+        rig = Rig(self.folder, self.session, None)
+        self.open_window(rig)
+        window = self.window
+        rig.wait_for_text("samples arrive", 1, 240)
+        window.wait_for_text("source", "live")
+        self.assertIn("grey: a live radar has no stored poses", window.text("next"))
+        self.assertIn("grey: a live radar cannot be stopped", window.text("play"))
+        window.wait_for_text("figures", "recall")
+        residuals = self.last("/attribution/residuals")
+        self.assertTrue(residuals.regions)
+        self.ask_about_the_list()
+        self.ask_about_a_map()
+        window.picture("live")
+        # All poses have been played once.
+        rig.wait_for_messages("/diagnosis", {"/radar/adc": int(1.3 * int(self.frames) * int(self.locations))})
+        window.do("tab tabs Diagnosis")
+        window.do("click diagnose")
+        window.wait_for_text("progress", "%")
+        self.findings_are(self.effect)
+        given, _ = self.apply(self.effect)
+        self.last("/attribution/residual_map")    # of the new twin
+        window.wait_for_text("before_after_words", "left")
+        window.picture("live_after_a_diagnosis")
+        self.revert(given)
+
+    def asked(self, order):
+        """The answer to a click, and what the panel says of it; nothing where the radar moved on meanwhile."""
+        try:
+            self.window.do(order)
+        except AssertionError:    # the list has no line, since nothing differs at this pose
+            return None
+        end_s = time.monotonic() + 3
+        while "the twin has" not in (said := self.window.text("why")):
+            if time.monotonic() > end_s:
+                return None
+            time.sleep(0.1)
+        told = self.last("/attribution/explanation")
+        return told.kind and (told, said)
+
+    def ask_about_the_list(self):
+        """A click on a number of "What differs", whatever stands there at that moment."""
+        told, said = wait_for(lambda: self.asked("link residual_list 1"), "an answer about what differs")
+        self.assertRegex(told.kind, "^C[1-5]$")
+        self.assertIn("dB here", said)
+        self.assertGreater(told.range_m, 0)
+
+    def ask_about_a_map(self):
+        told, _ = wait_for(lambda: self.asked("click map_of_Measured 0.43 0.5"), "an answer about a place ahead")
+        self.assertLess(abs(told.azimuth_rad), math.radians(20))
+        self.assertTrue(math.isfinite(told.measured_db) and math.isfinite(told.simulated_db))
 
 
 if __name__ == "__main__":

@@ -65,4 +65,18 @@ void fade(const std::vector<float>& power_db, const ShadedMap& shaded, ShadedMap
   }
 }
 
+double farthestOver_m(const FanGeometry& geometry, const std::vector<float>& power_db, const ShadedMap& shaded,
+                      double below_db) {
+  const std::size_t angles = geometry.angles();
+  for (std::size_t r = geometry.ranges(); r-- > 0;) {
+    for (std::size_t a = 0; a < angles; ++a) {
+      const std::size_t cell = r * angles + a;
+      if (power_db[cell] >= shaded.scale.high_db - below_db && shaded.argb[cell] != 0) {
+        return geometry.rangeEdges_m()[r + 1];
+      }
+    }
+  }
+  return 0;
+}
+
 }  // namespace mmradartwin

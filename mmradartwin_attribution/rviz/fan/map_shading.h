@@ -35,4 +35,9 @@ void shade(const FanGeometry& geometry, const std::vector<float>& power_db, cons
 /// middle of either side outwards.
 void fade(const std::vector<float>& power_db, const ShadedMap& shaded, ShadedMap& faded);
 
+/// Far edge of the last range bin with a cell that is shown and lies at most `below_db` below the upper end of the
+/// colours; 0 where there is none.
+double farthestOver_m(const FanGeometry& geometry, const std::vector<float>& power_db, const ShadedMap& shaded,
+                      double below_db);
+
 }  // namespace mmradartwin

@@ -149,6 +149,14 @@ QString wordsOf(const TwinFigures& now, const TwinFigures& before) {
   return html + line("difference, rms", differences) + "</table>";
 }
 
+QString shortWordsOf(const TwinFigures& twin) {
+  if (!twin.pose) return "";
+  const mmradartwin_msgs::PoseFigures& p = *twin.pose;
+  return QString("recall %1, Q1 %2, Q2 %3, difference %4 rms")
+      .arg(percent(p.figures.recall), percent(p.figures.q1_energy), percent(p.figures.q2_energy),
+           level(p.residual_rms_db));
+}
+
 QString wordsOf(const mmradartwin_msgs::Explanation* explanation) {
   if (explanation && explanation->kind.empty() && !explanation->note.empty()) return plain(explanation->note) + ".";
   if (!explanation || explanation->kind.empty()) {

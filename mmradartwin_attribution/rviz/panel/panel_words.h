@@ -13,6 +13,8 @@ namespace mmradartwin {
 
 /// The table of the pose and of all poses, and beside each that of the twin before, where there was one.
 QString wordsOf(const TwinFigures& now, const TwinFigures& before);
+/// How well one twin explains the pose, in a line of plain text.
+QString shortWordsOf(const TwinFigures& twin);
 /// What stands behind a place that was asked for, or how to ask.
 QString wordsOf(const mmradartwin_msgs::Explanation* explanation);
 /// Findings with values, intervals, gain and place.

@@ -23,6 +23,8 @@ TwinLink::TwinLink(std::function<void()> on_change) : on_change_(std::move(on_ch
   hear("inspect/shown", shown_);
   hear("attribution/pose", pose_);
   hear("attribution/ledger", ledger_);
+  hear("twin/range_angle", simulated_);
+  hear("attribution/residual_map", residual_);
   hear("attribution/explanation", explanation_);
   hear("attribution/findings", findings_);
   hear("inspect/poses", stored_);
@@ -109,7 +111,9 @@ void TwinLink::showPose(const std::string& order, const std::string& pose, int s
   request.order = order;
   request.pose = pose;
   request.step = step;
+  ++showing_;
   services_.callService<Show>("inspect/show", request, this, [this](bool reached, const Show::Response& response) {
+    --showing_;
     const QString problem = response.success ? "" : QString::fromStdString(response.message);
     say(reached ? problem : "inspect/show does not answer");
   });
@@ -180,6 +184,7 @@ void TwinLink::applyTwin(const std::string& file, bool extended) {
                                [this, extended, before](bool reached, const Apply::Response& response) {
                                  if (reached && response.success) {
                                    applied_ = extended;
+                                   changed_ = true;
                                    other_ = before;
                                  }
                                  say(reached ? QString::fromStdString(response.message) : "twin/apply does not answer");

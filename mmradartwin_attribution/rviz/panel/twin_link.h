@@ -7,6 +7,7 @@
 #include <mmradartwin_msgs/Findings.h>
 #include <mmradartwin_msgs/Ledger.h>
 #include <mmradartwin_msgs/PoseFigures.h>
+#include <mmradartwin_msgs/RangeAngleMap.h>
 #include <mmradartwin_msgs/Scene.h>
 #include <mmradartwin_msgs/ShownPose.h>
 #include <mmradartwin_msgs/StoredPoses.h>
@@ -22,11 +23,15 @@
 
 namespace mmradartwin {
 
-/// The table of one twin.
+/// RangeAngleMap::source of a residual.
+constexpr std::uint8_t kResidualSource = 2;
+
+/// The table of one twin, and its maps.
 struct TwinFigures {
   QString label;
   mmradartwin_msgs::PoseFigures::ConstPtr pose;
   mmradartwin_msgs::Ledger::ConstPtr all;
+  mmradartwin_msgs::RangeAngleMap::ConstPtr simulated, residual;
 };
 
 /// The panel's side of the graph: what it hears of the nodes, and what it asks them for. `on_change` is called in the
@@ -47,6 +52,8 @@ class TwinLink : public QObject {
 
   /// `pose` and `step` as in ShowPose; `order` empty: as before.
   void showPose(const std::string& order, const std::string& pose, int step);
+  /// A call of showPose() has no answer yet.
+  bool showing() const { return showing_ > 0; }
   void play(bool on);
   void diagnose();
   void cancelDiagnosis();
@@ -62,10 +69,13 @@ class TwinLink : public QObject {
   const mmradartwin_msgs::Explanation* explanation() const { return explanation_.get(); }
   const mmradartwin_msgs::Findings* findings() const { return findings_.get(); }
   const mmradartwin_msgs::Scene* twin() const { return twin_.get(); }
-  TwinFigures figures() const { return {QString(), pose_, ledger_}; }
+  TwinFigures figures() const { return {QString(), pose_, ledger_, simulated_, residual_}; }
+  /// Of the twin before the last change; without maps and figures where there was none.
   const TwinFigures& otherFigures() const { return other_; }
   bool playing() const;
   bool diagnosing() const { return diagnosing_; }
+  /// The twin has been changed by apply(), and perhaps back.
+  bool changed() const { return changed_; }
   bool applied() const { return applied_; }
   QString stage() const { return stage_; }
   double share() const { return share_; }
@@ -93,13 +103,15 @@ class TwinLink : public QObject {
   mmradartwin_msgs::ShownPose::ConstPtr shown_;
   mmradartwin_msgs::PoseFigures::ConstPtr pose_;
   mmradartwin_msgs::Ledger::ConstPtr ledger_;
+  mmradartwin_msgs::RangeAngleMap::ConstPtr simulated_, residual_;
   mmradartwin_msgs::Explanation::ConstPtr explanation_;
   mmradartwin_msgs::Findings::ConstPtr findings_;
   mmradartwin_msgs::Scene::ConstPtr twin_;
   TwinFigures other_;
   std::string report_file_, extended_twin_file_;
-  bool diagnosing_ = false, applied_ = false, player_there_ = false, player_runs_ = false;
+  bool diagnosing_ = false, applied_ = false, changed_ = false, player_there_ = false, player_runs_ = false;
   bool asked_for_player_ = false;
+  int showing_ = 0;
   ros::WallTime player_looked_;
   ros::Time clock_;
   ros::WallTime clock_moved_;

@@ -17,7 +17,9 @@
 #include <pluginlib/class_list_macros.hpp>
 #include <utility>
 
+#include "../disabled_letters.h"
 #include "../words_panel.h"
+#include "before_after.h"
 #include "layer_list.h"
 #include "panel_words.h"
 #include "twin_link.h"
@@ -46,9 +48,11 @@ void allow(QWidget* widget, const QString& why_not, const QString& tip) {
 }  // namespace
 
 TwinPanel::TwinPanel(QWidget* parent) : rviz::Panel(parent) {
+  setObjectName("twin_panel");
   link_ = std::make_unique<TwinLink>([this] { showSoon(); });
   auto* all = new QVBoxLayout(this);
   all->setContentsMargins(4, 4, 4, 4);
+  keepDisabledLettersReadable(*this);
   source_ = new QLabel;
   source_->setObjectName("source");
   source_->setWordWrap(true);
@@ -123,6 +127,7 @@ QWidget* TwinPanel::makeDiagnosis() {
   save_ = button("save", "Save twin…", "");
   save_->setText(QString::fromUtf8("Save twin…"));
   report_ = button("report", "Report", "");
+  compare_ = button("before_after", "Before and after", "");
   progress_ = new QProgressBar;
   progress_->setObjectName("progress");
   progress_->setRange(0, 100);
@@ -134,6 +139,7 @@ QWidget* TwinPanel::makeDiagnosis() {
   connect(revert_, &QPushButton::clicked, this, [this] { link_->revert(); });
   connect(save_, &QPushButton::clicked, this, [this] { saveTwin(); });
   connect(report_, &QPushButton::clicked, this, [this] { openReport(); });
+  connect(compare_, &QPushButton::clicked, this, [this] { showBeforeAfter(true); });
   auto* diagnosis = new QWidget;
   auto* grid = new QGridLayout(diagnosis);
   grid->setContentsMargins(2, 4, 2, 2);
@@ -146,6 +152,7 @@ QWidget* TwinPanel::makeDiagnosis() {
   grid->addWidget(apply_, 3, 0);
   grid->addWidget(revert_, 3, 1);
   grid->addWidget(save_, 3, 2);
+  grid->addWidget(compare_, 4, 0, 1, 3);
   grid->setRowStretch(2, 1);
   return diagnosis;
 }
@@ -161,6 +168,8 @@ void TwinPanel::show() {
   figures_->setWords(wordsOf(link_->figures(), link_->otherFigures()));
   why_->setWords(wordsOf(link_->explanation()));
   showDiagnosis();
+  const bool first_change = link_->changed() && !std::exchange(was_changed_, link_->changed());
+  showBeforeAfter(first_change);
   said_->setText(link_->said());
   said_->setVisible(!link_->said().isEmpty());
   if (vis_manager_ && layers_->isVisible()) layers_->follow(*vis_manager_->getRootDisplayGroup());
@@ -180,7 +189,8 @@ void TwinPanel::showPoses() {
                  .arg(shown->rank + 1)
                  .arg(shown->count);
     const QSignalBlocker quiet(order_);
-    order_->setCurrentIndex(order_->findData(QString::fromStdString(shown->order)));
+    const int index = order_->findData(QString::fromStdString(shown->order));
+    if (!link_->showing()) order_->setCurrentIndex(index);  // else it is about to become what was chosen
   }
   source_->setText(words);
   const QString why_not = link_->whyNoPoses();
@@ -202,10 +212,23 @@ void TwinPanel::showDiagnosis() {
   allow(revert_, link_->whyNoRevert(), "simulate the twin as it was given");
   allow(save_, link_->twin() ? "" : "no twin is known", "write the twin that is simulated into a twin.yaml");
   allow(report_, link_->reportFile().isEmpty() ? "there is no report yet" : "", link_->reportFile());
+  allow(compare_, link_->changed() ? "" : "apply what was found, first",
+        "maps and residuals of the twin as given and with what was found, side by side");
   progress_->setVisible(runs);
   progress_->setValue(static_cast<int>(100 * link_->share()));
   progress_->setFormat(link_->stage() + " %p %");
   findings_->setWords(wordsOf(link_->findings()));
+}
+
+void TwinPanel::showBeforeAfter(bool open) {
+  if (open && !before_after_) {
+    before_after_ = new BeforeAfter(this);
+    before_after_->move(window()->geometry().center() - before_after_->rect().center());  // the panel stays in sight
+  }
+  if (open) before_after_->show();
+  if (!before_after_ || !before_after_->isVisible()) return;
+  const TwinFigures now = link_->figures(), other = link_->otherFigures();
+  before_after_->showTwins(link_->applied() ? other : now, link_->applied() ? now : other);
 }
 
 void TwinPanel::showWorst() {

@@ -11,6 +11,7 @@ class QPushButton;
 
 namespace mmradartwin {
 
+class BeforeAfter;
 class LayerList;
 class TwinLink;
 class WordsPanel;
@@ -31,6 +32,8 @@ class TwinPanel : public rviz::Panel {
   void show();
   void showPoses();
   void showDiagnosis();
+  /// Opens the window where `open`, and draws it anew where it is open.
+  void showBeforeAfter(bool open);
   void showWorst();
   void saveTwin();
   void openReport();
@@ -40,10 +43,12 @@ class TwinPanel : public rviz::Panel {
   QComboBox* order_ = nullptr;
   QPushButton *worst_ = nullptr, *previous_ = nullptr, *play_ = nullptr, *next_ = nullptr;
   QPushButton *diagnose_ = nullptr, *cancel_ = nullptr, *apply_ = nullptr, *revert_ = nullptr, *save_ = nullptr,
-              *report_ = nullptr;
+              *report_ = nullptr, *compare_ = nullptr;
   QProgressBar* progress_ = nullptr;
   WordsPanel *figures_ = nullptr, *why_ = nullptr, *findings_ = nullptr;
   LayerList* layers_ = nullptr;
+  BeforeAfter* before_after_ = nullptr;
+  bool was_changed_ = false;
   bool due_ = false;
 };
 

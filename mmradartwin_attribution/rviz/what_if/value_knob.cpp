@@ -17,6 +17,7 @@ constexpr double kWide = 100;  // of two ends, from here on a slider's steps are
 ValueKnob::ValueKnob(const QString& name, double min, double max, std::function<void(double, bool)> on_change)
     : min_(min), max_(max), slider_(new QSlider(Qt::Horizontal)), box_(new QDoubleSpinBox) {
   setObjectName(name);
+  box_->setObjectName(name + "_value");
   auto* row = new QHBoxLayout(this);
   row->setContentsMargins(0, 0, 0, 0);
   row->addWidget(slider_, 1);

@@ -16,6 +16,8 @@
 #include <cmath>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "../disabled_letters.h"
+
 namespace mmradartwin {
 namespace {
 
@@ -43,6 +45,8 @@ QWidget* scrolled(QWidget* inside) {
 
 WhatIfPanel::WhatIfPanel(QWidget* parent) : rviz::Panel(parent) {
   auto* all = new QVBoxLayout(this);
+  setObjectName("what_if_panel");
+  keepDisabledLettersReadable(*this);
   numbers_ = new QLabel;
   numbers_->setObjectName("numbers");
   numbers_->setTextFormat(Qt::RichText);

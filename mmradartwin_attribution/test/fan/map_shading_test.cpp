@@ -171,5 +171,23 @@ TEST_F(Shading, AMapOfAnotherShapeIsRefused) {
   EXPECT_THROW(shade(geometry_, power_, shading_, shaded_), InputError);
 }
 
+TEST(FarthestOver, IsTheFarEdgeOfTheLastCellThatIsShownAndStrongEnough) {
+  const FanGeometry geometry({0, 1, 2, 3, 4}, {-1.2, 0, 1.2});
+  std::vector<float> power_db(15, -80);
+  power_db[1 * 3 + 1] = 0;
+  power_db[2 * 3 + 1] = -25;
+  power_db[3 * 3 + 1] = -35;
+  power_db[4 * 3 + 0] = 0;  // beyond what is shown
+  MapShading shading;
+  shading.mask_azimuth_rad = 1;
+  shading.peak_azimuth_rad = 1;
+  ShadedMap shaded;
+  shade(geometry, power_db, shading, shaded);
+  EXPECT_DOUBLE_EQ(farthestOver_m(geometry, power_db, shaded, 30), 2.5);
+  EXPECT_DOUBLE_EQ(farthestOver_m(geometry, power_db, shaded, 40), 3.5);
+  EXPECT_DOUBLE_EQ(farthestOver_m(geometry, power_db, shaded, 10), 1.5);
+  EXPECT_DOUBLE_EQ(farthestOver_m(geometry, power_db, shaded, -1), 0);
+}
+
 }  // namespace
 }  // namespace mmradartwin

@@ -4,11 +4,14 @@
 //   click NAME [X Y]   mouse click on a widget, at shares of its width and height (default: its middle)
 //   shift NAME X Y     the same with Shift
 //   tab NAME TITLE     click on a tab
-//   row NAME TEXT      click on the line of a tree that says so
+//   row NAME TEXT      click on the line of a tree, list or table that says so
 //   key NAME KEYS      Home, Down, Space, Return, or letters to type
 //   text NAME          what stands in the widget; "grey: REASON" where it is disabled
 //   tool NAME          click on a tool of the tool bar
 //   link NAME N        click on the N-th link of a text
+//   grab NAME FILE     write what the widget shows into a PNG
+//   contrast NAME      "N labels, the faintest R: WORDS" of the widget and all in it
+//   close NAME         close a window
 //   quit
 //
 // NAME is a widget's objectName; "render" is the 3-D view.
@@ -18,6 +21,8 @@
 #include <rviz/visualization_frame.h>
 
 #include <QAbstractButton>
+#include <QAbstractItemView>
+#include <QAbstractSpinBox>
 #include <QApplication>
 #include <QComboBox>
 #include <QLabel>
@@ -27,12 +32,13 @@
 #include <QTextBrowser>
 #include <QToolBar>
 #include <QToolButton>
-#include <QTreeWidget>
 #include <QtTest/QTest>
 #include <iostream>
 #include <stdexcept>
 #include <string>
 #include <thread>
+
+#include "label_contrast.h"
 
 namespace {
 
@@ -84,11 +90,13 @@ void clickTab(const QString& name, const QString& title) {
 }
 
 void clickRow(const QString& name, const QString& text) {
-  auto* tree = qobject_cast<QTreeWidget*>(visible(name));
-  const QList<QTreeWidgetItem*> found = tree->findItems(text, Qt::MatchExactly | Qt::MatchRecursive);
+  auto* view = qobject_cast<QAbstractItemView*>(visible(name));
+  if (!view) throw std::runtime_error(name.toStdString() + " has no lines");
+  const QModelIndexList found =
+      view->model()->match(view->model()->index(0, 0), Qt::DisplayRole, text, 1, Qt::MatchExactly | Qt::MatchRecursive);
   if (found.isEmpty()) throw std::runtime_error("no line " + text.toStdString());
-  tree->scrollToItem(found.front());
-  QTest::mouseClick(tree->viewport(), Qt::LeftButton, Qt::NoModifier, tree->visualItemRect(found.front()).center());
+  view->scrollTo(found.front());
+  QTest::mouseClick(view->viewport(), Qt::LeftButton, Qt::NoModifier, view->visualRect(found.front()).center());
 }
 
 void press(const QString& name, const QString& keys) {
@@ -104,6 +112,7 @@ void press(const QString& name, const QString& keys) {
     QTest::keyClick(widget, Qt::Key_Return);
   } else {
     if (auto* line = qobject_cast<QLineEdit*>(widget)) line->selectAll();
+    if (auto* number = qobject_cast<QAbstractSpinBox*>(widget)) number->selectAll();
     QTest::keyClicks(widget, keys);
   }
 }
@@ -137,6 +146,15 @@ void clickLink(const QString& name, int number) {
   throw std::runtime_error("no link " + std::to_string(number));
 }
 
+QString faintestLabel(const QString& name) {
+  const mmradartwin::LabelContrasts labels(*visible(name));
+  const auto& all = labels.all();
+  if (all.empty()) throw std::runtime_error(name.toStdString() + " has no words");
+  const auto faintest =
+      std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.ratio < b.ratio; });
+  return QString("%1 labels, the faintest %2: %3").arg(all.size()).arg(faintest->ratio, 0, 'f', 2).arg(faintest->words);
+}
+
 QString obey(const QString& line) {
   const QString order = line.section(' ', 0, 0), name = line.section(' ', 1, 1), rest = line.section(' ', 2);
   if (order == "click" || order == "shift") {
@@ -158,6 +176,12 @@ QString obey(const QString& line) {
     clickTool(line.section(' ', 1));
   } else if (order == "link") {
     clickLink(name, rest.toInt());
+  } else if (order == "grab") {
+    if (!visible(name)->grab().save(rest)) throw std::runtime_error(rest.toStdString() + " cannot be written");
+  } else if (order == "contrast") {
+    return faintestLabel(name).replace('\n', ' ');
+  } else if (order == "close") {
+    visible(name)->close();
   } else if (order == "quit") {
     QApplication::quit();
   } else {

@@ -16,6 +16,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "label_contrast.h"
 #include "mmradartwin_dsp/range_angle.h"
 #include "mmradartwin_dsp/ros/conversions.h"
 #include "mmradartwin_dsp/session.h"
@@ -97,6 +98,11 @@ class WhatIfPanelTest : public ::testing::Test {
     QTest::keyClick(&box, Qt::Key_Return);
     box.clearFocus();
   }
+  void expectLabelsToStandOut() {
+    const LabelContrasts labels(panel_);
+    EXPECT_GT(labels.all().size(), 8u);
+    for (const LabelContrast& label : labels.all()) EXPECT_GE(label.ratio, 3) << label.words.toStdString();
+  }
   void picture(const std::string& name) {
     const char* folder = std::getenv("MMRADARTWIN_PICTURES");
     if (folder) panel_.grab().save(QString::fromStdString(std::string(folder) + "/" + name + ".png"));
@@ -111,6 +117,7 @@ class WhatIfPanelTest : public ::testing::Test {
 
 TEST_F(WhatIfPanelTest, WhatAPersonDoes) {
   picture("as_given");
+  expectLabelsToStandOut();
   EXPECT_TRUE(state_->edits.empty());
   EXPECT_FALSE(find<QPushButton>("revert")->isEnabled());
   EXPECT_NEAR(state_->now.q1_energy, state_->given.q1_energy, 0);
@@ -162,12 +169,14 @@ TEST_F(WhatIfPanelTest, WhatAPersonDoes) {
   ASSERT_TRUE(waitFor([&] { return pattern() && pattern()->parameters.front().value > before; }));
   EXPECT_FALSE(state_->traced);
   picture("mechanisms");
+  expectLabelsToStandOut();
 
   // The radar is turned.
   openTab(2);
   type("radar_yaw_deg", "5");
   ASSERT_TRUE(waitFor([&] { return state_->edits.back().find("turned by 5 deg") != std::string::npos; }));
   picture("radar");
+  expectLabelsToStandOut();
 
   // Back, step by step and at once.
   const std::size_t edits = state_->edits.size();
