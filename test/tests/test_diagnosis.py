@@ -302,7 +302,8 @@ class HiddenEffects(InFolder):
             with open(self.at(os.path.join("out", figure)), "rb") as picture:
                 self.assertEqual(picture.read(8), b"\x89PNG\r\n\x1a\n")
         with open(self.at("out/report.html"), encoding="utf-8") as report:
-            self.assertEqual(report.read().count('src="data:image/png;base64,'), 6)   # two maps and the room of each
+            pictures = report.read().count('src="data:image/png;base64,')
+        self.assertEqual(pictures, 2 * 3 + 3 * 5)    # two maps and the room of each finding; five maps of each pose that is shown
         # The twin that it wrote has both, and nothing more is found with it.
         extended = self.at("out/twin.extended.yaml")
         with open(extended, encoding="ascii") as twin:
