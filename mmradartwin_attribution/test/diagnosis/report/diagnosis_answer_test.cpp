@@ -46,8 +46,8 @@ std::string answerOf(std::vector<Finding> findings, bool has_twin = true, std::s
   d.tried.resize(tried);
   d.findings.findings = std::move(findings);
   const CauseWords words(page::templatesOf(""));
-  return page::shownText(
-      diagnosisAnswer(d, words, nlohmann::json::parse(toJson(d.findings)), diagnosisSummary(d, RunDescription())));
+  return page::shownText(diagnosisAnswer(d, words, nlohmann::json::parse(toJson(d.findings)),
+                                         diagnosisSummary(d, RunDescription(), nullptr)));
 }
 
 TEST(DiagnosisAnswer, OfOneCause) {
