@@ -26,9 +26,10 @@ namespace mmradartwin::diagnosis {
 namespace {
 
 constexpr int kFolds = 5;
-/// The scene's error over the one that actors are judged by, from which on they are let farther; and how often.
+/// The scene's error over the one that actors are judged by, from which on they are let farther: more than the estimate
+/// scatters by; see docs/verification/calibration_of_bounds.md#errors-of-the-ground
 constexpr double kWider = 1.2;
-constexpr int kMostWidenings = 3;
+constexpr int kMostWidenings = 3;  ///< each costs a fit of all latents
 
 }  // namespace
 
