@@ -15,19 +15,23 @@ from test_demo_loop import picture_pixels
 from test_launch_files import end, free_port, start_master
 from wait_for import wait_for
 
-# In a process of its own: rospy knows one master for as long as it lives. Publishes a pose and maps until it is ended;
-# each line of standard input is the angle of the maps' echo from then on, in degrees.
-PUBLISH = """
-import math, sys, threading, rospy
-from geometry_msgs.msg import TransformStamped
-from mmradartwin_msgs.msg import RangeAngleMap, Residual, Residuals, ResponseRegion
-from tf2_msgs.msg import TFMessage
+# In a process of its own: rospy knows one master for as long as it lives. Each line of standard input is the echo of
+# the maps from then on.
+LISTEN = """
+import sys, threading, rospy
 rospy.init_node("maps")
 echo = [0.0]
 def listen():
     for line in sys.stdin:
         echo[0] = float(line)
 threading.Thread(target=listen, daemon=True).start()
+"""
+# Publishes a pose and maps until it is ended; the echo is an angle in degrees.
+PUBLISH = LISTEN + """
+import math
+from geometry_msgs.msg import TransformStamped
+from mmradartwin_msgs.msg import RangeAngleMap, Residual, Residuals, ResponseRegion
+from tf2_msgs.msg import TFMessage
 topics = {"radar/range_angle": 0, "twin/range_angle": 1, "attribution/residual_map": 2}
 publishers = {t: rospy.Publisher("/" + t, RangeAngleMap, queue_size=1) for t in topics}
 residuals = rospy.Publisher("/attribution/residuals", Residuals, queue_size=1)
@@ -56,16 +60,9 @@ while not rospy.is_shutdown():
     residuals.publish(r)
     rate.sleep()
 """
-# The same of range-Doppler maps; each line of standard input is the echo's speed from then on, in m/s.
-PUBLISH_SPEEDS = """
-import sys, threading, rospy
+# The same of range-Doppler maps; the echo is a speed in m/s.
+PUBLISH_SPEEDS = LISTEN + """
 from mmradartwin_msgs.msg import RangeDopplerMap
-rospy.init_node("maps")
-echo = [0.0]
-def listen():
-    for line in sys.stdin:
-        echo[0] = float(line)
-threading.Thread(target=listen, daemon=True).start()
 publisher = rospy.Publisher("/radar/range_doppler", RangeDopplerMap, queue_size=1)
 ranges, speeds = [0.1 * r for r in range(60)], [0.1 * d for d in range(-32, 32)]
 rate = rospy.Rate(10)
