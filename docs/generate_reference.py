@@ -342,7 +342,7 @@ YAML_FILES = [
     ("scene.yaml", ["mmradartwin_sim/src/scene/scene.cpp"], []),
     ("materials.yaml", ["mmradartwin_sim/src/scene/material.cpp"], ["mmradartwin_sim/include/mmradartwin_sim/material.h"]),
     ("twin.yaml", ["mmradartwin_sim/src/twin/twin_description.cpp"], []),
-    ("channels.yaml", ["mmradartwin_dsp/src/channel_correction.cpp"], []),
+    ("channels.yaml", ["mmradartwin_dsp/src/chain/channel_correction.cpp"], []),
     ("attribution.yaml", ["mmradartwin_attribution/src/attribution_config.cpp"],
      ["mmradartwin_attribution/include/mmradartwin_attribution/attribution_config.h"]),
 ]
