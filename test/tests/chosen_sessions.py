@@ -1,7 +1,8 @@
 """Which sessions of the diagnosis a run takes: fixed ones always, and in a long run a third of the others, by the day.
 
 Three days in a row take all. MMRADARTWIN_LONG=long takes the day's third, MMRADARTWIN_LONG=all every one;
-MMRADARTWIN_DAY=2026-01-31 repeats a day, which a long run prints.
+MMRADARTWIN_DAY=2026-01-31 repeats a day, which is printed. Of the causes of the catalogue a usual run takes the day's
+half.
 """
 import datetime
 import hashlib
@@ -15,8 +16,13 @@ NOT_TAKEN = ("of the long run" if not RUN else f"not of {DAY}") + "; MMRADARTWIN
 
 if RUN not in ("", "long", "all"):
     raise ValueError(f"MMRADARTWIN_LONG is long or all, not '{RUN}'")
-if RUN:
+def print_day():
+    """The line by which a run is repeated."""
     print(f"MMRADARTWIN_DAY={DAY}", file=sys.stderr, flush=True)
+
+
+if RUN:
+    print_day()
 
 
 def is_taken(name, always=False):
@@ -25,6 +31,12 @@ def is_taken(name, always=False):
         return True
     third = int.from_bytes(hashlib.sha256(name.encode()).digest()[:4], "big") % THIRDS
     return RUN == "long" and third == DAY.toordinal() % THIRDS
+
+
+def is_of_half(index):
+    """True where this run takes the index-th of a row of sessions: a long run takes all, a usual one every second. Two
+    days in a row take all."""
+    return bool(RUN) or index % 2 == DAY.toordinal() % 2
 
 
 def every_run(test):
