@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,8 @@ struct Diagnosis {
   std::vector<PoseProblem> problems;  ///< poses that were left out
   std::vector<TriedHypothesis> tried;
   double explained_power = 0;  ///< of the twin as given, all poses
+  /// Nats that the twin as given gained by `knife_edges: 1`, where all was judged so; the extended twin then has it.
+  std::optional<double> knife_edges_nats;
   std::vector<ComparedTwin> compared;
   SurveyPlan plan;
 };

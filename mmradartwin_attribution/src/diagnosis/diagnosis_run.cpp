@@ -16,6 +16,7 @@
 #include "diagnosis/receiver/receiver_noise.h"
 #include "diagnosis/receiver/sample_convention.h"
 #include "diagnosis/receiver/strongest_echo.h"
+#include "diagnosis/rounds/knife_edges.h"
 #include "diagnosis/scene_match.h"
 #include "diagnosis/survey_plan.h"
 #include "diagnosis/unexplained_frames.h"
@@ -139,12 +140,29 @@ void DiagnosisRun::fitTwinAsGiven() {
   context_.echoes.pointBeams(data_, mechanisms_, context_.likelihood.firstBin());
   context_.echoes.setBaseline(mechanisms_);
   state_ = context_.fitter.state(mechanisms_, nullptr);
-  if (!session_.few) takeSmallerErrors();
+  if (!session_.few) {
+    takeKnifeEdges();
+    takeSmallerErrors();
+  }
   for (Finding& finding : result_.findings.findings) {
     if (traitsOf(finding.cause).form != MechanismForm::kBodyFixedTone) continue;
     referToStrongestEcho(twin_.changed(mechanisms_), data_, finding);
     replaceOrAppend(*finding.mechanism, extended_);
   }
+}
+
+void DiagnosisRun::takeKnifeEdges() {
+  std::optional<ModelState> graded = likelierWithKnifeEdges(context_, state_);
+  if (!graded) return;
+  result_.knife_edges_nats = graded->log_likelihood - state_.log_likelihood;
+  state_ = std::move(*graded);
+  mechanisms_ = state_.mechanisms;
+  extended_ = *withKnifeEdges(std::move(extended_));
+}
+
+std::vector<NamedParameters> DiagnosisRun::given() const {
+  const std::vector<NamedParameters>& as_given = twin_.description().mechanisms;
+  return result_.knife_edges_nats ? *withKnifeEdges(as_given) : as_given;
 }
 
 void DiagnosisRun::compareTwins() {
@@ -189,7 +207,7 @@ bool DiagnosisRun::sceneMatches() {
   }
   if (!alone.empty()) *mismatch->description += ". What needs no scene, told without one: " + alone;
   findings.findings = {std::move(*mismatch)};
-  extended_ = twin_.description().mechanisms;
+  extended_ = given();
   return false;
 }
 
@@ -303,7 +321,7 @@ void DiagnosisRun::insertBeforeUnknown(Finding finding) {
 /// Each finding changes the paths of the twin with the findings before it. Adds the paper's metrics where its round has
 /// not measured them.
 void DiagnosisRun::recordChangedPaths() {
-  std::vector<NamedParameters> mechanisms = twin_.description().mechanisms;
+  std::vector<NamedParameters> mechanisms = given();
   const std::vector<FrameFinding>& frames = session_.received.frames;
   for (Finding& finding : result_.findings.findings) {
     if (!finding.mechanism) continue;

@@ -58,6 +58,10 @@ class DiagnosisRun {
   /// elsewhere: actors whose range errors the slopes of the likelihood do not show.
   std::map<std::string, SpreadEstimate> spreadsUnder(const ModelState& state,
                                                      const std::vector<RangeShift>& elsewhere) const;
+  /// Lets edges weigh paths by the field behind them where the session is likelier so.
+  void takeKnifeEdges();
+  /// Mechanisms of the twin as given, with edges as they were taken.
+  std::vector<NamedParameters> given() const;
   /// Takes the actors' errors as they are where the twin as given shows them to be smaller than stated.
   void takeSmallerErrors();
   void insertBeforeUnknown(Finding finding);

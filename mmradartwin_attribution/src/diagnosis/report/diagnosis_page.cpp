@@ -34,7 +34,7 @@ const char* const kNames =
     "has_ranges[] actors has_actors[] poses has_poses[]] records[event actors pose before_db before_m before_deg "
     "after_db "
     "after_m after_deg] has_records[] records_file] "
-    "tried[what round gain verdict] has_tried[] tried_count accuracy[key stated estimated] far_worse[sentence] "
+    "tried[what round gain verdict] has_tried[] tried_count accuracy[key stated estimated] judged_by[sentence] "
     "compared[file sentence] has_compared[] ";
 
 std::string wordOf(const char* shown, const char* word) {
@@ -273,6 +273,8 @@ nlohmann::json diagnosisSummary(const Diagnosis& diagnosis, const RunDescription
   j["explained_power"] = diagnosis.has_twin && std::isfinite(diagnosis.explained_power)
                              ? nlohmann::json(diagnosis.explained_power)
                              : nlohmann::json(nullptr);
+  j["knife_edges_nats"] =
+      diagnosis.knife_edges_nats ? nlohmann::json(*diagnosis.knife_edges_nats) : nlohmann::json(nullptr);
   j["tried"] = diagnosis.tried.size();
   j["compared"] = nlohmann::json::array();
   for (const ComparedTwin& twin : diagnosis.compared) {
@@ -318,9 +320,9 @@ std::string diagnosisPage(const page::PageTemplate& page, const CauseWords& word
   values["tried"] = std::move(tried);
   values["tried_count"] = PageValue::html(of_summary.count("/tried"));
   values["accuracy"] = diagnosis.has_twin ? accuracyRows(numbers) : std::vector<PageValues>();
-  std::vector<PageValues> far_worse, compared = comparedItems(of_summary);
-  for (const std::string& sentence : shownFarWorse(diagnosis.findings)) far_worse.push_back({{"sentence", sentence}});
-  values["far_worse"] = std::move(far_worse);
+  std::vector<PageValues> judged_by, compared = comparedItems(of_summary);
+  for (const std::string& sentence : shownJudgedBy(diagnosis)) judged_by.push_back({{"sentence", sentence}});
+  values["judged_by"] = std::move(judged_by);
   values["has_compared"] = !compared.empty();
   values["compared"] = std::move(compared);
   addPoseValues(input.poses, of_summary, values);

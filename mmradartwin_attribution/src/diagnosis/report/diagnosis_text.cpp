@@ -63,7 +63,7 @@ std::string diagnosisText(const Diagnosis& diagnosis) {
         << shownNumber(twin.log_likelihood_gain_ci95[1], 5) << " more by places) and "
         << shownNumber(twin.explained_power) << " of the measured power\n";
   }
-  for (const std::string& sentence : shownFarWorse(diagnosis.findings)) out << sentence << "\n";
+  for (const std::string& sentence : shownJudgedBy(diagnosis)) out << sentence << "\n";
   int number = 0;
   for (const Finding& finding : diagnosis.findings.findings) out << findingText(finding, ++number);
   return out.str();

@@ -36,7 +36,8 @@ std::string shownParameter(const FindingParameter& parameter) {
   return out.str();
 }
 
-std::vector<std::string> shownFarWorse(const Findings& findings) {
+std::vector<std::string> shownJudgedBy(const Diagnosis& diagnosis) {
+  const Findings& findings = diagnosis.findings;
   const std::map<std::string, std::string> of = {{"scene_m", "places of the actors"},
                                                  {"level_db", "levels of the actors' echoes"},
                                                  {"heading_deg", "headings of the poses"}};
@@ -50,6 +51,12 @@ std::vector<std::string> shownFarWorse(const Findings& findings) {
         << shownNumber(findings.accuracy.*key.member) << " " << key.unit << " is stated (" << key.name
         << "); the session was judged by the former.";
     sentences.push_back(out.str());
+  }
+  if (diagnosis.knife_edges_nats) {
+    sentences.push_back(
+        "The twin was judged with edges that weigh a path by the field behind them (knife_edges: 1), not by 0 "
+        "or 1: so the session is " +
+        shownNumber(*diagnosis.knife_edges_nats) + " nats likelier. The extended twin has it so.");
   }
   return sentences;
 }

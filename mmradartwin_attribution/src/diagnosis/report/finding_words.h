@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "diagnosis/rooms.h"
+#include "mmradartwin_attribution/diagnosis_result.h"
 #include "mmradartwin_attribution/finding.h"
 
 namespace mmradartwin::diagnosis::report {
@@ -13,8 +14,9 @@ namespace mmradartwin::diagnosis::report {
 std::string shownNumber(double value, int significant_digits = 3);
 /// "name = value unit (low to high)".
 std::string shownParameter(const FindingParameter& parameter);
-/// A sentence for each accuracy that the session shows to be far worse than stated.
-std::vector<std::string> shownFarWorse(const Findings& findings);
+/// Sentences about what the session was judged by other than it and its twin state: accuracies that are far worse, and
+/// how edges hide what is behind them.
+std::vector<std::string> shownJudgedBy(const Diagnosis& diagnosis);
 /// "cause (probability)" of a candidate, with what tells it from others of the same cause.
 std::string shownCandidate(const CauseProbability& candidate);
 /// Parameters of a finding's mechanism beyond those of its cause, in words: the shape of an object, the time of a step

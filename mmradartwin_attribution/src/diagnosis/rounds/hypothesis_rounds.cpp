@@ -19,7 +19,8 @@ namespace mmradartwin::diagnosis::rounds {
 namespace {
 
 constexpr std::size_t kMostRangeErrors = 4;  ///< actors whose range error is searched for in a round
-constexpr std::size_t kMostAllowedFor = 12;  ///< things that stand out of the clutter, allowed for in a session
+constexpr std::size_t kMostAllowedFor =
+    12;  ///< things that stand out of the clutter and moves within the scene's error
 
 /// True of a transmitter's delay that is no larger than its error: its phase alone is another cause's.
 bool isPhaseOnly(const HypothesisFit& fit) {
@@ -100,6 +101,10 @@ void HypothesisRounds::run(const std::vector<NamedParameters>& mechanisms, const
     const RoundEnd end = findOne(round);
     if (end == RoundEnd::kNothing) break;
     if (end == RoundEnd::kFound) ++found;
+    // Beside a large error of the twin, edges do not tell how they hide.
+    if (result_.knife_edges_nats) continue;
+    result_.knife_edges_nats = selection_.takeKnifeEdges();
+    if (result_.knife_edges_nats) ranking_.tryAllAgain();
   }
   selection_.finish();
 }
@@ -143,6 +148,28 @@ std::vector<HypothesisFit> HypothesisRounds::newClutter(const std::vector<Hypoth
   return apart;
 }
 
+std::vector<HypothesisFit> HypothesisRounds::newMoves(const std::vector<HypothesisFit>& moves,
+                                                      std::size_t others) const {
+  std::vector<HypothesisFit> fresh;
+  for (const HypothesisFit& move : moves) {
+    const bool is_new = std::find(moves_allowed_for_.begin(), moves_allowed_for_.end(), move.hypothesis.subject) ==
+                        moves_allowed_for_.end();
+    if (is_new && allowed_for_ + others + fresh.size() < kMostAllowedFor) fresh.push_back(move);
+  }
+  return fresh;
+}
+
+void HypothesisRounds::allowFor(const std::vector<HypothesisFit>& granted, int round) {
+  for (const HypothesisFit& fit : granted) {
+    triedAs(fit, round, result_.tried).verdict += ", allowed for in what follows";
+    if (fit.hypothesis.isMove()) moves_allowed_for_.push_back(fit.hypothesis.subject);
+  }
+  context_.report("what is likelier and no cause", 1);
+  selection_.allowFor(granted);
+  allowed_for_ += granted.size();
+  ranking_.tryAllAgain();
+}
+
 std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<HypothesisFit>& fits, std::size_t best) {
   const ModelState& state = selection_.state();
   std::optional<std::vector<CellPowers>> of_best;
@@ -173,7 +200,7 @@ HypothesisRounds::RoundEnd HypothesisRounds::findOne(int round) {
   preferBetterNames(fits, state);
   preferSimplerNames(fits, state, context_.data);
   MapEvidence maps(context_, state);
-  std::vector<HypothesisFit> clutter;  // likelier than the fits that follow
+  std::vector<HypothesisFit> clutter, within_error;  // likelier than the fits that follow
   for (std::size_t i = 0; i < fits.size(); ++i) {
     HypothesisFit& fit = fits[i];
     std::string& verdict = triedAs(fit, round, result_.tried).verdict;
@@ -181,17 +208,13 @@ HypothesisRounds::RoundEnd HypothesisRounds::findOne(int round) {
     if (isClutter(fit)) clutter.push_back(fit);
     if (!verdict.empty()) continue;
     const bool placed = placeOf(fit.hypothesis.at(fit.scaled_values), context_.twin.scene()).has_value();
-    const std::vector<HypothesisFit> things = placed ? std::vector<HypothesisFit>() : newClutter(clutter);
-    if (!things.empty()) {
-      verdict = "judged again beside clutter that stands out";
-      for (const HypothesisFit& thing : things) {
-        triedAs(thing, round, result_.tried).verdict += ", allowed for in what follows";
-      }
-      context_.report("clutter that stands out", 1);
-      selection_.allowFor(things);
-      allowed_for_ += things.size();
-      ranking_.tryAllAgain();
-      return RoundEnd::kAllowedForClutter;
+    std::vector<HypothesisFit> granted = placed ? std::vector<HypothesisFit>() : newClutter(clutter);
+    const std::vector<HypothesisFit> moves = newMoves(within_error, granted.size());
+    granted.insert(granted.end(), moves.begin(), moves.end());
+    if (!granted.empty()) {
+      verdict = "judged again beside what is likelier and no cause";
+      allowFor(granted, round);
+      return RoundEnd::kAllowedFor;
     }
     Finding finding = findingOf(fit, fits, state, context_.twin.scene(), context_.data);
     if (context_.data.locations.size() > 1) {
@@ -216,8 +239,11 @@ HypothesisRounds::RoundEnd HypothesisRounds::findOne(int round) {
       return RoundEnd::kFound;
     }
     context_.report("taken back: " + fit.hypothesis.label(), 1);
-    // An effect that looks like an actor's own error may have another cause.
-    if (!fit.hypothesis.isMove()) maps.addRejected(fit);
+    if (fit.hypothesis.isMove()) {
+      within_error.push_back(fit);
+    } else {
+      maps.addRejected(fit);
+    }
   }
   return RoundEnd::kNothing;
 }

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "diagnosis/fit/diagnosis_context.h"
@@ -39,9 +40,10 @@ class HypothesisRounds {
   const std::vector<RangeShift>& elsewhere() const { return elsewhere_; }
 
  private:
-  enum class RoundEnd { kNothing, kFound, kAllowedForClutter };
-  /// Runs one round. Where clutter that stands out is likelier than a cause that the scene does not place, the clutter
-  /// is allowed for and the round ends: the next one judges all causes beside it.
+  enum class RoundEnd { kNothing, kFound, kAllowedFor };
+  /// Runs one round. Where clutter that stands out is likelier than a cause that the scene does not place, or the move
+  /// of an actor within the scene's error likelier than a cause, these are allowed for and the round ends: the next one
+  /// judges all causes beside them.
   RoundEnd findOne(int round);
   std::vector<HypothesisFit> fitBest(int round);
   /// Reason why a fit is no finding by its likelihood alone, "" where it may be one.
@@ -51,6 +53,10 @@ class HypothesisRounds {
   bool isClutter(const HypothesisFit& fit) const;
   /// Those of these things, likeliest first, that stand apart from each other, as many as may still be allowed for.
   std::vector<HypothesisFit> newClutter(const std::vector<HypothesisFit>& clutter) const;
+  /// Those of these moves within the scene's error whose actors are not allowed one yet, beside so many other things.
+  std::vector<HypothesisFit> newMoves(const std::vector<HypothesisFit>& moves, std::size_t others) const;
+  /// Takes fits of a round for granted in all that follows.
+  void allowFor(const std::vector<HypothesisFit>& granted, int round);
   /// Index of the likeliest named fit after fits[best] that is about as likely and explains clearly more power on
   /// held-out places; nothing where there is none.
   std::optional<std::size_t> betterByMaps(std::vector<HypothesisFit>& fits, std::size_t best);
@@ -62,8 +68,9 @@ class HypothesisRounds {
   HypothesisRanking ranking_;
   Selection selection_;
   std::vector<RangeShift> elsewhere_;
-  std::size_t family_ = 1;       ///< number of hypotheses of a round
-  std::size_t allowed_for_ = 0;  ///< number of things that stand out of the clutter, taken for granted
+  std::size_t family_ = 1;                      ///< number of hypotheses of a round
+  std::size_t allowed_for_ = 0;                 ///< number of things and moves that are taken for granted
+  std::vector<std::string> moves_allowed_for_;  ///< their actors
 };
 
 }  // namespace mmradartwin::diagnosis::rounds

@@ -11,6 +11,7 @@
 #include "diagnosis/receiver/receiver_findings.h"
 #include "diagnosis/receiver/receiver_image.h"
 #include "diagnosis/rounds/hypothesis_finding.h"
+#include "diagnosis/rounds/knife_edges.h"
 
 namespace mmradartwin::diagnosis::rounds {
 namespace {
@@ -84,6 +85,22 @@ void Selection::allowFor(const std::vector<HypothesisFit>& things) {
   for (const HypothesisFit& thing : things) before_rounds_.push_back(thing.hypothesis.at(thing.scaled_values));
   writeBackFindings();
   refitState();
+}
+
+std::optional<double> Selection::takeKnifeEdges() {
+  std::optional<ModelState> graded = likelierWithKnifeEdges(context_, state_);
+  if (!graded) return std::nullopt;
+  const double nats = graded->log_likelihood - state_.log_likelihood;
+  before_rounds_ = *withKnifeEdges(std::move(before_rounds_));
+  extended_before_rounds_ = *withKnifeEdges(std::move(extended_before_rounds_));
+  state_ = std::move(*graded);
+  writeBackFindings();
+  if (!accepted_.empty()) {
+    refitAndProfile();
+    refitState();
+    for (Accepted& a : accepted_) a.beside.reset();
+  }
+  return nats;
 }
 
 /// Fits all findings of rounds jointly, and withdraws findings that then gain nothing given the others.

@@ -45,6 +45,9 @@ class Selection {
   /// Takes things that the twin lacks for granted: all that follows is judged beside them. They are no findings, and
   /// the extended twin has them not.
   void allowFor(const std::vector<HypothesisFit>& things);
+  /// Lets edges weigh paths by the field behind them where the session is likelier so given all that was found. Returns
+  /// the nats gained, nothing where edges stay as they are.
+  std::optional<double> takeKnifeEdges();
   /// Profiles what was found, and sorts it by falling gain, an unknown last. Gains are measured again where other
   /// findings now precede them.
   void finish();
