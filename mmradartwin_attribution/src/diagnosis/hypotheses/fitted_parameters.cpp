@@ -1,6 +1,7 @@
 #include "diagnosis/hypotheses/fitted_parameters.h"
 
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
@@ -12,6 +13,20 @@ namespace {
 // Factor on standard errors by which 95 % intervals hold the truth as often as they state; see
 // docs/verification/calibration_of_bounds.md#kcalibration.
 constexpr double kCalibration = 1.3;
+
+/// Widens the intervals of a list's elements by the coordinates that add a shape to the list.
+void widenByShapes(const Hypothesis& hypothesis, const std::vector<double>& standard_error, double t,
+                   const std::string& parameter, std::vector<std::array<double, 2>>& ci95) {
+  for (std::size_t k = 0; k < ci95.size(); ++k) {
+    double squares = 0;
+    for (std::size_t j = 0; j < hypothesis.coordinates.size(); ++j) {
+      const Coordinate& c = hypothesis.coordinates[j];
+      if (c.parameter == parameter && k < c.shape.size()) squares += std::pow(t * standard_error[j] * c.shape[k], 2);
+    }
+    ci95[k][0] -= std::sqrt(squares);
+    ci95[k][1] += std::sqrt(squares);
+  }
+}
 
 }  // namespace
 
@@ -49,6 +64,7 @@ std::vector<FindingParameter> fittedParameters(const Hypothesis& hypothesis, con
         const double v = (*list)[static_cast<std::size_t>(c.element)];
         parameter.ci95[static_cast<std::size_t>(c.element)] = {v - t * standard_error[j], v + t * standard_error[j]};
       }
+      widenByShapes(hypothesis, standard_error, t, wanted.name, parameter.ci95);
     }
     parameters.push_back(std::move(parameter));
   }

@@ -12,6 +12,7 @@
 #include "diagnosis/receiver/receiver_image.h"
 #include "diagnosis/rounds/hypothesis_finding.h"
 #include "diagnosis/rounds/knife_edges.h"
+#include "diagnosis/rounds/pattern_curve.h"
 
 namespace mmradartwin::diagnosis::rounds {
 namespace {
@@ -76,6 +77,7 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
     }
   }
   exchangeNames();
+  joinPattern();
   takeOutImage();
   refitState();
   return "";
@@ -356,6 +358,47 @@ void Selection::exchangeNames() {
     exchanged = true;
   }
   if (exchanged) refitAndProfile();
+}
+
+/// A pattern of the elements that is a power of the cosine, and a law without a name of all levels over the same angle,
+/// are one pattern that is a curve. It takes the place of both where the data are as likely under it.
+void Selection::joinPattern() {
+  const auto pattern = std::find_if(accepted_.begin(), accepted_.end(), [](const Accepted& a) {
+    return angleOfPattern(a.hypothesis).has_value() && a.hypothesis.variant.empty();
+  });
+  if (pattern == accepted_.end()) return;
+  const auto law = std::find_if(accepted_.begin(), accepted_.end(), [&](const Accepted& a) {
+    return isLawOfAllLevels(a.hypothesis, *angleOfPattern(pattern->hypothesis));
+  });
+  if (law == accepted_.end()) return;
+  context_.report("the pattern as a curve", 0);
+  const auto [curve, start] = patternCurve(pattern->hypothesis, pattern->hypothesis.at(pattern->scaled_values).values,
+                                           law->hypothesis.at(law->scaled_values).values);
+  std::vector<NamedParameters> others = before_rounds_;
+  for (const Accepted& a : accepted_) {
+    if (&a != &*pattern && &a != &*law) replaceOrAppend(a.hypothesis.at(a.scaled_values), others);
+  }
+  refitState();  // with both
+  const double with_both = state_.log_likelihood;
+  context_.echoes.setBaseline(others);
+  const ModelState null = context_.fitter.state(others, &state_.latents);
+  HypothesisFit fit = context_.fitter.fit(null, curve, {start});
+  context_.fitter.judge(fit, family_);
+  if (fit.state.log_likelihood < with_both - bounds::kNotToldApart_nats) {
+    context_.echoes.setBaseline(mechanisms_);
+    return;
+  }
+  context_.report("found " + fit.hypothesis.label() + " instead of two laws", 1);
+  renameVerdict(pattern->hypothesis.label(), "found, later called " + fit.hypothesis.label());
+  renameVerdict(law->hypothesis.label(), "found, later a part of " + fit.hypothesis.label());
+  const std::size_t at = pattern->finding;
+  findings_[at] = findingOf(fit, {fit}, null, context_.twin.scene(), context_.data);
+  if (context_.data.locations.size() > 1) findings_[at].gain.emplace();
+  accepted_[static_cast<std::size_t>(pattern - accepted_.begin())] = {
+      fit.hypothesis, fit.scaled_values, fit.standard_error, fit.overwhelming, at, {}, {}};
+  state_.latents = fit.state.latents;
+  withdraw(static_cast<std::size_t>(law - accepted_.begin()));
+  refitAndProfile();
 }
 
 void Selection::finish() {

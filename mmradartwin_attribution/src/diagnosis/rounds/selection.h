@@ -80,6 +80,7 @@ class Selection {
   bool mayBeNothing(const Hypothesis& hypothesis) const;
   bool isWithinErrors(const HypothesisFit& fit) const;
   std::optional<HypothesisFit> betterName(const Accepted& a);
+  void joinPattern();
   void exchangeNames();
   void takeOutImage();
   void measureAgain(const Accepted& a);
