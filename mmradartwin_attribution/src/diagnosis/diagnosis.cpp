@@ -11,6 +11,8 @@
 #include "diagnosis/channels/pose_time_lag.h"
 #include "diagnosis/diagnosis_run.h"
 #include "diagnosis/receiver/received_session.h"
+#include "mmradartwin_attribution/scene_refinement.h"
+#include "mmradartwin_dsp/input_error.h"
 
 namespace mmradartwin {
 
@@ -37,14 +39,35 @@ Diagnosis diagnosed(const TimedRecording& timed, Twin& twin, const DiagnosisOpti
   return run.result();
 }
 
+/// Keeps to a number of threads as long as it lives; 0: as many as there are cores.
+std::unique_ptr<tbb::global_control> limited(int jobs) {
+  if (jobs <= 0) return nullptr;
+  return std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                               static_cast<std::size_t>(jobs));
+}
+
 }  // namespace
 
-Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOptions& options) {
-  std::unique_ptr<tbb::global_control> limit;
-  if (options.jobs > 0) {
-    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
-                                                  static_cast<std::size_t>(options.jobs));
+SceneRefinement refineScene(const Recording& recording, Twin& twin, const DiagnosisOptions& options) {
+  const auto limit = limited(options.jobs);
+  const TimedRecording timed =
+      inTime(recording, twin.description().mechanisms, readingProgress(options, "frames on the way"));
+  DiagnosisRun run(timed, twin, options);
+  run.judgeFrames();
+  run.judgeConventions();
+  run.judgeOwnEcho();
+  run.judgeNoise();
+  run.fitTwinAsGiven();
+  if (!run.sceneMatches()) {
+    throw InputError(
+        recording.source +
+        ": the twin explains no more of it than chance; diagnose it first, and refine the scene when it matches");
   }
+  return run.refinement();
+}
+
+Diagnosis diagnose(const Recording& recording, Twin& twin, const DiagnosisOptions& options) {
+  const auto limit = limited(options.jobs);
   const TimedRecording timed =
       inTime(recording, twin.description().mechanisms, readingProgress(options, "frames on the way"));
   Diagnosis by_stated = diagnosed(timed, twin, options, {});

@@ -16,6 +16,7 @@
 #include "diagnosis/receiver/receiver_noise.h"
 #include "diagnosis/receiver/sample_convention.h"
 #include "diagnosis/receiver/strongest_echo.h"
+#include "diagnosis/refined_ranges.h"
 #include "diagnosis/rounds/knife_edges.h"
 #include "diagnosis/scene_match.h"
 #include "diagnosis/survey_plan.h"
@@ -338,6 +339,12 @@ void DiagnosisRun::recordChangedPaths() {
     finding.records = changedRecords(twin_, data_, poses, mechanisms, changed);
     mechanisms = std::move(changed);
   }
+}
+
+SceneRefinement DiagnosisRun::refinement() {
+  rounds_.takeRangeErrors(state_);
+  context_.echoes.setBaseline(state_.mechanisms);
+  return refinedRanges(context_, state_);
 }
 
 Diagnosis DiagnosisRun::result() {

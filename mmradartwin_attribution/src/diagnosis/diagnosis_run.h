@@ -12,6 +12,7 @@
 #include "diagnosis/rooms.h"
 #include "diagnosis/rounds/hypothesis_rounds.h"
 #include "mmradartwin_attribution/diagnosis_result.h"
+#include "mmradartwin_attribution/scene_refinement.h"
 
 namespace mmradartwin::diagnosis {
 
@@ -49,6 +50,9 @@ class DiagnosisRun {
   /// The paths that each finding changes.
   void recordChangedPaths();
   Diagnosis result();
+
+  /// Ranges of the scene's actors by the twin as given; after fitTwinAsGiven().
+  SceneRefinement refinement();
 
  private:
   /// Adds a finding unless the twin states the same already.

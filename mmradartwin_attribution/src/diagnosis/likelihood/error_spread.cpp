@@ -123,6 +123,26 @@ std::optional<SpreadEstimate> estimatedSpread(const ErrorEvidence& evidence, dou
   return SpreadEstimate{stated * std::exp(log_ratio[best]), below(0.025), below(0.975)};
 }
 
+PosteriorErrors posteriorErrors(const ErrorEvidence& evidence, double spread) {
+  const Eigen::Index count = evidence.weighted.size();
+  const Eigen::MatrixXd precision = evidence.information + Eigen::MatrixXd::Identity(count, count) / (spread * spread);
+  const Eigen::MatrixXd covariance = regularised(precision).ldlt().solve(Eigen::MatrixXd::Identity(count, count));
+  const Eigen::VectorXd mean = covariance * evidence.weighted;
+  PosteriorErrors posterior;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    posterior.mean.push_back(mean[i]);
+    posterior.standard_deviation.push_back(std::sqrt(std::max(0.0, covariance(i, i))));
+  }
+  return posterior;
+}
+
+ErrorEvidence rangeEvidence(const ChannelLikelihood& likelihood, const std::vector<PoseEchoes>& echoes,
+                            const SessionLatents& latents, const std::vector<int>& poses) {
+  const Scores scores = likelihood.freeScores(likelihood.basis(echoes, latents, false), {}, poses);
+  const int errors = static_cast<int>(latents.actor_range_m.size());
+  return evidenceOf(scores, latents, latents.globals() - errors, errors);
+}
+
 SessionEvidence errorEvidence(const ChannelLikelihood& likelihood, const std::vector<PoseEchoes>& echoes,
                               const SessionLatents& latents) {
   const Basis basis = likelihood.basis(echoes, latents, false);

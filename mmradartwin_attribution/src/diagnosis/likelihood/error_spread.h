@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <vector>
 
 #include "diagnosis/likelihood/channel_likelihood.h"
 #include "diagnosis/rooms.h"
@@ -30,11 +31,21 @@ struct ErrorEvidence {
 /// prior: log-normal, a factor of e wide. Nothing where the data say little.
 std::optional<SpreadEstimate> estimatedSpread(const ErrorEvidence& evidence, double stated);
 
+/// Posterior mean and standard deviation of errors.
+struct PosteriorErrors {
+  std::vector<double> mean, standard_deviation;  ///< [errors]
+};
+/// Posterior of errors that are normal about zero with this spread.
+PosteriorErrors posteriorErrors(const ErrorEvidence& evidence, double spread);
+
 /// Evidence of the actors' levels and of their ranges, and of the poses' headings, at fitted latents.
 struct SessionEvidence {
   ErrorEvidence actor_gain, actor_range_m, yaw_rad;
 };
 SessionEvidence errorEvidence(const ChannelLikelihood& likelihood, const std::vector<PoseEchoes>& echoes,
                               const SessionLatents& latents);
+/// Evidence of the actors' ranges that these poses alone have.
+ErrorEvidence rangeEvidence(const ChannelLikelihood& likelihood, const std::vector<PoseEchoes>& echoes,
+                            const SessionLatents& latents, const std::vector<int>& poses);
 
 }  // namespace mmradartwin::diagnosis::likelihood

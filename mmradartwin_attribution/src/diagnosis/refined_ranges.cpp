@@ -1,0 +1,81 @@
+#include "diagnosis/refined_ranges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "diagnosis/gain/held_out_gain.h"
+#include "diagnosis/likelihood/error_spread.h"
+
+namespace mmradartwin::diagnosis {
+namespace {
+
+/// Share of the stated error that is left where a session says something of an actor's place.
+constexpr double kSaysSomething = 0.9;
+/// Spread of ranges that stand where the scene has them.
+constexpr double kInPlace_m = 1e-5;
+
+PosteriorErrors rangesBy(const DiagnosisContext& context, const ModelState& state, const std::vector<int>& poses) {
+  ErrorEvidence evidence = rangeEvidence(context.likelihood, state.echoes, state.latents, poses);
+  evidence.leaveOutCommon();
+  return posteriorErrors(evidence, context.accuracy.scene_m);
+}
+
+/// Log-likelihood by pose with actors at these ranges and all else as it is in a state.
+std::vector<double> natsAt(DiagnosisContext& context, const ModelState& state, std::vector<double> range_m) {
+  SessionLatents latents = state.latents;
+  latents.actor_range_m = std::move(range_m);
+  std::vector<double> by_pose;
+  const std::vector<PoseEchoes> echoes = context.echoes.echoes(state.mechanisms, latents.actor_range_m);
+  context.likelihood.logLikelihood(echoes, latents, &by_pose);
+  return by_pose;
+}
+
+/// The state with every actor where the scene has it, all else fitted.
+ModelState inPlace(DiagnosisContext& context, const ModelState& state) {
+  SessionLatents start = state.latents;
+  std::fill(start.actor_range_m.begin(), start.actor_range_m.end(), 0.0);
+  const LatentSpread spread = context.likelihood.spread();
+  LatentSpread tight = spread;
+  tight.actor_range_m = kInPlace_m;
+  context.likelihood.setSpread(tight);
+  ModelState fitted = context.fitter.state(state.mechanisms, &start);
+  context.likelihood.setSpread(spread);
+  return fitted;
+}
+
+}  // namespace
+
+SceneRefinement refinedRanges(DiagnosisContext& context, const ModelState& state) {
+  SceneRefinement refinement;
+  refinement.scene_m = context.accuracy.scene_m;
+  refinement.poses = static_cast<int>(context.data.poses.size());
+  refinement.locations = static_cast<int>(context.data.locations.size());
+  context.report("ranges of the actors", 0);
+  const PosteriorErrors ranges = rangesBy(context, state, everyPose(state));
+  const std::vector<Actor>& actors = context.twin.scene().actors;
+  for (std::size_t i = 0; i < actors.size(); ++i) {
+    const std::size_t error = errorOf(static_cast<int>(i), ranges.mean.size());
+    if (ranges.standard_deviation[error] > kSaysSomething * refinement.scene_m) continue;
+    refinement.actors.push_back({actors[i].name, ranges.mean[error], ranges.standard_deviation[error]});
+  }
+  const std::vector<double> before = inPlace(context, state).by_pose;
+  std::vector<double> after = before;
+  const int folds = std::min(context.fitter.folds(), refinement.locations);
+  for (int fold = 0; folds > 1 && fold < folds; ++fold) {
+    context.report("gain on held-out places", static_cast<double>(fold) / folds);
+    std::vector<int> others;
+    for (std::size_t i = 0; i < context.data.poses.size(); ++i) {
+      if (context.fitter.fold(context.data.poses[i].location) != fold) others.push_back(static_cast<int>(i));
+    }
+    const std::vector<double> nats = natsAt(context, state, rangesBy(context, state, others).mean);
+    for (std::size_t i = 0; i < context.data.poses.size(); ++i) {
+      if (context.fitter.fold(context.data.poses[i].location) == fold) after[i] = nats[i];
+    }
+  }
+  refinement.held_out_nats_per_pose = likelihoodGain(context.data, before, after);
+  return refinement;
+}
+
+}  // namespace mmradartwin::diagnosis
