@@ -1,8 +1,10 @@
-// make_scene: mesh files of a person's own room -> scene.yaml and materials.yaml to edit.
+// make_scene: a person's own room -> a scene to edit. A scan becomes planes and things; a mesh with named parts stays
+// as it is and gets materials by their names.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
@@ -13,7 +15,10 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
+#include "mmradartwin_dsp/progress_line.h"
+#include "mmradartwin_sim/material_presets.h"
 #include "mmradartwin_sim/mesh_frame.h"
+#include "mmradartwin_sim/scan_to_scene.h"
 #include "mmradartwin_sim/scene.h"
 
 namespace fs = std::filesystem;
@@ -23,6 +28,10 @@ namespace {
 
 struct Options {
   std::vector<std::string> meshes;
+  ScanOptions scan;
+  bool planes = false, model = false, no_regularise = false, exact_up = false;
+  std::string up;
+  double floor_m = std::nan("");
   OutputArguments output;
   std::string material = "Concrete";
   double scale = 1;
@@ -30,66 +39,13 @@ struct Options {
   std::string unit;
 };
 
-struct Preset {
-  const char* tag;
-  const char* yaml;
-  std::vector<const char*> words;  // in names of actors and tags, lower case
-};
-
-// The shipped physical table's values (ITU-R P.2040 at 77 GHz), and the words by which people name such things.
-const std::vector<Preset>& presets() {
-  static const std::vector<Preset> list = {
-      {"Metal",
-       "{model: conductor, color: [0.55, 0.60, 0.68]}",
-       {"metal", "steel", "alumin", "iron", "radiator", "cabinet", "locker", "fridge"}},
-      {"Glass",
-       "{model: dielectric, relative_permittivity: 6.31, conductivity_s_per_m: 1.211, color: [0.55, 0.80, 0.88]}",
-       {"glass", "window", "mirror", "screen", "monitor", "tv", "display"}},
-      {"Wood",
-       "{model: dielectric, relative_permittivity: 1.99, conductivity_s_per_m: 0.494, color: [0.62, 0.43, 0.24]}",
-       {"wood", "door", "shelf", "bookcase", "wardrobe", "drawer", "chair"}},
-      {"TableTop",
-       "{model: dielectric, relative_permittivity: 2.58, conductivity_s_per_m: 0.643, color: [0.80, 0.68, 0.50]}",
-       {"table", "desk", "counter", "worktop"}},
-      {"Carpet",
-       "{model: dielectric, relative_permittivity: 2.08, conductivity_s_per_m: 0.0317, scattering_coefficient: 0.4, "
-       "extrapolated: true, color: [0.38, 0.42, 0.55]}",
-       {"carpet", "rug", "sofa", "couch", "curtain", "fabric", "cushion", "bed"}},
-      {"Plastic",
-       "{model: dielectric, relative_permittivity: 2.57, conductivity_s_per_m: 0.49, color: [0.85, 0.85, 0.80]}",
-       {"plastic", "acryl", "bin", "printer"}},
-      {"Plasterboard",
-       "{model: dielectric, relative_permittivity: 2.73, conductivity_s_per_m: 0.503, scattering_coefficient: 0.2, "
-       "color: [0.88, 0.87, 0.84]}",
-       {"plaster", "gypsum", "drywall", "partition"}},
-      {"Concrete",
-       "{model: dielectric, relative_permittivity: 5.24, conductivity_s_per_m: 1.38, scattering_coefficient: 0.5, "
-       "color: [0.70, 0.69, 0.66]}",
-       {"concrete", "wall", "floor", "ceiling", "column", "pillar", "cement"}}};
-  return list;
-}
-
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
   return text;
 }
 
-/// The preset whose tag or words occur in a name, or null.
-const Preset* guess(const std::string& name) {
-  const std::string text = lower(name);
-  for (const Preset& p : presets()) {
-    if (text == lower(p.tag)) return &p;
-  }
-  for (const Preset& p : presets()) {
-    if (std::any_of(p.words.begin(), p.words.end(),
-                    [&text](const char* w) { return text.find(w) != std::string::npos; }))
-      return &p;
-  }
-  return nullptr;
-}
-
-const Preset& find(const std::string& tag) {
-  for (const Preset& p : presets()) {
+const MaterialPreset& find(const std::string& tag) {
+  for (const MaterialPreset& p : materialPresets()) {
     if (tag == p.tag) return p;
   }
   throw InputError("--material " + tag +
@@ -128,8 +84,8 @@ StatedFrame statedFrame(const Options& options, const std::string& mesh) {
   return stated;
 }
 
-int makeScene(const Options& options) {
-  const Preset& fallback = find(options.material);
+int makeModelScene(const Options& options) {
+  const MaterialPreset& fallback = find(options.material);
   Output output = Output::folder(options.output, options.meshes, "scene.yaml");
   const fs::path folder(output.path()), scene_file = folder / "scene.yaml", materials_file = folder / "materials.yaml";
   std::map<std::string, std::string> overrides;  // actor -> tag
@@ -147,9 +103,9 @@ int makeScene(const Options& options) {
         throw InputError(mesh + ": a second actor is named " + actor.name + "; rename the object or the file");
       for (const auto& v : actor.vertices) bounds.extend(options.scale * v);
       triangles += actor.triangles.size();
-      const Preset* by_tag = guess(actor.material_tag);
-      const Preset* by_name = by_tag ? by_tag : guess(actor.name);
-      const Preset& preset = by_name ? *by_name : fallback;
+      const MaterialPreset* by_tag = presetOfName(actor.material_tag);
+      const MaterialPreset* by_name = by_tag ? by_tag : presetOfName(actor.name);
+      const MaterialPreset& preset = by_name ? *by_name : fallback;
       used.insert(preset.tag);
       if (actor.material_tag != preset.tag) overrides[actor.name] = preset.tag;
       const std::string choice = "actor " + actor.name + ", material tag '" + actor.material_tag + "' -> " + preset.tag;
@@ -192,20 +148,108 @@ int makeScene(const Options& options) {
   return 0;
 }
 
+Eigen::Vector3d axisNamed(const std::string& name) {
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero();
+  axis[name.back() - 'x'] = name.size() > 1 ? -1 : 1;
+  return axis;
+}
+
+double metresPer(const std::string& unit) { return unit == "mm" ? 1e-3 : unit == "cm" ? 1e-2 : 1.0; }
+
+/// An older scene.yaml of the output's folder, which a person may have edited.
+std::string olderScene(const Options& options) {
+  const fs::path older = fs::path(options.output.path) / "scene.yaml";
+  std::error_code error;
+  return fs::is_regular_file(older, error) ? older.string() : "";
+}
+
+void sayScene(const ScanScene& scene) {
+  std::size_t triangles = 0;
+  for (const ScanActor& actor : scene.actors) triangles += actor.triangles.size();
+  std::cout << scene.frame.words << "\n" << std::fixed << std::setprecision(1);
+  for (const ScanPlane& p : scene.planes) {
+    std::cout << p.name << ": " << p.area_m2 << " m2, residual " << 1e3 * p.rms_m << " mm rms, 99 % within "
+              << 1e3 * p.largest_m << " mm";
+    if (!p.holes.empty()) std::cout << ", " << p.holes.size() << " opening(s)";
+    std::cout << "\n";
+  }
+  for (const ScanThing& t : scene.things) {
+    const Eigen::Vector3d size = t.bounds.sizes();
+    std::cout << t.name << ": " << std::setprecision(2) << size.x() << " x " << size.y() << " x " << size.z() << " m"
+              << (t.why.empty() ? "" : " (" + t.why + ")") << std::setprecision(1) << "\n";
+  }
+  std::cout << scene.planes.size() << " plane(s), " << scene.things.size() << " thing(s), " << triangles
+            << " triangles; state in session.yaml: accuracy: {scene_m: " << std::setprecision(4) << scene.accuracy_m
+            << "}\n";
+}
+
+int makeScanScene(const Options& options) {
+  if (options.meshes.size() > 1)
+    throw InputError("one scan makes a scene; " + std::to_string(options.meshes.size()) + " files are given");
+  const std::string older = olderScene(options);
+  ProgressLine progress;
+  ScanOptions scan_options = options.scan;
+  scan_options.progress = [&progress](double share, const std::string& stage) { progress.show(share, stage); };
+  if (!options.unit.empty()) scan_options.unit_m = metresPer(options.unit);
+  if (options.scale != 1) scan_options.unit_m = scan_options.unit_m.value_or(1) * options.scale;
+  if (options.y_up) scan_options.up = Eigen::Vector3d::UnitY();
+  if (!options.up.empty()) scan_options.up = axisNamed(options.up);
+  if (!std::isnan(options.floor_m)) scan_options.floor_m = options.floor_m;
+  scan_options.level = !options.exact_up;
+  scan_options.regularise = !options.no_regularise;
+  Output output = Output::folder(options.output, options.meshes, "scene.yaml");
+  progress.show(0, "reading");
+  const ScanScene scene = sceneOfScan(readScan(options.meshes.front()), scan_options);
+  progress.clear();
+  writeScanScene(scene, output.path(), older);
+  output.complete();
+  sayScene(scene);
+  noteAll(scene.notes);
+  return 0;
+}
+
+int makeScene(const Options& options) {
+  const bool scan = options.planes || (!options.model && isScan(options.meshes.front()));
+  note(options.meshes.front() + (scan
+                                     ? ": taken as a scan: planes and things are made of it (--model takes it as it is)"
+                                     : ": taken as a model with named parts (--planes makes planes and things of it)"));
+  return scan ? makeScanScene(options) : makeModelScene(options);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app("Begins a scene from your own meshes: writes scene.yaml and materials.yaml to edit.");
-  app.add_option("MESH", options.meshes, "OBJ, PLY, STL, glTF, Collada or FBX files")->required();
-  addOutputArguments(app, options.output, "folder for scene.yaml and materials.yaml");
-  app.add_option("--unit", options.unit, "of meshes that declare none: m, mm or cm")
+  CLI::App app("Makes a scene of your own room: planes and things of a scan, or a model's parts as they are.");
+  app.add_option("SCAN", options.meshes, "a scan (PLY, OBJ, STL, glTF, PCD, XYZ), or models with named parts")
+      ->required();
+  addOutputArguments(app, options.output, "folder for room.obj, scene.yaml and materials.yaml");
+  app.add_option("--unit", options.unit, "of files that declare none: m, mm or cm; of a scan, found from its size")
       ->check(CLI::IsMember({"m", "mm", "cm"}));
-  app.add_option("--scale", options.scale, "factor on the meshes, beyond their unit")
+  app.add_option("--scale", options.scale, "factor on the coordinates, beyond their unit")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--material", options.material, "of actors that neither tag nor name explains")->capture_default_str();
-  app.add_flag("--y-up", options.y_up, "meshes that declare no axes are y-up (glTF, Collada and FBX declare them)");
-  app.footer("Example: make_scene room.obj --output my_room --unit mm");
+  app.add_option("--material", options.material, "of a model's actors that neither tag nor name explains")
+      ->capture_default_str();
+  app.add_flag("--y-up", options.y_up, "files that declare no axes are y-up (glTF, Collada and FBX declare them)");
+  app.add_flag("--planes", options.planes, "take it as a scan, whatever its parts");
+  app.add_flag("--model", options.model, "take it as a model, however many triangles")->excludes("--planes");
+  app.add_option("--up", options.up, "axis of the scan's file that is up, about; found from its planes")
+      ->check(CLI::IsMember({"x", "y", "z", "-x", "-y", "-z"}));
+  app.add_flag("--exact-up", options.exact_up, "that axis is up exactly: nothing is turned by floor and walls")
+      ->needs("--up");
+  app.add_option("--floor", options.floor_m,
+                 "height of the floor above the file's origin, metres; found from its planes");
+  app.add_flag("--no-regularise", options.no_regularise,
+               "leave planes that are parallel or at right angles within noise");
+  app.add_option("--triangles", options.scan.triangles, "of all things that are meshes together, at most")
+      ->check(CLI::Range(100, 1000000))
+      ->capture_default_str();
+  app.add_option("--silhouette", options.scan.silhouette_m, "metres within which fewer triangles leave silhouettes")
+      ->check(CLI::Range(0.001, 0.1))
+      ->capture_default_str();
+  app.add_flag("--proxies", options.scan.proxies,
+               "every thing becomes its box: fewest triangles, for simulation alone");
+  app.footer("Example: make_scene phone_scan.ply --output my_room");
   return runProgram(app, argc, argv, [&options] { return makeScene(options); });
 }

@@ -40,6 +40,7 @@ ROOMS = {
         "twin": {"stages"},
         "what_if": {"twin"},
         "room": {"rays"},
+        "scan": {"rays"},
         "ros": {"twin", "room"},
     },
     "mmradartwin_sim/src/mechanisms": {

@@ -39,9 +39,14 @@ std::size_t bytesOf(const std::string& type) {
   return found == kSizes.end() ? 0 : found->second;
 }
 
+struct PlyLimits {
+  bool cloud = false;  ///< the file may have no faces
+  std::uint64_t vertices = UINT64_MAX, faces = UINT64_MAX;
+};
+
 class PlyReader {
  public:
-  explicit PlyReader(const std::string& file) : file_(file) {
+  PlyReader(const std::string& file, const PlyLimits& limits) : file_(file), limits_(limits) {
     requireRegularFile(file);
     std::ifstream in(file, std::ios::binary);
     bytes_.assign(std::istreambuf_iterator<char>(in), {});
@@ -52,7 +57,12 @@ class PlyReader {
     const Element* vertices = element("vertex");
     const Element* faces = element("face");
     if (!vertices || vertices->count == 0) refuse("has no vertices");
-    if (!faces || faces->count == 0) refuse("has no faces; export the surfaces as a triangle mesh");
+    if (!limits_.cloud && (!faces || faces->count == 0)) {
+      refuse("has no faces; export the surfaces as a triangle mesh");
+    }
+    refuseMore(vertices, limits_.vertices, "points");
+    refuseMore(faces, limits_.faces, "triangles");
+    for (const Property& p : vertices->properties) colored_ = colored_ || p.name == "red";
     for (const char* axis : {"x", "y", "z"}) {
       const auto& properties = vertices->properties;
       if (std::none_of(properties.begin(), properties.end(), [&](const Property& p) { return p.name == axis; })) {
@@ -65,6 +75,7 @@ class PlyReader {
       current_ = &e;
       for (item_ = 0; item_ < e.count; ++item_) {
         if (&e == vertices) mesh_.vertices.emplace_back();
+        if (&e == vertices && colored_) mesh_.colors.push_back({0, 0, 0});
         for (const Property& property : e.properties) walk(e, property);
       }
     }
@@ -82,6 +93,11 @@ class PlyReader {
  private:
   [[noreturn]] void refuse(const std::string& why) const {
     throw InputError(file_ + ": cannot be read as a mesh: " + why);
+  }
+  void refuseMore(const Element* e, std::uint64_t most, const char* what) const {
+    if (!e || e->count <= most) return;
+    throw InputError(file_ + ": holds " + std::to_string(e->count) + " " + what + ", more than the " +
+                     std::to_string(most) + " that fit into memory; thin it to 1 cm and give it again");
   }
   std::string where() const {
     return current_->name + " " + std::to_string(item_) + " of " + std::to_string(current_->count);
@@ -164,6 +180,8 @@ class PlyReader {
       const double value = next(property.type);
       if (e.name == "vertex" && property.name.size() == 1 && property.name[0] >= 'x' && property.name[0] <= 'z') {
         mesh_.vertices.back()[property.name[0] - 'x'] = value;
+      } else if (colored_ && e.name == "vertex") {
+        setColor(property, value);
       }
       return;
     }
@@ -181,7 +199,19 @@ class PlyReader {
     }
   }
 
+  void setColor(const Property& property, double value) {
+    const bool real = property.type[0] == 'f' || property.type[0] == 'd';
+    const double level = std::clamp(real ? 255 * value : value, 0.0, 255.0);
+    int channel = -1;
+    if (property.name == "red") channel = 0;
+    if (property.name == "green") channel = 1;
+    if (property.name == "blue") channel = 2;
+    if (channel >= 0) mesh_.colors.back()[static_cast<std::size_t>(channel)] = static_cast<unsigned char>(level);
+  }
+
   const std::string file_;
+  const PlyLimits limits_;
+  bool colored_ = false;
   std::string bytes_, format_;
   std::size_t at_ = 0;
   std::uint64_t item_ = 0;
@@ -207,6 +237,10 @@ std::string PlyMesh::toObj() const {
   return text;
 }
 
-PlyMesh readPly(const std::string& file) { return PlyReader(file).run(); }
+PlyMesh readPly(const std::string& file) { return PlyReader(file, {}).run(); }
+
+PlyMesh readPlyScan(const std::string& file, std::uint64_t most_vertices, std::uint64_t most_faces) {
+  return PlyReader(file, {true, most_vertices, most_faces}).run();
+}
 
 }  // namespace mmradartwin

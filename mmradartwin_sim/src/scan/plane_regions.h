@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "scan/scan_samples.h"
+
+namespace mmradartwin {
+
+/// A connected flat part of a scan.
+struct PlaneRegion {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit; of an oriented scan towards where it was seen from
+  double offset_m = 0;                                ///< normal . p = offset
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  std::vector<int> samples;  ///< ascending
+  double area_m2 = 0;
+  double rms_m = 0;          ///< of the samples
+  double bow_m = 0;          ///< rms of the residuals' means over patches of 0.5 m
+  double angle_std_rad = 0;  ///< of the normal
+  double offset_std_m = 0;   ///< of the offset at the middle
+  double turned_rad = 0;     ///< by regularisation
+
+  double distance(const Eigen::Vector3d& p) const { return normal.dot(p) - offset_m; }
+};
+
+/// How far a sample may lie from its plane: three standard deviations of the scan's noise.
+double planeTolerance(const ScanSamples& samples);
+
+/// Least squares through samples, twice, the second time without what lies farther off than the tolerance. Sets all but
+/// `samples`; the normal keeps its side.
+void fitPlane(const ScanSamples& samples, double tolerance_m, PlaneRegion& region);
+/// rms, bow and standard deviations of a plane that is given.
+void measurePlane(const ScanSamples& samples, PlaneRegion& region);
+
+/// Grows planes from the flattest samples, largest first; parts of one plane that touch are one. Source: region growing
+/// by normals and distance, Rabbani et al. 2006, with the plane instead of the neighbour as what a sample must fit.
+std::vector<PlaneRegion> growPlanes(const ScanSamples& samples, double smallest_m2, const Progress& progress);
+
+}  // namespace mmradartwin

@@ -1,0 +1,579 @@
+#include "scan/room_planes.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <numeric>
+#include <set>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "scan/cell_raster.h"
+#include "scan/polygon_triangles.h"
+#include "scene/polygon_set.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kDegree = M_PI / 180;
+constexpr double kSameWall_m = 0.06;  // a wall that drift has doubled is one; boards hang farther off
+constexpr double kSnap_m = 0.25;      // corners are rounded, hidden or not scanned so far
+constexpr double kBridge_m = 0.6;     // a gap in a wall's columns, of a curtain or a tall cabinet
+constexpr double kLeastHole_m = 0.35, kLeastHole_m2 = 0.2;  // smaller gaps are where a scan has none
+constexpr double kHides_m = 1.2;                            // what stands so far before a wall may hide it
+constexpr double kCell_m = 0.05;
+
+std::string text(const char* format, double a, double b = 0) {
+  std::array<char, 200> line{};
+  std::snprintf(line.data(), line.size(), format, a, b);
+  return line.data();
+}
+
+Eigen::Vector3d sampleAt(const ScanSamples& samples, int i) {
+  return samples.points[static_cast<std::size_t>(i)].cast<double>();
+}
+
+/// Offset of a plane of a given normal: the mean of all points of its samples, twice, without what lies off.
+void fitOffset(const ScanSamples& samples, PlaneRegion& region) {
+  const double tolerance_m = planeTolerance(samples);
+  for (int round = 0; round < 2; ++round) {
+    double sum = 0;
+    std::size_t count = 0;
+    for (int i : region.samples) {
+      const auto s = static_cast<std::size_t>(i);
+      for (std::size_t k = samples.dense_first[s]; k < samples.dense_first[s + 1]; ++k) {
+        const double along = region.normal.dot(samples.dense[k].cast<double>());
+        // Twice the tolerance: points scatter more than the means that voxels make of them.
+        if (std::abs(along - region.offset_m) < 2 * tolerance_m) sum += along, ++count;
+      }
+    }
+    if (count) region.offset_m = sum / static_cast<double>(count);
+  }
+}
+
+/// Angle modulo 90 deg, -45 to 45.
+double quarter(double angle_rad) { return angle_rad - M_PI / 2 * std::round(angle_rad / (M_PI / 2)); }
+
+double yawOf(const PlaneRegion& r) { return std::atan2(r.normal.y(), r.normal.x()); }
+
+bool isUpright(const PlaneRegion& r) { return std::abs(r.normal.z()) < 1e-9; }
+bool isLevel(const PlaneRegion& r) { return std::abs(r.normal.z()) > 1 - 1e-12; }
+
+/// The direction modulo 90 deg that most upright area has.
+double mainDirection(const std::vector<PlaneRegion>& regions) {
+  std::array<double, 180> area{};
+  const auto bin = [](double angle) { return static_cast<int>(std::floor(angle / (M_PI / 2) * 180 + 360)) % 180; };
+  for (const PlaneRegion& r : regions) {
+    if (std::abs(r.normal.z()) < std::sin(5 * kDegree))
+      area[static_cast<std::size_t>(bin(quarter(yawOf(r)) + M_PI / 4))] += r.area_m2;
+  }
+  double best = -1, direction = 0;
+  for (int i = 0; i < 180; ++i) {
+    double sum = 0;
+    for (int k = -3; k <= 3; ++k) sum += area[static_cast<std::size_t>((i + k + 180) % 180)];
+    if (sum > best) best = sum, direction = (i + 0.5) * M_PI / 360 - M_PI / 4;
+  }
+  for (double cone : {3.0, 1.0, 1.0}) {
+    double sum = 0, weights = 0;
+    for (const PlaneRegion& r : regions) {
+      if (std::abs(r.normal.z()) > std::sin(5 * kDegree)) continue;
+      const double off = quarter(yawOf(r) - direction);
+      if (std::abs(off) > cone * kDegree) continue;
+      const double weight = r.area_m2 / (std::pow(r.angle_std_rad, 2) + std::pow(0.05 * kDegree, 2));
+      sum += weight * off, weights += weight;
+    }
+    if (weights > 0) direction += sum / weights;
+  }
+  return direction;
+}
+
+/// Upright or level parts of one plane, wherever they are.
+struct PlaneGroup {
+  PlaneRegion plane;
+  std::vector<int> second_copy;  // samples of what drift has doubled
+  Eigen::Vector3d u = Eigen::Vector3d::UnitX(), v = Eigen::Vector3d::UnitY();
+  double low_m = 0, high_m = 0;  // of an upright plane: heights of its samples
+  bool wall = false;
+
+  Eigen::Vector2d project(const Eigen::Vector3d& p) const { return {u.dot(p), v.dot(p)}; }
+};
+
+/// A wall from one end to the other.
+struct WallRun {
+  std::size_t group;
+  double from_m, to_m;
+};
+
+class RoomBuilder {
+ public:
+  RoomBuilder(const std::string& file, const ScanFrame& frame, const ScanSamples& samples,
+              const std::vector<PlaneRegion>& regions, double yaw_rad)
+      : file_(file), frame_(frame), samples_(samples), tolerance_m_(planeTolerance(samples)) {
+    room_.yaw_rad = yaw_rad;
+    room_.owner.assign(samples.size(), -1);
+    std::vector<float> heights;
+    for (const Eigen::Vector3f& p : samples.points) heights.push_back(p.z());
+    std::sort(heights.begin(), heights.end());
+    room_.height_m = frame.has_ceiling ? frame.ceiling_m : static_cast<double>(heights[heights.size() * 199 / 200]);
+    group(regions);
+    findWalls();
+  }
+
+  RoomPlanes run() {
+    std::vector<WallRun> runs;
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      if (groups_[g].wall) addRuns(g, runs);
+    }
+    if (runs.empty())
+      throw InputError(file_ + ": shows no wall, so that it is no room; outdoors and tables alone are no scenes");
+    addFloorAndCeiling(runs);
+    for (const WallRun& run : runs) addWall(run);
+    return std::move(room_);
+  }
+
+ private:
+  void group(const std::vector<PlaneRegion>& regions) {
+    for (const PlaneRegion& r : regions) {
+      if (!isUpright(r) && !isLevel(r)) continue;
+      PlaneGroup* home = nullptr;
+      bool doubled = false;
+      for (PlaneGroup& g : groups_) {
+        if (g.plane.normal.dot(r.normal) < 1 - 1e-9) continue;
+        const double apart = std::abs(g.plane.offset_m - r.offset_m);
+        if (apart < std::max(tolerance_m_, 3 * std::hypot(g.plane.offset_std_m, r.offset_std_m))) {
+          home = &g;
+          doubled = apart > 0.5 * tolerance_m_ && overlap(g, r) > 0.3;
+          break;
+        }
+        if (apart < kSameWall_m && overlap(g, r) > 0.3) {
+          home = &g, doubled = true;
+          break;
+        }
+      }
+      if (!home) {
+        groups_.emplace_back();
+        groups_.back().plane = r;
+        setAxes(groups_.back());
+      } else if (doubled) {
+        home->second_copy.insert(home->second_copy.end(), r.samples.begin(), r.samples.end());
+      } else {
+        home->plane.samples.insert(home->plane.samples.end(), r.samples.begin(), r.samples.end());
+        fitOffset(samples_, home->plane);
+      }
+    }
+    for (PlaneGroup& g : groups_) {
+      std::sort(g.plane.samples.begin(), g.plane.samples.end());
+      fitOffset(samples_, g.plane);
+      measurePlane(samples_, g.plane);
+    }
+  }
+
+  static void setAxes(PlaneGroup& g) {
+    if (isLevel(g.plane)) {
+      g.u = Eigen::Vector3d::UnitX();
+      g.v = g.plane.normal.cross(g.u);
+    } else {
+      g.u = Eigen::Vector3d::UnitZ().cross(g.plane.normal);
+      g.v = Eigen::Vector3d::UnitZ();
+    }
+  }
+
+  /// Share of a region's area over which a group's plane has samples, too.
+  double overlap(const PlaneGroup& g, const PlaneRegion& r) const {
+    std::set<std::pair<int, int>> cells, both;
+    const auto cell = [&g](const Eigen::Vector3d& p) {
+      const Eigen::Vector2d q = g.project(p) / (2 * kCell_m);
+      return std::make_pair(static_cast<int>(std::floor(q.x())), static_cast<int>(std::floor(q.y())));
+    };
+    for (int i : r.samples) cells.insert(cell(sampleAt(samples_, i)));
+    for (int i : g.plane.samples) {
+      const auto at = cell(sampleAt(samples_, i));
+      if (cells.count(at)) both.insert(at);
+    }
+    return cells.empty() ? 0 : static_cast<double>(both.size()) / static_cast<double>(cells.size());
+  }
+
+  void findWalls() {
+    for (PlaneGroup& g : groups_) {
+      if (!isUpright(g.plane)) continue;
+      std::vector<double> heights;
+      for (int i : g.plane.samples) heights.push_back(sampleAt(samples_, i).z());
+      std::sort(heights.begin(), heights.end());
+      g.low_m = heights[heights.size() / 50];
+      g.high_m = heights[heights.size() - 1 - heights.size() / 50];
+      const double height = g.high_m - g.low_m;
+      const double top = frame_.has_ceiling ? room_.height_m - 0.3 : std::min(1.9, room_.height_m - 0.4);
+      g.wall = g.plane.area_m2 > 0.5 && g.high_m > top && height > 0.4 * room_.height_m && !isPillar(g);
+      // Nothing is seen behind an outer wall, however little of it furniture leaves to see.
+      if (!g.wall && g.plane.area_m2 > 2 && height > 1 && behind(g) < 0.01) g.wall = true;
+    }
+  }
+
+  /// Share of all samples behind a plane.
+  double behind(const PlaneGroup& g) const {
+    std::size_t count = 0;
+    for (const Eigen::Vector3f& p : samples_.points) count += g.plane.distance(p.cast<double>()) < -0.1;
+    return static_cast<double>(count) / static_cast<double>(samples_.size());
+  }
+
+  /// A narrow upright plane that others of its kind close to a column: the room goes on behind it.
+  bool isPillar(const PlaneGroup& g) const {
+    double low = 1e9, high = -1e9;
+    for (int i : g.plane.samples) {
+      const double u = g.u.dot(sampleAt(samples_, i));
+      low = std::min(low, u), high = std::max(high, u);
+    }
+    if (high - low > 1.2) return false;
+    // Both ends are convex: nothing of the scan stands before the plane there, and the room is seen behind.
+    std::size_t before = 0, beyond = 0;
+    for (const Eigen::Vector3f& q : samples_.points) {
+      const Eigen::Vector3d p = q.cast<double>();
+      if (p.z() < 0.3 || p.z() > room_.height_m - 0.3) continue;
+      const double u = g.u.dot(p), d = g.plane.distance(p);
+      if (u > low - 0.3 && u < high + 0.3 && d > 0.1 && d < 0.5) ++before;
+      if (u > low - 0.1 && u < high + 0.1 && d < -0.1 && d > -1.2) ++beyond;
+    }
+    return before < g.plane.samples.size() / 4 && beyond > 0 && behind(g) > 0.05;
+  }
+
+  /// Where other walls cross a wall, as places along it; only where the other wall reaches it.
+  std::vector<double> crossings(std::size_t g) const {
+    std::vector<double> places;
+    const PlaneGroup& wall = groups_[g];
+    for (std::size_t o = 0; o < groups_.size(); ++o) {
+      const PlaneGroup& other = groups_[o];
+      if (o == g || !other.wall || std::abs(other.plane.normal.dot(wall.plane.normal)) > 0.9) continue;
+      // p on both planes: p = offset n + s u with other.n . p = other.offset.
+      const double slope = other.plane.normal.dot(wall.u);
+      const double s = (other.plane.offset_m - wall.plane.offset_m * other.plane.normal.dot(wall.plane.normal)) / slope;
+      std::size_t near = 0;
+      for (int i : other.plane.samples) near += std::abs(wall.plane.distance(sampleAt(samples_, i))) < kSnap_m + 0.15;
+      if (static_cast<double>(near) * samples_.area_m2() > 0.05) places.push_back(s);
+    }
+    std::sort(places.begin(), places.end());
+    return places;
+  }
+
+  void addRuns(std::size_t g, std::vector<WallRun>& runs) const {
+    const PlaneGroup& wall = groups_[g];
+    std::map<int, std::set<int>> columns;
+    for (int i : wall.plane.samples) {
+      const Eigen::Vector2d p = wall.project(sampleAt(samples_, i)) / kCell_m;
+      columns[static_cast<int>(std::floor(p.x()))].insert(static_cast<int>(std::floor(p.y())));
+    }
+    const std::vector<double> places = crossings(g);
+    const auto snapped = [&places](double at) {
+      double best = at, least = kSnap_m;
+      for (double s : places) {
+        if (std::abs(s - at) < least) least = std::abs(s - at), best = s;
+      }
+      return best;
+    };
+    std::vector<WallRun> found;
+    for (const auto& [column, rows] : columns) {
+      if (static_cast<double>(rows.size()) * kCell_m < 0.12 * room_.height_m) continue;
+      const double from = column * kCell_m, to = from + kCell_m;
+      const bool crossed = !found.empty() && std::any_of(places.begin(), places.end(), [&](double s) {
+        return s > found.back().to_m - 0.02 && s < from + 0.02 && from - found.back().to_m > 0.1;
+      });
+      if (!found.empty() && from - found.back().to_m < kBridge_m && !crossed) {
+        found.back().to_m = to;
+      } else {
+        found.push_back({g, from, to});
+      }
+    }
+    for (WallRun& run : found) {
+      run.from_m = snapped(run.from_m), run.to_m = snapped(run.to_m);
+      if (run.to_m - run.from_m > 0.3) runs.push_back(run);
+    }
+  }
+
+  /// The floor reaches to the walls: of the cells that the walls' lines cut the plane into, those that hold the scan.
+  void addFloorAndCeiling(const std::vector<WallRun>& runs) {
+    const Eigen::Vector2d ex(std::cos(room_.yaw_rad), std::sin(room_.yaw_rad)), ey(-ex.y(), ex.x());
+    std::set<double> xs, ys;
+    Eigen::AlignedBox2d box;
+    CellRaster cells(kCell_m * 2);
+    for (const Eigen::Vector3f& p : samples_.points) {
+      const Eigen::Vector2d q(ex.dot(p.head<2>().cast<double>()), ey.dot(p.head<2>().cast<double>()));
+      if (p.z() > -0.3F && p.z() < static_cast<float>(room_.height_m) + 0.3F) cells.set(q);
+    }
+    for (int i : floorSamples()) {
+      const Eigen::Vector3d p = sampleAt(samples_, i);
+      box.extend(Eigen::Vector2d(ex.dot(p.head<2>()), ey.dot(p.head<2>())));
+    }
+    std::vector<std::array<Eigen::Vector2d, 2>> slanted;
+    for (const WallRun& run : runs) {
+      const PlaneGroup& g = groups_[run.group];
+      const Eigen::Vector3d a = g.plane.offset_m * g.plane.normal + run.from_m * g.u,
+                            b = g.plane.offset_m * g.plane.normal + run.to_m * g.u;
+      const Eigen::Vector2d p(ex.dot(a.head<2>()), ey.dot(a.head<2>())), q(ex.dot(b.head<2>()), ey.dot(b.head<2>()));
+      if (std::abs(p.x() - q.x()) < 1e-9 * std::abs(p.y() - q.y()) + 1e-7) {
+        xs.insert(p.x());
+      } else if (std::abs(p.y() - q.y()) < 1e-9 * std::abs(p.x() - q.x()) + 1e-7) {
+        ys.insert(p.y());
+      } else {
+        slanted.push_back({p, q});
+      }
+      box.extend(p), box.extend(q);
+    }
+    const auto addEnd = [](std::set<double>& lines, double end) {
+      if (std::none_of(lines.begin(), lines.end(), [end](double l) { return std::abs(l - end) < kSnap_m; }))
+        lines.insert(end);
+    };
+    addEnd(xs, box.min().x()), addEnd(xs, box.max().x()), addEnd(ys, box.min().y()), addEnd(ys, box.max().y());
+    const PlaneLoops loops = loopsOfCells({xs.begin(), xs.end()}, {ys.begin(), ys.end()}, cells);
+    if (!slanted.empty()) {
+      room_.notes.push_back(
+          text("%.0f wall(s) stand slanted to the room's main direction; floor and ceiling end beyond them",
+               static_cast<double>(slanted.size())));
+    }
+    addLevel("floor", PlaneKind::kFloor, 1, 0, loops, ex);
+    if (frame_.has_ceiling) addLevel("ceiling", PlaneKind::kCeiling, -1, frame_.ceiling_m, loops, ex);
+  }
+
+  std::vector<int> floorSamples() const {
+    std::vector<int> all;
+    for (const PlaneGroup& g : groups_) {
+      if (isLevel(g.plane) &&
+          (std::abs(g.plane.middle.z()) < kSameWall_m || std::abs(g.plane.middle.z() - room_.height_m) < kSameWall_m)) {
+        all.insert(all.end(), g.plane.samples.begin(), g.plane.samples.end());
+      }
+    }
+    return all;
+  }
+
+  /// Cells of the lines that the scan covers by more than a third, as outlines and holes.
+  static PlaneLoops loopsOfCells(const std::vector<double>& xs, const std::vector<double>& ys,
+                                 const CellRaster& cells) {
+    if (xs.size() < 2 || ys.size() < 2) return {};
+    PlaneLoops loops = {
+        {{xs.front(), ys.front()}, {xs.back(), ys.front()}, {xs.back(), ys.back()}, {xs.front(), ys.back()}}};
+    for (std::size_t i = 0; i + 1 < xs.size(); ++i) {
+      for (std::size_t k = 0; k + 1 < ys.size(); ++k) {
+        const Eigen::AlignedBox2d cell(Eigen::Vector2d(xs[i], ys[k]), Eigen::Vector2d(xs[i + 1], ys[k + 1]));
+        if (cells.share(cell) > 0.35) continue;
+        loops = without(loops,
+                        {{cell.min(), {cell.max().x(), cell.min().y()}, cell.max(), {cell.min().x(), cell.max().y()}}});
+      }
+    }
+    return loops;
+  }
+
+  void addLevel(const std::string& name, PlaneKind kind, int side, double height_m, const PlaneLoops& loops,
+                const Eigen::Vector2d& ex) {
+    // Samples of the level, of whichever part.
+    PlaneGroup level;
+    level.plane.normal = side * Eigen::Vector3d::UnitZ();
+    level.plane.offset_m = side * height_m;
+    level.u = {ex.x(), ex.y(), 0};
+    level.v = level.plane.normal.cross(level.u);
+    for (const PlaneGroup& g : groups_) {
+      if (!isLevel(g.plane) || std::abs(g.plane.middle.z() - height_m) > kSameWall_m) continue;
+      auto& list = std::abs(g.plane.middle.z() - height_m) < tolerance_m_ ? level.plane.samples : level.second_copy;
+      list.insert(list.end(), g.plane.samples.begin(), g.plane.samples.end());
+      level.second_copy.insert(level.second_copy.end(), g.second_copy.begin(), g.second_copy.end());
+    }
+    measurePlane(samples_, level.plane);
+    std::size_t parts = 0;
+    std::vector<std::vector<Eigen::Vector2d>> outlines, holes;
+    for (const auto& loop : loops) (signedAreaOf(loop) > 0 ? outlines : holes).push_back(loop);
+    parts = outlines.size();
+    for (std::size_t i = 0; i < outlines.size(); ++i) {
+      ScanPlane plane = planeOf(level, kind);
+      plane.name = parts == 1 ? name : name + "_" + std::to_string(i + 1);
+      // (x, y) of the main directions are (u, v) of the floor, (u, -v) of the ceiling.
+      const auto flipped = [side](std::vector<Eigen::Vector2d> loop) {
+        if (side < 0) {
+          for (Eigen::Vector2d& p : loop) p.y() *= -1;
+          std::reverse(loop.begin(), loop.end());
+        }
+        return loop;
+      };
+      plane.outline = flipped(outlines[i]);
+      for (const auto& hole : holes) {
+        if (parts == 1) plane.holes.push_back(flipped(hole));
+      }
+      finish(level, plane);
+    }
+  }
+
+  void addWall(const WallRun& run) {
+    const PlaneGroup& g = groups_[run.group];
+    ScanPlane plane = planeOf(g, PlaneKind::kWall);
+    const double top = frame_.has_ceiling || g.high_m > room_.height_m - 0.3 ? room_.height_m : g.high_m;
+    const PlaneLoops rectangle = {{{run.from_m, 0}, {run.to_m, 0}, {run.to_m, top}, {run.from_m, top}}};
+    PlaneLoops loops = rectangle;
+    for (const Eigen::AlignedBox2d& hole : openings(g, run, top)) {
+      loops = without(loops,
+                      {{hole.min(), {hole.max().x(), hole.min().y()}, hole.max(), {hole.min().x(), hole.max().y()}}});
+    }
+    std::size_t outer = 0;
+    for (const auto& loop : loops) outer += signedAreaOf(loop) > 0;
+    std::size_t part = 0;
+    ++walls_;
+    for (const auto& loop : loops) {
+      if (signedAreaOf(loop) <= 0) continue;
+      ScanPlane own = plane;
+      own.name = "wall_" + std::to_string(walls_) + (outer > 1 ? std::string(1, static_cast<char>('a' + part++)) : "");
+      own.outline = loop;
+      for (const auto& hole : loops) {
+        if (signedAreaOf(hole) < 0 && (outer == 1 || commonArea(loop, hole) > 0)) own.holes.push_back(hole);
+      }
+      finish(g, own);
+    }
+  }
+
+  static double commonArea(const std::vector<Eigen::Vector2d>& loop, std::vector<Eigen::Vector2d> hole) {
+    std::reverse(hole.begin(), hole.end());
+    return areaWithin(commonPart({loop}, {hole}));
+  }
+
+  /// Rectangles of a wall that the scan does not have, though nothing before it hides them: windows and doorways. What
+  /// has no such shape, and through which nothing is seen, is where the scan has gaps.
+  std::vector<Eigen::AlignedBox2d> openings(const PlaneGroup& g, const WallRun& run, double top) {
+    CellRaster wall(kCell_m), hides(kCell_m), beyond(kCell_m);
+    for (const Eigen::Vector3f& q : samples_.points) {
+      const Eigen::Vector3d p = q.cast<double>();
+      const Eigen::Vector2d at = g.project(p);
+      if (at.x() < run.from_m - 0.3 || at.x() > run.to_m + 0.3) continue;
+      const double d = g.plane.distance(p);
+      if (std::abs(d) < 2 * tolerance_m_) wall.set(at);
+      if (d >= 2 * tolerance_m_ && d < kHides_m && at.x() > run.from_m + 0.05 && at.x() < run.to_m - 0.05)
+        hides.set(at);
+      if (d < -2 * tolerance_m_ - 0.05 && d > -4) beyond.set(at);
+    }
+    const Eigen::AlignedBox2d area(Eigen::Vector2d(run.from_m + 0.05, 0.05),
+                                   Eigen::Vector2d(run.to_m - 0.05, top - 0.05));
+    std::vector<Eigen::AlignedBox2d> found;
+    for (const RasterGap& gap : gapsOf(wall, area)) {
+      const Eigen::Vector2d sizes = gap.box.sizes();
+      if (sizes.minCoeff() < kLeastHole_m || gap.area_m2 < kLeastHole_m2) continue;
+      const double hidden = hides.share(gap.box), seen = beyond.share(gap.box);
+      const bool rectangle = gap.fill > (seen > 0.15 ? 0.6 : 0.85);
+      if (hidden > 0.3 || !rectangle || gap.touches_side || sizes.x() > 0.9 * (run.to_m - run.from_m)) {
+        if (hidden <= 0.3) room_.closed_m2 += gap.area_m2;
+        continue;
+      }
+      Eigen::AlignedBox2d box = gap.box;
+      if (box.min().y() < 0.15) box.min().y() = 0;
+      found.push_back(box);
+    }
+    return found;
+  }
+
+  ScanPlane planeOf(const PlaneGroup& g, PlaneKind kind) const {
+    ScanPlane plane;
+    plane.kind = kind;
+    plane.normal = g.plane.normal;
+    plane.offset_m = g.plane.offset_m;
+    plane.u = g.u;
+    plane.v = g.v;
+    plane.angle_std_deg = g.plane.angle_std_rad / kDegree;
+    plane.turned_deg = g.plane.turned_rad / kDegree;
+    return plane;
+  }
+
+  /// Measures a plane by the samples within its bounds, which become its own.
+  void finish(const PlaneGroup& g, ScanPlane plane) {
+    const int id = static_cast<int>(room_.planes.size());
+    Eigen::AlignedBox2d box;
+    for (const Eigen::Vector2d& p : plane.outline) box.extend(p);
+    box.min().array() -= kCell_m, box.max().array() += kCell_m;
+    std::vector<double> distances;
+    CellRaster covered(kCell_m);
+    std::map<std::pair<int, int>, std::pair<double, double>> patches;
+    for (int i : g.plane.samples) {
+      const Eigen::Vector3d p = sampleAt(samples_, i);
+      const Eigen::Vector2d at = g.project(p);
+      if (!box.contains(at) || room_.owner[static_cast<std::size_t>(i)] != -1) continue;
+      room_.owner[static_cast<std::size_t>(i)] = id;
+      const double d = g.plane.distance(p);
+      distances.push_back(d);
+      covered.set(at);
+      auto& patch = patches[{static_cast<int>(std::floor(at.x() / 0.5)), static_cast<int>(std::floor(at.y() / 0.5))}];
+      patch.first += d, patch.second += 1;
+      plane.residuals.emplace_back(static_cast<float>(at.x()), static_cast<float>(at.y()), static_cast<float>(d));
+    }
+    for (int i : g.second_copy) {
+      if (!box.contains(g.project(sampleAt(samples_, i)))) continue;
+      room_.owner[static_cast<std::size_t>(i)] = -2;
+      room_.doubled_m2 += samples_.area_m2();
+    }
+    plane.samples = distances.size();
+    plane.covered_m2 = covered.area_m2();
+    plane.area_m2 = std::abs(signedAreaOf(plane.outline));
+    for (const auto& hole : plane.holes) plane.area_m2 -= std::abs(signedAreaOf(hole));
+    if (!distances.empty()) {
+      double squares = 0, bow = 0;
+      for (double& d : distances) squares += d * d, d = std::abs(d);
+      for (const auto& [place, patch] : patches) bow += patch.first * patch.first / patch.second;
+      const auto count = static_cast<double>(distances.size());
+      plane.rms_m = std::sqrt(squares / count);
+      plane.bow_m = std::sqrt(bow / count);
+      const auto most = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 99 / 100);
+      std::nth_element(distances.begin(), most, distances.end());
+      plane.largest_m = *most;
+    }
+    room_.planes.push_back(std::move(plane));
+  }
+
+  const std::string& file_;
+  const ScanFrame& frame_;
+  const ScanSamples& samples_;
+  const double tolerance_m_;
+  std::vector<PlaneGroup> groups_;
+  RoomPlanes room_;
+  int walls_ = 0;
+};
+
+/// A cloud's planes face the side where most of the scan is.
+void turnInwards(const ScanSamples& samples, std::vector<PlaneRegion>& regions) {
+  const std::size_t step = std::max<std::size_t>(1, samples.size() / 20000);
+  for (PlaneRegion& r : regions) {
+    long front = 0;
+    for (std::size_t i = 0; i < samples.size(); i += step) {
+      const Eigen::Vector3d p = samples.points[i].cast<double>();
+      const double d = r.distance(p);
+      if (std::abs(d) > 0.1 && (p - r.middle).squaredNorm() < 9) front += d > 0 ? 1 : -1;
+    }
+    if (front < 0) r.normal *= -1, r.offset_m *= -1;
+  }
+}
+
+}  // namespace
+
+double regularise(const ScanSamples& samples, bool enabled, std::vector<PlaneRegion>& regions) {
+  if (!samples.oriented) turnInwards(samples, regions);
+  const double direction = mainDirection(regions);
+  for (PlaneRegion& r : regions) {
+    const Eigen::Vector3d before = r.normal;
+    const double limit = std::max(3 * r.angle_std_rad, 0.05 * kDegree);
+    const double height = std::asin(std::clamp(r.normal.z(), -1.0, 1.0));  // of the normal above the level
+    // Floors and walls are level and upright to a degree; what leans more does so on purpose.
+    const double lean = std::min(std::max(limit, 1 * kDegree), 4 * kDegree);
+    if (M_PI / 2 - std::abs(height) < lean) {
+      r.normal = Eigen::Vector3d(0, 0, r.normal.z() > 0 ? 1 : -1);
+    } else if (std::abs(height) < lean) {
+      double yaw = yawOf(r);
+      const double off = quarter(yaw - direction);
+      if (enabled && std::abs(off) < std::min(limit, 3 * kDegree)) yaw -= off;
+      r.normal = Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0);
+    } else {
+      continue;
+    }
+    r.turned_rad = std::acos(std::min(1.0, before.dot(r.normal)));
+    r.offset_m = r.normal.dot(r.middle);
+    fitOffset(samples, r);
+    measurePlane(samples, r);
+  }
+  return direction;
+}
+
+RoomPlanes roomPlanes(const std::string& file, const ScanFrame& frame, const ScanSamples& samples,
+                      const std::vector<PlaneRegion>& regions, double yaw_rad) {
+  return RoomBuilder(file, frame, samples, regions, yaw_rad).run();
+}
+
+}  // namespace mmradartwin

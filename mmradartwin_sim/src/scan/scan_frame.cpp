@@ -1,0 +1,301 @@
+#include "scan/scan_frame.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "mmradartwin_dsp/input_error.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kDeg = M_PI / 180;
+constexpr double kCone_rad = 12 * kDeg;    // planes within are level or upright, before up is known
+constexpr double kRoom_m[2] = {1.0, 9.0};  // the smallest of a room's three sizes, up to a hall's height
+constexpr double kWidest_m = 150;
+constexpr double kSameLevel_m = 0.06;  // a floor that drift has doubled is one
+
+std::string number(double value, int digits = 2) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.*f", digits, value);
+  return text.data();
+}
+
+/// What lies between the first and the last percent along each axis.
+Eigen::Vector3d robustSizes(const std::vector<Eigen::Vector3f>& points) {
+  Eigen::Vector3d sizes;
+  std::vector<float> values(points.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < points.size(); ++i) values[i] = points[i][axis];
+    const auto low = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 100);
+    const auto high = values.end() - 1 - static_cast<std::ptrdiff_t>(values.size() / 100);
+    std::nth_element(values.begin(), low, values.end());
+    const double from = static_cast<double>(*low);
+    std::nth_element(values.begin(), high, values.end());
+    sizes[axis] = static_cast<double>(*high) - from;
+  }
+  return sizes;
+}
+
+struct NamedAxis {
+  const char* name;
+  Eigen::Vector3d axis;
+  double prior;  ///< how usual it is that a file's up is this axis
+};
+
+std::vector<NamedAxis> axesOf(const RawScan& scan) {
+  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(), z = Eigen::Vector3d::UnitZ();
+  // Surveyors and robots write z up, phones and games y up; a depth camera looks along z with y down.
+  if (scan.camera_axes) return {{"-y", -y, 3}, {"z", z, 0}, {"y", y, 0}, {"x", x, 0}, {"-z", -z, 0}, {"-x", -x, 0}};
+  return {{"z", z, 1}, {"y", y, 0.7}, {"-y", -y, 0.3}, {"x", x, 0.2}, {"-z", -z, 0.2}, {"-x", -x, 0.1}};
+}
+
+/// Area of planes whose normal lies along an axis, or across it.
+struct Alignment {
+  double along_m2 = 0, across_m2 = 0;
+};
+
+Alignment alignmentWith(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& axis) {
+  Alignment result;
+  for (const PlaneRegion& r : regions) {
+    const double cosine = std::abs(r.normal.dot(axis));
+    if (cosine > std::cos(kCone_rad)) result.along_m2 += r.area_m2;
+    if (cosine < std::sin(kCone_rad)) result.across_m2 += r.area_m2;
+  }
+  return result;
+}
+
+/// Rooms are lower than they are wide, and furniture stands on the floor: how well an axis fits as up.
+double scoreOfUp(const ScanSamples& samples, const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& axis) {
+  const Alignment aligned = alignmentWith(regions, axis);
+  double all_m2 = 1e-9;
+  for (const PlaneRegion& r : regions) all_m2 += r.area_m2;
+  if (aligned.along_m2 < 0.05 * all_m2) return -10;
+  std::vector<float> heights;
+  for (const Eigen::Vector3f& p : samples.points) heights.push_back(p.dot(axis.cast<float>()));
+  std::vector<float> sorted = heights;
+  std::sort(sorted.begin(), sorted.end());
+  const float low = sorted[sorted.size() / 200], high = sorted[sorted.size() - 1 - sorted.size() / 200];
+  const float height_m = high - low;
+  // Across: the smaller of two sizes at right angles.
+  const Eigen::Vector3d u = axis.unitOrthogonal(), v = axis.cross(u);
+  double narrowest_m = 1e9;
+  for (const Eigen::Vector3d& side : {u, v}) {
+    for (std::size_t i = 0; i < sorted.size(); ++i) sorted[i] = samples.points[i].dot(side.cast<float>());
+    std::sort(sorted.begin(), sorted.end());
+    narrowest_m =
+        std::min(narrowest_m, static_cast<double>(sorted[sorted.size() * 199 / 200] - sorted[sorted.size() / 200]));
+  }
+  double score = (aligned.along_m2 + aligned.across_m2) / all_m2;
+  if (height_m > 1.9F && height_m < 5) score += 0.5;
+  if (static_cast<double>(height_m) < narrowest_m) score += 0.7;
+  std::size_t lower = 0, upper = 0;
+  for (float h : heights) {
+    const float share = (h - low) / height_m;
+    lower += share > 0.05F && share < 0.45F;
+    upper += share > 0.55F && share < 0.95F;
+  }
+  return score + (static_cast<double>(lower) - static_cast<double>(upper)) / static_cast<double>(lower + upper + 1);
+}
+
+Eigen::Vector3d findUp(const RawScan& scan, const ScanSamples& samples, const std::vector<PlaneRegion>& regions) {
+  Eigen::Vector3d best = Eigen::Vector3d::UnitZ();
+  double best_score = -1e9;
+  for (const NamedAxis& candidate : axesOf(scan)) {
+    // The planes near the axis say where it is; without any it cannot be up.
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const PlaneRegion& r : regions) {
+      const double cosine = r.normal.dot(candidate.axis);
+      if (std::abs(cosine) > std::cos(25 * kDeg)) sum += (cosine > 0 ? 1 : -1) * r.area_m2 * r.normal;
+    }
+    if (sum.isZero()) continue;
+    const Eigen::Vector3d axis = sum.normalized();
+    const double score = candidate.prior + scoreOfUp(samples, regions, axis);
+    if (score > best_score) best_score = score, best = axis;
+  }
+  // Axes of the file that no plane follows: the sensor's own attitude at the start. Planes alone decide.
+  if (best_score < 0.5) {
+    for (std::size_t i = 0; i < std::min<std::size_t>(regions.size(), 8); ++i) {
+      for (double sign : {1.0, -1.0}) {
+        const Eigen::Vector3d axis = sign * regions[i].normal;
+        const double score = scoreOfUp(samples, regions, axis) + 0.2 * axis.z();
+        if (score > best_score) best_score = score, best = axis;
+      }
+    }
+  }
+  return best;
+}
+
+struct Level {
+  Eigen::Vector3d up;
+  double std_rad = 0;
+};
+
+/// up that the level planes have as normal and the upright ones lie along, by their areas; what is off by more than
+/// three of its standard deviations and half a degree is no plane of that kind.
+Level levelBy(const std::vector<PlaneRegion>& regions, Eigen::Vector3d up) {
+  double cone = kCone_rad;
+  Level level{up, 0};
+  for (int round = 0; round < 6; ++round, cone = std::max(0.5 * cone, 0.6 * kDeg)) {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    double weights = 0, squares = 0;
+    for (const PlaneRegion& r : regions) {
+      if (r.area_m2 < 0.3) continue;
+      const double angle = std::acos(std::min(1.0, std::abs(r.normal.dot(level.up))));
+      const bool level_plane = angle < M_PI / 4;
+      const double off = level_plane ? angle : M_PI / 2 - angle;
+      if (off > std::max(cone, 3 * r.angle_std_rad) || off > kCone_rad) continue;
+      const double weight = r.area_m2 / (std::pow(r.angle_std_rad, 2) + std::pow(0.1 * kDeg, 2));
+      sum += (level_plane ? -weight : weight) * r.normal * r.normal.transpose();
+      weights += weight;
+      squares += weight * weight * (off * off + std::pow(r.angle_std_rad, 2));
+    }
+    if (weights == 0) break;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spectrum(sum);
+    const Eigen::Vector3d found = spectrum.eigenvectors().col(0);
+    level.up = found.dot(level.up) < 0 ? Eigen::Vector3d(-found) : found;
+    level.std_rad = std::sqrt(squares) / weights;
+  }
+  return level;
+}
+
+struct HorizontalLevel {
+  double height_m, area_m2;
+};
+
+/// Heights of level planes, lowest first; those closer than kSameLevel_m are the larger one's.
+std::vector<HorizontalLevel> levelsOf(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up) {
+  std::vector<HorizontalLevel> levels;
+  for (const PlaneRegion& r : regions) {  // largest first
+    if (std::abs(r.normal.dot(up)) < std::cos(3 * kDeg)) continue;
+    const double height = r.middle.dot(up);
+    const auto same = std::find_if(levels.begin(), levels.end(), [height](const HorizontalLevel& l) {
+      return std::abs(l.height_m - height) < kSameLevel_m;
+    });
+    if (same == levels.end()) {
+      levels.push_back({height, r.area_m2});
+    } else {
+      same->area_m2 += r.area_m2;
+    }
+  }
+  std::sort(levels.begin(), levels.end(),
+            [](const HorizontalLevel& a, const HorizontalLevel& b) { return a.height_m < b.height_m; });
+  return levels;
+}
+
+/// The turn that makes a named axis of a file z and is nothing but an exchange of axes.
+Eigen::Matrix3d exchangeOfAxes(const std::string& up) {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  if (up == "y") R << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  if (up == "-y") R << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // a camera's z is x, forward
+  if (up == "-z") R << 1, 0, 0, 0, -1, 0, 0, 0, -1;
+  if (up == "x") R << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+  if (up == "-x") R << 0, -1, 0, 0, 0, 1, -1, 0, 0;
+  return R;
+}
+
+std::string wordsOf(const ScanFrame& frame) {
+  std::string words = frame.unit_name == "mm" ? "millimetres" : frame.unit_name == "cm" ? "centimetres" : "metres";
+  if (frame.unit_name.empty()) words = number(frame.unit_m, 4) + " m a unit";
+  words += ", " + frame.up_name + " up";
+  if (frame.tilt_deg > 0.05) words += " but for a tilt of " + number(frame.tilt_deg, 1) + " deg";
+  words += ", floor ";
+  if (std::abs(frame.floor_m) < 0.005) {
+    words += "at the origin";
+  } else {
+    words += number(std::abs(frame.floor_m)) + " m " + (frame.floor_m < 0 ? "below" : "above") + " the origin";
+  }
+  words += frame.has_ceiling ? ", ceiling at " + number(frame.ceiling_m) + " m" : ", no ceiling";
+  return words + ", noise " + number(1e3 * frame.noise_m, 1) + " mm";
+}
+
+}  // namespace
+
+double unitOfScan(const RawScan& scan) {
+  if (scan.metres) return 1;
+  const Eigen::Vector3d sizes = robustSizes(scan.points);
+  for (double unit : {1.0, 0.001, 0.01}) {
+    const double smallest = unit * sizes.minCoeff();
+    if (smallest > kRoom_m[0] && smallest < kRoom_m[1] && unit * sizes.maxCoeff() < kWidest_m) return unit;
+  }
+  // A part of a room, of one plane perhaps: by its largest size.
+  for (double unit : {1.0, 0.001, 0.01}) {
+    const double largest = unit * sizes.maxCoeff();
+    if (largest > 1.5 && largest < 30) return unit;
+  }
+  throw InputError(scan.file + ": is " + number(sizes.x()) + " by " + number(sizes.y()) + " by " + number(sizes.z()) +
+                   " units wide, which is no room in m, cm or mm; cut it to the room, or state --unit");
+}
+
+ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double unit_m, ScanSamples& samples,
+                       std::vector<PlaneRegion>& regions) {
+  ScanFrame frame;
+  frame.unit_m = unit_m;
+  frame.unit_name = unit_m == 1 ? "m" : unit_m == 0.01 ? "cm" : unit_m == 0.001 ? "mm" : "";
+  frame.spacing_m = samples.spacing_m;
+  frame.noise_m = samples.noise_m;
+  Level level{options.up ? options.up->normalized() : findUp(scan, samples, regions), 0};
+  if (options.level) level = levelBy(regions, level.up);
+  frame.up = level.up;
+  frame.tilt_std_deg = level.std_rad / kDeg;
+  const Alignment aligned = alignmentWith(regions, frame.up);
+  if (aligned.across_m2 < 1) {
+    throw InputError(scan.file + ": shows " +
+                     (aligned.along_m2 > 1 ? "one level surface and nothing upright" : "no flat surface") +
+                     ", so that it is no room; scan the walls, too");
+  }
+  double nearest = -1;
+  for (const NamedAxis& candidate : axesOf(scan)) {
+    const double cosine = candidate.axis.dot(frame.up);
+    if (cosine > nearest) nearest = cosine, frame.up_name = candidate.name;
+  }
+  frame.tilt_deg = std::acos(std::min(1.0, nearest)) / kDeg;
+  const Eigen::Matrix3d exchange = exchangeOfAxes(frame.up_name);
+  const Eigen::Matrix3d R =
+      Eigen::Quaterniond::FromTwoVectors(exchange * frame.up, Eigen::Vector3d::UnitZ()).toRotationMatrix() * exchange;
+
+  const std::vector<HorizontalLevel> levels = levelsOf(regions, frame.up);
+  double largest_m2 = 0;
+  for (const HorizontalLevel& l : levels) largest_m2 = std::max(largest_m2, l.area_m2);
+  const Eigen::Vector3d offset = unit_m * scan.offset;
+  double floor = 0;
+  if (options.floor_m) {
+    floor = *options.floor_m - frame.up.dot(offset);
+  } else {
+    const auto lowest = std::find_if(levels.begin(), levels.end(), [&](const HorizontalLevel& l) {
+      return l.area_m2 > std::max(0.3, 0.25 * largest_m2);
+    });
+    if (lowest == levels.end()) {
+      throw InputError(scan.file + ": shows no floor; say where it is by --floor, and which way is up by --up");
+    }
+    floor = lowest->height_m;
+  }
+  for (const HorizontalLevel& l : levels) {
+    if (l.area_m2 > 0.25 * largest_m2 && l.height_m > floor + 1.8) {
+      frame.has_ceiling = true;
+      frame.ceiling_m = l.height_m - floor;
+    }
+  }
+  frame.floor_m = floor + frame.up.dot(offset);
+  frame.origin_m = R * offset;
+  const Eigen::Vector3d shift(0, 0, -floor);
+  frame.T_map_file.linear() = R;
+  frame.T_map_file.translation() = shift - R * offset;
+  frame.words = wordsOf(frame);
+
+  const Eigen::Matrix3f Rf = R.cast<float>();
+  const Eigen::Vector3f shift_f = shift.cast<float>();
+  for (Eigen::Vector3f& p : samples.points) p = Rf * p + shift_f;
+  for (Eigen::Vector3f& p : samples.dense) p = Rf * p + shift_f;
+  for (Eigen::Vector3f& n : samples.normals) n = Rf * n;
+  for (PlaneRegion& r : regions) {
+    r.normal = R * r.normal;
+    r.middle = R * r.middle + shift;
+    r.offset_m += r.normal.dot(shift);
+  }
+  return frame;
+}
+
+}  // namespace mmradartwin

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "mmradartwin_sim/scan_to_scene.h"
+
+namespace mmradartwin {
+
+/// A scan thinned to one sample a voxel, in metres, axes of the file.
+struct ScanSamples {
+  std::vector<Eigen::Vector3f> points;   ///< mean of the voxel's points
+  std::vector<Eigen::Vector3f> normals;  ///< unit, of the plane through the neighbours; zero where there are too few
+  std::vector<float> flatness_m;         ///< rms distance of the neighbours from that plane
+  std::vector<Eigen::Vector3f> colors;   ///< 0 to 1, or empty
+  bool oriented = false;                 ///< normals point to the side from which the scan saw the surface
+  double spacing_m = 0;                  ///< side of a voxel
+  double noise_m = 0;                    ///< rms distance from planes of 0.4 m, median over the flat half of the scan
+  // Neighbours of sample i: neighbour[first[i]] to neighbour[first[i + 1]].
+  std::vector<std::size_t> first;
+  std::vector<int> neighbour;
+  // All points of the scan, those of sample i between dense_first[i] and dense_first[i + 1].
+  std::vector<Eigen::Vector3f> dense;
+  std::vector<std::size_t> dense_first;
+
+  std::size_t size() const { return points.size(); }
+  double area_m2() const { return spacing_m * spacing_m; }  ///< what a sample stands for
+};
+
+using Progress = std::function<void(double, const std::string&)>;
+
+/// Triangles larger than a voxel get points of their own, so that large ones count by their area.
+ScanSamples thinScan(const RawScan& scan, double unit_m, const Progress& progress);
+
+}  // namespace mmradartwin

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <vector>
+
+#include "scan/plane_regions.h"
+
+namespace mmradartwin {
+
+/// An upright box.
+struct UprightBox {
+  double yaw_rad = 0;
+  Eigen::AlignedBox3d box;  ///< in axes turned by yaw about map's z
+  double share = 0;         ///< of the samples within the tolerance of its surface
+  double rms_m = 0, largest_m = 0;
+
+  Eigen::Vector3d toBox(const Eigen::Vector3d& p_map) const;
+  Eigen::Vector3d toMap(const Eigen::Vector3d& p_box) const;
+};
+
+/// The box whose surface holds most of the samples, along one of some directions; its faces stand where samples that
+/// look along them are.
+UprightBox fitBox(const ScanSamples& samples, const std::vector<int>& indices, const std::vector<double>& yaws_rad,
+                  double tolerance_m);
+
+struct UprightCylinder {
+  Eigen::Vector2d center = Eigen::Vector2d::Zero();
+  double radius_m = 0, low_m = 0, high_m = 0;
+  double share = 0, rms_m = 0, largest_m = 0;
+};
+/// By least squares through its upright side (Kasa 1976).
+UprightCylinder fitCylinder(const ScanSamples& samples, const std::vector<int>& indices, double tolerance_m);
+
+struct FittedSphere {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  double radius_m = 0, share = 0, rms_m = 0, largest_m = 0;
+};
+FittedSphere fitSphere(const ScanSamples& samples, const std::vector<int>& indices, double tolerance_m);
+
+/// Closed triangle bodies, added to a thing's mesh.
+void addBox(const UprightBox& box, ScanThing& thing);
+void addCylinder(const UprightCylinder& cylinder, ScanThing& thing);
+void addSphere(const FittedSphere& sphere, ScanThing& thing);
+
+}  // namespace mmradartwin
