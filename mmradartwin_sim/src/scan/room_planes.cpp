@@ -23,6 +23,7 @@ constexpr double kBridge_m = 0.6;     // a gap in a wall's columns, of a curtain
 constexpr double kLeastHole_m = 0.35, kLeastHole_m2 = 0.2;  // smaller gaps are where a scan has none
 constexpr double kHides_m = 1.2;                            // what stands so far before a wall may hide it
 constexpr double kCell_m = 0.05;
+constexpr double kStraggler = 0.7;  // cosine between a straggler's normal and its plane's
 
 std::string text(const char* format, double a, double b = 0) {
   std::array<char, 200> line{};
@@ -143,7 +144,6 @@ class RoomBuilder {
         const double apart = std::abs(g.plane.offset_m - r.offset_m);
         if (apart < std::max(tolerance_m_, 3 * std::hypot(g.plane.offset_std_m, r.offset_std_m))) {
           home = &g;
-          doubled = apart > 0.5 * tolerance_m_ && overlap(g, r) > 0.3;
           break;
         }
         if (apart < kSameWall_m && overlap(g, r) > 0.3) {
@@ -205,8 +205,14 @@ class RoomBuilder {
       const double height = g.high_m - g.low_m;
       const double top = frame_.has_ceiling ? room_.height_m - 0.3 : std::min(1.9, room_.height_m - 0.4);
       g.wall = g.plane.area_m2 > 0.5 && g.high_m > top && height > 0.4 * room_.height_m && !isPillar(g);
-      // Nothing is seen behind an outer wall, however little of it furniture leaves to see.
-      if (!g.wall && g.plane.area_m2 > 2 && height > 1 && behind(g) < 0.01) g.wall = true;
+    }
+    // Nothing is seen behind an outer wall, however little of it furniture leaves to see; what lies on a wall is none.
+    for (PlaneGroup& g : groups_) {
+      if (!isUpright(g.plane) || g.wall || g.plane.area_m2 < 2 || g.high_m - g.low_m < 1) continue;
+      const bool on_wall = std::any_of(groups_.begin(), groups_.end(), [&g](const PlaneGroup& w) {
+        return w.wall && w.plane.normal.dot(g.plane.normal) > 0.99 && std::abs(w.plane.distance(g.plane.middle)) < 0.3;
+      });
+      g.wall = !on_wall && behind(g) < 0.01;
     }
   }
 
@@ -475,6 +481,20 @@ class RoomBuilder {
     return plane;
   }
 
+  /// A plane's samples and those that lie on it though their own normals, of few noisy neighbours, kept them out.
+  std::vector<int> withStragglers(const PlaneGroup& g) const {
+    std::vector<char> taken(samples_.size(), 0);
+    for (int i : g.plane.samples) taken[static_cast<std::size_t>(i)] = 1;
+    for (int i : g.second_copy) taken[static_cast<std::size_t>(i)] = 1;
+    std::vector<int> all = g.plane.samples;
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      if (taken[i] || room_.owner[i] != -1) continue;
+      if (std::abs(g.plane.distance(samples_.points[i].cast<double>())) > tolerance_m_) continue;
+      if (std::abs(g.plane.normal.dot(samples_.normals[i].cast<double>())) > kStraggler) all.push_back(static_cast<int>(i));
+    }
+    return all;
+  }
+
   /// Measures a plane by the samples within its bounds, which become its own.
   void finish(const PlaneGroup& g, ScanPlane plane) {
     const int id = static_cast<int>(room_.planes.size());
@@ -484,7 +504,7 @@ class RoomBuilder {
     std::vector<double> distances;
     CellRaster covered(kCell_m);
     std::map<std::pair<int, int>, std::pair<double, double>> patches;
-    for (int i : g.plane.samples) {
+    for (int i : withStragglers(g)) {
       const Eigen::Vector3d p = sampleAt(samples_, i);
       const Eigen::Vector2d at = g.project(p);
       if (!box.contains(at) || room_.owner[static_cast<std::size_t>(i)] != -1) continue;

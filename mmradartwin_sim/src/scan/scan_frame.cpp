@@ -185,6 +185,29 @@ std::vector<HorizontalLevel> levelsOf(const std::vector<PlaneRegion>& regions, c
   return levels;
 }
 
+/// Mean height of all points of level planes near a height, twice, the second time without what lies off.
+double heightOf(const ScanSamples& samples, const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up,
+                double height_m) {
+  const Eigen::Vector3f axis = up.cast<float>();
+  const double tolerance_m = planeTolerance(samples);
+  for (int round = 0; round < 2; ++round) {
+    double sum = 0;
+    std::size_t count = 0;
+    for (const PlaneRegion& r : regions) {
+      if (std::abs(r.normal.dot(up)) < std::cos(3 * kDeg) || std::abs(r.middle.dot(up) - height_m) > tolerance_m) continue;
+      for (int i : r.samples) {
+        const auto s = static_cast<std::size_t>(i);
+        for (std::size_t k = samples.dense_first[s]; k < samples.dense_first[s + 1]; ++k) {
+          const auto along = static_cast<double>(axis.dot(samples.dense[k]));
+          if (std::abs(along - height_m) < 2 * tolerance_m) sum += along, ++count;
+        }
+      }
+    }
+    if (count) height_m = sum / static_cast<double>(count);
+  }
+  return height_m;
+}
+
 /// The turn that makes a named axis of a file z and is nothing but an exchange of axes.
 Eigen::Matrix3d exchangeOfAxes(const std::string& up) {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
@@ -278,6 +301,8 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
       frame.ceiling_m = l.height_m - floor;
     }
   }
+  if (!options.floor_m) floor = heightOf(samples, regions, frame.up, floor);
+  if (frame.has_ceiling) frame.ceiling_m = heightOf(samples, regions, frame.up, floor + frame.ceiling_m) - floor;
   frame.floor_m = floor + frame.up.dot(offset);
   frame.origin_m = R * offset;
   const Eigen::Vector3d shift(0, 0, -floor);

@@ -20,7 +20,7 @@ namespace {
 constexpr double kFinest_m = 0.02;            // side of a voxel
 constexpr std::size_t kMostSamples = 450000;  // else the voxels grow: a large flat has 500 m2 of surface
 constexpr double kReach_voxels = 3.5;         // of a sample's neighbours, some forty on a plane
-constexpr double kWide_m = 0.4;               // the scale at which noise is measured: slower than a scanner's ripple
+constexpr double kWide_m = 0.8;               // the scale at which noise is measured: slower than a scanner's ripple
 constexpr std::size_t kWidePlaces = 3000;
 
 struct DensePoint {
@@ -183,7 +183,8 @@ class Thinning {
     return found;
   }
 
-  /// rms distance from planes of kWide_m at places spread over the scan; the median of the flatter half.
+  /// rms distance from planes of kWide_m at places spread over the scan: what a quarter of them is below, since furniture
+  /// and corners are in most of the others.
   void measureNoise() {
     const std::size_t places = std::min(kWidePlaces, samples_.size());
     std::vector<float> rms(places, -1);
@@ -206,6 +207,11 @@ class Thinning {
     std::atomic<std::size_t> done{0};
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
       around[i] = within(i, reach_m);
+      if (samples_.oriented) {
+        // The other side of a thin plate is another plane.
+        const auto other = [&](int k) { return area_[static_cast<std::size_t>(k)].dot(area_[i]) < 0; };
+        around[i].erase(std::remove_if(around[i].begin(), around[i].end(), other), around[i].end());
+      }
       const LocalPlane plane = planeThrough(samples_.points, around[i]);
       samples_.normals[i] = plane.normal;
       samples_.flatness_m[i] = plane.rms_m;

@@ -16,7 +16,7 @@ struct ScanSamples {
   std::vector<Eigen::Vector3f> colors;   ///< 0 to 1, or empty
   bool oriented = false;                 ///< normals point to the side from which the scan saw the surface
   double spacing_m = 0;                  ///< side of a voxel
-  double noise_m = 0;                    ///< rms distance from planes of 0.4 m, median over the flat half of the scan
+  double noise_m = 0;                    ///< rms distance from planes of 0.8 m, at the flattest quarter of places
   // Neighbours of sample i: neighbour[first[i]] to neighbour[first[i + 1]].
   std::vector<std::size_t> first;
   std::vector<int> neighbour;

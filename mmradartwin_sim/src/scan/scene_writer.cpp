@@ -39,12 +39,19 @@ void writeObj(const ScanScene& scene, const std::string& file) {
   if (!out.flush()) throw std::runtime_error(file + ": cannot be written; check the free space");
 }
 
+/// Not as input of the run, which its output replaces.
+std::string textOfOlder(const std::string& file) {
+  std::ifstream in(file);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
 /// What a person has made of an older scene: actors whose material is another than the one proposed then.
 std::map<std::string, std::string> editedMaterials(const std::string& scene_yaml) {
   std::map<std::string, std::string> edited, proposed;
-  std::ifstream in(scene_yaml);
-  std::stringstream text;
-  text << in.rdbuf();
+  const std::string whole = textOfOlder(scene_yaml);
+  std::istringstream text(whole);
   std::string row;
   while (std::getline(text, row)) {
     const std::size_t comment = row.find(kProposed), colon = row.find(':');
@@ -55,7 +62,7 @@ std::map<std::string, std::string> editedMaterials(const std::string& scene_yaml
     std::istringstream(row.substr(comment + std::string(kProposed).size())) >> tag;
     proposed[name] = tag;
   }
-  YamlMap older = YamlMap::load(scene_yaml);
+  YamlMap older = YamlMap::parse(whole, scene_yaml);
   if (!older.has("actors")) return edited;
   YamlMap actors = older.map("actors");
   for (const std::string& name : actors.keys()) {
@@ -73,7 +80,7 @@ std::map<std::string, std::string> olderMaterials(const std::string& materials_y
   std::map<std::string, std::string> lines;
   std::error_code error;
   if (!std::filesystem::is_regular_file(materials_yaml, error)) return lines;
-  YamlMap materials = YamlMap::load(materials_yaml).map("materials");
+  YamlMap materials = YamlMap::parse(textOfOlder(materials_yaml), materials_yaml).map("materials");
   for (const std::string& tag : materials.keys()) lines[tag] = materials.dump(tag);
   return lines;
 }
