@@ -42,12 +42,12 @@ struct ScanOptions {
 /// How the map's coordinates come from the file's, and what the scan is good for.
 struct ScanFrame {
   double unit_m = 1;
-  std::string unit_name;                               ///< "m", "cm", "mm"
-  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();       ///< unit, in axes of the file
-  std::string up_name;                                 ///< of the file's axis that is nearest to up: "z", "-y"
-  double tilt_deg = 0;                                 ///< between that axis and up
-  double tilt_std_deg = 0;                             ///< of up, from the planes that gave it
-  double floor_m = 0;                                  ///< of the floor along up, above the file's origin
+  std::string unit_name;                          ///< "m", "cm", "mm"
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< unit, in axes of the file
+  std::string up_name;                            ///< of the file's axis that is nearest to up: "z", "-y"
+  double tilt_deg = 0;                            ///< between that axis and up
+  double tilt_std_deg = 0;                        ///< of up, from the planes that gave it
+  double floor_m = 0;  ///< of the floor above the file's origin, along that axis where large coordinates were taken off
   Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();  ///< large coordinates that were taken off; z up, metres
   Eigen::Isometry3d T_map_file = Eigen::Isometry3d::Identity();  ///< p_map = T_map_file * (unit_m * p_file)
   bool has_ceiling = false;

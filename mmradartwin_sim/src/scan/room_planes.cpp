@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <set>
@@ -23,6 +24,7 @@ constexpr double kBridge_m = 0.6;     // a gap in a wall's columns, of a curtain
 constexpr double kLeastHole_m = 0.35, kLeastHole_m2 = 0.2;  // smaller gaps are where a scan has none
 constexpr double kHides_m = 1.2;                            // what stands so far before a wall may hide it
 constexpr double kCell_m = 0.05;
+constexpr double kOpenStep_m = 1.0;
 constexpr double kStraggler = 0.7;  // cosine between a straggler's normal and its plane's
 
 std::string text(const char* format, double a, double b = 0) {
@@ -104,6 +106,25 @@ struct PlaneGroup {
 struct WallRun {
   std::size_t group;
   double from_m, to_m;
+  double top_m = 0;
+  std::vector<Eigen::AlignedBox2d> openings = {};
+};
+
+/// Lines at right angles that cut the floor into cells, in the room's main directions, and which cells are the room.
+struct FloorCells {
+  std::vector<double> xs, ys;
+  std::vector<char> inside;  // [x][y]
+
+  std::size_t index(std::size_t i, std::size_t k) const { return i * (ys.size() - 1) + k; }
+  Eigen::AlignedBox2d box(std::size_t i, std::size_t k) const {
+    return Eigen::AlignedBox2d(Eigen::Vector2d(xs[i], ys[k]), Eigen::Vector2d(xs[i + 1], ys[k + 1]));
+  }
+  bool holds(const Eigen::Vector2d& p) const {
+    const auto i = std::upper_bound(xs.begin(), xs.end(), p.x()) - xs.begin(),
+               k = std::upper_bound(ys.begin(), ys.end(), p.y()) - ys.begin();
+    if (i < 1 || k < 1 || i >= static_cast<long>(xs.size()) || k >= static_cast<long>(ys.size())) return false;
+    return inside[index(static_cast<std::size_t>(i) - 1, static_cast<std::size_t>(k) - 1)] != 0;
+  }
 };
 
 class RoomBuilder {
@@ -128,8 +149,14 @@ class RoomBuilder {
     }
     if (runs.empty())
       throw InputError(file_ + ": shows no wall, so that it is no room; outdoors and tables alone are no scenes");
+    for (WallRun& run : runs) {
+      const PlaneGroup& g = groups_[run.group];
+      run.top_m = frame_.has_ceiling || g.high_m > room_.height_m - 0.3 ? room_.height_m : g.high_m;
+      run.openings = openings(g, run, run.top_m);
+    }
     addFloorAndCeiling(runs);
     for (const WallRun& run : runs) addWall(run);
+    if (walls_ == 0) throw InputError(file_ + ": shows no wall around its floor, so that it is no room");
     return std::move(room_);
   }
 
@@ -208,12 +235,27 @@ class RoomBuilder {
     }
     // Nothing is seen behind an outer wall, however little of it furniture leaves to see; what lies on a wall is none.
     for (PlaneGroup& g : groups_) {
-      if (!isUpright(g.plane) || g.wall || g.plane.area_m2 < 2 || g.high_m - g.low_m < 1) continue;
+      if (!isUpright(g.plane) || g.wall || g.plane.area_m2 < 0.5 || g.high_m < 1.5 || g.high_m - g.low_m < 1.2)
+        continue;
       const bool on_wall = std::any_of(groups_.begin(), groups_.end(), [&g](const PlaneGroup& w) {
         return w.wall && w.plane.normal.dot(g.plane.normal) > 0.99 && std::abs(w.plane.distance(g.plane.middle)) < 0.3;
       });
-      g.wall = !on_wall && behind(g) < 0.01;
+      g.wall = !on_wall && seenBehind(g) < 0.1;
     }
+  }
+
+  /// Samples behind a plane, within its ends, as a share of its own.
+  double seenBehind(const PlaneGroup& g) const {
+    double low = 1e9, high = -1e9;
+    for (int i : g.plane.samples)
+      low = std::min(low, g.u.dot(sampleAt(samples_, i))), high = std::max(high, g.u.dot(sampleAt(samples_, i)));
+    std::size_t count = 0;
+    for (const Eigen::Vector3f& q : samples_.points) {
+      const Eigen::Vector3d p = q.cast<double>();
+      const double u = g.u.dot(p), d = g.plane.distance(p);
+      count += u > low && u < high && d < -0.15 && d > -3 && p.z() > 0.1 && p.z() < room_.height_m - 0.1;
+    }
+    return static_cast<double>(count) / static_cast<double>(g.plane.samples.size());
   }
 
   /// Share of all samples behind a plane.
@@ -286,7 +328,7 @@ class RoomBuilder {
       if (!found.empty() && from - found.back().to_m < kBridge_m && !crossed) {
         found.back().to_m = to;
       } else {
-        found.push_back({g, from, to});
+        found.push_back({g, from, to, 0, {}});
       }
     }
     for (WallRun& run : found) {
@@ -295,48 +337,182 @@ class RoomBuilder {
     }
   }
 
-  /// The floor reaches to the walls: of the cells that the walls' lines cut the plane into, those that hold the scan.
-  void addFloorAndCeiling(const std::vector<WallRun>& runs) {
-    const Eigen::Vector2d ex(std::cos(room_.yaw_rad), std::sin(room_.yaw_rad)), ey(-ex.y(), ex.x());
+  Eigen::Vector2d inMain(const Eigen::Vector3d& p) const {
+    const double c = std::cos(room_.yaw_rad), s = std::sin(room_.yaw_rad);
+    return {c * p.x() + s * p.y(), -s * p.x() + c * p.y()};
+  }
+  std::array<Eigen::Vector2d, 2> endsOf(const WallRun& run) const {
+    const PlaneGroup& g = groups_[run.group];
+    const Eigen::Vector3d foot = g.plane.offset_m * g.plane.normal;
+    return {inMain(foot + run.from_m * g.u), inMain(foot + run.to_m * g.u)};
+  }
+
+  /// The floor reaches to the walls: of the cells that the walls' lines cut the plane into, those that hold the scan
+  /// and that no wall parts from the largest. Walls that do not face these are those of a mirror's room, or seen
+  /// through a window.
+  void addFloorAndCeiling(std::vector<WallRun>& runs) {
+    FloorCells cells = cutFloor(runs);
+    const std::size_t columns = cells.xs.size() - 1, rows = cells.ys.size() - 1;
+    CellRaster scanned(2 * kCell_m);
+    for (const Eigen::Vector3f& p : samples_.points) {
+      if (p.z() > -0.3F && p.z() < static_cast<float>(room_.height_m) + 0.3F) scanned.set(inMain(p.cast<double>()));
+    }
+    std::vector<double> share(columns * rows);
+    std::size_t start = 0;
+    double most = -1;
+    for (std::size_t i = 0; i < columns; ++i) {
+      for (std::size_t k = 0; k < rows; ++k) {
+        const std::size_t c = cells.index(i, k);
+        share[c] = scanned.share(cells.box(i, k));
+        const double area = share[c] * cells.box(i, k).volume();
+        if (area > most) most = area, start = c;
+      }
+    }
+    cells.inside.assign(columns * rows, 0);
+    std::vector<std::size_t> queue = {start};
+    cells.inside[start] = 1;
+    for (std::size_t q = 0; q < queue.size(); ++q) {
+      const std::size_t i = queue[q] / rows, k = queue[q] % rows;
+      const std::array<std::array<int, 2>, 4> steps = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
+      for (const auto& step : steps) {
+        const long ni = static_cast<long>(i) + step[0], nk = static_cast<long>(k) + step[1];
+        if (ni < 0 || nk < 0 || ni >= static_cast<long>(columns) || nk >= static_cast<long>(rows)) continue;
+        const std::size_t next = cells.index(static_cast<std::size_t>(ni), static_cast<std::size_t>(nk));
+        if (cells.inside[next] || share[next] < 0.35) continue;
+        if (walled(runs, cells, i, k, step)) continue;
+        cells.inside[next] = 1;
+        queue.push_back(next);
+      }
+    }
+    fillNooks(runs, cells);
+    PlaneLoops loops = {{{cells.xs.front(), cells.ys.front()},
+                         {cells.xs.back(), cells.ys.front()},
+                         {cells.xs.back(), cells.ys.back()},
+                         {cells.xs.front(), cells.ys.back()}}};
+    for (std::size_t i = 0; i < columns; ++i) {
+      for (std::size_t k = 0; k < rows; ++k) {
+        if (!cells.inside[cells.index(i, k)]) loops = without(loops, {loopOf(cells.box(i, k))});
+      }
+    }
+    std::vector<WallRun> facing;
+    std::copy_if(runs.begin(), runs.end(), std::back_inserter(facing),
+                 [&](const WallRun& run) { return facesRoom(run, cells); });
+    const std::size_t before = runs.size();
+    // One frame of a camera may show walls apart from all floor.
+    if (!facing.empty()) runs = facing;
+    if (before > runs.size())
+      room_.notes.push_back(
+          text("%.0f upright plane(s) outside of the room were left out", static_cast<double>(before - runs.size())));
+    const Eigen::Vector2d ex(std::cos(room_.yaw_rad), std::sin(room_.yaw_rad));
+    addLevel("floor", PlaneKind::kFloor, 1, 0, loops, ex);
+    if (frame_.has_ceiling) addLevel("ceiling", PlaneKind::kCeiling, -1, frame_.ceiling_m, loops, ex);
+  }
+
+  /// Cells that walls and the room enclose on three sides are the room's, though furniture hides what lies there.
+  void fillNooks(const std::vector<WallRun>& runs, FloorCells& cells) const {
+    const auto columns = static_cast<long>(cells.xs.size()) - 1, rows = static_cast<long>(cells.ys.size()) - 1;
+    const std::array<std::array<int, 2>, 4> steps = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
+    for (bool filled = true; filled;) {
+      filled = false;
+      for (long i = 0; i < columns; ++i) {
+        for (long k = 0; k < rows; ++k) {
+          const auto ui = static_cast<std::size_t>(i), uk = static_cast<std::size_t>(k);
+          if (cells.inside[cells.index(ui, uk)]) continue;
+          int closed = 0, open = 0;
+          for (const auto& step : steps) {
+            const long ni = i + step[0], nk = k + step[1];
+            const bool exists = ni >= 0 && nk >= 0 && ni < columns && nk < rows;
+            const bool wall = walled(runs, cells, ui, uk, step);
+            closed += wall;
+            open += !wall && exists &&
+                    cells.inside[cells.index(static_cast<std::size_t>(ni), static_cast<std::size_t>(nk))];
+          }
+          if (open == 0 || open + closed < 3) continue;
+          cells.inside[cells.index(ui, uk)] = 1;
+          filled = true;
+        }
+      }
+    }
+  }
+
+  static std::vector<Eigen::Vector2d> loopOf(const Eigen::AlignedBox2d& box) {
+    return {box.min(), {box.max().x(), box.min().y()}, box.max(), {box.min().x(), box.max().y()}};
+  }
+
+  FloorCells cutFloor(const std::vector<WallRun>& runs) const {
     std::set<double> xs, ys;
     Eigen::AlignedBox2d box;
-    CellRaster cells(kCell_m * 2);
-    for (const Eigen::Vector3f& p : samples_.points) {
-      const Eigen::Vector2d q(ex.dot(p.head<2>().cast<double>()), ey.dot(p.head<2>().cast<double>()));
-      if (p.z() > -0.3F && p.z() < static_cast<float>(room_.height_m) + 0.3F) cells.set(q);
-    }
-    for (int i : floorSamples()) {
-      const Eigen::Vector3d p = sampleAt(samples_, i);
-      box.extend(Eigen::Vector2d(ex.dot(p.head<2>()), ey.dot(p.head<2>())));
-    }
-    std::vector<std::array<Eigen::Vector2d, 2>> slanted;
+    for (int i : floorSamples()) box.extend(inMain(sampleAt(samples_, i)));
+    std::vector<Eigen::Vector2d> slanted;
     for (const WallRun& run : runs) {
-      const PlaneGroup& g = groups_[run.group];
-      const Eigen::Vector3d a = g.plane.offset_m * g.plane.normal + run.from_m * g.u,
-                            b = g.plane.offset_m * g.plane.normal + run.to_m * g.u;
-      const Eigen::Vector2d p(ex.dot(a.head<2>()), ey.dot(a.head<2>())), q(ex.dot(b.head<2>()), ey.dot(b.head<2>()));
-      if (std::abs(p.x() - q.x()) < 1e-9 * std::abs(p.y() - q.y()) + 1e-7) {
+      const auto [p, q] = endsOf(run);
+      if (std::abs(p.x() - q.x()) < 1e-6) {
         xs.insert(p.x());
-      } else if (std::abs(p.y() - q.y()) < 1e-9 * std::abs(p.x() - q.x()) + 1e-7) {
+      } else if (std::abs(p.y() - q.y()) < 1e-6) {
         ys.insert(p.y());
       } else {
-        slanted.push_back({p, q});
+        slanted.push_back(p), slanted.push_back(q);
       }
       box.extend(p), box.extend(q);
     }
-    const auto addEnd = [](std::set<double>& lines, double end) {
-      if (std::none_of(lines.begin(), lines.end(), [end](double l) { return std::abs(l - end) < kSnap_m; }))
-        lines.insert(end);
+    const auto add = [](std::set<double>& lines, double line, double apart) {
+      if (std::none_of(lines.begin(), lines.end(), [&](double l) { return std::abs(l - line) < apart; }))
+        lines.insert(line);
     };
-    addEnd(xs, box.min().x()), addEnd(xs, box.max().x()), addEnd(ys, box.min().y()), addEnd(ys, box.max().y());
-    const PlaneLoops loops = loopsOfCells({xs.begin(), xs.end()}, {ys.begin(), ys.end()}, cells);
-    if (!slanted.empty()) {
-      room_.notes.push_back(
-          text("%.0f wall(s) stand slanted to the room's main direction; floor and ceiling end beyond them",
-               static_cast<double>(slanted.size())));
+    for (const Eigen::Vector2d& p : slanted) add(xs, p.x(), kSnap_m), add(ys, p.y(), kSnap_m);
+    add(xs, box.min().x(), kSnap_m), add(xs, box.max().x(), kSnap_m);
+    add(ys, box.min().y(), kSnap_m), add(ys, box.max().y(), kSnap_m);
+    // Where no wall bounds the scan, the floor follows it by such steps.
+    for (double x = box.min().x(); x < box.max().x(); x += kOpenStep_m) add(xs, x, kOpenStep_m / 2);
+    for (double y = box.min().y(); y < box.max().y(); y += kOpenStep_m) add(ys, y, kOpenStep_m / 2);
+    FloorCells cells;
+    const auto distinct = [](const std::set<double>& lines) {
+      std::vector<double> list;
+      for (double l : lines) {
+        if (list.empty() || l - list.back() > 1e-3) list.push_back(l);
+      }
+      return list;
+    };
+    cells.xs = distinct(xs), cells.ys = distinct(ys);
+    return cells;
+  }
+
+  /// A wall without a doorway stands on most of a cell's edge.
+  bool walled(const std::vector<WallRun>& runs, const FloorCells& cells, std::size_t i, std::size_t k,
+              const std::array<int, 2>& side) const {
+    const bool across_x = side[0] != 0;
+    const double line = across_x ? cells.xs[i + (side[0] > 0)] : cells.ys[k + (side[1] > 0)];
+    const double low = across_x ? cells.ys[k] : cells.xs[i], high = across_x ? cells.ys[k + 1] : cells.xs[i + 1];
+    double covered = 0;
+    for (const WallRun& run : runs) {
+      const auto [p, q] = endsOf(run);
+      const double at = across_x ? p.x() : p.y(), other = across_x ? q.x() : q.y();
+      if (std::abs(at - line) > 2e-3 || std::abs(other - line) > 2e-3) continue;
+      const double from = across_x ? p.y() : p.x(), to = across_x ? q.y() : q.x();
+      covered += std::max(0.0, std::min(high, std::max(from, to)) - std::max(low, std::min(from, to)));
+      for (const Eigen::AlignedBox2d& hole : run.openings) {
+        if (hole.min().y() > 0) continue;
+        const double sign = to > from ? 1 : -1;
+        const double a = from + sign * (hole.min().x() - run.from_m), b = from + sign * (hole.max().x() - run.from_m);
+        if (std::min(a, b) < high && std::max(a, b) > low) return false;
+      }
     }
-    addLevel("floor", PlaneKind::kFloor, 1, 0, loops, ex);
-    if (frame_.has_ceiling) addLevel("ceiling", PlaneKind::kCeiling, -1, frame_.ceiling_m, loops, ex);
+    return covered > 0.5 * (high - low);
+  }
+
+  bool facesRoom(const WallRun& run, const FloorCells& cells) const {
+    const auto [p, q] = endsOf(run);
+    const PlaneGroup& g = groups_[run.group];
+    const Eigen::Vector2d n = inMain(g.plane.normal);
+    int inside = 0, behind = 0;
+    for (int i = 0; i < 10; ++i) {
+      const Eigen::Vector2d at = p + (i + 0.5) / 10 * (q - p);
+      inside += cells.holds(at + 0.1 * n);
+      behind += cells.holds(at - 0.25 * n);
+    }
+    // A low plane in the midst of the room is a partition or a cabinet's.
+    if (g.high_m < room_.height_m - 0.3 && behind > 3) return false;
+    return inside >= 4;
   }
 
   std::vector<int> floorSamples() const {
@@ -350,23 +526,6 @@ class RoomBuilder {
     return all;
   }
 
-  /// Cells of the lines that the scan covers by more than a third, as outlines and holes.
-  static PlaneLoops loopsOfCells(const std::vector<double>& xs, const std::vector<double>& ys,
-                                 const CellRaster& cells) {
-    if (xs.size() < 2 || ys.size() < 2) return {};
-    PlaneLoops loops = {
-        {{xs.front(), ys.front()}, {xs.back(), ys.front()}, {xs.back(), ys.back()}, {xs.front(), ys.back()}}};
-    for (std::size_t i = 0; i + 1 < xs.size(); ++i) {
-      for (std::size_t k = 0; k + 1 < ys.size(); ++k) {
-        const Eigen::AlignedBox2d cell(Eigen::Vector2d(xs[i], ys[k]), Eigen::Vector2d(xs[i + 1], ys[k + 1]));
-        if (cells.share(cell) > 0.35) continue;
-        loops = without(loops,
-                        {{cell.min(), {cell.max().x(), cell.min().y()}, cell.max(), {cell.min().x(), cell.max().y()}}});
-      }
-    }
-    return loops;
-  }
-
   void addLevel(const std::string& name, PlaneKind kind, int side, double height_m, const PlaneLoops& loops,
                 const Eigen::Vector2d& ex) {
     // Samples of the level, of whichever part.
@@ -377,8 +536,11 @@ class RoomBuilder {
     level.v = level.plane.normal.cross(level.u);
     for (const PlaneGroup& g : groups_) {
       if (!isLevel(g.plane) || std::abs(g.plane.middle.z() - height_m) > kSameWall_m) continue;
-      auto& list = std::abs(g.plane.middle.z() - height_m) < tolerance_m_ ? level.plane.samples : level.second_copy;
-      list.insert(list.end(), g.plane.samples.begin(), g.plane.samples.end());
+      if (std::abs(g.plane.middle.z() - height_m) < tolerance_m_) {
+        level.plane.samples.insert(level.plane.samples.end(), g.plane.samples.begin(), g.plane.samples.end());
+      } else if (overlap(level, g.plane) > 0.3) {  // groups come largest first; a carpet hides the floor
+        level.second_copy.insert(level.second_copy.end(), g.plane.samples.begin(), g.plane.samples.end());
+      }
       level.second_copy.insert(level.second_copy.end(), g.second_copy.begin(), g.second_copy.end());
     }
     measurePlane(samples_, level.plane);
@@ -408,13 +570,9 @@ class RoomBuilder {
   void addWall(const WallRun& run) {
     const PlaneGroup& g = groups_[run.group];
     ScanPlane plane = planeOf(g, PlaneKind::kWall);
-    const double top = frame_.has_ceiling || g.high_m > room_.height_m - 0.3 ? room_.height_m : g.high_m;
-    const PlaneLoops rectangle = {{{run.from_m, 0}, {run.to_m, 0}, {run.to_m, top}, {run.from_m, top}}};
-    PlaneLoops loops = rectangle;
-    for (const Eigen::AlignedBox2d& hole : openings(g, run, top)) {
-      loops = without(loops,
-                      {{hole.min(), {hole.max().x(), hole.min().y()}, hole.max(), {hole.min().x(), hole.max().y()}}});
-    }
+    const double top = run.top_m;
+    PlaneLoops loops = {{{run.from_m, 0}, {run.to_m, 0}, {run.to_m, top}, {run.from_m, top}}};
+    for (const Eigen::AlignedBox2d& hole : run.openings) loops = without(loops, {loopOf(hole)});
     std::size_t outer = 0;
     for (const auto& loop : loops) outer += signedAreaOf(loop) > 0;
     std::size_t part = 0;
@@ -490,7 +648,8 @@ class RoomBuilder {
     for (std::size_t i = 0; i < samples_.size(); ++i) {
       if (taken[i] || room_.owner[i] != -1) continue;
       if (std::abs(g.plane.distance(samples_.points[i].cast<double>())) > tolerance_m_) continue;
-      if (std::abs(g.plane.normal.dot(samples_.normals[i].cast<double>())) > kStraggler) all.push_back(static_cast<int>(i));
+      if (std::abs(g.plane.normal.dot(samples_.normals[i].cast<double>())) > kStraggler)
+        all.push_back(static_cast<int>(i));
     }
     return all;
   }
@@ -578,7 +737,7 @@ double regularise(const ScanSamples& samples, bool enabled, std::vector<PlaneReg
     } else if (std::abs(height) < lean) {
       double yaw = yawOf(r);
       const double off = quarter(yaw - direction);
-      if (enabled && std::abs(off) < std::min(limit, 3 * kDegree)) yaw -= off;
+      if (enabled && std::abs(off) < std::min(limit, 6 * kDegree)) yaw -= off;
       r.normal = Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0);
     } else {
       continue;

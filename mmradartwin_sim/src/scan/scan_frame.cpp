@@ -194,7 +194,8 @@ double heightOf(const ScanSamples& samples, const std::vector<PlaneRegion>& regi
     double sum = 0;
     std::size_t count = 0;
     for (const PlaneRegion& r : regions) {
-      if (std::abs(r.normal.dot(up)) < std::cos(3 * kDeg) || std::abs(r.middle.dot(up) - height_m) > tolerance_m) continue;
+      if (std::abs(r.normal.dot(up)) < std::cos(3 * kDeg) || std::abs(r.middle.dot(up) - height_m) > tolerance_m)
+        continue;
       for (int i : r.samples) {
         const auto s = static_cast<std::size_t>(i);
         for (std::size_t k = samples.dense_first[s]; k < samples.dense_first[s + 1]; ++k) {
@@ -270,9 +271,10 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
                      ", so that it is no room; scan the walls, too");
   }
   double nearest = -1;
+  Eigen::Vector3d axis = frame.up;
   for (const NamedAxis& candidate : axesOf(scan)) {
     const double cosine = candidate.axis.dot(frame.up);
-    if (cosine > nearest) nearest = cosine, frame.up_name = candidate.name;
+    if (cosine > nearest) nearest = cosine, frame.up_name = candidate.name, axis = candidate.axis;
   }
   frame.tilt_deg = std::acos(std::min(1.0, nearest)) / kDeg;
   const Eigen::Matrix3d exchange = exchangeOfAxes(frame.up_name);
@@ -285,7 +287,7 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
   const Eigen::Vector3d offset = unit_m * scan.offset;
   double floor = 0;
   if (options.floor_m) {
-    floor = *options.floor_m - frame.up.dot(offset);
+    floor = *options.floor_m - axis.dot(offset);
   } else {
     const auto lowest = std::find_if(levels.begin(), levels.end(), [&](const HorizontalLevel& l) {
       return l.area_m2 > std::max(0.3, 0.25 * largest_m2);
@@ -303,7 +305,7 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
   }
   if (!options.floor_m) floor = heightOf(samples, regions, frame.up, floor);
   if (frame.has_ceiling) frame.ceiling_m = heightOf(samples, regions, frame.up, floor + frame.ceiling_m) - floor;
-  frame.floor_m = floor + frame.up.dot(offset);
+  frame.floor_m = floor + axis.dot(offset);
   frame.origin_m = R * offset;
   const Eigen::Vector3d shift(0, 0, -floor);
   frame.T_map_file.linear() = R;

@@ -120,9 +120,9 @@ void readPcdFile(RawScan& scan) {
     const std::uint8_t* at = cloud.data.data() + i * cloud.point_step + color->offset;
     filler.addColor(i, {at[2], at[1], at[0]});  // blue comes first
   }
-  // A frame of a depth camera keeps its rows; sensors that have turned it into a map do not.
-  scan.camera_axes =
-      cloud.height > 1 && origin.head<3>().isZero() && orientation.isApprox(Eigen::Quaternionf::Identity());
+  // A frame of a depth camera keeps its rows, and all of it lies before the camera.
+  scan.camera_axes = cloud.height > 1 && origin.head<3>().isZero() &&
+                     std::all_of(scan.points.begin(), scan.points.end(), [](const auto& p) { return p.z() > 0; });
 }
 
 /// Lines of x y z, with or without r g b behind; what begins otherwise is a comment or a count of points.

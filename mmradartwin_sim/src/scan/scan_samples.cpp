@@ -51,6 +51,7 @@ class VoxelKey {
 struct DenseCloud {
   std::vector<Eigen::Vector3f> points, normals;  // normals times area; of a cloud none
   std::vector<Eigen::Vector3f> colors;
+  std::vector<int> triangles;  // of a mesh, that each point lies on
 };
 
 Eigen::Vector3f colorOf(const RawScan& scan, std::size_t i) {
@@ -87,6 +88,7 @@ DenseCloud densePoints(const RawScan& scan, double unit_m) {
       }
       dense.points.push_back(a + static_cast<float>(u) * b + static_cast<float>(v) * c);
       dense.normals.push_back(n / static_cast<float>(count));
+      dense.triangles.push_back(static_cast<int>(&t - scan.triangles.data()));
       if (colored) {
         dense.colors.push_back((colorOf(scan, at(0)) + colorOf(scan, at(1)) + colorOf(scan, at(2))) / 3);
       }
@@ -152,6 +154,7 @@ class Thinning {
         const std::size_t k = order[end].index;
         sum += dense.points[k].cast<double>();
         samples_.dense.push_back(dense.points[k]);
+        if (samples_.oriented) samples_.dense_triangle.push_back(dense.triangles[k]);
         if (samples_.oriented) area += dense.normals[k];
         if (!dense.colors.empty()) color += dense.colors[k];
       }
@@ -183,8 +186,8 @@ class Thinning {
     return found;
   }
 
-  /// rms distance from planes of kWide_m at places spread over the scan: what a quarter of them is below, since furniture
-  /// and corners are in most of the others.
+  /// rms distance from planes of kWide_m at places spread over the scan: what a quarter of them is below, since
+  /// furniture and corners are in most of the others.
   void measureNoise() {
     const std::size_t places = std::min(kWidePlaces, samples_.size());
     std::vector<float> rms(places, -1);
@@ -194,7 +197,7 @@ class Thinning {
     });
     rms.erase(std::remove(rms.begin(), rms.end(), -1.0F), rms.end());
     std::sort(rms.begin(), rms.end());
-    samples_.noise_m = rms.empty() ? kFinest_m : static_cast<double>(rms[rms.size() / 4]);
+    samples_.noise_m = rms.empty() ? kFinest_m : static_cast<double>(rms[rms.size() / 10]);
   }
 
   void findNormals() {

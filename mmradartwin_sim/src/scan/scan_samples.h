@@ -16,13 +16,14 @@ struct ScanSamples {
   std::vector<Eigen::Vector3f> colors;   ///< 0 to 1, or empty
   bool oriented = false;                 ///< normals point to the side from which the scan saw the surface
   double spacing_m = 0;                  ///< side of a voxel
-  double noise_m = 0;                    ///< rms distance from planes of 0.8 m, at the flattest quarter of places
+  double noise_m = 0;                    ///< rms distance from planes of 0.8 m, at the flattest tenth of places
   // Neighbours of sample i: neighbour[first[i]] to neighbour[first[i + 1]].
   std::vector<std::size_t> first;
   std::vector<int> neighbour;
   // All points of the scan, those of sample i between dense_first[i] and dense_first[i + 1].
   std::vector<Eigen::Vector3f> dense;
   std::vector<std::size_t> dense_first;
+  std::vector<int> dense_triangle;  ///< of a mesh, that each of these points lies on
 
   std::size_t size() const { return points.size(); }
   double area_m2() const { return spacing_m * spacing_m; }  ///< what a sample stands for

@@ -169,7 +169,7 @@ void writeFrame(const ScanFrame& f, std::ofstream& out) {
       << formatted("floor_m: %.5f                    # above the file's origin, along up\n", f.floor_m)
       << "T_map_file:                          # p_map = T * (unit_m * p_file)\n";
   for (int i = 0; i < 3; ++i) {
-    out << formatted("  - [%.9f, %.9f, %.9f, %.6f]\n", f.T_map_file(i, 0), f.T_map_file(i, 1), f.T_map_file(i, 2),
+    out << formatted("  - [%.15g, %.15g, %.15g, %.15g]\n", f.T_map_file(i, 0), f.T_map_file(i, 1), f.T_map_file(i, 2),
                      f.T_map_file(i, 3));
   }
   if (f.has_ceiling) out << formatted("ceiling_m: %.5f\n", f.ceiling_m);

@@ -28,7 +28,7 @@ ClassGuess classOnWall(const ThingSigns& s) {
 
 /// On the floor.
 ClassGuess classOnFloor(const ThingSigns& s) {
-  const bool box = s.box_share > 0.7;
+  const bool box = s.is_box;
   if (s.high_m < 0.06 && s.width_m > 0.5) return {"carpet", 0.7, "flat on the floor"};
   if (s.high_m > s.room_m - 0.45 && s.length_m < 1.3 && s.width_m > 0.1) {
     return {"pillar", 0.7, "narrow and as high as the room"};
@@ -76,7 +76,7 @@ ClassGuess classOf(const ThingSigns& s) {
   if (s.low_m < 0.3) return classOnFloor(s);
   if (s.wall_m < 0.15 && s.high_m - s.low_m < 0.15) return {"shelf", 0.6, "a level plate at a wall"};
   if (s.high_m > s.room_m - 0.3 && s.low_m > 1.6) return {"lamp", 0.6, "hangs from the ceiling"};
-  if (s.wall_m < 0.15 && s.box_share > 0.7) return {"cabinet", 0.4, "a box on a wall"};
+  if (s.wall_m < 0.15 && s.is_box) return {"cabinet", 0.4, "a box on a wall"};
   return {};
 }
 

@@ -4,9 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scan/cell_raster.h"
+
 namespace mmradartwin {
 namespace {
 
+// Corners by bits of x, y and z; counter-clockwise as seen from outside.
+constexpr int kBoxFaces[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
 constexpr int kSides = 24;  // of a tessellated cylinder: sagitta below a hundredth of the radius
 
 Eigen::Vector3d placeOf(const ScanSamples& samples, int i) {
@@ -98,6 +102,73 @@ UprightBox fitBox(const ScanSamples& samples, const std::vector<int>& indices, c
   return best;
 }
 
+BoxEvidence evidenceOf(const ScanSamples& samples, const std::vector<int>& indices, const UprightBox& box,
+                       double tolerance_m) {
+  constexpr double kSide_m = 0.05;
+  BoxEvidence evidence;
+  std::vector<CellRaster> faces(5, CellRaster(kSide_m));  // -x, x, -y, y, top
+  std::size_t on = 0, inward = 0;
+  for (int i : indices) {
+    const Eigen::Vector3d p = box.toBox(placeOf(samples, i));
+    const Eigen::Vector3d n = box.toBox(samples.normals[static_cast<std::size_t>(i)].cast<double>());
+    for (int f = 0; f < 5; ++f) {
+      const int axis = f / 2;
+      const bool upper = f % 2 == 1 || axis == 2;
+      const double end = upper ? box.box.max()[axis] : box.box.min()[axis];
+      if (std::abs(p[axis] - end) > tolerance_m || std::abs(n[axis]) < 0.7) continue;
+      faces[static_cast<std::size_t>(f)].set({p[(axis + 1) % 3], p[(axis + 2) % 3]});
+      ++on;
+      inward += samples.oriented && (upper ? -n[axis] : n[axis]) > 0;
+      break;
+    }
+  }
+  const Eigen::Vector3d size = box.box.sizes();
+  const double all = 2 * (size.x() + size.y()) * size.z() + size.x() * size.y();
+  double covered = 0;
+  for (const CellRaster& face : faces) covered += face.area_m2();
+  evidence.covered = all > 0 ? covered / all : 0;
+  evidence.inward = on ? static_cast<double>(inward) / static_cast<double>(on) : 0;
+  return evidence;
+}
+
+Plate plateOf(const ScanSamples& samples, const std::vector<int>& indices, const Eigen::Vector3d& normal,
+              double offset_m, double thickness_m) {
+  const bool level = std::abs(normal.z()) > 0.95;
+  // A level plate along its own sides, by the smallest rectangle; others along the level.
+  Eigen::Vector3d u =
+      level ? Eigen::Vector3d::UnitX() : Eigen::Vector3d(Eigen::Vector3d::UnitZ().cross(normal).normalized());
+  u = (u - u.dot(normal) * normal).normalized();
+  Plate best;
+  double smallest = 1e300;
+  for (int turn = 0; turn < (level ? 18 : 1); ++turn) {
+    const Eigen::Vector3d a = Eigen::AngleAxisd(turn * M_PI / 36, normal) * u, b = normal.cross(a);
+    std::vector<double> along, across;
+    for (int i : indices) {
+      const Eigen::Vector3d p = placeOf(samples, i);
+      along.push_back(a.dot(p)), across.push_back(b.dot(p));
+    }
+    const double a0 = quantile(along, 0.01), a1 = quantile(along, 0.99), b0 = quantile(across, 0.01),
+                 b1 = quantile(across, 0.99);
+    if ((a1 - a0) * (b1 - b0) > smallest) continue;
+    smallest = (a1 - a0) * (b1 - b0);
+    best = {offset_m * normal + a0 * a + b0 * b, (a1 - a0) * a, (b1 - b0) * b, -thickness_m * normal};
+  }
+  return best;
+}
+
+void addPlate(const Plate& plate, ScanThing& thing) {
+  const int base = static_cast<int>(thing.vertices.size());
+  for (int i = 0; i < 8; ++i) {
+    thing.vertices.push_back(plate.corner + (i & 1 ? 1 : 0) * plate.e1 + (i & 2 ? 1 : 0) * plate.e2 +
+                             (i & 4 ? 0 : 1) * plate.back);
+    thing.bounds.extend(thing.vertices.back());
+  }
+  for (const auto& f : kBoxFaces) {
+    thing.triangles.push_back({base + f[0], base + f[1], base + f[2]});
+    thing.triangles.push_back({base + f[0], base + f[2], base + f[3]});
+  }
+}
+
 UprightCylinder fitCylinder(const ScanSamples& samples, const std::vector<int>& indices, double tolerance_m) {
   UprightCylinder fit;
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
@@ -160,9 +231,7 @@ void addBox(const UprightBox& box, ScanThing& thing) {
     thing.vertices.push_back(box.toMap(corner));
     thing.bounds.extend(thing.vertices.back());
   }
-  // Counter-clockwise as seen from outside.
-  constexpr int kFaces[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
-  for (const auto& f : kFaces) {
+  for (const auto& f : kBoxFaces) {
     thing.triangles.push_back({base + f[0], base + f[1], base + f[2]});
     thing.triangles.push_back({base + f[0], base + f[2], base + f[3]});
   }

@@ -27,6 +27,14 @@ struct UprightCylinder {
   double radius_m = 0, low_m = 0, high_m = 0;
   double share = 0, rms_m = 0, largest_m = 0;
 };
+/// How far the scan bears a box out.
+struct BoxEvidence {
+  double covered = 0;  ///< share of the top and of the sides that has samples
+  double inward = 0;   ///< share of the samples on it that were seen from within: of an oriented scan
+};
+BoxEvidence evidenceOf(const ScanSamples& samples, const std::vector<int>& indices, const UprightBox& box,
+                       double tolerance_m);
+
 /// By least squares through its upright side (Kasa 1976).
 UprightCylinder fitCylinder(const ScanSamples& samples, const std::vector<int>& indices, double tolerance_m);
 
@@ -35,6 +43,14 @@ struct FittedSphere {
   double radius_m = 0, share = 0, rms_m = 0, largest_m = 0;
 };
 FittedSphere fitSphere(const ScanSamples& samples, const std::vector<int>& indices, double tolerance_m);
+
+/// A flat part as a thin box: its rectangle, behind the side that was seen.
+struct Plate {
+  Eigen::Vector3d corner, e1, e2, back;  ///< e1, e2: its sides; back: from the seen face to the other one
+};
+Plate plateOf(const ScanSamples& samples, const std::vector<int>& indices, const Eigen::Vector3d& normal,
+              double offset_m, double thickness_m);
+void addPlate(const Plate& plate, ScanThing& thing);
 
 /// Closed triangle bodies, added to a thing's mesh.
 void addBox(const UprightBox& box, ScanThing& thing);

@@ -6,17 +6,18 @@
 #include <numeric>
 
 #include "scan/cell_raster.h"
-#include "scan/polygon_triangles.h"
+#include "scan/thing_mesh.h"
 #include "scan/thing_shapes.h"
 
 namespace mmradartwin {
 namespace {
 
 constexpr double kTouching_voxels = 2.6;
-constexpr double kLeastThing_m2 = 0.03;  // of surface: a hand's breadth
+constexpr double kLeastThing_m2 = 0.06;  // of surface: two hands
 constexpr double kGap_m = 0.01;          // bodies end so far from what they stand on, so that no faces coincide
 constexpr double kThinnest_m = 0.01;
 constexpr double kTop_m[2] = {0.25, 1.25};  // heights of table tops
+constexpr double kLowTable_m = 0.58;        // lower tops may be seats
 constexpr double kSlab_m = 0.05;            // thickness of a top, at most
 
 /// A level plate over free space.
@@ -24,6 +25,7 @@ struct TableTop {
   double height_m;
   CellRaster footprint{kSlab_m};
   std::vector<int> samples;
+  UprightBox rim;  ///< its rectangle
 };
 
 struct Part {
@@ -34,9 +36,10 @@ struct Part {
 
 class ThingFinder {
  public:
-  ThingFinder(const ScanFrame& frame, const ScanOptions& options, const ScanSamples& samples,
+  ThingFinder(const RawScan& scan, const ScanFrame& frame, const ScanOptions& options, const ScanSamples& samples,
               const std::vector<PlaneRegion>& regions, const RoomPlanes& room)
-      : frame_(frame),
+      : scan_(scan),
+        frame_(frame),
         options_(options),
         samples_(samples),
         regions_(regions),
@@ -44,11 +47,11 @@ class ThingFinder {
         tolerance_m_(planeTolerance(samples)) {}
 
   Things run() {
-    findFree();
     region_of_.assign(samples_.size(), -1);
     for (std::size_t r = 0; r < regions_.size(); ++r) {
       for (int i : regions_[r].samples) region_of_[static_cast<std::size_t>(i)] = static_cast<int>(r);
     }
+    findFree();
     findTops();
     for (const Part& part : parts()) addThing(part);
     nameThings();
@@ -74,7 +77,7 @@ class ThingFinder {
         const Eigen::Vector2d q(floor->u.dot(p), floor->v.dot(p));
         inside = std::any_of(floors.begin(), floors.end(), [&q](const auto& loop) { return holds(loop, q); });
       }
-      if (inside) free_[i] = !nearPlane(p);
+      if (inside) free_[i] = !nearPlane(p) || isOnLargePlate(static_cast<int>(i));
     }
   }
 
@@ -104,6 +107,12 @@ class ThingFinder {
     return corner > 1;
   }
 
+  /// A carpet or a board is a flat part of its own, however near it lies to the plane behind it.
+  bool isOnLargePlate(int i) const {
+    const int r = region_of_[static_cast<std::size_t>(i)];
+    return r >= 0 && regions_[static_cast<std::size_t>(r)].area_m2 > 0.3;
+  }
+
   /// Level flat parts at a table's height under which there is more room than surface.
   void findTops() {
     top_of_.assign(samples_.size(), -1);
@@ -113,8 +122,11 @@ class ThingFinder {
       if (samples_.oriented && r.normal.z() < 0) continue;
       std::size_t free = 0;
       for (int i : r.samples) free += free_[static_cast<std::size_t>(i)] != 0;
-      if (2 * free < r.samples.size() || !hollowBelow(r)) continue;
-      TableTop top{r.middle.z(), CellRaster(kSlab_m), {}};
+      if (2 * free < r.samples.size() || isSeat(r) || !hollowBelow(r)) continue;
+      TableTop top{r.middle.z(),
+                   CellRaster(kSlab_m),
+                   {},
+                   fitBox(samples_, r.samples, {room_.yaw_rad, yawIn(r.samples)}, tolerance_m_)};
       for (int i : r.samples) {
         const Eigen::Vector2d p = at(i).head<2>();
         for (int dx = -1; dx <= 1; ++dx) {
@@ -126,7 +138,7 @@ class ThingFinder {
         const Eigen::Vector3d p = at(static_cast<int>(i));
         if (!free_[i] || top_of_[i] >= 0 || p.z() > top.height_m + tolerance_m_ || p.z() < top.height_m - kSlab_m)
           continue;
-        if (!covers(top, p)) continue;
+        if (!covers(top, p) && !isWithinRim(top, p)) continue;
         top_of_[i] = id;
         top.samples.push_back(static_cast<int>(i));
       }
@@ -138,8 +150,34 @@ class ThingFinder {
     }
   }
 
+  /// A low top with a back over its rim, or no larger than a seat.
+  bool isSeat(const PlaneRegion& r) const {
+    if (r.middle.z() > kLowTable_m) return false;
+    if (r.area_m2 < 0.3) return true;
+    CellRaster footprint(kSlab_m);
+    for (int i : r.samples) {
+      for (int dx = -2; dx <= 2; ++dx) {
+        for (int dy = -2; dy <= 2; ++dy) footprint.set(at(i).head<2>() + kSlab_m * Eigen::Vector2d(dx, dy));
+      }
+    }
+    std::size_t above = 0;
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      const Eigen::Vector3f& p = samples_.points[i];
+      if (!free_[i] || static_cast<double>(p.z()) < r.middle.z() + 0.1 || p.z() > 1.4F) continue;
+      above += footprint.has(footprint.index(static_cast<double>(p.x())), footprint.index(static_cast<double>(p.y())));
+    }
+    return above > r.samples.size() / 10;
+  }
+
   static bool covers(const TableTop& top, const Eigen::Vector3d& p) {
     return top.footprint.has(top.footprint.index(p.x()), top.footprint.index(p.y()));
+  }
+
+  /// Things on a table hide parts of its top.
+  static bool isWithinRim(const TableTop& top, const Eigen::Vector3d& p) {
+    const Eigen::Vector3d q = top.rim.toBox(p);
+    const Eigen::Vector2d outside = (top.rim.box.min() - q).cwiseMax(q - top.rim.box.max()).head<2>();
+    return outside.maxCoeff() < 0.03;
   }
 
   /// A table's rim has little surface below it; a cabinet's has its sides, of which a scan sees two at least.
@@ -148,6 +186,7 @@ class ThingFinder {
     const double high = top.middle.z() - 0.1, low = std::min(0.1, 0.3 * high);
     CellRaster sides(kSlab_m);
     const Eigen::Vector3d sizes = rim.box.sizes();
+    if (std::min(sizes.x(), sizes.y()) < 0.3) return false;  // a back's upper side, a sill
     for (std::size_t i = 0; i < samples_.size(); ++i) {
       if (!free_[i]) continue;
       const Eigen::Vector3d p = rim.toBox(at(static_cast<int>(i)));
@@ -332,9 +371,13 @@ class ThingFinder {
     signs.round = cylinder.share > box.share;
     signs.on_table = part.stands_on >= 0;
     signs.table_top = part.top >= 0;
+    const BoxEvidence evidence = evidenceOf(samples_, part.samples, box, tolerance);
+    signs.upright_share = uprightShare(part.samples);
+    signs.is_box = box.share > 0.7 && evidence.covered > 0.25 && evidence.inward < 0.25;
     const ClassGuess guess = classOf(signs);
     thing.klass = guess.klass, thing.class_confidence = guess.confidence, thing.why = guess.why;
-    if (part.top >= 0) {
+    thing.watertight = true;
+    if (part.top >= 0 && !options_.proxies) {
       addTable(part, thing);
     } else if (sphere.share > 0.85 && sphere.share > box.share + 0.1 && sphere.radius_m < 0.6) {
       thing.shape = ThingShape::kSphere;
@@ -346,15 +389,68 @@ class ThingFinder {
       UprightCylinder standing = cylinder;
       if (standing.low_m < 0.06) standing.low_m = kGap_m;
       addCylinder(standing, thing);
-    } else {
-      thing.shape = std::min(sizes.minCoeff(), 1.0) < 0.04 ? ThingShape::kPlate : ThingShape::kBox;
+    } else if (signs.is_box || options_.proxies || sizes.minCoeff() < 0.06 || !addPlatesOrMesh(part.samples, thing)) {
+      thing.shape = sizes.minCoeff() < 0.04 ? ThingShape::kPlate : ThingShape::kBox;
       thing.rms_m = box.rms_m, thing.largest_m = box.largest_m;
       clear(box, signs.flat_on_wall);
       addBox(box, thing);
     }
-    thing.watertight = true;
     result_.things.push_back(std::move(thing));
     result_.samples.push_back(part.samples);
+  }
+
+  double uprightShare(const std::vector<int>& indices) const {
+    std::size_t upright = 0;
+    for (int i : indices) upright += std::abs(samples_.normals[static_cast<std::size_t>(i)].z()) < 0.3F;
+    return static_cast<double>(upright) / static_cast<double>(indices.size());
+  }
+
+  /// No box: its flat parts as plates where they are most of it, else its own surface with fewer triangles. False where
+  /// neither can be made.
+  bool addPlatesOrMesh(const std::vector<int>& indices, ScanThing& thing) const {
+    std::map<int, std::vector<int>> flat;
+    for (int i : indices) {
+      const int r = region_of_[static_cast<std::size_t>(i)];
+      if (r >= 0) flat[r].push_back(i);
+    }
+    std::size_t on_plates = 0;
+    for (auto r = flat.begin(); r != flat.end();) {
+      const bool large = static_cast<double>(r->second.size()) * samples_.area_m2() > 0.04;
+      if (large) on_plates += r->second.size();
+      r = large ? std::next(r) : flat.erase(r);
+    }
+    if (static_cast<double>(on_plates) < 0.6 * static_cast<double>(indices.size()))
+      return addMesh(scan_, samples_, frame_, options_, indices, thing);
+    thing.shape = ThingShape::kPlate;
+    double squares = 0;
+    for (const auto& [r, own] : flat) {
+      const PlaneRegion& region = regions_[static_cast<std::size_t>(r)];
+      squares += region.rms_m * region.rms_m * static_cast<double>(own.size());
+      if (isBackOfOther(r, flat)) continue;
+      Plate plate = plateOf(samples_, own, region.normal, region.offset_m, kThinnest_m);
+      // Plates that meet at an edge end short of each other.
+      const Eigen::Vector3d d1 = plate.e1.normalized(), d2 = plate.e2.normalized();
+      plate.corner += kGap_m * (d1 + d2);
+      plate.e1 -= 2 * kGap_m * d1, plate.e2 -= 2 * kGap_m * d2;
+      if (plate.e1.dot(d1) > 0.03 && plate.e2.dot(d2) > 0.03) addPlate(plate, thing);
+    }
+    thing.rms_m = std::sqrt(squares / static_cast<double>(on_plates));
+    thing.largest_m = tolerance_m_;
+    return !thing.triangles.empty();
+  }
+
+  /// The other side of a plate that has its first side already.
+  bool isBackOfOther(int r, const std::map<int, std::vector<int>>& flat) const {
+    const PlaneRegion& back = regions_[static_cast<std::size_t>(r)];
+    return std::any_of(flat.begin(), flat.end(), [&](const auto& other) {
+      if (other.first >= r) return false;  // regions come largest first
+      const PlaneRegion& front = regions_[static_cast<std::size_t>(other.first)];
+      if (front.normal.dot(back.normal) > -0.98 || std::abs(front.distance(back.middle)) > 0.08) return false;
+      const Plate plate = plateOf(samples_, other.second, front.normal, front.offset_m, kThinnest_m);
+      const Eigen::Vector3d from = back.middle - plate.corner;
+      const double a = from.dot(plate.e1) / plate.e1.squaredNorm(), b = from.dot(plate.e2) / plate.e2.squaredNorm();
+      return a > 0 && a < 1 && b > 0 && b < 1;
+    });
   }
 
   /// A top as a slab, and each thing below it as a box of its own.
@@ -422,6 +518,7 @@ class ThingFinder {
     result_ = std::move(sorted);
   }
 
+  const RawScan& scan_;
   const ScanFrame& frame_;
   const ScanOptions& options_;
   const ScanSamples& samples_;
@@ -436,9 +533,9 @@ class ThingFinder {
 
 }  // namespace
 
-Things thingsOf(const ScanFrame& frame, const ScanOptions& options, const ScanSamples& samples,
+Things thingsOf(const RawScan& scan, const ScanFrame& frame, const ScanOptions& options, const ScanSamples& samples,
                 const std::vector<PlaneRegion>& regions, const RoomPlanes& room) {
-  return ThingFinder(frame, options, samples, regions, room).run();
+  return ThingFinder(scan, frame, options, samples, regions, room).run();
 }
 
 }  // namespace mmradartwin

@@ -17,7 +17,7 @@ struct Things {
 
 /// Clusters what no plane holds, cuts it at table tops, and gives each part the simplest shape that fits within the
 /// scan's noise. `regions` are all flat parts, in map.
-Things thingsOf(const ScanFrame& frame, const ScanOptions& options, const ScanSamples& samples,
+Things thingsOf(const RawScan& scan, const ScanFrame& frame, const ScanOptions& options, const ScanSamples& samples,
                 const std::vector<PlaneRegion>& regions, const RoomPlanes& room);
 
 /// "cabinet", "table", ...; "unknown" where nothing fits. Reads shape and bounds, and what `scene` has already.
@@ -36,6 +36,8 @@ struct ThingSigns {
   double box_share;          ///< of its samples on its box
   double seat_m;             ///< height of its largest level face below its top, 0 where it has none
   bool flat_on_wall;         ///< its long side lies along the wall that it is at
+  double upright_share;      ///< of its samples, with a level normal
+  bool is_box;               ///< the scan bears its box out
   bool round;
   bool on_table;
   bool table_top;  ///< a level plate over little

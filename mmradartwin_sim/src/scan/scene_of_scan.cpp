@@ -1,11 +1,10 @@
-#include "mmradartwin_sim/scan_to_scene.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/scan_to_scene.h"
 #include "scan/plane_regions.h"
 #include "scan/polygon_triangles.h"
 #include "scan/proposed_materials.h"
@@ -30,6 +29,19 @@ ScanActor actorOfPlane(const ScanPlane& plane) {
   return actor;
 }
 
+/// Takes the residuals of large planes for the noise where they are larger. True where that changes much.
+bool takeNoiseOf(const std::vector<PlaneRegion>& regions, ScanSamples& samples) {
+  double squares = 0, area = 0;
+  for (const PlaneRegion& r : regions) {
+    if (r.area_m2 < 1) continue;
+    squares += r.area_m2 * r.rms_m * r.rms_m, area += r.area_m2;
+  }
+  const double noise = area > 0 ? std::sqrt(squares / area) : 0;
+  if (noise < 1.1 * samples.noise_m) return false;
+  samples.noise_m = noise;
+  return true;
+}
+
 /// The planes' residuals, of which noise that averages out is no part, and what their offsets are known to.
 double accuracyOf(const std::vector<ScanPlane>& planes) {
   double squares = 0, area = 0;
@@ -42,7 +54,7 @@ double accuracyOf(const std::vector<ScanPlane>& planes) {
 
 /// Areas of the scan by what became of them.
 void countAreas(ScanScene& scene, const ScanSamples& samples, const std::vector<std::vector<int>>& of_things) {
-  const double each = samples.area_m2();
+  const double each = samples.area_m2(), reach_m = std::max(0.03, 5 * samples.noise_m);
   for (std::size_t t = 0; t < of_things.size(); ++t) {
     for (int i : of_things[t])
       scene.sample_owner[static_cast<std::size_t>(i)] = static_cast<int>(scene.planes.size() + t);
@@ -60,7 +72,7 @@ void countAreas(ScanScene& scene, const ScanSamples& samples, const std::vector<
     const Eigen::Vector3d p = samples.points[i].cast<double>();
     const bool on_wall = owner >= 0 && scene.planes[static_cast<std::size_t>(owner)].kind == PlaneKind::kWall;
     const bool at_wall = on_wall || std::any_of(scene.planes.begin(), scene.planes.end(), [&](const ScanPlane& w) {
-                           return w.kind == PlaneKind::kWall && std::abs(w.normal.dot(p) - w.offset_m) < 0.1;
+                           return w.kind == PlaneKind::kWall && std::abs(w.normal.dot(p) - w.offset_m) < reach_m;
                          });
     if (at_wall) scene.wall_m2 += each;
     if (on_wall) scene.wall_on_planes_m2 += each;
@@ -105,12 +117,14 @@ ScanScene sceneOfScan(const RawScan& scan, const ScanOptions& options) {
   const double unit_m = options.unit_m.value_or(unitOfScan(scan));
   ScanSamples samples = thinScan(scan, unit_m, options.progress);
   std::vector<PlaneRegion> regions = growPlanes(samples, kLeastPlane_m2, options.progress);
+  // Errors that are alike over more than the places of the first measure show on large planes alone.
+  if (takeNoiseOf(regions, samples)) regions = growPlanes(samples, kLeastPlane_m2, options.progress);
   if (regions.empty()) throw InputError(scan.file + ": shows no flat surface, so that it is no room");
   ScanScene scene;
   scene.frame = bringIntoMap(scan, options, unit_m, samples, regions);
   const double yaw_rad = regularise(samples, options.regularise, regions);
   RoomPlanes room = roomPlanes(scan.file, scene.frame, samples, regions, yaw_rad);
-  Things things = thingsOf(scene.frame, options, samples, regions, room);
+  Things things = thingsOf(scan, scene.frame, options, samples, regions, room);
   scene.planes = std::move(room.planes);
   scene.things = std::move(things.things);
   scene.sample_owner = std::move(room.owner);

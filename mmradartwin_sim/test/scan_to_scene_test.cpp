@@ -1,0 +1,344 @@
+// Scenes made of scans that are sampled here from boxes and plates: frame, planes, openings, things, edits, bad input.
+
+#include "mmradartwin_sim/scan_to_scene.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <random>
+#include <sstream>
+
+#include "mmradartwin_dsp/input_error.h"
+#include "scene_files.h"
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kDeg = M_PI / 180;
+
+/// Points spread evenly at random over rectangles, each moved along its rectangle's normal by Gaussian noise.
+class SampledRoom {
+ public:
+  explicit SampledRoom(double noise_m, double per_m2 = 3000) : noise_(0, noise_m), per_m2_(per_m2) {}
+
+  /// Rectangle corner + [0, 1] a + [0, 1] b; `missing` says which of its points the scan lacks.
+  void add(const Eigen::Vector3d& corner, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+           const std::function<bool(const Eigen::Vector3d&)>& missing = nullptr) {
+    const Eigen::Vector3d n = a.cross(b).normalized();
+    const auto count = static_cast<int>(a.cross(b).norm() * per_m2_);
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (int i = 0; i < count; ++i) {
+      const Eigen::Vector3d p = corner + unit(random_) * a + unit(random_) * b;
+      if (!missing || !missing(p)) points_.push_back(p + noise_(random_) * n);
+    }
+  }
+  /// Sides and top of a box, those that a scanner in the room sees.
+  void addBox(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+    const Eigen::Vector3d s = high - low, x(s.x(), 0, 0), y(0, s.y(), 0), z(0, 0, s.z());
+    add(low, x, z), add(low + y, x, z), add(low, y, z), add(low + x, y, z), add(low + z, x, y);
+  }
+  /// Floor, ceiling and four walls of a room with a corner in the origin.
+  void addShell(const Eigen::Vector3d& size, const std::function<bool(const Eigen::Vector3d&)>& missing = nullptr) {
+    const Eigen::Vector3d x(size.x(), 0, 0), y(0, size.y(), 0), z(0, 0, size.z()), zero = Eigen::Vector3d::Zero();
+    add(zero, x, y, missing), add(z, x, y, missing);
+    add(zero, x, z, missing), add(y, x, z, missing), add(zero, y, z, missing), add(x, y, z, missing);
+  }
+
+  /// As a scanner's file holds it: p_file = (T p + shift) / unit.
+  RawScan scan(const Eigen::Matrix3d& T = Eigen::Matrix3d::Identity(),
+               const Eigen::Vector3d& shift = Eigen::Vector3d::Zero(), double unit_m = 1) const {
+    RawScan raw;
+    raw.file = "room.xyz";
+    for (const Eigen::Vector3d& p : points_) raw.points.push_back(((T * p + shift) / unit_m).cast<float>());
+    return raw;
+  }
+  const std::vector<Eigen::Vector3d>& points() const { return points_; }
+
+ private:
+  std::mt19937 random_{7};
+  std::normal_distribution<double> noise_;
+  double per_m2_;
+  std::vector<Eigen::Vector3d> points_;
+};
+
+const Eigen::Vector3d kRoom(5, 4, 2.6);
+
+const ScanPlane* planeAt(const ScanScene& scene, const Eigen::Vector3d& normal, double offset_m) {
+  for (const ScanPlane& p : scene.planes) {
+    if (p.normal.dot(normal) > std::cos(1 * kDeg) && std::abs(p.offset_m - offset_m) < 0.05) return &p;
+  }
+  return nullptr;
+}
+
+const ScanThing* thingOf(const ScanScene& scene, const std::string& klass) {
+  for (const ScanThing& t : scene.things) {
+    if (t.klass == klass) return &t;
+  }
+  return nullptr;
+}
+
+double areaOf(const ScanActor& actor) {
+  double area = 0;
+  for (const auto& t : actor.triangles) {
+    const Eigen::Vector3d a = actor.vertices[static_cast<std::size_t>(t[0])],
+                          b = actor.vertices[static_cast<std::size_t>(t[1])],
+                          c = actor.vertices[static_cast<std::size_t>(t[2])];
+    area += 0.5 * (b - a).cross(c - a).norm();
+  }
+  return area;
+}
+
+class ScanToSceneTest : public SceneFiles {};
+
+TEST_F(ScanToSceneTest, RoomWithNoiseBecomesSixExactPlanes) {
+  SampledRoom room(0.005);
+  room.addShell(kRoom);
+  const ScanScene scene = sceneOfScan(room.scan(), {});
+  ASSERT_EQ(scene.planes.size(), 6U);
+  EXPECT_TRUE(scene.things.empty());
+  const std::vector<std::pair<Eigen::Vector3d, double>> truth = {
+      {{0, 0, 1}, 0}, {{0, 0, -1}, -2.6}, {{1, 0, 0}, 0}, {{-1, 0, 0}, -5}, {{0, 1, 0}, 0}, {{0, -1, 0}, -4}};
+  for (const auto& [normal, offset_m] : truth) {
+    const ScanPlane* plane = planeAt(scene, normal, offset_m);
+    ASSERT_NE(plane, nullptr) << normal.transpose();
+    EXPECT_NEAR(plane->offset_m, offset_m, 0.001);
+    EXPECT_GT(plane->normal.dot(normal), std::cos(0.05 * kDeg));
+    EXPECT_NEAR(plane->rms_m, 0.0045, 0.0015);  // voxels average some of it away
+  }
+  EXPECT_GT(scene.wall_on_planes_m2, 0.97 * scene.wall_m2);
+  for (const ScanActor& actor : scene.actors) {
+    for (const Eigen::Vector3d& v : actor.vertices) {
+      for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_LT(std::min(std::abs(v[axis]), std::abs(v[axis] - kRoom[axis])), 0.002) << actor.name;
+      }
+    }
+  }
+}
+
+TEST_F(ScanToSceneTest, UnitUpAndFloorAreFound) {
+  SampledRoom room(0.003);
+  room.addShell(kRoom);
+  room.addBox({0.5, 0.05, 0.01}, {1.5, 0.5, 1.8});
+  room.addBox({3, 2, 0.01}, {3.6, 2.5, 0.6});
+  const Eigen::Matrix3d y_up = Eigen::AngleAxisd(-90 * kDeg, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  const Eigen::Vector3d axis = Eigen::Vector3d(1, 0, 2).normalized();
+  const Eigen::Matrix3d tilted = Eigen::AngleAxisd(5 * kDeg, axis).toRotationMatrix() * y_up;
+  const ScanScene scene = sceneOfScan(room.scan(tilted, tilted * Eigen::Vector3d(0, 0, -1.03), 0.001), {});
+  EXPECT_EQ(scene.frame.unit_name, "mm");
+  EXPECT_EQ(scene.frame.up_name, "y");
+  EXPECT_LT(std::acos(scene.frame.up.dot(tilted * Eigen::Vector3d::UnitZ())), 0.1 * kDeg);
+  EXPECT_NEAR(scene.frame.floor_m, -1.03, 0.003);
+  EXPECT_NEAR(scene.frame.ceiling_m, 2.6, 0.003);
+  // The frame takes points of the file to the floor.
+  const Eigen::Vector3d corner = scene.frame.T_map_file * (tilted * Eigen::Vector3d(2, 2, -1.03));
+  EXPECT_NEAR(corner.z(), 0, 0.003);
+}
+
+TEST_F(ScanToSceneTest, UnitAndUpThatAreStatedWin) {
+  SampledRoom room(0.003);
+  room.addShell(kRoom);
+  ScanOptions options;
+  options.unit_m = 2;
+  options.up = -Eigen::Vector3d::UnitZ();
+  options.floor_m = -5.2;
+  const ScanScene scene = sceneOfScan(room.scan(), options);
+  EXPECT_EQ(scene.frame.up_name, "-z");
+  EXPECT_NEAR(scene.frame.ceiling_m, 5.2, 0.01);
+}
+
+TEST_F(ScanToSceneTest, DoorwayAndWindowAreOpenings) {
+  SampledRoom room(0.004);
+  room.addShell(kRoom, [](const Eigen::Vector3d& p) {
+    const bool doorway = std::abs(p.x()) < 0.001 && p.y() > 1 && p.y() < 1.9 && p.z() < 2.05 && p.z() > 0;
+    const bool window = std::abs(p.y()) < 0.001 && p.x() > 2 && p.x() < 3.5 && p.z() > 0.9 && p.z() < 2.1;
+    return doorway || window;
+  });
+  const ScanScene scene = sceneOfScan(room.scan(), {});
+  const ScanPlane* west = planeAt(scene, {1, 0, 0}, 0);
+  const ScanPlane* south = planeAt(scene, {0, 1, 0}, 0);
+  ASSERT_TRUE(west && south);
+  EXPECT_NEAR(west->area_m2, 4 * 2.6 - 0.9 * 2.05, 0.12);
+  ASSERT_EQ(south->holes.size(), 1U);
+  EXPECT_NEAR(south->area_m2, 5 * 2.6 - 1.5 * 1.2, 0.12);
+  // Triangles are the polygons, no more and no less.
+  for (std::size_t i = 0; i < scene.planes.size(); ++i)
+    EXPECT_NEAR(areaOf(scene.actors[i]), scene.planes[i].area_m2, 1e-6);
+}
+
+TEST_F(ScanToSceneTest, WallBehindACabinetIsClosed) {
+  SampledRoom room(0.004);
+  const Eigen::Vector3d low(1.5, 0.02, 0.01), high(2.5, 0.5, 2.0);
+  room.addShell(kRoom, [&](const Eigen::Vector3d& p) {
+    return p.y() < 0.001 && p.x() > low.x() && p.x() < high.x() && p.z() < high.z() && p.z() > 0;
+  });
+  room.addBox(low, high);
+  const ScanScene scene = sceneOfScan(room.scan(), {});
+  const ScanPlane* south = planeAt(scene, {0, 1, 0}, 0);
+  ASSERT_TRUE(south);
+  EXPECT_NEAR(south->area_m2, 5 * 2.6, 0.01);
+  const ScanThing* cabinet = thingOf(scene, "cabinet");
+  ASSERT_TRUE(cabinet);
+  EXPECT_EQ(cabinet->shape, ThingShape::kBox);
+  EXPECT_TRUE(cabinet->watertight);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(cabinet->bounds.min()[axis], low[axis], 0.02);
+    EXPECT_NEAR(cabinet->bounds.max()[axis], high[axis], 0.01);
+  }
+}
+
+TEST_F(ScanToSceneTest, FurnitureIsToldApart) {
+  SampledRoom room(0.003);
+  room.addShell({6, 5, 2.6});
+  room.addBox({0.05, 1, 0.01}, {0.5, 2, 1.9});       // cabinet
+  room.add({2, 2, 0.74}, {1.6, 0, 0}, {0, 0.8, 0});  // a table's top
+  for (double x : {2.05, 3.5}) {
+    for (double y : {2.05, 2.7}) room.addBox({x, y, 0.01}, {x + 0.05, y + 0.05, 0.71});
+  }
+  room.addBox({4.5, 4.0, 0.01}, {4.95, 4.45, 0.45});  // a chair's seat, and its back
+  room.addBox({4.5, 4.45, 0.45}, {4.95, 4.49, 0.9});
+  room.addBox({3.0, 4.94, 0.15}, {4.0, 4.99, 0.75});  // a radiator
+  const ScanScene scene = sceneOfScan(room.scan(), {});
+  for (const char* klass : {"cabinet", "table", "chair", "radiator"}) EXPECT_TRUE(thingOf(scene, klass)) << klass;
+  const ScanThing* table = thingOf(scene, "table");
+  ASSERT_TRUE(table);
+  EXPECT_NEAR(table->bounds.max().z(), 0.74, 0.005);
+  EXPECT_NEAR(table->bounds.sizes().x(), 1.6, 0.02);
+}
+
+TEST_F(ScanToSceneTest, CylinderAndItsRadiusAreFound) {
+  SampledRoom room(0.002);
+  room.addShell({6, 5, 2.6});
+  for (int k = 0; k < 60; ++k) {
+    const double a = k * 6 * kDeg, b = (k + 1) * 6 * kDeg, r = 0.25;
+    room.add({3 + r * std::cos(a), 2.5 + r * std::sin(a), 0.01},
+             {r * (std::cos(b) - std::cos(a)), r * (std::sin(b) - std::sin(a)), 0}, {0, 0, 0.9});
+  }
+  const ScanScene scene = sceneOfScan(room.scan(), {});
+  ASSERT_EQ(scene.things.size(), 1U);
+  EXPECT_EQ(scene.things[0].shape, ThingShape::kCylinder);
+  EXPECT_NEAR(scene.things[0].bounds.sizes().x(), 0.5, 0.01);
+}
+
+TEST_F(ScanToSceneTest, DoubledWallIsOnePlane) {
+  SampledRoom room(0.003);
+  room.addShell(kRoom);
+  room.add({0, 0.035, 0}, {2.5, 0, 0}, {0, 0, 2.6});  // half of a wall once more, by drift
+  const ScanScene scene = sceneOfScan(room.scan(), {});
+  int south = 0;
+  for (const ScanPlane& p : scene.planes) south += p.normal.y() > 0.99;
+  EXPECT_EQ(south, 1);
+  for (const ScanThing& t : scene.things) {
+    ADD_FAILURE() << t.name << " " << t.bounds.min().transpose() << " to " << t.bounds.max().transpose();
+  }
+  EXPECT_NEAR(planeAt(scene, {0, 1, 0}, 0)->offset_m, 0, 0.002);
+}
+
+TEST_F(ScanToSceneTest, WrittenSceneLoadsAndGivesTheSameBytesAgain) {
+  SampledRoom room(0.004);
+  room.addShell(kRoom);
+  room.addBox({1.5, 1.5, 0.01}, {2.5, 2.0, 1.5});
+  for (const char* name : {"a", "b"}) {
+    std::filesystem::create_directory(path(name));
+    writeScanScene(sceneOfScan(room.scan(), {}), path(name));
+  }
+  const auto read = [](const std::string& file) {
+    std::ifstream in(file);
+    std::stringstream text;
+    text << in.rdbuf();
+    return text.str();
+  };
+  for (const char* file : {"/room.obj", "/scene.yaml", "/materials.yaml", "/scan.yaml"}) {
+    EXPECT_FALSE(read(path("a") + file).empty());
+    EXPECT_EQ(read(path("a") + file), read(path("b") + file)) << file;
+  }
+  const Scene scene = loadScene(path("a") + "/scene.yaml", 77e9);
+  EXPECT_EQ(scene.actors.size(), 7U);
+  EXPECT_EQ(scene.bodies.size(), 1U);
+  EXPECT_GE(scene.actorIndex("floor"), 0);
+  EXPECT_EQ(scene.facets.size(), 6U + 6U);
+}
+
+TEST_F(ScanToSceneTest, PersonsMaterialsStay) {
+  SampledRoom room(0.004);
+  room.addShell(kRoom);
+  const ScanScene scene = sceneOfScan(room.scan(), {});
+  std::filesystem::create_directory(path("first"));
+  std::filesystem::create_directory(path("second"));
+  writeScanScene(scene, path("first"));
+  std::ifstream in(path("first") + "/scene.yaml");
+  std::stringstream text;
+  text << in.rdbuf();
+  std::string edited = text.str();
+  const std::size_t at = edited.find("wall_2: {material: Concrete}");
+  ASSERT_NE(at, std::string::npos);
+  edited.replace(at, 28, "wall_2: {material: Brick}");
+  std::ofstream(path("first") + "/scene.yaml") << edited;
+  std::ofstream(path("first") + "/materials.yaml")
+      << "materials:\n  Brick: {model: dielectric, relative_permittivity: 3.91}\n"
+         "  Concrete: {model: dielectric, relative_permittivity: 6.1}\n";
+  writeScanScene(scene, path("second"), path("first") + "/scene.yaml");
+  const Scene loaded = loadScene(path("second") + "/scene.yaml", 77e9);
+  const auto material = [&](const char* name) {
+    return loaded.actors[static_cast<std::size_t>(loaded.actorIndex(name))].material;
+  };
+  EXPECT_EQ(material("wall_2").name, "Brick");
+  EXPECT_EQ(material("wall_1").name, "Concrete");
+  EXPECT_DOUBLE_EQ(material("wall_1").relative_permittivity, 6.1);
+}
+
+TEST_F(ScanToSceneTest, WhatIsNoRoomIsSaidInOneLine) {
+  const auto said = [](const SampledRoom& room) { return errorOf([&] { sceneOfScan(room.scan(), {}); }); };
+  SampledRoom plane(0.003);
+  plane.add({0, 0, 0}, {4, 0, 0}, {0, 4, 0});
+  EXPECT_NE(said(plane).find("nothing upright"), std::string::npos) << said(plane);
+  SampledRoom wide(0.003, 1);
+  wide.add({0, 0, 0}, {900, 0, 0}, {0, 900, 0});
+  EXPECT_NE(said(wide).find("no room"), std::string::npos) << said(wide);
+}
+
+TEST_F(ScanToSceneTest, FilesThatAreNoScansAreRefused) {
+  write("empty.ply", "");
+  write("two.xyz", "0 0 0\n1 1 1\n");
+  write("huge.ply",
+        "ply\nformat binary_little_endian 1.0\nelement vertex 10000000\nproperty float x\nproperty float y\nproperty "
+        "float z\n"
+        "element face 20000000\nproperty list uchar int vertex_indices\nend_header\n" +
+            std::string(20000000, 'x'));
+  for (const char* name : {"empty.ply", "two.xyz", "huge.ply", "absent.pcd"}) {
+    const std::string error = errorOf([&] { readScan(path(name)); });
+    EXPECT_FALSE(error.empty()) << name;
+    EXPECT_EQ(error.find('\n'), std::string::npos);
+    EXPECT_NE(error.find(name), std::string::npos) << error;
+  }
+  EXPECT_NE(errorOf([&] { readScan(path("huge.ply")); }).find("more than"), std::string::npos);
+}
+
+TEST_F(ScanToSceneTest, FarAndMissingPointsAreReadWithoutLoss) {
+  std::ostringstream text;
+  text.precision(12);
+  SampledRoom room(0.002);
+  room.addShell(kRoom);
+  const Eigen::Vector3d origin(431200.25, 5412300.5, 312.125);
+  for (const Eigen::Vector3d& p : room.points()) text << (p + origin).transpose() << "\n";
+  text << "nan nan nan\n";
+  write("far.xyz", text.str());
+  const RawScan scan = readScan(path("far.xyz"));
+  EXPECT_EQ(scan.left_out, 1U);
+  const ScanScene scene = sceneOfScan(scan, {});
+  EXPECT_NEAR(scene.frame.floor_m, 312.125, 0.001);
+  const ScanPlane* east = nullptr;
+  for (const ScanPlane& p : scene.planes) {
+    if (p.normal.x() < -0.99) east = &p;
+  }
+  ASSERT_TRUE(east);
+  // Back in the file's coordinates.
+  const Eigen::Vector3d p = scene.frame.T_map_file.inverse() * east->at({0, 1});
+  EXPECT_NEAR(p.x(), 431200.25 + 5, 0.002);
+}
+
+}  // namespace
+}  // namespace mmradartwin
