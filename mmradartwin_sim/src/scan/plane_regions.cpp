@@ -59,7 +59,8 @@ class Growth {
       if (k % 20000 == 0 && progress) progress(static_cast<double>(k) / static_cast<double>(order.size()), "planes");
       const int seed = order[k];
       if (owner_[static_cast<std::size_t>(seed)] != -1 || normalOf(seed).isZero()) continue;
-      if (flatness(seed) > 2 * samples_.noise_m) break;
+      // Two sheets a voxel or two apart are no flatter than that, and each of them is a plane.
+      if (flatness(seed) > std::max(2 * samples_.noise_m, samples_.spacing_m)) break;
       grow(seed);
     }
     join();

@@ -18,9 +18,9 @@ namespace mmradartwin {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
-constexpr double kSameWall_m = 0.06;  // a wall that drift has doubled is one; boards hang farther off
-constexpr double kSnap_m = 0.25;      // corners are rounded, hidden or not scanned so far
-constexpr double kBridge_m = 0.6;     // a gap in a wall's columns, of a curtain or a tall cabinet
+constexpr double kSameWall_m = 0.045;  // a wall that drift has doubled is one; boards hang farther off
+constexpr double kSnap_m = 0.25;       // corners are rounded, hidden or not scanned so far
+constexpr double kBridge_m = 0.6;      // a gap in a wall's columns, of a curtain or a tall cabinet
 constexpr double kLeastHole_m = 0.35, kLeastHole_m2 = 0.2;  // smaller gaps are where a scan has none
 constexpr double kHides_m = 1.2;                            // what stands so far before a wall may hide it
 constexpr double kCell_m = 0.05;
@@ -37,21 +37,33 @@ Eigen::Vector3d sampleAt(const ScanSamples& samples, int i) {
   return samples.points[static_cast<std::size_t>(i)].cast<double>();
 }
 
-/// Offset of a plane of a given normal: the mean of all points of its samples, twice, without what lies off.
+/// Offset of a plane of a given normal: from the median of all points of its samples, the mean of what lies within two
+/// of their deviations, so that a door that stands a little before its wall does not draw the wall along.
 void fitOffset(const ScanSamples& samples, PlaneRegion& region) {
-  const double tolerance_m = planeTolerance(samples);
-  for (int round = 0; round < 2; ++round) {
+  std::vector<double> along;
+  for (int i : region.samples) {
+    const auto s = static_cast<std::size_t>(i);
+    for (std::size_t k = samples.dense_first[s]; k < samples.dense_first[s + 1]; ++k) {
+      along.push_back(region.normal.dot(samples.dense[k].cast<double>()));
+    }
+  }
+  if (along.empty()) return;
+  const auto median = [](std::vector<double>& values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  region.offset_m = median(along);
+  std::vector<double> off;
+  for (double a : along) off.push_back(std::abs(a - region.offset_m));
+  const double limit_m = std::max(2 * 1.4826 * median(off), 0.001);  // of a normal distribution: its deviation
+  for (int round = 0; round < 3; ++round) {
     double sum = 0;
     std::size_t count = 0;
-    for (int i : region.samples) {
-      const auto s = static_cast<std::size_t>(i);
-      for (std::size_t k = samples.dense_first[s]; k < samples.dense_first[s + 1]; ++k) {
-        const double along = region.normal.dot(samples.dense[k].cast<double>());
-        // Twice the tolerance: points scatter more than the means that voxels make of them.
-        if (std::abs(along - region.offset_m) < 2 * tolerance_m) sum += along, ++count;
-      }
+    for (double a : along) {
+      if (std::abs(a - region.offset_m) < limit_m) sum += a - region.offset_m, ++count;
     }
-    if (count) region.offset_m = sum / static_cast<double>(count);
+    if (count) region.offset_m += sum / static_cast<double>(count);
   }
 }
 
@@ -173,7 +185,7 @@ class RoomBuilder {
           home = &g;
           break;
         }
-        if (apart < kSameWall_m && overlap(g, r) > 0.3) {
+        if (apart < kSameWall_m && overlap(g, r) > 0.5) {
           home = &g, doubled = true;
           break;
         }
@@ -510,8 +522,8 @@ class RoomBuilder {
       inside += cells.holds(at + 0.1 * n);
       behind += cells.holds(at - 0.25 * n);
     }
-    // A low plane in the midst of the room is a partition or a cabinet's.
-    if (g.high_m < room_.height_m - 0.3 && behind > 3) return false;
+    // A low or narrow plane in the midst of the room is a partition, a cabinet's or a pillar's.
+    if ((g.high_m < room_.height_m - 0.3 || run.to_m - run.from_m < 1.2) && behind > 3) return false;
     return inside >= 4;
   }
 
@@ -538,7 +550,7 @@ class RoomBuilder {
       if (!isLevel(g.plane) || std::abs(g.plane.middle.z() - height_m) > kSameWall_m) continue;
       if (std::abs(g.plane.middle.z() - height_m) < tolerance_m_) {
         level.plane.samples.insert(level.plane.samples.end(), g.plane.samples.begin(), g.plane.samples.end());
-      } else if (overlap(level, g.plane) > 0.3) {  // groups come largest first; a carpet hides the floor
+      } else if (overlap(level, g.plane) > 0.5) {  // groups come largest first; a carpet hides the floor
         level.second_copy.insert(level.second_copy.end(), g.plane.samples.begin(), g.plane.samples.end());
       }
       level.second_copy.insert(level.second_copy.end(), g.second_copy.begin(), g.second_copy.end());
@@ -647,7 +659,7 @@ class RoomBuilder {
     std::vector<int> all = g.plane.samples;
     for (std::size_t i = 0; i < samples_.size(); ++i) {
       if (taken[i] || room_.owner[i] != -1) continue;
-      if (std::abs(g.plane.distance(samples_.points[i].cast<double>())) > tolerance_m_) continue;
+      if (std::abs(g.plane.distance(samples_.points[i].cast<double>())) > 1.5 * tolerance_m_) continue;
       if (std::abs(g.plane.normal.dot(samples_.normals[i].cast<double>())) > kStraggler)
         all.push_back(static_cast<int>(i));
     }
@@ -680,6 +692,7 @@ class RoomBuilder {
       room_.owner[static_cast<std::size_t>(i)] = -2;
       room_.doubled_m2 += samples_.area_m2();
     }
+    if (distances.empty() && plane.kind == PlaneKind::kWall) return;  // others hold all of it
     plane.samples = distances.size();
     plane.covered_m2 = covered.area_m2();
     plane.area_m2 = std::abs(signedAreaOf(plane.outline));

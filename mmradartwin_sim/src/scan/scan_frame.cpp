@@ -185,6 +185,17 @@ std::vector<HorizontalLevel> levelsOf(const std::vector<PlaneRegion>& regions, c
   return levels;
 }
 
+/// True where a mesh is wound so that its floor faces down: another hand's triangles.
+bool isInsideOut(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up, double floor_m) {
+  double faces_up = 0;
+  for (const PlaneRegion& r : regions) {
+    const double cosine = r.normal.dot(up);
+    const bool on_floor = std::abs(r.middle.dot(up) - floor_m) < kSameLevel_m;
+    if (on_floor && std::abs(cosine) > std::cos(3 * kDeg)) faces_up += cosine * r.area_m2;
+  }
+  return faces_up < 0;
+}
+
 /// Mean height of all points of level planes near a height, twice, the second time without what lies off.
 double heightOf(const ScanSamples& samples, const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up,
                 double height_m) {
@@ -306,6 +317,10 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
   if (!options.floor_m) floor = heightOf(samples, regions, frame.up, floor);
   if (frame.has_ceiling) frame.ceiling_m = heightOf(samples, regions, frame.up, floor + frame.ceiling_m) - floor;
   frame.floor_m = floor + axis.dot(offset);
+  if (samples.oriented && isInsideOut(regions, frame.up, floor)) {
+    for (Eigen::Vector3f& n : samples.normals) n *= -1;
+    for (PlaneRegion& r : regions) r.normal *= -1, r.offset_m *= -1;
+  }
   frame.origin_m = R * offset;
   const Eigen::Vector3d shift(0, 0, -floor);
   frame.T_map_file.linear() = R;

@@ -1,4 +1,5 @@
 #include <pcl/PCLPointCloud2.h>
+#include <pcl/console/print.h>
 #include <pcl/io/pcd_io.h>
 
 #include <algorithm>
@@ -98,6 +99,11 @@ void readPcdFile(RawScan& scan) {
   Eigen::Vector4f origin;
   Eigen::Quaternionf orientation;
   int version = 0;
+  std::error_code error;
+  if (std::filesystem::file_size(scan.file, error) < 64 || error) {
+    throw InputError(scan.file + ": is empty, or too short for a PCD file; write it again");
+  }
+  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // what is wrong is said once, below
   if (pcl::PCDReader().read(scan.file, cloud, origin, orientation, version) < 0) {
     throw InputError(scan.file + ": cannot be read as a PCD file; write it again, best as binary");
   }
@@ -106,6 +112,9 @@ void readPcdFile(RawScan& scan) {
   for (const pcl::PCLPointField& f : cloud.fields) {
     if (f.name == "x" || f.name == "y" || f.name == "z") axes[f.name[0] - 'x'] = &f;
     if (f.name == "rgb" || f.name == "rgba") color = &f;
+  }
+  if (cloud.data.size() < static_cast<std::size_t>(cloud.width) * cloud.height * cloud.point_step) {
+    throw InputError(scan.file + ": its data end before its last point; write it again");
   }
   if (!axes[0] || !axes[1] || !axes[2]) throw InputError(scan.file + ": its points have no x, y and z");
   const std::size_t count = static_cast<std::size_t>(cloud.width) * cloud.height;
@@ -207,14 +216,17 @@ RawScan readScan(const std::string& file) {
     readMeshFile(scan);
   }
   if (scan.points.size() < kFewestPoints && scan.triangles.size() < kFewestPoints) {
-    throw InputError(file + ": holds " + std::to_string(scan.points.size()) + " point(s); a scan of a room has " +
-                     std::to_string(kFewestPoints) + " at least");
+    const std::string bad =
+        scan.left_out ? " and " + std::to_string(scan.left_out) + " that are no finite numbers" : std::string();
+    throw InputError(file + ": holds " + std::to_string(scan.points.size()) + " point(s)" + bad +
+                     "; a scan of a room has " + std::to_string(kFewestPoints) + " at least");
   }
   return scan;
 }
 
 bool isScan(const std::string& file) {
   const std::string extension = extensionOf(file);
+  requireRegularFile(file);
   if (isCloudFormat(extension)) return true;
   // PLY and STL name no parts; few triangles are a drawing.
   constexpr std::size_t kDrawing = 2000;

@@ -37,13 +37,16 @@ ClassGuess classOnFloor(const ThingSigns& s) {
     if (s.length_m > 1.15) return {"sofa", 0.7, "a long seat with a back"};
     if (s.length_m < 1.0) return {"chair", 0.7, "a seat with a back"};
   }
+  if (!s.is_box && s.upright_share > 0.85 && s.high_m > 0.9 && s.high_m < 2.3 && s.length_m > 0.6) {
+    return {"partition", 0.6, "upright plates that stand free"};
+  }
   if (s.width_m < 0.15 && s.high_m > 0.9 && s.length_m > 0.6)
     return {"partition", 0.7, "a thin upright plate that stands free"};
   if (s.high_m > 0.95 && s.width_m > 0.15 && s.length_m > 0.3 && box) {
     if (s.width_m < 0.36 && s.high_m > 1.5) return {"bookshelf", 0.6, "a high box of small depth"};
     return {"cabinet", 0.75, "a high box on the floor"};
   }
-  if (s.high_m < 0.8 && s.length_m < 0.55)
+  if (s.high_m < 0.8 && s.high_m > 0.2 && s.length_m < 0.55 && s.width_m > 0.12)
     return {"bin", 0.5, s.round ? "small and round, on the floor" : "small, on the floor"};
   if (within(s.high_m, 0.5, 1.0) && box && s.width_m > 0.3) return {"cabinet", 0.6, "a low box on the floor"};
   if (within(s.high_m, 0.3, 0.7) && s.length_m > 1.6 && s.width_m > 0.7) return {"bed", 0.5, "long, wide and low"};
@@ -61,13 +64,21 @@ ClassGuess classOf(const ThingSigns& s) {
     if (s.high_m > 0.25 && s.high_m <= 0.6 && s.length_m > 0.5)
       return {"table", 0.6, "a low level top over free space"};
   }
-  if (s.on_table) {
-    if (s.width_m < 0.35 && within(s.length_m, 0.25, 1.4) && within(s.high_m - s.low_m, 0.15, 0.8) &&
+  // A scan may lack a table's thin top.
+  const bool at_table = within(s.low_m, 0.55, 1.2) && s.wall_m > 0.15 && s.length_m < 1.5 && s.high_m < 1.8;
+  if (s.on_table || at_table) {
+    const double height = s.high_m - s.low_m, sure = s.on_table ? 0.6 : 0.4;
+    if (s.width_m < 0.35 && within(s.length_m, 0.25, 1.4) && within(height, 0.15, 0.8) &&
         s.width_m < 0.7 * s.length_m) {
-      return {"screen", 0.6, "thin and upright on a table"};
+      return {"screen", sure, "thin and upright at a table's height"};
     }
-    if (s.high_m - s.low_m > 0.08) return {"device", 0.5, "a body on a table"};
+    if (height > 0.08 && s.width_m > 0.15) return {"device", sure, "a body at a table's height"};
     return {};
+  }
+  if (within(s.low_m, 0.3, 0.55) && within(s.length_m, 0.3, 0.8) && within(s.width_m, 0.3, 0.7)) {
+    if (s.high_m - s.low_m < 0.1) return {"chair", 0.4, "a seat's plate at a seat's height"};
+    if (within(s.seat_m, 0.3, 0.62) && s.high_m < 1.35)
+      return {"chair", 0.6, "a seat with a back; its legs are not in the scan"};
   }
   if (s.flat_on_wall && s.width_m < 0.25) {
     const ClassGuess guess = classOnWall(s);

@@ -152,7 +152,11 @@ bool addMesh(const RawScan& scan, const ScanSamples& samples, const ScanFrame& f
   const double share = static_cast<double>(indices.size()) / (0.2 * static_cast<double>(samples.size()));
   const auto most =
       static_cast<std::size_t>(std::max(24.0, std::min(1.0, share) * static_cast<double>(options.triangles)));
-  surface = decimated(surface, options.silhouette_m, most);
+  // The limit of triangles comes first: a surface that is rougher than the limit of its silhouette gives way.
+  double error_m = options.silhouette_m;
+  for (int round = 0; round < 5 && surface.triangles.size() > most; ++round, error_m *= 2) {
+    surface = decimated(surface, error_m, most);
+  }
   std::set<std::array<int, 3>> seen;
   const int base = static_cast<int>(thing.vertices.size());
   for (Eigen::Vector3d& v : surface.vertices) {
@@ -176,7 +180,7 @@ bool addMesh(const RawScan& scan, const ScanSamples& samples, const ScanFrame& f
   thing.shape = ThingShape::kMesh;
   thing.watertight = isClosed(kept);
   thing.rms_m = samples.noise_m;
-  thing.largest_m = options.silhouette_m;
+  thing.largest_m = std::max(options.silhouette_m, error_m / 2);
   return true;
 }
 

@@ -12,9 +12,9 @@
 namespace mmradartwin {
 namespace {
 
-constexpr double kTouching_voxels = 2.6;
-constexpr double kLeastThing_m2 = 0.06;  // of surface: two hands
-constexpr double kGap_m = 0.01;          // bodies end so far from what they stand on, so that no faces coincide
+constexpr double kTouching_voxels = 2.6, kTouching_m = 0.052;  // neighbours on one surface, whatever the thinning
+constexpr double kLeastThing_m2 = 0.06;                        // of surface: two hands
+constexpr double kGap_m = 0.01;  // bodies end so far from what they stand on, so that no faces coincide
 constexpr double kThinnest_m = 0.01;
 constexpr double kTop_m[2] = {0.25, 1.25};  // heights of table tops
 constexpr double kLowTable_m = 0.58;        // lower tops may be seats
@@ -52,6 +52,11 @@ class ThingFinder {
       for (int i : regions_[r].samples) region_of_[static_cast<std::size_t>(i)] = static_cast<int>(r);
     }
     findFree();
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      const int owner = room_.owner[i];
+      if (owner < 0 || room_.planes[static_cast<std::size_t>(owner)].kind != PlaneKind::kFloor) continue;
+      floor_.set(samples_.points[i].head<2>().cast<double>());
+    }
     findTops();
     for (const Part& part : parts()) addThing(part);
     nameThings();
@@ -136,7 +141,8 @@ class ThingFinder {
       const int id = static_cast<int>(tops_.size());
       for (std::size_t i = 0; i < samples_.size(); ++i) {
         const Eigen::Vector3d p = at(static_cast<int>(i));
-        if (!free_[i] || top_of_[i] >= 0 || p.z() > top.height_m + tolerance_m_ || p.z() < top.height_m - kSlab_m)
+        if (!free_[i] || top_of_[i] >= 0 || p.z() > top.height_m + std::max(tolerance_m_, 0.02) ||
+            p.z() < top.height_m - 0.06)
           continue;
         if (!covers(top, p) && !isWithinRim(top, p)) continue;
         top_of_[i] = id;
@@ -209,7 +215,7 @@ class ThingFinder {
     std::vector<Part> tables(tops_.size()), others;
     for (std::size_t t = 0; t < tops_.size(); ++t)
       tables[t].samples = tops_[t].samples, tables[t].top = static_cast<int>(t);
-    const auto touching_m = static_cast<float>(kTouching_voxels * samples_.spacing_m);
+    const auto touching_m = static_cast<float>(std::min(kTouching_voxels * samples_.spacing_m, kTouching_m));
     std::vector<char> seen(samples_.size(), 0);
     for (std::size_t s = 0; s < samples_.size(); ++s) {
       if (!free_[s] || seen[s] || top_of_[s] >= 0) continue;
@@ -373,7 +379,8 @@ class ThingFinder {
     signs.table_top = part.top >= 0;
     const BoxEvidence evidence = evidenceOf(samples_, part.samples, box, tolerance);
     signs.upright_share = uprightShare(part.samples);
-    signs.is_box = box.share > 0.7 && evidence.covered > 0.25 && evidence.inward < 0.25;
+    signs.is_box = box.share > 0.7 && (evidence.covered > 0.5 || floorBelow(box) < 0.4) && evidence.covered > 0.25 &&
+                   evidence.inward < 0.25;
     const ClassGuess guess = classOf(signs);
     thing.klass = guess.klass, thing.class_confidence = guess.confidence, thing.why = guess.why;
     thing.watertight = true;
@@ -397,6 +404,20 @@ class ThingFinder {
     }
     result_.things.push_back(std::move(thing));
     result_.samples.push_back(part.samples);
+  }
+
+  /// Share of a box's footprint, its rim left out, where the scan has the floor: a body hides it.
+  double floorBelow(const UprightBox& box) const {
+    const Eigen::Vector3d low = box.box.min(), high = box.box.max();
+    std::size_t seen = 0, all = 0;
+    for (double x = low.x() + 0.1; x < high.x() - 0.1; x += 0.05) {
+      for (double y = low.y() + 0.1; y < high.y() - 0.1; y += 0.05) {
+        const Eigen::Vector3d p = box.toMap({x, y, 0});
+        ++all;
+        seen += floor_.has(floor_.index(p.x()), floor_.index(p.y()));
+      }
+    }
+    return all && low.z() < 0.3 ? static_cast<double>(seen) / static_cast<double>(all) : 0;
   }
 
   double uprightShare(const std::vector<int>& indices) const {
@@ -477,7 +498,7 @@ class ThingFinder {
     std::vector<std::vector<int>> found;
     std::map<int, bool> open;
     for (int i : indices) open[i] = true;
-    const auto touching_m = static_cast<float>(kTouching_voxels * samples_.spacing_m);
+    const auto touching_m = static_cast<float>(std::min(kTouching_voxels * samples_.spacing_m, kTouching_m));
     for (auto& [start, is_open] : open) {
       if (!is_open) continue;
       is_open = false;
@@ -528,6 +549,7 @@ class ThingFinder {
   std::vector<char> free_;
   std::vector<int> region_of_, top_of_;
   std::vector<TableTop> tops_;
+  CellRaster floor_{0.05};
   Things result_;
 };
 
