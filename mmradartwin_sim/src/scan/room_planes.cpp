@@ -25,7 +25,8 @@ constexpr double kLeastHole_m = 0.35, kLeastHole_m2 = 0.2;  // smaller gaps are 
 constexpr double kHides_m = 1.2;                            // what stands so far before a wall may hide it
 constexpr double kCell_m = 0.05;
 constexpr double kOpenStep_m = 1.0;
-constexpr double kStraggler = 0.7;  // cosine between a straggler's normal and its plane's
+constexpr double kLeastSeen_m2 = 0.2;  // of a wall
+constexpr double kStraggler = 0.7;     // cosine between a straggler's normal and its plane's
 
 std::string text(const char* format, double a, double b = 0) {
   std::array<char, 200> line{};
@@ -692,7 +693,10 @@ class RoomBuilder {
       room_.owner[static_cast<std::size_t>(i)] = -2;
       room_.doubled_m2 += samples_.area_m2();
     }
-    if (distances.empty() && plane.kind == PlaneKind::kWall) return;  // others hold all of it
+    if (plane.kind == PlaneKind::kWall && covered.area_m2() < kLeastSeen_m2) {  // others hold nearly all of it
+      std::replace(room_.owner.begin(), room_.owner.end(), id, -1);
+      return;
+    }
     plane.samples = distances.size();
     plane.covered_m2 = covered.area_m2();
     plane.area_m2 = std::abs(signedAreaOf(plane.outline));

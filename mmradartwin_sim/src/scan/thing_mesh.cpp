@@ -10,6 +10,7 @@
 #include <vtkNew.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
+#include <vtkQuadricDecimation.h>
 
 #include <algorithm>
 #include <limits>
@@ -86,7 +87,7 @@ Surface meshedCloud(const ScanSamples& samples, const std::vector<int>& indices)
 }
 
 /// With at most so many triangles, if the limit of the error allows it.
-Surface decimated(const Surface& surface, double error_m, std::size_t most) {
+Surface decimated(const Surface& surface, double error_m, std::size_t most, bool last) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
   for (const Eigen::Vector3d& v : surface.vertices) points->InsertNextPoint(v.data());
@@ -114,13 +115,23 @@ Surface decimated(const Surface& surface, double error_m, std::size_t most) {
   decimate->SetErrorIsAbsolute(1);
   decimate->SetAbsoluteError(error_m);
   decimate->Update();
+  vtkPolyData* out = decimate->GetOutput();
+  // Surfaces of scraps have no inner vertices to go; where the limit of triangles stays exceeded, edges go by quadrics.
+  vtkNew<vtkQuadricDecimation> collapse;
+  const auto left = static_cast<double>(out->GetNumberOfPolys());
+  if (last && left > static_cast<double>(most)) {
+    collapse->SetInputData(out);
+    collapse->SetTargetReduction(1 - static_cast<double>(most) / left);
+    collapse->Update();
+    out = collapse->GetOutput();
+  }
   Surface result;
-  for (vtkIdType i = 0; i < decimate->GetOutput()->GetNumberOfPoints(); ++i) {
+  for (vtkIdType i = 0; i < out->GetNumberOfPoints(); ++i) {
     Eigen::Vector3d p;
-    decimate->GetOutput()->GetPoint(i, p.data());
+    out->GetPoint(i, p.data());
     result.vertices.push_back(p);
   }
-  vtkCellArray* polys = decimate->GetOutput()->GetPolys();
+  vtkCellArray* polys = out->GetPolys();
   polys->InitTraversal();
   vtkIdType count = 0;
   const vtkIdType* corners = nullptr;
@@ -148,14 +159,13 @@ bool addMesh(const RawScan& scan, const ScanSamples& samples, const ScanFrame& f
   Surface surface =
       scan.triangles.empty() ? meshedCloud(samples, indices) : ownTriangles(scan, samples, frame, indices);
   if (surface.triangles.size() < 8) return false;
-  // A thing's part of the budget is that of its surface in the scan, of which things are a fifth at most.
-  const double share = static_cast<double>(indices.size()) / (0.2 * static_cast<double>(samples.size()));
-  const auto most =
-      static_cast<std::size_t>(std::max(24.0, std::min(1.0, share) * static_cast<double>(options.triangles)));
+  // A thing's part of the budget is that of its surface in the scan.
+  const double share = static_cast<double>(indices.size()) / static_cast<double>(samples.size());
+  const auto most = static_cast<std::size_t>(std::max(24.0, share * static_cast<double>(options.triangles)));
   // The limit of triangles comes first: a surface that is rougher than the limit of its silhouette gives way.
   double error_m = options.silhouette_m;
   for (int round = 0; round < 5 && surface.triangles.size() > most; ++round, error_m *= 2) {
-    surface = decimated(surface, error_m, most);
+    surface = decimated(surface, error_m, most, round == 4);
   }
   std::set<std::array<int, 3>> seen;
   const int base = static_cast<int>(thing.vertices.size());
