@@ -18,6 +18,7 @@
 #include "mmradartwin_dsp/progress_line.h"
 #include "mmradartwin_sim/material_presets.h"
 #include "mmradartwin_sim/mesh_frame.h"
+#include "mmradartwin_sim/scan_refinement.h"
 #include "mmradartwin_sim/scan_to_scene.h"
 #include "mmradartwin_sim/scene.h"
 
@@ -37,6 +38,7 @@ struct Options {
   double scale = 1;
   bool y_up = false;
   std::string unit;
+  std::string refine;
 };
 
 std::string lower(std::string text) {
@@ -199,7 +201,15 @@ int makeScanScene(const Options& options) {
   scan_options.regularise = !options.no_regularise;
   Output output = Output::folder(options.output, options.meshes, "scene.yaml");
   progress.show(0, "reading");
-  const ScanScene scene = sceneOfScan(readScan(options.meshes.front()), scan_options);
+  const RawScan scan = readScan(options.meshes.front());
+  ScanScene scene = sceneOfScan(scan, scan_options);
+  if (!options.refine.empty()) {
+    const std::vector<MeasuredRange> ranges = readRefinement(options.refine);
+    scan_options.shifts = shiftsOf(scene, ranges, options.refine);
+    const std::vector<std::string> moved = refinementNotes(scene, ranges);
+    scene = sceneOfScan(scan, scan_options);
+    scene.notes.insert(scene.notes.begin(), moved.begin(), moved.end());
+  }
   progress.clear();
   writeScanScene(scene, output.path(), older);
   output.complete();
@@ -213,6 +223,10 @@ int makeScene(const Options& options) {
   note(options.meshes.front() + (scan
                                      ? ": taken as a scan: planes and things are made of it (--model takes it as it is)"
                                      : ": taken as a model with named parts (--planes makes planes and things of it)"));
+  if (!scan && !options.refine.empty()) {
+    throw InputError("--refine " + options.refine +
+                     ": moves walls of scans alone; give --planes to take the model as a scan");
+  }
   return scan ? makeScanScene(options) : makeModelScene(options);
 }
 
@@ -248,6 +262,8 @@ int main(int argc, char** argv) {
   app.add_option("--silhouette", options.scan.silhouette_m, "metres within which fewer triangles leave silhouettes")
       ->check(CLI::Range(0.001, 0.1))
       ->capture_default_str();
+  app.add_option("--refine", options.refine,
+                 "refinement.yaml of refine_scene, or its folder: walls move to where a radar in the room has them");
   app.add_flag("--proxies", options.scan.proxies,
                "every thing becomes its box: fewest triangles, for simulation alone");
   app.footer("Example: make_scene phone_scan.ply --output my_room");

@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "mmradartwin_sim/scan_refinement.h"
 #include "scene_files.h"
 
 namespace mmradartwin {
@@ -116,6 +117,46 @@ TEST_F(ScanToSceneTest, RoomWithNoiseBecomesSixExactPlanes) {
         EXPECT_LT(std::min(std::abs(v[axis]), std::abs(v[axis] - kRoom[axis])), 0.002) << actor.name;
       }
     }
+  }
+}
+
+TEST_F(ScanToSceneTest, ARadarMovesAWallAndTheRoomStaysClosed) {
+  SampledRoom room(0.005);
+  room.addShell(kRoom);
+  const RawScan scan = room.scan();
+  const ScanScene before = sceneOfScan(scan, {});
+  const ScanPlane* east = planeAt(before, {-1, 0, 0}, -5);
+  ASSERT_NE(east, nullptr);
+  const std::vector<MeasuredRange> ranges = {{east->name, 0.020, 0.002}, {"cabinet_1", 0.05, 0.002}};
+  ScanOptions options;
+  options.shifts = shiftsOf(before, ranges, "measured");
+  ASSERT_EQ(options.shifts.size(), 1U);
+  const ScanScene after = sceneOfScan(scan, options);
+  ASSERT_EQ(after.planes.size(), before.planes.size());
+  const ScanPlane* moved = planeAt(after, {-1, 0, 0}, -5.02);
+  ASSERT_NE(moved, nullptr);
+  EXPECT_EQ(moved->name, east->name);
+  EXPECT_NEAR(moved->offset_m, east->offset_m - 0.020, 1e-9);  // outwards, against the normal
+  for (const ScanActor& actor : after.actors) {
+    for (const Eigen::Vector3d& v : actor.vertices) {
+      EXPECT_LT(std::min(std::abs(v.x()), std::abs(v.x() - 5.02)), 0.002) << actor.name;
+    }
+  }
+  EXPECT_EQ(refinementNotes(before, ranges).size(), 1U);
+  EXPECT_THROW(shiftsOf(before, {{"cabinet_1", 0.01, 0.001}}, "measured"), InputError);
+}
+
+TEST_F(ScanToSceneTest, RefinementIsReadStrictly) {
+  write("refinement.yaml",
+        "format: mmradartwin_refinement/1\nrecording: session\nactors:\n"
+        "  wall_1: {range_m: -0.004, std_m: 0.001}\n");
+  const std::vector<MeasuredRange> ranges = readRefinement(folder_);
+  ASSERT_EQ(ranges.size(), 1U);
+  EXPECT_EQ(ranges.front().actor, "wall_1");
+  EXPECT_DOUBLE_EQ(ranges.front().range_m, -0.004);
+  for (const char* actor : {"{range_m: 3, std_m: 0.001}", "{range_m: 0.01}", "{range_m: 0.01, std_m: 0.001, x: 1}"}) {
+    write("bad.yaml", std::string("format: mmradartwin_refinement/1\nactors:\n  wall_1: ") + actor + "\n");
+    EXPECT_THROW(readRefinement(folder_ + "/bad.yaml"), InputError) << actor;
   }
 }
 

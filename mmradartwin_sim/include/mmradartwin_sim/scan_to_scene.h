@@ -26,6 +26,13 @@ struct RawScan {
 /// file: unreadable, fewer than 1000 points, more than 12 million points or 6 million triangles.
 RawScan readScan(const std::string& file);
 
+/// An upright plane of a scan, and how far it goes along its normal against where the scan has it.
+struct PlaneShift {
+  Eigen::Vector3d normal;  ///< unit, in map, into the room
+  double offset_m = 0;     ///< normal . p = offset on the plane as the scan has it
+  double by_m = 0;
+};
+
 /// What a person states of a scan; what is not stated is found from the data.
 struct ScanOptions {
   std::optional<double> unit_m;       ///< metres per unit of the file
@@ -36,6 +43,7 @@ struct ScanOptions {
   std::size_t triangles = 20000;      ///< all things that are meshes together, at most
   double silhouette_m = 0.01;         ///< decimation leaves silhouettes within this
   bool proxies = false;               ///< every thing becomes its box: smallest, for simulation only
+  std::vector<PlaneShift> shifts;     ///< walls that another sensor knows better (scan_refinement.h)
   std::function<void(double, const std::string&)> progress;  ///< share of a stage that is done, and its name
 };
 

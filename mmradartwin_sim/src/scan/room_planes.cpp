@@ -143,7 +143,7 @@ struct FloorCells {
 class RoomBuilder {
  public:
   RoomBuilder(const std::string& file, const ScanFrame& frame, const ScanSamples& samples,
-              const std::vector<PlaneRegion>& regions, double yaw_rad)
+              const std::vector<PlaneRegion>& regions, double yaw_rad, const std::vector<PlaneShift>& shifts)
       : file_(file), frame_(frame), samples_(samples), tolerance_m_(planeTolerance(samples)) {
     room_.yaw_rad = yaw_rad;
     room_.owner.assign(samples.size(), -1);
@@ -152,6 +152,7 @@ class RoomBuilder {
     std::sort(heights.begin(), heights.end());
     room_.height_m = frame.has_ceiling ? frame.ceiling_m : static_cast<double>(heights[heights.size() * 199 / 200]);
     group(regions);
+    shift(shifts);
     findWalls();
   }
 
@@ -206,6 +207,17 @@ class RoomBuilder {
       std::sort(g.plane.samples.begin(), g.plane.samples.end());
       fitOffset(samples_, g.plane);
       measurePlane(samples_, g.plane);
+    }
+  }
+
+  void shift(const std::vector<PlaneShift>& shifts) {
+    for (const PlaneShift& s : shifts) {
+      for (PlaneGroup& g : groups_) {
+        const bool is_it = s.normal.dot(g.plane.normal) > 1 - 1e-6 && std::abs(s.offset_m - g.plane.offset_m) < 0.001;
+        if (!is_it) continue;
+        g.plane.offset_m += s.by_m;
+        break;
+      }
     }
   }
 
@@ -768,8 +780,8 @@ double regularise(const ScanSamples& samples, bool enabled, std::vector<PlaneReg
 }
 
 RoomPlanes roomPlanes(const std::string& file, const ScanFrame& frame, const ScanSamples& samples,
-                      const std::vector<PlaneRegion>& regions, double yaw_rad) {
-  return RoomBuilder(file, frame, samples, regions, yaw_rad).run();
+                      const std::vector<PlaneRegion>& regions, double yaw_rad, const std::vector<PlaneShift>& shifts) {
+  return RoomBuilder(file, frame, samples, regions, yaw_rad, shifts).run();
 }
 
 }  // namespace mmradartwin

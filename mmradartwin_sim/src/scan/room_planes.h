@@ -22,8 +22,9 @@ struct RoomPlanes {
 /// deviations; their offsets are fitted again. Returns the room's main direction.
 double regularise(const ScanSamples& samples, bool enabled, std::vector<PlaneRegion>& regions);
 
-/// Floor, ceiling and walls with exact bounds. Everything is in map. Throws InputError where there is no wall.
+/// Floor, ceiling and walls with exact bounds. Everything is in map. shifts: of upright planes, before their bounds are
+/// found. Throws InputError where there is no wall.
 RoomPlanes roomPlanes(const std::string& file, const ScanFrame& frame, const ScanSamples& samples,
-                      const std::vector<PlaneRegion>& regions, double yaw_rad);
+                      const std::vector<PlaneRegion>& regions, double yaw_rad, const std::vector<PlaneShift>& shifts);
 
 }  // namespace mmradartwin

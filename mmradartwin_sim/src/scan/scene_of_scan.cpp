@@ -123,7 +123,7 @@ ScanScene sceneOfScan(const RawScan& scan, const ScanOptions& options) {
   ScanScene scene;
   scene.frame = bringIntoMap(scan, options, unit_m, samples, regions);
   const double yaw_rad = regularise(samples, options.regularise, regions);
-  RoomPlanes room = roomPlanes(scan.file, scene.frame, samples, regions, yaw_rad);
+  RoomPlanes room = roomPlanes(scan.file, scene.frame, samples, regions, yaw_rad, options.shifts);
   Things things = thingsOf(scan, scene.frame, options, samples, regions, room);
   scene.planes = std::move(room.planes);
   scene.things = std::move(things.things);
