@@ -1,0 +1,105 @@
+"""The generator of degraded scans: what it writes has the faults that were asked for, and no others."""
+import dataclasses
+import unittest
+
+import numpy as np
+
+from mmradartwin_tests.scans import degraded_scan, known_room
+from mmradartwin_tests.scans.degraded_scan import Degradation, make_scan
+from mmradartwin_tests.scans.ray_casting import CastRoom
+
+
+def in_map(scan):
+    """[V, 3] points as they stand in map."""
+    T = np.linalg.inv(scan.T_scan_map)
+    return scan.points @ T[:3, :3].T + T[:3, 3]
+
+
+def distance_to_surface(room, points):
+    """[P] distance to the nearest rectangle of the room, m."""
+    cast = CastRoom(room)
+    best = np.full(len(points), np.inf)
+    for i in range(len(cast.actor)):
+        q = points - cast.origin[i]
+        u, v = q @ cast.e1[i], q @ cast.e2[i]
+        du = np.maximum(np.maximum(-u, u - cast.s1[i]), 0)
+        dv = np.maximum(np.maximum(-v, v - cast.s2[i]), 0)
+        best = np.minimum(best, np.sqrt(du**2 + dv**2 + (q @ cast.normal[i])**2))
+    return best
+
+
+class DegradedScans(unittest.TestCase):
+    def test_same_seed_same_scan(self):
+        room = known_room.l_shaped_room()
+        for kind in ("cloud", "frames", "fused"):
+            asked = Degradation("small", kind=kind, size=20000, holes=2, colors=True)
+            a, b, other = make_scan(room, asked, 3), make_scan(room, asked, 3), make_scan(room, asked, 4)
+            np.testing.assert_array_equal(a.points, b.points)
+            np.testing.assert_array_equal(a.colors, b.colors)
+            self.assertFalse(a.points.shape == other.points.shape and np.allclose(a.points, other.points))
+
+    def test_points_are_off_the_room_by_the_noise_alone(self):
+        room = known_room.office_room()
+        for kind, noise_m, slack in (("cloud", 0.005, 0.5), ("frames", 0.005, 0.5), ("fused", 0.005, 0.5)):
+            scan = make_scan(room, Degradation("noise", kind=kind, size=100000, noise_m=noise_m), 1)
+            points = in_map(scan)
+            wall = points[(points[:, 0] < 0.2) & (points[:, 0] > -0.1) & (points[:, 2] > 2.3) & (points[:, 2] < 2.7) &
+                          (points[:, 1] > 0.3) & (points[:, 1] < 5.7)]
+            self.assertGreater(len(wall), 100, msg=kind)
+            # Along the ray, so that across the wall it is less.
+            self.assertLess(abs(wall[:, 0].std() / noise_m - 0.8), slack, msg=f"{kind}: {wall[:, 0].std()}")
+            # The error of a fused mesh is alike over patches, of which this wall has few.
+            self.assertLess(abs(wall[:, 0].mean()), 0.002 if kind == "fused" else 0.0005, msg=kind)
+            step = scan.step_m if kind == "fused" else 0
+            self.assertGreater(np.mean(distance_to_surface(room, points) < 4 * noise_m + step), 0.97, msg=kind)
+
+    def test_frame_is_as_asked(self):
+        room = known_room.l_shaped_room()
+        plain = Degradation("plain", kind="cloud", size=30000, noise_m=0.0)
+        turned = dataclasses.replace(plain, y_up=True, unit_m=1e-3, tilt_deg=5.0, yaw_deg=20.0, offset_m=(1.0, 2.0, 3.0))
+        scan = make_scan(room, turned, 2)
+        up = scan.T_scan_map[:3, 2] * 1e-3
+        self.assertAlmostEqual(np.degrees(np.arccos(up[1])), 5.0, places=6)
+        np.testing.assert_allclose(in_map(scan), make_scan(room, plain, 2).points, atol=1e-5)
+        self.assertGreater(np.ptp(scan.points[:, 0]), 3000)
+
+    def test_ghosts_lie_behind_the_glass(self):
+        room = known_room.office_room()
+        clean = make_scan(room, Degradation("clean", kind="cloud", size=100000), 5)
+        ghosts = make_scan(room, Degradation("ghosts", kind="cloud", size=100000, ghosts=0.5), 5)
+        outside = lambda s: int((~room.contains(in_map(s), -0.1)).sum())
+        self.assertEqual(outside(clean), 0)
+        self.assertGreater(outside(ghosts), 300)
+
+    def test_holes_and_unseen_places_are_empty(self):
+        room = known_room.l_shaped_room()
+        asked = Degradation("fused", size=60000)
+        whole, holed = make_scan(room, asked, 6), make_scan(room, dataclasses.replace(asked, holes=10), 6)
+        self.assertLess(len(holed.points), 0.99 * len(whole.points))
+        closed = make_scan(room, dataclasses.replace(asked, unseen=True), 6)
+        self.assertGreater(len(closed.points), 1.01 * len(whole.points))
+        # A mesh that closes what nobody saw has no open edge.
+        edges = np.sort(np.concatenate([closed.faces[:, [0, 1]], closed.faces[:, [1, 2]], closed.faces[:, [2, 0]]]), axis=1)
+        _, count = np.unique(edges, axis=0, return_counts=True)
+        self.assertTrue((count % 2 == 0).all())
+
+    def test_doubled_surfaces_lie_apart(self):
+        room = known_room.office_room()
+        asked = Degradation("frames", kind="frames", size=60000, noise_m=0.0005)
+        apart = dataclasses.replace(asked, place_error_m=0.01)
+        spread = lambda s: np.median(distance_to_surface(room, in_map(s)))
+        self.assertLess(spread(make_scan(room, asked, 7)), 0.001)
+        self.assertGreater(spread(make_scan(room, apart, 7)), 0.003)
+
+    def test_rounding_eats_edges(self):
+        room = known_room.office_room()
+        sharp = make_scan(room, Degradation("sharp", size=60000, noise_m=0.0), 8)
+        soft = make_scan(room, Degradation("soft", size=60000, noise_m=0.0, smooth_steps=1.6), 8)
+        # The upper edge of the large wooden cupboard, 1.82 m high, away from walls.
+        near = lambda s: [p for p in in_map(s) if abs(p[2] - 1.82) < 0.05 and 0.2 < p[0] < 0.8 and 1.0 < p[1] < 1.7]
+        self.assertGreater(max(p[2] for p in near(sharp)), max(p[2] for p in near(soft)) - 1e-9)
+        self.assertEqual(set(degraded_scan.DEGRADATIONS), {d.name for d in degraded_scan.DEGRADATIONS.values()})
+
+
+if __name__ == "__main__":
+    unittest.main()
