@@ -18,6 +18,7 @@
 #include "mmradartwin_dsp/progress_line.h"
 #include "mmradartwin_sim/material_presets.h"
 #include "mmradartwin_sim/mesh_frame.h"
+#include "mmradartwin_sim/scan_quality.h"
 #include "mmradartwin_sim/scan_refinement.h"
 #include "mmradartwin_sim/scan_to_scene.h"
 #include "mmradartwin_sim/scene.h"
@@ -210,11 +211,15 @@ int makeScanScene(const Options& options) {
     scene = sceneOfScan(scan, scan_options);
     scene.notes.insert(scene.notes.begin(), moved.begin(), moved.end());
   }
-  progress.clear();
   writeScanScene(scene, output.path(), older);
+  progress.show(0, "checks");
+  const ScanQuality quality = checkScanScene(scene);
+  writeScanQuality(scene, quality, output.path());
+  progress.clear();
   output.complete();
   sayScene(scene);
   noteAll(scene.notes);
+  noteAll(qualityNotes(quality));
   return 0;
 }
 

@@ -41,6 +41,7 @@ ROOMS = {
         "what_if": {"twin"},
         "room": {"rays"},
         "scan": {"rays"},
+        "scan_quality": {"scan"},
         "ros": {"twin", "room"},
     },
     "mmradartwin_sim/src/mechanisms": {
