@@ -202,6 +202,19 @@ void writeCounts(std::ostream& out, const std::string& key, const List& list) {
   out << "}\n";
 }
 
+void writeFrame(std::ostream& out, const ScanFrame& frame) {
+  out << "frame:  # p_map = T_map_file * (unit_m * p_file)\n  unit_m: " << frame.unit_m << "\n  up: [" << frame.up.x()
+      << ", " << frame.up.y() << ", " << frame.up.z() << "]\n  T_map_file:" << std::setprecision(12) << "\n";
+  for (int r = 0; r < 3; ++r) {
+    out << "    - [";
+    for (int c = 0; c < 4; ++c) out << (c ? ", " : "") << frame.T_map_file.matrix()(r, c);
+    out << "]\n";
+  }
+  out << std::setprecision(4) << "  tilt_deg: " << frame.tilt_deg << "\n  tilt_std_deg: " << frame.tilt_std_deg
+      << "\n  has_ceiling: " << (frame.has_ceiling ? "true" : "false") << "\n  ceiling_m: " << frame.ceiling_m
+      << "\n  noise_m: " << frame.noise_m << "\n  spacing_m: " << frame.spacing_m << "\n";
+}
+
 void writePlanes(std::ostream& out, const ScanScene& scene, const ScanQuality& quality) {
   out << "# rms and largest: of the scan's points, of which 1 in 100 lies farther off. bow: rms of the mean over "
          "patches "
@@ -284,8 +297,9 @@ std::vector<std::string> qualityNotes(const ScanQuality& quality) {
 
 void writeScanQuality(const ScanScene& scene, const ScanQuality& quality, const std::string& folder) {
   std::ofstream out(folder + "/quality.yaml");
-  out << std::setprecision(4) << "format: mmradartwin_scan_quality/1\n"
-      << "# Rays from free places inside the room: none should leave through a gap.\nchecks:\n"
+  out << std::setprecision(4) << "format: mmradartwin_scan_quality/1\n";
+  writeFrame(out, scene.frame);
+  out << "# Rays from free places inside the room: none should leave through a gap.\nchecks:\n"
       << "  places: " << quality.places << "\n  rays: " << quality.rays << "\n  through_gaps: " << quality.through_gaps
       << "\n  through_openings: " << quality.through_openings << "\n";
   writeCounts(out, "places_in_bodies", quality.bodies);

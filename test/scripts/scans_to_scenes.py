@@ -1,0 +1,179 @@
+#!/usr/bin/env python3
+"""Makes scenes of degraded scans of known rooms, and of real scans, and measures what came out.
+
+Results stand in OUTPUT/results.jsonl, and a scan that is done does not run again. The table is printed at the end and written
+to OUTPUT/table.md. Scans and scenes stay in OUTPUT.
+"""
+import argparse
+import math
+import os
+import sys
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
+
+import numpy as np
+import yaml
+
+from mmradartwin_tests.arguments import whole
+from mmradartwin_tests.blind import table
+from mmradartwin_tests.blind.trials import Results, run_measured
+from mmradartwin_tests.installed_programs import find_program
+from mmradartwin_tests.resumable_program import run_resumable
+from mmradartwin_tests.scans import persistence, scan_files, scene_comparison
+from mmradartwin_tests.scans.degraded_scan import DEGRADATIONS, Scan, make_scan
+from mmradartwin_tests.scans.known_room import l_shaped_room, office_room, third_world_room, tilted_corner_room
+
+ROOMS = {"office": office_room, "l_shaped": l_shaped_room, "meeting_97": tilted_corner_room,
+         "living_room": lambda: third_world_room("living_room", 3), "laboratory": lambda: third_world_room("laboratory", 5),
+         "small_office": lambda: third_world_room("small_office", 7)}
+CASES = (("fused_fine", "office"), ("fused_mm_y_up", "l_shaped"), ("poisson", "meeting_97"), ("lidar_cloud", "office"),
+         ("noisy_cloud", "l_shaped"), ("doubled_frames", "living_room"), ("far_coordinates", "laboratory"),
+         ("three_million", "small_office"))
+REAL = ("hololens_room.ply", "kinect_office.pcd")
+MOST_RAW = 1200000      # triangles of a raw scan that is simulated beside its scene
+
+
+def parse():
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--output", required=True, help="folder of scans, scenes, results and table")
+    parser.add_argument("--seed", type=whole(0), default=1, help="of scans and poses (default: 1)")
+    parser.add_argument("--cases", default="", help="only these, by names of scans or rooms, with commas (default: all)")
+    parser.add_argument("--real", default=os.path.join(os.environ.get("MMRADARTWIN_DATA", ""), "rooms"),
+                        help="folder of the real scans (default: rooms in MMRADARTWIN_DATA)")
+    parser.add_argument("--pairs", type=whole(0), default=50, help="of poses 1 cm apart; 0: none (default: 50)")
+    parser.add_argument("--table", action="store_true", help="run nothing, print the table of the results that exist")
+    return parser.parse_args()
+
+
+def make_scene(scan_file, folder):
+    """{status, seconds, mib, log's last line} of the program."""
+    log = folder + ".log"
+    status, seconds, _, mib = run_measured([find_program("mmradartwin_sim", "make_scene"), scan_file, "--output", folder,
+                                            "--force"], 600, log)
+    with open(log, encoding="utf-8", errors="replace") as text:
+        lines = text.read().strip().splitlines()
+    return {"status": status, "seconds": round(seconds, 1), "mib": round(mib), "said": lines[-1] if lines else ""}
+
+
+def raw_scene(folder, scan, quality):
+    """scene.yaml of the raw mesh in the map of its scene, as one concrete actor with wide facets."""
+    os.makedirs(folder, exist_ok=True)
+    T = scene_comparison.map_from_truth(quality, scan) @ np.linalg.inv(scan.T_scan_map)
+    upright = Scan(scan.points @ T[:3, :3].T + T[:3, 3], scan.faces, None, scan.T_scan_map, scan.step_m)
+    scan_files.write_ply(os.path.join(folder, "raw.ply"), upright)
+    with open(os.path.join(folder, "scene.yaml"), "w", encoding="ascii") as out:
+        out.write("meshes:\n  - {file: raw.ply}\nfacets: {angle_deg: 35, offset_m: 0.05}\nmaterials: materials.yaml\n"
+                  "actors: {raw: {material: Concrete}}\n")
+    with open(os.path.join(folder, "materials.yaml"), "w", encoding="ascii") as out:
+        out.write("materials:\n  Concrete: {model: dielectric, relative_permittivity: 5.24, conductivity_s_per_m: 1.38, "
+                  "scattering_coefficient: 0.5}\n")
+    return os.path.join(folder, "scene.yaml")
+
+
+def steady(scene_yaml, room, T, arguments, place):
+    """persistence.measure() of a scene; what went wrong as a text."""
+    pairs = persistence.draw_pairs(room, T, np.random.default_rng([arguments.seed, 50]), arguments.pairs)
+    persistence.write_session(place, scene_yaml, pairs)
+    try:
+        persistence.simulate(find_program("mmradartwin_sim", "simulate"), place, place + "_simulated")
+    except (ValueError, OSError) as error:
+        return {"failed": str(error)}
+    return persistence.measure(place + "_simulated", pairs)
+
+
+def run_known(name, room_name, arguments):
+    """Record of a degraded scan of a known room."""
+    room, place = ROOMS[room_name](), os.path.join(arguments.output, f"{name}_{room_name}")
+    scan = make_scan(room, DEGRADATIONS[name], arguments.seed)
+    file = place + ".ply"
+    scan_files.write_ply(file, scan)
+    scan_files.write_truth(place + ".json", room, scan)
+    record = {"key": f"{name}_{room_name}", "size": len(scan.points if scan.faces is None else scan.faces),
+              "cloud": scan.faces is None, **make_scene(file, place)}
+    if record["status"] != 0:
+        return record
+    found = scene_comparison.compare(place, room, scan)
+    record.update(floor_m=found.floor_m, tilt_deg=found.tilt_deg, walls=found.walls, wall_share=found.wall_share,
+                  furniture=found.furniture, flat=found.flat, extra=found.extra, checks=found.quality["checks"],
+                  accuracy_m=found.quality["accuracy"]["scene_m"])
+    if arguments.pairs:
+        T = scene_comparison.map_from_truth(found.quality, scan)
+        record["steady"] = steady(os.path.join(place, "scene.yaml"), room, T, arguments, place + "_pairs")
+        if scan.faces is not None and len(scan.faces) <= MOST_RAW:
+            raw = raw_scene(place + "_raw", scan, found.quality)
+            record["steady_raw"] = steady(raw, room, T, arguments, place + "_raw_pairs")
+    return record
+
+
+def run_real(name, arguments):
+    """Record of a real scan, of which no truth is known."""
+    place = os.path.join(arguments.output, name.split(".")[0])
+    record = {"key": name, "cloud": name.endswith(".pcd"), "size": 0, **make_scene(os.path.join(arguments.real, name), place)}
+    if record["status"] == 0:
+        with open(os.path.join(place, "quality.yaml"), encoding="utf-8") as text:
+            quality = yaml.safe_load(text)
+        areas = quality["areas"]
+        record.update(wall_share=areas["wall_on_planes_m2"] / max(areas["wall_m2"], 1e-9), checks=quality["checks"],
+                      accuracy_m=quality["accuracy"]["scene_m"], things=len(quality["things"]), planes=len(quality["planes"]))
+    return record
+
+
+def worst(walls, index):
+    """Largest error of the walls that were found."""
+    return max((w[index] for w in walls if not math.isnan(w[index])), default=math.nan)
+
+
+def row(record):
+    """Cells of a record."""
+    cells = [record["key"], f"{record['size'] / 1e6:.2f} M {'points' if record['cloud'] else 'triangles'}" if record["size"] else "",
+             f"{record['seconds']:.0f} s", f"{record['mib']} MiB"]
+    if record["status"] != 0:
+        return [*cells, record["said"]] + [""] * 9
+    cells.append(f"{100 * record['wall_share']:.0f} %")
+    if "walls" in record:
+        absent = sum(math.isnan(w[1]) for w in record["walls"])
+        right = sum(r for _, _, r in record["furniture"])
+        cells += [f"{1e3 * record['floor_m']:+.1f} mm", f"{record['tilt_deg']:.3f}°", f"{1e3 * worst(record['walls'], 1):.1f} mm",
+                  f"{worst(record['walls'], 2):.2f}°" + (f", {absent} absent" if absent else ""),
+                  f"{right} of {len(record['furniture'])}",
+                  f"{sum(r for _, _, r in record['flat'])} of {len(record['flat'])}"]
+    else:
+        cells += ["", "", "", "", "", ""]
+    checks = record["checks"]
+    cells.append(f"{checks['through_gaps']} / {sum(checks['places_in_bodies'].values())} / "
+                 f"{sum(checks['coincident_m2'].values()):.2f} m² / {sum(checks['slivers'].values())}")
+    for key in ("steady", "steady_raw"):
+        s = record.get(key)
+        cells.append("" if not s else "none" if "failed" in s or not s["paths"] else
+                     f"{100 * s['persist']:.0f} % of {s['paths']}, {100 * s['within_1_db']:.0f} % within 1 dB")
+    return cells
+
+
+HEAD = ("scan", "size", "time", "memory", "wall area on planes", "floor", "tilt", "walls' offset", "walls' angle",
+        "furniture", "flat things", "gaps / bodies / coincident / slivers", "paths that persist over 1 cm", "on the raw mesh")
+
+
+def run(arguments):
+    """Runs what is missing."""
+    results = Results(os.path.join(arguments.output, "results.jsonl"), ("status", "seconds"))
+    wanted = [c for c in arguments.cases.split(",") if c]
+    todo = [(f"{name}_{room}", lambda n=name, r=room: run_known(n, r, arguments)) for name, room in CASES]
+    todo += [(name, lambda n=name: run_real(n, arguments)) for name in REAL if os.path.exists(os.path.join(arguments.real, name))]
+    if not arguments.table:
+        if find_program("mmradartwin_sim", "make_scene") is None:
+            raise ValueError("mmradartwin_sim make_scene is not in the sourced workspace; build it first")
+        for key, measure in todo:
+            if key in results.records or (wanted and not any(w in key for w in wanted)):
+                continue
+            results.add(measure())
+            print(" | ".join(row(results.records[key])), flush=True)
+    text = table.markdown(HEAD, [row(r) for r in results.records.values()])
+    with open(os.path.join(arguments.output, "table.md"), "w", encoding="utf-8") as out:
+        out.write(text + "\n")
+    print(text)
+
+
+if __name__ == "__main__":
+    sys.exit(run_resumable(parse, run))
