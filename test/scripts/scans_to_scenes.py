@@ -22,12 +22,9 @@ from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.resumable_program import run_resumable
 from mmradartwin_tests.scans import persistence, scan_files, scene_comparison
 from mmradartwin_tests.scans.degraded_scan import DEGRADATIONS, Scan, make_scan
-from mmradartwin_tests.scans.known_room import l_shaped_room, office_room, third_world_room, tilted_corner_room
+from mmradartwin_tests.scans.known_room import ROOMS
 
-ROOMS = {"office": office_room, "l_shaped": l_shaped_room, "meeting_97": tilted_corner_room,
-         "living_room": lambda: third_world_room("living_room", 3), "laboratory": lambda: third_world_room("laboratory", 5),
-         "small_office": lambda: third_world_room("small_office", 7)}
-CASES = (("fused_fine", "office"), ("fused_mm_y_up", "l_shaped"), ("poisson", "meeting_97"), ("lidar_cloud", "office"),
+CASES = (("phone", "office"), ("fused_fine", "office"), ("fused_mm_y_up", "l_shaped"), ("poisson", "meeting_97"), ("lidar_cloud", "office"),
          ("noisy_cloud", "l_shaped"), ("doubled_frames", "living_room"), ("far_coordinates", "laboratory"),
          ("three_million", "small_office"))
 REAL = ("hololens_room.ply", "kinect_office.pcd")

@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 
 from mmradartwin_tests.installed_programs import find_program
+from mmradartwin_tests.office import build_actors, write_obj
 from mmradartwin_tests.scans import known_room, scan_files, scene_comparison
 from mmradartwin_tests.scans.degraded_scan import Degradation, Scan, make_scan
 from in_folder import InFolder
@@ -197,7 +198,6 @@ class BadInput(InFolder):
 class ModelledRoom(InFolder):
     def test_named_parts_stay_as_they_are(self):
         """A room of named parts is taken as it was modelled."""
-        from mmradartwin_tests.office import build_actors, write_obj
         write_obj(build_actors(), self.at("office.obj"))
         status, _, said = make_scene(self.at("office.obj"), "--output", self.at("scene"))
         self.assertEqual(status, 0, msg=said)

@@ -191,6 +191,11 @@ def tilted_corner_room():
     return KnownRoom("meeting_97", outline, 2.75, list(SIDES), ["Concrete"] * 4, furniture)
 
 
+ROOMS = {"office": office_room, "l_shaped": l_shaped_room, "meeting_97": tilted_corner_room,
+         "living_room": lambda: third_world_room("living_room", 3), "laboratory": lambda: third_world_room("laboratory", 5),
+         "small_office": lambda: third_world_room("small_office", 7)}
+
+
 def rectangles_of(part):
     """Rectangles of a box, a sheet or a cylinder, whose side and lids become flat pieces."""
     if not isinstance(part, Cylinder):
