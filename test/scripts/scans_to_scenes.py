@@ -13,16 +13,17 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
 import numpy as np
-import yaml
 
+from mmradartwin_tests import office
 from mmradartwin_tests.arguments import whole
 from mmradartwin_tests.blind import table
 from mmradartwin_tests.blind.trials import Results, run_measured
+from mmradartwin_tests.geometry import Actor
 from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.resumable_program import run_resumable
 from mmradartwin_tests.scans import persistence, scan_files, scene_comparison
 from mmradartwin_tests.scans.degraded_scan import DEGRADATIONS, Scan, make_scan
-from mmradartwin_tests.scans.known_room import ROOMS
+from mmradartwin_tests.scans.known_room import ROOMS, rectangles_of
 
 CASES = (("phone", "office"), ("fused_fine", "office"), ("fused_mm_y_up", "l_shaped"), ("poisson", "meeting_97"), ("lidar_cloud", "office"),
          ("noisy_cloud", "l_shaped"), ("doubled_frames", "living_room"), ("far_coordinates", "laboratory"),
@@ -69,6 +70,18 @@ def raw_scene(folder, scan, quality):
     return os.path.join(folder, "scene.yaml")
 
 
+def true_scene(folder, room, T_map_room):
+    """scene.yaml of the known room in the map of its scene."""
+    os.makedirs(folder, exist_ok=True)
+    actors = []
+    for a in room.actors():
+        flat = [r for part in a.parts for r in rectangles_of(part)]
+        tag = a.tag if a.tag in office.MATERIALS else "Concrete"
+        actors.append(Actor(a.name, tag, flat).moved(T_map_room[:3, :3], T_map_room[:3, 3]))
+    office.write_scene(folder, actors)
+    return os.path.join(folder, "scene.yaml")
+
+
 def steady(scene_yaml, room, T, arguments, place):
     """persistence.measure() of a scene; what went wrong as a text."""
     pairs = persistence.draw_pairs(room, T, np.random.default_rng([arguments.seed, 50]), arguments.pairs)
@@ -98,6 +111,7 @@ def run_known(name, room_name, arguments):
     if arguments.pairs:
         T = scene_comparison.map_from_truth(found.quality, scan)
         record["steady"] = steady(os.path.join(place, "scene.yaml"), room, T, arguments, place + "_pairs")
+        record["steady_true"] = steady(true_scene(place + "_true", room, T), room, T, arguments, place + "_true_pairs")
         if scan.faces is not None and len(scan.faces) <= MOST_RAW:
             raw = raw_scene(place + "_raw", scan, found.quality)
             record["steady_raw"] = steady(raw, room, T, arguments, place + "_raw_pairs")
@@ -109,8 +123,7 @@ def run_real(name, arguments):
     place = os.path.join(arguments.output, name.split(".")[0])
     record = {"key": name, "cloud": name.endswith(".pcd"), "size": 0, **make_scene(os.path.join(arguments.real, name), place)}
     if record["status"] == 0:
-        with open(os.path.join(place, "quality.yaml"), encoding="utf-8") as text:
-            quality = yaml.safe_load(text)
+        quality = scene_comparison.read_summary(place)
         areas = quality["areas"]
         record.update(wall_share=areas["wall_on_planes_m2"] / max(areas["wall_m2"], 1e-9), checks=quality["checks"],
                       accuracy_m=quality["accuracy"]["scene_m"], things=len(quality["things"]), planes=len(quality["planes"]))
@@ -127,7 +140,7 @@ def row(record):
     cells = [record["key"], f"{record['size'] / 1e6:.2f} M {'points' if record['cloud'] else 'triangles'}" if record["size"] else "",
              f"{record['seconds']:.0f} s", f"{record['mib']} MiB"]
     if record["status"] != 0:
-        return [*cells, record["said"]] + [""] * 9
+        return [*cells, record["said"]] + [""] * 10
     cells.append(f"{100 * record['wall_share']:.0f} %")
     if "walls" in record:
         absent = sum(math.isnan(w[1]) for w in record["walls"])
@@ -141,7 +154,7 @@ def row(record):
     checks = record["checks"]
     cells.append(f"{checks['through_gaps']} / {sum(checks['places_in_bodies'].values())} / "
                  f"{sum(checks['coincident_m2'].values()):.2f} m² / {sum(checks['slivers'].values())}")
-    for key in ("steady", "steady_raw"):
+    for key in ("steady", "steady_raw", "steady_true"):
         s = record.get(key)
         cells.append("" if not s else "none" if "failed" in s or not s["paths"] else
                      f"{100 * s['persist']:.0f} % of {s['paths']}, {100 * s['within_1_db']:.0f} % within 1 dB")
@@ -149,7 +162,7 @@ def row(record):
 
 
 HEAD = ("scan", "size", "time", "memory", "wall area on planes", "floor", "tilt", "walls' offset", "walls' angle",
-        "furniture", "flat things", "gaps / bodies / coincident / slivers", "paths that persist over 1 cm", "on the raw mesh")
+        "furniture", "flat things", "gaps / bodies / coincident / slivers", "paths that persist over 1 cm", "on the raw mesh", "with the true mesh")
 
 
 def run(arguments):

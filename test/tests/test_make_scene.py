@@ -61,7 +61,7 @@ class DegradedScansBecomeScenes(InFolder):
         found, said = self.made(known_room.l_shaped_room(), asked)
         self.assert_close(found)
         self.assert_sound(found)
-        self.assertEqual(found.quality["frame"]["unit_m"], 1e-3)
+        self.assertEqual(found.quality["unit_m"], 1e-3)
         self.assertRegex(said, "mm|millimet")
         right = [r for _, _, r in found.furniture]
         self.assertGreaterEqual(np.mean(right), 0.8, msg=f"{found.furniture}")
@@ -81,7 +81,7 @@ class DegradedScansBecomeScenes(InFolder):
     def test_pictures_and_numbers_stand_beside_the_scene(self):
         asked = Degradation("small", kind="cloud", size=100000)
         self.made(known_room.l_shaped_room(), asked)
-        for name in ("scene.yaml", "materials.yaml", "room.obj", "quality.yaml", "top_view.png", "residuals.png",
+        for name in ("scene.yaml", "materials.yaml", "room.obj", "scan.yaml", "quality.yaml", "top_view.png", "residuals.png",
                      "before_after.png"):
             self.assertGreater(os.path.getsize(self.at("scene", name)), 100, msg=name)
         with open(self.at("scene", "top_view.png"), "rb") as picture:
@@ -91,7 +91,7 @@ class DegradedScansBecomeScenes(InFolder):
         asked = Degradation("small", kind="cloud", size=100000)
         self.made(known_room.l_shaped_room(), asked)
         text = {}
-        for name in ("scene.yaml", "materials.yaml", "room.obj", "quality.yaml"):
+        for name in ("scene.yaml", "materials.yaml", "room.obj", "scan.yaml", "quality.yaml"):
             with open(self.at("scene", name), encoding="utf-8") as file:
                 text[name] = file.read()
         status, _, said = make_scene(self.at("scan.ply"), "--output", self.at("again"))

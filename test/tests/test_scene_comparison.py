@@ -36,10 +36,11 @@ def perfect(folder, room, asked, moved=None, said=None):
             klass = (said or {}).get(actor.name, CLASSES[scene_comparison.kind_of(actor.name)])
             things.append({"name": actor.name, "class": klass})
     write_obj(actors, os.path.join(folder, "room.obj"))
-    quality = {"frame": {"unit_m": asked.unit_m, "T_map_file": flat_file[:3].tolist()}, "planes": planes, "things": things,
+    quality = {"unit_m": asked.unit_m, "T_map_file": flat_file[:3].tolist(), "planes": planes, "things": things,
                "areas": {"wall_m2": 50.0, "wall_on_planes_m2": 48.0}}
-    with open(os.path.join(folder, "quality.yaml"), "w", encoding="utf-8") as out:
-        yaml.safe_dump(quality, out)
+    for name, said in (("scan.yaml", quality), ("quality.yaml", {"checks": {}})):
+        with open(os.path.join(folder, name), "w", encoding="utf-8") as out:
+            yaml.safe_dump(said, out)
     return scan
 
 

@@ -202,41 +202,6 @@ void writeCounts(std::ostream& out, const std::string& key, const List& list) {
   out << "}\n";
 }
 
-void writeFrame(std::ostream& out, const ScanFrame& frame) {
-  out << "frame:  # p_map = T_map_file * (unit_m * p_file)\n  unit_m: " << frame.unit_m << "\n  up: [" << frame.up.x()
-      << ", " << frame.up.y() << ", " << frame.up.z() << "]\n  T_map_file:" << std::setprecision(12) << "\n";
-  for (int r = 0; r < 3; ++r) {
-    out << "    - [";
-    for (int c = 0; c < 4; ++c) out << (c ? ", " : "") << frame.T_map_file.matrix()(r, c);
-    out << "]\n";
-  }
-  out << std::setprecision(4) << "  tilt_deg: " << frame.tilt_deg << "\n  tilt_std_deg: " << frame.tilt_std_deg
-      << "\n  has_ceiling: " << (frame.has_ceiling ? "true" : "false") << "\n  ceiling_m: " << frame.ceiling_m
-      << "\n  noise_m: " << frame.noise_m << "\n  spacing_m: " << frame.spacing_m << "\n";
-}
-
-void writePlanes(std::ostream& out, const ScanScene& scene, const ScanQuality& quality) {
-  out << "# rms and largest: of the scan's points, of which 1 in 100 lies farther off. bow: rms of the mean over "
-         "patches "
-         "of 0.5 m.\n# Expected errors of the specular path, 1 sigma; that of the level at "
-      << kExpectedRange_m << " m, in proportion to the distance.\nplanes:\n";
-  for (const ScanPlane& p : scene.planes) {
-    out << "  - {name: \"" << p.name << "\", area_m2: " << p.area_m2 << ", covered_m2: " << p.covered_m2
-        << ", rms_m: " << p.rms_m << ", largest_m: " << p.largest_m << ", bow_m: " << p.bow_m
-        << ", turned_deg: " << p.turned_deg;
-    for (const PathExpectation& e : quality.expected) {
-      if (e.plane == p.name) out << ", expected_range_m: " << e.range_m << ", expected_level_db: " << e.level_db;
-    }
-    out << "}\n";
-  }
-  out << "things:\n";
-  for (const ScanThing& t : scene.things) {
-    out << "  - {name: \"" << t.name << "\", class: " << t.klass << ", confidence: " << t.class_confidence
-        << ", watertight: " << (t.watertight ? "true" : "false") << ", rms_m: " << t.rms_m
-        << ", largest_m: " << t.largest_m << ", triangles: " << t.triangles.size() << "}\n";
-  }
-}
-
 std::string counted(const std::vector<std::pair<std::string, int>>& list) {
   std::ostringstream text;
   for (std::size_t i = 0; i < list.size(); ++i)
@@ -297,9 +262,8 @@ std::vector<std::string> qualityNotes(const ScanQuality& quality) {
 
 void writeScanQuality(const ScanScene& scene, const ScanQuality& quality, const std::string& folder) {
   std::ofstream out(folder + "/quality.yaml");
-  out << std::setprecision(4) << "format: mmradartwin_scan_quality/1\n";
-  writeFrame(out, scene.frame);
-  out << "# Rays from free places inside the room: none should leave through a gap.\nchecks:\n"
+  out << std::setprecision(4) << "format: mmradartwin_scan_quality/1\n"
+      << "# Rays from free places inside the room: none should leave through a gap.\nchecks:\n"
       << "  places: " << quality.places << "\n  rays: " << quality.rays << "\n  through_gaps: " << quality.through_gaps
       << "\n  through_openings: " << quality.through_openings << "\n";
   writeCounts(out, "places_in_bodies", quality.bodies);
@@ -308,11 +272,11 @@ void writeScanQuality(const ScanScene& scene, const ScanQuality& quality, const 
   out << "  open_things: [";
   for (std::size_t i = 0; i < quality.open.size(); ++i) out << (i ? ", " : "") << '"' << quality.open[i] << '"';
   out << "]\n"
-      << "areas: {scanned_m2: " << scene.scanned_m2 << ", on_planes_m2: " << scene.on_planes_m2
-      << ", on_things_m2: " << scene.on_things_m2 << ", left_out_m2: " << scene.left_out_m2
-      << ", wall_m2: " << scene.wall_m2 << ", wall_on_planes_m2: " << scene.wall_on_planes_m2 << "}\n"
-      << "accuracy: {scene_m: " << scene.accuracy_m << "}\n";
-  writePlanes(out, scene, quality);
+      << "# Of the planes' specular paths, 1 sigma, as far as the scan's residuals tell; the level at "
+      << kExpectedRange_m << " m, in\n# proportion to the distance.\nexpected:\n";
+  for (const PathExpectation& e : quality.expected) {
+    out << "  - {plane: \"" << e.plane << "\", range_m: " << e.range_m << ", level_db: " << e.level_db << "}\n";
+  }
   out.close();
   if (!out) throw std::runtime_error(folder + "/quality.yaml cannot be written; check the free space");
   drawTopView(scene, folder + "/top_view.png");

@@ -54,6 +54,15 @@ def read_obj(path):
     return {n: vertices[np.array(t)] for n, t in objects.items()}
 
 
+def read_summary(folder):
+    """What make_scene says of its scene: the keys of scan.yaml and of quality.yaml."""
+    said = {}
+    for name in ("scan.yaml", "quality.yaml"):
+        with open(os.path.join(folder, name), encoding="utf-8") as text:
+            said.update(yaml.safe_load(text))
+    return said
+
+
 def fitted_plane(triangles):
     """(unit normal, centre, area m2, spread m) of a flat set of triangles [T, 3, 3]."""
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -68,8 +77,8 @@ def fitted_plane(triangles):
 def map_from_truth(quality, scan):
     """[4, 4] p_map = T p_room, by the frame that make_scene says it found."""
     T = np.eye(4)
-    T[:3] = quality["frame"]["T_map_file"]
-    T[:3, :3] = T[:3, :3] * quality["frame"]["unit_m"]
+    T[:3] = quality["T_map_file"]
+    T[:3, :3] = T[:3, :3] * quality["unit_m"]
     return T @ scan.T_scan_map
 
 
@@ -148,8 +157,7 @@ def furniture_found(groups, things):
 
 def compare(folder, room, scan):
     """Measured, of a folder that make_scene wrote of a Scan of a KnownRoom."""
-    with open(os.path.join(folder, "quality.yaml"), encoding="utf-8") as text:
-        quality = yaml.safe_load(text)
+    quality = read_summary(folder)
     objects = read_obj(os.path.join(folder, "room.obj"))
     T = map_from_truth(quality, scan)
     flat = {p["name"]: fitted_plane(objects[p["name"]]) for p in quality["planes"] if p["name"] in objects}
