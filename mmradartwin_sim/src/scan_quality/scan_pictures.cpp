@@ -136,7 +136,13 @@ class Plan {
       for (const auto& p : plane.outline) box.extend(plane.at(p));
       name(plane.name, box.center() + 0.12 * plane.normal);
     }
-    for (const ScanThing& thing : scene_.things) name(thing.name, thing.bounds.center());
+    // Of very many things the small ones would hide each other's names.
+    constexpr std::size_t kMany = 40;
+    constexpr double kSmall_m = 0.5;
+    for (const ScanThing& thing : scene_.things) {
+      const bool small = thing.bounds.sizes().head<2>().maxCoeff() < kSmall_m;
+      if (scene_.things.size() < kMany || !small) name(thing.name, thing.bounds.center());
+    }
   }
 
   cv::Mat picture;
@@ -299,10 +305,21 @@ class Camera {
 };
 
 /// Seen from behind, or the ceiling: left out so that one looks into the room.
-bool inTheWay(const ScanScene& scene, int actor, const Eigen::Vector3d& direction) {
-  if (actor < 0 || static_cast<std::size_t>(actor) >= scene.planes.size()) return false;
-  const ScanPlane& plane = scene.planes[static_cast<std::size_t>(actor)];
+bool isInTheWay(const ScanPlane& plane, const Eigen::Vector3d& direction) {
   return plane.kind == PlaneKind::kCeiling || plane.normal.dot(direction) > 0;
+}
+
+bool isInTheWay(const ScanScene& scene, int actor, const Eigen::Vector3d& direction) {
+  return actor >= 0 && static_cast<std::size_t>(actor) < scene.planes.size() &&
+         isInTheWay(scene.planes[static_cast<std::size_t>(actor)], direction);
+}
+
+/// Likewise of a sample that belongs to nothing: beside such a plane, or behind it.
+bool isBesideOneInTheWay(const ScanScene& scene, const Eigen::Vector3d& p, const Eigen::Vector3d& direction) {
+  constexpr double kBeside_m = 0.15;
+  return std::any_of(scene.planes.begin(), scene.planes.end(), [&](const ScanPlane& plane) {
+    return isInTheWay(plane, direction) && plane.area_m2 > 1 && plane.normal.dot(p) - plane.offset_m < kBeside_m;
+  });
 }
 
 cv::Vec3b shaded(const cv::Scalar& color, const Eigen::Vector3d& normal) {
@@ -317,9 +334,8 @@ cv::Mat drawScan(const ScanScene& scene, const Camera& camera, const Eigen::Alig
   for (std::size_t i = 0; i < scene.samples.size(); ++i) {
     const Eigen::Vector3d p = scene.samples[i].cast<double>();
     const int owner = scene.sample_owner[i];
-    if (inTheWay(scene, owner, p - camera.place)) continue;
-    // What is left out above the walls' middle would hide the room.
-    if (owner < 0 && scene.frame.has_ceiling && p.z() > scene.frame.ceiling_m - 0.15) continue;
+    if (isInTheWay(scene, owner, p - camera.place)) continue;
+    if (owner < 0 && isBesideOneInTheWay(scene, p, p - camera.place)) continue;
     if (bounds.exteriorDistance(p) > 1.0) continue;
     const Eigen::Vector3d q = camera.project(p);
     if (q.z() <= 0) continue;
@@ -349,7 +365,7 @@ cv::Mat drawScene(const ScanScene& scan, const Camera& camera, cv::Size size) {
       for (int layer = 0; layer < kMostLayers; ++layer) {
         const auto hit = rays.firstHit(from, direction, 1000);
         if (!hit || hit->facet < 0) break;
-        if (inTheWay(scan, hit->actor, direction)) {
+        if (isInTheWay(scan, hit->actor, direction)) {
           from = hit->point + 1e-3 * direction;
           continue;
         }

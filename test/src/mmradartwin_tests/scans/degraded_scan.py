@@ -251,11 +251,11 @@ def make_scan(room, degradation, seed):
 
 # What stands in docs/verification/scans.md: each fault at least once, each kind of scan at least twice.
 DEGRADATIONS = {d.name: d for d in (
-    Degradation("phone", size=300000, noise_m=0.005, smooth_steps=0.8, holes=4, y_up=True, unit_m=1e-3, colors=True),
+    Degradation("phone", size=500000, noise_m=0.005, smooth_steps=0.5, holes=4, y_up=True, unit_m=1e-3, colors=True),
     Degradation("fused_fine", noise_m=0.003, colors=True),
-    Degradation("fused_mm_y_up", noise_m=0.005, size=500000, smooth_steps=1.0, holes=6, y_up=True, unit_m=1e-3,
+    Degradation("fused_mm_y_up", noise_m=0.005, size=700000, smooth_steps=0.6, holes=6, y_up=True, unit_m=1e-3,
                 yaw_deg=23.0, offset_m=(1.2, -3.1, 1.03)),
-    Degradation("poisson", noise_m=0.006, size=700000, smooth_steps=1.6, unseen=True, tilt_deg=5.0, yaw_deg=-31.0,
+    Degradation("poisson", noise_m=0.006, size=1000000, smooth_steps=1.0, unseen=True, tilt_deg=5.0, yaw_deg=-31.0,
                 offset_m=(-2.0, 0.7, -0.4)),
     Degradation("lidar_cloud", kind="cloud", noise_m=0.003, places=6, holes=4, ghosts=0.3, blind_glass=True,
                 yaw_deg=11.0, offset_m=(0.0, 0.0, -1.5)),

@@ -5,6 +5,7 @@ import os
 
 import numpy as np
 import yaml
+from scipy.spatial import cKDTree
 
 from mmradartwin_tests.scans.known_room import rectangles_of
 
@@ -17,6 +18,7 @@ ANSWERS = {"cabinet": CUPBOARD, "locker": CUPBOARD, "wardrobe": CUPBOARD, "books
            "monitor": ("screen",), "shelf": ("shelf",), "radiator": ("radiator",),
            "door": ("door",), "window": ("window",), "whiteboard": ("board", "panel"), "screen": ("screen", "board"),
            "tv": ("screen", "board"), "carpet": ("carpet",)}
+SCANNED_M, SCANNED_SHARE = 0.03, 0.3     # a piece is in the scan where so much of its surface has a point as near as that
 FLAT_M = 0.07        # thinner things on walls or floor are surface, no furniture
 LEAST_WALL_M = 0.5
 
@@ -31,6 +33,7 @@ class Measured:
     furniture: list           # (name, what it was said to be or "", right)
     flat: list                # likewise, for what is thinner than FLAT_M
     extra: list               # things that stand for nothing
+    unscanned: list           # pieces of which the scan has too little
     quality: dict
 
 
@@ -111,6 +114,26 @@ def grouped(room, T):
     return groups
 
 
+def scanned_share(actors, scan):
+    """Share of the surfaces of known actors that the scan has: their sides that can be seen, by points 5 cm apart, near
+    which the scan has a point."""
+    T = scan.T_scan_map
+    places = []
+    for r in (r for actor in actors for part in actor.parts for r in rectangles_of(part)):
+        if np.cross(r.e1, r.e2)[2] < -0.5:
+            continue       # undersides
+        u, v = (np.arange(0.02, s, 0.05) if s > 0.05 else np.array([s / 2]) for s in (r.s1, r.s2))
+        places.append((r.origin + u[:, None, None] * r.e1 + v[None, :, None] * r.e2).reshape(-1, 3))
+    places = np.concatenate(places) @ T[:3, :3].T + T[:3, 3]
+    unit = np.linalg.norm(T[:3, 0])
+    near = np.concatenate([places.min(axis=0), places.max(axis=0)]).reshape(2, 3) + [[-0.1 * unit] * 3, [0.1 * unit] * 3]
+    points = scan.points[((scan.points > near[0]) & (scan.points < near[1])).all(axis=1)]
+    if not len(points):
+        return 0.0
+    distance, _ = cKDTree(points).query(places)
+    return float(np.mean(distance < SCANNED_M * unit))
+
+
 def overlap(a, b):
     """Share of their union that two boxes (low, high) have in common; each is at least 10 cm thick."""
     def thick(box):
@@ -167,11 +190,16 @@ def compare(folder, room, scan):
     for name in flat:
         if kind_of(name) in ("door", "window", "panel"):
             things[name] = (kind_of(name), objects[name].min(axis=(0, 1)), objects[name].max(axis=(0, 1)))
-    rows, extra = furniture_found(grouped(room, T), things)
+    groups = grouped(room, T)
+    pieces = {name: [a for a in room.furniture if a.name == name or a.name.rsplit("_", 1)[0] == name] for name in groups}
+    unscanned = [name for name in groups if len(scan.points) and scanned_share(pieces[name], scan) < SCANNED_SHARE]
+    rows, extra = furniture_found(groups, things)
+    rows = [r for r in rows if r[0] not in unscanned]
     up = T[:3, 2] / np.linalg.norm(T[:3, 2])
     areas = quality["areas"]
     return Measured(floor_m=float(T[2, 3] + T[2, :2] @ room.outline.mean(axis=0)),
                     tilt_deg=math.degrees(math.acos(min(1.0, abs(up[2])))), walls=walls,
                     wall_share=areas["wall_on_planes_m2"] / max(areas["wall_m2"], 1e-9),
                     furniture=[r[:3] for r in rows if not r[3]], flat=[r[:3] for r in rows if r[3]], extra=extra,
+                    unscanned=unscanned,
                     quality=quality)
