@@ -160,8 +160,7 @@ TEST(ScanQuality, ARoomWithoutCeilingIsOpenAndHasNoGap) {
   scene.frame.has_ceiling = false;
   const ScanQuality quality = checkScanScene(scene);
   EXPECT_GT(quality.through_openings, 1000u);
-  // A ray beside the upper edge of a wall has neighbours that meet the wall: some of each thousand.
-  EXPECT_LT(quality.through_gaps, quality.through_openings / 20);
+  EXPECT_EQ(quality.through_gaps, 0u);
   ASSERT_EQ(quality.coincide.size(), 1u);
   EXPECT_NEAR(quality.coincide[0].second, 0.09, 1e-3);
 }

@@ -34,7 +34,7 @@ class DegradedScansBecomeScenes(InFolder):
         """(Measured, standard error) of a scan of a room."""
         scan = make_scan(room, asked, 11)
         scan_files.write_ply(self.at("scan.ply"), scan)
-        status, _, said = make_scene(self.at("scan.ply"), "--output", self.at("scene"), *more)
+        status, self.told, said = make_scene(self.at("scan.ply"), "--output", self.at("scene"), *more)
         self.assertEqual(status, 0, msg=said)
         return scene_comparison.compare(self.at("scene"), room, scan), said
 
@@ -62,7 +62,7 @@ class DegradedScansBecomeScenes(InFolder):
         self.assert_close(found)
         self.assert_sound(found)
         self.assertEqual(found.quality["unit_m"], 1e-3)
-        self.assertRegex(said, "mm|millimet")
+        self.assertRegex(self.told, "millimetres, y up, floor 1.00 m below")
         right = [r for _, _, r in found.furniture]
         self.assertGreaterEqual(np.mean(right), 0.8, msg=f"{found.furniture}")
 
@@ -153,9 +153,9 @@ class BadInput(InFolder):
 
     def test_two_points(self):
         scan_files.write_ply(self.at("two.ply"), as_scan([[0, 0, 0], [1, 1, 1]]))
-        self.assert_refused(self.at("two.ply"), "points")
+        self.assert_refused(self.at("two.ply"), "point")
         scan_files.write_xyz(self.at("two.xyz"), as_scan([[0, 0, 0], [1, 1, 1]]))
-        self.assert_refused(self.at("two.xyz"), "points")
+        self.assert_refused(self.at("two.xyz"), "point")
 
     def test_a_plane_alone(self):
         rng = np.random.default_rng(1)
@@ -174,7 +174,7 @@ class BadInput(InFolder):
 
     def test_all_vertices_nan(self):
         scan_files.write_ply(self.at("nan.ply"), as_scan(np.full((5000, 3), math.nan)))
-        self.assert_refused(self.at("nan.ply"), "number|points")
+        self.assert_refused(self.at("nan.ply"), "number")
 
     def test_twenty_million_triangles_are_refused_within_memory(self):
         """The file is sparse: what it says of itself is enough."""

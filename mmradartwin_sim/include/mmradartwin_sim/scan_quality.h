@@ -9,7 +9,7 @@
 
 namespace mmradartwin {
 
-/// A gap narrower than 10 cm that rays leave the scene through.
+/// A gap narrower than some 5 cm that rays leave the scene through.
 struct SceneGap {
   Eigen::Vector3d place, direction;  ///< of the ray
   Eigen::Vector3d at;                ///< where it passes the surfaces beside it
@@ -30,7 +30,7 @@ constexpr double kExpectedRange_m = 3;
 struct ScanQuality {
   std::size_t places = 0;                                ///< free places inside the room that rays left from
   std::size_t rays = 0;                                  ///< in all
-  std::size_t through_gaps = 0;                          ///< rays that left through a gap narrower than 10 cm
+  std::size_t through_gaps = 0;                          ///< rays that left through such a gap
   std::size_t through_openings = 0;                      ///< rays that left where the scan is open
   std::vector<SceneGap> gaps;                            ///< the first of each actor beside one
   std::vector<std::pair<std::string, int>> bodies;       ///< actors that hold free places, and how many
