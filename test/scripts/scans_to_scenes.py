@@ -175,7 +175,7 @@ def row(record):
                  f"{sum(checks['coincident_m2'].values()):.2f} m² / {sum(checks['slivers'].values())}")
     for key in ("steady", "steady_raw", "steady_true"):
         s = record.get(key)
-        cells.append("" if not s else "none" if "failed" in s or not s["paths"] else
+        cells.append("" if not s else s["failed"] if "failed" in s else "no path" if not s["paths"] else
                      f"{100 * s['persist']:.0f} % of {s['paths']}, {100 * s['within_1_db']:.0f} % within 1 dB")
     return cells
 

@@ -251,7 +251,7 @@ def make_scan(room, degradation, seed):
 
 # What stands in docs/verification/scans.md: each fault at least once, each kind of scan at least twice.
 DEGRADATIONS = {d.name: d for d in (
-    Degradation("phone", size=500000, noise_m=0.005, smooth_steps=0.5, holes=4, y_up=True, unit_m=1e-3, colors=True),
+    Degradation("phone", size=800000, noise_m=0.005, smooth_steps=0.5, holes=4, y_up=True, unit_m=1e-3, colors=True),
     Degradation("fused_fine", noise_m=0.003, colors=True),
     Degradation("fused_mm_y_up", noise_m=0.005, size=700000, smooth_steps=0.6, holes=6, y_up=True, unit_m=1e-3,
                 yaw_deg=23.0, offset_m=(1.2, -3.1, 1.03)),

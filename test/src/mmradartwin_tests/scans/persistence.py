@@ -33,7 +33,9 @@ def write_session(folder, scene_yaml, pairs, radar="package://mmradartwin_config
     os.makedirs(folder, exist_ok=True)
     with open(os.path.join(folder, "session.yaml"), "w", encoding="utf-8") as out:
         out.write(f"format: mmradartwin_session/1\nradar: {radar}\nscene: {os.path.abspath(scene_yaml)}\n"
-                  "poses: poses.csv\ncaptures: captures/{pose}.bin\n")
+                  "poses: poses.csv\ncaptures: captures/{pose}.bin\ntwin: twin.yaml\n")
+    with open(os.path.join(folder, "twin.yaml"), "w", encoding="ascii") as out:
+        out.write("mechanisms: {specular: {max_bounces: 3}, corner: {}}\n")
     with open(os.path.join(folder, "poses.csv"), "w", encoding="ascii") as out:
         out.write("pose,location,stamp,x,y,z,qx,qy,qz,qw\n")
         for i, pair in enumerate(pairs):
@@ -74,9 +76,12 @@ def measure(folder, pairs):
             "within_1_db": float(np.mean(changes < 1)) if len(changes) else math.nan}
 
 
-def simulate(program, session, output, limit_s=1200):
+def simulate(program, session, output, limit_s=300):
     """Runs simulate of a session; ValueError with its last line where it fails."""
-    done = subprocess.run([program, session, "--output", output, "--force"], capture_output=True, text=True, check=False,
-                          timeout=limit_s)
+    try:
+        done = subprocess.run([program, session, "--output", output, "--force"], capture_output=True, text=True, check=False,
+                              timeout=limit_s)
+    except subprocess.TimeoutExpired:
+        raise ValueError(f"simulate took more than {limit_s} s") from None
     if done.returncode not in (0, 2) or not os.path.isdir(os.path.join(output, "paths")):
         raise ValueError((done.stderr.strip().splitlines() or ["simulate failed"])[-1])
