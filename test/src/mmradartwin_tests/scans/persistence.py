@@ -76,7 +76,7 @@ def measure(folder, pairs):
             "within_1_db": float(np.mean(changes < 1)) if len(changes) else math.nan}
 
 
-def simulate(program, session, output, limit_s=300):
+def simulate(program, session, output, limit_s=120):
     """Runs simulate of a session; ValueError with its last line where it fails."""
     try:
         done = subprocess.run([program, session, "--output", output, "--force"], capture_output=True, text=True, check=False,
