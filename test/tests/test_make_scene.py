@@ -62,7 +62,7 @@ class DegradedScansBecomeScenes(InFolder):
         self.assert_close(found)
         self.assert_sound(found)
         self.assertEqual(found.quality["unit_m"], 1e-3)
-        self.assertRegex(self.told, "millimetres, y up, floor 1.00 m below")
+        self.assertRegex(self.told, "millimetres, y up.* floor 1.00 m below")
         right = [r for _, _, r in found.furniture]
         self.assertGreaterEqual(np.mean(right), 0.8, msg=f"{found.furniture}")
 

@@ -55,14 +55,18 @@ def strong_paths(file):
 
 
 def measure(folder, pairs):
-    """{paths, persist, level_db: 90 % of the changes are smaller, within_1_db: share of those that persist}.
+    """{paths, persist, level_db: 90 % of the changes are smaller, within_1_db: share of those that persist, refused: pairs
+    that the simulator did not take}.
 
     A path persists where the other pose has one of the same event and actors that is at most 2 cm longer or shorter and
     looks the same way within 3 degrees, however weak it is there.
     """
-    paths = persist = 0
+    paths = persist = refused = 0
     changes = []
     for i in range(len(pairs)):
+        if not all(os.path.exists(os.path.join(folder, "paths", f"{k}{i:03d}.csv")) for k in "ab"):
+            refused += 1      # a radar inside a body
+            continue
         rows = strong_paths(os.path.join(folder, "paths", f"a{i:03d}.csv"))
         others = [r for r in read_paths(os.path.join(folder, "paths", f"b{i:03d}.csv"))
                   if r["event"].split(";")[0] in EVENTS]
@@ -71,7 +75,7 @@ def measure(folder, pairs):
         persist += len(found)
         changes += [abs(a["amplitude_db"] - b["amplitude_db"]) for a, b in found]
     changes = np.array(changes)
-    return {"paths": paths, "persist": persist / max(paths, 1),
+    return {"refused": refused, "paths": paths, "persist": persist / max(paths, 1),
             "level_db": float(np.quantile(changes, 0.9)) if len(changes) else math.nan,
             "within_1_db": float(np.mean(changes < 1)) if len(changes) else math.nan}
 
