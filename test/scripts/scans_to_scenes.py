@@ -179,7 +179,8 @@ def row(record):
     for key in ("steady", "steady_raw", "steady_true"):
         s = record.get(key)
         cells.append("" if not s else s["failed"] if "failed" in s else "no path" if not s["paths"] else
-                     f"{100 * s['persist']:.0f} % of {s['paths']}, {100 * s['within_1_db']:.0f} % within 1 dB" + (f", {s['refused']} pairs refused" if s.get("refused") else ""))
+                     f"{100 * s['persist']:.0f} % of {s['paths']}, {100 * s['within_1_db']:.0f} % within 1 dB" +
+                     (f", {s['refused']} pairs refused" if s.get("refused") else ""))
     return cells
 
 
