@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/gain/held_out_gain.h"
@@ -32,6 +34,20 @@ std::vector<double> natsAt(DiagnosisContext& context, const ModelState& state, s
   return by_pose;
 }
 
+/// Range that all actors have in a state beyond these: what they share is left out of a refinement, and stays in the
+/// likelihood.
+double sharedRange_m(const ModelState& state, const PosteriorErrors& ranges) {
+  double sum = 0, weights = 0;
+  for (std::size_t i = 0; i < ranges.mean.size(); ++i) {
+    const double weight = 1 / (ranges.standard_deviation[i] * ranges.standard_deviation[i]);
+    sum += weight * (state.latents.actor_range_m[i] - ranges.mean[i]);
+    weights += weight;
+  }
+  return sum / weights;
+}
+
+double total(const std::vector<double>& nats) { return std::accumulate(nats.begin(), nats.end(), 0.0); }
+
 /// The state with every actor where the scene has it, all else fitted.
 ModelState inPlace(DiagnosisContext& context, const ModelState& state) {
   SessionLatents start = state.latents;
@@ -60,7 +76,15 @@ SceneRefinement refinedRanges(DiagnosisContext& context, const ModelState& state
     if (ranges.standard_deviation[error] > kSaysSomething * refinement.scene_m) continue;
     refinement.actors.push_back({actors[i].name, ranges.mean[error], ranges.standard_deviation[error]});
   }
-  const std::vector<double> before = inPlace(context, state).by_pose;
+  const double shared_m = sharedRange_m(state, ranges);
+  const auto beyond = [shared_m](std::vector<double> range_m) {
+    for (double& r : range_m) r += shared_m;
+    return range_m;
+  };
+  // All else fitted to actors in their places, or fitted beside their ranges: what is likelier is to be surpassed.
+  std::vector<double> before = natsAt(context, state, beyond(std::vector<double>(ranges.mean.size(), 0.0)));
+  const ModelState in_place = inPlace(context, state);
+  if (total(in_place.by_pose) > total(before)) before = in_place.by_pose;
   std::vector<double> after = before;
   const int folds = std::min(context.fitter.folds(), refinement.locations);
   for (int fold = 0; folds > 1 && fold < folds; ++fold) {
@@ -69,7 +93,7 @@ SceneRefinement refinedRanges(DiagnosisContext& context, const ModelState& state
     for (std::size_t i = 0; i < context.data.poses.size(); ++i) {
       if (context.fitter.fold(context.data.poses[i].location) != fold) others.push_back(static_cast<int>(i));
     }
-    const std::vector<double> nats = natsAt(context, state, rangesBy(context, state, others).mean);
+    const std::vector<double> nats = natsAt(context, state, beyond(rangesBy(context, state, others).mean));
     for (std::size_t i = 0; i < context.data.poses.size(); ++i) {
       if (context.fitter.fold(context.data.poses[i].location) == fold) after[i] = nats[i];
     }
