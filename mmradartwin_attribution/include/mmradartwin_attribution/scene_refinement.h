@@ -26,7 +26,7 @@ struct SceneRefinement {
   /// of the locations is judged by ranges that it has no part in. Without an interval where there is one location.
   GainMetric held_out_nats_per_pose;
 
-  /// YAML as refine_scene writes it (docs/reference/formats.md).
+  /// YAML as refine_scene writes it (docs/room/scan_to_scene.md).
   std::string toYaml(const std::string& recording) const;
 };
 
