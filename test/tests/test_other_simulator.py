@@ -66,11 +66,14 @@ class OtherSimulator(InFolder):
         curve = found["mechanism"]["element_pattern"]
         told = found["parameters"]["gain_db"]["ci95"]
         for angle_deg, gain_db, (low, high) in zip(curve["angles_deg"], curve["gain_db"], told):
-            # Two ways lose 40 dB at 52 degrees: hardly an echo of this room tells of more.
-            if abs(angle_deg) <= 60:
-                truth_db = 120 * math.log10(0.8 / (1.8 - math.cos(math.radians(angle_deg))))
-                with self.subTest(angle_deg=angle_deg):
-                    self.assertAlmostEqual(gain_db, truth_db, delta=1.0 if abs(angle_deg) <= 45 else 2.5)
+            # Two ways lose 40 dB at 52 degrees: hardly an echo of this room tells of more. Near its outer nodes, at 67.5
+            # degrees, a spline of seven nodes is off by some tenths of a dB by itself, which no interval knows.
+            truth_db = 120 * math.log10(0.8 / (1.8 - math.cos(math.radians(angle_deg))))
+            if abs(angle_deg) > 60:
+                continue
+            with self.subTest(angle_deg=angle_deg):
+                self.assertAlmostEqual(gain_db, truth_db, delta=1.0 if abs(angle_deg) < 55 else 1.5)
+                if abs(angle_deg) < 55:
                     self.assertTrue(low - 0.5 <= truth_db <= high + 0.5, msg=f"{truth_db} in {low} to {high}")
 
     def test_edges_hide_as_fields_do(self):
