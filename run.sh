@@ -134,11 +134,11 @@ run_tests() {
   # Counted among the tests.
   python3 "$root/test/scripts/lint.py" format includes python shell packages --xml "$ws/build/test_results/lint/lint.xml" >&2 || true
   (cd "$ws/build" && ctest --show-only=json-v1) >"$ws/build/ctest_list.json"
-  # Side by side but for those that keep time; seeds and the day are shown. Cases are read from the XML files, and ctest
-  # says which modules ended badly or left none.
+  # Side by side but for those that keep time, one more than there are cores: launches and bags mostly wait. Seeds and the
+  # day are shown. Cases are read from the XML files, and ctest says which modules ended badly or left none.
   say "running the tests (log: $ws/build/Testing/Temporary/LastTest.log)"
   local status=0
-  (cd "$ws/build" && ctest -V -j"$(jobs)" --timeout "$limit_s" --output-junit ctest.xml) |
+  (cd "$ws/build" && ctest -V -j"$(($(jobs) + 1))" --timeout "$limit_s" --output-junit ctest.xml) |
     awk '/^ *[0-9]+\/[0-9]+ Test|^ +Start|^[0-9]+: MMRADARTWIN_[A-Z_]*(SEED|DAY)=/ {print; fflush()}' >&2 || status=$?
   python3 "$root/test/summarise_results.py" "$ws/build/test_results" --list "$ws/build/ctest_list.json" \
     --ran "$ws/build/ctest.xml" --status "$status" --step "core=$core_status"
