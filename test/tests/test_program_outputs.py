@@ -21,6 +21,7 @@ PACKAGES = {"process": "mmradartwin_dsp", "validate": "mmradartwin_dsp", "sessio
             "bag_to_session": "mmradartwin_dsp", "import_settings": "mmradartwin_dsp", "simulate": "mmradartwin_sim",
             "make_scene": "mmradartwin_sim", "evaluate": "mmradartwin_attribution",
             "diagnose": "mmradartwin_attribution", "calibrate": "mmradartwin_attribution",
+            "refine_scene": "mmradartwin_attribution",
             "pcap_to_capture": "mmradartwin_driver", "replay_packets": "mmradartwin_driver", "doctor": "mmradartwin_driver",
             "configure_radar": "mmradartwin_driver", "dca1000_emulator": "mmradartwin_driver",
             "emulated_rig": "mmradartwin_driver", "awr2243_emulator": "mmradartwin_driver"}
@@ -76,6 +77,7 @@ class Programs(InFolder):
             "simulate": (["session", "--output"], [], "session.yaml"),
             "evaluate": (["session", "--no-pictures", "--output"], [], "report.html"),
             "diagnose": (["session", "--findings", "0", "--output"], [], "findings.json"),
+            "refine_scene": (["session", "--output"], [], "refinement.yaml"),
             "bag_to_session": (["session.bag"], [], "session.yaml"),
             "make_scene": ([mesh, "--output"], [], "scene.yaml"),
             "session_to_bag": (["session"], [], None),
@@ -332,7 +334,7 @@ class Manner(Programs):
         os.mkdir(self.at("piped"))
         out = ["--output", "out"]
         calls = {"process": ["{}", *out], "evaluate": ["{}", *out], "diagnose": ["{}", *out], "simulate": ["{}", *out],
-                 "calibrate": ["{}", "--wall", "w", *out], "validate": ["{}"], "bag_to_session": ["{}", "out"],
+                 "refine_scene": ["{}", *out], "calibrate": ["{}", "--wall", "w", *out], "validate": ["{}"], "bag_to_session": ["{}", "out"],
                  "session_to_bag": ["{}", "out"], "import_settings": ["{}", *out], "make_scene": ["{}", *out],
                  "pcap_to_capture": ["{}", "--radar", "session/radar.yaml", *out], "replay_packets": ["{}"],
                  "configure_radar": ["{}", "--check"], "dca1000_emulator": ["{}", "--radar", "session/radar.yaml"],
