@@ -334,7 +334,8 @@ class Manner(Programs):
         os.mkdir(self.at("piped"))
         out = ["--output", "out"]
         calls = {"process": ["{}", *out], "evaluate": ["{}", *out], "diagnose": ["{}", *out], "simulate": ["{}", *out],
-                 "refine_scene": ["{}", *out], "calibrate": ["{}", "--wall", "w", *out], "validate": ["{}"], "bag_to_session": ["{}", "out"],
+                 "refine_scene": ["{}", *out], "calibrate": ["{}", "--wall", "w", *out], "validate": ["{}"],
+                 "bag_to_session": ["{}", "out"],
                  "session_to_bag": ["{}", "out"], "import_settings": ["{}", *out], "make_scene": ["{}", *out],
                  "pcap_to_capture": ["{}", "--radar", "session/radar.yaml", *out], "replay_packets": ["{}"],
                  "configure_radar": ["{}", "--check"], "dca1000_emulator": ["{}", "--radar", "session/radar.yaml"],
