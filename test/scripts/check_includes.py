@@ -54,6 +54,11 @@ ROOMS = {
         "frames": {"base"},
         "empirical": {"base"},
     },
+    "mmradartwin_sim/src/scan": {
+        "samples": set(),
+        "planes": {"samples"},
+        "things": {"planes"},
+    },
     "mmradartwin_attribution/src/diagnosis": {
         "catalogue": set(),
         "numbers": {"catalogue"},
@@ -76,7 +81,7 @@ HEADERS_WITHOUT_SOURCE = {
     "mmradartwin_sim/include/mmradartwin_sim/mechanism.h": "mmradartwin_sim/src/stages",
     "mmradartwin_sim/include/mmradartwin_sim/mechanism_stages.h": "mmradartwin_sim/src/stages",
     "mmradartwin_sim/include/mmradartwin_sim/register_mechanism.h": "mmradartwin_sim/src/stages",
-    "mmradartwin_sim/include/mmradartwin_sim/scan_to_scene.h": "mmradartwin_sim/src/scan",
+    "mmradartwin_sim/include/mmradartwin_sim/scan_to_scene.h": "mmradartwin_sim/src/scan/samples",
     "mmradartwin_sim/include/mmradartwin_sim/what_if_entry.h": "mmradartwin_sim/src/what_if",
 }
 

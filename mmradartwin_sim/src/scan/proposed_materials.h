@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "scan/scan_samples.h"
+#include "scan/samples/scan_samples.h"
 
 namespace mmradartwin {
 

@@ -5,13 +5,14 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/scan_to_scene.h"
-#include "scan/plane_regions.h"
-#include "scan/polygon_triangles.h"
+#include "scan/planes/plane_directions.h"
+#include "scan/planes/plane_regions.h"
+#include "scan/planes/polygon_triangles.h"
+#include "scan/planes/room_planes.h"
+#include "scan/planes/scan_frame.h"
 #include "scan/proposed_materials.h"
-#include "scan/room_planes.h"
-#include "scan/scan_frame.h"
-#include "scan/scan_samples.h"
-#include "scan/things.h"
+#include "scan/samples/scan_samples.h"
+#include "scan/things/things.h"
 
 namespace mmradartwin {
 namespace {

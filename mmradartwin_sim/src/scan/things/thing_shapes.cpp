@@ -1,10 +1,10 @@
-#include "scan/thing_shapes.h"
+#include "scan/things/thing_shapes.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
-#include "scan/cell_raster.h"
+#include "scan/samples/cell_raster.h"
 
 namespace mmradartwin {
 namespace {

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "scan/things.h"
+#include "scan/things/things.h"
 
 namespace mmradartwin {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "scan/room_planes.h"
+#include "scan/planes/room_planes.h"
 
 namespace mmradartwin {
 

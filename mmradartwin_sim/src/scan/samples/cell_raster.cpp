@@ -1,4 +1,4 @@
-#include "scan/cell_raster.h"
+#include "scan/samples/cell_raster.h"
 
 #include <algorithm>
 

@@ -1,13 +1,13 @@
-#include "scan/things.h"
+#include "scan/things/things.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
 
-#include "scan/cell_raster.h"
-#include "scan/thing_mesh.h"
-#include "scan/thing_shapes.h"
+#include "scan/samples/cell_raster.h"
+#include "scan/things/thing_mesh.h"
+#include "scan/things/thing_shapes.h"
 
 namespace mmradartwin {
 namespace {

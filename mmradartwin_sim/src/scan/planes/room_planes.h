@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "scan/plane_regions.h"
+#include "scan/planes/plane_regions.h"
 
 namespace mmradartwin {
 
@@ -17,10 +17,6 @@ struct RoomPlanes {
   double doubled_m2 = 0;   ///< of second copies
   std::vector<std::string> notes;
 };
-
-/// Turns planes of one direction into exact parallels, level ones and upright ones, as far as three of their standard
-/// deviations; their offsets are fitted again. Returns the room's main direction.
-double regularise(const ScanSamples& samples, bool enabled, std::vector<PlaneRegion>& regions);
 
 /// Floor, ceiling and walls with exact bounds. Everything is in map. shifts: of upright planes, before their bounds are
 /// found. Throws InputError where there is no wall.

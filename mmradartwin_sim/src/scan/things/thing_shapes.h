@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "scan/plane_regions.h"
+#include "scan/planes/plane_regions.h"
 
 namespace mmradartwin {
 

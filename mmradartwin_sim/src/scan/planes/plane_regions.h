@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "scan/scan_samples.h"
+#include "scan/samples/scan_samples.h"
 
 namespace mmradartwin {
 
@@ -35,5 +35,9 @@ void measurePlane(const ScanSamples& samples, PlaneRegion& region);
 /// Grows planes from the flattest samples, largest first; parts of one plane that touch are one. Source: region growing
 /// by normals and distance, Rabbani et al. 2006, with the plane instead of the neighbour as what a sample must fit.
 std::vector<PlaneRegion> growPlanes(const ScanSamples& samples, double smallest_m2, const Progress& progress);
+
+/// Offset of a plane of a given normal: from the median of all points of its samples, the mean of what lies within two
+/// of their deviations, so that a door that stands a little before its wall does not draw the wall along.
+void fitOffset(const ScanSamples& samples, PlaneRegion& region);
 
 }  // namespace mmradartwin

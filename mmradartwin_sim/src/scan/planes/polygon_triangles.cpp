@@ -1,4 +1,4 @@
-#include "scan/polygon_triangles.h"
+#include "scan/planes/polygon_triangles.h"
 
 #include <algorithm>
 #include <cmath>

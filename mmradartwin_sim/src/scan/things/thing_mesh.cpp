@@ -1,4 +1,4 @@
-#include "scan/thing_mesh.h"
+#include "scan/things/thing_mesh.h"
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>

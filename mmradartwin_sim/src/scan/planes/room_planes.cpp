@@ -1,4 +1,4 @@
-#include "scan/room_planes.h"
+#include "scan/planes/room_planes.h"
 
 #include <algorithm>
 #include <array>
@@ -10,8 +10,8 @@
 #include <set>
 
 #include "mmradartwin_dsp/input_error.h"
-#include "scan/cell_raster.h"
-#include "scan/polygon_triangles.h"
+#include "scan/planes/polygon_triangles.h"
+#include "scan/samples/cell_raster.h"
 #include "scene/polygon_set.h"
 
 namespace mmradartwin {
@@ -38,71 +38,8 @@ Eigen::Vector3d sampleAt(const ScanSamples& samples, int i) {
   return samples.points[static_cast<std::size_t>(i)].cast<double>();
 }
 
-/// Offset of a plane of a given normal: from the median of all points of its samples, the mean of what lies within two
-/// of their deviations, so that a door that stands a little before its wall does not draw the wall along.
-void fitOffset(const ScanSamples& samples, PlaneRegion& region) {
-  std::vector<double> along;
-  for (int i : region.samples) {
-    const auto s = static_cast<std::size_t>(i);
-    for (std::size_t k = samples.dense_first[s]; k < samples.dense_first[s + 1]; ++k) {
-      along.push_back(region.normal.dot(samples.dense[k].cast<double>()));
-    }
-  }
-  if (along.empty()) return;
-  const auto median = [](std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  };
-  region.offset_m = median(along);
-  std::vector<double> off;
-  for (double a : along) off.push_back(std::abs(a - region.offset_m));
-  const double limit_m = std::max(2 * 1.4826 * median(off), 0.001);  // of a normal distribution: its deviation
-  for (int round = 0; round < 3; ++round) {
-    double sum = 0;
-    std::size_t count = 0;
-    for (double a : along) {
-      if (std::abs(a - region.offset_m) < limit_m) sum += a - region.offset_m, ++count;
-    }
-    if (count) region.offset_m += sum / static_cast<double>(count);
-  }
-}
-
-/// Angle modulo 90 deg, -45 to 45.
-double quarter(double angle_rad) { return angle_rad - M_PI / 2 * std::round(angle_rad / (M_PI / 2)); }
-
-double yawOf(const PlaneRegion& r) { return std::atan2(r.normal.y(), r.normal.x()); }
-
 bool isUpright(const PlaneRegion& r) { return std::abs(r.normal.z()) < 1e-9; }
 bool isLevel(const PlaneRegion& r) { return std::abs(r.normal.z()) > 1 - 1e-12; }
-
-/// The direction modulo 90 deg that most upright area has.
-double mainDirection(const std::vector<PlaneRegion>& regions) {
-  std::array<double, 180> area{};
-  const auto bin = [](double angle) { return static_cast<int>(std::floor(angle / (M_PI / 2) * 180 + 360)) % 180; };
-  for (const PlaneRegion& r : regions) {
-    if (std::abs(r.normal.z()) < std::sin(5 * kDegree))
-      area[static_cast<std::size_t>(bin(quarter(yawOf(r)) + M_PI / 4))] += r.area_m2;
-  }
-  double best = -1, direction = 0;
-  for (int i = 0; i < 180; ++i) {
-    double sum = 0;
-    for (int k = -3; k <= 3; ++k) sum += area[static_cast<std::size_t>((i + k + 180) % 180)];
-    if (sum > best) best = sum, direction = (i + 0.5) * M_PI / 360 - M_PI / 4;
-  }
-  for (double cone : {3.0, 1.0, 1.0}) {
-    double sum = 0, weights = 0;
-    for (const PlaneRegion& r : regions) {
-      if (std::abs(r.normal.z()) > std::sin(5 * kDegree)) continue;
-      const double off = quarter(yawOf(r) - direction);
-      if (std::abs(off) > cone * kDegree) continue;
-      const double weight = r.area_m2 / (std::pow(r.angle_std_rad, 2) + std::pow(0.05 * kDegree, 2));
-      sum += weight * off, weights += weight;
-    }
-    if (weights > 0) direction += sum / weights;
-  }
-  return direction;
-}
 
 /// Upright or level parts of one plane, wherever they are.
 struct PlaneGroup {
@@ -736,48 +673,7 @@ class RoomBuilder {
   int walls_ = 0;
 };
 
-/// A cloud's planes face the side where most of the scan is.
-void turnInwards(const ScanSamples& samples, std::vector<PlaneRegion>& regions) {
-  const std::size_t step = std::max<std::size_t>(1, samples.size() / 20000);
-  for (PlaneRegion& r : regions) {
-    long front = 0;
-    for (std::size_t i = 0; i < samples.size(); i += step) {
-      const Eigen::Vector3d p = samples.points[i].cast<double>();
-      const double d = r.distance(p);
-      if (std::abs(d) > 0.1 && (p - r.middle).squaredNorm() < 9) front += d > 0 ? 1 : -1;
-    }
-    if (front < 0) r.normal *= -1, r.offset_m *= -1;
-  }
-}
-
 }  // namespace
-
-double regularise(const ScanSamples& samples, bool enabled, std::vector<PlaneRegion>& regions) {
-  if (!samples.oriented) turnInwards(samples, regions);
-  const double direction = mainDirection(regions);
-  for (PlaneRegion& r : regions) {
-    const Eigen::Vector3d before = r.normal;
-    const double limit = std::max(3 * r.angle_std_rad, 0.05 * kDegree);
-    const double height = std::asin(std::clamp(r.normal.z(), -1.0, 1.0));  // of the normal above the level
-    // Floors and walls are level and upright to a degree; what leans more does so on purpose.
-    const double lean = std::min(std::max(limit, 1 * kDegree), 4 * kDegree);
-    if (M_PI / 2 - std::abs(height) < lean) {
-      r.normal = Eigen::Vector3d(0, 0, r.normal.z() > 0 ? 1 : -1);
-    } else if (std::abs(height) < lean) {
-      double yaw = yawOf(r);
-      const double off = quarter(yaw - direction);
-      if (enabled && std::abs(off) < std::min(limit, 6 * kDegree)) yaw -= off;
-      r.normal = Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0);
-    } else {
-      continue;
-    }
-    r.turned_rad = std::acos(std::min(1.0, before.dot(r.normal)));
-    r.offset_m = r.normal.dot(r.middle);
-    fitOffset(samples, r);
-    measurePlane(samples, r);
-  }
-  return direction;
-}
 
 RoomPlanes roomPlanes(const std::string& file, const ScanFrame& frame, const ScanSamples& samples,
                       const std::vector<PlaneRegion>& regions, double yaw_rad, const std::vector<PlaneShift>& shifts) {

@@ -1,4 +1,4 @@
-#include "scan/scan_samples.h"
+#include "scan/samples/scan_samples.h"
 
 #include <pcl/kdtree/kdtree_flann.h>
 #include <pcl/point_cloud.h>

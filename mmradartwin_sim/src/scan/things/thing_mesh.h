@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "scan/scan_samples.h"
+#include "scan/samples/scan_samples.h"
 
 namespace mmradartwin {
 

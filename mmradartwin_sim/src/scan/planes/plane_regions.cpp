@@ -1,4 +1,4 @@
-#include "scan/plane_regions.h"
+#include "scan/planes/plane_regions.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -242,6 +242,34 @@ void fitPlane(const ScanSamples& samples, double tolerance_m, PlaneRegion& regio
 
 std::vector<PlaneRegion> growPlanes(const ScanSamples& samples, double smallest_m2, const Progress& progress) {
   return Growth(samples, smallest_m2).run(progress);
+}
+
+void fitOffset(const ScanSamples& samples, PlaneRegion& region) {
+  std::vector<double> along;
+  for (int i : region.samples) {
+    const auto s = static_cast<std::size_t>(i);
+    for (std::size_t k = samples.dense_first[s]; k < samples.dense_first[s + 1]; ++k) {
+      along.push_back(region.normal.dot(samples.dense[k].cast<double>()));
+    }
+  }
+  if (along.empty()) return;
+  const auto median = [](std::vector<double>& values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  region.offset_m = median(along);
+  std::vector<double> off;
+  for (double a : along) off.push_back(std::abs(a - region.offset_m));
+  const double limit_m = std::max(2 * 1.4826 * median(off), 0.001);  // of a normal distribution: its deviation
+  for (int round = 0; round < 3; ++round) {
+    double sum = 0;
+    std::size_t count = 0;
+    for (double a : along) {
+      if (std::abs(a - region.offset_m) < limit_m) sum += a - region.offset_m, ++count;
+    }
+    if (count) region.offset_m += sum / static_cast<double>(count);
+  }
 }
 
 }  // namespace mmradartwin

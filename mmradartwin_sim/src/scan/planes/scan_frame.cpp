@@ -1,4 +1,4 @@
-#include "scan/scan_frame.h"
+#include "scan/planes/scan_frame.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

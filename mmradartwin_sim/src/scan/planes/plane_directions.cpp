@@ -1,0 +1,88 @@
+#include "scan/planes/plane_directions.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace mmradartwin {
+namespace {
+
+constexpr double kRadPerDeg = M_PI / 180;
+
+/// Angle modulo 90 deg, -45 to 45.
+double quarter(double angle_rad) { return angle_rad - M_PI / 2 * std::round(angle_rad / (M_PI / 2)); }
+
+double yawOf(const PlaneRegion& r) { return std::atan2(r.normal.y(), r.normal.x()); }
+
+/// The direction modulo 90 deg that most upright area has.
+double mainDirection(const std::vector<PlaneRegion>& regions) {
+  std::array<double, 180> area{};
+  const auto bin = [](double angle) { return static_cast<int>(std::floor(angle / (M_PI / 2) * 180 + 360)) % 180; };
+  for (const PlaneRegion& r : regions) {
+    if (std::abs(r.normal.z()) < std::sin(5 * kRadPerDeg))
+      area[static_cast<std::size_t>(bin(quarter(yawOf(r)) + M_PI / 4))] += r.area_m2;
+  }
+  double best = -1, direction = 0;
+  for (int i = 0; i < 180; ++i) {
+    double sum = 0;
+    for (int k = -3; k <= 3; ++k) sum += area[static_cast<std::size_t>((i + k + 180) % 180)];
+    if (sum > best) best = sum, direction = (i + 0.5) * M_PI / 360 - M_PI / 4;
+  }
+  for (double cone : {3.0, 1.0, 1.0}) {
+    double sum = 0, weights = 0;
+    for (const PlaneRegion& r : regions) {
+      if (std::abs(r.normal.z()) > std::sin(5 * kRadPerDeg)) continue;
+      const double off = quarter(yawOf(r) - direction);
+      if (std::abs(off) > cone * kRadPerDeg) continue;
+      const double weight = r.area_m2 / (std::pow(r.angle_std_rad, 2) + std::pow(0.05 * kRadPerDeg, 2));
+      sum += weight * off, weights += weight;
+    }
+    if (weights > 0) direction += sum / weights;
+  }
+  return direction;
+}
+
+/// A cloud's planes face the side where most of the scan is.
+void turnInwards(const ScanSamples& samples, std::vector<PlaneRegion>& regions) {
+  const std::size_t step = std::max<std::size_t>(1, samples.size() / 20000);
+  for (PlaneRegion& r : regions) {
+    long front = 0;
+    for (std::size_t i = 0; i < samples.size(); i += step) {
+      const Eigen::Vector3d p = samples.points[i].cast<double>();
+      const double d = r.distance(p);
+      if (std::abs(d) > 0.1 && (p - r.middle).squaredNorm() < 9) front += d > 0 ? 1 : -1;
+    }
+    if (front < 0) r.normal *= -1, r.offset_m *= -1;
+  }
+}
+
+}  // namespace
+
+double regularise(const ScanSamples& samples, bool enabled, std::vector<PlaneRegion>& regions) {
+  if (!samples.oriented) turnInwards(samples, regions);
+  const double direction = mainDirection(regions);
+  for (PlaneRegion& r : regions) {
+    const Eigen::Vector3d before = r.normal;
+    const double limit = std::max(3 * r.angle_std_rad, 0.05 * kRadPerDeg);
+    const double height = std::asin(std::clamp(r.normal.z(), -1.0, 1.0));  // of the normal above the level
+    // Floors and walls are level and upright to a degree; what leans more does so on purpose.
+    const double lean = std::min(std::max(limit, 1 * kRadPerDeg), 4 * kRadPerDeg);
+    if (M_PI / 2 - std::abs(height) < lean) {
+      r.normal = Eigen::Vector3d(0, 0, r.normal.z() > 0 ? 1 : -1);
+    } else if (std::abs(height) < lean) {
+      double yaw = yawOf(r);
+      const double off = quarter(yaw - direction);
+      if (enabled && std::abs(off) < std::min(limit, 6 * kRadPerDeg)) yaw -= off;
+      r.normal = Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0);
+    } else {
+      continue;
+    }
+    r.turned_rad = std::acos(std::min(1.0, before.dot(r.normal)));
+    r.offset_m = r.normal.dot(r.middle);
+    fitOffset(samples, r);
+    measurePlane(samples, r);
+  }
+  return direction;
+}
+
+}  // namespace mmradartwin
