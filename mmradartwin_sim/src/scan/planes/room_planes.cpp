@@ -10,6 +10,7 @@
 #include <set>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "scan/planes/floor_cells.h"
 #include "scan/planes/polygon_triangles.h"
 #include "scan/samples/cell_raster.h"
 #include "scene/polygon_set.h"
@@ -58,23 +59,6 @@ struct WallRun {
   double from_m, to_m;
   double top_m = 0;
   std::vector<Eigen::AlignedBox2d> openings = {};
-};
-
-/// Lines at right angles that cut the floor into cells, in the room's main directions, and which cells are the room.
-struct FloorCells {
-  std::vector<double> xs, ys;
-  std::vector<char> inside;  // [x][y]
-
-  std::size_t index(std::size_t i, std::size_t k) const { return i * (ys.size() - 1) + k; }
-  Eigen::AlignedBox2d box(std::size_t i, std::size_t k) const {
-    return Eigen::AlignedBox2d(Eigen::Vector2d(xs[i], ys[k]), Eigen::Vector2d(xs[i + 1], ys[k + 1]));
-  }
-  bool holds(const Eigen::Vector2d& p) const {
-    const auto i = std::upper_bound(xs.begin(), xs.end(), p.x()) - xs.begin(),
-               k = std::upper_bound(ys.begin(), ys.end(), p.y()) - ys.begin();
-    if (i < 1 || k < 1 || i >= static_cast<long>(xs.size()) || k >= static_cast<long>(ys.size())) return false;
-    return inside[index(static_cast<std::size_t>(i) - 1, static_cast<std::size_t>(k) - 1)] != 0;
-  }
 };
 
 class RoomBuilder {
@@ -330,23 +314,11 @@ class RoomBuilder {
         if (area > most) most = area, start = c;
       }
     }
-    cells.inside.assign(columns * rows, 0);
-    std::vector<std::size_t> queue = {start};
-    cells.inside[start] = 1;
-    for (std::size_t q = 0; q < queue.size(); ++q) {
-      const std::size_t i = queue[q] / rows, k = queue[q] % rows;
-      const std::array<std::array<int, 2>, 4> steps = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
-      for (const auto& step : steps) {
-        const long ni = static_cast<long>(i) + step[0], nk = static_cast<long>(k) + step[1];
-        if (ni < 0 || nk < 0 || ni >= static_cast<long>(columns) || nk >= static_cast<long>(rows)) continue;
-        const std::size_t next = cells.index(static_cast<std::size_t>(ni), static_cast<std::size_t>(nk));
-        if (cells.inside[next] || share[next] < 0.35) continue;
-        if (walled(runs, cells, i, k, step)) continue;
-        cells.inside[next] = 1;
-        queue.push_back(next);
-      }
-    }
-    fillNooks(runs, cells);
+    const auto is_walled = [&](std::size_t i, std::size_t k, const CellStep& step) {
+      return walled(runs, cells, i, k, step);
+    };
+    fillFrom(start, share, is_walled, cells);
+    fillNooks(is_walled, cells);
     PlaneLoops loops = {{{cells.xs.front(), cells.ys.front()},
                          {cells.xs.back(), cells.ys.front()},
                          {cells.xs.back(), cells.ys.back()},
@@ -368,33 +340,6 @@ class RoomBuilder {
     const Eigen::Vector2d ex(std::cos(room_.yaw_rad), std::sin(room_.yaw_rad));
     addLevel("floor", PlaneKind::kFloor, 1, 0, loops, ex);
     if (frame_.has_ceiling) addLevel("ceiling", PlaneKind::kCeiling, -1, frame_.ceiling_m, loops, ex);
-  }
-
-  /// Cells that walls and the room enclose on three sides are the room's, though furniture hides what lies there.
-  void fillNooks(const std::vector<WallRun>& runs, FloorCells& cells) const {
-    const auto columns = static_cast<long>(cells.xs.size()) - 1, rows = static_cast<long>(cells.ys.size()) - 1;
-    const std::array<std::array<int, 2>, 4> steps = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
-    for (bool filled = true; filled;) {
-      filled = false;
-      for (long i = 0; i < columns; ++i) {
-        for (long k = 0; k < rows; ++k) {
-          const auto ui = static_cast<std::size_t>(i), uk = static_cast<std::size_t>(k);
-          if (cells.inside[cells.index(ui, uk)]) continue;
-          int closed = 0, open = 0;
-          for (const auto& step : steps) {
-            const long ni = i + step[0], nk = k + step[1];
-            const bool exists = ni >= 0 && nk >= 0 && ni < columns && nk < rows;
-            const bool wall = walled(runs, cells, ui, uk, step);
-            closed += wall;
-            open += !wall && exists &&
-                    cells.inside[cells.index(static_cast<std::size_t>(ni), static_cast<std::size_t>(nk))];
-          }
-          if (open == 0 || open + closed < 3) continue;
-          cells.inside[cells.index(ui, uk)] = 1;
-          filled = true;
-        }
-      }
-    }
   }
 
   static std::vector<Eigen::Vector2d> loopOf(const Eigen::AlignedBox2d& box) {
@@ -441,7 +386,7 @@ class RoomBuilder {
 
   /// A wall without a doorway stands on most of a cell's edge.
   bool walled(const std::vector<WallRun>& runs, const FloorCells& cells, std::size_t i, std::size_t k,
-              const std::array<int, 2>& side) const {
+              const CellStep& side) const {
     const bool across_x = side[0] != 0;
     const double line = across_x ? cells.xs[i + (side[0] > 0)] : cells.ys[k + (side[1] > 0)];
     const double low = across_x ? cells.ys[k] : cells.xs[i], high = across_x ? cells.ys[k + 1] : cells.xs[i + 1];
