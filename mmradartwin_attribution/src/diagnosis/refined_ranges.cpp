@@ -19,7 +19,7 @@ constexpr double kSaysSomething = 0.9;
 constexpr double kInPlace_m = 1e-5;
 
 PosteriorErrors rangesBy(const DiagnosisContext& context, const ModelState& state, const std::vector<int>& poses) {
-  ErrorEvidence evidence = rangeEvidence(context.likelihood, state.echoes, state.latents, poses);
+  ErrorEvidence evidence = rangeEvidence(context.likelihood, state.basis, poses);
   evidence.leaveOutCommon();
   return posteriorErrors(evidence, context.accuracy.scene_m);
 }

@@ -136,11 +136,10 @@ PosteriorErrors posteriorErrors(const ErrorEvidence& evidence, double spread) {
   return posterior;
 }
 
-ErrorEvidence rangeEvidence(const ChannelLikelihood& likelihood, const std::vector<PoseEchoes>& echoes,
-                            const SessionLatents& latents, const std::vector<int>& poses) {
-  const Scores scores = likelihood.freeScores(likelihood.basis(echoes, latents, false), {}, poses);
-  const int errors = static_cast<int>(latents.actor_range_m.size());
-  return evidenceOf(scores, latents, latents.globals() - errors, errors);
+ErrorEvidence rangeEvidence(const ChannelLikelihood& likelihood, const Basis& basis, const std::vector<int>& poses) {
+  const Scores scores = likelihood.freeScores(basis, {}, poses);
+  const int errors = static_cast<int>(basis.latents.actor_range_m.size());
+  return evidenceOf(scores, basis.latents, basis.latents.globals() - errors, errors);
 }
 
 SessionEvidence errorEvidence(const ChannelLikelihood& likelihood, const std::vector<PoseEchoes>& echoes,

@@ -44,8 +44,7 @@ struct SessionEvidence {
 };
 SessionEvidence errorEvidence(const ChannelLikelihood& likelihood, const std::vector<PoseEchoes>& echoes,
                               const SessionLatents& latents);
-/// Evidence of the actors' ranges that these poses alone have.
-ErrorEvidence rangeEvidence(const ChannelLikelihood& likelihood, const std::vector<PoseEchoes>& echoes,
-                            const SessionLatents& latents, const std::vector<int>& poses);
+/// Evidence of the actors' ranges that these poses alone have, about the latents of a basis.
+ErrorEvidence rangeEvidence(const ChannelLikelihood& likelihood, const Basis& basis, const std::vector<int>& poses);
 
 }  // namespace mmradartwin::diagnosis::likelihood
