@@ -20,14 +20,13 @@ class CheckIncludes(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.root = Path(folder.name)
-        # A room of the table without files is told: each has one here, whatever rooms the table has.
-        for room in ROOMS[DIAGNOSIS]:
-            self.write(f"{DIAGNOSIS}/{room}/{room}_unit.h", "<vector>")
+        # A room of a table without files is told: each has one here, whatever tables and rooms there are. A room with
+        # rooms of its own has theirs.
+        for folder, rooms in ROOMS.items():
+            for room in rooms:
+                if f"{folder}/{room}" not in ROOMS:
+                    self.write(f"{folder}/{room}/{room}_{'mechanism' if folder == MECHANISMS else 'unit'}.h", "<vector>")
         self.write(f"{DIAGNOSIS}/rooms.h")
-        for room in ROOMS[SIM].keys() - {"mechanisms"}:
-            self.write(f"{SIM}/{room}/{room}_unit.h", "<vector>")
-        for room in ROOMS[MECHANISMS]:
-            self.write(f"{MECHANISMS}/{room}/{room}_mechanism.h", "<vector>")
         self.write("mmradartwin_dsp/include/mmradartwin_dsp/session.h", "<string>")
         self.write("mmradartwin_dsp/include/mmradartwin_dsp/ros/bag.h", "<rosbag/bag.h>", '"mmradartwin_dsp/session.h"')
 
