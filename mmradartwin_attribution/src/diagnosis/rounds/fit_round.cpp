@@ -36,6 +36,15 @@ bool isPlaced(const Hypothesis& h) { return isObject(h) || h.form() == Mechanism
 
 }  // namespace
 
+void FitRound::considerBox(const HypothesisFit& cylinder) {
+  const bool thing = cylinder.size_m() > bounds::kLeastSize_m;
+  const std::pair<bool, double> evidence{thing, cylinder.gain_without_best_place};
+  if (evidence.second <= kLeastForBox_nats || evidence <= boxed_) return;
+  if (boxed_.second > 0) screened_.pop_back();
+  boxed_ = evidence;
+  screened_.push_back(asBox(context_.data, state_, cylinder));  // last, since it is the slowest fit
+}
+
 void FitRound::fitOne(Screened screened) {
   const bool law = !isCatalogued(screened.hypothesis.mechanism.mechanism), box = isUnmodelledBox(screened.hypothesis);
   if (screened.hypothesis.isGeometry()) {
@@ -58,12 +67,7 @@ void FitRound::fitOne(Screened screened) {
   context_.echoes.setBaseline(state_.mechanisms);
   if (!law && context_.fitter.isOverwhelming(fits_.back().gain_without_best_place))
     best_overwhelming_name_ = std::max(best_overwhelming_name_, fits_.back().gain);
-  if (isObject(screened.hypothesis) && !box &&
-      fits_.back().gain_without_best_place > std::max(kLeastForBox_nats, best_object_)) {
-    best_object_ = fits_.back().gain_without_best_place;
-    if (isUnmodelledBox(screened_.back().hypothesis)) screened_.pop_back();
-    screened_.push_back(asBox(context_.data, state_, fits_.back()));  // last, since it is the slowest fit
-  }
+  if (isObject(screened.hypothesis) && !box) considerBox(fits_.back());
   // Better latents that a fit has found are no gain of its hypothesis: they become the null's.
   if (std::optional<ModelState> better = context_.fitter.improved(state_, fits_.back().state.latents)) {
     const double nats = better->log_likelihood - state_.log_likelihood;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/fit/diagnosis_context.h"
@@ -22,13 +23,15 @@ class FitRound {
 
  private:
   void fitOne(Screened screened);
+  /// Tries a box about that object, if no other deserves it more: a point may be clutter, which has no sides.
+  void considerBox(const HypothesisFit& cylinder);
 
   DiagnosisContext& context_;
   ModelState& state_;
   std::vector<Screened> screened_;
   std::vector<HypothesisFit> fits_;  ///< best first
-  double best_object_ = 0,
-         best_overwhelming_name_ = 0;  ///< nats of the best object, and of the best overwhelming named cause
+  double best_overwhelming_name_ = 0;  ///< nats of the best overwhelming named cause
+  std::pair<bool, double> boxed_{false, 0};  ///< of the object that a box is tried about: larger than clutter; its nats
 };
 
 /// Row of `tried` about a fit of that round.
