@@ -253,7 +253,9 @@ void preferSimplerNames(std::vector<HypothesisFit>& fits, const ModelState& befo
            f.false_alarm_rate <= bounds::kFalseAlarmRateOfRound;
   };
   for (std::size_t i = 0; i < fits.size(); ++i) {
-    if (!is_name(fits[i])) continue;
+    // A move by no more than actors err is expected of the scene, and no rival that a simpler name has to beat.
+    const bool is_error = fits[i].hypothesis.isMove() && fits[i].moved_m() < fits[i].stated.leastMove_m();
+    if (!is_name(fits[i]) || is_error) continue;
     const Eigen::VectorXd gained = gainByPose(fits[i], before);
     for (std::size_t j = i + 1; j < fits.size(); ++j) {
       const HypothesisFit& simpler = fits[j];
