@@ -8,6 +8,17 @@
 #include "diagnosis/rounds/hypothesis_finding.h"
 
 namespace mmradartwin::diagnosis::rounds {
+namespace {
+
+/// True of causes of the catalogue that put echoes into the room which the twin lacks. What the receiver adds lies tens
+/// of dB below its echo, too low for maps.
+bool addsEchoes(const Hypothesis& hypothesis) {
+  const std::string& name = hypothesis.mechanism.mechanism;
+  return isCatalogued(name) && causeDescription(name).residual_class == ResidualClass::kMissingMechanism &&
+         hypothesis.form() != MechanismForm::kReceiverImage && hypothesis.form() != MechanismForm::kHarmonic;
+}
+
+}  // namespace
 
 // The likelihood gains a little by its own errors: a pose error resembles small amounts of many effects at edges. Where
 // the maps do not gain, a fit needs more evidence. Real effects need not show in maps (a receiver image at -26 dB), so
@@ -29,10 +40,12 @@ std::string MapEvidence::rejection(const HypothesisFit& fit, const FindingGain& 
   // nothing.
   const bool named = isCatalogued(fit.hypothesis.mechanism.mechanism);
   const bool clearly_worse = explained_more < -bounds::kLeastExplainedMore && explained[1] < 0;
+  // Echoes that are there add to the power that is explained. What is put in for others has its power in other cells.
+  const bool worse = clearly_worse || (addsEchoes(fit.hypothesis) && explained_more < 0);
   const Eigen::VectorXd nats_by_pose = gainByPose(fit, before_);
-  if (named && !clearly_worse && hasEnoughEvidence(fit, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
+  if (named && !worse && hasEnoughEvidence(fit, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
   if (likelier) rejected_.push_back({nats_by_pose, true});
-  return (clearly_worse ? "the maps get worse" : "the maps gain nothing") + by_how_much;
+  return (worse ? "the maps get worse" : "the maps gain nothing") + by_how_much;
 }
 
 void MapEvidence::addRejected(const HypothesisFit& fit) { rejected_.push_back({gainByPose(fit, before_), false}); }
