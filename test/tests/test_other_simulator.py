@@ -51,6 +51,7 @@ class OtherSimulator(InFolder):
         subject = first["parameters"].get("material") or first["parameters"].get("actor")
         self.assertIn(subject["value"], ("Metal", "cabinet"))
         self.assert_holds(first, "delta_db", -12.04)
+        self.assertAlmostEqual(first["parameters"]["delta_db"]["value"], -12.04, delta=0.5)
 
     def test_a_box_is_found_that_few_poses_face(self):
         first, *rest = self.findings_of("H_obj_40")
@@ -75,6 +76,17 @@ class OtherSimulator(InFolder):
                 self.assertAlmostEqual(gain_db, truth_db, delta=1.0 if abs(angle_deg) < 55 else 1.5)
                 if abs(angle_deg) < 55:
                     self.assertTrue(low - 0.5 <= truth_db <= high + 0.5, msg=f"{truth_db} in {low} to {high}")
+
+    def test_levels_of_the_room_are_those_of_the_twin(self):
+        self.findings_of("W0")
+        with open(self.at("W0/summary.json"), encoding="utf-8") as text:
+            actors = {a["actor"]: a for a in json.load(text)["actors"]}
+        self.assertEqual(set(actors), {"wall_west", "wall_east", "wall_south", "wall_north", "cabinet"})
+        for name, actor in actors.items():
+            with self.subTest(name):
+                self.assertAlmostEqual(actor["level_db"], 0, delta=0.3)
+                self.assertLess(actor["level_sd_db"], 0.3)
+                self.assertAlmostEqual(actor["range_m"], 0, delta=1e-3)
 
     def test_edges_hide_as_fields_do(self):
         self.assertEqual(self.findings_of("W0"), [])

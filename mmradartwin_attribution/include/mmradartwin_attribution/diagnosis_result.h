@@ -34,6 +34,14 @@ struct ComparedTwin {
   double explained_power = 0;                        ///< all poses
 };
 
+/// How an actor's echoes differ from those that the twin expects of it, beside what was found: posterior mean and standard
+/// deviation, per reflection. What all actors share is left out: that is the radar's.
+struct ActorErrors {
+  std::string actor;
+  double level_db = 0, level_sd_db = 0;
+  double range_m = 0, range_sd_m = 0;  ///< one-way
+};
+
 /// The survey seen from above, in map, for the findings' figures.
 struct SurveyPlan {
   struct Wall {  ///< an upright triangle of an actor
@@ -58,6 +66,7 @@ struct Diagnosis {
   double explained_power = 0;  ///< of the twin as given, all poses
   /// Nats that the twin as given gained by `knife_edges: 1`, where all was judged so; the extended twin then has it.
   std::optional<double> knife_edges_nats;
+  std::vector<ActorErrors> actors;  ///< of which the session says more than what was stated
   std::vector<ComparedTwin> compared;
   SurveyPlan plan;
 };

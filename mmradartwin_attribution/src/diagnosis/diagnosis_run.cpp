@@ -32,6 +32,9 @@ constexpr int kFolds = 5;
 /// scatters by; see docs/verification/calibration_of_bounds.md#errors-of-the-ground
 constexpr double kWider = 1.2;
 constexpr int kMostWidenings = 3;  ///< each costs a fit of all latents
+const double kDbPerNeper = 10 / std::log(10);  ///< decibels of a power whose natural logarithm is 1
+/// Standard deviation of an actor's error over the spread of all, below which the session tells something of it.
+constexpr double kKnownBelow = 0.9;
 
 }  // namespace
 
@@ -229,25 +232,49 @@ void DiagnosisRun::addUnexplained() {
                             extended_);
 }
 
-std::map<std::string, SpreadEstimate> DiagnosisRun::spreadsUnder(const ModelState& state,
-                                                                 const std::vector<RangeShift>& elsewhere) const {
+SessionEvidence DiagnosisRun::evidenceUnder(const ModelState& state, const std::vector<RangeShift>& elsewhere) const {
   SessionEvidence evidence = errorEvidence(context_.likelihood, state.echoes, state.latents);
   for (const RangeShift& shift : elsewhere) evidence.actor_range_m.replace(shift.actor, shift.shift_m, shift.nats);
   evidence.actor_range_m.leaveOutCommon();
   evidence.yaw_rad.leaveOutCommon();
+  return evidence;
+}
+
+std::map<std::string, SpreadEstimate> DiagnosisRun::spreadsBy(const SessionEvidence& evidence) const {
   std::map<std::string, SpreadEstimate> spreads;
   const auto estimate = [&](const char* key, const ErrorEvidence& errors, double unit, double stated) {
     const std::optional<SpreadEstimate> found = estimatedSpread(errors, stated / unit);
     if (found) spreads[key] = {unit * found->value, unit * found->low, unit * found->high};
   };
   estimate("scene_m", evidence.actor_range_m, 1, stated_.scene_m);
-  estimate("level_db", evidence.actor_gain, 10 / std::log(10), stated_.level_db);
+  estimate("level_db", evidence.actor_gain, kDbPerNeper, stated_.level_db);
   estimate("heading_deg", evidence.yaw_rad, 180 / M_PI, stated_.heading_deg);
   return spreads;
 }
 
+std::vector<ActorErrors> DiagnosisRun::actorsBy(const SessionEvidence& evidence) const {
+  const auto spread = [&](const char* key, double stated) {
+    const auto found = result_.findings.estimated.find(key);
+    return found != result_.findings.estimated.end() ? found->second.value : stated;
+  };
+  const double level_db = spread("level_db", stated_.level_db), range_m = spread("scene_m", stated_.scene_m);
+  const PosteriorErrors levels = errorsBesideCommon(evidence.actor_gain, level_db / kDbPerNeper);
+  const PosteriorErrors ranges = errorsBesideCommon(evidence.actor_range_m, range_m);
+  std::vector<ActorErrors> errors;
+  const std::vector<Actor>& actors = twin_.scene().actors;
+  for (std::size_t i = 0; i < actors.size(); ++i) {
+    const std::size_t e = errorOf(static_cast<int>(i), levels.mean.size());
+    const ActorErrors of_actor = {actors[i].name, kDbPerNeper * levels.mean[e],
+                                  kDbPerNeper * levels.standard_deviation[e], ranges.mean[e],
+                                  ranges.standard_deviation[e]};
+    if (of_actor.level_sd_db < kKnownBelow * level_db || of_actor.range_sd_m < kKnownBelow * range_m)
+      errors.push_back(of_actor);
+  }
+  return errors;
+}
+
 void DiagnosisRun::takeSmallerErrors() {
-  std::map<std::string, SpreadEstimate> spreads = spreadsUnder(state_, {});
+  std::map<std::string, SpreadEstimate> spreads = spreadsBy(evidenceUnder(state_, {}));
   StatedAccuracy smaller = context_.accuracy;
   const auto take = [&](const char* key, double least, double& value) {
     const auto found = spreads.find(key);
@@ -267,7 +294,7 @@ void DiagnosisRun::estimateAccuracy() {
   const StatedAccuracy judged = context_.accuracy;
   ModelState state = rounds_.state();
   std::map<std::string, SpreadEstimate>& spreads = result_.findings.estimated;
-  spreads = spreadsUnder(state, rounds_.elsewhere());
+  spreads = spreadsBy(evidenceUnder(state, rounds_.elsewhere()));
   // Errors stand no farther than the spread lets them: one that turns out larger lets them farther.
   for (int i = 0; i < kMostWidenings; ++i) {
     const auto found = spreads.find("scene_m");
@@ -279,8 +306,9 @@ void DiagnosisRun::estimateAccuracy() {
     context_.echoes.setBaseline(state.mechanisms);
     state = context_.fitter.state(state.mechanisms, &state.latents);
     rounds_.takeRangeErrors(state);
-    spreads = spreadsUnder(state, rounds_.elsewhere());
+    spreads = spreadsBy(evidenceUnder(state, rounds_.elsewhere()));
   }
+  result_.actors = actorsBy(evidenceUnder(state, rounds_.elsewhere()));
   context_.judgeActorsBy(judged);
 }
 

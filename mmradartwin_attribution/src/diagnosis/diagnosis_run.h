@@ -8,6 +8,7 @@
 #include "diagnosis/channels/pose_time_lag.h"
 #include "diagnosis/fit/diagnosis_context.h"
 #include "diagnosis/gain/gain_measurement.h"
+#include "diagnosis/likelihood/error_spread.h"
 #include "diagnosis/prepared_session.h"
 #include "diagnosis/rooms.h"
 #include "diagnosis/rounds/hypothesis_rounds.h"
@@ -58,10 +59,13 @@ class DiagnosisRun {
   /// Adds a finding unless the twin states the same already.
   void add(Finding finding, const std::map<std::string, double>& nats_by_pose = {});
   void measureFrameGain();
-  /// Errors by the session's own echoes under a state of the model, by the keys of the accuracy.
+  /// Evidence of errors by the session's own echoes under a state of the model.
   /// elsewhere: actors whose range errors the slopes of the likelihood do not show.
-  std::map<std::string, SpreadEstimate> spreadsUnder(const ModelState& state,
-                                                     const std::vector<RangeShift>& elsewhere) const;
+  SessionEvidence evidenceUnder(const ModelState& state, const std::vector<RangeShift>& elsewhere) const;
+  /// Spreads of errors by that evidence, by the keys of the accuracy.
+  std::map<std::string, SpreadEstimate> spreadsBy(const SessionEvidence& evidence) const;
+  /// Errors of the actors by that evidence, normal about zero with the spreads that were found.
+  std::vector<ActorErrors> actorsBy(const SessionEvidence& evidence) const;
   /// Lets edges weigh paths by the field behind them where the session is likelier so.
   void takeKnifeEdges();
   /// Mechanisms of the twin as given, with edges as they were taken.

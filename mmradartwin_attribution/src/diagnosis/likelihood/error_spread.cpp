@@ -81,6 +81,22 @@ ErrorEvidence evidenceOf(const Scores& scores, const SessionLatents& latents, in
   return evidence;
 }
 
+/// [errors][errors] Covariance of errors that are normal about zero with this spread, given the evidence.
+Eigen::MatrixXd posteriorCovariance(const ErrorEvidence& evidence, double spread) {
+  const Eigen::Index count = evidence.weighted.size();
+  const Eigen::MatrixXd precision = evidence.information + Eigen::MatrixXd::Identity(count, count) / (spread * spread);
+  return regularised(precision).ldlt().solve(Eigen::MatrixXd::Identity(count, count));
+}
+
+PosteriorErrors errorsOf(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) {
+  PosteriorErrors errors;
+  for (Eigen::Index i = 0; i < mean.size(); ++i) {
+    errors.mean.push_back(mean[i]);
+    errors.standard_deviation.push_back(std::sqrt(std::max(0.0, covariance(i, i))));
+  }
+  return errors;
+}
+
 }  // namespace
 
 void ErrorEvidence::replace(int error, double value, double nats) {
@@ -124,16 +140,19 @@ std::optional<SpreadEstimate> estimatedSpread(const ErrorEvidence& evidence, dou
 }
 
 PosteriorErrors posteriorErrors(const ErrorEvidence& evidence, double spread) {
-  const Eigen::Index count = evidence.weighted.size();
-  const Eigen::MatrixXd precision = evidence.information + Eigen::MatrixXd::Identity(count, count) / (spread * spread);
-  const Eigen::MatrixXd covariance = regularised(precision).ldlt().solve(Eigen::MatrixXd::Identity(count, count));
-  const Eigen::VectorXd mean = covariance * evidence.weighted;
-  PosteriorErrors posterior;
-  for (Eigen::Index i = 0; i < count; ++i) {
-    posterior.mean.push_back(mean[i]);
-    posterior.standard_deviation.push_back(std::sqrt(std::max(0.0, covariance(i, i))));
-  }
-  return posterior;
+  const Eigen::MatrixXd covariance = posteriorCovariance(evidence, spread);
+  return errorsOf(covariance * evidence.weighted, covariance);
+}
+
+PosteriorErrors errorsBesideCommon(ErrorEvidence evidence, double spread) {
+  evidence.leaveOutCommon();
+  const Eigen::VectorXd known = evidence.information.diagonal().cwiseMax(0.0);
+  if (!(known.sum() > 0)) return posteriorErrors(evidence, spread);
+  const Eigen::Index count = known.size();
+  const Eigen::MatrixXd beside =
+      Eigen::MatrixXd::Identity(count, count) - Eigen::VectorXd::Ones(count) * known.transpose() / known.sum();
+  const Eigen::MatrixXd covariance = posteriorCovariance(evidence, spread);
+  return errorsOf(beside * covariance * evidence.weighted, beside * covariance * beside.transpose());
 }
 
 ErrorEvidence rangeEvidence(const ChannelLikelihood& likelihood, const Basis& basis, const std::vector<int>& poses) {

@@ -37,6 +37,8 @@ struct PosteriorErrors {
 };
 /// Posterior of errors that are normal about zero with this spread.
 PosteriorErrors posteriorErrors(const ErrorEvidence& evidence, double spread);
+/// The same of the differences from what they share: from their mean, weighted by what the data say of each.
+PosteriorErrors errorsBesideCommon(ErrorEvidence evidence, double spread);
 
 /// Evidence of the actors' levels and of their ranges, and of the poses' headings, at fitted latents.
 struct SessionEvidence {

@@ -34,7 +34,8 @@ const char* const kNames =
     "has_ranges[] actors has_actors[] poses has_poses[]] records[event actors pose before_db before_m before_deg "
     "after_db "
     "after_m after_deg] has_records[] records_file] "
-    "tried[what round gain verdict] has_tried[] tried_count accuracy[key stated estimated] judged_by[sentence] "
+    "tried[what round gain verdict] has_tried[] tried_count accuracy[key stated estimated] "
+    "scene_actors[actor level range] has_scene_actors[] judged_by[sentence] "
     "compared[file sentence] has_compared[] ";
 
 std::string wordOf(const char* shown, const char* word) {
@@ -233,6 +234,21 @@ std::vector<PageValues> accuracyRows(const PageNumbers& numbers) {
   return rows;
 }
 
+std::vector<PageValues> sceneActorRows(const PageNumbers& summary) {
+  std::vector<PageValues> rows;
+  for (std::size_t i = 0; i < summary.values()["actors"].size(); ++i) {
+    const std::string at = "/actors/" + std::to_string(i);
+    const auto value = [&](const std::string& key, const std::string& unit) {
+      return PageValue::html(summary.significant(at + key + unit) + " &plusmn; " +
+                             summary.significant(at + key + "_sd" + unit));
+    };
+    rows.push_back({{"actor", summary.values()["actors"][i]["actor"].get<std::string>()},
+                    {"level", value("/level", "_db")},
+                    {"range", value("/range", "_m")}});
+  }
+  return rows;
+}
+
 std::vector<PageValues> comparedItems(const PageNumbers& summary) {
   std::vector<PageValues> items;
   for (std::size_t i = 0; i < summary.values()["compared"].size(); ++i) {
@@ -276,6 +292,14 @@ nlohmann::json diagnosisSummary(const Diagnosis& diagnosis, const RunDescription
   j["knife_edges_nats"] =
       diagnosis.knife_edges_nats ? nlohmann::json(*diagnosis.knife_edges_nats) : nlohmann::json(nullptr);
   j["tried"] = diagnosis.tried.size();
+  j["actors"] = nlohmann::json::array();
+  for (const ActorErrors& a : diagnosis.actors) {
+    j["actors"].push_back({{"actor", a.actor},
+                           {"level_db", a.level_db},
+                           {"level_sd_db", a.level_sd_db},
+                           {"range_m", a.range_m},
+                           {"range_sd_m", a.range_sd_m}});
+  }
   j["compared"] = nlohmann::json::array();
   for (const ComparedTwin& twin : diagnosis.compared) {
     j["compared"].push_back({{"file", twin.file},
@@ -320,6 +344,9 @@ std::string diagnosisPage(const page::PageTemplate& page, const CauseWords& word
   values["tried"] = std::move(tried);
   values["tried_count"] = PageValue::html(of_summary.count("/tried"));
   values["accuracy"] = diagnosis.has_twin ? accuracyRows(numbers) : std::vector<PageValues>();
+  std::vector<PageValues> scene_actors = sceneActorRows(of_summary);
+  values["has_scene_actors"] = !scene_actors.empty();
+  values["scene_actors"] = std::move(scene_actors);
   std::vector<PageValues> judged_by, compared = comparedItems(of_summary);
   for (const std::string& sentence : shownJudgedBy(diagnosis)) judged_by.push_back({{"sentence", sentence}});
   values["judged_by"] = std::move(judged_by);

@@ -187,6 +187,8 @@ void Selection::renameVerdict(const std::string& label, const std::string& verdi
 /// Profiles the values and intervals of all findings of rounds, or of only one and what is profiled with it.
 void Selection::profileFound(std::optional<std::size_t> only) {
   context_.report("errors of what was found", 0);
+  // A climb of the values leaves the latents short of their optimum, from where other values look likelier.
+  state_.latents = context_.fitter.state(mechanisms_, &state_.latents).latents;
   std::vector<Hypothesis> parts;
   std::vector<ProfiledValues> fits;
   for (const Accepted& a : accepted_) {
