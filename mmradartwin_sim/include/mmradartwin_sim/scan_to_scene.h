@@ -22,9 +22,22 @@ struct RawScan {
   bool y_up = false;                                 ///< the format itself declares that y is up
 };
 
+constexpr std::size_t kFewestPointsOfRoom = 1000;
+
 /// Reads PLY, OBJ, STL, glTF, Collada, FBX (meshes), PLY without faces, PCD, XYZ (clouds). Throws InputError naming the
-/// file: unreadable, fewer than 1000 points, more than 12 million points or 6 million triangles.
-RawScan readScan(const std::string& file);
+/// file: unreadable, fewer points and triangles than `fewest`, more than 12 million points or 6 million triangles.
+RawScan readScan(const std::string& file, std::size_t fewest = kFewestPointsOfRoom);
+
+/// A thing that was scanned by itself, and where it stands in the room (scan_objects.h).
+struct ScanObject {
+  std::string name;  ///< of its actor
+  RawScan scan;      ///< in a frame of its own
+  /// From the object's axes, metres, to map; or to the axes of the room's scan where `in_scan`
+  Eigen::Isometry3d T_object = Eigen::Isometry3d::Identity();
+  bool in_scan = false;
+  std::optional<double> unit_m;  ///< metres per unit of its file; found from its size where it is not stated
+  std::string material;          ///< a preset's tag, or "" where nobody has said
+};
 
 /// An upright plane of a scan, and how far it goes along its normal against where the scan has it.
 struct PlaneShift {
@@ -43,6 +56,7 @@ struct ScanOptions {
   std::size_t triangles = 20000;      ///< all things that are meshes together, at most
   double silhouette_m = 0.01;         ///< decimation leaves silhouettes within this
   bool proxies = false;               ///< every thing becomes its box: smallest, for simulation only
+  std::vector<ScanObject> objects;    ///< replace what they overlap in the room's scan
   std::vector<PlaneShift> shifts;     ///< walls that another sensor knows better (scan_refinement.h)
   std::function<void(double, const std::string&)> progress;  ///< share of a stage that is done, and its name
 };
@@ -96,6 +110,7 @@ struct ScanThing {
   std::string klass;            ///< "cabinet", "table", ...; "unknown" where no class fits
   double class_confidence = 0;  ///< 0 to 1
   std::string why;              ///< of the class, in words
+  std::string material;         ///< that a person has stated for it, or ""
   ThingShape shape = ThingShape::kMesh;
   bool watertight = false;
   Eigen::AlignedBox3d bounds;             ///< in map

@@ -5,6 +5,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/scan_to_scene.h"
+#include "scan/objects/placed_objects.h"
 #include "scan/planes/plane_directions.h"
 #include "scan/planes/plane_regions.h"
 #include "scan/planes/polygon_triangles.h"
@@ -125,7 +126,10 @@ ScanScene sceneOfScan(const RawScan& scan, const ScanOptions& options) {
   scene.frame = bringIntoMap(scan, options, unit_m, samples, regions);
   const double yaw_rad = regularise(samples, options.regularise, regions);
   RoomPlanes room = roomPlanes(scan.file, scene.frame, samples, regions, yaw_rad, options.shifts);
+  PlacedObjects objects = placeObjects(scene.frame, options, samples, room);
+  const std::vector<std::string> of_objects = objects.notes;
   Things things = thingsOf(scan, scene.frame, options, samples, regions, room);
+  joinObjects(samples, std::move(objects), things);
   scene.planes = std::move(room.planes);
   scene.things = std::move(things.things);
   scene.sample_owner = std::move(room.owner);
@@ -137,6 +141,7 @@ ScanScene sceneOfScan(const RawScan& scan, const ScanOptions& options) {
   for (const ScanThing& thing : scene.things) scene.actors.push_back({thing.name, thing.vertices, thing.triangles});
   scene.materials = proposeMaterials(scene, things.samples, samples);
   scene.notes = room.notes;
+  scene.notes.insert(scene.notes.end(), of_objects.begin(), of_objects.end());
   addNotes(scene, scan, room, things, samples.area_m2());
   scene.samples = std::move(samples.points);
   scene.sample_normals = std::move(samples.normals);
