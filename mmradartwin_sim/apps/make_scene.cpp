@@ -160,7 +160,7 @@ std::string olderScene(const Options& options) {
   return fs::is_regular_file(older, error) ? older.string() : "";
 }
 
-void sayScene(const ScanScene& scene) {
+void sayScene(const ScanScene& scene, const StatedAccuracy& accuracy) {
   std::size_t triangles = 0;
   for (const ScanActor& actor : scene.actors) triangles += actor.triangles.size();
   std::cout << scene.frame.words << "\n" << std::fixed << std::setprecision(1);
@@ -176,7 +176,9 @@ void sayScene(const ScanScene& scene) {
               << (t.why.empty() ? "" : " (" + t.why + ")") << std::setprecision(1) << "\n";
   }
   std::cout << scene.planes.size() << " plane(s), " << scene.things.size() << " thing(s), " << triangles
-            << " triangles; state in session.yaml: accuracy: {scene_m: " << std::setprecision(4) << scene.accuracy_m
+            << " triangles; state in session.yaml: accuracy: {scene_m: " << std::setprecision(4) << accuracy.scene_m
+            << ", level_db: " << std::setprecision(1) << accuracy.level_db << ", path_range_m: " << std::setprecision(4)
+            << accuracy.path_range_m << ", path_angle_deg: " << std::setprecision(2) << accuracy.path_angle_deg
             << "}\n";
 }
 
@@ -212,13 +214,13 @@ int makeScanScene(const Options& options) {
     scene = sceneOfScan(scan, scan_options);
     scene.notes.insert(scene.notes.begin(), moved.begin(), moved.end());
   }
-  writeScanScene(scene, output.path(), older);
+  const StatedAccuracy accuracy = writeScanScene(scene, output.path(), older);
   progress.show(0, "checks");
   const ScanQuality quality = checkScanScene(scene);
   writeScanQuality(scene, quality, output.path());
   progress.clear();
   output.complete();
-  sayScene(scene);
+  sayScene(scene, accuracy);
   noteAll(scene.notes);
   noteAll(qualityNotes(quality));
   return 0;

@@ -2,9 +2,9 @@
 """The whole way: measured sessions of the office, whose twin is a scene made of a scan, evaluated and diagnosed.
 
 Each session is evaluated with the true mesh, with the scene that make_scene proposes of a degraded scan, and with that scene
-once a person has corrected its materials: what an actor stands for in the room gives its material. It is diagnosed with the
-corrected scene. Rows: `clean` hides nothing, `single` one effect. Results stand in OUTPUT/results.jsonl, and a session that
-is done does not run again. The table is printed at the end and written to OUTPUT/table.md.
+once a person has corrected its materials: what an actor stands for in the room gives its material. Rows: `clean` hides
+nothing, `single` one effect. Results stand in OUTPUT/results.jsonl, and a session that is done does not run again. The table
+is printed at the end and written to OUTPUT/table.md.
 """
 import argparse
 import dataclasses
@@ -47,7 +47,8 @@ def parse():
     parser.add_argument("--poses", type=whole(1), default=24, help="of each session (default: 24)")
     parser.add_argument("--frames", type=whole(1), default=8, help="of each pose (default: 8)")
     parser.add_argument("--jobs", type=whole(1), default=1, help="threads of one diagnosis")
-    parser.add_argument("--evaluate", action="store_true", help="leave the diagnoses out")
+    parser.add_argument("--diagnose", choices=("corrected", "proposed", "none"), default="corrected",
+                        help="scene that sessions are diagnosed with (default: corrected)")
     parser.add_argument("--budget", type=float, metavar="MINUTES", help="start no session after this time")
     parser.add_argument("--table", action="store_true", help="run nothing, print the table of the results that exist")
     return parser.parse_args()
@@ -55,64 +56,80 @@ def parse():
 
 @dataclasses.dataclass
 class MadeScene:
-    """Scene that make_scene made of a scan of the office: its folder, the map's frame, what it states, and the materials that
-    a person would give its actors."""
+    """Scene that make_scene made of a scan of the office: its folder, the map's frame, and the accuracy that it states."""
     folder: str
     T_map_office: np.ndarray
     accuracy: dict
-    tags: dict
 
 
-def made_scene(kind, output):
-    """MadeScene of the office's scan of a kind."""
-    room, place = office_room(), os.path.join(output, kind)
-    scan = make_scan(room, DEGRADATIONS[kind], 1)
-    if not os.path.exists(os.path.join(place, "quality.yaml")):
-        scan_files.write_ply(place + ".ply", scan)
-        status, *_ = run_measured([find_program("mmradartwin_sim", "make_scene"), place + ".ply", "--output", place, "--force"],
-                                  600, place + ".log")
-        if status != 0:
-            raise ValueError(f"{place}.ply: make_scene ended with status {status}; see {place}.log")
-    quality = scene_comparison.read_summary(place)
-    T = scene_comparison.map_from_truth(quality, scan)
-    objects = scene_comparison.read_obj(os.path.join(place, "room.obj"))
-    return MadeScene(place, T, quality["accuracy"], scene_materials.true_tags(room, objects, T))
+def run_make_scene(scan_file, folder):
+    """Makes a scene into a folder, or makes it anew."""
+    status, *_ = run_measured([find_program("mmradartwin_sim", "make_scene"), scan_file, "--output", folder, "--force"], 600,
+                              folder + ".log")
+    if status != 0:
+        raise ValueError(f"{scan_file}: make_scene ended with status {status}; see {folder}.log")
 
 
-def put_scene(session, made, tags):
-    """Puts a made scene into a session in place of its own, moved into the session's map, and states its accuracy.
-    tags: {actor: material} that a person changed."""
-    with open(os.path.join(session, "materials.yaml"), encoding="utf-8") as text:
-        materials = yaml.safe_load(text)["materials"]
-    with open(os.path.join(made.folder, "materials.yaml"), encoding="utf-8") as text:
-        materials = {**yaml.safe_load(text)["materials"], **materials}
-    for name in os.listdir(session):
-        if name in ("scene.yaml", "materials.yaml") or name.endswith(".obj"):
-            os.remove(os.path.join(session, name))
-    with open(os.path.join(made.folder, "scene.yaml"), encoding="utf-8") as text:
+def correct(folder, tags):
+    """Says of all actors what they are of, as a person does: tags, and what was proposed where tags have nothing."""
+    file = os.path.join(folder, "scene.yaml")
+    with open(file, encoding="utf-8") as text:
         scene = yaml.safe_load(text)
-    for actor in scene["actors"]:
-        scene["actors"][actor]["material"] = tags.get(actor, scene["actors"][actor]["material"])
-    for name, told in (("scene.yaml", scene), ("materials.yaml", {"materials": materials})):
-        with open(os.path.join(session, name), "w", encoding="utf-8") as out:
-            yaml.safe_dump(told, out)
+    for actor, entry in scene["actors"].items():
+        entry["material"] = tags.get(actor, entry["material"])
+    with open(file, "w", encoding="utf-8") as out:
+        yaml.safe_dump(scene, out)
+
+
+def made_scenes(kind, output):
+    """(MadeScene as it was proposed, MadeScene with corrected materials) of the office's scan of a kind."""
+    room = office_room()
+    scan = make_scan(room, DEGRADATIONS[kind], 1)
+    file = os.path.join(output, kind + ".ply")
+    folders = [os.path.join(output, f"{kind}_{how}") for how in ("proposed", "corrected")]
+    for folder in folders:
+        if os.path.exists(os.path.join(folder, "whole")):
+            continue
+        if folder == folders[0]:
+            scan_files.write_ply(file, scan)
+            run_make_scene(file, folder)
+        else:
+            shutil.rmtree(folder, ignore_errors=True)
+            shutil.copytree(folders[0], folder)
+            os.remove(os.path.join(folder, "whole"))
+            objects = scene_comparison.read_obj(os.path.join(folder, "room.obj"))
+            correct(folder, scene_materials.true_tags(room, objects, read_made(folders[0], scan).T_map_office))
+            run_make_scene(file, folder)
+        with open(os.path.join(folder, "whole"), "w", encoding="ascii"):
+            pass
+    return tuple(read_made(folder, scan) for folder in folders)
+
+
+def read_made(folder, scan):
+    """MadeScene of a folder that make_scene wrote."""
+    quality = scene_comparison.read_summary(folder)
+    return MadeScene(folder, scene_comparison.map_from_truth(quality, scan), quality["accuracy"])
+
+
+def with_scene(session, made, copy):
+    """A copy of a session that has a made scene, moved into the session's map, in place of its own, and its accuracy."""
+    shutil.rmtree(copy, ignore_errors=True)
+    shutil.copytree(session, copy)
+    for name in os.listdir(copy):
+        if name.endswith(".obj"):
+            os.remove(os.path.join(copy, name))
+    for name in ("scene.yaml", "materials.yaml"):
+        shutil.copy(os.path.join(made.folder, name), copy)
     back = np.linalg.inv(made.T_map_office)
     with open(os.path.join(made.folder, "room.obj"), encoding="utf-8") as text, \
-            open(os.path.join(session, "room.obj"), "w", encoding="utf-8") as out:
+            open(os.path.join(copy, "room.obj"), "w", encoding="utf-8") as out:
         for line in text:
             if line.startswith("v "):
                 p = back[:3, :3] @ [float(w) for w in line.split()[1:4]] + back[:3, 3]
                 line = f"v {p[0]:.6f} {p[1]:.6f} {p[2]:.6f}\n"
             out.write(line)
-    with open(os.path.join(session, "session.yaml"), "a", encoding="ascii") as out:
+    with open(os.path.join(copy, "session.yaml"), "a", encoding="ascii") as out:
         out.write("accuracy: " + json.dumps(made.accuracy) + "\n")
-
-
-def with_scene(session, made, tags, copy):
-    """A copy of a session that has a made scene."""
-    shutil.rmtree(copy, ignore_errors=True)
-    shutil.copytree(session, copy)
-    put_scene(copy, made, tags)
     return copy
 
 
@@ -140,16 +157,15 @@ def run_session(seed, row, arguments):
     measurement = Measurement(Settings(output=session, seed=1000 * (row == "single") + seed, poses=arguments.poses,
                                        frames=arguments.frames, headings=2, duplicates=0, effects=chosen, jobs=1))
     measurement.run()
-    made = made_scene(kind, arguments.output)
-    corrected = with_scene(session, made, made.tags, os.path.join(place, "corrected"))
-    maps = {"true": evaluated(session, os.path.join(place, "maps_true")),
-            "corrected": evaluated(corrected, os.path.join(place, "maps_corrected")),
-            "proposed": evaluated(with_scene(session, made, {}, os.path.join(place, "proposed")),
-                                  os.path.join(place, "maps_proposed"))}
-    record = {"status": "ok", "seconds": 0, "verdict": None, "findings": []} if arguments.evaluate else \
-        answer(find_program("mmradartwin_attribution", "diagnose"), corrected, place, 3600, arguments.jobs)
+    proposed, corrected = (with_scene(session, made, os.path.join(place, name)) for name, made in
+                           zip(("proposed", "corrected"), made_scenes(kind, arguments.output)))
+    maps = {name: evaluated(folder, os.path.join(place, "maps_" + name))
+            for name, folder in (("true", session), ("corrected", corrected), ("proposed", proposed))}
+    diagnosed = {"none": None, "corrected": corrected, "proposed": proposed}[arguments.diagnose]
+    record = {"status": "ok", "seconds": 0, "verdict": None, "findings": []} if diagnosed is None else \
+        answer(find_program("mmradartwin_attribution", "diagnose"), diagnosed, place, 3600, arguments.jobs)
     record.update(key=f"{row}-{seed}", row=row, seed=seed, scan=kind, truths=measurement.hidden(), maps=maps,
-                  diagnosed=not arguments.evaluate)
+                  diagnosed=arguments.diagnose)
     return record
 
 
@@ -172,7 +188,7 @@ def table_of(records):
         text = {name: f"{hit / max(all_of, 1):.3f} ({hit} of {all_of})" for name, (hit, all_of) in recall.items()}
         rows += [(f"{hidden}: recall with {SCENES[name]}", "within 0.03 of the true mesh's" if name == "corrected" else "",
                   text[name], len(mine)) for name in SCENES]
-    clean, single = ([r for r in done if r["row"] == row and r["diagnosed"]] for row in ("clean", "single"))
+    clean, single = ([r for r in done if r["row"] == row and r["diagnosed"] != "none"] for row in ("clean", "single"))
     named = [bool(r["findings"]) and scoring.same_cause(r["truths"][0], r["findings"][0]["cause"]) for r in single]
     anywhere = [any(scoring.same_cause(r["truths"][0], f["cause"]) for f in r["findings"]) for r in single]
     rows += [("nothing hidden: a finding", "none", *table.share([bool(r["findings"]) for r in clean])),
@@ -193,7 +209,7 @@ def run(arguments):
         for row in rows:
             late = arguments.budget is not None and time.monotonic() - start > 60 * arguments.budget
             known = results.records.get(f"{row}-{seed}")
-            if late or (known and (known["diagnosed"] or arguments.evaluate)):
+            if late or (known and arguments.diagnose in ("none", known["diagnosed"])):
                 continue
             record = run_session(seed, row, arguments)
             results.add(record)
