@@ -212,6 +212,8 @@ int makeScanScene(const Options& options) {
     scan_options.shifts = shiftsOf(scene, ranges, options.refine);
     const std::vector<std::string> moved = refinementNotes(scene, ranges);
     scene = sceneOfScan(scan, scan_options);
+    const std::vector<std::string> things = moveThings(ranges, scene);
+    scene.notes.insert(scene.notes.begin(), things.begin(), things.end());
     scene.notes.insert(scene.notes.begin(), moved.begin(), moved.end());
   }
   const StatedAccuracy accuracy = writeScanScene(scene, output.path(), older);
@@ -233,7 +235,7 @@ int makeScene(const Options& options) {
                                      : ": taken as a model with named parts (--planes makes planes and things of it)"));
   if (!scan && !options.refine.empty()) {
     throw InputError("--refine " + options.refine +
-                     ": moves walls of scans alone; give --planes to take the model as a scan");
+                     ": moves walls and things of scans alone; give --planes to take the model as a scan");
   }
   if (!scan && !options.objects.empty()) {
     throw InputError("--objects " + options.objects +
@@ -277,8 +279,9 @@ int main(int argc, char** argv) {
   app.add_option(
       "--objects", options.objects,
       "objects.yaml: things that were scanned by themselves, with their poses; they replace what they overlap");
-  app.add_option("--refine", options.refine,
-                 "refinement.yaml of refine_scene, or its folder: walls move to where a radar in the room has them");
+  app.add_option(
+      "--refine", options.refine,
+      "refinement.yaml of refine_scene, or its folder: walls and things move to where a radar in the room has them");
   app.add_flag("--proxies", options.scan.proxies,
                "every thing becomes its box: fewest triangles, for simulation alone");
   app.footer("Example: make_scene phone_scan.ply --output my_room");

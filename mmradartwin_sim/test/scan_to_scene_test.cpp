@@ -127,7 +127,7 @@ TEST_F(ScanToSceneTest, ARadarMovesAWallAndTheRoomStaysClosed) {
   const ScanScene before = sceneOfScan(scan, {});
   const ScanPlane* east = planeAt(before, {-1, 0, 0}, -5);
   ASSERT_NE(east, nullptr);
-  const std::vector<MeasuredRange> ranges = {{east->name, 0.020, 0.002}, {"cabinet_1", 0.05, 0.002}};
+  const std::vector<MeasuredRange> ranges = {{east->name, 0.020, 0.002, {}, {}}, {"cabinet_1", 0.05, 0.002, {}, {}}};
   ScanOptions options;
   options.shifts = shiftsOf(before, ranges, "measured");
   ASSERT_EQ(options.shifts.size(), 1U);
@@ -143,7 +143,40 @@ TEST_F(ScanToSceneTest, ARadarMovesAWallAndTheRoomStaysClosed) {
     }
   }
   EXPECT_EQ(refinementNotes(before, ranges).size(), 1U);
-  EXPECT_THROW(shiftsOf(before, {{"cabinet_1", 0.01, 0.001}}, "measured"), InputError);
+  EXPECT_THROW(shiftsOf(before, {{"cabinet_1", 0.01, 0.001, {}, {}}}, "measured"), InputError);
+}
+
+TEST_F(ScanToSceneTest, ARadarMovesAThing) {
+  SampledRoom room(0.004);
+  room.addShell(kRoom);
+  room.addBox({2.0, 1.5, 0}, {2.6, 2.0, 1.6});
+  room.addBox({4.2, 3.0, 0}, {4.98, 3.9, 1.9});
+  ScanScene scene = sceneOfScan(room.scan(), {});
+  ASSERT_EQ(scene.things.size(), 2U);
+  const std::size_t free = scene.things[0].bounds.max().x() < 3 ? 0 : 1, at_wall = 1 - free;
+  const std::vector<ScanThing> before = scene.things;
+  write("refinement.yaml",
+        "format: mmradartwin_refinement/1\nactors:\n"
+        "  " +
+            before[free].name +
+            ": {range_m: 0.01, std_m: 0.002, shift_m: [0.012, -0.02], shift_covariance_m2: "
+            "[4.0e-6, 0, 9.0e-6]}\n"
+            "  " +
+            before[at_wall].name +
+            ": {range_m: 0.01, std_m: 0.002, shift_m: [0.09, 0], shift_covariance_m2: "
+            "[4.0e-6, 0, 9.0e-6]}\n");
+  const std::vector<MeasuredRange> ranges = readRefinement(folder_);
+  EXPECT_TRUE(shiftsOf(scene, ranges, "refinement.yaml").empty());
+  const std::vector<std::string> notes = moveThings(ranges, scene);
+  EXPECT_EQ(notes.size(), 2U);
+  const Eigen::Vector3d by(0.012, -0.02, 0);
+  const ScanActor& actor = scene.actors[scene.planes.size() + free];
+  EXPECT_EQ(actor.name, before[free].name);
+  for (std::size_t k = 0; k < actor.vertices.size(); ++k) {
+    EXPECT_LT((actor.vertices[k] - before[free].vertices[k] - by).norm(), 1e-9);
+  }
+  EXPECT_LT((scene.things[free].bounds.center() - before[free].bounds.center() - by).norm(), 1e-9);
+  EXPECT_EQ(scene.things[at_wall].vertices, before[at_wall].vertices);  // it would stand in the wall
 }
 
 TEST_F(ScanToSceneTest, RefinementIsReadStrictly) {
