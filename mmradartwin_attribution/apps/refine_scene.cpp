@@ -27,15 +27,21 @@ struct Arguments {
 void print(const SceneRefinement& refinement) {
   std::printf("%-24s %10s %8s\n", "actor", "farther by", "+-");
   for (const RefinedActor& actor : refinement.actors) {
-    std::printf("%-24s %7.1f mm %5.1f mm\n", actor.actor.c_str(), 1000 * actor.range_m, 1000 * actor.std_m);
+    std::printf("%-24s %7.1f mm %5.1f mm", actor.actor.c_str(), 1000 * actor.range_m, 1000 * actor.std_m);
+    if (actor.shift) {
+      const Eigen::Vector2d std_m = actor.shift->covariance_m2.diagonal().cwiseSqrt();
+      std::printf("   moved by (%.1f +- %.1f, %.1f +- %.1f) mm", 1000 * actor.shift->mean_m.x(), 1000 * std_m.x(),
+                  1000 * actor.shift->mean_m.y(), 1000 * std_m.y());
+    }
+    std::printf("\n");
   }
   const GainMetric& gain = refinement.held_out_nats_per_pose;
   if (!gain.difference_ci95) {
     std::printf("one location: the gain on held-out places cannot be measured\n");
     return;
   }
-  std::printf("On places that have no part in these ranges: %+.1f nats per pose (%.1f to %.1f)\n",
-              gain.after - gain.before, (*gain.difference_ci95)[0], (*gain.difference_ci95)[1]);
+  std::printf("On places that have no part in it: %+.1f nats per pose (%.1f to %.1f)\n", gain.after - gain.before,
+              (*gain.difference_ci95)[0], (*gain.difference_ci95)[1]);
 }
 
 int run(const Arguments& arguments) {

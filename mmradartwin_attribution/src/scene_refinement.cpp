@@ -27,7 +27,14 @@ std::string SceneRefinement::toYaml(const std::string& recording) const {
   out << "actors:" << (actors.empty() ? " {}" : "") << "\n";
   for (const RefinedActor& actor : actors) {
     out << "  " << yamlText(actor.actor) << ": {range_m: " << fixedNumber(actor.range_m, 5)
-        << ", std_m: " << fixedNumber(actor.std_m, 5) << "}\n";
+        << ", std_m: " << fixedNumber(actor.std_m, 5);
+    if (actor.shift) {
+      const LevelShift& s = *actor.shift;
+      out << ", shift_m: [" << fixedNumber(s.mean_m.x(), 5) << ", " << fixedNumber(s.mean_m.y(), 5)
+          << "], shift_covariance_m2: [" << significantNumber(s.covariance_m2(0, 0), 4) << ", "
+          << significantNumber(s.covariance_m2(0, 1), 4) << ", " << significantNumber(s.covariance_m2(1, 1), 4) << "]";
+    }
+    out << "}\n";
   }
   return out.str();
 }

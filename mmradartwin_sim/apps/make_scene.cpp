@@ -16,8 +16,10 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_dsp/program.h"
 #include "mmradartwin_dsp/progress_line.h"
+#include "mmradartwin_dsp/strict_yaml.h"
 #include "mmradartwin_sim/material_presets.h"
 #include "mmradartwin_sim/mesh_frame.h"
+#include "mmradartwin_sim/scan_objects.h"
 #include "mmradartwin_sim/scan_quality.h"
 #include "mmradartwin_sim/scan_refinement.h"
 #include "mmradartwin_sim/scan_to_scene.h"
@@ -40,6 +42,7 @@ struct Options {
   bool y_up = false;
   std::string unit;
   std::string refine;
+  std::string objects;
 };
 
 std::string lower(std::string text) {
@@ -53,15 +56,6 @@ const MaterialPreset& find(const std::string& tag) {
   }
   throw InputError("--material " + tag +
                    ": unknown; known: Metal, Glass, Wood, TableTop, Carpet, Plastic, Plasterboard, Concrete");
-}
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c;
-  }
-  return out + "\"";
 }
 
 /// What the options state of a mesh that does not declare it itself: its frame, and as keys of its entry.
@@ -99,7 +93,7 @@ int makeModelScene(const Options& options) {
   for (const std::string& mesh : options.meshes) {
     std::string path = fs::proximate(fs::weakly_canonical(mesh), output.place()).string();
     const StatedFrame stated = statedFrame(options, mesh);
-    meshes << "  - {file: " << quoted(path) << stated.keys
+    meshes << "  - {file: " << yamlText(path) << stated.keys
            << ", xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0], scale: " << options.scale << "}\n";
     for (const Actor& actor : loadMesh(mesh, stated.frame)) {
       if (!actors.insert(actor.name).second)
@@ -132,7 +126,7 @@ int makeModelScene(const Options& options) {
   }
   if (!overrides.empty()) {
     scene << "# What each actor is made of; every tag must stand in materials.yaml.\nactors:\n";
-    for (const auto& [actor, tag] : overrides) scene << "  " << quoted(actor) << ": {material: " << tag << "}\n";
+    for (const auto& [actor, tag] : overrides) scene << "  " << yamlText(actor) << ": {material: " << tag << "}\n";
   }
   std::ofstream materials(materials_file);
   materials << "# Constants at 77 GHz from ITU-R P.2040; Carpet and Plastic lie outside the recommendation's range or "
@@ -166,7 +160,7 @@ std::string olderScene(const Options& options) {
   return fs::is_regular_file(older, error) ? older.string() : "";
 }
 
-void sayScene(const ScanScene& scene) {
+void sayScene(const ScanScene& scene, const StatedAccuracy& accuracy) {
   std::size_t triangles = 0;
   for (const ScanActor& actor : scene.actors) triangles += actor.triangles.size();
   std::cout << scene.frame.words << "\n" << std::fixed << std::setprecision(1);
@@ -182,7 +176,9 @@ void sayScene(const ScanScene& scene) {
               << (t.why.empty() ? "" : " (" + t.why + ")") << std::setprecision(1) << "\n";
   }
   std::cout << scene.planes.size() << " plane(s), " << scene.things.size() << " thing(s), " << triangles
-            << " triangles; state in session.yaml: accuracy: {scene_m: " << std::setprecision(4) << scene.accuracy_m
+            << " triangles; state in session.yaml: accuracy: {scene_m: " << std::setprecision(4) << accuracy.scene_m
+            << ", level_db: " << std::setprecision(1) << accuracy.level_db << ", path_range_m: " << std::setprecision(4)
+            << accuracy.path_range_m << ", path_angle_deg: " << std::setprecision(2) << accuracy.path_angle_deg
             << "}\n";
 }
 
@@ -200,7 +196,14 @@ int makeScanScene(const Options& options) {
   if (!std::isnan(options.floor_m)) scan_options.floor_m = options.floor_m;
   scan_options.level = !options.exact_up;
   scan_options.regularise = !options.no_regularise;
-  Output output = Output::folder(options.output, options.meshes, "scene.yaml");
+  std::vector<std::string> inputs = options.meshes;
+  if (!options.objects.empty()) {
+    progress.show(0, "objects");
+    inputs.push_back(options.objects);
+    scan_options.objects = readScanObjects(options.objects);
+    for (const ScanObject& object : scan_options.objects) inputs.push_back(object.scan.file);
+  }
+  Output output = Output::folder(options.output, inputs, "scene.yaml");
   progress.show(0, "reading");
   const RawScan scan = readScan(options.meshes.front());
   ScanScene scene = sceneOfScan(scan, scan_options);
@@ -209,15 +212,17 @@ int makeScanScene(const Options& options) {
     scan_options.shifts = shiftsOf(scene, ranges, options.refine);
     const std::vector<std::string> moved = refinementNotes(scene, ranges);
     scene = sceneOfScan(scan, scan_options);
+    const std::vector<std::string> things = moveThings(ranges, scene);
+    scene.notes.insert(scene.notes.begin(), things.begin(), things.end());
     scene.notes.insert(scene.notes.begin(), moved.begin(), moved.end());
   }
-  writeScanScene(scene, output.path(), older);
+  const StatedAccuracy accuracy = writeScanScene(scene, output.path(), older);
   progress.show(0, "checks");
   const ScanQuality quality = checkScanScene(scene);
   writeScanQuality(scene, quality, output.path());
   progress.clear();
   output.complete();
-  sayScene(scene);
+  sayScene(scene, accuracy);
   noteAll(scene.notes);
   noteAll(qualityNotes(quality));
   return 0;
@@ -230,7 +235,11 @@ int makeScene(const Options& options) {
                                      : ": taken as a model with named parts (--planes makes planes and things of it)"));
   if (!scan && !options.refine.empty()) {
     throw InputError("--refine " + options.refine +
-                     ": moves walls of scans alone; give --planes to take the model as a scan");
+                     ": moves walls and things of scans alone; give --planes to take the model as a scan");
+  }
+  if (!scan && !options.objects.empty()) {
+    throw InputError("--objects " + options.objects +
+                     ": replaces things of scans alone; give --planes to take the model as a scan");
   }
   return scan ? makeScanScene(options) : makeModelScene(options);
 }
@@ -267,8 +276,12 @@ int main(int argc, char** argv) {
   app.add_option("--silhouette", options.scan.silhouette_m, "metres within which fewer triangles leave silhouettes")
       ->check(CLI::Range(0.001, 0.1))
       ->capture_default_str();
-  app.add_option("--refine", options.refine,
-                 "refinement.yaml of refine_scene, or its folder: walls move to where a radar in the room has them");
+  app.add_option(
+      "--objects", options.objects,
+      "objects.yaml: things that were scanned by themselves, with their poses; they replace what they overlap");
+  app.add_option(
+      "--refine", options.refine,
+      "refinement.yaml of refine_scene, or its folder: walls and things move to where a radar in the room has them");
   app.add_flag("--proxies", options.scan.proxies,
                "every thing becomes its box: fewest triangles, for simulation alone");
   app.footer("Example: make_scene phone_scan.ply --output my_room");

@@ -58,6 +58,7 @@ ROOMS = {
         "samples": set(),
         "planes": {"samples"},
         "things": {"planes"},
+        "objects": {"things"},
     },
     "mmradartwin_attribution/src/diagnosis": {
         "catalogue": set(),

@@ -195,6 +195,62 @@ class BadInput(InFolder):
 
 
 @unittest.skipIf(PROGRAM is None, "make_scene is not built in this workspace")
+class ObjectScans(InFolder):
+    """A cabinet of the office with a scan of its own, in millimetres, beside a coarse scan of the room."""
+
+    def setUp(self):
+        super().setUp()
+        room = known_room.office_room()
+        self.scan = make_scan(room, Degradation("small", kind="cloud", size=200000), 11)
+        scan_files.write_ply(self.at("scan.ply"), self.scan)
+        self.body = next(a for a in room.furniture if a.name == "cabinet_east").parts[0]
+        rng, points = np.random.default_rng(5), []
+        for axis in range(3):
+            face = rng.uniform(-0.5, 0.5, (6000, 3)) * self.body.size
+            face[:, axis] = np.sign(rng.uniform(-1, 1, 6000)) * self.body.size[axis] / 2
+            points.append(face)
+        points = np.concatenate(points) + 0.001 * rng.standard_normal((18000, 3))
+        scan_files.write_ply(self.at("cabinet.ply"), as_scan(1000 * points))
+
+    def objects(self, place, name="steel_cabinet"):
+        """Writes objects.yaml: the cabinet's middle at a place, turned as in the office."""
+        half = math.atan2(self.body.rotation[1, 0], self.body.rotation[0, 0]) / 2
+        pose = [*(float(v) for v in place), 0.0, 0.0, math.sin(half), math.cos(half)]
+        entry = {"file": "cabinet.ply", "pose": pose, "frame": "scan", "unit": "mm", "material": "Metal"}
+        with open(self.at("objects.yaml"), "w", encoding="utf-8") as out:
+            yaml.safe_dump({"objects": {name: entry}}, out)
+        return make_scene(self.at("scan.ply"), "--objects", self.at("objects.yaml"), "--output", self.at("scene"))
+
+    def test_a_scanned_object_takes_the_place_of_what_the_room_has_of_it(self):
+        status, _, said = self.objects(self.body.center)
+        self.assertEqual(status, 0, msg=said)
+        made = scene_comparison.read_obj(self.at("scene", "room.obj"))
+        quality = scene_comparison.read_summary(self.at("scene"))
+        back = np.linalg.inv(scene_comparison.map_from_truth(quality, self.scan))
+        corners = made["steel_cabinet"].reshape(-1, 3) @ back[:3, :3].T + back[:3, 3]
+        off = np.abs(np.abs((corners - self.body.center) @ self.body.rotation) - self.body.size / 2)
+        self.assertLess(off.max(), 0.006)
+        for name, triangles in made.items():      # nothing else fills its place
+            inside = np.abs((triangles.reshape(-1, 3) @ back[:3, :3].T + back[:3, 3] - self.body.center)
+                            @ self.body.rotation) < self.body.size / 2 - 0.03
+            self.assertTrue(name == "steel_cabinet" or not inside.all(axis=1).any(), msg=name)
+        self.assertEqual(quality["checks"]["coincident_m2"], {})
+        with open(self.at("scene", "scene.yaml"), encoding="utf-8") as text:
+            self.assertEqual(yaml.safe_load(text)["actors"]["steel_cabinet"]["material"], "Metal")
+
+    def test_bad_places_are_refused_in_one_line(self):
+        for place, name, pattern in ((self.body.center + [9, 0, 0], "steel_cabinet", "outside of the room"),
+                                     (self.body.center, "wall_1", "name of a plane"),
+                                     (self.body.center * math.nan, "steel_cabinet", "pose")):
+            status, out, said = self.objects(place, name)
+            self.assertEqual(status, 2, msg=f"{out}{said}")
+            errors = [line for line in said.splitlines() if line.startswith("error")]
+            self.assertEqual(len(errors), 1, msg=said)
+            self.assertRegex(errors[0], pattern)
+            self.assertFalse(os.path.exists(self.at("scene")))
+
+
+@unittest.skipIf(PROGRAM is None, "make_scene is not built in this workspace")
 class ModelledRoom(InFolder):
     def test_named_parts_stay_as_they_are(self):
         """A room of named parts is taken as it was modelled."""

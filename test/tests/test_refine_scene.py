@@ -7,6 +7,7 @@ import unittest
 import numpy as np
 import yaml
 
+from mmradartwin_tests import effects
 from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.session import Measurement, Settings
 from in_folder import InFolder
@@ -43,6 +44,21 @@ class RefineScene(InFolder):
         low, high = told["held_out_nats_per_pose"]["difference_ci95"]
         self.assertGreater(low, 0, msg=run.stdout)
         self.assertLess(low, high)
+
+    def test_a_body_is_found_where_it_went(self):
+        moved_m = np.array([0.025, -0.018])
+        effect = effects.make_effect("actor_moved", {"actor": "pillar", "dx_m": moved_m[0], "dy_m": moved_m[1]}, None)
+        Measurement(Settings(output=self.at("session"), seed=71, poses=24, locations=12, headings=4, frames=8, duplicates=0,
+                             effects=[effect])).run()
+        run = self.refine(self.at("session"))
+        self.assertEqual(run.returncode, 0, msg=run.stderr)
+        with open(self.at("refined", "refinement.yaml"), encoding="utf-8") as text:
+            actors = yaml.safe_load(text)["actors"]
+        left_m = np.array(actors["pillar"]["shift_m"]) - moved_m
+        self.assertLess(np.hypot(*left_m), np.hypot(*moved_m) / 3, msg=run.stdout)
+        for name, actor in actors.items():
+            if name != "pillar" and "shift_m" in actor:
+                self.assertLess(np.hypot(*actor["shift_m"]), np.hypot(*moved_m) / 3, msg=name)
 
     def test_a_session_without_a_scene_is_refused_in_one_line(self):
         Measurement(Settings(output=self.at("session"), seed=64, poses=3, headings=1, frames=2, duplicates=0)).run()

@@ -1,5 +1,6 @@
 #include "diagnosis/refined_ranges.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -7,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "diagnosis/actor_shifts.h"
 #include "diagnosis/gain/held_out_gain.h"
 #include "diagnosis/likelihood/error_spread.h"
 
@@ -24,7 +26,44 @@ PosteriorErrors rangesBy(const DiagnosisContext& context, const ModelState& stat
   return posteriorErrors(evidence, context.accuracy.scene_m);
 }
 
-/// Log-likelihood by pose with actors at these ranges and all else as it is in a state.
+/// Where actors are by some poses: their displacements where places determine both components, else their ranges.
+struct Places {
+  PosteriorErrors ranges;
+  PosteriorShifts shifts;
+  std::vector<char> shifted;  ///< whose displacement is determined
+
+  /// [errors] added one-way ranges at a pose.
+  std::vector<double> rangesAt(int pose, const ActorShifts& evidence) const {
+    std::vector<double> range_m = evidence.rangesAt(pose, shifts);
+    for (std::size_t e = 0; e < range_m.size(); ++e) {
+      if (!shifted[e]) range_m[e] = ranges.mean[e];
+    }
+    return range_m;
+  }
+};
+
+Places placesBy(const DiagnosisContext& context, const ModelState& state, const ActorShifts& evidence,
+                const std::vector<int>& poses) {
+  Places places{rangesBy(context, state, poses), evidence.posterior(poses), {}};
+  const double most_m = kSaysSomething * context.accuracy.scene_m;
+  for (const ActorShift& shift : places.shifts.actors) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> spectrum(shift.covariance_m2);
+    places.shifted.push_back(spectrum.eigenvalues()[1] < most_m * most_m);
+  }
+  places.shifted.back() = 0;  // what is no actor of the scene
+  return places;
+}
+
+/// Log-likelihood by pose with actors at these places, which all are farther by a shared range, and all else as it is
+/// in a state.
+double natsAt(DiagnosisContext& context, const ModelState& state, int pose, std::vector<double> range_m) {
+  SessionLatents latents = state.latents;
+  latents.actor_range_m = std::move(range_m);
+  const std::vector<PoseEchoes> echoes = context.echoes.echoes(state.mechanisms, {pose}, latents.actor_range_m);
+  return context.likelihood.byPose(echoes, latents, {pose}).front();
+}
+
+/// The same of all poses with the same ranges.
 std::vector<double> natsAt(DiagnosisContext& context, const ModelState& state, std::vector<double> range_m) {
   SessionLatents latents = state.latents;
   latents.actor_range_m = std::move(range_m);
@@ -69,12 +108,19 @@ SceneRefinement refinedRanges(DiagnosisContext& context, const ModelState& state
   refinement.poses = static_cast<int>(context.data.poses.size());
   refinement.locations = static_cast<int>(context.data.locations.size());
   context.report("ranges of the actors", 0);
-  const PosteriorErrors ranges = rangesBy(context, state, everyPose(state));
+  const ActorShifts evidence(context, state);
+  const Places places = placesBy(context, state, evidence, everyPose(state));
+  const PosteriorErrors& ranges = places.ranges;
   const std::vector<Actor>& actors = context.twin.scene().actors;
   for (std::size_t i = 0; i < actors.size(); ++i) {
     const std::size_t error = errorOf(static_cast<int>(i), ranges.mean.size());
     if (ranges.standard_deviation[error] > kSaysSomething * refinement.scene_m) continue;
-    refinement.actors.push_back({actors[i].name, ranges.mean[error], ranges.standard_deviation[error]});
+    RefinedActor actor{actors[i].name, ranges.mean[error], ranges.standard_deviation[error], {}};
+    if (places.shifted[error]) {
+      const ActorShift& shift = places.shifts.actors[error];
+      actor.shift = LevelShift{shift.mean_m, shift.covariance_m2};
+    }
+    refinement.actors.push_back(actor);
   }
   const double shared_m = sharedRange_m(state, ranges);
   const auto beyond = [shared_m](std::vector<double> range_m) {
@@ -93,9 +139,11 @@ SceneRefinement refinedRanges(DiagnosisContext& context, const ModelState& state
     for (std::size_t i = 0; i < context.data.poses.size(); ++i) {
       if (context.fitter.fold(context.data.poses[i].location) != fold) others.push_back(static_cast<int>(i));
     }
-    const std::vector<double> nats = natsAt(context, state, beyond(rangesBy(context, state, others).mean));
+    const Places by_others = placesBy(context, state, evidence, others);
     for (std::size_t i = 0; i < context.data.poses.size(); ++i) {
-      if (context.fitter.fold(context.data.poses[i].location) == fold) after[i] = nats[i];
+      if (context.fitter.fold(context.data.poses[i].location) != fold) continue;
+      const int pose = static_cast<int>(i);
+      after[i] = natsAt(context, state, pose, beyond(by_others.rangesAt(pose, evidence)));
     }
   }
   refinement.held_out_nats_per_pose = likelihoodGain(context.data, before, after);

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "mmradartwin_dsp/stated_accuracy.h"
+
 namespace mmradartwin {
 
 /// A scan as its files hold it, in one list of points: a triangle mesh, or a point cloud where `triangles` is empty.
@@ -22,9 +24,22 @@ struct RawScan {
   bool y_up = false;                                 ///< the format itself declares that y is up
 };
 
+constexpr std::size_t kFewestPointsOfRoom = 1000;
+
 /// Reads PLY, OBJ, STL, glTF, Collada, FBX (meshes), PLY without faces, PCD, XYZ (clouds). Throws InputError naming the
-/// file: unreadable, fewer than 1000 points, more than 12 million points or 6 million triangles.
-RawScan readScan(const std::string& file);
+/// file: unreadable, fewer points and triangles than `fewest`, more than 12 million points or 6 million triangles.
+RawScan readScan(const std::string& file, std::size_t fewest = kFewestPointsOfRoom);
+
+/// A thing that was scanned by itself, and where it stands in the room (scan_objects.h).
+struct ScanObject {
+  std::string name;  ///< of its actor
+  RawScan scan;      ///< in a frame of its own
+  /// From the object's axes, metres, to map; or to the axes of the room's scan where `in_scan`
+  Eigen::Isometry3d T_object = Eigen::Isometry3d::Identity();
+  bool in_scan = false;
+  std::optional<double> unit_m;  ///< metres per unit of its file; found from its size where it is not stated
+  std::string material;          ///< a preset's tag, or "" where nobody has said
+};
 
 /// An upright plane of a scan, and how far it goes along its normal against where the scan has it.
 struct PlaneShift {
@@ -43,6 +58,7 @@ struct ScanOptions {
   std::size_t triangles = 20000;      ///< all things that are meshes together, at most
   double silhouette_m = 0.01;         ///< decimation leaves silhouettes within this
   bool proxies = false;               ///< every thing becomes its box: smallest, for simulation only
+  std::vector<ScanObject> objects;    ///< replace what they overlap in the room's scan
   std::vector<PlaneShift> shifts;     ///< walls that another sensor knows better (scan_refinement.h)
   std::function<void(double, const std::string&)> progress;  ///< share of a stage that is done, and its name
 };
@@ -96,10 +112,12 @@ struct ScanThing {
   std::string klass;            ///< "cabinet", "table", ...; "unknown" where no class fits
   double class_confidence = 0;  ///< 0 to 1
   std::string why;              ///< of the class, in words
+  std::string material;         ///< that a person has stated for it, or ""
   ThingShape shape = ThingShape::kMesh;
   bool watertight = false;
   Eigen::AlignedBox3d bounds;             ///< in map
   double rms_m = 0, largest_m = 0;        ///< distance of its points from the shape that it became
+  double range_std_m = 0;                 ///< how far its faces are known along their normals, 1 sigma
   std::vector<Eigen::Vector3d> vertices;  ///< in map, metres
   std::vector<std::array<int, 3>> triangles;
   std::size_t samples = 0;
@@ -108,10 +126,11 @@ struct ScanThing {
 /// A proposed material of one actor.
 struct MaterialProposal {
   std::string actor;
-  std::string tag;        ///< of materials.yaml; "unknown" actors get the fallback's
-  bool unknown = false;   ///< nothing tells
-  double confidence = 0;  ///< 0 to 1
-  std::string source;     ///< "shape: outermost upright plane of the room", "edited by a person"
+  std::string tag;          ///< of materials.yaml; "unknown" actors get the fallback's
+  bool unknown = false;     ///< nothing tells
+  double confidence = 0;    ///< 0 to 1
+  std::string source;       ///< "shape: outermost upright plane of the room", "edited by a person"
+  double level_std_db = 0;  ///< of its echoes, by what else it may be of; 0 where a person has said
 };
 
 /// A flat triangle set with a name: what the scene file's mesh holds.
@@ -127,9 +146,7 @@ struct ScanScene {
   std::vector<ScanThing> things;
   std::vector<MaterialProposal> materials;  ///< one of each plane and thing, in their order
   std::vector<ScanActor> actors;            ///< likewise
-  /// Standard deviation of a surface's place, for session.yaml's accuracy: {scene_m: ...}. The planes' residuals by
-  /// area, of which noise that averages out is no part.
-  double accuracy_m = 0;
+  StatedAccuracy accuracy;  ///< for session.yaml, in what a scan tells: scene_m, level_db, path_range_m, path_angle_deg
   // The thinned scan in map, for pictures and checks.
   std::vector<Eigen::Vector3f> samples;
   std::vector<Eigen::Vector3f> sample_normals;  ///< unit; of a cloud, the sign means nothing
@@ -146,8 +163,10 @@ struct ScanScene {
 ScanScene sceneOfScan(const RawScan& scan, const ScanOptions& options);
 
 /// Writes room.obj, materials.yaml and scene.yaml into a folder. `edited_scene_yaml` is an older scene.yaml ("" for
-/// none) whose materials, where a person changed them, stay. Throws InputError where that file cannot be read.
-void writeScanScene(const ScanScene& scene, const std::string& folder, const std::string& edited_scene_yaml = "");
+/// none) whose materials, where a person changed them, stay. Returns the accuracy that it states, in which a person's
+/// materials are known. Throws InputError where that file cannot be read.
+StatedAccuracy writeScanScene(const ScanScene& scene, const std::string& folder,
+                              const std::string& edited_scene_yaml = "");
 
 /// A reader's check of one line: does this file hold a room-scale scan (one part, or a cloud) and not a modelled room
 /// with named parts?

@@ -22,7 +22,6 @@ namespace {
 // What two gigabytes hold with all that is made of it.
 constexpr std::size_t kMostPoints = 12000000, kMostTriangles = 6000000;
 constexpr std::uintmax_t kMostBytes = 1000000000;  // of a text mesh, which grows on reading
-constexpr std::size_t kFewestPoints = 1000;
 constexpr double kLargeCoordinate = 1000;  // of a file's units: beyond, single precision begins to blur millimetres
 
 std::string extensionOf(const std::string& file) {
@@ -196,7 +195,7 @@ bool isCloudFormat(const std::string& extension) {
 
 }  // namespace
 
-RawScan readScan(const std::string& file) {
+RawScan readScan(const std::string& file, std::size_t fewest) {
   requireRegularFile(file);
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) throw InputError(file + ": no such file");
@@ -215,11 +214,12 @@ RawScan readScan(const std::string& file) {
   } else {
     readMeshFile(scan);
   }
-  if (scan.points.size() < kFewestPoints && scan.triangles.size() < kFewestPoints) {
+  if (scan.points.size() < fewest && scan.triangles.size() < fewest) {
     const std::string bad =
         scan.left_out ? " and " + std::to_string(scan.left_out) + " that are no finite numbers" : std::string();
-    throw InputError(file + ": holds " + std::to_string(scan.points.size()) + " point(s)" + bad +
-                     "; a scan of a room has " + std::to_string(kFewestPoints) + " at least");
+    throw InputError(file + ": holds " + std::to_string(scan.points.size()) + " point(s)" + bad + "; a scan of " +
+                     (fewest == kFewestPointsOfRoom ? "a room" : "an object") + " has " + std::to_string(fewest) +
+                     " at least");
   }
   return scan;
 }

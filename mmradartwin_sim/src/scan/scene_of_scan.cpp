@@ -5,6 +5,7 @@
 
 #include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/scan_to_scene.h"
+#include "scan/objects/placed_objects.h"
 #include "scan/planes/plane_directions.h"
 #include "scan/planes/plane_regions.h"
 #include "scan/planes/polygon_triangles.h"
@@ -12,6 +13,7 @@
 #include "scan/planes/scan_frame.h"
 #include "scan/proposed_materials.h"
 #include "scan/samples/scan_samples.h"
+#include "scan/scan_accuracy.h"
 #include "scan/things/things.h"
 
 namespace mmradartwin {
@@ -41,16 +43,6 @@ bool takeNoiseOf(const std::vector<PlaneRegion>& regions, ScanSamples& samples) 
   if (noise < 1.1 * samples.noise_m) return false;
   samples.noise_m = noise;
   return true;
-}
-
-/// The planes' residuals, of which noise that averages out is no part, and what their offsets are known to.
-double accuracyOf(const std::vector<ScanPlane>& planes) {
-  double squares = 0, area = 0;
-  for (const ScanPlane& p : planes) {
-    squares += p.covered_m2 * p.bow_m * p.bow_m;
-    area += p.covered_m2;
-  }
-  return area > 0 ? std::max(0.001, std::sqrt(squares / area)) : 0.05;
 }
 
 /// Areas of the scan by what became of them.
@@ -125,18 +117,22 @@ ScanScene sceneOfScan(const RawScan& scan, const ScanOptions& options) {
   scene.frame = bringIntoMap(scan, options, unit_m, samples, regions);
   const double yaw_rad = regularise(samples, options.regularise, regions);
   RoomPlanes room = roomPlanes(scan.file, scene.frame, samples, regions, yaw_rad, options.shifts);
+  PlacedObjects objects = placeObjects(scene.frame, options, samples, room);
+  const std::vector<std::string> of_objects = objects.notes;
   Things things = thingsOf(scan, scene.frame, options, samples, regions, room);
+  joinObjects(samples, std::move(objects), things);
   scene.planes = std::move(room.planes);
   scene.things = std::move(things.things);
   scene.sample_owner = std::move(room.owner);
   countAreas(scene, samples, things.samples);
   for (int& owner : scene.sample_owner) owner = std::max(owner, -1);
   things.things = scene.things;
-  scene.accuracy_m = accuracyOf(scene.planes);
   for (const ScanPlane& plane : scene.planes) scene.actors.push_back(actorOfPlane(plane));
   for (const ScanThing& thing : scene.things) scene.actors.push_back({thing.name, thing.vertices, thing.triangles});
   scene.materials = proposeMaterials(scene, things.samples, samples);
+  scene.accuracy = accuracyOf(scene);
   scene.notes = room.notes;
+  scene.notes.insert(scene.notes.end(), of_objects.begin(), of_objects.end());
   addNotes(scene, scan, room, things, samples.area_m2());
   scene.samples = std::move(samples.points);
   scene.sample_normals = std::move(samples.normals);

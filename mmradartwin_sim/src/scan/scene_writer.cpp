@@ -11,11 +11,13 @@
 #include "mmradartwin_dsp/strict_yaml.h"
 #include "mmradartwin_sim/material_presets.h"
 #include "mmradartwin_sim/scan_to_scene.h"
+#include "scan/scan_accuracy.h"
 
 namespace mmradartwin {
 namespace {
 
 constexpr const char* kProposed = "# proposed ";  // what follows is the tag that no person has chosen
+constexpr const char* kOfPerson = "; a person's";
 
 template <typename... Numbers>
 std::string formatted(const char* format, Numbers... numbers) {
@@ -47,7 +49,8 @@ std::string textOfOlder(const std::string& file) {
   return text.str();
 }
 
-/// What a person has made of an older scene: actors whose material is another than the one proposed then.
+/// What a person has made of an older scene: actors whose material is another than the one proposed then, or without
+/// the comment that says what was proposed.
 std::map<std::string, std::string> editedMaterials(const std::string& scene_yaml) {
   std::map<std::string, std::string> edited, proposed;
   const std::string whole = textOfOlder(scene_yaml);
@@ -55,11 +58,13 @@ std::map<std::string, std::string> editedMaterials(const std::string& scene_yaml
   std::string row;
   while (std::getline(text, row)) {
     const std::size_t comment = row.find(kProposed), colon = row.find(':');
-    if (comment == std::string::npos || colon == std::string::npos) continue;
+    if (comment == std::string::npos || colon == std::string::npos || row.find(kOfPerson) != std::string::npos)
+      continue;
     std::string name = row.substr(0, colon), tag;
     name.erase(0, name.find_first_not_of(" \""));
     while (!name.empty() && (name.back() == '"' || name.back() == ' ')) name.pop_back();
     std::istringstream(row.substr(comment + std::string(kProposed).size())) >> tag;
+    if (!tag.empty() && tag.back() == ',') tag.pop_back();
     proposed[name] = tag;
   }
   YamlMap older = YamlMap::parse(whole, scene_yaml);
@@ -119,17 +124,34 @@ std::string wordOf(PlaneKind kind) {
   return "";
 }
 
-void writeScene(const ScanScene& scene, const std::string& file, const std::map<std::string, std::string>& edited,
-                std::set<std::string>& used) {
+/// What a scan tells of the accuracy, as session.yaml takes it.
+std::string accuracyText(const StatedAccuracy& a) {
+  return formatted("accuracy: {scene_m: %.4f, level_db: %.1f, path_range_m: %.4f, path_angle_deg: %.2f}", a.scene_m,
+                   a.level_db, a.path_range_m, a.path_angle_deg);
+}
+
+/// With the materials that a person has chosen known.
+StatedAccuracy accuracyWith(const ScanScene& scene, const std::map<std::string, std::string>& edited) {
+  std::vector<MaterialProposal> materials = scene.materials;
+  for (MaterialProposal& p : materials) {
+    if (edited.count(p.actor)) p.level_std_db = 0;
+  }
+  StatedAccuracy accuracy = scene.accuracy;
+  accuracy.level_db = levelAccuracy_db(materials);
+  return accuracy;
+}
+
+void writeScene(const ScanScene& scene, const StatedAccuracy& accuracy, const std::string& file,
+                const std::map<std::string, std::string>& edited, std::set<std::string>& used) {
   std::ofstream out(file);
   out << "# Made by make_scene from a scan: " << scene.frame.words << ".\n"
       << "# Lengths in metres, z up, floor at 0. How the scan became this stands in scan.yaml.\n"
       << "# A session in this room states how well it is known, in session.yaml:\n"
-      << formatted("#   accuracy: {scene_m: %.4f}\n", scene.accuracy_m);
+      << "#   " << accuracyText(accuracy) << "\n";
   for (const std::string& note : scene.notes) out << "# " << note << ".\n";
   out << "meshes:\n  - {file: room.obj}\nmaterials: materials.yaml\n"
-      << "# Change a material here; the next run of make_scene keeps it. A confidence is 1 where it is "
-         "sure.\nactors:\n";
+      << "# Change a material here; the next run of make_scene keeps it. Take the comment away where you know it to be "
+         "right.\nactors:\n";
   for (std::size_t a = 0; a < scene.actors.size(); ++a) {
     const MaterialProposal& p = scene.materials[a];
     if (scene.actors[a].triangles.empty()) continue;
@@ -138,7 +160,7 @@ void writeScene(const ScanScene& scene, const std::string& file, const std::map<
     used.insert(tag);
     out << "  " << p.actor << ": {material: " << tag << "}  " << kProposed << p.tag
         << (p.unknown ? ", unknown" : formatted(", confidence %.2f", p.confidence)) << " (" << p.source << ")";
-    if (person != edited.end()) out << "; edited by a person";
+    if (person != edited.end()) out << kOfPerson;
     out << "\n";
   }
   if (!out.flush()) throw std::runtime_error(file + ": cannot be written; check the free space");
@@ -177,11 +199,12 @@ void writeFrame(const ScanFrame& f, std::ofstream& out) {
 }
 
 /// What a program that reads the result wants to know.
-void writeSummary(const ScanScene& scene, const std::string& file) {
+void writeSummary(const ScanScene& scene, const StatedAccuracy& accuracy, const std::string& file) {
   std::ofstream out(file);
   out << "# How a scan became room.obj. Lengths in metres, areas in square metres.\n";
   writeFrame(scene.frame, out);
-  out << formatted("accuracy: {scene_m: %.5f}\n", scene.accuracy_m)
+  out << "# For session.yaml. It does not cover what was not scanned, or left out.\n"
+      << accuracyText(accuracy) << "\n"
       << formatted(
              "areas: {scanned_m2: %.3f, on_planes_m2: %.3f, on_things_m2: %.3f, left_out_m2: %.3f, wall_m2: %.3f, "
              "wall_on_planes_m2: %.3f}\n",
@@ -204,15 +227,15 @@ void writeSummary(const ScanScene& scene, const std::string& file) {
         << ", watertight: " << (t.watertight ? "true" : "false")
         << formatted(", low_m: [%.3f, %.3f, %.3f], high_m: [%.3f, %.3f, %.3f]", low.x(), low.y(), low.z(), high.x(),
                      high.y(), high.z())
-        << formatted(", rms_m: %.4f, largest_m: %.4f, triangles: %d}\n", t.rms_m, t.largest_m,
-                     static_cast<int>(t.triangles.size()));
+        << formatted(", rms_m: %.4f, largest_m: %.4f, range_std_m: %.4f, triangles: %d}\n", t.rms_m, t.largest_m,
+                     t.range_std_m, static_cast<int>(t.triangles.size()));
   }
   if (!out.flush()) throw std::runtime_error(file + ": cannot be written; check the free space");
 }
 
 }  // namespace
 
-void writeScanScene(const ScanScene& scene, const std::string& folder, const std::string& edited_scene_yaml) {
+StatedAccuracy writeScanScene(const ScanScene& scene, const std::string& folder, const std::string& edited_scene_yaml) {
   const std::filesystem::path place(folder);
   std::map<std::string, std::string> edited, lines;
   if (!edited_scene_yaml.empty()) {
@@ -221,9 +244,11 @@ void writeScanScene(const ScanScene& scene, const std::string& folder, const std
   }
   std::set<std::string> used;
   writeObj(scene, (place / "room.obj").string());
-  writeScene(scene, (place / "scene.yaml").string(), edited, used);
+  const StatedAccuracy accuracy = accuracyWith(scene, edited);
+  writeScene(scene, accuracy, (place / "scene.yaml").string(), edited, used);
   writeMaterials((place / "materials.yaml").string(), used, lines);
-  writeSummary(scene, (place / "scan.yaml").string());
+  writeSummary(scene, accuracy, (place / "scan.yaml").string());
+  return accuracy;
 }
 
 }  // namespace mmradartwin

@@ -390,6 +390,14 @@ Basis ChannelLikelihood::basis(const std::vector<PoseEchoes>& echoes, const Sess
   return b;
 }
 
+Basis ChannelLikelihood::basisAt(int pose, const PoseEchoes& echoes, const SessionLatents& latents) const {
+  Basis b;
+  b.latents = latents;
+  b.poses.resize(data_.poses.size());
+  addBasis(echoes, latents, pose, false, b.poses[static_cast<std::size_t>(pose)]);
+  return b;
+}
+
 /// Score and information of one pose along globals, further directions and, last, its heading.
 struct ChannelLikelihood::PoseScores {
   Eigen::VectorXd score;

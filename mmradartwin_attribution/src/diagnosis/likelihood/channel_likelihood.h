@@ -91,6 +91,8 @@ class ChannelLikelihood {
                                const std::vector<int>& poses) const;
   /// Derivatives along the globals and headings. further: keeps what scores() needs for further directions.
   Basis basis(const std::vector<PoseEchoes>& echoes, const SessionLatents& latents, bool further = true) const;
+  /// The same of one pose alone; the others' stay empty.
+  Basis basisAt(int pose, const PoseEchoes& echoes, const SessionLatents& latents) const;
   /// Scores along the globals of SessionLatents and further directions, each a change of covariance() at these poses.
   /// Other poses do not count.
   Scores scores(const Basis& basis, const std::vector<SessionCovariance>& directions,
