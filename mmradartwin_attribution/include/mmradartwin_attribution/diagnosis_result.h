@@ -34,8 +34,8 @@ struct ComparedTwin {
   double explained_power = 0;                        ///< all poses
 };
 
-/// How an actor's echoes differ from those that the twin expects of it, beside what was found: posterior mean and standard
-/// deviation, per reflection. What all actors share is left out: that is the radar's.
+/// How an actor's echoes differ from those that the twin expects of it, beside what was found: posterior mean and
+/// standard deviation, per reflection. What all actors share is left out: that is the radar's.
 struct ActorErrors {
   std::string actor;
   double level_db = 0, level_sd_db = 0;

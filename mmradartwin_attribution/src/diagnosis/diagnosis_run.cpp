@@ -31,7 +31,7 @@ constexpr int kFolds = 5;
 /// The scene's error over the one that actors are judged by, from which on they are let farther: more than the estimate
 /// scatters by; see docs/verification/calibration_of_bounds.md#errors-of-the-ground
 constexpr double kWider = 1.2;
-constexpr int kMostWidenings = 3;  ///< each costs a fit of all latents
+constexpr int kMostWidenings = 3;              ///< each costs a fit of all latents
 const double kDbPerNeper = 10 / std::log(10);  ///< decibels of a power whose natural logarithm is 1
 /// Standard deviation of an actor's error over the spread of all, below which the session tells something of it.
 constexpr double kKnownBelow = 0.9;

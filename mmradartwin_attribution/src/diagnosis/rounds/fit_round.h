@@ -29,8 +29,8 @@ class FitRound {
   DiagnosisContext& context_;
   ModelState& state_;
   std::vector<Screened> screened_;
-  std::vector<HypothesisFit> fits_;  ///< best first
-  double best_overwhelming_name_ = 0;  ///< nats of the best overwhelming named cause
+  std::vector<HypothesisFit> fits_;          ///< best first
+  double best_overwhelming_name_ = 0;        ///< nats of the best overwhelming named cause
   std::pair<bool, double> boxed_{false, 0};  ///< of the object that a box is tried about: larger than clutter; its nats
 };
 
