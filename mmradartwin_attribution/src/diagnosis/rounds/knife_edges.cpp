@@ -11,11 +11,11 @@ namespace mmradartwin::diagnosis::rounds {
 namespace {
 
 constexpr const char* kKnifeEdges = "knife_edges";
-constexpr std::size_t kPosesBeforeFit = 22;
+constexpr std::size_t kPosesBeforeFit = 22;  ///< looked at, evenly spread; most sessions have more
 constexpr double kSure_sigmas = 3;  ///< of a loss that no fit of latents turns into a gain
 
-/// True where poses are surely less likely before the latents are fitted, which spares the fit. With fitted latents
-/// such a loss changes by a few percent; see docs/verification/speed.md.
+/// True where poses are surely less likely before the latents are fitted, which spares the fit: such a loss is far
+/// larger than what fitted latents win; see docs/verification/speed.md#a-full-campaign.
 bool surelyLoses(DiagnosisContext& context, const ModelState& plain, const std::vector<NamedParameters>& mechanisms) {
   const std::size_t all = plain.by_pose.size(), looked_at = std::min(all, kPosesBeforeFit);
   std::vector<int> poses;
