@@ -297,6 +297,19 @@ TEST_F(ScanToSceneTest, CylinderAndItsRadiusAreFound) {
   EXPECT_NEAR(scene.things[0].bounds.sizes().x(), 0.5, 0.01);
 }
 
+TEST_F(ScanToSceneTest, UpOfACorridorThatIsHigherThanWideIsFound) {
+  SampledRoom room(0.003, 1500);
+  room.addShell({9, 2.0, 2.7});
+  room.addBox({1, 0.02, 0}, {2.2, 0.5, 1.9});  // all furniture at one wall
+  room.addBox({4, 0.02, 0}, {5.0, 0.45, 1.8});
+  const ScanScene z_up = sceneOfScan(room.scan(), {});
+  EXPECT_EQ(z_up.frame.up_name, "z");
+  EXPECT_NEAR(z_up.frame.ceiling_m, 2.7, 0.002);
+  Eigen::Matrix3d y_up;
+  y_up << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  EXPECT_NEAR(sceneOfScan(room.scan(y_up), {}).frame.ceiling_m, 2.7, 0.002);
+}
+
 TEST_F(ScanToSceneTest, DoubledWallIsOnePlane) {
   SampledRoom room(0.003);
   room.addShell(kRoom);

@@ -25,12 +25,16 @@ from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.resumable_program import run_resumable
 from mmradartwin_tests.scans import persistence, scan_files, scene_comparison
 from mmradartwin_tests.scans.degraded_scan import DEGRADATIONS, Scan, make_scan
-from mmradartwin_tests.scans.known_room import ROOMS, rectangles_of
+from mmradartwin_tests.scans.drawn_room import SHAPES, draw_room
+from mmradartwin_tests.scans.known_room import ROOMS, rectangles_of, third_world_room
+from mmradartwin_tests.third_world.rooms import KINDS
 
 CASES = (("phone", "office"), ("fused_fine", "office"),
          ("fused_mm_y_up", "l_shaped"), ("poisson", "meeting_97"), ("lidar_cloud", "office"),
          ("noisy_cloud", "l_shaped"), ("doubled_frames", "living_room"), ("far_coordinates", "laboratory"),
          ("three_million", "small_office"))
+# Drawn scans take these in turn, so that each fault meets other rooms with each seed.
+FAULTS = ("phone", "doubled_frames", "noisy_cloud", "fused_mm_y_up", "lidar_cloud", "poisson", "far_coordinates", "fused_fine")
 REAL = ("hololens_room.ply", "kinect_office.pcd")
 MOST_RAW = 800000      # triangles of a raw scan that is simulated beside its scene
 
@@ -40,6 +44,8 @@ def parse():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--output", required=True, help="folder of scans, scenes, results and table")
     parser.add_argument("--seed", type=whole(0), default=1, help="of scans and poses (default: 1)")
+    parser.add_argument("--draw", type=whole(0), default=0,
+                        help="so many scans of drawn rooms in place of the known cases and the real scans (default: 0)")
     parser.add_argument("--cases", default="", help="only these, by names of scans or rooms, with commas (default: all)")
     parser.add_argument("--real", default=os.path.join(os.environ.get("MMRADARTWIN_DATA", ""), "rooms"),
                         help="folder of the real scans (default: rooms in MMRADARTWIN_DATA)")
@@ -113,9 +119,34 @@ def steady(scene_yaml, room, T, arguments, place):
     return persistence.measure(place + "_simulated", pairs)
 
 
+def drawn_cases(count, seed):
+    """[(name of a fault, name of a room)] of drawn scans: each shape and each known room in turn, each with a fault."""
+    rng = np.random.default_rng([seed, 4949])
+    shapes, rooms = rng.permutation(list(SHAPES)), rng.permutation(["office", "laboratory", "living_room", "l_shaped"])
+    faults = rng.permutation(FAULTS)
+    order = [*shapes, *rooms]
+    chosen = []
+    for i in range(count):
+        # The second round of faults begins one later, so that no fault meets the same room again.
+        fault = faults[(i + i // len(order)) % len(faults)]
+        room = order[i % len(order)]
+        chosen.append((str(fault), f"{room}:{seed + i // len(order)}" if room in SHAPES or room in KINDS else str(room)))
+    return chosen
+
+
+def room_of(name):
+    """A room of ROOMS by its name, or a drawn one: SHAPE:SEED, or KIND:SEED of the third world."""
+    kind, _, seed = name.partition(":")
+    if not seed:
+        return ROOMS[name]()
+    return draw_room(kind, int(seed)) if kind in SHAPES else third_world_room(kind, int(seed))
+
+
 def run_known(name, room_name, arguments):
-    """Record of a degraded scan of a known room."""
-    room, place = ROOMS[room_name](), os.path.join(arguments.output, f"{name}_{room_name}")
+    """Record of a degraded scan of a known or drawn room."""
+    room = room_of(room_name)
+    room_name = room_name.replace(":", "_")
+    place = os.path.join(arguments.output, f"{name}_{room_name}")
     scan = make_scan(room, DEGRADATIONS[name], arguments.seed)
     file = place + ".ply"
     scan_files.write_ply(file, scan)
@@ -193,8 +224,11 @@ def run(arguments):
     """Runs what is missing."""
     results = Results(os.path.join(arguments.output, "results.jsonl"), ("status", "seconds"))
     wanted = [c for c in arguments.cases.split(",") if c]
-    todo = [(f"{name}_{room}", lambda n=name, r=room: run_known(n, r, arguments)) for name, room in CASES]
-    todo += [(name, lambda n=name: run_real(n, arguments)) for name in REAL if os.path.exists(os.path.join(arguments.real, name))]
+    cases = drawn_cases(arguments.draw, arguments.seed) if arguments.draw else CASES
+    todo = [(f"{name}_{room.replace(':', '_')}", lambda n=name, r=room: run_known(n, r, arguments)) for name, room in cases]
+    if not arguments.draw:
+        todo += [(name, lambda n=name: run_real(n, arguments))
+                 for name in REAL if os.path.exists(os.path.join(arguments.real, name))]
     if not arguments.table:
         if find_program("mmradartwin_sim", "make_scene") is None:
             raise ValueError("mmradartwin_sim make_scene is not in the sourced workspace; build it first")

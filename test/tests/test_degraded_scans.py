@@ -6,6 +6,7 @@ import numpy as np
 
 from mmradartwin_tests.scans import degraded_scan, known_room
 from mmradartwin_tests.scans.degraded_scan import Degradation, make_scan
+from mmradartwin_tests.scans.drawn_room import SHAPES, draw_room
 from mmradartwin_tests.scans.ray_casting import CastRoom
 
 
@@ -29,6 +30,32 @@ def distance_to_surface(room, points):
 
 
 class DegradedScans(unittest.TestCase):
+    def test_drawn_rooms_hold_their_furniture_and_are_free_to_stand_in(self):
+        for shape in SHAPES:
+            room, again, other = draw_room(shape, 5), draw_room(shape, 5), draw_room(shape, 6)
+            np.testing.assert_array_equal(room.outline, again.outline)
+            self.assertFalse(room.outline.shape == other.outline.shape and np.allclose(room.outline, other.outline))
+            self.assertGreaterEqual(len(room.furniture), 3, msg=shape)
+            for actor in room.furniture:
+                corners = np.array([r.origin + a * r.s1 * r.e1 + b * r.s2 * r.e2 for part in actor.parts
+                                    for r in part.rectangles() for a in (0, 1) for b in (0, 1)])
+                self.assertTrue(room.contains(corners, -1e-6).all(), msg=f"{shape}: {actor.name}")
+                self.assertLessEqual(corners[:, 2].max(), room.height_m, msg=f"{shape}: {actor.name}")
+                below = [slant.parts[0].distance(p) for slant in room.slants for p in corners]
+                self.assertGreater(min(below, default=1), 0, msg=f"{shape}: {actor.name} is in the roof")
+            for place in room.standpoints(np.random.default_rng(1), 3):
+                self.assertGreater(room.clearance(place), 0.1, msg=shape)
+
+    def test_a_roof_bounds_the_scan(self):
+        room = draw_room("attic", 5)
+        roof = room.slants[0].parts[0]
+        for kind in ("cloud", "fused"):
+            points = in_map(make_scan(room, Degradation("roof", kind=kind, size=60000, noise_m=0.0), 2))
+            inside = np.abs((points - roof.center) @ roof.rotation) - roof.size / 2
+            depth = -inside.max(axis=1)       # below the roof's surface, m
+            self.assertLess(depth.max(), 0.06, msg=kind)
+            self.assertGreater(np.mean(np.abs(depth) < 0.02), 0.05, msg=kind)
+
     def test_same_seed_same_scan(self):
         room = known_room.l_shaped_room()
         for kind in ("cloud", "frames", "fused"):

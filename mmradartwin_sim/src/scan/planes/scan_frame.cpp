@@ -15,6 +15,8 @@ constexpr double kDeg = M_PI / 180;
 constexpr double kCone_rad = 12 * kDeg;    // planes within are level or upright, before up is known
 constexpr double kRoom_m[2] = {1.0, 9.0};  // the smallest of a room's three sizes, up to a hall's height
 constexpr double kWidest_m = 150;
+constexpr double kShell_m2 = 3;        // a plane as large is the room's own: tops and sides of furniture are smaller
+constexpr double kNoUp = -100;         // score of an axis that no plane has as its normal
 constexpr double kSameLevel_m = 0.06;  // a floor that drift has doubled is one
 
 std::string number(double value, int digits = 2) {
@@ -42,14 +44,15 @@ Eigen::Vector3d robustSizes(const std::vector<Eigen::Vector3f>& points) {
 struct NamedAxis {
   const char* name;
   Eigen::Vector3d axis;
-  double prior;  ///< how usual it is that a file's up is this axis
+  double prior;  ///< ln of how usual it is that a file's up is this axis, to the most usual one
 };
 
 std::vector<NamedAxis> axesOf(const RawScan& scan) {
   const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(), z = Eigen::Vector3d::UnitZ();
   // Surveyors and robots write z up, phones and games y up; a depth camera looks along z with y down.
-  if (scan.camera_axes) return {{"-y", -y, 3}, {"z", z, 0}, {"y", y, 0}, {"x", x, 0}, {"-z", -z, 0}, {"-x", -x, 0}};
-  return {{"z", z, 1}, {"y", y, 0.7}, {"-y", -y, 0.3}, {"x", x, 0.2}, {"-z", -z, 0.2}, {"-x", -x, 0.1}};
+  if (scan.camera_axes)
+    return {{"-y", -y, 0}, {"z", z, -6}, {"y", y, -6}, {"x", x, -6}, {"-z", -z, -6}, {"-x", -x, -6}};
+  return {{"z", z, 0}, {"y", y, -0.5}, {"-y", -y, -2}, {"x", x, -3}, {"-z", -z, -3}, {"-x", -x, -3.5}};
 }
 
 /// Area of planes whose normal lies along an axis, or across it.
@@ -67,42 +70,79 @@ Alignment alignmentWith(const std::vector<PlaneRegion>& regions, const Eigen::Ve
   return result;
 }
 
-/// Rooms are lower than they are wide, and furniture stands on the floor: how well an axis fits as up.
-double scoreOfUp(const ScanSamples& samples, const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& axis) {
-  const Alignment aligned = alignmentWith(regions, axis);
-  double all_m2 = 1e-9;
-  for (const PlaneRegion& r : regions) all_m2 += r.area_m2;
-  if (aligned.along_m2 < 0.05 * all_m2) return -10;
-  std::vector<float> heights;
-  for (const Eigen::Vector3f& p : samples.points) heights.push_back(p.dot(axis.cast<float>()));
-  std::vector<float> sorted = heights;
-  std::sort(sorted.begin(), sorted.end());
-  const float low = sorted[sorted.size() / 200], high = sorted[sorted.size() - 1 - sorted.size() / 200];
-  const float height_m = high - low;
+/// What of a scan tells which way is up.
+struct UpSigns {
+  const ScanSamples& samples;
+  const std::vector<PlaneRegion>& regions;
+  std::vector<int> furniture;  ///< samples that are on no plane as large as a wall's
+};
+
+UpSigns upSigns(const ScanSamples& samples, const std::vector<PlaneRegion>& regions) {
+  UpSigns signs{samples, regions, {}};
+  std::vector<char> on_shell(samples.size(), 0);
+  for (const PlaneRegion& r : regions) {
+    if (r.area_m2 < kShell_m2) continue;
+    for (int i : r.samples) on_shell[static_cast<std::size_t>(i)] = 1;
+  }
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!on_shell[i]) signs.furniture.push_back(static_cast<int>(i));
+  }
+  return signs;
+}
+
+/// Lower and upper end along an axis, but for half a percent.
+std::array<double, 2> endsAlong(const ScanSamples& samples, const Eigen::Vector3d& axis) {
+  std::vector<float> along;
+  for (const Eigen::Vector3f& p : samples.points) along.push_back(p.dot(axis.cast<float>()));
+  const auto low = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 200);
+  std::nth_element(along.begin(), low, along.end());
+  const double from = static_cast<double>(*low);
+  const auto high = along.end() - 1 - static_cast<std::ptrdiff_t>(along.size() / 200);
+  std::nth_element(along.begin(), high, along.end());
+  return {from, static_cast<double>(*high)};
+}
+
+/// How well an axis fits as up, as the logarithm of a likelihood: most rooms are 2.2 to 3.6 m high and lower than wide
+/// (one in six is no wider than high), furniture stands in their lower half, and its upper sides are what is seen of
+/// it. The shares are those of rooms at large, and of no scan.
+double scoreOfUp(const UpSigns& signs, const Eigen::Vector3d& axis) {
+  const Alignment aligned = alignmentWith(signs.regions, axis);
+  double all_m2 = 1e-9, up_m2 = 0, down_m2 = 0;
+  for (const PlaneRegion& r : signs.regions) {
+    all_m2 += r.area_m2;
+    const double cosine = r.normal.dot(axis);
+    if (r.area_m2 < kShell_m2 && std::abs(cosine) > std::cos(kCone_rad)) (cosine > 0 ? up_m2 : down_m2) += r.area_m2;
+  }
+  if (aligned.along_m2 < 0.05 * all_m2) return kNoUp;
+  const auto [low, high] = endsAlong(signs.samples, axis);
+  const double height_m = high - low;
   // Across: the smaller of two sizes at right angles.
   const Eigen::Vector3d u = axis.unitOrthogonal(), v = axis.cross(u);
   double narrowest_m = 1e9;
   for (const Eigen::Vector3d& side : {u, v}) {
-    for (std::size_t i = 0; i < sorted.size(); ++i) sorted[i] = samples.points[i].dot(side.cast<float>());
-    std::sort(sorted.begin(), sorted.end());
-    narrowest_m =
-        std::min(narrowest_m, static_cast<double>(sorted[sorted.size() * 199 / 200] - sorted[sorted.size() / 200]));
+    const auto [from, to] = endsAlong(signs.samples, side);
+    narrowest_m = std::min(narrowest_m, to - from);
   }
-  double score = (aligned.along_m2 + aligned.across_m2) / all_m2;
-  if (height_m > 1.9F && height_m < 5) score += 0.5;
-  if (static_cast<double>(height_m) < narrowest_m) score += 0.7;
-  std::size_t lower = 0, upper = 0;
-  for (float h : heights) {
-    const float share = (h - low) / height_m;
-    lower += share > 0.05F && share < 0.45F;
-    upper += share > 0.55F && share < 0.95F;
+  double score = 4 * (aligned.along_m2 + aligned.across_m2) / all_m2;
+  if (height_m < 2.2 || height_m > 3.6) score -= 2.5;
+  if (height_m < 1.9 || height_m > 5) score -= 1.5;
+  if (narrowest_m < height_m) score -= 1.6;
+  double lower = 0, upper = 0;
+  for (int i : signs.furniture) {
+    const double at = signs.samples.points[static_cast<std::size_t>(i)].cast<double>().dot(axis) - low;
+    lower += at > 0.05 * height_m && at < 0.45 * height_m;
+    upper += at > 0.55 * height_m && at < 0.95 * height_m;
   }
-  return score + (static_cast<double>(lower) - static_cast<double>(upper)) / static_cast<double>(lower + upper + 1);
+  // All furniture may stand at one wall, so that neither share is proof.
+  score += std::clamp(2.5 * (lower - upper) / (lower + upper + 1), -1.5, 1.0);
+  if (signs.samples.oriented) score += (up_m2 - down_m2) / (up_m2 + down_m2 + 0.3);
+  return score;
 }
 
 Eigen::Vector3d findUp(const RawScan& scan, const ScanSamples& samples, const std::vector<PlaneRegion>& regions) {
+  const UpSigns signs = upSigns(samples, regions);
   Eigen::Vector3d best = Eigen::Vector3d::UnitZ();
-  double best_score = -1e9;
+  double best_score = 2 * kNoUp;
   for (const NamedAxis& candidate : axesOf(scan)) {
     // The planes near the axis say where it is; without any it cannot be up.
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -112,15 +152,15 @@ Eigen::Vector3d findUp(const RawScan& scan, const ScanSamples& samples, const st
     }
     if (sum.isZero()) continue;
     const Eigen::Vector3d axis = sum.normalized();
-    const double score = candidate.prior + scoreOfUp(samples, regions, axis);
+    const double score = candidate.prior + scoreOfUp(signs, axis);
     if (score > best_score) best_score = score, best = axis;
   }
   // Axes of the file that no plane follows: the sensor's own attitude at the start. Planes alone decide.
-  if (best_score < 0.5) {
+  if (best_score < kNoUp / 2) {
     for (std::size_t i = 0; i < std::min<std::size_t>(regions.size(), 8); ++i) {
       for (double sign : {1.0, -1.0}) {
         const Eigen::Vector3d axis = sign * regions[i].normal;
-        const double score = scoreOfUp(samples, regions, axis) + 0.2 * axis.z();
+        const double score = scoreOfUp(signs, axis) + 0.2 * axis.z();
         if (score > best_score) best_score = score, best = axis;
       }
     }

@@ -48,6 +48,8 @@ ClassGuess classOnFloor(const ThingSigns& s) {
   }
   if (s.high_m < 0.8 && s.high_m > 0.2 && s.length_m < 0.55 && s.width_m > 0.12)
     return {"bin", 0.5, s.round ? "small and round, on the floor" : "small, on the floor"};
+  // Cupboards are at most 0.65 m deep, a sofa's seat and back are deeper.
+  if (within(s.high_m, 0.55, 1.0) && s.length_m > 1.3 && s.width_m > 0.7) return {"sofa", 0.4, "long, low and deep"};
   if (within(s.high_m, 0.5, 1.0) && box && s.width_m > 0.3) return {"cabinet", 0.6, "a low box on the floor"};
   if (within(s.high_m, 0.3, 0.7) && s.length_m > 1.6 && s.width_m > 0.7) return {"bed", 0.5, "long, wide and low"};
   if (within(s.high_m, 0.6, 1.1) && s.length_m > 1.2 && s.width_m > 0.6)

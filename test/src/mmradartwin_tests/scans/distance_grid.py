@@ -51,7 +51,7 @@ class DistanceGrid:
         height = np.minimum(z, room.height_m - z).astype(np.float32)
         self.values = np.minimum(walls[:, :, None], height[None, None, :])
         cut = TRUNCATION * step_m
-        for part in (p for actor in room.furniture for p in actor.parts):
+        for part in (p for actor in room.solids() for p in actor.parts):
             near, far = part_bounds(part)
             a = np.maximum(np.floor((near - cut - self.low) / step_m).astype(int), 0)
             b = np.minimum(np.ceil((far + cut - self.low) / step_m).astype(int) + 1, shape)

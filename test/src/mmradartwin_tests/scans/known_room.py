@@ -26,13 +26,19 @@ class Wall:
 
 @dataclasses.dataclass
 class KnownRoom:
-    """outline: [n, 2] corners, counter-clockwise; walls[i] runs from corner i to the next. furniture: list of Actor."""
+    """outline: [n, 2] corners, counter-clockwise; walls[i] runs from corner i to the next. furniture: list of Actor.
+    slants: bodies of the building itself, of which one slanted face bounds the room: the lower one of a roof."""
     name: str
     outline: np.ndarray
     height_m: float
     wall_names: list
     wall_tags: list
     furniture: list
+    slants: list = dataclasses.field(default_factory=list)
+
+    def solids(self):
+        """All bodies in the room."""
+        return self.furniture + self.slants
 
     def walls(self):
         """List of Wall."""
@@ -56,8 +62,8 @@ class KnownRoom:
         return actors
 
     def actors(self):
-        """Shell and furniture."""
-        return self.shell() + self.furniture
+        """Shell and bodies."""
+        return self.shell() + self.solids()
 
     def contains(self, points, margin_m=0.0):
         """[P] whether places [P, 2 or 3] lie within the outline, at least margin_m from each wall."""
@@ -66,7 +72,7 @@ class KnownRoom:
     def clearance(self, p):
         """Distance of a point to the nearest surface, m."""
         height = min(p[2], self.height_m - p[2])
-        pieces = [part.distance(p) for actor in self.furniture for part in actor.parts]
+        pieces = [part.distance(p) for actor in self.solids() for part in actor.parts]
         return min([height, float(outline_distance(self.outline, np.atleast_2d(p)[:, :2])[0]), *pieces])
 
     def standpoints(self, rng, count, height_m=(1.3, 1.7), clearance_m=0.5):
@@ -123,11 +129,10 @@ def office_room():
                      [tag[name] for name in SIDES], furniture)
 
 
-def third_world_room(kind, seed):
-    """A room of the third world (third_world/rooms.py), with legs under its tables."""
-    plan = rooms.draw_plan(np.random.default_rng([seed, 49]), kind)
+def furniture_of(pieces):
+    """Actors of the third world's pieces, with legs under its tables."""
     furniture = []
-    for piece in plan.pieces:
+    for piece in pieces:
         size = piece.box.size
         turn = piece.box.axes().T
         solid = Box(piece.box.center, size, turn)
@@ -139,6 +144,13 @@ def third_world_room(kind, seed):
                     foot = piece.box.center + turn @ [sx * (size[0] / 2 - 0.05), sy * (size[1] / 2 - 0.05), 0.0]
                     parts.append(Box(np.array([foot[0], foot[1], bottom / 2]), np.array([0.05, 0.05, bottom - 0.01]), turn))
         furniture.append(Actor(piece.name, piece.tag, parts))
+    return furniture
+
+
+def third_world_room(kind, seed):
+    """A room of the third world (third_world/rooms.py)."""
+    plan = rooms.draw_plan(np.random.default_rng([seed, 49]), kind)
+    furniture = furniture_of(plan.pieces)
     return KnownRoom(f"{kind}_{seed}", rectangle_outline(*plan.size_m[:2]), float(plan.size_m[2]), list(SIDES),
                      [plan.walls[name] for name in SIDES], furniture)
 

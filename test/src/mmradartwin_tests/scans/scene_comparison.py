@@ -29,7 +29,7 @@ class Measured:
     floor_m: float
     tilt_deg: float
     walls: list
-    wall_share: float         # of the scan's wall area that lies on planes
+    wall_share: float         # of the walls' area that the scan has: what the scene's planes hold
     furniture: list           # (name, what it was said to be or "", right)
     flat: list                # likewise, for what is thinner than FLAT_M
     extra: list               # things that stand for nothing
@@ -144,6 +144,25 @@ def overlap(a, b):
     return common / (np.prod(ah - al) + np.prod(bh - bl) - common)
 
 
+def slant_errors(room, T, planes):
+    """Likewise of the slanted faces that bound the room: of each such body, the face that looks down most."""
+    found = []
+    for slant in room.slants:
+        faces = [r for part in slant.parts for r in rectangles_of(part)]
+        face = min(faces, key=lambda r: np.cross(r.e1, r.e2)[2])
+        normal = T[:3, :3] @ np.cross(face.e1, face.e2)
+        normal /= np.linalg.norm(normal)
+        middle = T[:3, :3] @ (face.origin + face.s1 / 2 * face.e1 + face.s2 / 2 * face.e2) + T[:3, 3]
+        best = None
+        for n, center, area, _ in planes.values():
+            angle = math.degrees(math.acos(min(1.0, abs(n @ normal))))
+            offset = abs((center - middle) @ normal)
+            if angle < 5 and offset < 0.2 and area > 1 and (best is None or area > best[2]):
+                best = (offset, angle, area)
+        found.append((slant.name, *(best[:2] if best else (math.nan, math.nan))))
+    return found
+
+
 def wall_errors(room, T, planes):
     """[(name, offset m, angle deg)] of each known wall, by the found plane nearest to it; nan where none is."""
     found = []
@@ -165,6 +184,37 @@ def wall_errors(room, T, planes):
     return found
 
 
+def wall_share(room, T, scan, planes):
+    """Share of the walls' area that the scan has over which one of the planes {name: [T, 3, 3]} lies within SCANNED_M.
+
+    By places 10 cm apart on the known walls and slants. What furniture covers the scan does not have."""
+    places = []
+    faces = [r for actor in room.shell()[2:] for r in actor.parts]
+    faces += [min((r for part in s.parts for r in rectangles_of(part)), key=lambda r: np.cross(r.e1, r.e2)[2])
+              for s in room.slants]
+    for r in faces:
+        u, v = np.arange(0.05, r.s1, 0.1), np.arange(0.05, r.s2, 0.1)
+        places.append((r.origin + u[:, None, None] * r.e1 + v[None, :, None] * r.e2).reshape(-1, 3))
+    places = np.concatenate(places)
+    S = scan.T_scan_map
+    near, _ = cKDTree(scan.points).query(places @ S[:3, :3].T + S[:3, 3])
+    places = places[near < SCANNED_M * np.linalg.norm(S[:3, 0])]
+    places = places @ T[:3, :3].T + T[:3, 3]
+    held = np.zeros(len(places), bool)
+    for triangles in planes.values():
+        for a, b, c in triangles:
+            normal = np.cross(b - a, c - a)
+            area = np.linalg.norm(normal)
+            if area < 1e-9:
+                continue
+            normal /= area
+            off = (places - a) @ normal
+            # Weights of the corners; a centimetre beyond an edge counts, too.
+            inside = [np.cross(q - p, places - p) @ normal > -0.01 * np.linalg.norm(q - p) for p, q in ((a, b), (b, c), (c, a))]
+            held |= (np.abs(off) < SCANNED_M) & np.all(inside, axis=0)
+    return float(held.mean()) if len(held) else math.nan
+
+
 def furniture_found(groups, things):
     """[(name, said class or "", right, flat)] and the things that stand for no piece."""
     rows, used = [], set()
@@ -184,7 +234,7 @@ def compare(folder, room, scan):
     objects = read_obj(os.path.join(folder, "room.obj"))
     T = map_from_truth(quality, scan)
     flat = {p["name"]: fitted_plane(objects[p["name"]]) for p in quality["planes"] if p["name"] in objects}
-    walls = wall_errors(room, T, {n: p for n, p in flat.items() if abs(p[0][2]) < 0.5})
+    walls = wall_errors(room, T, {n: p for n, p in flat.items() if abs(p[0][2]) < 0.5}) + slant_errors(room, T, flat)
     things = {t["name"]: (t["class"], objects[t["name"]].min(axis=(0, 1)), objects[t["name"]].max(axis=(0, 1)))
               for t in quality["things"] if t["name"] in objects}
     for name in flat:
@@ -196,10 +246,9 @@ def compare(folder, room, scan):
     rows, extra = furniture_found(groups, things)
     rows = [r for r in rows if r[0] not in unscanned]
     up = T[:3, 2] / np.linalg.norm(T[:3, 2])
-    areas = quality["areas"]
     return Measured(floor_m=float(T[2, 3] + T[2, :2] @ room.outline.mean(axis=0)),
                     tilt_deg=math.degrees(math.acos(min(1.0, abs(up[2])))), walls=walls,
-                    wall_share=areas["wall_on_planes_m2"] / max(areas["wall_m2"], 1e-9),
+                    wall_share=wall_share(room, T, scan, {n: objects[n] for n in flat}),
                     furniture=[r[:3] for r in rows if not r[3]], flat=[r[:3] for r in rows if r[3]], extra=extra,
                     unscanned=unscanned,
                     quality=quality)
