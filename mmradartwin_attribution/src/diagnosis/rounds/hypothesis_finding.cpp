@@ -147,14 +147,20 @@ std::string rejectionOfObject(const Parameters& values, const std::vector<FrameF
 
 }  // namespace
 
-std::string rejectionReason(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers) {
-  const Parameters values = fit.hypothesis.at(fit.scaled_values).values;
-  const MechanismTraits& traits = traitsOf(fit.hypothesis.mechanism.mechanism);
-  for (const PlausibleRange& range : traits.plausible) {
-    const double value = values.number(range.parameter);
+std::string implausibility(const NamedParameters& mechanism) {
+  for (const PlausibleRange& range : traitsOf(mechanism.mechanism).plausible) {
+    const double value = mechanism.values.number(range.parameter);
     if (value < range.low) return range.too_low + number(value) + range.unit;
     if (value > range.high) return range.too_high + number(value) + range.unit;
   }
+  return "";
+}
+
+std::string rejectionReason(const HypothesisFit& fit, const std::vector<FrameFinding>& walkers) {
+  const NamedParameters mechanism = fit.hypothesis.at(fit.scaled_values);
+  const Parameters& values = mechanism.values;
+  const MechanismTraits& traits = traitsOf(mechanism.mechanism);
+  if (std::string reason = implausibility(mechanism); !reason.empty()) return reason;
   if (traits.form == MechanismForm::kSurfaceClutter) return "what lies on " + values.text("actor") + " is clutter";
   return traits.form == MechanismForm::kUnmodelledObject ? rejectionOfObject(values, walkers) : "";
 }

@@ -26,6 +26,9 @@ void describeGain(const HypothesisFit& fit, const ModelState& before, const Chan
 /// is missing or has a law of its own. Nothing for other mechanisms.
 std::optional<Eigen::Vector2d> placeOf(const NamedParameters& mechanism, const Scene& scene);
 
+/// What speaks against the numbers of a cause by themselves, "" where nothing does.
+std::string implausibility(const NamedParameters& mechanism);
+
 /// Reason why a fit is no finding, "" where it may be one. Refused are: an object or a scattering as weak as clutter, a
 /// panel that lets everything through, a second image (ghost) by edges alone, and an object where one of the `walkers`
 /// walks, whose echo does not average out over a pose's frames. Other causes in `walkers` are ignored.

@@ -61,7 +61,9 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
   }
   const bool stands = acceptedAs(fit.hypothesis) != accepted_.end();
   const bool is_nothing = stands && mayBeNothing(fit.hypothesis);
-  if (!stands || is_nothing || isWithinErrors(fit)) {
+  const std::string implausible =
+      stands ? implausibility(fit.hypothesis.at(acceptedAs(fit.hypothesis)->scaled_values)) : "";
+  if (!stands || is_nothing || !implausible.empty() || isWithinErrors(fit)) {
     accepted_ = accepted;
     findings_ = findings;
     writeBackFindings();
@@ -69,6 +71,7 @@ std::string Selection::take(const HypothesisFit& fit, const std::vector<Hypothes
     all_profiled_ = profiled_before;
     context_.echoes.setBaseline(mechanisms_);
     if (is_nothing) return "its interval holds the value that does nothing";
+    if (!implausible.empty()) return implausible;
     return stands ? "no larger than what errors of actors and poses look like" : "worth nothing beside the rest";
   }
   for (const Accepted& before : accepted) {
@@ -127,8 +130,10 @@ void Selection::refitTogether() {
       // A finding without numbers, or with an overwhelming gain, was judged by its own round. A law is judged again: it
       // may have stood for a named cause that had not been fitted yet.
       a.plain_beside_others = a.overwhelming && context_.fitter.isOverwhelming(fit.evidence[i].nats);
-      if (numbers == 0 || a.plain_beside_others) continue;
-      const double rate = context_.fitter.falseAlarmRate(fit.evidence[i].scattered(), a.hypothesis, numbers, family_);
+      const bool plausible = implausibility(a.hypothesis.at(a.scaled_values)).empty();
+      if (plausible && (numbers == 0 || a.plain_beside_others)) continue;
+      const double rate =
+          plausible ? context_.fitter.falseAlarmRate(fit.evidence[i].scattered(), a.hypothesis, numbers, family_) : 1;
       if (rate > weakest_rate) {
         weakest = i;
         weakest_rate = rate;
@@ -187,8 +192,9 @@ void Selection::renameVerdict(const std::string& label, const std::string& verdi
 /// Profiles the values and intervals of all findings of rounds, or of only one and what is profiled with it.
 void Selection::profileFound(std::optional<std::size_t> only) {
   context_.report("errors of what was found", 0);
-  // A climb of the values leaves the latents short of their optimum, from where other values look likelier.
-  state_.latents = context_.fitter.state(mechanisms_, &state_.latents).latents;
+  // A climb of the values leaves the latents short of their optimum, from where other values look likelier. What follows
+  // starts from where the climb left them: latents at their optimum take in what a further cause would explain.
+  const SessionLatents latents = context_.fitter.state(mechanisms_, &state_.latents).latents;
   std::vector<Hypothesis> parts;
   std::vector<ProfiledValues> fits;
   for (const Accepted& a : accepted_) {
@@ -196,8 +202,8 @@ void Selection::profileFound(std::optional<std::size_t> only) {
     fits.push_back({a.scaled_values, a.standard_error});
   }
   all_profiled_ =
-      profileParts({context_.echoes, context_.likelihood, context_.pose_accuracy, before_rounds_, state_.latents},
-                   parts, fits, only);
+      profileParts({context_.echoes, context_.likelihood, context_.pose_accuracy, before_rounds_, latents}, parts, fits,
+                   only);
   for (std::size_t i = 0; i < accepted_.size(); ++i) {
     Accepted& a = accepted_[i];
     a.scaled_values = fits[i].scaled_values;
