@@ -175,6 +175,10 @@ std::optional<std::size_t> HypothesisRounds::betterByMaps(std::vector<Hypothesis
   std::optional<std::vector<CellPowers>> of_best;
   for (std::size_t i = best + 1; i < fits.size(); ++i) {
     HypothesisFit& rival = fits[i];
+    // Seen from places that look one way, geometries are alike, and more numbers take in more of what the twin lacks.
+    const bool more_geometry =
+        fits[best].hypothesis.isGeometry() && rival.hypothesis.isGeometry() && rival.numbers() > fits[best].numbers();
+    if (more_geometry) continue;
     const double likelier_nats = natsApart(fits[best], rival, context_.data);
     if (likelier_nats > bounds::kNotToldApart_nats || rival.ranking() < bounds::kShareOfSimpler * fits[best].ranking())
       continue;
