@@ -283,6 +283,71 @@ TEST_F(ScanToSceneTest, FurnitureIsToldApart) {
   EXPECT_NEAR(table->bounds.sizes().x(), 1.6, 0.02);
 }
 
+TEST_F(ScanToSceneTest, ARoofBoundsWallsAndCeiling) {
+  // From a low wall of 1 m at y = 0 a roof rises by 45 deg to the ceiling at y = 1.6.
+  SampledRoom room(0.004);
+  room.addShell(kRoom, [](const Eigen::Vector3d& p) { return p.z() > 1 + p.y(); });
+  room.add({0, 0, 1}, {5, 0, 0}, {0, 1.6, 1.6});
+  const ScanScene scene = sceneOfScan(room.scan(), {});
+  ASSERT_EQ(scene.planes.size(), 7U);
+  const double s = std::sqrt(0.5);
+  const ScanPlane *roof = planeAt(scene, {0, s, -s}, -s), *low = planeAt(scene, {0, 1, 0}, 0),
+                  *gable = planeAt(scene, {-1, 0, 0}, -5), *ceiling = planeAt(scene, {0, 0, -1}, -2.6),
+                  *floor = planeAt(scene, {0, 0, 1}, 0);
+  ASSERT_TRUE(roof && low && gable && ceiling && floor);
+  EXPECT_NEAR(roof->area_m2, 5 * 1.6 / s, 0.05);
+  EXPECT_NEAR(roof->covered_m2, roof->area_m2, 0.03 * roof->area_m2);
+  EXPECT_NEAR(low->area_m2, 5 * 1, 0.05);
+  EXPECT_NEAR(gable->area_m2, 4 * 2.6 - 0.5 * 1.6 * 1.6, 0.05);
+  EXPECT_NEAR(ceiling->area_m2, 5 * 2.4, 0.05);
+  EXPECT_NEAR(floor->area_m2, 5 * 4, 0.05);
+  EXPECT_TRUE(scene.things.empty());
+}
+
+TEST_F(ScanToSceneTest, AWallThatCutsACornerEndsTheFloor) {
+  SampledRoom room(0.004);
+  room.addShell(kRoom, [](const Eigen::Vector3d& p) { return p.x() + p.y() > 7.6; });
+  room.add({5, 2.6, 0}, {-1.4, 1.4, 0}, {0, 0, 2.6});
+  const ScanScene scene = sceneOfScan(room.scan(), {});
+  const ScanPlane *floor = planeAt(scene, {0, 0, 1}, 0), *ceiling = planeAt(scene, {0, 0, -1}, -2.6);
+  ASSERT_TRUE(floor && ceiling);
+  EXPECT_TRUE(planeAt(scene, {-std::sqrt(0.5), -std::sqrt(0.5), 0}, -7.6 * std::sqrt(0.5)));
+  EXPECT_NEAR(floor->area_m2, 20 - 0.5 * 1.4 * 1.4, 0.05);
+  EXPECT_NEAR(ceiling->area_m2, 20 - 0.5 * 1.4 * 1.4, 0.05);
+}
+
+TEST_F(ScanToSceneTest, SmallThingsOfNoSureClassAreLeftOut) {
+  SampledRoom room(0.003);
+  room.addShell(kRoom);
+  room.addBox({1.5, 1.5, 1.5}, {1.7, 1.7, 1.7});  // 0.2 m2 are seen of it
+  room.addBox({3.0, 2.0, 1.4}, {3.6, 2.6, 2.0});  // 1.8 m2
+  const ScanScene scene = sceneOfScan(room.scan(), {});
+  ASSERT_EQ(scene.things.size(), 1U);
+  EXPECT_NEAR(scene.things[0].bounds.min().x(), 3.0, 0.02);
+  EXPECT_TRUE(std::any_of(scene.notes.begin(), scene.notes.end(), [](const std::string& note) {
+    return note.find("in small things of no sure class") != std::string::npos;
+  }));
+}
+
+TEST_F(ScanToSceneTest, AnInnerWallIsCutFromWhatLeansOnIt) {
+  SampledRoom room(0.004);
+  const Eigen::Vector3d size(8, 6, 2.6);
+  room.addShell(size);
+  room.addBox({2, 3, 0}, {5, 3.12, 2.45});
+  // Two heaps that lean on it: their tops are no table's.
+  for (int k = 0; k < 4; ++k) {
+    const double x = 2.2 + 0.7 * k, z = 0.3 + 0.2 * k;
+    room.add({x, 3.12, z}, {0.6, 0, 0.1}, {0, 0.7 + 0.1 * k, -0.25});
+    room.add({x, 3.0, z}, {0.6, 0, -0.1}, {0, -0.8 + 0.1 * k, -0.25});
+  }
+  const ScanScene scene = sceneOfScan(room.scan(), {});
+  const ScanThing* wall = thingOf(scene, "partition");
+  ASSERT_TRUE(wall);
+  EXPECT_NEAR(wall->bounds.min().y(), 3, 0.05);
+  EXPECT_NEAR(wall->bounds.max().y(), 3.12, 0.05);
+  EXPECT_NEAR(wall->bounds.sizes().x(), 3, 0.06);
+}
+
 TEST_F(ScanToSceneTest, CylinderAndItsRadiusAreFound) {
   SampledRoom room(0.002);
   room.addShell({6, 5, 2.6});

@@ -178,7 +178,8 @@ def run_real(name, arguments):
         quality = scene_comparison.read_summary(place)
         areas = quality["areas"]
         record.update(wall_share=areas["wall_on_planes_m2"] / max(areas["wall_m2"], 1e-9), checks=quality["checks"],
-                      accuracy_m=quality["accuracy"]["scene_m"], things=len(quality["things"]), planes=len(quality["planes"]))
+                      accuracy_m=quality["accuracy"]["scene_m"], things=len(quality["things"] or []),
+                      planes=len(quality["planes"]))
     return record
 
 

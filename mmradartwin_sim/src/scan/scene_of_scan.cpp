@@ -95,6 +95,9 @@ void addNotes(ScanScene& scene, const RawScan& scan, const RoomPlanes& room, con
   if (things.crumbs)
     scene.notes.push_back(line("%.2f m2 lie in pieces too small for a thing and were left out",
                                static_cast<double>(things.crumbs) * cell_m2));
+  if (things.scraps)
+    scene.notes.push_back(line("%.2f m2 lie in small things of no sure class and were left out",
+                               static_cast<double>(things.scraps) * cell_m2));
   const double share = scene.scanned_m2 > 0 ? scene.left_out_m2 / scene.scanned_m2 : 0;
   if (share > 0.1)
     scene.notes.push_back(line(

@@ -3,11 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 namespace mmradartwin {
 namespace {
 
 constexpr double kRadPerDeg = M_PI / 180;
+constexpr double kBend_rad = 4 * kRadPerDeg;  // as parts of one plane that touch
+constexpr double kWall_m2 = 1;                // drift shows on large planes alone
+constexpr double kFarthest_m = 0.1;           // no piece of a wall is farther off; the tolerance decides
+constexpr double kBendCell_m = 0.1;
+constexpr double kWallGap_m = 0.6;  // in a wall, of a curtain or a tall cabinet
 
 /// Angle modulo 90 deg, -45 to 45.
 double quarter(double angle_rad) { return angle_rad - M_PI / 2 * std::round(angle_rad / (M_PI / 2)); }
@@ -56,10 +62,68 @@ void turnInwards(const ScanSamples& samples, std::vector<PlaneRegion>& regions) 
   }
 }
 
+/// Where an upright region has samples: cells of kBendCell_m along it and up.
+std::set<std::pair<int, int>> cellsOf(const ScanSamples& samples, const PlaneRegion& r, const Eigen::Vector3d& u) {
+  std::set<std::pair<int, int>> cells;
+  for (int i : r.samples) {
+    const Eigen::Vector3d p = samples.points[static_cast<std::size_t>(i)].cast<double>() / kBendCell_m;
+    cells.insert({static_cast<int>(std::floor(u.dot(p))), static_cast<int>(std::floor(p.z()))});
+  }
+  return cells;
+}
+
+/// Whether a piece goes on where a wall ends: it stands beside the wall's samples, and not before them.
+bool goesOn(const ScanSamples& samples, const PlaneRegion& wall, const PlaneRegion& piece) {
+  const Eigen::Vector3d u = Eigen::Vector3d::UnitZ().cross(wall.normal).normalized();
+  const auto of_wall = cellsOf(samples, wall, u), of_piece = cellsOf(samples, piece, u);
+  const auto shared = std::count_if(of_piece.begin(), of_piece.end(), [&](const auto& c) { return of_wall.count(c); });
+  const double apart_m =
+      std::max(of_piece.begin()->first - of_wall.rbegin()->first, of_wall.begin()->first - of_piece.rbegin()->first) *
+      kBendCell_m;
+  return apart_m < kWallGap_m && static_cast<double>(shared) < 0.3 * static_cast<double>(of_piece.size());
+}
+
+/// Nine in ten samples of a part lie on a plane.
+bool holdsPart(const ScanSamples& samples, const PlaneRegion& plane, const std::vector<int>& part) {
+  const double tolerance_m = planeTolerance(samples);
+  const auto near = std::count_if(part.begin(), part.end(), [&](int i) {
+    return std::abs(plane.distance(samples.points[static_cast<std::size_t>(i)].cast<double>())) < tolerance_m;
+  });
+  return 10 * static_cast<std::size_t>(near) > 9 * part.size();
+}
+
+/// A scanner that drifts bends a long wall, so that it grows in pieces that turn by a degree or two. A piece that goes
+/// on where a larger one ends is of that wall where one plane holds both.
+void joinBentWalls(const ScanSamples& samples, std::vector<PlaneRegion>& regions) {
+  std::vector<char> joined(regions.size(), 0);
+  for (std::size_t a = 0; a < regions.size(); ++a) {  // largest first
+    PlaneRegion& wall = regions[a];
+    if (joined[a] || wall.area_m2 < kWall_m2 || std::abs(wall.normal.z()) > std::sin(kBend_rad)) continue;
+    for (std::size_t b = a + 1; b < regions.size(); ++b) {
+      const PlaneRegion& piece = regions[b];
+      if (joined[b] || piece.normal.dot(wall.normal) < std::cos(kBend_rad)) continue;
+      if (std::abs(wall.distance(piece.middle)) > kFarthest_m || !goesOn(samples, wall, piece)) continue;
+      PlaneRegion both = wall;
+      both.samples.insert(both.samples.end(), piece.samples.begin(), piece.samples.end());
+      std::sort(both.samples.begin(), both.samples.end());
+      fitPlane(samples, kFarthest_m, both);
+      if (!holdsPart(samples, both, wall.samples) || !holdsPart(samples, both, piece.samples)) continue;
+      wall = std::move(both);
+      joined[b] = 1;
+    }
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    if (!joined[i] && kept++ != i) regions[kept - 1] = std::move(regions[i]);
+  }
+  regions.resize(kept);
+}
+
 }  // namespace
 
 double regularise(const ScanSamples& samples, bool enabled, std::vector<PlaneRegion>& regions) {
   if (!samples.oriented) turnInwards(samples, regions);
+  joinBentWalls(samples, regions);
   const double direction = mainDirection(regions);
   for (PlaneRegion& r : regions) {
     const Eigen::Vector3d before = r.normal;

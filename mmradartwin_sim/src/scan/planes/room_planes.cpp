@@ -12,6 +12,7 @@
 #include "mmradartwin_dsp/input_error.h"
 #include "scan/planes/floor_cells.h"
 #include "scan/planes/polygon_triangles.h"
+#include "scan/planes/slanted_bounds.h"
 #include "scan/samples/cell_raster.h"
 #include "scene/polygon_set.h"
 
@@ -27,6 +28,7 @@ constexpr double kHides_m = 1.2;                            // what stands so fa
 constexpr double kCell_m = 0.05;
 constexpr double kOpenStep_m = 1.0;
 constexpr double kLeastSeen_m2 = 0.2;  // of a wall
+constexpr double kParallel = 0.98;     // cosine of 11 deg
 constexpr double kStraggler = 0.7;     // cosine between a straggler's normal and its plane's
 
 std::string text(const char* format, double a, double b = 0) {
@@ -74,6 +76,7 @@ class RoomBuilder {
     room_.height_m = frame.has_ceiling ? frame.ceiling_m : static_cast<double>(heights[heights.size() * 199 / 200]);
     group(regions);
     shift(shifts);
+    slants_ = slantedBounds(samples, regions, room_.height_m);
     findWalls();
   }
 
@@ -86,7 +89,8 @@ class RoomBuilder {
       throw InputError(file_ + ": shows no wall, so that it is no room; outdoors and tables alone are no scenes");
     for (WallRun& run : runs) {
       const PlaneGroup& g = groups_[run.group];
-      run.top_m = frame_.has_ceiling || g.high_m > room_.height_m - 0.3 ? room_.height_m : g.high_m;
+      const bool to_top = frame_.has_ceiling || g.high_m > room_.height_m - 0.3 || endsAtSlant(g);
+      run.top_m = to_top ? room_.height_m : g.high_m;
       run.openings = openings(g, run, run.top_m);
     }
     addFloorAndCeiling(runs);
@@ -181,13 +185,21 @@ class RoomBuilder {
     }
     // Nothing is seen behind an outer wall, however little of it furniture leaves to see; what lies on a wall is none.
     for (PlaneGroup& g : groups_) {
-      if (!isUpright(g.plane) || g.wall || g.plane.area_m2 < 0.5 || g.high_m < 1.5 || g.high_m - g.low_m < 1.2)
-        continue;
+      if (!isUpright(g.plane) || g.wall || g.plane.area_m2 < 0.5) continue;
+      if ((g.high_m < 1.5 || g.high_m - g.low_m < 1.2) && !endsAtSlant(g)) continue;
       const bool on_wall = std::any_of(groups_.begin(), groups_.end(), [&g](const PlaneGroup& w) {
         return w.wall && w.plane.normal.dot(g.plane.normal) > 0.99 && std::abs(w.plane.distance(g.plane.middle)) < 0.3;
       });
       g.wall = !on_wall && seenBehind(g) < 0.1;
     }
+  }
+
+  /// A low wall ends where a slanted plane meets it.
+  bool endsAtSlant(const PlaneGroup& g) const {
+    return std::any_of(slants_.begin(), slants_.end(), [&g](const PlaneRegion& slant) {
+      const Eigen::Vector3d top(g.plane.middle.x(), g.plane.middle.y(), g.high_m);
+      return std::abs(slant.distance(top)) < kSnap_m && slant.normal.dot(g.plane.normal) > 0;
+    });
   }
 
   /// Samples behind a plane, within its ends, as a share of its own.
@@ -337,9 +349,95 @@ class RoomBuilder {
     if (before > runs.size())
       room_.notes.push_back(
           text("%.0f upright plane(s) outside of the room were left out", static_cast<double>(before - runs.size())));
+    loops = withoutCorners(runs, scanned, loops);
     const Eigen::Vector2d ex(std::cos(room_.yaw_rad), std::sin(room_.yaw_rad));
-    addLevel("floor", PlaneKind::kFloor, 1, 0, loops, ex);
-    if (frame_.has_ceiling) addLevel("ceiling", PlaneKind::kCeiling, -1, frame_.ceiling_m, loops, ex);
+    addLevel("floor", PlaneKind::kFloor, 1, 0, belowSlants(loops, 0), ex);
+    if (frame_.has_ceiling)
+      addLevel("ceiling", PlaneKind::kCeiling, -1, frame_.ceiling_m, belowSlants(loops, frame_.ceiling_m), ex);
+    for (std::size_t i = 0; i < slants_.size(); ++i) addSlant(i, loops);
+  }
+
+  /// Axes of the main directions at a height.
+  PlaneAxes mainAxes(double height_m) const {
+    const double c = std::cos(room_.yaw_rad), s = std::sin(room_.yaw_rad);
+    return {height_m * Eigen::Vector3d::UnitZ(), {c, s, 0}, {-s, c, 0}};
+  }
+  static Eigen::AlignedBox2d boxOf(const PlaneLoops& loops) {
+    Eigen::AlignedBox2d box;
+    for (const auto& loop : loops) {
+      for (const Eigen::Vector2d& p : loop) box.extend(p);
+    }
+    return box;
+  }
+
+  /// What of a level lies in the room, and not behind a slanted plane.
+  PlaneLoops belowSlants(PlaneLoops loops, double height_m) const {
+    for (const PlaneRegion& slant : slants_) {
+      const PlaneLoops behind = behindSlant(slant, mainAxes(height_m), boxOf(loops));
+      if (!behind.empty()) loops = without(loops, behind);
+    }
+    return loops;
+  }
+
+  /// Cells are rectangles along the main directions, so that they reach behind a wall that cuts a corner. What lies
+  /// behind such a wall, as far as a right angle over it goes, is none of the room where the scan has nothing there.
+  PlaneLoops withoutCorners(const std::vector<WallRun>& runs, const CellRaster& scanned, PlaneLoops loops) const {
+    for (const WallRun& run : runs) {
+      const auto [p, q] = endsOf(run);
+      const Eigen::Vector2d along = q - p, n = inMain(groups_[run.group].plane.normal);
+      if (std::abs(along.x()) < 1e-6 || std::abs(along.y()) < 1e-6) continue;
+      const double depth_m = 0.5 * along.norm() + kSnap_m;
+      std::size_t seen = 0, all = 0;
+      for (double a = kCell_m; a < along.norm(); a += 2 * kCell_m) {
+        for (double d = 4 * kCell_m; d < depth_m; d += 2 * kCell_m, ++all) {
+          const Eigen::Vector2d at = p + a * along.normalized() - d * n;
+          seen += scanned.has(scanned.index(at.x()), scanned.index(at.y()));
+        }
+      }
+      // Of a wall that drift has doubled the outer copy ends the floor, so that no gap is left between them.
+      const bool is_inner = std::any_of(runs.begin(), runs.end(), [&](const WallRun& other) {
+        const double behind_m = (p - endsOf(other)[0]).dot(inMain(groups_[other.group].plane.normal));
+        return n.dot(inMain(groups_[other.group].plane.normal)) > kParallel && behind_m > 1e-3 && behind_m < depth_m;
+      });
+      if (is_inner || 10 * seen > all) continue;
+      // The wall's place is known to the tolerance: the floor ends behind it.
+      const Eigen::Vector2d near = tolerance_m_ * n, far = depth_m * n;
+      std::vector<Eigen::Vector2d> behind = {p - near, q - near, q - far, p - far};
+      if (signedAreaOf(behind) < 0) std::reverse(behind.begin(), behind.end());
+      loops = without(loops, {behind});
+    }
+    return loops;
+  }
+
+  /// The part of a slanted plane between floor and ceiling, over the floor and below the other slanted planes.
+  void addSlant(std::size_t index, PlaneLoops loops) {
+    PlaneGroup group;
+    group.plane = slants_[index];
+    group.u = Eigen::Vector3d::UnitZ().cross(group.plane.normal).normalized();
+    group.v = group.plane.normal.cross(group.u);
+    const PlaneRegion& slant = group.plane;
+    // Over a place q of the main axes the slanted plane is at height(q), so that its points are affine in q.
+    const PlaneAxes level = mainAxes(0);
+    const auto lifted = [&slant](const Eigen::Vector3d& p) { return -slant.distance(p) / slant.normal.z(); };
+    const double rise_u = -slant.normal.dot(level.u) / slant.normal.z();
+    const double rise_v = -slant.normal.dot(level.v) / slant.normal.z();
+    const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+    const PlaneAxes on_slant{lifted(level.origin) * up, level.u + rise_u * up, level.v + rise_v * up};
+    std::vector<PlaneRegion> limits(2);
+    limits[0].normal = up, limits[0].offset_m = 0;
+    limits[1].normal = -up, limits[1].offset_m = -room_.height_m;
+    for (std::size_t i = 0; i < slants_.size(); ++i) {
+      if (i != index) limits.push_back(slants_[i]);
+    }
+    for (const PlaneRegion& limit : limits) {
+      const PlaneLoops behind = behindSlant(limit, on_slant, boxOf(loops));
+      if (!behind.empty()) loops = without(loops, behind);
+    }
+    for (auto& loop : loops) {
+      for (Eigen::Vector2d& q : loop) q = group.project(on_slant.origin + q.x() * on_slant.u + q.y() * on_slant.v);
+      std::reverse(loop.begin(), loop.end());  // it is seen from below
+    }
+    addParts(group, PlaneKind::kCeiling, "roof_" + std::to_string(index + 1), loops);
   }
 
   static std::vector<Eigen::Vector2d> loopOf(const Eigen::AlignedBox2d& box) {
@@ -476,18 +574,28 @@ class RoomBuilder {
 
   void addWall(const WallRun& run) {
     const PlaneGroup& g = groups_[run.group];
-    ScanPlane plane = planeOf(g, PlaneKind::kWall);
     const double top = run.top_m;
     PlaneLoops loops = {{{run.from_m, 0}, {run.to_m, 0}, {run.to_m, top}, {run.from_m, top}}};
     for (const Eigen::AlignedBox2d& hole : run.openings) loops = without(loops, {loopOf(hole)});
+    const PlaneAxes axes{g.plane.offset_m * g.plane.normal, g.u, g.v};
+    for (const PlaneRegion& slant : slants_) {
+      const PlaneLoops behind = behindSlant(slant, axes, boxOf(loops));
+      if (!behind.empty()) loops = without(loops, behind);
+    }
+    ++walls_;
+    addParts(g, PlaneKind::kWall, "wall_" + std::to_string(walls_), loops);
+  }
+
+  /// Each outer loop as a plane of its own, with the holes in it.
+  void addParts(const PlaneGroup& g, PlaneKind kind, const std::string& name, const PlaneLoops& loops) {
+    const ScanPlane plane = planeOf(g, kind);
     std::size_t outer = 0;
     for (const auto& loop : loops) outer += signedAreaOf(loop) > 0;
     std::size_t part = 0;
-    ++walls_;
     for (const auto& loop : loops) {
       if (signedAreaOf(loop) <= 0) continue;
       ScanPlane own = plane;
-      own.name = "wall_" + std::to_string(walls_) + (outer > 1 ? std::string(1, static_cast<char>('a' + part++)) : "");
+      own.name = name + (outer > 1 ? std::string(1, static_cast<char>('a' + part++)) : "");
       own.outline = loop;
       for (const auto& hole : loops) {
         if (signedAreaOf(hole) < 0 && (outer == 1 || commonArea(loop, hole) > 0)) own.holes.push_back(hole);
@@ -517,6 +625,14 @@ class RoomBuilder {
     }
     const Eigen::AlignedBox2d area(Eigen::Vector2d(run.from_m + 0.05, 0.05),
                                    Eigen::Vector2d(run.to_m - 0.05, top - 0.05));
+    // Behind a slanted plane there is no wall that could be absent.
+    for (double u = run.from_m; u < run.to_m && !slants_.empty(); u += kCell_m) {
+      for (double z = 0; z < top; z += kCell_m) {
+        const Eigen::Vector3d p = g.plane.offset_m * g.plane.normal + u * g.u + z * g.v;
+        if (std::any_of(slants_.begin(), slants_.end(), [&](const auto& s) { return s.distance(p) < 2 * kCell_m; }))
+          wall.set({u, z});
+      }
+    }
     std::vector<Eigen::AlignedBox2d> found;
     for (const RasterGap& gap : gapsOf(wall, area)) {
       const Eigen::Vector2d sizes = gap.box.sizes();
@@ -614,6 +730,7 @@ class RoomBuilder {
   const ScanSamples& samples_;
   const double tolerance_m_;
   std::vector<PlaneGroup> groups_;
+  std::vector<PlaneRegion> slants_;  // that bound the room from above
   RoomPlanes room_;
   int walls_ = 0;
 };

@@ -54,7 +54,7 @@ ClassGuess classOnFloor(const ThingSigns& s) {
   if (within(s.high_m, 0.3, 0.7) && s.length_m > 1.6 && s.width_m > 0.7) return {"bed", 0.5, "long, wide and low"};
   if (within(s.high_m, 0.6, 1.1) && s.length_m > 1.2 && s.width_m > 0.6)
     return {"sofa", 0.4, "long and as high as a back"};
-  if (within(s.high_m, 0.7, 1.35) && s.length_m < 0.95) return {"chair", 0.4, "of a chair's size"};
+  if (within(s.high_m, 0.7, 1.35) && within(s.length_m, 0.3, 0.95)) return {"chair", 0.4, "of a chair's size"};
   return {};
 }
 

@@ -14,7 +14,12 @@ namespace {
 
 constexpr double kTouching_voxels = 2.6, kTouching_m = 0.052;  // neighbours on one surface, whatever the thinning
 constexpr double kLeastThing_m2 = 0.06;                        // of surface: two hands
-constexpr double kGap_m = 0.01;  // bodies end so far from what they stand on, so that no faces coincide
+// A thing of no sure class has to be larger than a chair's back: what is smaller nobody could name, or give a material.
+constexpr double kLeastUnsure_m2 = 0.25, kSure = 0.5;
+constexpr double kPlate_m2 = 0.5;     // of an upright plate that is a part by itself: half of a door's leaf and more
+constexpr double kThickest_m = 0.25;  // of a plate that has two faces: an inner wall
+constexpr double kUpright = 0.1;      // cosine between an upright plate's normal and up
+constexpr double kGap_m = 0.01;       // bodies end so far from what they stand on, so that no faces coincide
 constexpr double kThinnest_m = 0.01;
 constexpr double kTop_m[2] = {0.25, 1.25};  // heights of table tops
 constexpr double kLowTable_m = 0.58;        // lower tops may be seats
@@ -33,6 +38,9 @@ struct Part {
   int top = -1;  ///< a table: index of its top
   int stands_on = -1;
 };
+
+/// Of a cluster of no known class: may be cut at its upright plates, is such a plate, or is what that left.
+enum class Cut { kMayBe, kPlate, kRest };
 
 class ThingFinder {
  public:
@@ -58,7 +66,7 @@ class ThingFinder {
       floor_.set(samples_.points[i].head<2>().cast<double>());
     }
     findTops();
-    for (const Part& part : parts()) addThing(part);
+    for (const Part& part : parts()) addThing(part, Cut::kMayBe);
     nameThings();
     return std::move(result_);
   }
@@ -357,7 +365,7 @@ class ThingFinder {
     return height;
   }
 
-  void addThing(const Part& part) {
+  void addThing(const Part& part, Cut cut) {
     ScanThing thing;
     thing.samples = part.samples.size();
     const double tolerance = std::max(tolerance_m_, 0.015);
@@ -381,7 +389,13 @@ class ThingFinder {
     signs.upright_share = uprightShare(part.samples);
     signs.is_box = box.share > 0.7 && (evidence.covered > 0.5 || floorBelow(box) < 0.4) && evidence.covered > 0.25 &&
                    evidence.inward < 0.25;
-    const ClassGuess guess = classOf(signs);
+    ClassGuess guess = classOf(signs);
+    if (cut == Cut::kPlate && guess.klass == "unknown") guess = {"partition", 0.6, "an upright plate that stands free"};
+    if (guess.klass == "unknown" && !signs.is_box && cut == Cut::kMayBe && cutAtPlates(part)) return;
+    if (guess.confidence < kSure && static_cast<double>(part.samples.size()) * samples_.area_m2() < kLeastUnsure_m2) {
+      result_.scraps += part.samples.size();
+      return;
+    }
     thing.klass = guess.klass, thing.class_confidence = guess.confidence, thing.why = guess.why;
     thing.watertight = true;
     if (part.top >= 0 && !options_.proxies) {
@@ -396,7 +410,8 @@ class ThingFinder {
       UprightCylinder standing = cylinder;
       if (standing.low_m < 0.06) standing.low_m = kGap_m;
       addCylinder(standing, thing);
-    } else if (signs.is_box || options_.proxies || sizes.minCoeff() < 0.06 || !addPlatesOrMesh(part.samples, thing)) {
+    } else if (signs.is_box || options_.proxies || sizes.minCoeff() < 0.06 ||
+               !addPlatesOrMesh(part.samples, cut == Cut::kPlate ? 0.3 : 0.6, thing)) {
       thing.shape = sizes.minCoeff() < 0.04 ? ThingShape::kPlate : ThingShape::kBox;
       thing.rms_m = box.rms_m, thing.largest_m = box.largest_m;
       clear(box, signs.flat_on_wall);
@@ -404,6 +419,51 @@ class ThingFinder {
     }
     result_.things.push_back(std::move(thing));
     result_.samples.push_back(part.samples);
+  }
+
+  /// Partitions and parts of walls tie what leans on them to one cluster, as tables tie what stands on them. Each such
+  /// plate with its back becomes a part of its own, and so does what then hangs together. False where there is none.
+  bool cutAtPlates(const Part& part) {
+    std::map<int, std::vector<int>> flat;
+    for (int i : part.samples) {
+      const int r = region_of_[static_cast<std::size_t>(i)];
+      if (r >= 0 && std::abs(regions_[static_cast<std::size_t>(r)].normal.z()) < kUpright) flat[r].push_back(i);
+    }
+    std::vector<Part> plates;
+    std::map<int, char> taken;
+    for (const auto& [r, own] : flat) {  // regions come largest first
+      if (static_cast<double>(own.size()) * samples_.area_m2() < kPlate_m2 || taken.count(own.front())) continue;
+      const PlaneRegion& front = regions_[static_cast<std::size_t>(r)];
+      const Plate plate = plateOf(samples_, own, front.normal, front.offset_m, kThinnest_m);
+      Part cut{{}, -1, -1};
+      for (int i : part.samples) {
+        if (taken.count(i)) continue;
+        const Eigen::Vector3d from = at(i) - plate.corner;
+        const double a = from.dot(plate.e1) / plate.e1.squaredNorm(), b = from.dot(plate.e2) / plate.e2.squaredNorm();
+        const double d = front.distance(at(i));
+        const bool within = a > -0.05 && a < 1.05 && b > -0.05 && b < 1.05;
+        // Its back, which faces the other way, and its edges are of it, too.
+        if (region_of_[static_cast<std::size_t>(i)] == r || (within && d < tolerance_m_ && d > -kThickest_m))
+          cut.samples.push_back(i);
+      }
+      for (int i : cut.samples) taken[i] = 1;
+      plates.push_back(std::move(cut));
+    }
+    if (plates.empty()) return false;
+    std::vector<int> rest;
+    for (int i : part.samples) {
+      if (!taken.count(i)) rest.push_back(i);
+    }
+    for (const Part& plate : plates) addThing(plate, Cut::kPlate);
+    for (std::vector<int>& own : connected(rest)) {
+      std::sort(own.begin(), own.end());
+      if (static_cast<double>(own.size()) * samples_.area_m2() < kLeastThing_m2) {
+        result_.crumbs += own.size();
+      } else {
+        addThing({std::move(own), -1, part.stands_on}, Cut::kRest);
+      }
+    }
+    return true;
   }
 
   /// Share of a box's footprint, its rim left out, where the scan has the floor: a body hides it.
@@ -426,9 +486,9 @@ class ThingFinder {
     return static_cast<double>(upright) / static_cast<double>(indices.size());
   }
 
-  /// No box: its flat parts as plates where they are most of it, else its own surface with fewer triangles. False where
-  /// neither can be made.
-  bool addPlatesOrMesh(const std::vector<int>& indices, ScanThing& thing) const {
+  /// No box: its flat parts as plates where they are a share of it, else its own surface with fewer triangles. False
+  /// where neither can be made.
+  bool addPlatesOrMesh(const std::vector<int>& indices, double least_share, ScanThing& thing) const {
     std::map<int, std::vector<int>> flat;
     for (int i : indices) {
       const int r = region_of_[static_cast<std::size_t>(i)];
@@ -440,7 +500,7 @@ class ThingFinder {
       if (large) on_plates += r->second.size();
       r = large ? std::next(r) : flat.erase(r);
     }
-    if (static_cast<double>(on_plates) < 0.6 * static_cast<double>(indices.size()))
+    if (static_cast<double>(on_plates) < least_share * static_cast<double>(indices.size()))
       return addMesh(scan_, samples_, frame_, options_, indices, thing);
     thing.shape = ThingShape::kPlate;
     double squares = 0;
@@ -535,6 +595,7 @@ class ThingFinder {
       sorted.samples.push_back(std::move(result_.samples[i]));
     }
     sorted.crumbs = result_.crumbs;
+    sorted.scraps = result_.scraps;
     sorted.notes = result_.notes;
     result_ = std::move(sorted);
   }

@@ -12,6 +12,7 @@ struct Things {
   std::vector<ScanThing> things;
   std::vector<std::vector<int>> samples;  ///< of each thing
   std::size_t crumbs = 0;                 ///< samples in clusters too small for a thing
+  std::size_t scraps = 0;                 ///< samples of small things of no sure class, which are left out
   std::vector<std::string> notes;
 };
 
