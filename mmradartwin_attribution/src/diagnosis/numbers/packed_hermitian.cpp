@@ -5,7 +5,8 @@
 #include <type_traits>
 
 // Function clones for processors with AVX-512 or AVX2, where loops run up to three times as fast. The arithmetic is the
-// same (-ffp-contract=off in CMakeLists.txt). A clone for one kind of processor, as "arch=haswell", is chosen on it alone.
+// same (-ffp-contract=off in CMakeLists.txt). A clone for one kind of processor, as "arch=haswell", is chosen on it
+// alone.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define MMRADARTWIN_VECTORISED __attribute__((target_clones("avx512f", "avx2", "default")))
 #else

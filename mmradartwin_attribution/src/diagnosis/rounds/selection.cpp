@@ -192,8 +192,8 @@ void Selection::renameVerdict(const std::string& label, const std::string& verdi
 /// Profiles the values and intervals of all findings of rounds, or of only one and what is profiled with it.
 void Selection::profileFound(std::optional<std::size_t> only) {
   context_.report("errors of what was found", 0);
-  // A climb of the values leaves the latents short of their optimum, from where other values look likelier. What follows
-  // starts from where the climb left them: latents at their optimum take in what a further cause would explain.
+  // A climb of the values leaves the latents short of their optimum, from where other values look likelier. What
+  // follows starts from where the climb left them: latents at their optimum take in what a further cause would explain.
   const SessionLatents latents = context_.fitter.state(mechanisms_, &state_.latents).latents;
   std::vector<Hypothesis> parts;
   std::vector<ProfiledValues> fits;
@@ -201,9 +201,8 @@ void Selection::profileFound(std::optional<std::size_t> only) {
     parts.push_back(a.hypothesis);
     fits.push_back({a.scaled_values, a.standard_error});
   }
-  all_profiled_ =
-      profileParts({context_.echoes, context_.likelihood, context_.pose_accuracy, before_rounds_, latents}, parts, fits,
-                   only);
+  all_profiled_ = profileParts({context_.echoes, context_.likelihood, context_.pose_accuracy, before_rounds_, latents},
+                               parts, fits, only);
   for (std::size_t i = 0; i < accepted_.size(); ++i) {
     Accepted& a = accepted_[i];
     a.scaled_values = fits[i].scaled_values;
