@@ -82,6 +82,10 @@ const ScanThing* thingOf(const ScanScene& scene, const std::string& klass) {
   return nullptr;
 }
 
+bool rangeIsOf(const std::vector<MeasuredRange>& ranges, const std::string& actor) {
+  return std::any_of(ranges.begin(), ranges.end(), [&actor](const MeasuredRange& r) { return r.actor == actor; });
+}
+
 double areaOf(const ScanActor& actor) {
   double area = 0;
   for (const auto& t : actor.triangles) {
@@ -144,6 +148,32 @@ TEST_F(ScanToSceneTest, ARadarMovesAWallAndTheRoomStaysClosed) {
   }
   EXPECT_EQ(refinementNotes(before, ranges).size(), 1U);
   EXPECT_THROW(shiftsOf(before, {{"cabinet_1", 0.01, 0.001, {}, {}}}, "measured"), InputError);
+}
+
+TEST_F(ScanToSceneTest, PartsOfOneWallMoveTogether) {
+  SampledRoom room(0.005);
+  room.addShell(kRoom, [](const Eigen::Vector3d& p) {  // a passage as high as the room parts the south wall
+    return std::abs(p.y()) < 0.001 && p.x() > 2 && p.x() < 3.2 && p.z() > 0 && p.z() < kRoom.z();
+  });
+  const RawScan scan = room.scan();
+  const ScanScene before = sceneOfScan(scan, {});
+  std::vector<MeasuredRange> ranges;
+  for (const ScanPlane& p : before.planes) {
+    if (p.kind != PlaneKind::kWall || p.normal.y() < 0.99) continue;
+    const bool first = ranges.empty();
+    ranges.push_back({p.name, first ? 0.010 : 0.020, first ? 0.002 : 0.004, {}, {}});
+  }
+  ASSERT_EQ(ranges.size(), 2U);
+  ScanOptions options;
+  options.shifts = shiftsOf(before, ranges, "measured");
+  ASSERT_EQ(options.shifts.size(), 1U);
+  const ScanScene after = sceneOfScan(scan, options);
+  ASSERT_EQ(after.planes.size(), before.planes.size());
+  for (std::size_t i = 0; i < after.planes.size(); ++i) {  // by (4 * 10 + 20) / 5 mm: weights are 1 / variance
+    const bool moves = rangeIsOf(ranges, before.planes[i].name);
+    EXPECT_NEAR(after.planes[i].offset_m, before.planes[i].offset_m - (moves ? 0.012 : 0), 1e-9)
+        << before.planes[i].name;
+  }
 }
 
 TEST_F(ScanToSceneTest, ARadarMovesAThing) {

@@ -132,14 +132,7 @@ class RoomBuilder {
   }
 
   void shift(const std::vector<PlaneShift>& shifts) {
-    for (const PlaneShift& s : shifts) {
-      for (PlaneGroup& g : groups_) {
-        const bool is_it = s.normal.dot(g.plane.normal) > 1 - 1e-6 && std::abs(s.offset_m - g.plane.offset_m) < 0.001;
-        if (!is_it) continue;
-        g.plane.offset_m += s.by_m;
-        break;
-      }
-    }
+    for (const PlaneShift& s : shifts) groups_.at(s.plane).plane.offset_m += s.by_m;
   }
 
   static void setAxes(PlaneGroup& g) {
@@ -477,6 +470,7 @@ class RoomBuilder {
   void addWall(const WallRun& run) {
     const PlaneGroup& g = groups_[run.group];
     ScanPlane plane = planeOf(g, PlaneKind::kWall);
+    plane.plane = run.group;
     const double top = run.top_m;
     PlaneLoops loops = {{{run.from_m, 0}, {run.to_m, 0}, {run.to_m, top}, {run.from_m, top}}};
     for (const Eigen::AlignedBox2d& hole : run.openings) loops = without(loops, {loopOf(hole)});
