@@ -176,6 +176,68 @@ TEST_F(ScanToSceneTest, PartsOfOneWallMoveTogether) {
   }
 }
 
+TEST_F(ScanToSceneTest, ThingsBecomeShapesBoxesOrMeshesAsAsked) {
+  SampledRoom room(0.003, 6000);
+  room.addShell({6, 5, 2.6});
+  const Eigen::AlignedBox3d cabinet(Eigen::Vector3d(0.5, 1, 0.01), Eigen::Vector3d(1.0, 2, 1.9));
+  room.addBox(cabinet.min(), cabinet.max());
+  room.addBox({4.5, 4.0, 0.35}, {4.95, 4.45, 0.45});  // a chair's seat, and its back
+  room.addBox({4.5, 4.45, 0.45}, {4.95, 4.49, 0.9});
+  for (int k = 0; k < 60; ++k) {  // a drum
+    const double a = k * 6 * kDeg, b = (k + 1) * 6 * kDeg, r = 0.25;
+    room.add({3 + r * std::cos(a), 2.5 + r * std::sin(a), 0.01},
+             {r * (std::cos(b) - std::cos(a)), r * (std::sin(b) - std::sin(a)), 0}, {0, 0, 0.9});
+  }
+  const RawScan scan = room.scan();
+  const auto sceneWith = [&scan](ThingForms things, std::size_t triangles) {
+    ScanOptions options;
+    options.things = things, options.triangles = triangles;
+    return sceneOfScan(scan, options);
+  };
+  const auto count = [](const ScanScene& scene) {
+    std::size_t sum = 0;
+    for (const ScanThing& t : scene.things) sum += t.triangles.size();
+    return sum;
+  };
+  const ScanScene shapes = sceneWith(ThingForms::kShapes, 20000), boxes = sceneWith(ThingForms::kBoxes, 20000),
+                  few = sceneWith(ThingForms::kMeshes, 1000), many = sceneWith(ThingForms::kMeshes, 20000);
+  ASSERT_EQ(shapes.things.size(), 3U);
+  for (const ScanScene* scene : {&boxes, &few, &many}) {
+    ASSERT_EQ(scene->things.size(), 3U);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(scene->things[i].name, shapes.things[i].name);
+  }
+  const auto standingAt = [](const ScanScene& scene, const Eigen::Vector3d& p) {
+    const auto found = std::find_if(scene.things.begin(), scene.things.end(),
+                                    [&p](const ScanThing& t) { return t.bounds.contains(p); });
+    return found == scene.things.end() ? nullptr : &*found;
+  };
+  const Eigen::Vector3d on_seat(4.7, 4.2, 0.44);
+  const ScanThing *chair = standingAt(shapes, on_seat), *proxy = standingAt(boxes, on_seat);
+  ASSERT_TRUE(chair && proxy);
+  EXPECT_GT(chair->triangles.size(), 12U);
+  EXPECT_EQ(proxy->shape, ThingShape::kBox);
+  EXPECT_EQ(proxy->triangles.size(), 12U);
+  EXPECT_TRUE(proxy->watertight);
+  EXPECT_NEAR(proxy->bounds.max().z(), 0.9, 0.02);
+  EXPECT_NEAR(proxy->bounds.sizes().x(), 0.45, 0.03);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(few.things[i].shape, ThingShape::kMesh);
+    EXPECT_EQ(many.things[i].shape, ThingShape::kMesh);
+  }
+  EXPECT_LT(count(boxes), count(shapes));
+  EXPECT_LE(count(few), 1000U);
+  EXPECT_GT(count(many), 2 * count(few));
+  EXPECT_LE(count(many), 20000U);
+  const ScanThing *drum = standingAt(boxes, {3, 2.5, 0.5}), *mesh = standingAt(many, {0.7, 1.5, 1});
+  ASSERT_TRUE(drum && mesh);
+  EXPECT_EQ(drum->shape, ThingShape::kCylinder);
+  for (const Eigen::Vector3d& v : mesh->vertices) {
+    const double outside_m = cabinet.exteriorDistance(v);
+    const double inside_m = std::min((v - cabinet.min()).minCoeff(), (cabinet.max() - v).minCoeff());
+    EXPECT_LT(std::max(outside_m, inside_m), 0.015);
+  }
+}
+
 TEST_F(ScanToSceneTest, ARadarMovesAThing) {
   SampledRoom room(0.004);
   room.addShell(kRoom);

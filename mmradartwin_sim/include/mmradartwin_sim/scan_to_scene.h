@@ -47,6 +47,10 @@ struct PlaneShift {
   double by_m = 0;
 };
 
+/// What things become: the simplest shapes that fit; boxes and cylinders alone, however they fit, so that a simulation
+/// is fast; or meshes of the scan's own triangles, cleaned and thinned, however simple they are.
+enum class ThingForms { kShapes, kBoxes, kMeshes };
+
 /// What a person states of a scan; what is not stated is found from the data.
 struct ScanOptions {
   std::optional<double> unit_m;       ///< metres per unit of the file
@@ -56,7 +60,7 @@ struct ScanOptions {
   bool regularise = true;             ///< planes turn to parallels and right angles within their uncertainty
   std::size_t triangles = 20000;      ///< all things that are meshes together, at most
   double silhouette_m = 0.01;         ///< decimation leaves silhouettes within this
-  bool proxies = false;               ///< every thing becomes its box: smallest, for simulation only
+  ThingForms things = ThingForms::kShapes;
   std::vector<ScanObject> objects;  ///< replace what they overlap in the room's scan
   std::vector<PlaneShift> shifts;   ///< walls that another sensor knows better (scan_refinement.h)
   std::function<void(double, const std::string&)> progress;  ///< share of a stage that is done, and its name
