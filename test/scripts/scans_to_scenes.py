@@ -253,7 +253,7 @@ def run_limits(name, room_name, arguments, results):
 
 def limit_row(record):
     """Cells of a record of run_limits()."""
-    return [record["label"], str(record["triangles"]), str(record.get("things", "")), f"{1e3 * record['pose_s']:.0f} ms",
+    return [record["label"], str(record["triangles"]), str(record.get("things", "")), f"{1e3 * record['pose_s']:.1f} ms",
             f"{100 * record['found']:.0f} % of {record['paths']}", f"{100 * record['true']:.0f} % of {record['own']}",
             "" if record["label"] == "raw mesh" else f"{record['level_db']:.1f} dB, {record['level_90_db']:.1f} dB",
             str(record["refused"])]

@@ -87,7 +87,9 @@ def draw_picture(records, file):
     for axes, key in ((left, "found"), (right, "pose_s")):
         for r in others:
             y = 100 * r[key] if key == "found" else r[key]
-            axes.annotate(r["label"], (r["triangles"], y), textcoords="offset points", xytext=(4, 6), fontsize=8)
+            side = -1 if r["triangles"] > 1e5 or r["label"] == "boxes" else 1      # where free room is
+            axes.annotate(r["label"], (r["triangles"], y), textcoords="offset points", fontsize=8, va="center",
+                          xytext=(8 * side, 6), ha="left" if side > 0 else "right")
         axes.set_xscale("log")
         axes.set_xlabel("triangles of the scene")
         axes.grid(True, alpha=0.3)
