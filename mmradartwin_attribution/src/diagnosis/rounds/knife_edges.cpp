@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kKnifeEdges = "knife_edges";
 constexpr std::size_t kPosesBeforeFit = 22;  ///< looked at, evenly spread; most sessions have more
-constexpr double kSure_sigmas = 3;  ///< of a loss that no fit of latents turns into a gain
+constexpr double kSure_sigmas = 3;           ///< of a loss that no fit of latents turns into a gain
 
 /// True where poses are surely less likely before the latents are fitted, which spares the fit: such a loss is far
 /// larger than what fitted latents win; see docs/verification/speed.md#a-full-campaign.
