@@ -43,6 +43,7 @@ struct Options {
   std::string unit;
   std::string refine;
   std::string objects;
+  std::string things = "shapes";
 };
 
 std::string lower(std::string text) {
@@ -196,6 +197,8 @@ int makeScanScene(const Options& options) {
   if (!std::isnan(options.floor_m)) scan_options.floor_m = options.floor_m;
   scan_options.level = !options.exact_up;
   scan_options.regularise = !options.no_regularise;
+  if (options.things == "boxes") scan_options.things = ThingForms::kBoxes;
+  if (options.things == "meshes") scan_options.things = ThingForms::kMeshes;
   std::vector<std::string> inputs = options.meshes;
   if (!options.objects.empty()) {
     progress.show(0, "objects");
@@ -282,8 +285,11 @@ int main(int argc, char** argv) {
   app.add_option(
       "--refine", options.refine,
       "refinement.yaml of refine_scene, or its folder: walls and things move to where a radar in the room has them");
-  app.add_flag("--proxies", options.scan.proxies,
-               "every thing becomes its box: fewest triangles, for simulation alone");
+  app.add_option("--things", options.things,
+                 "shapes: the simplest that fit, meshes where none does; boxes: boxes and cylinders alone, for fast "
+                 "simulations; meshes: the scan's own triangles, thinned by --triangles and --silhouette")
+      ->check(CLI::IsMember({"shapes", "boxes", "meshes"}))
+      ->capture_default_str();
   app.footer("Example: make_scene phone_scan.ply --output my_room");
   return runProgram(app, argc, argv, [&options] { return makeScene(options); });
 }

@@ -82,6 +82,10 @@ const ScanThing* thingOf(const ScanScene& scene, const std::string& klass) {
   return nullptr;
 }
 
+bool rangeIsOf(const std::vector<MeasuredRange>& ranges, const std::string& actor) {
+  return std::any_of(ranges.begin(), ranges.end(), [&actor](const MeasuredRange& r) { return r.actor == actor; });
+}
+
 double areaOf(const ScanActor& actor) {
   double area = 0;
   for (const auto& t : actor.triangles) {
@@ -144,6 +148,94 @@ TEST_F(ScanToSceneTest, ARadarMovesAWallAndTheRoomStaysClosed) {
   }
   EXPECT_EQ(refinementNotes(before, ranges).size(), 1U);
   EXPECT_THROW(shiftsOf(before, {{"cabinet_1", 0.01, 0.001, {}, {}}}, "measured"), InputError);
+}
+
+TEST_F(ScanToSceneTest, PartsOfOneWallMoveTogether) {
+  SampledRoom room(0.005);
+  room.addShell(kRoom, [](const Eigen::Vector3d& p) {  // a passage as high as the room parts the south wall
+    return std::abs(p.y()) < 0.001 && p.x() > 2 && p.x() < 3.2 && p.z() > 0 && p.z() < kRoom.z();
+  });
+  const RawScan scan = room.scan();
+  const ScanScene before = sceneOfScan(scan, {});
+  std::vector<MeasuredRange> ranges;
+  for (const ScanPlane& p : before.planes) {
+    if (p.kind != PlaneKind::kWall || p.normal.y() < 0.99) continue;
+    const bool first = ranges.empty();
+    ranges.push_back({p.name, first ? 0.010 : 0.020, first ? 0.002 : 0.004, {}, {}});
+  }
+  ASSERT_EQ(ranges.size(), 2U);
+  ScanOptions options;
+  options.shifts = shiftsOf(before, ranges, "measured");
+  ASSERT_EQ(options.shifts.size(), 1U);
+  const ScanScene after = sceneOfScan(scan, options);
+  ASSERT_EQ(after.planes.size(), before.planes.size());
+  for (std::size_t i = 0; i < after.planes.size(); ++i) {  // by (4 * 10 + 20) / 5 mm: weights are 1 / variance
+    const bool moves = rangeIsOf(ranges, before.planes[i].name);
+    EXPECT_NEAR(after.planes[i].offset_m, before.planes[i].offset_m - (moves ? 0.012 : 0), 1e-9)
+        << before.planes[i].name;
+  }
+}
+
+TEST_F(ScanToSceneTest, ThingsBecomeShapesBoxesOrMeshesAsAsked) {
+  SampledRoom room(0.003, 6000);
+  room.addShell({6, 5, 2.6});
+  const Eigen::AlignedBox3d cabinet(Eigen::Vector3d(0.5, 1, 0.01), Eigen::Vector3d(1.0, 2, 1.9));
+  room.addBox(cabinet.min(), cabinet.max());
+  room.addBox({4.5, 4.0, 0.35}, {4.95, 4.45, 0.45});  // a chair's seat, and its back
+  room.addBox({4.5, 4.45, 0.45}, {4.95, 4.49, 0.9});
+  for (int k = 0; k < 60; ++k) {  // a drum
+    const double a = k * 6 * kDeg, b = (k + 1) * 6 * kDeg, r = 0.25;
+    room.add({3 + r * std::cos(a), 2.5 + r * std::sin(a), 0.01},
+             {r * (std::cos(b) - std::cos(a)), r * (std::sin(b) - std::sin(a)), 0}, {0, 0, 0.9});
+  }
+  const RawScan scan = room.scan();
+  const auto sceneWith = [&scan](ThingForms things, std::size_t triangles) {
+    ScanOptions options;
+    options.things = things, options.triangles = triangles;
+    return sceneOfScan(scan, options);
+  };
+  const auto count = [](const ScanScene& scene) {
+    std::size_t sum = 0;
+    for (const ScanThing& t : scene.things) sum += t.triangles.size();
+    return sum;
+  };
+  const ScanScene shapes = sceneWith(ThingForms::kShapes, 20000), boxes = sceneWith(ThingForms::kBoxes, 20000),
+                  few = sceneWith(ThingForms::kMeshes, 1000), many = sceneWith(ThingForms::kMeshes, 20000);
+  ASSERT_EQ(shapes.things.size(), 3U);
+  for (const ScanScene* scene : {&boxes, &few, &many}) {
+    ASSERT_EQ(scene->things.size(), 3U);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(scene->things[i].name, shapes.things[i].name);
+  }
+  const auto standingAt = [](const ScanScene& scene, const Eigen::Vector3d& p) {
+    const auto found = std::find_if(scene.things.begin(), scene.things.end(),
+                                    [&p](const ScanThing& t) { return t.bounds.contains(p); });
+    return found == scene.things.end() ? nullptr : &*found;
+  };
+  const Eigen::Vector3d on_seat(4.7, 4.2, 0.44);
+  const ScanThing *chair = standingAt(shapes, on_seat), *proxy = standingAt(boxes, on_seat);
+  ASSERT_TRUE(chair && proxy);
+  EXPECT_GT(chair->triangles.size(), 12U);
+  EXPECT_EQ(proxy->shape, ThingShape::kBox);
+  EXPECT_EQ(proxy->triangles.size(), 12U);
+  EXPECT_TRUE(proxy->watertight);
+  EXPECT_NEAR(proxy->bounds.max().z(), 0.9, 0.02);
+  EXPECT_NEAR(proxy->bounds.sizes().x(), 0.45, 0.03);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(few.things[i].shape, ThingShape::kMesh);
+    EXPECT_EQ(many.things[i].shape, ThingShape::kMesh);
+  }
+  EXPECT_LT(count(boxes), count(shapes));
+  EXPECT_LE(count(few), 1000U);
+  EXPECT_GT(count(many), 2 * count(few));
+  EXPECT_LE(count(many), 20000U);
+  const ScanThing *drum = standingAt(boxes, {3, 2.5, 0.5}), *mesh = standingAt(many, {0.7, 1.5, 1});
+  ASSERT_TRUE(drum && mesh);
+  EXPECT_EQ(drum->shape, ThingShape::kCylinder);
+  for (const Eigen::Vector3d& v : mesh->vertices) {
+    const double outside_m = cabinet.exteriorDistance(v);
+    const double inside_m = std::min((v - cabinet.min()).minCoeff(), (cabinet.max() - v).minCoeff());
+    EXPECT_LT(std::max(outside_m, inside_m), 0.015);
+  }
 }
 
 TEST_F(ScanToSceneTest, ARadarMovesAThing) {

@@ -2,11 +2,13 @@
 """Makes scenes of degraded scans of known rooms, and of real scans, and measures what came out.
 
 Results stand in OUTPUT/results.jsonl, and a scan that is done does not run again. The table is printed at the end and written
-to OUTPUT/table.md. Scans and scenes stay in OUTPUT.
+to OUTPUT/table.md. Scans and scenes stay in OUTPUT. With --limits it measures how accuracy depends on the triangles of one
+scan's scene, in place of all scans; the picture of that is OUTPUT/triangles.png.
 """
 import argparse
 import math
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -15,6 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "src"))
 
 import numpy as np
+import yaml
 
 from mmradartwin_tests import office
 from mmradartwin_tests.arguments import whole
@@ -23,7 +26,7 @@ from mmradartwin_tests.blind.trials import Results
 from mmradartwin_tests.geometry import Actor
 from mmradartwin_tests.installed_programs import find_program
 from mmradartwin_tests.resumable_program import run_resumable
-from mmradartwin_tests.scans import persistence, scan_files, scene_comparison
+from mmradartwin_tests.scans import persistence, scan_files, scene_comparison, scene_materials, triangle_budget
 from mmradartwin_tests.scans.degraded_scan import DEGRADATIONS, Scan, make_scan
 from mmradartwin_tests.scans.drawn_room import SHAPES, draw_room
 from mmradartwin_tests.scans.known_room import ROOMS, rectangles_of, third_world_room
@@ -50,6 +53,9 @@ def parse():
     parser.add_argument("--real", default=os.path.join(os.environ.get("MMRADARTWIN_DATA", ""), "rooms"),
                         help="folder of the real scans (default: rooms in MMRADARTWIN_DATA)")
     parser.add_argument("--pairs", type=whole(0), default=50, help="of poses 1 cm apart; 0: none (default: 50)")
+    parser.add_argument("--limits", default="",
+                        help="limits of triangles, with commas: things as meshes of so many against shapes, boxes, the raw and "
+                        "the true mesh, of the first of --cases; --pairs poses")
     parser.add_argument("--table", action="store_true", help="run nothing, print the table of the results that exist")
     return parser.parse_args()
 
@@ -63,14 +69,14 @@ def peak_mib(process):
         return 0.0
 
 
-def make_scene(scan_file, folder):
+def make_scene(scan_file, folder, *options):
     """{status, seconds, mib, log's last line} of the program."""
     log = folder + ".log"
     # The child of a large process is as large itself for a moment: the peak is asked for while it runs.
     start, mib, limit_s = time.monotonic(), 0.0, 600
     with open(log, "wb") as out:
-        child = subprocess.Popen([find_program("mmradartwin_sim", "make_scene"), scan_file, "--output", folder, "--force"],
-                                 stdin=subprocess.DEVNULL, stdout=out, stderr=out)
+        child = subprocess.Popen([find_program("mmradartwin_sim", "make_scene"), scan_file, "--output", folder, "--force",
+                                  *options], stdin=subprocess.DEVNULL, stdout=out, stderr=out)
     while child.poll() is None and time.monotonic() - start < limit_s:
         mib = max(mib, peak_mib(child.pid))
         time.sleep(0.02)
@@ -183,6 +189,81 @@ def run_real(name, arguments):
     return record
 
 
+def give_true_materials(folder, room, T, true_folder):
+    """Gives the actors of a made scene the room's own materials, so that levels differ by the mesh alone."""
+    tags = scene_materials.true_tags(room, scene_comparison.read_obj(os.path.join(folder, "room.obj")), T)
+    file = os.path.join(folder, "scene.yaml")
+    with open(file, encoding="utf-8") as text:
+        scene = yaml.safe_load(text)
+    for actor, entry in scene["actors"].items():
+        tag = tags.get(actor, entry["material"])
+        entry["material"] = tag if tag in office.MATERIALS else "Concrete"
+    with open(file, "w", encoding="utf-8") as out:
+        yaml.safe_dump(scene, out)
+    shutil.copy(os.path.join(true_folder, "materials.yaml"), folder)
+
+
+def triangles_of(folder):
+    """Triangles of a folder's OBJ or, of a raw scan, of its PLY."""
+    for name in os.listdir(folder):
+        with open(os.path.join(folder, name), "rb") as file:
+            if name.endswith(".obj"):
+                # An OBJ of the generator has faces of four corners.
+                return sum(len(line.split()) - 3 for line in file if line.startswith(b"f "))
+            if name.endswith(".ply"):
+                return next(int(line.split()[2]) for line in file if line.startswith(b"element face"))
+    raise ValueError(f"{folder}: holds no mesh")
+
+
+def run_limits(name, room_name, arguments, results):
+    """Rows of one scan: its things as shapes, as boxes and as meshes of so many triangles; the true and the raw mesh."""
+    room = room_of(room_name)
+    place = os.path.join(arguments.output, f"{name}_{room_name.replace(':', '_')}")
+    scan = make_scan(room, DEGRADATIONS[name], arguments.seed)
+    scan_files.write_ply(place + ".ply", scan)
+    options = {"shapes": ("--things", "shapes"), "boxes": ("--things", "boxes")}
+    options.update({f"meshes, at most {n}": ("--things", "meshes", "--triangles", n) for n in arguments.limits.split(",")})
+    folders = {label: place + "_" + label.replace(",", "").replace(" ", "_") for label in [*options, "true mesh", "raw mesh"]}
+    for label, more in options.items():
+        made = make_scene(place + ".ply", folders[label], *more)
+        if made["status"] != 0:
+            raise ValueError(f"{place}.ply: make_scene {' '.join(more)}: {made['said']}")
+    # All scenes of one scan have the same map: the option concerns things alone.
+    quality = scene_comparison.read_summary(folders["shapes"])
+    T = scene_comparison.map_from_truth(quality, scan)
+    true_scene(folders["true mesh"], room, T)
+    for label in options:
+        give_true_materials(folders[label], room, T, folders["true mesh"])
+    if scan.faces is None or len(scan.faces) > MOST_RAW:
+        del folders["raw mesh"]
+    else:
+        raw_scene(folders["raw mesh"], scan, quality)
+    poses = [a for a, _ in persistence.draw_pairs(room, T, np.random.default_rng([arguments.seed, 51]), arguments.pairs)]
+    true_paths = f"{folders['true mesh']}_paths_{len(poses)}_simulated"
+    for label in sorted(folders, key=lambda label: label != "true mesh"):
+        folder, record = folders[label], {"key": f"{name}_{room_name}: {label}", "label": label}
+        if record["key"] in results.records:
+            continue
+        simulated, record["pose_s"] = triangle_budget.simulate(os.path.join(folder, "scene.yaml"), poses, folder + "_paths")
+        record.update(triangles=triangles_of(folder), **triangle_budget.agree(true_paths, simulated, len(poses)))
+        if label in options:
+            record["things"] = len(scene_comparison.read_summary(folder)["things"])
+        results.add(record)
+        print(" | ".join(limit_row(record)), flush=True)
+
+
+def limit_row(record):
+    """Cells of a record of run_limits()."""
+    return [record["label"], str(record["triangles"]), str(record.get("things", "")), f"{1e3 * record['pose_s']:.1f} ms",
+            f"{100 * record['found']:.0f} % of {record['paths']}", f"{100 * record['true']:.0f} % of {record['own']}",
+            "" if record["label"] == "raw mesh" else f"{record['level_db']:.1f} dB, {record['level_90_db']:.1f} dB",
+            str(record["refused"])]
+
+
+LIMIT_HEAD = ("scene", "triangles", "things", "processor time of a pose", "of the room's strong paths, the scene has",
+              "of the scene's strong paths, the room has", "levels: half, nine in ten within", "poses refused")
+
+
 def worst(walls, index):
     """Largest error of the walls that were found."""
     return max((w[index] for w in walls if not math.isnan(w[index])), default=math.nan)
@@ -221,10 +302,36 @@ HEAD = ("scan", "size", "time", "memory", "wall area on planes", "floor", "tilt"
         "with the true mesh")
 
 
+def write_table(arguments, head, rows):
+    """Writes table.md and prints it."""
+    text = table.markdown(head, rows)
+    with open(os.path.join(arguments.output, "table.md"), "w", encoding="utf-8") as out:
+        out.write(text + "\n")
+    print(text)
+
+
+def run_all_limits(arguments, wanted):
+    """Runs what is missing of --limits, then table and picture."""
+    results = Results(os.path.join(arguments.output, "limits.jsonl"), ("label", "triangles", "pose_s", "found", "true"))
+    if not arguments.table:
+        name, room = next((c for c in CASES if not wanted or any(w in "_".join(c) for w in wanted)), (None, None))
+        if name is None:
+            raise ValueError(f"--cases {arguments.cases}: names no scan of a known room")
+        if arguments.pairs < 2:
+            raise ValueError("--pairs: --limits wants two poses at least")
+        run_limits(name, room, arguments, results)
+    records = list(results.records.values())
+    write_table(arguments, LIMIT_HEAD, [limit_row(r) for r in records])
+    triangle_budget.draw_picture(records, os.path.join(arguments.output, "triangles.png"))
+
+
 def run(arguments):
     """Runs what is missing."""
     results = Results(os.path.join(arguments.output, "results.jsonl"), ("status", "seconds"))
     wanted = [c for c in arguments.cases.split(",") if c]
+    if arguments.limits:
+        run_all_limits(arguments, wanted)
+        return
     cases = drawn_cases(arguments.draw, arguments.seed) if arguments.draw else CASES
     todo = [(f"{name}_{room.replace(':', '_')}", lambda n=name, r=room: run_known(n, r, arguments)) for name, room in cases]
     if not arguments.draw:
@@ -238,10 +345,7 @@ def run(arguments):
                 continue
             results.add(measure())
             print(" | ".join(row(results.records[key])), flush=True)
-    text = table.markdown(HEAD, [row(r) for r in results.records.values()])
-    with open(os.path.join(arguments.output, "table.md"), "w", encoding="utf-8") as out:
-        out.write(text + "\n")
-    print(text)
+    write_table(arguments, HEAD, [row(r) for r in results.records.values()])
 
 
 if __name__ == "__main__":

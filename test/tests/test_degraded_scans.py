@@ -1,13 +1,16 @@
 """The generator of degraded scans: what it writes has the faults that were asked for, and no others."""
 import dataclasses
+import math
+import os
 import unittest
 
 import numpy as np
 
-from mmradartwin_tests.scans import degraded_scan, known_room
+from mmradartwin_tests.scans import degraded_scan, known_room, triangle_budget
 from mmradartwin_tests.scans.degraded_scan import Degradation, make_scan
 from mmradartwin_tests.scans.drawn_room import SHAPES, draw_room
 from mmradartwin_tests.scans.ray_casting import CastRoom
+from in_folder import InFolder
 
 
 def in_map(scan):
@@ -126,6 +129,36 @@ class DegradedScans(unittest.TestCase):
         near = lambda s: [p for p in in_map(s) if abs(p[2] - 1.82) < 0.05 and 0.2 < p[0] < 0.8 and 1.0 < p[1] < 1.7]
         self.assertGreater(max(p[2] for p in near(sharp)), max(p[2] for p in near(soft)) - 1e-9)
         self.assertEqual(set(degraded_scan.DEGRADATIONS), {d.name for d in degraded_scan.DEGRADATIONS.values()})
+
+
+class PathsOfTwoMeshes(InFolder):
+    def write(self, name, pose, rows):
+        """A path list of (length, azimuth, level, bounces, event, actors)."""
+        os.makedirs(self.at(name, "paths"), exist_ok=True)
+        with open(self.at(name, "paths", pose + ".csv"), "w", encoding="ascii") as out:
+            out.write("length_m,azimuth_dep_deg,elevation_dep_deg,azimuth_arr_deg,elevation_arr_deg,amplitude_db,phase_rad,"
+                      "bounces,event,actors,materials\n")
+            for length, azimuth, level, bounces, event, actors in rows:
+                out.write(f"{length},{azimuth},0,{azimuth},0,{level},0,{bounces},{event},{actors},Wood\n")
+
+    def test_paths_are_known_by_range_direction_and_bounces_whatever_the_actors_are_called(self):
+        self.write("true", "a000", [(4.0, 0, -80, 1, "specular", "wall_east"), (6.0, 20, -90, 1, "specular", "locker"),
+                                    (8.0, 40, -95, 2, "corner", "wall_east;floor"),
+                                    (9.0, 60, -101, 1, "specular", "far")])       # more than 20 dB below the strongest
+        self.write("made", "a000", [(4.01, 1, -81, 1, "specular", "wall_1"),      # found, 1 dB off
+                                    (6.05, 20, -90, 1, "specular", "cabinet_1"),  # 2.5 cm of range off
+                                    (8.0, 40, -108, 2, "specular;specular", "a;b"),    # found, however weak: 13 dB off
+                                    (9.0, 60, -100, 1, "specular", "b"),          # strong here alone, and the room has it
+                                    (5.0, 0, -82, 1, "diffuse", "wall_1")])       # no specular path
+        self.write("true", "a001", [(4.0, 0, -80, 1, "specular", "wall_east")])   # the scene refuses this pose
+        agreed = triangle_budget.agree(self.at("true"), self.at("made"), 2)
+        self.assertEqual((agreed["paths"], agreed["own"], agreed["refused"]), (3, 3, 1))
+        self.assertAlmostEqual(agreed["found"], 2 / 3)
+        self.assertAlmostEqual(agreed["true"], 2 / 3)
+        self.assertAlmostEqual(agreed["level_db"], 7.0)
+        self.assertAlmostEqual(agreed["level_90_db"], 1 + 0.9 * 12)
+        os.remove(self.at("made", "paths", "a000.csv"))
+        self.assertTrue(math.isnan(triangle_budget.agree(self.at("true"), self.at("made"), 2)["level_db"]))
 
 
 if __name__ == "__main__":

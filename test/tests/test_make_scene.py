@@ -87,6 +87,19 @@ class DegradedScansBecomeScenes(InFolder):
         with open(self.at("scene", "top_view.png"), "rb") as picture:
             self.assertEqual(picture.read(8), b"\x89PNG\r\n\x1a\n")
 
+    def test_boxes_alone_leave_the_planes_and_take_fewer_triangles(self):
+        asked = Degradation("small", kind="cloud", size=100000)
+        self.made(known_room.l_shaped_room(), asked)
+        shapes = scene_comparison.read_obj(self.at("scene", "room.obj"))
+        self.made(known_room.l_shaped_room(), asked, "--things", "boxes", "--force")
+        boxes = scene_comparison.read_obj(self.at("scene", "room.obj"))
+        self.assertEqual(sorted(shapes), sorted(boxes))
+        things = scene_comparison.read_summary(self.at("scene"))["things"]
+        self.assertLessEqual({t["shape"] for t in things}, {"box", "plate", "cylinder"})
+        for name in set(shapes) - {t["name"] for t in things}:
+            np.testing.assert_array_equal(shapes[name], boxes[name], err_msg=name)
+        self.assertLess(sum(map(len, boxes.values())), sum(map(len, shapes.values())))
+
     def test_same_bytes_again_and_edits_stay(self):
         asked = Degradation("small", kind="cloud", size=100000)
         self.made(known_room.l_shaped_room(), asked)

@@ -43,10 +43,13 @@ struct ScanObject {
 
 /// An upright plane of a scan, and how far it goes along its normal against where the scan has it.
 struct PlaneShift {
-  Eigen::Vector3d normal;  ///< unit, in map, into the room
-  double offset_m = 0;     ///< normal . p = offset on the plane as the scan has it
+  std::size_t plane = 0;  ///< ScanPlane::plane of its parts, in the scene of the same scan and options without shifts
   double by_m = 0;
 };
+
+/// What things become: the simplest shapes that fit; boxes and cylinders alone, however they fit, so that a simulation
+/// is fast; or meshes of the scan's own triangles, cleaned and thinned, however simple they are.
+enum class ThingForms { kShapes, kBoxes, kMeshes };
 
 /// What a person states of a scan; what is not stated is found from the data.
 struct ScanOptions {
@@ -57,9 +60,9 @@ struct ScanOptions {
   bool regularise = true;             ///< planes turn to parallels and right angles within their uncertainty
   std::size_t triangles = 20000;      ///< all things that are meshes together, at most
   double silhouette_m = 0.01;         ///< decimation leaves silhouettes within this
-  bool proxies = false;               ///< every thing becomes its box: smallest, for simulation only
-  std::vector<ScanObject> objects;    ///< replace what they overlap in the room's scan
-  std::vector<PlaneShift> shifts;     ///< walls that another sensor knows better (scan_refinement.h)
+  ThingForms things = ThingForms::kShapes;
+  std::vector<ScanObject> objects;  ///< replace what they overlap in the room's scan
+  std::vector<PlaneShift> shifts;   ///< walls that another sensor knows better (scan_refinement.h)
   std::function<void(double, const std::string&)> progress;  ///< share of a stage that is done, and its name
 };
 
@@ -89,6 +92,7 @@ struct ScanPlane {
   PlaneKind kind = PlaneKind::kWall;
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, in map, into the room
   double offset_m = 0;                                ///< normal . p = offset on the plane
+  std::size_t plane = 0;                              ///< of walls: the same number on all parts of one plane
   Eigen::Vector3d u, v;                               ///< axes in the plane, u x v = normal; p = offset n + a u + b v
   std::vector<Eigen::Vector2d> outline;               ///< counter-clockwise about the normal, in (u, v), metres
   std::vector<std::vector<Eigen::Vector2d>> holes;    ///< windows, doorways: clockwise

@@ -12,9 +12,7 @@
 namespace mmradartwin {
 namespace {
 
-constexpr double kMostRange_m = 0.5;    // a scan that is farther off is another room's
-constexpr double kSamePlane_m = 0.001;  // parts of one wall share their plane exactly
-constexpr double kSameNormal = 1 - 1e-6;
+constexpr double kMostRange_m = 0.5;  // a scan that is farther off is another room's
 
 const MeasuredRange* rangeOf(const std::string& actor, const std::vector<MeasuredRange>& ranges) {
   const auto found =
@@ -46,10 +44,6 @@ bool runsIntoWall(const ScanScene& scene, const ScanThing& thing, const Eigen::V
     }
   }
   return false;
-}
-
-bool isSamePlane(const PlaneShift& shift, const ScanPlane& plane) {
-  return shift.normal.dot(plane.normal) > kSameNormal && std::abs(shift.offset_m - plane.offset_m) < kSamePlane_m;
 }
 
 }  // namespace
@@ -92,9 +86,9 @@ std::vector<PlaneShift> shiftsOf(const ScanScene& scene, const std::vector<Measu
     // The radar stands before the wall: what is farther lies against the normal.
     const double weight = 1 / (range->std_m * range->std_m);
     const auto known =
-        std::find_if(shifts.begin(), shifts.end(), [&](const PlaneShift& shift) { return isSamePlane(shift, plane); });
+        std::find_if(shifts.begin(), shifts.end(), [&](const PlaneShift& shift) { return shift.plane == plane.plane; });
     if (known == shifts.end()) {
-      shifts.push_back({plane.normal, plane.offset_m, -range->range_m});
+      shifts.push_back({plane.plane, -range->range_m});
       weights.push_back(weight);
     } else {
       double& sum = weights[static_cast<std::size_t>(known - shifts.begin())];

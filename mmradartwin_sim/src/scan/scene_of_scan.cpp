@@ -92,9 +92,9 @@ void addNotes(ScanScene& scene, const RawScan& scan, const RoomPlanes& room, con
   }
   if (room.closed_m2 > 0.1)
     scene.notes.push_back(line("%.1f m2 of walls are not in the scan and were closed", room.closed_m2));
-  if (things.crumbs)
-    scene.notes.push_back(line("%.2f m2 lie in pieces too small for a thing and were left out",
-                               static_cast<double>(things.crumbs) * cell_m2));
+  const double crumbs_m2 = static_cast<double>(things.crumbs) * cell_m2;
+  if (crumbs_m2 >= 0.01)
+    scene.notes.push_back(line("%.2f m2 lie in pieces too small for a thing and were left out", crumbs_m2));
   if (things.scraps)
     scene.notes.push_back(line("%.2f m2 lie in small things of no sure class and were left out",
                                static_cast<double>(things.scraps) * cell_m2));

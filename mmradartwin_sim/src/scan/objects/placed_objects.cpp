@@ -272,7 +272,8 @@ class ObjectPlacer {
     const BoxEvidence evidence = evidenceOf(placed.samples, placed.all, placed.box, tolerance_m);
     UprightCylinder cylinder = fitCylinder(placed.samples, placed.all, tolerance_m);
     const bool is_box = placed.box.share > 0.7 && evidence.covered > 0.5;
-    if (cylinder.share > 0.8 && cylinder.share > placed.box.share + 0.05 && !options_.proxies) {
+    const bool meshes = options_.things == ThingForms::kMeshes;
+    if (!meshes && cylinder.share > 0.8 && cylinder.share > placed.box.share + 0.05) {
       thing.shape = ThingShape::kCylinder;
       thing.rms_m = cylinder.rms_m, thing.largest_m = cylinder.largest_m;
       if (cylinder.low_m < kInsideWall_m) cylinder.low_m = kShort_m;
@@ -280,7 +281,7 @@ class ObjectPlacer {
       placed.is_box = true;  // what its box holds is it, too
       return thing;
     }
-    if (!is_box && !options_.proxies) {
+    if (meshes || (!is_box && options_.things != ThingForms::kBoxes)) {
       ScanFrame own;
       own.unit_m = unit_m;
       own.T_map_file = T_map_object;

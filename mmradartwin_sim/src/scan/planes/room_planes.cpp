@@ -136,14 +136,7 @@ class RoomBuilder {
   }
 
   void shift(const std::vector<PlaneShift>& shifts) {
-    for (const PlaneShift& s : shifts) {
-      for (PlaneGroup& g : groups_) {
-        const bool is_it = s.normal.dot(g.plane.normal) > 1 - 1e-6 && std::abs(s.offset_m - g.plane.offset_m) < 0.001;
-        if (!is_it) continue;
-        g.plane.offset_m += s.by_m;
-        break;
-      }
-    }
+    for (const PlaneShift& s : shifts) groups_.at(s.plane).plane.offset_m += s.by_m;
   }
 
   static void setAxes(PlaneGroup& g) {
@@ -583,7 +576,9 @@ class RoomBuilder {
       if (!behind.empty()) loops = without(loops, behind);
     }
     ++walls_;
+    const std::size_t first = room_.planes.size();
     addParts(g, PlaneKind::kWall, "wall_" + std::to_string(walls_), loops);
+    for (std::size_t i = first; i < room_.planes.size(); ++i) room_.planes[i].plane = run.group;
   }
 
   /// Each outer loop as a plane of its own, with the holes in it.

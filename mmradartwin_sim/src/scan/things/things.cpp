@@ -398,9 +398,12 @@ class ThingFinder {
     }
     thing.klass = guess.klass, thing.class_confidence = guess.confidence, thing.why = guess.why;
     thing.watertight = true;
-    if (part.top >= 0 && !options_.proxies) {
+    const bool boxes = options_.things == ThingForms::kBoxes;
+    if (options_.things == ThingForms::kMeshes && addMesh(scan_, samples_, frame_, options_, part.samples, thing)) {
+      // The scan's own surface.
+    } else if (part.top >= 0) {
       addTable(part, thing);
-    } else if (sphere.share > 0.85 && sphere.share > box.share + 0.1 && sphere.radius_m < 0.6) {
+    } else if (!boxes && sphere.share > 0.85 && sphere.share > box.share + 0.1 && sphere.radius_m < 0.6) {
       thing.shape = ThingShape::kSphere;
       thing.rms_m = sphere.rms_m, thing.largest_m = sphere.largest_m;
       addSphere(sphere, thing);
@@ -410,7 +413,7 @@ class ThingFinder {
       UprightCylinder standing = cylinder;
       if (standing.low_m < 0.06) standing.low_m = kGap_m;
       addCylinder(standing, thing);
-    } else if (signs.is_box || options_.proxies || sizes.minCoeff() < 0.06 ||
+    } else if (signs.is_box || boxes || sizes.minCoeff() < 0.06 ||
                !addPlatesOrMesh(part.samples, cut == Cut::kPlate ? 0.3 : 0.6, thing)) {
       thing.shape = sizes.minCoeff() < 0.04 ? ThingShape::kPlate : ThingShape::kBox;
       thing.rms_m = box.rms_m, thing.largest_m = box.largest_m;
