@@ -1,5 +1,6 @@
 """The comparison of a made scene with its known room: a scene written of the room itself has no error, and errors that are
 put in are found at their size."""
+import dataclasses
 import math
 import os
 import unittest
@@ -44,19 +45,36 @@ def perfect(folder, room, asked, moved=None, said=None):
     return scan
 
 
+def with_points(scan, room):
+    """The scan with points 5 cm apart on all faces of the room."""
+    points = []
+    for r in (r for actor in room.actors() for part in actor.parts for r in known_room.rectangles_of(part)):
+        u, v = np.arange(0, r.s1, 0.05), np.arange(0, r.s2, 0.05)
+        points.append((r.origin + u[:, None, None] * r.e1 + v[None, :, None] * r.e2).reshape(-1, 3))
+    S = scan.T_scan_map
+    return dataclasses.replace(scan, points=np.concatenate(points) @ S[:3, :3].T + S[:3, 3])
+
+
 class SceneComparison(InFolder):
     asked = Degradation("mm", unit_m=1e-3, y_up=True, tilt_deg=5.0, yaw_deg=20.0, offset_m=(1.0, 2.0, 0.5))
 
+    def test_a_wall_that_stands_elsewhere_holds_none_of_the_scan(self):
+        room = known_room.l_shaped_room()
+        scan = with_points(perfect(self.folder, room, self.asked, {room.wall_names[0]: np.array([0.3, 0.4, 0])}), room)
+        areas = {actor.name: sum(r.s1 * r.s2 for r in actor.parts) for actor in room.shell()[2:]}
+        held = 1 - areas[room.wall_names[0]] / sum(areas.values())
+        self.assertAlmostEqual(scene_comparison.compare(self.folder, room, scan).wall_share, held, delta=0.03)
+
     def test_exact_scene_has_no_error(self):
         room = known_room.l_shaped_room()
-        scan = perfect(self.folder, room, self.asked)
+        scan = with_points(perfect(self.folder, room, self.asked), room)
         found = scene_comparison.compare(self.folder, room, scan)
         self.assertLess(abs(found.floor_m), 1e-6)
         self.assertLess(found.tilt_deg, 1e-4)
         self.assertEqual([w[0] for w in found.walls], room.wall_names)
         self.assertLess(max(w[1] for w in found.walls), 1e-5)
         self.assertLess(max(w[2] for w in found.walls), 1e-3)
-        self.assertAlmostEqual(found.wall_share, 0.96)
+        self.assertEqual(found.wall_share, 1)
         self.assertTrue(all(right for _, _, right in found.furniture + found.flat), msg=f"{found}")
         self.assertEqual([n for n, _, _ in found.flat], ["door_1"])
         self.assertEqual(len(found.furniture), 10)
