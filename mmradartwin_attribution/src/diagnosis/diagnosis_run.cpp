@@ -33,8 +33,6 @@ constexpr int kFolds = 5;
 constexpr double kWider = 1.2;
 constexpr int kMostWidenings = 3;              ///< each costs a fit of all latents
 const double kDbPerNeper = 10 / std::log(10);  ///< decibels of a power whose natural logarithm is 1
-/// Standard deviation of an actor's error over the spread of all, below which the session tells something of it.
-constexpr double kKnownBelow = 0.9;
 
 }  // namespace
 
@@ -267,7 +265,7 @@ std::vector<ActorErrors> DiagnosisRun::actorsBy(const SessionEvidence& evidence)
     const ActorErrors of_actor = {actors[i].name, kDbPerNeper * levels.mean[e],
                                   kDbPerNeper * levels.standard_deviation[e], ranges.mean[e],
                                   ranges.standard_deviation[e]};
-    if (of_actor.level_sd_db < kKnownBelow * level_db || of_actor.range_sd_m < kKnownBelow * range_m)
+    if (of_actor.level_sd_db < kSaysSomething * level_db || of_actor.range_sd_m < kSaysSomething * range_m)
       errors.push_back(of_actor);
   }
   return errors;

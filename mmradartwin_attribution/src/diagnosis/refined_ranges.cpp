@@ -15,8 +15,6 @@
 namespace mmradartwin::diagnosis {
 namespace {
 
-/// Share of the stated error that is left where a session says something of an actor's place.
-constexpr double kSaysSomething = 0.9;
 /// Spread of ranges that stand where the scene has them.
 constexpr double kInPlace_m = 1e-5;
 

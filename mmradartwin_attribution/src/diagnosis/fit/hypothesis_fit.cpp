@@ -15,6 +15,13 @@ std::vector<int> everyPose(const ModelState& state) {
   return poses;
 }
 
+std::vector<int> evenlySpread(std::size_t poses, std::size_t wanted) {
+  wanted = std::min(poses, wanted);
+  std::vector<int> indices;
+  for (std::size_t i = 0; i < wanted; ++i) indices.push_back(static_cast<int>(i * poses / wanted));
+  return indices;
+}
+
 std::size_t HypothesisFit::numbers() const {
   return std::max<std::size_t>(1, hypothesis.coordinates.size()) + static_cast<std::size_t>(hypothesis.searched);
 }

@@ -52,6 +52,8 @@ constexpr int kLatentSteps = 3;  ///< Fisher steps of the latents before starts 
 
 /// Indices of all poses of the session.
 std::vector<int> everyPose(const ModelState& state);
+/// Indices of `wanted` of so many poses, or of all where there are fewer, evenly spread.
+std::vector<int> evenlySpread(std::size_t poses, std::size_t wanted);
 
 /// Hypothesis that was judged without a fit.
 struct Screened {

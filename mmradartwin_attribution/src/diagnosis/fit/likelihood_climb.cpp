@@ -315,9 +315,7 @@ std::vector<double> LikelihoodClimb::scannedValues(const Coordinate& c) const {
 }
 
 std::vector<double> LikelihoodClimb::peaks(const std::vector<double>& values, const SessionLatents& latents) const {
-  std::vector<int> poses;
-  const std::size_t all = everyone_.size(), wanted = std::min(all, kScanPoses);
-  for (std::size_t i = 0; i < wanted; ++i) poses.push_back(everyone_[i * all / wanted]);
+  const std::vector<int> poses = evenlySpread(everyone_.size(), kScanPoses);
   const auto likelihoodAt = [&](double value) {
     const auto echoes = source_.echoes(mechanismsAt({value}), poses, latents.actor_range_m);
     const std::vector<double> each = model_.byPose(echoes, latents, poses);

@@ -31,6 +31,9 @@ struct ErrorEvidence {
 /// prior: log-normal, a factor of e wide. Nothing where the data say little.
 std::optional<SpreadEstimate> estimatedSpread(const ErrorEvidence& evidence, double stated);
 
+/// Standard deviation of an error over the spread of all, below which the session says something of it.
+inline constexpr double kSaysSomething = 0.9;
+
 /// Posterior mean and standard deviation of errors.
 struct PosteriorErrors {
   std::vector<double> mean, standard_deviation;  ///< [errors]

@@ -1,6 +1,5 @@
 #include "diagnosis/rounds/knife_edges.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -17,13 +16,11 @@ constexpr double kSure_sigmas = 3;           ///< of a loss that no fit of laten
 /// True where poses are surely less likely before the latents are fitted, which spares the fit: such a loss is far
 /// larger than what fitted latents win; see docs/verification/speed.md#a-full-campaign.
 bool surelyLoses(DiagnosisContext& context, const ModelState& plain, const std::vector<NamedParameters>& mechanisms) {
-  const std::size_t all = plain.by_pose.size(), looked_at = std::min(all, kPosesBeforeFit);
-  std::vector<int> poses;
-  for (std::size_t i = 0; i < looked_at; ++i) poses.push_back(static_cast<int>(i * all / looked_at));
+  const std::vector<int> poses = evenlySpread(plain.by_pose.size(), kPosesBeforeFit);
   const auto echoes = context.echoes.echoes(mechanisms, poses, plain.actor_range_m);
   const std::vector<double> nats = context.likelihood.byPose(echoes, plain.latents, poses);
   double sum = 0, squares = 0;
-  for (std::size_t i = 0; i < looked_at; ++i) {
+  for (std::size_t i = 0; i < poses.size(); ++i) {
     const double gain = nats[i] - plain.by_pose[static_cast<std::size_t>(poses[i])];
     sum += gain;
     squares += gain * gain;

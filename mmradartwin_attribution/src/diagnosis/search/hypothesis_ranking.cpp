@@ -25,14 +25,6 @@ constexpr std::size_t kNeighbours = 2;        ///< actors near a place where an 
 constexpr std::size_t kMostElsewhere = 2;     ///< actors that are searched for by a shift of their echoes
 constexpr double kGainPerNumber_nats = 0.5;   ///< expected gain per number by chance
 
-/// Indices of `wanted` of the poses, evenly spread.
-std::vector<int> spread(std::size_t count, std::size_t wanted) {
-  wanted = std::min(count, wanted);
-  std::vector<int> poses;
-  for (std::size_t i = 0; i < wanted; ++i) poses.push_back(static_cast<int>(i * count / wanted));
-  return poses;
-}
-
 bool hasMoreScreenedNats(const Screened& a, const Screened& b) { return a.screened_nats > b.screened_nats; }
 
 /// Screens of one round.
@@ -58,7 +50,7 @@ class Looks {
   std::vector<Screened> ranked();
 
  private:
-  std::vector<int> spread(std::size_t wanted) const { return search::spread(context_.data.poses.size(), wanted); }
+  std::vector<int> spread(std::size_t wanted) const { return evenlySpread(context_.data.poses.size(), wanted); }
   const std::string& nameOf(int actor) const {
     return context_.twin.scene().actors[static_cast<std::size_t>(actor)].name;
   }
@@ -271,7 +263,8 @@ std::vector<Screened> Looks::ranked() {
 
 std::vector<RangeShift> HypothesisRanking::shifted(const ModelState& state) {
   context_.report("actors that stand elsewhere", 0);
-  std::vector<RangeShift> shifts = screen_.nearerOrFarther(state, spread(context_.data.poses.size(), kScreenPoses));
+  std::vector<RangeShift> shifts =
+      screen_.nearerOrFarther(state, evenlySpread(context_.data.poses.size(), kScreenPoses));
   const auto far = [](const RangeShift& s) { return s.nats >= bounds::kLeastNatsElsewhere; };
   shifts.erase(std::partition_point(shifts.begin(), shifts.end(), far), shifts.end());
   return shifts;
