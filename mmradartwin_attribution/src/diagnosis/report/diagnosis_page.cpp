@@ -239,7 +239,7 @@ std::vector<PageValues> sceneActorRows(const PageNumbers& summary) {
   for (std::size_t i = 0; i < summary.values()["actors"].size(); ++i) {
     const std::string at = "/actors/" + std::to_string(i);
     const auto value = [&](const std::string& key, const std::string& unit) {
-      return PageValue::html(summary.significant(at + key + unit) + " &plusmn; " +
+      return PageValue::html(summary.significant(at + key + unit) + " \u00b1 " +
                              summary.significant(at + key + "_sd" + unit));
     };
     rows.push_back({{"actor", summary.values()["actors"][i]["actor"].get<std::string>()},
