@@ -12,6 +12,7 @@
 #include "diagnosis/rounds/fit_round.h"
 #include "diagnosis/rounds/hypothesis_finding.h"
 #include "diagnosis/rounds/map_evidence.h"
+#include "diagnosis/rounds/move_within_errors.h"
 #include "diagnosis/search/law_screen.h"
 #include "diagnosis/search/places_apart.h"
 
@@ -211,6 +212,11 @@ HypothesisRounds::RoundEnd HypothesisRounds::findOne(int round) {
     verdict = rejectionByLikelihood(fit);
     if (isClutter(fit)) clutter.push_back(fit);
     if (!verdict.empty()) continue;
+    if (std::optional<HypothesisFit> small = moveWithinErrors(context_, state, fit)) {
+      verdict = "a move within the errors of actors explains as much";
+      within_error.push_back(std::move(*small));
+      continue;
+    }
     const bool placed = placeOf(fit.hypothesis.at(fit.scaled_values), context_.twin.scene()).has_value();
     std::vector<HypothesisFit> granted = placed ? std::vector<HypothesisFit>() : newClutter(clutter);
     const std::vector<HypothesisFit> moves = newMoves(within_error, granted.size());
