@@ -212,7 +212,7 @@ HypothesisRounds::RoundEnd HypothesisRounds::findOne(int round) {
     verdict = rejectionByLikelihood(fit);
     if (isClutter(fit)) clutter.push_back(fit);
     if (!verdict.empty()) continue;
-    if (std::optional<HypothesisFit> small = moveWithinErrors(context_, state, fit)) {
+    if (std::optional<HypothesisFit> small = moveWithinErrors(context_, state, fit, family_)) {
       verdict = "a move within the errors of actors explains as much";
       within_error.push_back(std::move(*small));
       continue;

@@ -30,7 +30,7 @@ class RoomWithAMove : public ::testing::Test {
     return fit;
   }
   std::optional<HypothesisFit> small(const HypothesisFit& far) {
-    return rounds::moveWithinErrors(*context_, null_, far);
+    return rounds::moveWithinErrors(*context_, null_, far, 300);
   }
   DiagnosisOptions options_;
   const double least_m_ = StatedBounds(options_.accuracy).leastMove_m();
@@ -47,8 +47,7 @@ TEST_F(RoomWithAMove, ASlideAlongTheOwnFrontIsTheSmallErrorThatItTakesAlong) {
   const std::optional<HypothesisFit> found = small(slid);
   ASSERT_TRUE(found);
   EXPECT_LE(std::abs(found->hypothesis.coordinates[1].value(found->scaled_values[1])), least_m_);
-  EXPECT_NEAR(found->hypothesis.coordinates[0].value(found->scaled_values[0]) +
-                  found->state.latents.actor_range_m[0],
+  EXPECT_NEAR(found->hypothesis.coordinates[0].value(found->scaled_values[0]) + found->state.latents.actor_range_m[0],
               0.03, 0.01);
 }
 
