@@ -238,13 +238,13 @@ std::vector<PageValues> sceneActorRows(const PageNumbers& summary) {
   std::vector<PageValues> rows;
   for (std::size_t i = 0; i < summary.values()["actors"].size(); ++i) {
     const std::string at = "/actors/" + std::to_string(i);
-    const auto value = [&](const std::string& key, const std::string& unit) {
-      return PageValue::html(summary.significant(at + key + unit) + " \u00b1 " +
-                             summary.significant(at + key + "_sd" + unit));
+    const auto value = [&](const std::string& key, const std::string& unit, int digits) {
+      return PageValue::html(summary.fixed(at + key + unit, digits) + " \u00b1 " +
+                             summary.fixed(at + key + "_sd" + unit, digits));
     };
     rows.push_back({{"actor", summary.values()["actors"][i]["actor"].get<std::string>()},
-                    {"level", value("/level", "_db")},
-                    {"range", value("/range", "_m")}});
+                    {"level", value("/level", "_db", 2)},
+                    {"range", value("/range", "_m", 4)}});
   }
   return rows;
 }
