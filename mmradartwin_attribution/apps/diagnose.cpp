@@ -75,7 +75,11 @@ int run(const Arguments& arguments, const std::vector<std::string>& command) {
         requireSameScene(options.compared.back(), twin.description());
       }
       diagnosis = diagnose(recording, twin, options);
-      poses = compareDiagnosedPoses(recording, twin, diagnosis, options);
+      try {
+        poses = compareDiagnosedPoses(recording, twin, diagnosis, options);
+      } catch (const InputError& error) {  // what was found stands without it
+        note("the report shows no single poses: " + std::string(error.what()));
+      }
     }
   }
   // Scene and radar are the recording's wherever it is read from: a bag's stand in a temporary folder.

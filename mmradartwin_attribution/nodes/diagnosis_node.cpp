@@ -281,7 +281,11 @@ class DiagnosisNode {
     if (recording.channels) refuseSameChannelError(chosen->description, *recording.channels);
     Twin twin = twinAt(chosen->description, recording.poses, recording.source);
     Diagnosed diagnosed{diagnose(recording, twin, options), std::nullopt};
-    diagnosed.poses = compareDiagnosedPoses(recording, twin, diagnosed.diagnosis, options);
+    try {
+      diagnosed.poses = compareDiagnosedPoses(recording, twin, diagnosed.diagnosis, options);
+    } catch (const InputError& error) {  // what was found stands without it
+      ROS_WARN_STREAM("The report shows no single poses: " << error.what());
+    }
     if (chosen->scene_of_session) diagnosed.diagnosis.extended.scene_file.clear();
     return diagnosed;
   }

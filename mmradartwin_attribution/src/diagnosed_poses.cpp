@@ -5,7 +5,6 @@
 #include <utility>
 #include <vector>
 
-#include "mmradartwin_dsp/input_error.h"
 #include "mmradartwin_sim/pose_placement.h"
 
 namespace mmradartwin {
@@ -26,27 +25,22 @@ Evaluation comparedWith(const Twin& twin, const Recording& recording, const Eval
 
 }  // namespace
 
-std::optional<DiagnosedPoses> compareDiagnosedPoses(const Recording& recording, const Twin& twin,
-                                                    const Diagnosis& diagnosis, const DiagnosisOptions& options) {
-  try {
-    const SignalChain chain(recording.radar);
-    EvaluationField field(options.config, recording.radar, chain.axes());
-    Evaluation given = comparedWith(twin, recording, field, options, "comparing poses with the twin as given");
-    DiagnosedPoses poses{std::move(field), std::move(given), std::nullopt};
-    const std::vector<Finding>& findings = diagnosis.findings.findings;
-    const bool changed =
-        std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.mechanism.has_value(); });
-    if (!changed) return poses;
-    Twin corrected = twinAt(diagnosis.extended, recording.poses, recording.source);
-    std::vector<Eigen::Isometry3d> places;
-    for (const Pose& pose : recording.poses) places.push_back(pose.T_map_radar);
-    corrected.prepare(places);
-    poses.corrected =
-        comparedWith(corrected, recording, poses.field, options, "comparing poses with the corrected twin");
-    return poses;
-  } catch (const InputError&) {
-    return std::nullopt;
-  }
+DiagnosedPoses compareDiagnosedPoses(const Recording& recording, const Twin& twin, const Diagnosis& diagnosis,
+                                     const DiagnosisOptions& options) {
+  const SignalChain chain(recording.radar);
+  EvaluationField field(options.config, recording.radar, chain.axes());
+  Evaluation given = comparedWith(twin, recording, field, options, "comparing poses with the twin as given");
+  DiagnosedPoses poses{std::move(field), std::move(given), std::nullopt};
+  const std::vector<Finding>& findings = diagnosis.findings.findings;
+  const bool changed =
+      std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.mechanism.has_value(); });
+  if (!changed) return poses;
+  Twin corrected = twinAt(diagnosis.extended, recording.poses, recording.source);
+  std::vector<Eigen::Isometry3d> places;
+  for (const Pose& pose : recording.poses) places.push_back(pose.T_map_radar);
+  corrected.prepare(places);
+  poses.corrected = comparedWith(corrected, recording, poses.field, options, "comparing poses with the corrected twin");
+  return poses;
 }
 
 }  // namespace mmradartwin

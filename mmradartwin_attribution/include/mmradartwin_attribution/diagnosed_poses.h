@@ -20,8 +20,9 @@ struct DiagnosedPoses {
 };
 
 /// Compares as evaluate() does, with the twin as given and with that of `diagnosis.extended`. Takes what diagnose()
-/// took and gave. Nothing where the radar's maps have no cell to compare. Throws DiagnosisCancelled.
-std::optional<DiagnosedPoses> compareDiagnosedPoses(const Recording& recording, const Twin& twin,
-                                                    const Diagnosis& diagnosis, const DiagnosisOptions& options);
+/// took and gave. Throws InputError where the poses cannot be compared, as where the radar's maps have no cell beyond
+/// the least range; what was found stands all the same. Throws DiagnosisCancelled.
+DiagnosedPoses compareDiagnosedPoses(const Recording& recording, const Twin& twin, const Diagnosis& diagnosis,
+                                     const DiagnosisOptions& options);
 
 }  // namespace mmradartwin
