@@ -43,7 +43,8 @@ std::string MapEvidence::rejection(const HypothesisFit& fit, const FindingGain& 
   // Echoes that are there add to the power that is explained. What is put in for others has its power in other cells.
   const bool worse = clearly_worse || (addsEchoes(fit.hypothesis) && explained_more < 0);
   const Eigen::VectorXd nats_by_pose = gainByPose(fit, before_);
-  if (named && !worse && hasEnoughEvidence(fit, likelier) && !explainsTheSame(fit, nats_by_pose)) return "";
+  if (named && !worse && hasEnoughEvidence(fit, likelier, explained[0] > 0) && !explainsTheSame(fit, nats_by_pose))
+    return "";
   if (likelier) rejected_.push_back({nats_by_pose, true});
   return (worse ? "the maps get worse" : "the maps gain nothing") + by_how_much;
 }
@@ -52,11 +53,12 @@ void MapEvidence::addRejected(const HypothesisFit& fit) { rejected_.push_back({g
 
 /// True of a fit that has enough evidence although the maps do not gain. Maps of many scatter points differ from their
 /// expectation by as much as they hold. Few places see one actor, so that little of its gain is left without the best
-/// place.
-bool MapEvidence::hasEnoughEvidence(const HypothesisFit& fit, bool likelier) {
+/// place. Evidence that is overwhelming whatever its scatter over places needs maps that gain surely, however little:
+/// an actor put where no map shows it can gain much at few places.
+bool MapEvidence::hasEnoughEvidence(const HypothesisFit& fit, bool likelier, bool maps_gain_surely) {
   const bool traces = context_.echoes.altersGeometry(fit.hypothesis.at(fit.scaled_values));
   const double least_nats = leastNats(fit.hypothesis, fit.scaled_values, traces, context_.data.poses.size());
-  const bool overwhelming = fit.overwhelming && !isFaintAddition(fit.hypothesis, fit.scaled_values);
+  const bool overwhelming = fit.overwhelming && maps_gain_surely && !isFaintAddition(fit.hypothesis, fit.scaled_values);
   return (likelier || fit.isFarAway()) &&
          (overwhelming || fit.gain_without_best_place / fit.overdispersion > least_nats);
 }

@@ -28,7 +28,7 @@ class MapEvidence {
     Eigen::VectorXd nats_by_pose;
     bool by_maps;  ///< else by the errors of the session itself
   };
-  bool hasEnoughEvidence(const HypothesisFit& fit, bool likelier);
+  bool hasEnoughEvidence(const HypothesisFit& fit, bool likelier, bool maps_gain_surely);
   bool explainsTheSame(const HypothesisFit& fit, const Eigen::VectorXd& nats_by_pose) const;
 
   DiagnosisContext& context_;
