@@ -12,6 +12,7 @@
 #include <set>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "scan/samples/scan_bounds.h"
 #include "scan/things/thing_mesh.h"
 #include "scan/things/thing_shapes.h"
 
@@ -24,8 +25,7 @@ constexpr double kInsideWall_m = 0.05;                // so far a pose's error m
 constexpr double kMostOutside = 0.05;                 // share of its surface
 constexpr double kMostShared = 0.05;                  // share of an object within another one
 constexpr double kSmallest_m = 0.15, kLargest_m = 4;  // largest size of a thing that is worth a scan of its own
-constexpr double kShort_m = 0.01;  // bodies end so far before walls, floor and ceiling, as all things do
-constexpr double kRest = 0.8;      // of a thing's samples near an object: what is left of it is no thing
+constexpr double kRest = 0.8;  // of a thing's samples near an object: what is left of it is no thing
 
 /// An object's surface in map, its body where it is one, and a search in it.
 struct PlacedObject {
@@ -171,8 +171,8 @@ void requireApart(const PlacedObject& a, const PlacedObject& b) {
 /// Ends a body short of what it touches.
 void endShort(const RoomPlanes& room, UprightBox& box) {
   Eigen::Vector3d &low = box.box.min(), &high = box.box.max();
-  if (low.z() < kInsideWall_m) low.z() = kShort_m;
-  if (high.z() > room.height_m - kInsideWall_m) high.z() = room.height_m - kShort_m;
+  if (low.z() < kInsideWall_m) low.z() = bounds::kGap_m;
+  if (high.z() > room.height_m - kInsideWall_m) high.z() = room.height_m - bounds::kGap_m;
   for (const ScanPlane& plane : room.planes) {
     const Eigen::Vector3d n = box.toBox(plane.normal);
     if (plane.kind != PlaneKind::kWall) continue;
@@ -180,7 +180,7 @@ void endShort(const RoomPlanes& room, UprightBox& box) {
       if (std::abs(n[axis]) < 0.9999) continue;
       double& end = n[axis] > 0 ? low[axis] : high[axis];
       const double beyond = n[axis] > 0 ? plane.offset_m - end : end + plane.offset_m;  // behind the wall
-      if (std::abs(beyond) < kInsideWall_m) end += n[axis] > 0 ? beyond + kShort_m : -beyond - kShort_m;
+      if (std::abs(beyond) < kInsideWall_m) end += n[axis] > 0 ? beyond + bounds::kGap_m : -beyond - bounds::kGap_m;
     }
   }
 }
@@ -192,7 +192,7 @@ void endShort(const RoomPlanes& room, ScanThing& thing) {
       if (plane.kind == PlaneKind::kDoor || plane.kind == PlaneKind::kWindow || plane.kind == PlaneKind::kPanel)
         continue;
       const double before = plane.normal.dot(v) - plane.offset_m;
-      if (before < kShort_m && before > -2 * kInsideWall_m) v += (kShort_m - before) * plane.normal;
+      if (before < bounds::kGap_m && before > -2 * kInsideWall_m) v += (bounds::kGap_m - before) * plane.normal;
     }
     thing.bounds.extend(v);
   }
@@ -276,7 +276,7 @@ class ObjectPlacer {
     if (!meshes && cylinder.share > 0.8 && cylinder.share > placed.box.share + 0.05) {
       thing.shape = ThingShape::kCylinder;
       thing.rms_m = cylinder.rms_m, thing.largest_m = cylinder.largest_m;
-      if (cylinder.low_m < kInsideWall_m) cylinder.low_m = kShort_m;
+      if (cylinder.low_m < kInsideWall_m) cylinder.low_m = bounds::kGap_m;
       addCylinder(cylinder, thing);
       placed.is_box = true;  // what its box holds is it, too
       return thing;

@@ -7,17 +7,12 @@
 #include <cstdio>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "scan/samples/scan_bounds.h"
 
 namespace mmradartwin {
 namespace {
 
-constexpr double kDeg = M_PI / 180;
-constexpr double kCone_rad = 12 * kDeg;    // planes within are level or upright, before up is known
-constexpr double kRoom_m[2] = {1.0, 9.0};  // the smallest of a room's three sizes, up to a hall's height
-constexpr double kWidest_m = 150;
-constexpr double kShell_m2 = 3;        // a plane as large is the room's own: tops and sides of furniture are smaller
-constexpr double kNoUp = -100;         // score of an axis that no plane has as its normal
-constexpr double kSameLevel_m = 0.06;  // a floor that drift has doubled is one
+constexpr double kNoUp = -100;  // score of an axis that no plane has as its normal
 
 std::string number(double value, int digits = 2) {
   std::array<char, 40> text{};
@@ -64,8 +59,8 @@ Alignment alignmentWith(const std::vector<PlaneRegion>& regions, const Eigen::Ve
   Alignment result;
   for (const PlaneRegion& r : regions) {
     const double cosine = std::abs(r.normal.dot(axis));
-    if (cosine > std::cos(kCone_rad)) result.along_m2 += r.area_m2;
-    if (cosine < std::sin(kCone_rad)) result.across_m2 += r.area_m2;
+    if (cosine > std::cos(bounds::kCone_deg * bounds::kDegree)) result.along_m2 += r.area_m2;
+    if (cosine < std::sin(bounds::kCone_deg * bounds::kDegree)) result.across_m2 += r.area_m2;
   }
   return result;
 }
@@ -81,7 +76,7 @@ UpSigns upSigns(const ScanSamples& samples, const std::vector<PlaneRegion>& regi
   UpSigns signs{samples, regions, {}};
   std::vector<char> on_shell(samples.size(), 0);
   for (const PlaneRegion& r : regions) {
-    if (r.area_m2 < kShell_m2) continue;
+    if (r.area_m2 < bounds::kShell_m2) continue;
     for (int i : r.samples) on_shell[static_cast<std::size_t>(i)] = 1;
   }
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -111,7 +106,8 @@ double scoreOfUp(const UpSigns& signs, const Eigen::Vector3d& axis) {
   for (const PlaneRegion& r : signs.regions) {
     all_m2 += r.area_m2;
     const double cosine = r.normal.dot(axis);
-    if (r.area_m2 < kShell_m2 && std::abs(cosine) > std::cos(kCone_rad)) (cosine > 0 ? up_m2 : down_m2) += r.area_m2;
+    if (r.area_m2 < bounds::kShell_m2 && std::abs(cosine) > std::cos(bounds::kCone_deg * bounds::kDegree))
+      (cosine > 0 ? up_m2 : down_m2) += r.area_m2;
   }
   if (aligned.along_m2 < 0.05 * all_m2) return kNoUp;
   const auto [low, high] = endsAlong(signs.samples, axis);
@@ -148,7 +144,7 @@ Eigen::Vector3d findUp(const RawScan& scan, const ScanSamples& samples, const st
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (const PlaneRegion& r : regions) {
       const double cosine = r.normal.dot(candidate.axis);
-      if (std::abs(cosine) > std::cos(25 * kDeg)) sum += (cosine > 0 ? 1 : -1) * r.area_m2 * r.normal;
+      if (std::abs(cosine) > std::cos(25 * bounds::kDegree)) sum += (cosine > 0 ? 1 : -1) * r.area_m2 * r.normal;
     }
     if (sum.isZero()) continue;
     const Eigen::Vector3d axis = sum.normalized();
@@ -176,9 +172,9 @@ struct Level {
 /// up that the level planes have as normal and the upright ones lie along, by their areas; what is off by more than
 /// three of its standard deviations and half a degree is no plane of that kind.
 Level levelBy(const std::vector<PlaneRegion>& regions, Eigen::Vector3d up) {
-  double cone = kCone_rad;
+  double cone = bounds::kCone_deg * bounds::kDegree;
   Level level{up, 0};
-  for (int round = 0; round < 6; ++round, cone = std::max(0.5 * cone, 0.6 * kDeg)) {
+  for (int round = 0; round < 6; ++round, cone = std::max(0.5 * cone, 0.6 * bounds::kDegree)) {
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
     double weights = 0, squares = 0;
     for (const PlaneRegion& r : regions) {
@@ -186,8 +182,8 @@ Level levelBy(const std::vector<PlaneRegion>& regions, Eigen::Vector3d up) {
       const double angle = std::acos(std::min(1.0, std::abs(r.normal.dot(level.up))));
       const bool level_plane = angle < M_PI / 4;
       const double off = level_plane ? angle : M_PI / 2 - angle;
-      if (off > std::max(cone, 3 * r.angle_std_rad) || off > kCone_rad) continue;
-      const double weight = r.area_m2 / (std::pow(r.angle_std_rad, 2) + std::pow(0.1 * kDeg, 2));
+      if (off > std::max(cone, 3 * r.angle_std_rad) || off > bounds::kCone_deg * bounds::kDegree) continue;
+      const double weight = r.area_m2 / (std::pow(r.angle_std_rad, 2) + std::pow(0.1 * bounds::kDegree, 2));
       sum += (level_plane ? -weight : weight) * r.normal * r.normal.transpose();
       weights += weight;
       squares += weight * weight * (off * off + std::pow(r.angle_std_rad, 2));
@@ -205,14 +201,14 @@ struct HorizontalLevel {
   double height_m, area_m2;
 };
 
-/// Heights of level planes, lowest first; those closer than kSameLevel_m are the larger one's.
+/// Heights of level planes, lowest first; those closer than bounds::kSameLevel_m are the larger one's.
 std::vector<HorizontalLevel> levelsOf(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up) {
   std::vector<HorizontalLevel> levels;
   for (const PlaneRegion& r : regions) {  // largest first
-    if (std::abs(r.normal.dot(up)) < std::cos(3 * kDeg)) continue;
+    if (std::abs(r.normal.dot(up)) < std::cos(bounds::kLevel_deg * bounds::kDegree)) continue;
     const double height = r.middle.dot(up);
     const auto same = std::find_if(levels.begin(), levels.end(), [height](const HorizontalLevel& l) {
-      return std::abs(l.height_m - height) < kSameLevel_m;
+      return std::abs(l.height_m - height) < bounds::kSameLevel_m;
     });
     if (same == levels.end()) {
       levels.push_back({height, r.area_m2});
@@ -230,8 +226,8 @@ bool isInsideOut(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d&
   double faces_up = 0;
   for (const PlaneRegion& r : regions) {
     const double cosine = r.normal.dot(up);
-    const bool on_floor = std::abs(r.middle.dot(up) - floor_m) < kSameLevel_m;
-    if (on_floor && std::abs(cosine) > std::cos(3 * kDeg)) faces_up += cosine * r.area_m2;
+    const bool on_floor = std::abs(r.middle.dot(up) - floor_m) < bounds::kSameLevel_m;
+    if (on_floor && std::abs(cosine) > std::cos(bounds::kLevel_deg * bounds::kDegree)) faces_up += cosine * r.area_m2;
   }
   return faces_up < 0;
 }
@@ -245,7 +241,8 @@ double heightOf(const ScanSamples& samples, const std::vector<PlaneRegion>& regi
     double sum = 0;
     std::size_t count = 0;
     for (const PlaneRegion& r : regions) {
-      if (std::abs(r.normal.dot(up)) < std::cos(3 * kDeg) || std::abs(r.middle.dot(up) - height_m) > tolerance_m)
+      if (std::abs(r.normal.dot(up)) < std::cos(bounds::kLevel_deg * bounds::kDegree) ||
+          std::abs(r.middle.dot(up) - height_m) > tolerance_m)
         continue;
       for (int i : r.samples) {
         const auto s = static_cast<std::size_t>(i);
@@ -293,7 +290,8 @@ double unitOfScan(const RawScan& scan) {
   const Eigen::Vector3d sizes = robustSizes(scan.points);
   for (double unit : {1.0, 0.001, 0.01}) {
     const double smallest = unit * sizes.minCoeff();
-    if (smallest > kRoom_m[0] && smallest < kRoom_m[1] && unit * sizes.maxCoeff() < kWidest_m) return unit;
+    if (smallest > bounds::kRoom_m[0] && smallest < bounds::kRoom_m[1] && unit * sizes.maxCoeff() < bounds::kWidest_m)
+      return unit;
   }
   // A part of a room, of one plane perhaps: by its largest size.
   for (double unit : {1.0, 0.001, 0.01}) {
@@ -314,7 +312,7 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
   Level level{options.up ? options.up->normalized() : findUp(scan, samples, regions), 0};
   if (options.level) level = levelBy(regions, level.up);
   frame.up = level.up;
-  frame.tilt_std_deg = level.std_rad / kDeg;
+  frame.tilt_std_deg = level.std_rad / bounds::kDegree;
   const Alignment aligned = alignmentWith(regions, frame.up);
   if (aligned.across_m2 < 1) {
     throw InputError(scan.file + ": shows " +
@@ -327,7 +325,7 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
     const double cosine = candidate.axis.dot(frame.up);
     if (cosine > nearest) nearest = cosine, frame.up_name = candidate.name, axis = candidate.axis;
   }
-  frame.tilt_deg = std::acos(std::min(1.0, nearest)) / kDeg;
+  frame.tilt_deg = std::acos(std::min(1.0, nearest)) / bounds::kDegree;
   const Eigen::Matrix3d exchange = exchangeOfAxes(frame.up_name);
   const Eigen::Matrix3d R =
       Eigen::Quaterniond::FromTwoVectors(exchange * frame.up, Eigen::Vector3d::UnitZ()).toRotationMatrix() * exchange;
@@ -341,7 +339,7 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
     floor = *options.floor_m - axis.dot(offset);
   } else {
     const auto lowest = std::find_if(levels.begin(), levels.end(), [&](const HorizontalLevel& l) {
-      return l.area_m2 > std::max(0.3, 0.25 * largest_m2);
+      return l.area_m2 > std::max(0.3, bounds::kShareOfLargestLevel * largest_m2);
     });
     if (lowest == levels.end()) {
       throw InputError(scan.file + ": shows no floor; say where it is by --floor, and which way is up by --up");
@@ -349,7 +347,7 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
     floor = lowest->height_m;
   }
   for (const HorizontalLevel& l : levels) {
-    if (l.area_m2 > 0.25 * largest_m2 && l.height_m > floor + 1.8) {
+    if (l.area_m2 > bounds::kShareOfLargestLevel * largest_m2 && l.height_m > floor + bounds::kLeastCeiling_m) {
       frame.has_ceiling = true;
       frame.ceiling_m = l.height_m - floor;
     }

@@ -13,13 +13,12 @@
 #include <numeric>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "scan/samples/scan_bounds.h"
 
 namespace mmradartwin {
 namespace {
 
-constexpr double kFinest_m = 0.02;            // side of a voxel
 constexpr std::size_t kMostSamples = 450000;  // else the voxels grow: a large flat has 500 m2 of surface
-constexpr double kReach_voxels = 3.5;         // of a sample's neighbours, some forty on a plane
 constexpr double kWide_m = 0.8;               // the scale at which noise is measured: slower than a scanner's ripple
 constexpr std::size_t kWidePlaces = 3000;
 
@@ -76,7 +75,7 @@ DenseCloud densePoints(const RawScan& scan, double unit_m) {
     const Eigen::Vector3f a = unit * scan.points[at(0)], b = unit * scan.points[at(1)] - a,
                           c = unit * scan.points[at(2)] - a;
     const Eigen::Vector3f n = 0.5F * b.cross(c);
-    const double share = n.norm() / (0.5 * kFinest_m * kFinest_m);
+    const double share = n.norm() / (0.5 * bounds::kFinest_m * bounds::kFinest_m);
     if (share > 1e7) continue;  // a triangle of thousands of square metres is no surface of a room
     const int count = std::max(1, static_cast<int>(share));
     for (int k = 0; k < count; ++k) {
@@ -141,7 +140,7 @@ class Thinning {
   Thinning(const RawScan& scan, double unit_m, const Progress& progress) : progress_(progress) {
     DenseCloud dense = densePoints(scan, unit_m);
     if (dense.points.size() < 1000) throw InputError(scan.file + ": has no surface to speak of");
-    samples_.spacing_m = kFinest_m;
+    samples_.spacing_m = bounds::kFinest_m;
     const std::vector<DensePoint> order = inVoxels(dense.points, samples_.spacing_m);
     samples_.oriented = !dense.normals.empty();
     samples_.dense.reserve(order.size());
@@ -197,13 +196,14 @@ class Thinning {
     });
     rms.erase(std::remove(rms.begin(), rms.end(), -1.0F), rms.end());
     std::sort(rms.begin(), rms.end());
-    samples_.noise_m = rms.empty() ? kFinest_m : static_cast<double>(rms[rms.size() / 10]);
+    samples_.noise_m = rms.empty() ? bounds::kFinest_m : static_cast<double>(rms[rms.size() / 10]);
   }
 
   void findNormals() {
     const std::size_t count = samples_.size();
     // Noise turns a normal by about noise / (reach / 2 * sqrt(neighbours)); noisy scans need a wider reach.
-    const double reach_m = std::max(kReach_voxels * samples_.spacing_m, std::min(5 * samples_.noise_m, 0.15));
+    const double reach_m =
+        std::max(bounds::kReachOfNormals_voxels * samples_.spacing_m, std::min(5 * samples_.noise_m, 0.15));
     std::vector<std::vector<int>> around(count);
     samples_.normals.assign(count, Eigen::Vector3f::Zero());
     samples_.flatness_m.assign(count, 0);

@@ -26,6 +26,7 @@ struct ScanSamples {
   std::vector<int> dense_triangle;  ///< of a mesh, that each of these points lies on
 
   std::size_t size() const { return points.size(); }
+  Eigen::Vector3d at(int i) const { return points[static_cast<std::size_t>(i)].cast<double>(); }
   double area_m2() const { return spacing_m * spacing_m; }  ///< what a sample stands for
 };
 
