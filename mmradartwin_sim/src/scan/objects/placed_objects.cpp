@@ -87,13 +87,13 @@ void turnIntoMap(const Eigen::Isometry3d& T_map_object, const Eigen::Vector3d& o
 std::vector<double> yawsOf(const ScanSamples& samples, double room_yaw_rad) {
   std::vector<double> yaws = {room_yaw_rad};
   for (const PlaneRegion& region : growPlanes(samples, 0.02, nullptr)) {
-    if (std::abs(region.normal.z()) > 0.1) continue;
+    if (std::abs(region.normal.z()) > bounds::kUprightPlane) continue;
     yaws.push_back(std::atan2(region.normal.y(), region.normal.x()));
     break;
   }
   double sines = 0, cosines = 0;
   for (const Eigen::Vector3f& n : samples.normals) {
-    if (std::abs(n.z()) > 0.3F) continue;
+    if (std::abs(n.z()) > bounds::kUprightNormal) continue;
     const double angle = 4 * std::atan2(static_cast<double>(n.y()), static_cast<double>(n.x()));
     sines += std::sin(angle), cosines += std::cos(angle);
   }
@@ -267,7 +267,7 @@ class ObjectPlacer {
     thing.material = placed.object->material;
     thing.samples = placed.samples.size();
     thing.watertight = true;
-    const double tolerance_m = std::max(planeTolerance(placed.samples), 0.015);
+    const double tolerance_m = std::max(planeTolerance(placed.samples), bounds::kLeastFit_m);
     placed.box = fitBox(placed.samples, placed.all, yawsOf(placed.samples, room_.yaw_rad), tolerance_m);
     const BoxEvidence evidence = evidenceOf(placed.samples, placed.all, placed.box, tolerance_m);
     UprightCylinder cylinder = fitCylinder(placed.samples, placed.all, tolerance_m);
@@ -348,6 +348,7 @@ void joinObjects(const ScanSamples& samples, PlacedObjects objects, Things& thin
   for (const ScanThing& object : objects.things) names.insert(object.name);
   Things joined;
   joined.crumbs = things.crumbs;
+  joined.scraps = things.scraps;
   joined.notes = things.notes;
   for (std::size_t k = 0; k < objects.things.size(); ++k) {
     joined.things.push_back(std::move(objects.things[k]));
