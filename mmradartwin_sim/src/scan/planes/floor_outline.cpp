@@ -18,8 +18,8 @@ constexpr double kOpenStep_m = 1.0;  // by which the floor follows the scan wher
 std::vector<int> floorSamples(const RoomParts& room) {
   std::vector<int> all;
   for (const PlaneGroup& g : room.groups) {
-    if (isLevel(g.plane) && (std::abs(g.plane.middle.z()) < bounds::kSameWall_m ||
-                             std::abs(g.plane.middle.z() - room.height_m) < bounds::kSameWall_m)) {
+    if (isLevel(g.plane) && (std::abs(g.plane.middle.z()) < bounds::kSameSurface_m ||
+                             std::abs(g.plane.middle.z() - room.height_m) < bounds::kSameSurface_m)) {
       all.insert(all.end(), g.plane.samples.begin(), g.plane.samples.end());
     }
   }

@@ -28,7 +28,7 @@ class PlaneGrouping {
           home = &g;
           break;
         }
-        if (apart < bounds::kSameWall_m && overlap(room_.samples, g, r) > 0.5) {
+        if (apart < bounds::kSameSurface_m && overlap(room_.samples, g, r) > 0.5) {
           home = &g, doubled = true;
           break;
         }

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kSameSide = 0.94;           // cosine of 20 deg: normals of few noisy neighbours scatter
 constexpr double kLeastTolerance_m = 0.006;  // rounding of voxels alone
-constexpr double kSameTurn = 0.9976;         // cosine of 4 deg, of parts of one plane
+const double kSameTurn = std::cos(bounds::kSameTurn_deg * bounds::kDegree);  // of parts of one plane
 
 /// Sums of points, from which their plane follows at any time.
 class PlaneSums {

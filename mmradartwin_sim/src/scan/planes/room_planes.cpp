@@ -112,7 +112,7 @@ class RoomBuilder {
     level.u = {ex.x(), ex.y(), 0};
     level.v = level.plane.normal.cross(level.u);
     for (const PlaneGroup& g : parts_.groups) {
-      if (!isLevel(g.plane) || std::abs(g.plane.middle.z() - height_m) > bounds::kSameWall_m) continue;
+      if (!isLevel(g.plane) || std::abs(g.plane.middle.z() - height_m) > bounds::kSameSurface_m) continue;
       if (std::abs(g.plane.middle.z() - height_m) < parts_.tolerance_m) {
         level.plane.samples.insert(level.plane.samples.end(), g.plane.samples.begin(), g.plane.samples.end());
       } else if (overlap(parts_.samples, level, g.plane) >

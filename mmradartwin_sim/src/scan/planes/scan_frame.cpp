@@ -201,14 +201,14 @@ struct HorizontalLevel {
   double height_m, area_m2;
 };
 
-/// Heights of level planes, lowest first; those closer than bounds::kSameLevel_m are the larger one's.
+/// Heights of level planes, lowest first; those closer than bounds::kSameSurface_m are the larger one's.
 std::vector<HorizontalLevel> levelsOf(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up) {
   std::vector<HorizontalLevel> levels;
   for (const PlaneRegion& r : regions) {  // largest first
     if (std::abs(r.normal.dot(up)) < std::cos(bounds::kLevel_deg * bounds::kDegree)) continue;
     const double height = r.middle.dot(up);
     const auto same = std::find_if(levels.begin(), levels.end(), [height](const HorizontalLevel& l) {
-      return std::abs(l.height_m - height) < bounds::kSameLevel_m;
+      return std::abs(l.height_m - height) < bounds::kSameSurface_m;
     });
     if (same == levels.end()) {
       levels.push_back({height, r.area_m2});
@@ -226,7 +226,7 @@ bool isInsideOut(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d&
   double faces_up = 0;
   for (const PlaneRegion& r : regions) {
     const double cosine = r.normal.dot(up);
-    const bool on_floor = std::abs(r.middle.dot(up) - floor_m) < bounds::kSameLevel_m;
+    const bool on_floor = std::abs(r.middle.dot(up) - floor_m) < bounds::kSameSurface_m;
     if (on_floor && std::abs(cosine) > std::cos(bounds::kLevel_deg * bounds::kDegree)) faces_up += cosine * r.area_m2;
   }
   return faces_up < 0;

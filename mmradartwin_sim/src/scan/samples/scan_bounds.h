@@ -47,11 +47,9 @@ inline constexpr double kCone_deg = 12;
 
 // ---- walls, floor and ceiling
 
-/// Distance of two copies of one wall, m. Scanners: drift parts them by up to this; boards and cabinets stand farther
-/// off the wall behind them.
-inline constexpr double kSameWall_m = 0.045;
-/// Distance of two copies of one floor, m. Carpets and thresholds are lower than that.
-inline constexpr double kSameLevel_m = 0.06;
+/// Distance of two copies of one wall, floor or ceiling, m. Scanners: drift parts them by up to this; boards and
+/// cabinets stand farther off the wall behind them, steps farther above the floor.
+inline constexpr double kSameSurface_m = 0.045;
 /// Corners are rounded, hidden or not scanned so far, m: the depth of a shelf or a curtain.
 inline constexpr double kSnap_m = 0.25;
 /// Gap in a wall, of a curtain, a pillar or a cabinet as high as the room, m. Building practice: cabinets are 0.6 deep.
