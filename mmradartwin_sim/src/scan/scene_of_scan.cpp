@@ -33,6 +33,7 @@ ScanActor actorOfPlane(const ScanPlane& plane) {
 
 /// Takes the residuals of large planes for the noise where they are larger. True where that changes much.
 bool takeNoiseOf(const std::vector<PlaneRegion>& regions, ScanSamples& samples) {
+  if (!samples.error_m.empty()) return false;  // each sample has its own
   double squares = 0, area = 0;
   for (const PlaneRegion& r : regions) {
     if (r.area_m2 < 1) continue;

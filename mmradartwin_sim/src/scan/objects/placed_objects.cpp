@@ -81,6 +81,7 @@ std::string unitName(double unit_m) { return unit_m == 1 ? "metres" : unit_m < 0
 void turnIntoMap(const Eigen::Isometry3d& T_map_object, const Eigen::Vector3d& offset_m, ScanSamples& samples) {
   for (Eigen::Vector3f& p : samples.points) p = (T_map_object * (p.cast<double>() + offset_m)).cast<float>();
   for (Eigen::Vector3f& n : samples.normals) n = (T_map_object.linear() * n.cast<double>()).cast<float>();
+  for (Eigen::Vector3f& e : samples.error_m) e = (T_map_object.linear() * e.cast<double>()).cast<float>();
 }
 
 /// Directions of its upright faces: of the largest flat part, and of all its normals.

@@ -127,7 +127,7 @@ PlaneLoops withoutCorners(const RoomParts& room, const std::vector<WallRun>& run
     });
     if (is_inner || 10 * seen > all) continue;
     // The wall's place is known to the tolerance: the floor ends behind it.
-    const Eigen::Vector2d near = room.tolerance_m * n, far = depth_m * n;
+    const Eigen::Vector2d near = planeTolerance(room.samples, room.groups[run.group].plane) * n, far = depth_m * n;
     std::vector<Eigen::Vector2d> behind = {p - near, q - near, q - far, p - far};
     if (signedAreaOf(behind) < 0) std::reverse(behind.begin(), behind.end());
     loops = without(loops, {behind});

@@ -85,9 +85,9 @@ bool goesOn(const ScanSamples& samples, const PlaneRegion& wall, const PlaneRegi
 
 /// Nine in ten samples of a part lie on a plane.
 bool holdsPart(const ScanSamples& samples, const PlaneRegion& plane, const std::vector<int>& part) {
-  const double tolerance_m = planeTolerance(samples);
-  const auto near = std::count_if(part.begin(), part.end(),
-                                  [&](int i) { return std::abs(plane.distance(samples.at(i))) < tolerance_m; });
+  const auto near = std::count_if(part.begin(), part.end(), [&](int i) {
+    return std::abs(plane.distance(samples.at(i))) < planeTolerance(samples, i, plane.normal);
+  });
   return 10 * static_cast<std::size_t>(near) > 9 * part.size();
 }
 

@@ -24,7 +24,7 @@ class PlaneGrouping {
       for (PlaneGroup& g : room_.groups) {
         if (g.plane.normal.dot(r.normal) < 1 - 1e-9) continue;
         const double apart = std::abs(g.plane.offset_m - r.offset_m);
-        if (apart < std::max(room_.tolerance_m, 3 * std::hypot(g.plane.offset_std_m, r.offset_std_m))) {
+        if (apart < std::max(planeTolerance(room_.samples, r), 3 * std::hypot(g.plane.offset_std_m, r.offset_std_m))) {
           home = &g;
           break;
         }
@@ -166,7 +166,7 @@ double overlap(const ScanSamples& samples, const PlaneGroup& g, const PlaneRegio
 
 RoomParts roomParts(const ScanFrame& frame, const ScanSamples& samples, const std::vector<PlaneRegion>& regions,
                     double yaw_rad, const std::vector<PlaneShift>& shifts) {
-  RoomParts room{frame, samples, planeTolerance(samples), yaw_rad, 0, {}, {}};
+  RoomParts room{frame, samples, yaw_rad, 0, {}, {}};
   std::vector<float> heights;
   for (const Eigen::Vector3f& p : samples.points) heights.push_back(p.z());
   std::sort(heights.begin(), heights.end());

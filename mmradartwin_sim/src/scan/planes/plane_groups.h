@@ -20,7 +20,6 @@ struct PlaneGroup {
 struct RoomParts {
   const ScanFrame& frame;
   const ScanSamples& samples;
-  double tolerance_m = 0;           ///< of the distance between a sample and its plane
   double yaw_rad = 0;               ///< of the room's main direction, 0 to 90 deg
   double height_m = 0;              ///< of the walls
   std::vector<PlaneRegion> slants;  ///< bound the room from above

@@ -44,7 +44,6 @@ class Growth {
   Growth(const ScanSamples& samples, double smallest_m2)
       : samples_(samples),
         smallest_(static_cast<std::size_t>(smallest_m2 / samples.area_m2())),
-        tolerance_m_(planeTolerance(samples)),
         owner_(samples.size(), -1) {}
 
   std::vector<PlaneRegion> run(const Progress& progress) {
@@ -57,7 +56,8 @@ class Growth {
       const int seed = order[k];
       if (owner_[static_cast<std::size_t>(seed)] != -1 || normalOf(seed).isZero()) continue;
       // Two sheets a voxel or two apart are no flatter than that, and each of them is a plane.
-      if (flatness(seed) > std::max(2 * samples_.noise_m, samples_.spacing_m)) break;
+      const double noise_m = samples_.noiseAlong(seed, normalOf(seed).cast<double>());
+      if (flatness(seed) > std::max(2 * noise_m, samples_.spacing_m)) continue;
       grow(seed);
     }
     join();
@@ -75,7 +75,7 @@ class Growth {
   bool fits(int i, const Eigen::Vector3d& normal, const Eigen::Vector3d& mean) const {
     const double cosine = normalOf(i).cast<double>().dot(normal);
     if ((samples_.oriented ? cosine : std::abs(cosine)) < kSameSide) return false;
-    return std::abs(normal.dot(samples_.at(i) - mean)) < tolerance_m_;
+    return std::abs(normal.dot(samples_.at(i) - mean)) < planeTolerance(samples_, i, normal);
   }
 
   void grow(int seed) {
@@ -114,7 +114,7 @@ class Growth {
       return;
     }
     std::sort(region.samples.begin(), region.samples.end());
-    fitPlane(samples_, tolerance_m_, region);
+    fitPlane(samples_, 0, region);
     drop(region);
     regions_.push_back(std::move(region));
   }
@@ -123,7 +123,7 @@ class Growth {
   void drop(PlaneRegion& region) {
     std::vector<int> kept;
     for (int i : region.samples) {
-      if (std::abs(region.distance(samples_.at(i))) < tolerance_m_) {
+      if (std::abs(region.distance(samples_.at(i))) < planeTolerance(samples_, i, region.normal)) {
         kept.push_back(i);
       } else {
         owner_[static_cast<std::size_t>(i)] = -1;
@@ -135,7 +135,7 @@ class Growth {
   bool alike(const PlaneRegion& a, const PlaneRegion& b) const {
     const double cosine = a.normal.dot(b.normal);
     if ((samples_.oriented ? cosine : std::abs(cosine)) < kSameTurn) return false;
-    const double slack = tolerance_m_;
+    const double slack = planeTolerance(samples_, b);
     return std::abs(a.distance(b.middle)) < slack && std::abs(b.distance(a.middle)) < slack;
   }
 
@@ -174,14 +174,13 @@ class Growth {
         }
         if (!taken[static_cast<std::size_t>(large)]) continue;
         std::sort(a.samples.begin(), a.samples.end());
-        fitPlane(samples_, tolerance_m_, a);
+        fitPlane(samples_, 0, a);
       }
     }
   }
 
   const ScanSamples& samples_;
   const std::size_t smallest_;
-  const double tolerance_m_;
   std::vector<int> owner_;  // region of each sample; -1 none, -2 a crumb
   std::vector<PlaneRegion> regions_;
 };
@@ -189,6 +188,17 @@ class Growth {
 }  // namespace
 
 double planeTolerance(const ScanSamples& samples) { return std::max(kLeastTolerance_m, 3 * samples.noise_m); }
+
+double planeTolerance(const ScanSamples& samples, int i, const Eigen::Vector3d& normal) {
+  return std::max(kLeastTolerance_m, 3 * samples.noiseAlong(i, normal));
+}
+
+double planeTolerance(const ScanSamples& samples, const PlaneRegion& region) {
+  if (samples.error_m.empty() || region.samples.empty()) return planeTolerance(samples);
+  double sum = 0;
+  for (int i : region.samples) sum += samples.noiseAlong(i, region.normal);
+  return std::max(kLeastTolerance_m, 3 * sum / static_cast<double>(region.samples.size()));
+}
 
 void measurePlane(const ScanSamples& samples, PlaneRegion& region) {
   if (region.samples.empty()) return;
@@ -221,11 +231,12 @@ void measurePlane(const ScanSamples& samples, PlaneRegion& region) {
   region.angle_std_rad = region.offset_std_m / reach_m;
 }
 
-void fitPlane(const ScanSamples& samples, double tolerance_m, PlaneRegion& region) {
+void fitPlane(const ScanSamples& samples, double least_m, PlaneRegion& region) {
   for (int round = 0; round < 2; ++round) {
     PlaneSums sums(samples.at(region.samples.front()));
     for (int i : region.samples) {
       const Eigen::Vector3d p = samples.at(i);
+      const double tolerance_m = std::max(least_m, planeTolerance(samples, i, region.normal));
       if (round == 0 || std::abs(region.distance(p)) < tolerance_m) sums.add(p);
     }
     if (sums.count() < 3) break;

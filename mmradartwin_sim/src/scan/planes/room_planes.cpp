@@ -113,7 +113,7 @@ class RoomBuilder {
     level.v = level.plane.normal.cross(level.u);
     for (const PlaneGroup& g : parts_.groups) {
       if (!isLevel(g.plane) || std::abs(g.plane.middle.z() - height_m) > bounds::kSameSurface_m) continue;
-      if (std::abs(g.plane.middle.z() - height_m) < parts_.tolerance_m) {
+      if (std::abs(g.plane.middle.z() - height_m) < planeTolerance(parts_.samples, g.plane)) {
         level.plane.samples.insert(level.plane.samples.end(), g.plane.samples.begin(), g.plane.samples.end());
       } else if (overlap(parts_.samples, level, g.plane) >
                  0.5) {  // groups come largest first; a carpet hides the floor
@@ -204,7 +204,9 @@ class RoomBuilder {
     std::vector<int> all = g.plane.samples;
     for (std::size_t i = 0; i < parts_.samples.size(); ++i) {
       if (taken[i] || room_.owner[i] != -1) continue;
-      if (std::abs(g.plane.distance(parts_.samples.points[i].cast<double>())) > 1.5 * parts_.tolerance_m) continue;
+      if (std::abs(g.plane.distance(parts_.samples.points[i].cast<double>())) >
+          1.5 * planeTolerance(parts_.samples, static_cast<int>(i), g.plane.normal))
+        continue;
       if (std::abs(g.plane.normal.dot(parts_.samples.normals[i].cast<double>())) > kStraggler)
         all.push_back(static_cast<int>(i));
     }

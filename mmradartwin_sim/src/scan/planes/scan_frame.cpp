@@ -7,12 +7,14 @@
 #include <cstdio>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "scan/planes/slanted_bounds.h"
 #include "scan/samples/scan_bounds.h"
 
 namespace mmradartwin {
 namespace {
 
-constexpr double kNoUp = -100;  // score of an axis that no plane has as its normal
+constexpr double kLeastFloor_m2 = 0.3;  // that a person stands on with both feet
+constexpr double kNoUp = -100;          // score of an axis that no plane has as its normal
 
 std::string number(double value, int digits = 2) {
   std::array<char, 40> text{};
@@ -197,6 +199,10 @@ Level levelBy(const std::vector<PlaneRegion>& regions, Eigen::Vector3d up) {
   return level;
 }
 
+bool isLevelTo(const PlaneRegion& r, const Eigen::Vector3d& up, double lean_deg = bounds::kLevel_deg) {
+  return std::abs(r.normal.dot(up)) > std::cos(lean_deg * bounds::kDegree);
+}
+
 struct HorizontalLevel {
   double height_m, area_m2;
 };
@@ -205,7 +211,7 @@ struct HorizontalLevel {
 std::vector<HorizontalLevel> levelsOf(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up) {
   std::vector<HorizontalLevel> levels;
   for (const PlaneRegion& r : regions) {  // largest first
-    if (std::abs(r.normal.dot(up)) < std::cos(bounds::kLevel_deg * bounds::kDegree)) continue;
+    if (!isLevelTo(r, up)) continue;
     const double height = r.middle.dot(up);
     const auto same = std::find_if(levels.begin(), levels.end(), [height](const HorizontalLevel& l) {
       return std::abs(l.height_m - height) < bounds::kSameSurface_m;
@@ -221,13 +227,55 @@ std::vector<HorizontalLevel> levelsOf(const std::vector<PlaneRegion>& regions, c
   return levels;
 }
 
+double largestOf(const std::vector<HorizontalLevel>& levels) {
+  double largest_m2 = 0;
+  for (const HorizontalLevel& l : levels) largest_m2 = std::max(largest_m2, l.area_m2);
+  return largest_m2;
+}
+
+/// The lowest large one; null where there is none.
+const HorizontalLevel* floorOf(const std::vector<HorizontalLevel>& levels) {
+  const double least_m2 = std::max(kLeastFloor_m2, bounds::kShareOfLargestLevel * largestOf(levels));
+  const auto lowest =
+      std::find_if(levels.begin(), levels.end(), [&](const HorizontalLevel& l) { return l.area_m2 > least_m2; });
+  return lowest == levels.end() ? nullptr : &*lowest;
+}
+
+/// A depth camera sees a floor far away at a grazing angle, so that it may lean by some degrees. A large plane that is
+/// about level, lies below all level ones, and has nothing of the scan behind it is the floor for all that: it becomes
+/// level. Returns by how much it leant, degrees; 0 where there is none.
+double levelLeaningFloor(const ScanSamples& samples, const Eigen::Vector3d& up, std::vector<PlaneRegion>& regions) {
+  const std::vector<HorizontalLevel> levels = levelsOf(regions, up);
+  const HorizontalLevel* level = floorOf(levels);
+  const double least_m2 = std::max(kLeastFloor_m2, bounds::kShareOfLargestLevel * largestOf(levels));
+  PlaneRegion* lowest = nullptr;
+  for (PlaneRegion& r : regions) {
+    if (r.area_m2 < least_m2 || isLevelTo(r, up) || !isLevelTo(r, up, bounds::kCone_deg)) continue;
+    const double height_m = r.middle.dot(up);
+    if (level && height_m > level->height_m - bounds::kSameSurface_m) continue;
+    PlaneRegion facing = r;
+    if (facing.normal.dot(up) < 0) facing.normal *= -1, facing.offset_m *= -1;
+    if (boundsRoom(samples, facing) && (!lowest || height_m < lowest->middle.dot(up))) lowest = &r;
+  }
+  if (!lowest) return 0;
+  const PlaneRegion floor = *lowest;
+  for (PlaneRegion& r : regions) {
+    const bool is_part = std::abs(floor.distance(r.middle)) < bounds::kSameSurface_m;
+    if (!is_part || !isLevelTo(r, up, bounds::kCone_deg)) continue;
+    r.normal = r.normal.dot(up) < 0 ? Eigen::Vector3d(-up) : up;
+    r.offset_m = r.normal.dot(r.middle);
+    measurePlane(samples, r);
+  }
+  return std::acos(std::min(1.0, std::abs(floor.normal.dot(up)))) / bounds::kDegree;
+}
+
 /// True where a mesh is wound so that its floor faces down: another hand's triangles.
 bool isInsideOut(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up, double floor_m) {
   double faces_up = 0;
   for (const PlaneRegion& r : regions) {
     const double cosine = r.normal.dot(up);
     const bool on_floor = std::abs(r.middle.dot(up) - floor_m) < bounds::kSameSurface_m;
-    if (on_floor && std::abs(cosine) > std::cos(bounds::kLevel_deg * bounds::kDegree)) faces_up += cosine * r.area_m2;
+    if (on_floor && isLevelTo(r, up)) faces_up += cosine * r.area_m2;
   }
   return faces_up < 0;
 }
@@ -236,14 +284,12 @@ bool isInsideOut(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d&
 double heightOf(const ScanSamples& samples, const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up,
                 double height_m) {
   const Eigen::Vector3f axis = up.cast<float>();
-  const double tolerance_m = planeTolerance(samples);
   for (int round = 0; round < 2; ++round) {
     double sum = 0;
     std::size_t count = 0;
     for (const PlaneRegion& r : regions) {
-      if (std::abs(r.normal.dot(up)) < std::cos(bounds::kLevel_deg * bounds::kDegree) ||
-          std::abs(r.middle.dot(up) - height_m) > tolerance_m)
-        continue;
+      const double tolerance_m = planeTolerance(samples, r);
+      if (!isLevelTo(r, up) || std::abs(r.middle.dot(up) - height_m) > tolerance_m) continue;
       for (int i : r.samples) {
         const auto s = static_cast<std::size_t>(i);
         for (std::size_t k = samples.dense_first[s]; k < samples.dense_first[s + 1]; ++k) {
@@ -279,6 +325,7 @@ std::string wordsOf(const ScanFrame& frame) {
   } else {
     words += number(std::abs(frame.floor_m)) + " m " + (frame.floor_m < 0 ? "below" : "above") + " the origin";
   }
+  if (frame.floor_leans_deg > 0) words += " (it leans by " + number(frame.floor_leans_deg, 1) + " deg in the scan)";
   words += frame.has_ceiling ? ", ceiling at " + number(frame.ceiling_m) + " m" : ", no ceiling";
   return words + ", noise " + number(1e3 * frame.noise_m, 1) + " mm";
 }
@@ -330,18 +377,16 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
   const Eigen::Matrix3d R =
       Eigen::Quaterniond::FromTwoVectors(exchange * frame.up, Eigen::Vector3d::UnitZ()).toRotationMatrix() * exchange;
 
+  if (!options.floor_m) frame.floor_leans_deg = levelLeaningFloor(samples, frame.up, regions);
   const std::vector<HorizontalLevel> levels = levelsOf(regions, frame.up);
-  double largest_m2 = 0;
-  for (const HorizontalLevel& l : levels) largest_m2 = std::max(largest_m2, l.area_m2);
+  const double largest_m2 = largestOf(levels);
   const Eigen::Vector3d offset = unit_m * scan.offset;
   double floor = 0;
   if (options.floor_m) {
     floor = *options.floor_m - axis.dot(offset);
   } else {
-    const auto lowest = std::find_if(levels.begin(), levels.end(), [&](const HorizontalLevel& l) {
-      return l.area_m2 > std::max(0.3, bounds::kShareOfLargestLevel * largest_m2);
-    });
-    if (lowest == levels.end()) {
+    const HorizontalLevel* lowest = floorOf(levels);
+    if (!lowest) {
       throw InputError(scan.file + ": shows no floor; say where it is by --floor, and which way is up by --up");
     }
     floor = lowest->height_m;
@@ -370,6 +415,7 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
   for (Eigen::Vector3f& p : samples.points) p = Rf * p + shift_f;
   for (Eigen::Vector3f& p : samples.dense) p = Rf * p + shift_f;
   for (Eigen::Vector3f& n : samples.normals) n = Rf * n;
+  for (Eigen::Vector3f& e : samples.error_m) e = Rf * e;
   for (PlaneRegion& r : regions) {
     r.normal = R * r.normal;
     r.middle = R * r.middle + shift;

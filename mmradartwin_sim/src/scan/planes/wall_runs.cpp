@@ -70,15 +70,15 @@ std::vector<Eigen::AlignedBox2d> openingsOf(const RoomParts& room, const WallRun
   const PlaneGroup& g = room.groups[run.group];
   const double top = run.top_m;
   CellRaster wall(bounds::kCell_m), hides(bounds::kCell_m), beyond(bounds::kCell_m);
-  for (const Eigen::Vector3f& q : room.samples.points) {
-    const Eigen::Vector3d p = q.cast<double>();
+  for (int i = 0; i < static_cast<int>(room.samples.size()); ++i) {
+    const Eigen::Vector3d p = room.samples.at(i);
     const Eigen::Vector2d at = g.project(p);
     if (at.x() < run.from_m - 0.3 || at.x() > run.to_m + 0.3) continue;
-    const double d = g.plane.distance(p);
-    if (std::abs(d) < 2 * room.tolerance_m) wall.set(at);
-    if (d >= 2 * room.tolerance_m && d < bounds::kHides_m && at.x() > run.from_m + 0.05 && at.x() < run.to_m - 0.05)
+    const double d = g.plane.distance(p), tolerance_m = planeTolerance(room.samples, i, g.plane.normal);
+    if (std::abs(d) < 2 * tolerance_m) wall.set(at);
+    if (d >= 2 * tolerance_m && d < bounds::kHides_m && at.x() > run.from_m + 0.05 && at.x() < run.to_m - 0.05)
       hides.set(at);
-    if (d < -2 * room.tolerance_m - 0.05 && d > -4) beyond.set(at);
+    if (d < -2 * tolerance_m - 0.05 && d > -4) beyond.set(at);
   }
   const Eigen::AlignedBox2d area(Eigen::Vector2d(run.from_m + 0.05, 0.05),
                                  Eigen::Vector2d(run.to_m - 0.05, top - 0.05));

@@ -19,10 +19,11 @@ bool holds(const std::vector<Eigen::Vector2d>& loop, const Eigen::Vector2d& p) {
   return inside;
 }
 
-bool nearPlane(const LooseSurface& surface, const Eigen::Vector3d& p) {
-  const double reach_m = std::max(1.5 * surface.tolerance_m, 0.02);
+bool nearPlane(const LooseSurface& surface, int i) {
+  const Eigen::Vector3d p = surface.samples.at(i);
   int corner = 0;  // planes within the reach of rounding
   for (const ScanPlane& plane : surface.room.planes) {
+    const double reach_m = std::max(1.5 * planeTolerance(surface.samples, i, plane.normal), 0.02);
     const double d = std::abs(plane.normal.dot(p) - plane.offset_m);
     if (d > 3 * reach_m) continue;
     Eigen::AlignedBox2d box;
@@ -42,6 +43,13 @@ bool isOnLargePlate(const LooseSurface& surface, int i) {
 }
 
 }  // namespace
+
+double LooseSurface::toleranceOf(const std::vector<int>& indices) const {
+  if (samples.error_m.empty() || indices.empty()) return planeTolerance(samples);
+  double sum = 0;
+  for (int i : indices) sum += static_cast<double>(samples.error_m[static_cast<std::size_t>(i)].norm());
+  return 3 * sum / static_cast<double>(indices.size());
+}
 
 double LooseSurface::yawIn(const std::vector<int>& indices) const {
   std::map<int, std::size_t> counts;
@@ -92,7 +100,7 @@ std::vector<std::vector<int>> LooseSurface::connected(const std::vector<int>& in
 }
 
 LooseSurface looseSurface(const ScanSamples& samples, const std::vector<PlaneRegion>& regions, const RoomPlanes& room) {
-  LooseSurface surface{samples, regions, room, planeTolerance(samples)};
+  LooseSurface surface{samples, regions, room};
   surface.region_of.assign(samples.size(), -1);
   for (std::size_t r = 0; r < regions.size(); ++r) {
     for (int i : regions[r].samples) surface.region_of[static_cast<std::size_t>(i)] = static_cast<int>(r);
@@ -106,12 +114,14 @@ LooseSurface looseSurface(const ScanSamples& samples, const std::vector<PlaneReg
   for (std::size_t i = 0; i < surface.samples.size(); ++i) {
     if (surface.room.owner[i] != -1) continue;
     const Eigen::Vector3d p = surface.samples.at(static_cast<int>(i));
-    bool inside = p.z() > -surface.tolerance_m && p.z() < surface.room.height_m + surface.tolerance_m;
+    const double tolerance_m = planeTolerance(samples, static_cast<int>(i), Eigen::Vector3d::UnitZ());
+    bool inside = p.z() > -tolerance_m && p.z() < surface.room.height_m + tolerance_m;
     if (inside && floor) {
       const Eigen::Vector2d q(floor->u.dot(p), floor->v.dot(p));
       inside = std::any_of(floors.begin(), floors.end(), [&q](const auto& loop) { return holds(loop, q); });
     }
-    if (inside) surface.free[i] = !nearPlane(surface, p) || isOnLargePlate(surface, static_cast<int>(i));
+    if (inside)
+      surface.free[i] = !nearPlane(surface, static_cast<int>(i)) || isOnLargePlate(surface, static_cast<int>(i));
   }
   return surface;
 }

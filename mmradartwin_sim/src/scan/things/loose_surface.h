@@ -11,10 +11,11 @@ struct LooseSurface {
   const ScanSamples& samples;
   const std::vector<PlaneRegion>& regions;  ///< all flat parts
   const RoomPlanes& room;
-  double tolerance_m = 0;
   std::vector<char> free = {};      ///< of each sample: it is loose
   std::vector<int> region_of = {};  ///< of each sample: index into regions, -1 none
 
+  /// How far samples may lie from their shape: three standard deviations of their noise, whatever its direction.
+  double toleranceOf(const std::vector<int>& indices) const;
   /// Direction of the largest upright flat part, which is regularised already; else of the normals.
   double yawIn(const std::vector<int>& indices) const;
   /// Parts of some samples that hang together: each ascending, in the order of their first samples.

@@ -35,8 +35,8 @@ bool isWithinRim(const TableTop& top, const Eigen::Vector3d& p) {
 
 /// A table's rim has little surface below it; a cabinet's has its sides, of which a scan sees two at least.
 bool hollowBelow(const LooseSurface& surface, const PlaneRegion& top) {
-  const UprightBox rim =
-      fitBox(surface.samples, top.samples, {surface.room.yaw_rad, surface.yawIn(top.samples)}, surface.tolerance_m);
+  const UprightBox rim = fitBox(surface.samples, top.samples, {surface.room.yaw_rad, surface.yawIn(top.samples)},
+                                surface.toleranceOf(top.samples));
   const double high = top.middle.z() - 0.1, low = std::min(0.1, 0.3 * high);
   CellRaster sides(bounds::kCell_m);
   const Eigen::Vector3d sizes = rim.box.sizes();
@@ -71,11 +71,11 @@ std::vector<TableTop> tableTops(const LooseSurface& surface, std::vector<int>& t
     std::size_t free = 0;
     for (int i : r.samples) free += surface.free[static_cast<std::size_t>(i)] != 0;
     if (2 * free < r.samples.size() || isSeat(surface, r) || !hollowBelow(surface, r)) continue;
-    TableTop top{
-        r.middle.z(),
-        CellRaster(bounds::kCell_m),
-        {},
-        fitBox(surface.samples, r.samples, {surface.room.yaw_rad, surface.yawIn(r.samples)}, surface.tolerance_m)};
+    TableTop top{r.middle.z(),
+                 CellRaster(bounds::kCell_m),
+                 {},
+                 fitBox(surface.samples, r.samples, {surface.room.yaw_rad, surface.yawIn(r.samples)},
+                        surface.toleranceOf(r.samples))};
     for (int i : r.samples) {
       const Eigen::Vector2d p = surface.samples.at(i).head<2>();
       for (int dx = -1; dx <= 1; ++dx) {
@@ -83,11 +83,10 @@ std::vector<TableTop> tableTops(const LooseSurface& surface, std::vector<int>& t
       }
     }
     const int id = static_cast<int>(tops.size());
+    const double above_m = std::max(surface.toleranceOf(r.samples), 0.02);
     for (std::size_t i = 0; i < surface.samples.size(); ++i) {
       const Eigen::Vector3d p = surface.samples.at(static_cast<int>(i));
-      if (!surface.free[i] || top_of[i] >= 0 || p.z() > top.height_m + std::max(surface.tolerance_m, 0.02) ||
-          p.z() < top.height_m - 0.06)
-        continue;
+      if (!surface.free[i] || top_of[i] >= 0 || p.z() > top.height_m + above_m || p.z() < top.height_m - 0.06) continue;
       if (!top.covers(p) && !isWithinRim(top, p)) continue;
       top_of[i] = id;
       top.samples.push_back(static_cast<int>(i));

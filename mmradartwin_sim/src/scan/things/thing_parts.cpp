@@ -13,7 +13,7 @@ void place(const LooseSurface& surface, ThingPart& part, ThingParts& found, std:
     std::size_t covered = 0;
     for (int i : part.samples) covered += found.tops[t].covers(surface.samples.at(i));
     if (2 * covered < part.samples.size()) continue;
-    if (box.max().z() < found.tops[t].height_m + surface.tolerance_m) {
+    if (box.max().z() < found.tops[t].height_m + surface.toleranceOf(part.samples)) {
       found.parts[t].samples.insert(found.parts[t].samples.end(), part.samples.begin(), part.samples.end());
       return;
     }

@@ -28,8 +28,7 @@ class ThingFinder {
         surface_(surface),
         samples_(surface.samples),
         regions_(surface.regions),
-        room_(surface.room),
-        tolerance_m_(surface.tolerance_m) {}
+        room_(surface.room) {}
 
   Things run() {
     for (std::size_t i = 0; i < samples_.size(); ++i) {
@@ -122,7 +121,7 @@ class ThingFinder {
   void addThing(const ThingPart& part, Cut cut) {
     ScanThing thing;
     thing.samples = part.samples.size();
-    const double tolerance = std::max(tolerance_m_, bounds::kLeastFit_m);
+    const double tolerance = std::max(surface_.toleranceOf(part.samples), bounds::kLeastFit_m);
     UprightBox box = fitBox(samples_, part.samples, yawsFor(part.samples), tolerance);
     const UprightCylinder cylinder = fitCylinder(samples_, part.samples, tolerance);
     const FittedSphere sphere = fitSphere(samples_, part.samples, tolerance);
@@ -204,7 +203,7 @@ class ThingFinder {
         const bool within = a > -0.05 && a < 1.05 && b > -0.05 && b < 1.05;
         // Its back, which faces the other way, and its edges are of it, too.
         if (surface_.region_of[static_cast<std::size_t>(i)] == r ||
-            (within && d < tolerance_m_ && d > -bounds::kThickestPlate_m))
+            (within && d < planeTolerance(samples_, front) && d > -bounds::kThickestPlate_m))
           cut.samples.push_back(i);
       }
       for (int i : cut.samples) taken[i] = 1;
@@ -277,7 +276,7 @@ class ThingFinder {
       if (plate.e1.dot(d1) > 0.03 && plate.e2.dot(d2) > 0.03) addPlate(plate, thing);
     }
     thing.rms_m = std::sqrt(squares / static_cast<double>(on_plates));
-    thing.largest_m = tolerance_m_;
+    thing.largest_m = surface_.toleranceOf(indices);
     return !thing.triangles.empty();
   }
 
@@ -298,7 +297,8 @@ class ThingFinder {
   /// A top as a slab, and each thing below it as a box of its own.
   void addTable(const ThingPart& part, ScanThing& thing) const {
     const TableTop& top = tops_[static_cast<std::size_t>(part.top)];
-    UprightBox slab = fitBox(samples_, top.samples, yawsFor(part.samples), std::max(tolerance_m_, bounds::kLeastFit_m));
+    UprightBox slab = fitBox(samples_, top.samples, yawsFor(part.samples),
+                             std::max(surface_.toleranceOf(top.samples), bounds::kLeastFit_m));
     slab.box.max().z() = top.height_m;
     slab.box.min().z() = std::min(slab.box.min().z(), top.height_m - 0.02);
     clear(slab, false);
@@ -308,7 +308,7 @@ class ThingFinder {
     std::vector<int> below(part.samples.begin() + static_cast<std::ptrdiff_t>(top.samples.size()), part.samples.end());
     for (const std::vector<int>& leg : surface_.connected(below)) {
       if (leg.size() < 12) continue;
-      UprightBox box = fitBox(samples_, leg, yawsFor(leg), std::max(tolerance_m_, bounds::kLeastFit_m));
+      UprightBox box = fitBox(samples_, leg, yawsFor(leg), std::max(surface_.toleranceOf(leg), bounds::kLeastFit_m));
       box.box.max().z() = std::min(box.box.max().z(), slab.box.min().z() - bounds::kGap_m);
       clear(box, false);
       if (box.box.sizes().minCoeff() > 0) addBox(box, thing);
@@ -343,7 +343,6 @@ class ThingFinder {
   const ScanSamples& samples_;
   const std::vector<PlaneRegion>& regions_;
   const RoomPlanes& room_;
-  const double tolerance_m_;
   std::vector<TableTop> tops_;
   CellRaster floor_{bounds::kCell_m};
   Things result_;
