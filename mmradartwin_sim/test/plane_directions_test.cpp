@@ -71,6 +71,22 @@ TEST(PlaneDirectionsTest, PiecesOfABentWallAreOnePlane) {
   EXPECT_NEAR(joined.rms_m, std::hypot(kNoise_m, wall.step_m(0.06) / std::sqrt(12.0)), 0.0003);  // noise and bend
 }
 
+TEST(PlaneDirectionsTest, CopiesOfAWallSayHowFarFramesAreTurned) {
+  Pieces doubled;  // two frames see a wall, one of them turned by 0.3 degrees; another wall stands at a right angle
+  doubled.add(0, 0, 0);
+  doubled.add(0, 0.02, 0.3, 3);
+  doubled.add(kLong_m, 0, 90);
+  regularise(doubled.samples, true, doubled.regions);
+  ASSERT_EQ(doubled.regions.size(), 3U);
+  EXPECT_GT(doubled.regions[0].normal.dot(doubled.regions[1].normal), 1 - 1e-12);  // three times 0.3 / sqrt(2)
+  Pieces skewed;                                                                   // as far turned, and no copy
+  skewed.add(0, 0, 0);
+  skewed.add(0, 3, 0.3, 3);
+  skewed.add(kLong_m, 0, 90);
+  regularise(skewed.samples, true, skewed.regions);
+  EXPECT_LT(skewed.regions[0].normal.dot(skewed.regions[1].normal), std::cos(0.2 * kDeg));
+}
+
 TEST(PlaneDirectionsTest, PiecesThatNoOnePlaneHoldsStayApart) {
   Pieces corner;  // 3 degrees: joined, a tenth of the samples and more would lie off
   corner.add(0, 0, -1.5);

@@ -91,6 +91,29 @@ bool holdsPart(const ScanSamples& samples, const PlaneRegion& plane, const std::
   return 10 * static_cast<std::size_t>(near) > 9 * part.size();
 }
 
+/// Two sheets of one wall, each seen from another place: so near that drift parts them, and one behind the other.
+bool areCopies(const ScanSamples& samples, const PlaneRegion& a, const PlaneRegion& b) {
+  if (a.normal.dot(b.normal) < std::cos(kBend_rad) || std::abs(a.normal.z()) > std::sin(kBend_rad)) return false;
+  if (std::abs(a.distance(b.middle)) > bounds::kSameSurface_m) return false;
+  const Eigen::Vector3d u = Eigen::Vector3d::UnitZ().cross(a.normal).normalized();
+  const auto of_a = cellsOf(samples, a, u), of_b = cellsOf(samples, b, u);
+  const auto shared = std::count_if(of_b.begin(), of_b.end(), [&](const auto& c) { return of_a.count(c); });
+  return 2 * static_cast<std::size_t>(shared) > of_b.size();
+}
+
+/// How far frames are turned against each other, 1 sigma, as the copies of large walls show; 0 where none is doubled.
+double registrationStd(const ScanSamples& samples, const std::vector<PlaneRegion>& regions) {
+  double squares = 0, weights = 0;
+  for (std::size_t a = 0; a < regions.size(); ++a) {  // largest first
+    for (std::size_t b = a + 1; b < regions.size() && regions[b].area_m2 > kWall_m2; ++b) {
+      if (!areCopies(samples, regions[a], regions[b])) continue;
+      const double between_rad = quarter(yawOf(regions[a]) - yawOf(regions[b]));
+      squares += regions[b].area_m2 * between_rad * between_rad / 2, weights += regions[b].area_m2;
+    }
+  }
+  return weights > 0 ? std::sqrt(squares / weights) : 0;
+}
+
 /// A scanner that drifts bends a long wall, so that it grows in pieces that turn by a degree or two. A piece that goes
 /// on where a larger one ends is of that wall where one plane holds both.
 void joinBentWalls(const ScanSamples& samples, std::vector<PlaneRegion>& regions) {
@@ -123,6 +146,9 @@ void joinBentWalls(const ScanSamples& samples, std::vector<PlaneRegion>& regions
 double regularise(const ScanSamples& samples, bool enabled, std::vector<PlaneRegion>& regions) {
   if (!samples.oriented) turnInwards(samples, regions);
   joinBentWalls(samples, regions);
+  // No plane is known better than the place that it was seen from.
+  const double registration_rad = registrationStd(samples, regions);
+  for (PlaneRegion& r : regions) r.angle_std_rad = std::hypot(r.angle_std_rad, registration_rad);
   const double direction = mainDirection(regions);
   for (PlaneRegion& r : regions) {
     const Eigen::Vector3d before = r.normal;

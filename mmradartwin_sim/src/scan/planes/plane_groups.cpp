@@ -39,16 +39,29 @@ class PlaneGrouping {
         setAxes(room_.groups.back());
       } else if (doubled) {
         home->second_copy.insert(home->second_copy.end(), r.samples.begin(), r.samples.end());
+        home->plane.samples.insert(home->plane.samples.end(), r.samples.begin(), r.samples.end());
+        meanOffset(*home);
       } else {
         home->plane.samples.insert(home->plane.samples.end(), r.samples.begin(), r.samples.end());
-        fitOffset(room_.samples, home->plane);
+        home->second_copy.empty() ? fitOffset(room_.samples, home->plane) : meanOffset(*home);
       }
     }
     for (PlaneGroup& g : room_.groups) {
       std::sort(g.plane.samples.begin(), g.plane.samples.end());
-      fitOffset(room_.samples, g.plane);
+      if (g.second_copy.empty()) {
+        fitOffset(room_.samples, g.plane);
+      } else {
+        meanOffset(g);
+      }
       measurePlane(room_.samples, g.plane);
     }
+  }
+
+  /// Copies of one surface are measurements of it from several places, none of them known better than the others.
+  void meanOffset(PlaneGroup& g) const {
+    double sum = 0;
+    for (int i : g.plane.samples) sum += g.plane.normal.dot(room_.samples.at(i));
+    g.plane.offset_m = sum / static_cast<double>(g.plane.samples.size());
   }
 
   void shift(const std::vector<PlaneShift>& shifts) {

@@ -237,7 +237,8 @@ class RoomBuilder {
     }
     for (int i : g.second_copy) {
       if (!box.contains(g.project(parts_.samples.at(i)))) continue;
-      room_.owner[static_cast<std::size_t>(i)] = -2;
+      int& owner = room_.owner[static_cast<std::size_t>(i)];
+      if (owner == -1) owner = -2;
       room_.doubled_m2 += parts_.samples.area_m2();
     }
     if (plane.kind == PlaneKind::kWall && covered.area_m2() < bounds::kLeastSeen_m2) {  // others hold nearly all of it
