@@ -179,6 +179,64 @@ TEST_F(ScanObjectsTest, OtherThingsStayAndGetOtherNames) {
   EXPECT_NEAR(scene.things[1].bounds.max().z(), 1.8, 0.01);
 }
 
+TEST_F(ScanObjectsTest, ObjectsAndThingsTakeTheFormThatIsAsked) {
+  // A chair has a scan of its own, in which its seat and its back are no box; a cabinet is a thing of the room's scan.
+  const Vector3d seat(0.5, 0.5, 0.45), back(0.5, 0.06, 0.5);
+  const auto add_chair = [&](const Eigen::Isometry3d& T, Sampled& to) {
+    to.addBox(seat, T);
+    to.addBox(back, T * Eigen::Translation3d(0, 0.22, 0.45));
+  };
+  Sampled own(0.002, 4), room(0.004, 3);
+  add_chair(Eigen::Isometry3d::Identity(), own);
+  room.addShell({5, 4, 2.6});
+  room.addBox({0.5, 0.4, 1.8}, placed({0.8, 3.2, 0}, 0));
+  add_chair(placed(kPlace, 0), room);
+  ScanObject chair;
+  chair.name = "chair_scanned";
+  chair.scan = own.scan("chair.ply");
+  chair.T_object = placed(kPlace, 0);
+  const auto scene_with = [&](ThingForms forms) {
+    ScanOptions options;
+    options.things = forms, options.objects = {chair};
+    return sceneOfScan(room.scan("room.xyz"), options);
+  };
+  const ScanScene boxes = scene_with(ThingForms::kBoxes), meshes = scene_with(ThingForms::kMeshes);
+  for (const ScanScene* scene : {&boxes, &meshes}) {
+    ASSERT_EQ(scene->things.size(), 2U);
+    EXPECT_EQ(scene->things[0].name, "chair_scanned");
+    // Its place and size are those of its own scan, whatever the form.
+    const Eigen::AlignedBox3d& b = scene->things[0].bounds;
+    EXPECT_LT((b.center() - Vector3d(kPlace.x(), kPlace.y(), 0.475)).cwiseAbs().maxCoeff(), 0.012);
+    EXPECT_LT((b.sizes() - Vector3d(0.5, 0.5, 0.95)).cwiseAbs().maxCoeff(), 0.025);
+  }
+  for (const ScanThing& thing : boxes.things) {
+    EXPECT_EQ(thing.shape, ThingShape::kBox) << thing.name;
+    EXPECT_EQ(thing.triangles.size(), 12U) << thing.name;
+  }
+  for (const ScanThing& thing : meshes.things) {
+    EXPECT_EQ(thing.shape, ThingShape::kMesh) << thing.name;
+    EXPECT_GT(thing.triangles.size(), 12U) << thing.name;
+  }
+  // Of the mesh, the space over the seat and before the back is free, which its box fills.
+  const Vector3d over_seat = kPlace + Vector3d(0, -0.1, 0.6);
+  EXPECT_TRUE(boxes.things[0].bounds.contains(over_seat));
+  for (const Vector3d& v : meshes.things[0].vertices) EXPECT_GT((v - over_seat).norm(), 0.1);
+}
+
+TEST_F(ScanObjectsTest, WhatIsLeftOutIsSaidBesideObjects) {
+  Sampled room = roomWithThing();
+  room.addBox({0.15, 0.15, 0.15}, placed({0.8, 3.2, 1.0}, 0));  // small, of no class
+  const auto says_it = [](const ScanScene& scene) {
+    return std::any_of(scene.notes.begin(), scene.notes.end(), [](const std::string& note) {
+      return note.find("small things of no sure class") != std::string::npos;
+    });
+  };
+  ScanOptions options;
+  ASSERT_TRUE(says_it(sceneOfScan(room.scan("room.xyz"), options)));
+  options.objects = {thing("fridge")};
+  EXPECT_TRUE(says_it(sceneOfScan(room.scan("room.xyz"), options)));
+}
+
 TEST_F(ScanObjectsTest, PlacesThatCannotBeAreSaidInOneLine) {
   ScanObject outside = thing("fridge");
   outside.T_object.translation().x() += 4;

@@ -74,6 +74,7 @@ struct ScanFrame {
   std::string up_name;                            ///< of the file's axis that is nearest to up: "z", "-y"
   double tilt_deg = 0;                            ///< between that axis and up
   double tilt_std_deg = 0;                        ///< of up, from the planes that gave it
+  double floor_leans_deg = 0;                     ///< that a floor leant in the scan, and was made level
   double floor_m = 0;  ///< of the floor above the file's origin, along that axis where large coordinates were taken off
   Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();  ///< large coordinates that were taken off; z up, metres
   Eigen::Isometry3d T_map_file = Eigen::Isometry3d::Identity();  ///< p_map = T_map_file * (unit_m * p_file)

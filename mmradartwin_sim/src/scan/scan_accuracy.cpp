@@ -5,14 +5,14 @@
 #include <map>
 #include <vector>
 
+#include "scan/samples/scan_bounds.h"
+
 namespace mmradartwin {
 namespace {
 
-constexpr double kReachOfNormals_voxels = 3.5;  // of the neighbours that a sample's normal comes of (scan_samples.cpp)
-constexpr double kSharpEdge = 0.85;             // cosine of the angle between faces that meet at an edge
-constexpr double kUprightPlane = 0.7;           // faces that lie more level return nothing to a radar
-constexpr double kBowPatch_m = 0.5;             // patches that ScanPlane::bow_m is the rms of
-constexpr double kLeastScene_m = 0.001;         // a scanner's own scale, to a ten-thousandth over a room
+constexpr double kSharpEdge = 0.85;      // cosine of the angle between faces that meet at an edge
+constexpr double kUprightPlane = 0.7;    // faces that lie more level return nothing to a radar
+constexpr double kLeastScene_m = 0.001;  // a scanner's own scale, to a ten-thousandth over a room
 constexpr double kNoPlane_m = 0.05;
 
 /// Share of a mesh's area that lies within a reach of its sharp edges.
@@ -43,7 +43,7 @@ double square(double x) { return x * x; }
 /// be taken anywhere within three sigma of the noise. Surfaces are off by bow_m over half a metre, too.
 double rangeStd_m(const ScanThing& thing, const ScanFrame& frame, double bow_m) {
   const double beyond_noise = std::max(0.0, square(thing.rms_m) - square(frame.noise_m));
-  const double at_edges = shareAtEdges(thing, kReachOfNormals_voxels * frame.spacing_m);
+  const double at_edges = shareAtEdges(thing, bounds::kReachOfNormals_voxels * frame.spacing_m);
   // Even over three sigma to both sides: its standard deviation is sqrt(3) sigma.
   return std::sqrt(square(bow_m) + beyond_noise + 3 * square(at_edges * frame.noise_m));
 }
@@ -74,7 +74,8 @@ StatedAccuracy accuracyOf(ScanScene& scene) {
   accuracy.scene_m = count > 0 ? std::max(kLeastScene_m, std::sqrt(sum / count)) : kNoPlane_m;
   // A surface whose heights have the rms b and are alike as exp(-(r/L)^2) has slopes of rms sqrt(2) b / L.
   accuracy.path_range_m = std::max(accuracy.path_range_m, bow_m);
-  accuracy.path_angle_deg = std::max(accuracy.path_angle_deg, std::sqrt(2.0) * bow_m / kBowPatch_m * 180 / M_PI);
+  accuracy.path_angle_deg =
+      std::max(accuracy.path_angle_deg, std::sqrt(2.0) * bow_m / bounds::kDriftPatch_m * 180 / M_PI);
   accuracy.level_db = levelAccuracy_db(scene.materials);
   return accuracy;
 }

@@ -12,14 +12,13 @@
 #include "scan/planes/room_planes.h"
 #include "scan/planes/scan_frame.h"
 #include "scan/proposed_materials.h"
+#include "scan/samples/scan_bounds.h"
 #include "scan/samples/scan_samples.h"
 #include "scan/scan_accuracy.h"
 #include "scan/things/things.h"
 
 namespace mmradartwin {
 namespace {
-
-constexpr double kLeastPlane_m2 = 0.04;
 
 ScanActor actorOfPlane(const ScanPlane& plane) {
   ScanActor actor;
@@ -34,6 +33,7 @@ ScanActor actorOfPlane(const ScanPlane& plane) {
 
 /// Takes the residuals of large planes for the noise where they are larger. True where that changes much.
 bool takeNoiseOf(const std::vector<PlaneRegion>& regions, ScanSamples& samples) {
+  if (!samples.error_m.empty()) return false;  // each sample has its own
   double squares = 0, area = 0;
   for (const PlaneRegion& r : regions) {
     if (r.area_m2 < 1) continue;
@@ -61,7 +61,8 @@ void countAreas(ScanScene& scene, const ScanSamples& samples, const std::vector<
       (owner < static_cast<int>(scene.planes.size()) ? scene.on_planes_m2 : scene.on_things_m2) += each;
     }
     // Upright surface at a wall, on its plane or not.
-    if (owner >= static_cast<int>(scene.planes.size()) || std::abs(samples.normals[i].z()) > 0.3F) continue;
+    if (owner >= static_cast<int>(scene.planes.size()) || std::abs(samples.normals[i].z()) > bounds::kUprightNormal)
+      continue;
     const Eigen::Vector3d p = samples.points[i].cast<double>();
     const bool on_wall = owner >= 0 && scene.planes[static_cast<std::size_t>(owner)].kind == PlaneKind::kWall;
     const bool at_wall = on_wall || std::any_of(scene.planes.begin(), scene.planes.end(), [&](const ScanPlane& w) {
@@ -86,8 +87,8 @@ void addNotes(ScanScene& scene, const RawScan& scan, const RoomPlanes& room, con
     scene.notes.push_back(line("no ceiling is in the scan; walls end at %.2f m", room.height_m));
   if (room.doubled_m2 > 0.1) {
     scene.notes.push_back(
-        line("%.1f m2 are second copies of a surface some centimetres off, which the scanner's drift makes; the larger "
-             "copy is taken",
+        line("%.1f m2 are second copies of a surface some centimetres off, which the scanner's drift makes; a wall is "
+             "the mean of its copies",
              room.doubled_m2));
   }
   if (room.closed_m2 > 0.1)
@@ -112,9 +113,9 @@ void addNotes(ScanScene& scene, const RawScan& scan, const RoomPlanes& room, con
 ScanScene sceneOfScan(const RawScan& scan, const ScanOptions& options) {
   const double unit_m = options.unit_m.value_or(unitOfScan(scan));
   ScanSamples samples = thinScan(scan, unit_m, options.progress);
-  std::vector<PlaneRegion> regions = growPlanes(samples, kLeastPlane_m2, options.progress);
+  std::vector<PlaneRegion> regions = growPlanes(samples, bounds::kLeastPlane_m2, options.progress);
   // Errors that are alike over more than the places of the first measure show on large planes alone.
-  if (takeNoiseOf(regions, samples)) regions = growPlanes(samples, kLeastPlane_m2, options.progress);
+  if (takeNoiseOf(regions, samples)) regions = growPlanes(samples, bounds::kLeastPlane_m2, options.progress);
   if (regions.empty()) throw InputError(scan.file + ": shows no flat surface, so that it is no room");
   ScanScene scene;
   scene.frame = bringIntoMap(scan, options, unit_m, samples, regions);

@@ -12,6 +12,7 @@
 #include <set>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "scan/samples/scan_bounds.h"
 #include "scan/things/thing_mesh.h"
 #include "scan/things/thing_shapes.h"
 
@@ -24,8 +25,7 @@ constexpr double kInsideWall_m = 0.05;                // so far a pose's error m
 constexpr double kMostOutside = 0.05;                 // share of its surface
 constexpr double kMostShared = 0.05;                  // share of an object within another one
 constexpr double kSmallest_m = 0.15, kLargest_m = 4;  // largest size of a thing that is worth a scan of its own
-constexpr double kShort_m = 0.01;  // bodies end so far before walls, floor and ceiling, as all things do
-constexpr double kRest = 0.8;      // of a thing's samples near an object: what is left of it is no thing
+constexpr double kRest = 0.8;  // of a thing's samples near an object: what is left of it is no thing
 
 /// An object's surface in map, its body where it is one, and a search in it.
 struct PlacedObject {
@@ -81,19 +81,20 @@ std::string unitName(double unit_m) { return unit_m == 1 ? "metres" : unit_m < 0
 void turnIntoMap(const Eigen::Isometry3d& T_map_object, const Eigen::Vector3d& offset_m, ScanSamples& samples) {
   for (Eigen::Vector3f& p : samples.points) p = (T_map_object * (p.cast<double>() + offset_m)).cast<float>();
   for (Eigen::Vector3f& n : samples.normals) n = (T_map_object.linear() * n.cast<double>()).cast<float>();
+  for (Eigen::Vector3f& e : samples.error_m) e = (T_map_object.linear() * e.cast<double>()).cast<float>();
 }
 
 /// Directions of its upright faces: of the largest flat part, and of all its normals.
 std::vector<double> yawsOf(const ScanSamples& samples, double room_yaw_rad) {
   std::vector<double> yaws = {room_yaw_rad};
   for (const PlaneRegion& region : growPlanes(samples, 0.02, nullptr)) {
-    if (std::abs(region.normal.z()) > 0.1) continue;
+    if (std::abs(region.normal.z()) > bounds::kUprightPlane) continue;
     yaws.push_back(std::atan2(region.normal.y(), region.normal.x()));
     break;
   }
   double sines = 0, cosines = 0;
   for (const Eigen::Vector3f& n : samples.normals) {
-    if (std::abs(n.z()) > 0.3F) continue;
+    if (std::abs(n.z()) > bounds::kUprightNormal) continue;
     const double angle = 4 * std::atan2(static_cast<double>(n.y()), static_cast<double>(n.x()));
     sines += std::sin(angle), cosines += std::cos(angle);
   }
@@ -171,8 +172,8 @@ void requireApart(const PlacedObject& a, const PlacedObject& b) {
 /// Ends a body short of what it touches.
 void endShort(const RoomPlanes& room, UprightBox& box) {
   Eigen::Vector3d &low = box.box.min(), &high = box.box.max();
-  if (low.z() < kInsideWall_m) low.z() = kShort_m;
-  if (high.z() > room.height_m - kInsideWall_m) high.z() = room.height_m - kShort_m;
+  if (low.z() < kInsideWall_m) low.z() = bounds::kGap_m;
+  if (high.z() > room.height_m - kInsideWall_m) high.z() = room.height_m - bounds::kGap_m;
   for (const ScanPlane& plane : room.planes) {
     const Eigen::Vector3d n = box.toBox(plane.normal);
     if (plane.kind != PlaneKind::kWall) continue;
@@ -180,7 +181,7 @@ void endShort(const RoomPlanes& room, UprightBox& box) {
       if (std::abs(n[axis]) < 0.9999) continue;
       double& end = n[axis] > 0 ? low[axis] : high[axis];
       const double beyond = n[axis] > 0 ? plane.offset_m - end : end + plane.offset_m;  // behind the wall
-      if (std::abs(beyond) < kInsideWall_m) end += n[axis] > 0 ? beyond + kShort_m : -beyond - kShort_m;
+      if (std::abs(beyond) < kInsideWall_m) end += n[axis] > 0 ? beyond + bounds::kGap_m : -beyond - bounds::kGap_m;
     }
   }
 }
@@ -192,7 +193,7 @@ void endShort(const RoomPlanes& room, ScanThing& thing) {
       if (plane.kind == PlaneKind::kDoor || plane.kind == PlaneKind::kWindow || plane.kind == PlaneKind::kPanel)
         continue;
       const double before = plane.normal.dot(v) - plane.offset_m;
-      if (before < kShort_m && before > -2 * kInsideWall_m) v += (kShort_m - before) * plane.normal;
+      if (before < bounds::kGap_m && before > -2 * kInsideWall_m) v += (bounds::kGap_m - before) * plane.normal;
     }
     thing.bounds.extend(v);
   }
@@ -267,7 +268,7 @@ class ObjectPlacer {
     thing.material = placed.object->material;
     thing.samples = placed.samples.size();
     thing.watertight = true;
-    const double tolerance_m = std::max(planeTolerance(placed.samples), 0.015);
+    const double tolerance_m = std::max(planeTolerance(placed.samples), bounds::kLeastFit_m);
     placed.box = fitBox(placed.samples, placed.all, yawsOf(placed.samples, room_.yaw_rad), tolerance_m);
     const BoxEvidence evidence = evidenceOf(placed.samples, placed.all, placed.box, tolerance_m);
     UprightCylinder cylinder = fitCylinder(placed.samples, placed.all, tolerance_m);
@@ -276,7 +277,7 @@ class ObjectPlacer {
     if (!meshes && cylinder.share > 0.8 && cylinder.share > placed.box.share + 0.05) {
       thing.shape = ThingShape::kCylinder;
       thing.rms_m = cylinder.rms_m, thing.largest_m = cylinder.largest_m;
-      if (cylinder.low_m < kInsideWall_m) cylinder.low_m = kShort_m;
+      if (cylinder.low_m < kInsideWall_m) cylinder.low_m = bounds::kGap_m;
       addCylinder(cylinder, thing);
       placed.is_box = true;  // what its box holds is it, too
       return thing;
@@ -348,6 +349,7 @@ void joinObjects(const ScanSamples& samples, PlacedObjects objects, Things& thin
   for (const ScanThing& object : objects.things) names.insert(object.name);
   Things joined;
   joined.crumbs = things.crumbs;
+  joined.scraps = things.scraps;
   joined.notes = things.notes;
   for (std::size_t k = 0; k < objects.things.size(); ++k) {
     joined.things.push_back(std::move(objects.things[k]));

@@ -5,15 +5,15 @@
 #include <cmath>
 #include <set>
 
+#include "scan/samples/scan_bounds.h"
+
 namespace mmradartwin {
 namespace {
 
-constexpr double kRadPerDeg = M_PI / 180;
-constexpr double kBend_rad = 4 * kRadPerDeg;  // as parts of one plane that touch
-constexpr double kWall_m2 = 1;                // drift shows on large planes alone
-constexpr double kFarthest_m = 0.1;           // no piece of a wall is farther off; the tolerance decides
+constexpr double kBend_rad = bounds::kSameTurn_deg * bounds::kDegree;
+constexpr double kWall_m2 = 1;       // drift shows on large planes alone
+constexpr double kFarthest_m = 0.1;  // no piece of a wall is farther off; the tolerance decides
 constexpr double kBendCell_m = 0.1;
-constexpr double kWallGap_m = 0.6;  // in a wall, of a curtain or a tall cabinet
 
 /// Angle modulo 90 deg, -45 to 45.
 double quarter(double angle_rad) { return angle_rad - M_PI / 2 * std::round(angle_rad / (M_PI / 2)); }
@@ -25,7 +25,7 @@ double mainDirection(const std::vector<PlaneRegion>& regions) {
   std::array<double, 180> area{};
   const auto bin = [](double angle) { return static_cast<int>(std::floor(angle / (M_PI / 2) * 180 + 360)) % 180; };
   for (const PlaneRegion& r : regions) {
-    if (std::abs(r.normal.z()) < std::sin(5 * kRadPerDeg))
+    if (std::abs(r.normal.z()) < std::sin(5 * bounds::kDegree))
       area[static_cast<std::size_t>(bin(quarter(yawOf(r)) + M_PI / 4))] += r.area_m2;
   }
   double best = -1, direction = 0;
@@ -37,10 +37,10 @@ double mainDirection(const std::vector<PlaneRegion>& regions) {
   for (double cone : {3.0, 1.0, 1.0}) {
     double sum = 0, weights = 0;
     for (const PlaneRegion& r : regions) {
-      if (std::abs(r.normal.z()) > std::sin(5 * kRadPerDeg)) continue;
+      if (std::abs(r.normal.z()) > std::sin(5 * bounds::kDegree)) continue;
       const double off = quarter(yawOf(r) - direction);
-      if (std::abs(off) > cone * kRadPerDeg) continue;
-      const double weight = r.area_m2 / (std::pow(r.angle_std_rad, 2) + std::pow(0.05 * kRadPerDeg, 2));
+      if (std::abs(off) > cone * bounds::kDegree) continue;
+      const double weight = r.area_m2 / (std::pow(r.angle_std_rad, 2) + std::pow(0.05 * bounds::kDegree, 2));
       sum += weight * off, weights += weight;
     }
     if (weights > 0) direction += sum / weights;
@@ -66,7 +66,7 @@ void turnInwards(const ScanSamples& samples, std::vector<PlaneRegion>& regions) 
 std::set<std::pair<int, int>> cellsOf(const ScanSamples& samples, const PlaneRegion& r, const Eigen::Vector3d& u) {
   std::set<std::pair<int, int>> cells;
   for (int i : r.samples) {
-    const Eigen::Vector3d p = samples.points[static_cast<std::size_t>(i)].cast<double>() / kBendCell_m;
+    const Eigen::Vector3d p = samples.at(i) / kBendCell_m;
     cells.insert({static_cast<int>(std::floor(u.dot(p))), static_cast<int>(std::floor(p.z()))});
   }
   return cells;
@@ -80,16 +80,38 @@ bool goesOn(const ScanSamples& samples, const PlaneRegion& wall, const PlaneRegi
   const double apart_m =
       std::max(of_piece.begin()->first - of_wall.rbegin()->first, of_wall.begin()->first - of_piece.rbegin()->first) *
       kBendCell_m;
-  return apart_m < kWallGap_m && static_cast<double>(shared) < 0.3 * static_cast<double>(of_piece.size());
+  return apart_m < bounds::kWallGap_m && static_cast<double>(shared) < 0.3 * static_cast<double>(of_piece.size());
 }
 
 /// Nine in ten samples of a part lie on a plane.
 bool holdsPart(const ScanSamples& samples, const PlaneRegion& plane, const std::vector<int>& part) {
-  const double tolerance_m = planeTolerance(samples);
   const auto near = std::count_if(part.begin(), part.end(), [&](int i) {
-    return std::abs(plane.distance(samples.points[static_cast<std::size_t>(i)].cast<double>())) < tolerance_m;
+    return std::abs(plane.distance(samples.at(i))) < planeTolerance(samples, i, plane.normal);
   });
   return 10 * static_cast<std::size_t>(near) > 9 * part.size();
+}
+
+/// Two sheets of one wall, each seen from another place: so near that drift parts them, and one behind the other.
+bool areCopies(const ScanSamples& samples, const PlaneRegion& a, const PlaneRegion& b) {
+  if (a.normal.dot(b.normal) < std::cos(kBend_rad) || std::abs(a.normal.z()) > std::sin(kBend_rad)) return false;
+  if (std::abs(a.distance(b.middle)) > bounds::kSameSurface_m) return false;
+  const Eigen::Vector3d u = Eigen::Vector3d::UnitZ().cross(a.normal).normalized();
+  const auto of_a = cellsOf(samples, a, u), of_b = cellsOf(samples, b, u);
+  const auto shared = std::count_if(of_b.begin(), of_b.end(), [&](const auto& c) { return of_a.count(c); });
+  return 2 * static_cast<std::size_t>(shared) > of_b.size();
+}
+
+/// How far frames are turned against each other, 1 sigma, as the copies of large walls show; 0 where none is doubled.
+double registrationStd(const ScanSamples& samples, const std::vector<PlaneRegion>& regions) {
+  double squares = 0, weights = 0;
+  for (std::size_t a = 0; a < regions.size(); ++a) {  // largest first
+    for (std::size_t b = a + 1; b < regions.size() && regions[b].area_m2 > kWall_m2; ++b) {
+      if (!areCopies(samples, regions[a], regions[b])) continue;
+      const double between_rad = quarter(yawOf(regions[a]) - yawOf(regions[b]));
+      squares += regions[b].area_m2 * between_rad * between_rad / 2, weights += regions[b].area_m2;
+    }
+  }
+  return weights > 0 ? std::sqrt(squares / weights) : 0;
 }
 
 /// A scanner that drifts bends a long wall, so that it grows in pieces that turn by a degree or two. A piece that goes
@@ -124,19 +146,22 @@ void joinBentWalls(const ScanSamples& samples, std::vector<PlaneRegion>& regions
 double regularise(const ScanSamples& samples, bool enabled, std::vector<PlaneRegion>& regions) {
   if (!samples.oriented) turnInwards(samples, regions);
   joinBentWalls(samples, regions);
+  // No plane is known better than the place that it was seen from.
+  const double registration_rad = registrationStd(samples, regions);
+  for (PlaneRegion& r : regions) r.angle_std_rad = std::hypot(r.angle_std_rad, registration_rad);
   const double direction = mainDirection(regions);
   for (PlaneRegion& r : regions) {
     const Eigen::Vector3d before = r.normal;
-    const double limit = std::max(3 * r.angle_std_rad, 0.05 * kRadPerDeg);
+    const double limit = std::max(3 * r.angle_std_rad, 0.05 * bounds::kDegree);
     const double height = std::asin(std::clamp(r.normal.z(), -1.0, 1.0));  // of the normal above the level
     // Floors and walls are level and upright to a degree; what leans more does so on purpose.
-    const double lean = std::min(std::max(limit, 1 * kRadPerDeg), 4 * kRadPerDeg);
+    const double lean = std::min(std::max(limit, 1 * bounds::kDegree), 4 * bounds::kDegree);
     if (M_PI / 2 - std::abs(height) < lean) {
       r.normal = Eigen::Vector3d(0, 0, r.normal.z() > 0 ? 1 : -1);
     } else if (std::abs(height) < lean) {
       double yaw = yawOf(r);
       const double off = quarter(yaw - direction);
-      if (enabled && std::abs(off) < std::min(limit, 6 * kRadPerDeg)) yaw -= off;
+      if (enabled && std::abs(off) < std::min(limit, 6 * bounds::kDegree)) yaw -= off;
       r.normal = Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0);
     } else {
       continue;

@@ -7,13 +7,14 @@
 #include <numeric>
 #include <set>
 
+#include "scan/samples/scan_bounds.h"
+
 namespace mmradartwin {
 namespace {
 
 constexpr double kSameSide = 0.94;           // cosine of 20 deg: normals of few noisy neighbours scatter
 constexpr double kLeastTolerance_m = 0.006;  // rounding of voxels alone
-constexpr double kPatch_m = 0.5;             // a scan's slow errors are alike over so much of a surface
-constexpr double kSameTurn = 0.9976;         // cosine of 4 deg, of parts of one plane
+const double kSameTurn = std::cos(bounds::kSameTurn_deg * bounds::kDegree);  // of parts of one plane
 
 /// Sums of points, from which their plane follows at any time.
 class PlaneSums {
@@ -38,16 +39,11 @@ class PlaneSums {
   std::size_t count_ = 0;
 };
 
-Eigen::Vector3d pointOf(const ScanSamples& samples, int i) {
-  return samples.points[static_cast<std::size_t>(i)].cast<double>();
-}
-
 class Growth {
  public:
   Growth(const ScanSamples& samples, double smallest_m2)
       : samples_(samples),
         smallest_(static_cast<std::size_t>(smallest_m2 / samples.area_m2())),
-        tolerance_m_(planeTolerance(samples)),
         owner_(samples.size(), -1) {}
 
   std::vector<PlaneRegion> run(const Progress& progress) {
@@ -60,7 +56,8 @@ class Growth {
       const int seed = order[k];
       if (owner_[static_cast<std::size_t>(seed)] != -1 || normalOf(seed).isZero()) continue;
       // Two sheets a voxel or two apart are no flatter than that, and each of them is a plane.
-      if (flatness(seed) > std::max(2 * samples_.noise_m, samples_.spacing_m)) break;
+      const double noise_m = samples_.noiseAlong(seed, normalOf(seed).cast<double>());
+      if (flatness(seed) > std::max(2 * noise_m, samples_.spacing_m)) continue;
       grow(seed);
     }
     join();
@@ -78,19 +75,19 @@ class Growth {
   bool fits(int i, const Eigen::Vector3d& normal, const Eigen::Vector3d& mean) const {
     const double cosine = normalOf(i).cast<double>().dot(normal);
     if ((samples_.oriented ? cosine : std::abs(cosine)) < kSameSide) return false;
-    return std::abs(normal.dot(pointOf(samples_, i) - mean)) < tolerance_m_;
+    return std::abs(normal.dot(samples_.at(i) - mean)) < planeTolerance(samples_, i, normal);
   }
 
   void grow(int seed) {
     const int id = static_cast<int>(regions_.size());
-    PlaneSums sums(pointOf(samples_, seed));
-    Eigen::Vector3d normal = normalOf(seed).cast<double>(), mean = pointOf(samples_, seed);
+    PlaneSums sums(samples_.at(seed));
+    Eigen::Vector3d normal = normalOf(seed).cast<double>(), mean = samples_.at(seed);
     std::vector<int> queue = {seed};
     owner_[static_cast<std::size_t>(seed)] = id;
     std::size_t next_fit = 24;
     for (std::size_t at = 0; at < queue.size(); ++at) {
       const auto i = static_cast<std::size_t>(queue[at]);
-      sums.add(pointOf(samples_, queue[at]));
+      sums.add(samples_.at(queue[at]));
       if (sums.count() >= next_fit) {
         const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spectrum(sums.covariance());
         const Eigen::Vector3d fitted = spectrum.eigenvectors().col(0);
@@ -117,7 +114,7 @@ class Growth {
       return;
     }
     std::sort(region.samples.begin(), region.samples.end());
-    fitPlane(samples_, tolerance_m_, region);
+    fitPlane(samples_, 0, region);
     drop(region);
     regions_.push_back(std::move(region));
   }
@@ -126,7 +123,7 @@ class Growth {
   void drop(PlaneRegion& region) {
     std::vector<int> kept;
     for (int i : region.samples) {
-      if (std::abs(region.distance(pointOf(samples_, i))) < tolerance_m_) {
+      if (std::abs(region.distance(samples_.at(i))) < planeTolerance(samples_, i, region.normal)) {
         kept.push_back(i);
       } else {
         owner_[static_cast<std::size_t>(i)] = -1;
@@ -138,7 +135,7 @@ class Growth {
   bool alike(const PlaneRegion& a, const PlaneRegion& b) const {
     const double cosine = a.normal.dot(b.normal);
     if ((samples_.oriented ? cosine : std::abs(cosine)) < kSameTurn) return false;
-    const double slack = tolerance_m_;
+    const double slack = planeTolerance(samples_, b);
     return std::abs(a.distance(b.middle)) < slack && std::abs(b.distance(a.middle)) < slack;
   }
 
@@ -177,14 +174,13 @@ class Growth {
         }
         if (!taken[static_cast<std::size_t>(large)]) continue;
         std::sort(a.samples.begin(), a.samples.end());
-        fitPlane(samples_, tolerance_m_, a);
+        fitPlane(samples_, 0, a);
       }
     }
   }
 
   const ScanSamples& samples_;
   const std::size_t smallest_;
-  const double tolerance_m_;
   std::vector<int> owner_;  // region of each sample; -1 none, -2 a crumb
   std::vector<PlaneRegion> regions_;
 };
@@ -193,19 +189,30 @@ class Growth {
 
 double planeTolerance(const ScanSamples& samples) { return std::max(kLeastTolerance_m, 3 * samples.noise_m); }
 
+double planeTolerance(const ScanSamples& samples, int i, const Eigen::Vector3d& normal) {
+  return std::max(kLeastTolerance_m, 3 * samples.noiseAlong(i, normal));
+}
+
+double planeTolerance(const ScanSamples& samples, const PlaneRegion& region) {
+  if (samples.error_m.empty() || region.samples.empty()) return planeTolerance(samples);
+  double sum = 0;
+  for (int i : region.samples) sum += samples.noiseAlong(i, region.normal);
+  return std::max(kLeastTolerance_m, 3 * sum / static_cast<double>(region.samples.size()));
+}
+
 void measurePlane(const ScanSamples& samples, PlaneRegion& region) {
   if (region.samples.empty()) return;
   const Eigen::Vector3d u = region.normal.unitOrthogonal(), v = region.normal.cross(u);
   std::map<std::pair<int, int>, std::pair<double, double>> patches;  // sum and count
-  PlaneSums sums(pointOf(samples, region.samples.front()));
+  PlaneSums sums(samples.at(region.samples.front()));
   double squares = 0;
   for (int i : region.samples) {
-    const Eigen::Vector3d p = pointOf(samples, i);
+    const Eigen::Vector3d p = samples.at(i);
     const double d = region.distance(p);
     sums.add(p);
     squares += d * d;
-    auto& patch =
-        patches[{static_cast<int>(std::floor(u.dot(p) / kPatch_m)), static_cast<int>(std::floor(v.dot(p) / kPatch_m))}];
+    auto& patch = patches[{static_cast<int>(std::floor(u.dot(p) / bounds::kDriftPatch_m)),
+                           static_cast<int>(std::floor(v.dot(p) / bounds::kDriftPatch_m))}];
     patch.first += d, patch.second += 1;
   }
   const auto count = static_cast<double>(region.samples.size());
@@ -216,7 +223,7 @@ void measurePlane(const ScanSamples& samples, PlaneRegion& region) {
   for (const auto& [place, patch] : patches) bow += patch.first * patch.first / patch.second;
   region.bow_m = std::sqrt(bow / count);
   // A patch is one measurement of the plane: its samples err together.
-  const double whole_patches = std::max(1.0, region.area_m2 / (kPatch_m * kPatch_m));
+  const double whole_patches = std::max(1.0, region.area_m2 / (bounds::kDriftPatch_m * bounds::kDriftPatch_m));
   const double one_m = std::max(region.bow_m, region.rms_m / std::sqrt(std::max(1.0, count / whole_patches)));
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spectrum(sums.covariance());
   const double reach_m = std::sqrt(std::max(1e-6, spectrum.eigenvalues()[1]));  // the shorter way in the plane
@@ -224,11 +231,12 @@ void measurePlane(const ScanSamples& samples, PlaneRegion& region) {
   region.angle_std_rad = region.offset_std_m / reach_m;
 }
 
-void fitPlane(const ScanSamples& samples, double tolerance_m, PlaneRegion& region) {
+void fitPlane(const ScanSamples& samples, double least_m, PlaneRegion& region) {
   for (int round = 0; round < 2; ++round) {
-    PlaneSums sums(pointOf(samples, region.samples.front()));
+    PlaneSums sums(samples.at(region.samples.front()));
     for (int i : region.samples) {
-      const Eigen::Vector3d p = pointOf(samples, i);
+      const Eigen::Vector3d p = samples.at(i);
+      const double tolerance_m = std::max(least_m, planeTolerance(samples, i, region.normal));
       if (round == 0 || std::abs(region.distance(p)) < tolerance_m) sums.add(p);
     }
     if (sums.count() < 3) break;

@@ -23,12 +23,16 @@ struct PlaneRegion {
   double distance(const Eigen::Vector3d& p) const { return normal.dot(p) - offset_m; }
 };
 
-/// How far a sample may lie from its plane: three standard deviations of the scan's noise.
+/// How far a sample may lie from its plane: three standard deviations of its noise along the plane's normal.
+double planeTolerance(const ScanSamples& samples, int i, const Eigen::Vector3d& normal);
+/// The same of a region, over whose samples the noise is averaged.
+double planeTolerance(const ScanSamples& samples, const PlaneRegion& region);
+/// The same at large, where no plane is at hand.
 double planeTolerance(const ScanSamples& samples);
 
-/// Least squares through samples, twice, the second time without what lies farther off than the tolerance. Sets all but
-/// `samples`; the normal keeps its side.
-void fitPlane(const ScanSamples& samples, double tolerance_m, PlaneRegion& region);
+/// Least squares through samples, twice, the second time without what lies farther off than its tolerance and than
+/// `least_m`. Sets all but `samples`; the normal keeps its side.
+void fitPlane(const ScanSamples& samples, double least_m, PlaneRegion& region);
 /// rms, bow and standard deviations of a plane that is given.
 void measurePlane(const ScanSamples& samples, PlaneRegion& region);
 

@@ -7,17 +7,14 @@
 #include <cstdio>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "scan/planes/slanted_bounds.h"
+#include "scan/samples/scan_bounds.h"
 
 namespace mmradartwin {
 namespace {
 
-constexpr double kDeg = M_PI / 180;
-constexpr double kCone_rad = 12 * kDeg;    // planes within are level or upright, before up is known
-constexpr double kRoom_m[2] = {1.0, 9.0};  // the smallest of a room's three sizes, up to a hall's height
-constexpr double kWidest_m = 150;
-constexpr double kShell_m2 = 3;        // a plane as large is the room's own: tops and sides of furniture are smaller
-constexpr double kNoUp = -100;         // score of an axis that no plane has as its normal
-constexpr double kSameLevel_m = 0.06;  // a floor that drift has doubled is one
+constexpr double kLeastFloor_m2 = 0.3;  // that a person stands on with both feet
+constexpr double kNoUp = -100;          // score of an axis that no plane has as its normal
 
 std::string number(double value, int digits = 2) {
   std::array<char, 40> text{};
@@ -64,8 +61,8 @@ Alignment alignmentWith(const std::vector<PlaneRegion>& regions, const Eigen::Ve
   Alignment result;
   for (const PlaneRegion& r : regions) {
     const double cosine = std::abs(r.normal.dot(axis));
-    if (cosine > std::cos(kCone_rad)) result.along_m2 += r.area_m2;
-    if (cosine < std::sin(kCone_rad)) result.across_m2 += r.area_m2;
+    if (cosine > std::cos(bounds::kCone_deg * bounds::kDegree)) result.along_m2 += r.area_m2;
+    if (cosine < std::sin(bounds::kCone_deg * bounds::kDegree)) result.across_m2 += r.area_m2;
   }
   return result;
 }
@@ -81,7 +78,7 @@ UpSigns upSigns(const ScanSamples& samples, const std::vector<PlaneRegion>& regi
   UpSigns signs{samples, regions, {}};
   std::vector<char> on_shell(samples.size(), 0);
   for (const PlaneRegion& r : regions) {
-    if (r.area_m2 < kShell_m2) continue;
+    if (r.area_m2 < bounds::kShell_m2) continue;
     for (int i : r.samples) on_shell[static_cast<std::size_t>(i)] = 1;
   }
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -111,7 +108,8 @@ double scoreOfUp(const UpSigns& signs, const Eigen::Vector3d& axis) {
   for (const PlaneRegion& r : signs.regions) {
     all_m2 += r.area_m2;
     const double cosine = r.normal.dot(axis);
-    if (r.area_m2 < kShell_m2 && std::abs(cosine) > std::cos(kCone_rad)) (cosine > 0 ? up_m2 : down_m2) += r.area_m2;
+    if (r.area_m2 < bounds::kShell_m2 && std::abs(cosine) > std::cos(bounds::kCone_deg * bounds::kDegree))
+      (cosine > 0 ? up_m2 : down_m2) += r.area_m2;
   }
   if (aligned.along_m2 < 0.05 * all_m2) return kNoUp;
   const auto [low, high] = endsAlong(signs.samples, axis);
@@ -148,7 +146,7 @@ Eigen::Vector3d findUp(const RawScan& scan, const ScanSamples& samples, const st
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (const PlaneRegion& r : regions) {
       const double cosine = r.normal.dot(candidate.axis);
-      if (std::abs(cosine) > std::cos(25 * kDeg)) sum += (cosine > 0 ? 1 : -1) * r.area_m2 * r.normal;
+      if (std::abs(cosine) > std::cos(25 * bounds::kDegree)) sum += (cosine > 0 ? 1 : -1) * r.area_m2 * r.normal;
     }
     if (sum.isZero()) continue;
     const Eigen::Vector3d axis = sum.normalized();
@@ -176,9 +174,9 @@ struct Level {
 /// up that the level planes have as normal and the upright ones lie along, by their areas; what is off by more than
 /// three of its standard deviations and half a degree is no plane of that kind.
 Level levelBy(const std::vector<PlaneRegion>& regions, Eigen::Vector3d up) {
-  double cone = kCone_rad;
+  double cone = bounds::kCone_deg * bounds::kDegree;
   Level level{up, 0};
-  for (int round = 0; round < 6; ++round, cone = std::max(0.5 * cone, 0.6 * kDeg)) {
+  for (int round = 0; round < 6; ++round, cone = std::max(0.5 * cone, 0.6 * bounds::kDegree)) {
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
     double weights = 0, squares = 0;
     for (const PlaneRegion& r : regions) {
@@ -186,8 +184,8 @@ Level levelBy(const std::vector<PlaneRegion>& regions, Eigen::Vector3d up) {
       const double angle = std::acos(std::min(1.0, std::abs(r.normal.dot(level.up))));
       const bool level_plane = angle < M_PI / 4;
       const double off = level_plane ? angle : M_PI / 2 - angle;
-      if (off > std::max(cone, 3 * r.angle_std_rad) || off > kCone_rad) continue;
-      const double weight = r.area_m2 / (std::pow(r.angle_std_rad, 2) + std::pow(0.1 * kDeg, 2));
+      if (off > std::max(cone, 3 * r.angle_std_rad) || off > bounds::kCone_deg * bounds::kDegree) continue;
+      const double weight = r.area_m2 / (std::pow(r.angle_std_rad, 2) + std::pow(0.1 * bounds::kDegree, 2));
       sum += (level_plane ? -weight : weight) * r.normal * r.normal.transpose();
       weights += weight;
       squares += weight * weight * (off * off + std::pow(r.angle_std_rad, 2));
@@ -201,18 +199,22 @@ Level levelBy(const std::vector<PlaneRegion>& regions, Eigen::Vector3d up) {
   return level;
 }
 
+bool isLevelTo(const PlaneRegion& r, const Eigen::Vector3d& up, double lean_deg = bounds::kLevel_deg) {
+  return std::abs(r.normal.dot(up)) > std::cos(lean_deg * bounds::kDegree);
+}
+
 struct HorizontalLevel {
   double height_m, area_m2;
 };
 
-/// Heights of level planes, lowest first; those closer than kSameLevel_m are the larger one's.
+/// Heights of level planes, lowest first; those closer than bounds::kSameSurface_m are the larger one's.
 std::vector<HorizontalLevel> levelsOf(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up) {
   std::vector<HorizontalLevel> levels;
   for (const PlaneRegion& r : regions) {  // largest first
-    if (std::abs(r.normal.dot(up)) < std::cos(3 * kDeg)) continue;
+    if (!isLevelTo(r, up)) continue;
     const double height = r.middle.dot(up);
     const auto same = std::find_if(levels.begin(), levels.end(), [height](const HorizontalLevel& l) {
-      return std::abs(l.height_m - height) < kSameLevel_m;
+      return std::abs(l.height_m - height) < bounds::kSameSurface_m;
     });
     if (same == levels.end()) {
       levels.push_back({height, r.area_m2});
@@ -225,13 +227,55 @@ std::vector<HorizontalLevel> levelsOf(const std::vector<PlaneRegion>& regions, c
   return levels;
 }
 
+double largestOf(const std::vector<HorizontalLevel>& levels) {
+  double largest_m2 = 0;
+  for (const HorizontalLevel& l : levels) largest_m2 = std::max(largest_m2, l.area_m2);
+  return largest_m2;
+}
+
+/// The lowest large one; null where there is none.
+const HorizontalLevel* floorOf(const std::vector<HorizontalLevel>& levels) {
+  const double least_m2 = std::max(kLeastFloor_m2, bounds::kShareOfLargestLevel * largestOf(levels));
+  const auto lowest =
+      std::find_if(levels.begin(), levels.end(), [&](const HorizontalLevel& l) { return l.area_m2 > least_m2; });
+  return lowest == levels.end() ? nullptr : &*lowest;
+}
+
+/// A depth camera sees a floor far away at a grazing angle, so that it may lean by some degrees. A large plane that is
+/// about level, lies below all level ones, and has nothing of the scan behind it is the floor for all that: it becomes
+/// level. Returns by how much it leant, degrees; 0 where there is none.
+double levelLeaningFloor(const ScanSamples& samples, const Eigen::Vector3d& up, std::vector<PlaneRegion>& regions) {
+  const std::vector<HorizontalLevel> levels = levelsOf(regions, up);
+  const HorizontalLevel* level = floorOf(levels);
+  const double least_m2 = std::max(kLeastFloor_m2, bounds::kShareOfLargestLevel * largestOf(levels));
+  PlaneRegion* lowest = nullptr;
+  for (PlaneRegion& r : regions) {
+    if (r.area_m2 < least_m2 || isLevelTo(r, up) || !isLevelTo(r, up, bounds::kCone_deg)) continue;
+    const double height_m = r.middle.dot(up);
+    if (level && height_m > level->height_m - bounds::kSameSurface_m) continue;
+    PlaneRegion facing = r;
+    if (facing.normal.dot(up) < 0) facing.normal *= -1, facing.offset_m *= -1;
+    if (boundsRoom(samples, facing) && (!lowest || height_m < lowest->middle.dot(up))) lowest = &r;
+  }
+  if (!lowest) return 0;
+  const PlaneRegion floor = *lowest;
+  for (PlaneRegion& r : regions) {
+    const bool is_part = std::abs(floor.distance(r.middle)) < bounds::kSameSurface_m;
+    if (!is_part || !isLevelTo(r, up, bounds::kCone_deg)) continue;
+    r.normal = r.normal.dot(up) < 0 ? Eigen::Vector3d(-up) : up;
+    r.offset_m = r.normal.dot(r.middle);
+    measurePlane(samples, r);
+  }
+  return std::acos(std::min(1.0, std::abs(floor.normal.dot(up)))) / bounds::kDegree;
+}
+
 /// True where a mesh is wound so that its floor faces down: another hand's triangles.
 bool isInsideOut(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up, double floor_m) {
   double faces_up = 0;
   for (const PlaneRegion& r : regions) {
     const double cosine = r.normal.dot(up);
-    const bool on_floor = std::abs(r.middle.dot(up) - floor_m) < kSameLevel_m;
-    if (on_floor && std::abs(cosine) > std::cos(3 * kDeg)) faces_up += cosine * r.area_m2;
+    const bool on_floor = std::abs(r.middle.dot(up) - floor_m) < bounds::kSameSurface_m;
+    if (on_floor && isLevelTo(r, up)) faces_up += cosine * r.area_m2;
   }
   return faces_up < 0;
 }
@@ -240,13 +284,12 @@ bool isInsideOut(const std::vector<PlaneRegion>& regions, const Eigen::Vector3d&
 double heightOf(const ScanSamples& samples, const std::vector<PlaneRegion>& regions, const Eigen::Vector3d& up,
                 double height_m) {
   const Eigen::Vector3f axis = up.cast<float>();
-  const double tolerance_m = planeTolerance(samples);
   for (int round = 0; round < 2; ++round) {
     double sum = 0;
     std::size_t count = 0;
     for (const PlaneRegion& r : regions) {
-      if (std::abs(r.normal.dot(up)) < std::cos(3 * kDeg) || std::abs(r.middle.dot(up) - height_m) > tolerance_m)
-        continue;
+      const double tolerance_m = planeTolerance(samples, r);
+      if (!isLevelTo(r, up) || std::abs(r.middle.dot(up) - height_m) > tolerance_m) continue;
       for (int i : r.samples) {
         const auto s = static_cast<std::size_t>(i);
         for (std::size_t k = samples.dense_first[s]; k < samples.dense_first[s + 1]; ++k) {
@@ -282,6 +325,7 @@ std::string wordsOf(const ScanFrame& frame) {
   } else {
     words += number(std::abs(frame.floor_m)) + " m " + (frame.floor_m < 0 ? "below" : "above") + " the origin";
   }
+  if (frame.floor_leans_deg > 0) words += " (it leans by " + number(frame.floor_leans_deg, 1) + " deg in the scan)";
   words += frame.has_ceiling ? ", ceiling at " + number(frame.ceiling_m) + " m" : ", no ceiling";
   return words + ", noise " + number(1e3 * frame.noise_m, 1) + " mm";
 }
@@ -293,7 +337,8 @@ double unitOfScan(const RawScan& scan) {
   const Eigen::Vector3d sizes = robustSizes(scan.points);
   for (double unit : {1.0, 0.001, 0.01}) {
     const double smallest = unit * sizes.minCoeff();
-    if (smallest > kRoom_m[0] && smallest < kRoom_m[1] && unit * sizes.maxCoeff() < kWidest_m) return unit;
+    if (smallest > bounds::kRoom_m[0] && smallest < bounds::kRoom_m[1] && unit * sizes.maxCoeff() < bounds::kWidest_m)
+      return unit;
   }
   // A part of a room, of one plane perhaps: by its largest size.
   for (double unit : {1.0, 0.001, 0.01}) {
@@ -314,7 +359,7 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
   Level level{options.up ? options.up->normalized() : findUp(scan, samples, regions), 0};
   if (options.level) level = levelBy(regions, level.up);
   frame.up = level.up;
-  frame.tilt_std_deg = level.std_rad / kDeg;
+  frame.tilt_std_deg = level.std_rad / bounds::kDegree;
   const Alignment aligned = alignmentWith(regions, frame.up);
   if (aligned.across_m2 < 1) {
     throw InputError(scan.file + ": shows " +
@@ -327,29 +372,27 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
     const double cosine = candidate.axis.dot(frame.up);
     if (cosine > nearest) nearest = cosine, frame.up_name = candidate.name, axis = candidate.axis;
   }
-  frame.tilt_deg = std::acos(std::min(1.0, nearest)) / kDeg;
+  frame.tilt_deg = std::acos(std::min(1.0, nearest)) / bounds::kDegree;
   const Eigen::Matrix3d exchange = exchangeOfAxes(frame.up_name);
   const Eigen::Matrix3d R =
       Eigen::Quaterniond::FromTwoVectors(exchange * frame.up, Eigen::Vector3d::UnitZ()).toRotationMatrix() * exchange;
 
+  if (!options.floor_m) frame.floor_leans_deg = levelLeaningFloor(samples, frame.up, regions);
   const std::vector<HorizontalLevel> levels = levelsOf(regions, frame.up);
-  double largest_m2 = 0;
-  for (const HorizontalLevel& l : levels) largest_m2 = std::max(largest_m2, l.area_m2);
+  const double largest_m2 = largestOf(levels);
   const Eigen::Vector3d offset = unit_m * scan.offset;
   double floor = 0;
   if (options.floor_m) {
     floor = *options.floor_m - axis.dot(offset);
   } else {
-    const auto lowest = std::find_if(levels.begin(), levels.end(), [&](const HorizontalLevel& l) {
-      return l.area_m2 > std::max(0.3, 0.25 * largest_m2);
-    });
-    if (lowest == levels.end()) {
+    const HorizontalLevel* lowest = floorOf(levels);
+    if (!lowest) {
       throw InputError(scan.file + ": shows no floor; say where it is by --floor, and which way is up by --up");
     }
     floor = lowest->height_m;
   }
   for (const HorizontalLevel& l : levels) {
-    if (l.area_m2 > 0.25 * largest_m2 && l.height_m > floor + 1.8) {
+    if (l.area_m2 > bounds::kShareOfLargestLevel * largest_m2 && l.height_m > floor + bounds::kLeastCeiling_m) {
       frame.has_ceiling = true;
       frame.ceiling_m = l.height_m - floor;
     }
@@ -372,6 +415,7 @@ ScanFrame bringIntoMap(const RawScan& scan, const ScanOptions& options, double u
   for (Eigen::Vector3f& p : samples.points) p = Rf * p + shift_f;
   for (Eigen::Vector3f& p : samples.dense) p = Rf * p + shift_f;
   for (Eigen::Vector3f& n : samples.normals) n = Rf * n;
+  for (Eigen::Vector3f& e : samples.error_m) e = Rf * e;
   for (PlaneRegion& r : regions) {
     r.normal = R * r.normal;
     r.middle = R * r.middle + shift;

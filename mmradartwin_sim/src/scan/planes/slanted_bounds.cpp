@@ -3,24 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scan/samples/scan_bounds.h"
+
 namespace mmradartwin {
 namespace {
 
-constexpr double kLeastSlant_m2 = 1;                           // slanted faces of furniture are smaller
-constexpr double kFlattest = 0.966, kSteepest = 0.174;         // |cosine| between normal and up: 15 and 80 deg
-constexpr double kSamePlane = 0.9998;                          // cosine of 1 deg
-constexpr double kBehind_m[2] = {0.15, 3}, kSeenBehind = 0.1;  // as of outer walls
-constexpr double kBelowTop_m = 0.3;                            // a roof ends at the ceiling, or at the top
-
-/// Nothing of the scan is behind a plane that bounds the room.
-bool isBound(const ScanSamples& samples, const PlaneRegion& r) {
-  std::size_t count = 0;
-  for (const Eigen::Vector3f& p : samples.points) {
-    const double d = r.distance(p.cast<double>());
-    count += d < -kBehind_m[0] && d > -kBehind_m[1];
-  }
-  return static_cast<double>(count) < kSeenBehind * static_cast<double>(r.samples.size());
-}
+constexpr double kLeastSlant_m2 = 1;                    // slanted faces of furniture are smaller
+constexpr double kFlattest = 0.966, kSteepest = 0.174;  // |cosine| between normal and up: 15 and 80 deg
+constexpr double kSamePlane = 0.9998;                   // cosine of 1 deg
 
 double topOf(const ScanSamples& samples, const PlaneRegion& r) {
   double top = -1e9;
@@ -30,24 +20,32 @@ double topOf(const ScanSamples& samples, const PlaneRegion& r) {
 
 }  // namespace
 
+bool boundsRoom(const ScanSamples& samples, const PlaneRegion& r) {
+  std::size_t count = 0;
+  for (const Eigen::Vector3f& p : samples.points) {
+    const double d = r.distance(p.cast<double>());
+    count += d < -bounds::kBehind_m[0] && d > -bounds::kBehind_m[1];
+  }
+  return static_cast<double>(count) < bounds::kSeenBehind * static_cast<double>(r.samples.size());
+}
+
 std::vector<PlaneRegion> slantedBounds(const ScanSamples& samples, const std::vector<PlaneRegion>& regions,
                                        double height_m) {
   std::vector<PlaneRegion> found;
-  const double tolerance_m = planeTolerance(samples);
   for (PlaneRegion r : regions) {  // largest first
     if (std::abs(r.normal.z()) > kFlattest || std::abs(r.normal.z()) < kSteepest) continue;
     if (r.normal.z() > 0 && !samples.oriented) r.normal *= -1, r.offset_m *= -1;  // its lower side is seen
     const auto same = std::find_if(found.begin(), found.end(), [&](const PlaneRegion& f) {
-      return f.normal.dot(r.normal) > kSamePlane && std::abs(f.distance(r.middle)) < tolerance_m;
+      return f.normal.dot(r.normal) > kSamePlane && std::abs(f.distance(r.middle)) < planeTolerance(samples, r);
     });
     if (same != found.end()) {
       same->samples.insert(same->samples.end(), r.samples.begin(), r.samples.end());
       std::sort(same->samples.begin(), same->samples.end());
-      fitPlane(samples, tolerance_m, *same);
+      fitPlane(samples, 0, *same);
       continue;
     }
-    if (r.normal.z() > 0 || r.area_m2 < kLeastSlant_m2 || topOf(samples, r) < height_m - kBelowTop_m) continue;
-    if (isBound(samples, r)) found.push_back(std::move(r));
+    if (r.normal.z() > 0 || r.area_m2 < kLeastSlant_m2 || topOf(samples, r) < height_m - bounds::kBelowTop_m) continue;
+    if (boundsRoom(samples, r)) found.push_back(std::move(r));
   }
   return found;
 }

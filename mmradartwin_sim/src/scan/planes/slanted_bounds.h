@@ -12,6 +12,9 @@ struct PlaneAxes {
   Eigen::Vector3d origin, u, v;
 };
 
+/// Nothing of the scan is behind a plane that bounds the room. Its normal points into the room.
+bool boundsRoom(const ScanSamples& samples, const PlaneRegion& region);
+
 /// Slanted planes that bound the room from above: lower faces of a roof. Their normals point into the room.
 std::vector<PlaneRegion> slantedBounds(const ScanSamples& samples, const std::vector<PlaneRegion>& regions,
                                        double height_m);

@@ -11,17 +11,19 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <optional>
 
 #include "mmradartwin_dsp/input_error.h"
+#include "scan/samples/scan_bounds.h"
 
 namespace mmradartwin {
 namespace {
 
-constexpr double kFinest_m = 0.02;            // side of a voxel
 constexpr std::size_t kMostSamples = 450000;  // else the voxels grow: a large flat has 500 m2 of surface
-constexpr double kReach_voxels = 3.5;         // of a sample's neighbours, some forty on a plane
 constexpr double kWide_m = 0.8;               // the scale at which noise is measured: slower than a scanner's ripple
 constexpr std::size_t kWidePlaces = 3000;
+constexpr double kLeastSight = 0.17;     // cosine between a plane's normal and the ray of sight: 10 deg above the plane
+constexpr double kWidestReach_m = 0.15;  // of neighbours: corners of furniture are rounded by as much
 
 struct DensePoint {
   std::uint64_t voxel;
@@ -76,7 +78,7 @@ DenseCloud densePoints(const RawScan& scan, double unit_m) {
     const Eigen::Vector3f a = unit * scan.points[at(0)], b = unit * scan.points[at(1)] - a,
                           c = unit * scan.points[at(2)] - a;
     const Eigen::Vector3f n = 0.5F * b.cross(c);
-    const double share = n.norm() / (0.5 * kFinest_m * kFinest_m);
+    const double share = n.norm() / (0.5 * bounds::kFinest_m * bounds::kFinest_m);
     if (share > 1e7) continue;  // a triangle of thousands of square metres is no surface of a room
     const int count = std::max(1, static_cast<int>(share));
     for (int k = 0; k < count; ++k) {
@@ -138,10 +140,12 @@ LocalPlane planeThrough(const std::vector<Eigen::Vector3f>& points, const Indice
 
 class Thinning {
  public:
-  Thinning(const RawScan& scan, double unit_m, const Progress& progress) : progress_(progress) {
+  Thinning(const RawScan& scan, double unit_m, const Progress& progress)
+      : progress_(progress),
+        sight_from_m_(scan.camera_axes ? std::optional<Eigen::Vector3d>(-unit_m * scan.offset) : std::nullopt) {
     DenseCloud dense = densePoints(scan, unit_m);
     if (dense.points.size() < 1000) throw InputError(scan.file + ": has no surface to speak of");
-    samples_.spacing_m = kFinest_m;
+    samples_.spacing_m = bounds::kFinest_m;
     const std::vector<DensePoint> order = inVoxels(dense.points, samples_.spacing_m);
     samples_.oriented = !dense.normals.empty();
     samples_.dense.reserve(order.size());
@@ -172,6 +176,7 @@ class Thinning {
     for (const Eigen::Vector3f& p : samples_.points) cloud->push_back(pcl::PointXYZ(p.x(), p.y(), p.z()));
     tree_.setInputCloud(cloud);
     measureNoise();
+    if (sight_from_m_) measureErrors();
     findNormals();
     return std::move(samples_);
   }
@@ -197,19 +202,55 @@ class Thinning {
     });
     rms.erase(std::remove(rms.begin(), rms.end(), -1.0F), rms.end());
     std::sort(rms.begin(), rms.end());
-    samples_.noise_m = rms.empty() ? kFinest_m : static_cast<double>(rms[rms.size() / 10]);
+    samples_.noise_m = rms.empty() ? bounds::kFinest_m : static_cast<double>(rms[rms.size() / 10]);
+  }
+
+  /// A depth camera triangulates: its depth z errs by b z^2 (Khoshelham and Elberink, Accuracy and Resolution of Kinect
+  /// Depth Data, 2012), the point by b z p. b is found from the planes of the same places, of which the normal sees a
+  /// part.
+  void measureErrors() {
+    const std::size_t places = std::min(kWidePlaces, samples_.size());
+    std::vector<double> factors(places, -1);
+    tbb::parallel_for(std::size_t{0}, places, [&](std::size_t k) {
+      const std::size_t i = k * samples_.size() / places;
+      const std::vector<int> around = within(i, kWide_m / 2);
+      if (around.size() < 30) return;
+      const LocalPlane plane = planeThrough(samples_.points, around);
+      Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+      for (int n : around) middle += samples_.at(n) / static_cast<double>(around.size());
+      const Eigen::Vector3d p = middle - *sight_from_m_;
+      // Planes that are seen at a grazing angle say nothing of the depth's error.
+      const double seen = std::abs(plane.normal.cast<double>().dot(p));
+      if (seen > kLeastSight * p.norm()) factors[k] = static_cast<double>(plane.rms_m) / (p.z() * seen);
+    });
+    factors.erase(std::remove(factors.begin(), factors.end(), -1.0), factors.end());
+    if (factors.empty()) return;
+    std::sort(factors.begin(), factors.end());
+    const double b = factors[factors.size() / 10];
+    for (const Eigen::Vector3f& sample : samples_.points) {
+      const Eigen::Vector3d p = sample.cast<double>() - *sight_from_m_;
+      samples_.error_m.push_back((b * p.z() * p).cast<float>());
+    }
+    std::vector<float> sizes;
+    for (const Eigen::Vector3f& e : samples_.error_m) sizes.push_back(e.norm());
+    std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2), sizes.end());
+    samples_.noise_m = static_cast<double>(sizes[sizes.size() / 2]);  // that is said of the scan
   }
 
   void findNormals() {
     const std::size_t count = samples_.size();
     // Noise turns a normal by about noise / (reach / 2 * sqrt(neighbours)); noisy scans need a wider reach.
-    const double reach_m = std::max(kReach_voxels * samples_.spacing_m, std::min(5 * samples_.noise_m, 0.15));
+    const auto reach_m = [this](std::size_t i) {
+      const double noise_m =
+          samples_.error_m.empty() ? samples_.noise_m : static_cast<double>(samples_.error_m[i].norm());
+      return std::max(bounds::kReachOfNormals_voxels * samples_.spacing_m, std::min(5 * noise_m, kWidestReach_m));
+    };
     std::vector<std::vector<int>> around(count);
     samples_.normals.assign(count, Eigen::Vector3f::Zero());
     samples_.flatness_m.assign(count, 0);
     std::atomic<std::size_t> done{0};
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-      around[i] = within(i, reach_m);
+      around[i] = within(i, reach_m(i));
       if (samples_.oriented) {
         // The other side of a thin plate is another plane.
         const auto other = [&](int k) { return area_[static_cast<std::size_t>(k)].dot(area_[i]) < 0; };
@@ -235,6 +276,7 @@ class Thinning {
   }
 
   const Progress& progress_;
+  const std::optional<Eigen::Vector3d> sight_from_m_;  // of one frame of a camera, axes of the file
   ScanSamples samples_;
   std::vector<Eigen::Vector3f> area_;  // normal times area of a sample's triangles
   pcl::KdTreeFLANN<pcl::PointXYZ> tree_;

@@ -1,6 +1,6 @@
-#include <cmath>
+#include "scan/things/thing_class.h"
 
-#include "scan/things/things.h"
+#include <cmath>
 
 namespace mmradartwin {
 namespace {

@@ -17,6 +17,8 @@
 #include <map>
 #include <set>
 
+#include "scan/samples/scan_bounds.h"
+
 namespace mmradartwin {
 namespace {
 
@@ -170,7 +172,7 @@ bool addMesh(const RawScan& scan, const ScanSamples& samples, const ScanFrame& f
   std::set<std::array<int, 3>> seen;
   const int base = static_cast<int>(thing.vertices.size());
   for (Eigen::Vector3d& v : surface.vertices) {
-    v.z() = std::max(v.z(), 0.01);  // what stands on the floor ends short of it
+    v.z() = std::max(v.z(), bounds::kGap_m);  // what stands on the floor ends short of it
     thing.vertices.push_back(v);
     thing.bounds.extend(v);
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "scan/samples/cell_raster.h"
+#include "scan/samples/scan_bounds.h"
 
 namespace mmradartwin {
 namespace {
@@ -12,10 +13,6 @@ namespace {
 // Corners by bits of x, y and z; counter-clockwise as seen from outside.
 constexpr int kBoxFaces[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
 constexpr int kSides = 24;  // of a tessellated cylinder: sagitta below a hundredth of the radius
-
-Eigen::Vector3d placeOf(const ScanSamples& samples, int i) {
-  return samples.points[static_cast<std::size_t>(i)].cast<double>();
-}
 
 /// Share within the tolerance, rms and largest of what lies within it.
 template <typename Distance>
@@ -25,7 +22,7 @@ void measureShape(const ScanSamples& samples, const std::vector<int>& indices, d
   double squares = 0;
   largest_m = 0;
   for (int i : indices) {
-    const double d = std::abs(distance(placeOf(samples, i)));
+    const double d = std::abs(distance(samples.at(i)));
     if (d > tolerance_m) continue;
     ++near;
     squares += d * d;
@@ -52,7 +49,7 @@ UprightBox boxAlong(const ScanSamples& samples, const std::vector<int>& indices,
   fit.yaw_rad = yaw_rad;
   std::vector<Eigen::Vector3d> points, normals;
   for (int i : indices) {
-    points.push_back(fit.toBox(placeOf(samples, i)));
+    points.push_back(fit.toBox(samples.at(i)));
     normals.push_back(fit.toBox(samples.normals[static_cast<std::size_t>(i)].cast<double>()));
   }
   const auto faces = static_cast<std::size_t>(0.01 / samples.area_m2());  // samples that make a face
@@ -104,12 +101,11 @@ UprightBox fitBox(const ScanSamples& samples, const std::vector<int>& indices, c
 
 BoxEvidence evidenceOf(const ScanSamples& samples, const std::vector<int>& indices, const UprightBox& box,
                        double tolerance_m) {
-  constexpr double kSide_m = 0.05;
   BoxEvidence evidence;
-  std::vector<CellRaster> faces(5, CellRaster(kSide_m));  // -x, x, -y, y, top
+  std::vector<CellRaster> faces(5, CellRaster(bounds::kCell_m));  // -x, x, -y, y, top
   std::size_t on = 0, inward = 0;
   for (int i : indices) {
-    const Eigen::Vector3d p = box.toBox(placeOf(samples, i));
+    const Eigen::Vector3d p = box.toBox(samples.at(i));
     const Eigen::Vector3d n = box.toBox(samples.normals[static_cast<std::size_t>(i)].cast<double>());
     for (int f = 0; f < 5; ++f) {
       const int axis = f / 2;
@@ -133,7 +129,7 @@ BoxEvidence evidenceOf(const ScanSamples& samples, const std::vector<int>& indic
 
 Plate plateOf(const ScanSamples& samples, const std::vector<int>& indices, const Eigen::Vector3d& normal,
               double offset_m, double thickness_m) {
-  const bool level = std::abs(normal.z()) > 0.95;
+  const bool level = std::abs(normal.z()) > bounds::kLevelPlane;
   // A level plate along its own sides, by the smallest rectangle; others along the level.
   Eigen::Vector3d u =
       level ? Eigen::Vector3d::UnitX() : Eigen::Vector3d(Eigen::Vector3d::UnitZ().cross(normal).normalized());
@@ -144,7 +140,7 @@ Plate plateOf(const ScanSamples& samples, const std::vector<int>& indices, const
     const Eigen::Vector3d a = Eigen::AngleAxisd(turn * M_PI / 36, normal) * u, b = normal.cross(a);
     std::vector<double> along, across;
     for (int i : indices) {
-      const Eigen::Vector3d p = placeOf(samples, i);
+      const Eigen::Vector3d p = samples.at(i);
       along.push_back(a.dot(p)), across.push_back(b.dot(p));
     }
     const double a0 = quantile(along, 0.01), a1 = quantile(along, 0.99), b0 = quantile(across, 0.01),
@@ -175,9 +171,9 @@ UprightCylinder fitCylinder(const ScanSamples& samples, const std::vector<int>& 
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   std::vector<double> heights;
   if (indices.empty()) return fit;
-  const Eigen::Vector3d about = placeOf(samples, indices[0]);
+  const Eigen::Vector3d about = samples.at(indices[0]);
   for (int i : indices) {
-    const Eigen::Vector3d p = placeOf(samples, i) - about;
+    const Eigen::Vector3d p = samples.at(i) - about;
     heights.push_back(p.z() + about.z());
     if (std::abs(samples.normals[static_cast<std::size_t>(i)].z()) > 0.5F) continue;
     const Eigen::Vector3d row(p.x(), p.y(), 1);
@@ -204,9 +200,9 @@ FittedSphere fitSphere(const ScanSamples& samples, const std::vector<int>& indic
   if (indices.size() < 30) return fit;
   Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
   Eigen::Vector4d b = Eigen::Vector4d::Zero();
-  const Eigen::Vector3d about = placeOf(samples, indices[0]);
+  const Eigen::Vector3d about = samples.at(indices[0]);
   for (int i : indices) {
-    const Eigen::Vector3d p = placeOf(samples, i) - about;
+    const Eigen::Vector3d p = samples.at(i) - about;
     const Eigen::Vector4d row(p.x(), p.y(), p.z(), 1);
     A += row * row.transpose();
     b += row * p.squaredNorm();

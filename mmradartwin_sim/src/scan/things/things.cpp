@@ -6,295 +6,48 @@
 #include <numeric>
 
 #include "scan/samples/cell_raster.h"
+#include "scan/samples/scan_bounds.h"
+#include "scan/things/loose_surface.h"
+#include "scan/things/thing_class.h"
 #include "scan/things/thing_mesh.h"
+#include "scan/things/thing_parts.h"
 #include "scan/things/thing_shapes.h"
 
 namespace mmradartwin {
 namespace {
-
-constexpr double kTouching_voxels = 2.6, kTouching_m = 0.052;  // neighbours on one surface, whatever the thinning
-constexpr double kLeastThing_m2 = 0.06;                        // of surface: two hands
-// A thing of no sure class has to be larger than a chair's back: what is smaller nobody could name, or give a material.
-constexpr double kLeastUnsure_m2 = 0.25, kSure = 0.5;
-constexpr double kPlate_m2 = 0.5;     // of an upright plate that is a part by itself: half of a door's leaf and more
-constexpr double kThickest_m = 0.25;  // of a plate that has two faces: an inner wall
-constexpr double kUpright = 0.1;      // cosine between an upright plate's normal and up
-constexpr double kGap_m = 0.01;       // bodies end so far from what they stand on, so that no faces coincide
-constexpr double kThinnest_m = 0.01;
-constexpr double kTop_m[2] = {0.25, 1.25};  // heights of table tops
-constexpr double kLowTable_m = 0.58;        // lower tops may be seats
-constexpr double kSlab_m = 0.05;            // thickness of a top, at most
-
-/// A level plate over free space.
-struct TableTop {
-  double height_m;
-  CellRaster footprint{kSlab_m};
-  std::vector<int> samples;
-  UprightBox rim;  ///< its rectangle
-};
-
-struct Part {
-  std::vector<int> samples;
-  int top = -1;  ///< a table: index of its top
-  int stands_on = -1;
-};
 
 /// Of a cluster of no known class: may be cut at its upright plates, is such a plate, or is what that left.
 enum class Cut { kMayBe, kPlate, kRest };
 
 class ThingFinder {
  public:
-  ThingFinder(const RawScan& scan, const ScanFrame& frame, const ScanOptions& options, const ScanSamples& samples,
-              const std::vector<PlaneRegion>& regions, const RoomPlanes& room)
+  ThingFinder(const RawScan& scan, const ScanFrame& frame, const ScanOptions& options, const LooseSurface& surface)
       : scan_(scan),
         frame_(frame),
         options_(options),
-        samples_(samples),
-        regions_(regions),
-        room_(room),
-        tolerance_m_(planeTolerance(samples)) {}
+        surface_(surface),
+        samples_(surface.samples),
+        regions_(surface.regions),
+        room_(surface.room) {}
 
   Things run() {
-    region_of_.assign(samples_.size(), -1);
-    for (std::size_t r = 0; r < regions_.size(); ++r) {
-      for (int i : regions_[r].samples) region_of_[static_cast<std::size_t>(i)] = static_cast<int>(r);
-    }
-    findFree();
     for (std::size_t i = 0; i < samples_.size(); ++i) {
       const int owner = room_.owner[i];
       if (owner < 0 || room_.planes[static_cast<std::size_t>(owner)].kind != PlaneKind::kFloor) continue;
       floor_.set(samples_.points[i].head<2>().cast<double>());
     }
-    findTops();
-    for (const Part& part : parts()) addThing(part, Cut::kMayBe);
+    ThingParts found = thingParts(surface_);
+    result_.crumbs = found.crumbs;
+    tops_ = std::move(found.tops);
+    for (const ThingPart& part : found.parts) addThing(part, Cut::kMayBe);
     nameThings();
     return std::move(result_);
   }
 
  private:
-  Eigen::Vector3d at(int i) const { return samples_.points[static_cast<std::size_t>(i)].cast<double>(); }
-
-  /// What neither lies on a plane, nor next to one where corners are rounded and noise is worst, nor outside.
-  void findFree() {
-    free_.assign(samples_.size(), 0);
-    std::vector<std::vector<Eigen::Vector2d>> floors;
-    const ScanPlane* floor = nullptr;
-    for (const ScanPlane& p : room_.planes) {
-      if (p.kind == PlaneKind::kFloor) floors.push_back(p.outline), floor = &p;
-    }
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      if (room_.owner[i] != -1) continue;
-      const Eigen::Vector3d p = at(static_cast<int>(i));
-      bool inside = p.z() > -tolerance_m_ && p.z() < room_.height_m + tolerance_m_;
-      if (inside && floor) {
-        const Eigen::Vector2d q(floor->u.dot(p), floor->v.dot(p));
-        inside = std::any_of(floors.begin(), floors.end(), [&q](const auto& loop) { return holds(loop, q); });
-      }
-      if (inside) free_[i] = !nearPlane(p) || isOnLargePlate(static_cast<int>(i));
-    }
-  }
-
-  static bool holds(const std::vector<Eigen::Vector2d>& loop, const Eigen::Vector2d& p) {
-    bool inside = false;
-    for (std::size_t i = 0, k = loop.size() - 1; i < loop.size(); k = i++) {
-      const Eigen::Vector2d &a = loop[i], &b = loop[k];
-      if ((a.y() > p.y()) != (b.y() > p.y()) && p.x() < (b.x() - a.x()) * (p.y() - a.y()) / (b.y() - a.y()) + a.x())
-        inside = !inside;
-    }
-    return inside;
-  }
-
-  bool nearPlane(const Eigen::Vector3d& p) const {
-    const double reach_m = std::max(1.5 * tolerance_m_, 0.02);
-    int corner = 0;  // planes within the reach of rounding
-    for (const ScanPlane& plane : room_.planes) {
-      const double d = std::abs(plane.normal.dot(p) - plane.offset_m);
-      if (d > 3 * reach_m) continue;
-      Eigen::AlignedBox2d box;
-      for (const Eigen::Vector2d& q : plane.outline) box.extend(q);
-      const Eigen::Vector2d q(plane.u.dot(p), plane.v.dot(p));
-      if (box.exteriorDistance(q) > reach_m) continue;
-      if (d < reach_m) return true;
-      ++corner;
-    }
-    return corner > 1;
-  }
-
-  /// A carpet or a board is a flat part of its own, however near it lies to the plane behind it.
-  bool isOnLargePlate(int i) const {
-    const int r = region_of_[static_cast<std::size_t>(i)];
-    return r >= 0 && regions_[static_cast<std::size_t>(r)].area_m2 > 0.3;
-  }
-
-  /// Level flat parts at a table's height under which there is more room than surface.
-  void findTops() {
-    top_of_.assign(samples_.size(), -1);
-    for (const PlaneRegion& r : regions_) {
-      if (std::abs(r.normal.z()) < 0.9999 || r.area_m2 < 0.15 || r.middle.z() < kTop_m[0] || r.middle.z() > kTop_m[1])
-        continue;
-      if (samples_.oriented && r.normal.z() < 0) continue;
-      std::size_t free = 0;
-      for (int i : r.samples) free += free_[static_cast<std::size_t>(i)] != 0;
-      if (2 * free < r.samples.size() || isSeat(r) || !hollowBelow(r)) continue;
-      TableTop top{r.middle.z(),
-                   CellRaster(kSlab_m),
-                   {},
-                   fitBox(samples_, r.samples, {room_.yaw_rad, yawIn(r.samples)}, tolerance_m_)};
-      for (int i : r.samples) {
-        const Eigen::Vector2d p = at(i).head<2>();
-        for (int dx = -1; dx <= 1; ++dx) {
-          for (int dy = -1; dy <= 1; ++dy) top.footprint.set(p + kSlab_m * Eigen::Vector2d(dx, dy));
-        }
-      }
-      const int id = static_cast<int>(tops_.size());
-      for (std::size_t i = 0; i < samples_.size(); ++i) {
-        const Eigen::Vector3d p = at(static_cast<int>(i));
-        if (!free_[i] || top_of_[i] >= 0 || p.z() > top.height_m + std::max(tolerance_m_, 0.02) ||
-            p.z() < top.height_m - 0.06)
-          continue;
-        if (!covers(top, p) && !isWithinRim(top, p)) continue;
-        top_of_[i] = id;
-        top.samples.push_back(static_cast<int>(i));
-      }
-      if (static_cast<double>(top.samples.size()) * samples_.area_m2() > 0.1) {
-        tops_.push_back(std::move(top));
-      } else {
-        for (int i : top.samples) top_of_[static_cast<std::size_t>(i)] = -1;
-      }
-    }
-  }
-
-  /// A low top with a back over its rim, or no larger than a seat.
-  bool isSeat(const PlaneRegion& r) const {
-    if (r.middle.z() > kLowTable_m) return false;
-    if (r.area_m2 < 0.3) return true;
-    CellRaster footprint(kSlab_m);
-    for (int i : r.samples) {
-      for (int dx = -2; dx <= 2; ++dx) {
-        for (int dy = -2; dy <= 2; ++dy) footprint.set(at(i).head<2>() + kSlab_m * Eigen::Vector2d(dx, dy));
-      }
-    }
-    std::size_t above = 0;
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      const Eigen::Vector3f& p = samples_.points[i];
-      if (!free_[i] || static_cast<double>(p.z()) < r.middle.z() + 0.1 || p.z() > 1.4F) continue;
-      above += footprint.has(footprint.index(static_cast<double>(p.x())), footprint.index(static_cast<double>(p.y())));
-    }
-    return above > r.samples.size() / 10;
-  }
-
-  static bool covers(const TableTop& top, const Eigen::Vector3d& p) {
-    return top.footprint.has(top.footprint.index(p.x()), top.footprint.index(p.y()));
-  }
-
-  /// Things on a table hide parts of its top.
-  static bool isWithinRim(const TableTop& top, const Eigen::Vector3d& p) {
-    const Eigen::Vector3d q = top.rim.toBox(p);
-    const Eigen::Vector2d outside = (top.rim.box.min() - q).cwiseMax(q - top.rim.box.max()).head<2>();
-    return outside.maxCoeff() < 0.03;
-  }
-
-  /// A table's rim has little surface below it; a cabinet's has its sides, of which a scan sees two at least.
-  bool hollowBelow(const PlaneRegion& top) const {
-    const UprightBox rim = fitBox(samples_, top.samples, {room_.yaw_rad, yawIn(top.samples)}, tolerance_m_);
-    const double high = top.middle.z() - 0.1, low = std::min(0.1, 0.3 * high);
-    CellRaster sides(kSlab_m);
-    const Eigen::Vector3d sizes = rim.box.sizes();
-    if (std::min(sizes.x(), sizes.y()) < 0.3) return false;  // a back's upper side, a sill
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      if (!free_[i]) continue;
-      const Eigen::Vector3d p = rim.toBox(at(static_cast<int>(i)));
-      if (p.z() < low || p.z() > high) continue;
-      const Eigen::Vector2d to_low = (p - rim.box.min()).head<2>(), to_high = (rim.box.max() - p).head<2>();
-      const double inside = std::min(to_low.minCoeff(), to_high.minCoeff());
-      if (inside < -0.06 || inside > 0.06) continue;
-      // The rim unrolled.
-      const bool along_x =
-          std::min(std::abs(to_low.y()), std::abs(to_high.y())) < std::min(std::abs(to_low.x()), std::abs(to_high.x()));
-      const double upper = along_x ? (to_high.y() < to_low.y() ? 100 : 0) : (to_high.x() < to_low.x() ? 300 : 200);
-      sides.set({upper + (along_x ? p.x() - rim.box.min().x() : p.y() - rim.box.min().y()), p.z()});
-    }
-    const double around = 2 * (sizes.x() + sizes.y()) * (high - low);
-    return sides.area_m2() < 0.33 * around;
-  }
-
-  /// Connected parts, with tables cut off.
-  std::vector<Part> parts() {
-    std::vector<Part> tables(tops_.size()), others;
-    for (std::size_t t = 0; t < tops_.size(); ++t)
-      tables[t].samples = tops_[t].samples, tables[t].top = static_cast<int>(t);
-    const auto touching_m = static_cast<float>(std::min(kTouching_voxels * samples_.spacing_m, kTouching_m));
-    std::vector<char> seen(samples_.size(), 0);
-    for (std::size_t s = 0; s < samples_.size(); ++s) {
-      if (!free_[s] || seen[s] || top_of_[s] >= 0) continue;
-      std::vector<int> queue = {static_cast<int>(s)};
-      seen[s] = 1;
-      for (std::size_t q = 0; q < queue.size(); ++q) {
-        const auto i = static_cast<std::size_t>(queue[q]);
-        for (std::size_t k = samples_.first[i]; k < samples_.first[i + 1]; ++k) {
-          const auto j = static_cast<std::size_t>(samples_.neighbour[k]);
-          if (seen[j] || !free_[j] || top_of_[j] >= 0) continue;
-          if ((samples_.points[i] - samples_.points[j]).squaredNorm() > touching_m * touching_m) continue;
-          seen[j] = 1;
-          queue.push_back(static_cast<int>(j));
-        }
-      }
-      std::sort(queue.begin(), queue.end());
-      Part part{std::move(queue), -1, -1};
-      place(part, tables, others);
-    }
-    tables.insert(tables.end(), others.begin(), others.end());
-    return tables;
-  }
-
-  /// Below a table: a part of it. Above: on it.
-  void place(Part& part, std::vector<Part>& tables, std::vector<Part>& others) {
-    Eigen::AlignedBox3d box;
-    for (int i : part.samples) box.extend(at(i));
-    for (std::size_t t = 0; t < tops_.size(); ++t) {
-      std::size_t covered = 0;
-      for (int i : part.samples) covered += covers(tops_[t], at(i));
-      if (2 * covered < part.samples.size()) continue;
-      if (box.max().z() < tops_[t].height_m + tolerance_m_) {
-        tables[t].samples.insert(tables[t].samples.end(), part.samples.begin(), part.samples.end());
-        return;
-      }
-      if (box.min().z() > tops_[t].height_m - kSlab_m && box.min().z() < tops_[t].height_m + 0.12)
-        part.stands_on = static_cast<int>(t);
-    }
-    if (static_cast<double>(part.samples.size()) * samples_.area_m2() < kLeastThing_m2) {
-      result_.crumbs += part.samples.size();
-      return;
-    }
-    others.push_back(std::move(part));
-  }
-
-  /// Direction of the largest upright flat part, which is regularised already; else of the normals.
-  double yawIn(const std::vector<int>& indices) const {
-    std::map<int, std::size_t> counts;
-    double sum_sin = 0, sum_cos = 0;
-    for (int i : indices) {
-      const int r = region_of_[static_cast<std::size_t>(i)];
-      const Eigen::Vector3f& n = samples_.normals[static_cast<std::size_t>(i)];
-      if (std::abs(n.z()) > 0.3F) continue;
-      const double angle = 4 * std::atan2(static_cast<double>(n.y()), static_cast<double>(n.x()));
-      sum_sin += std::sin(angle), sum_cos += std::cos(angle);
-      if (r >= 0 && std::abs(regions_[static_cast<std::size_t>(r)].normal.z()) < 0.1) ++counts[r];
-    }
-    int largest = -1;
-    for (const auto& [r, count] : counts) {
-      if (count > 40 && (largest < 0 || count > counts[largest])) largest = r;
-    }
-    if (largest >= 0) {
-      const Eigen::Vector3d& n = regions_[static_cast<std::size_t>(largest)].normal;
-      return std::atan2(n.y(), n.x());
-    }
-    return std::hypot(sum_sin, sum_cos) > 0 ? 0.25 * std::atan2(sum_sin, sum_cos) : room_.yaw_rad;
-  }
-
   /// A turned box is the room's where no flat part says by how much it is turned.
   std::vector<double> yawsFor(const std::vector<int>& indices) const {
-    const double own = yawIn(indices);
+    const double own = surface_.yawIn(indices);
     const double off = own - room_.yaw_rad - M_PI / 2 * std::round((own - room_.yaw_rad) / (M_PI / 2));
     if (std::abs(off) < 1e-6) return {room_.yaw_rad};
     return {room_.yaw_rad, own};
@@ -325,15 +78,15 @@ class ThingFinder {
   /// Ends a box short of floor, ceiling and the walls that it touches, and gives it a thickness.
   void clear(UprightBox& box, bool on_wall) const {
     Eigen::Vector3d &low = box.box.min(), &high = box.box.max();
-    if (low.z() < 0.06) low.z() = kGap_m;
-    if (high.z() > room_.height_m - 0.06) high.z() = room_.height_m - kGap_m;
+    if (low.z() < 0.06) low.z() = bounds::kGap_m;
+    if (high.z() > room_.height_m - 0.06) high.z() = room_.height_m - bounds::kGap_m;
     for (const ScanPlane& plane : room_.planes) {
       if (plane.kind != PlaneKind::kWall) continue;
       const Eigen::Vector3d n = box.toBox(plane.normal);
       for (int axis = 0; axis < 2; ++axis) {
         if (std::abs(n[axis]) < 0.9999) continue;
         // The wall as a limit of this axis; only where the box reaches it.
-        const double wall = plane.offset_m / n[axis] + kGap_m * n[axis];
+        const double wall = plane.offset_m / n[axis] + bounds::kGap_m * n[axis];
         double& end = n[axis] > 0 ? low[axis] : high[axis];
         const double other = n[axis] > 0 ? high[axis] : low[axis];
         const double behind = n[axis] > 0 ? wall - end : end - wall;
@@ -343,9 +96,9 @@ class ThingFinder {
       }
     }
     for (int axis = 0; axis < 3; ++axis) {
-      if (high[axis] - low[axis] < kThinnest_m) {
+      if (high[axis] - low[axis] < bounds::kThinnest_m) {
         const double middle = 0.5 * (high[axis] + low[axis]);
-        low[axis] = middle - kThinnest_m / 2, high[axis] = middle + kThinnest_m / 2;
+        low[axis] = middle - bounds::kThinnest_m / 2, high[axis] = middle + bounds::kThinnest_m / 2;
       }
     }
   }
@@ -353,8 +106,8 @@ class ThingFinder {
   double seatBelow(const std::vector<int>& indices, double top_m) const {
     std::map<int, std::size_t> counts;
     for (int i : indices) {
-      const int r = region_of_[static_cast<std::size_t>(i)];
-      if (r >= 0 && std::abs(regions_[static_cast<std::size_t>(r)].normal.z()) > 0.95) ++counts[r];
+      const int r = surface_.region_of[static_cast<std::size_t>(i)];
+      if (r >= 0 && std::abs(regions_[static_cast<std::size_t>(r)].normal.z()) > bounds::kLevelPlane) ++counts[r];
     }
     double height = 0;
     std::size_t most = static_cast<std::size_t>(0.05 / samples_.area_m2());
@@ -365,10 +118,10 @@ class ThingFinder {
     return height;
   }
 
-  void addThing(const Part& part, Cut cut) {
+  void addThing(const ThingPart& part, Cut cut) {
     ScanThing thing;
     thing.samples = part.samples.size();
-    const double tolerance = std::max(tolerance_m_, 0.015);
+    const double tolerance = std::max(surface_.toleranceOf(part.samples), bounds::kLeastFit_m);
     UprightBox box = fitBox(samples_, part.samples, yawsFor(part.samples), tolerance);
     const UprightCylinder cylinder = fitCylinder(samples_, part.samples, tolerance);
     const FittedSphere sphere = fitSphere(samples_, part.samples, tolerance);
@@ -392,7 +145,8 @@ class ThingFinder {
     ClassGuess guess = classOf(signs);
     if (cut == Cut::kPlate && guess.klass == "unknown") guess = {"partition", 0.6, "an upright plate that stands free"};
     if (guess.klass == "unknown" && !signs.is_box && cut == Cut::kMayBe && cutAtPlates(part)) return;
-    if (guess.confidence < kSure && static_cast<double>(part.samples.size()) * samples_.area_m2() < kLeastUnsure_m2) {
+    if (guess.confidence < bounds::kSure &&
+        static_cast<double>(part.samples.size()) * samples_.area_m2() < bounds::kLeastUnsure_m2) {
       result_.scraps += part.samples.size();
       return;
     }
@@ -411,7 +165,7 @@ class ThingFinder {
       thing.shape = ThingShape::kCylinder;
       thing.rms_m = cylinder.rms_m, thing.largest_m = cylinder.largest_m;
       UprightCylinder standing = cylinder;
-      if (standing.low_m < 0.06) standing.low_m = kGap_m;
+      if (standing.low_m < 0.06) standing.low_m = bounds::kGap_m;
       addCylinder(standing, thing);
     } else if (signs.is_box || boxes || sizes.minCoeff() < 0.06 ||
                !addPlatesOrMesh(part.samples, cut == Cut::kPlate ? 0.3 : 0.6, thing)) {
@@ -426,27 +180,30 @@ class ThingFinder {
 
   /// Partitions and parts of walls tie what leans on them to one cluster, as tables tie what stands on them. Each such
   /// plate with its back becomes a part of its own, and so does what then hangs together. False where there is none.
-  bool cutAtPlates(const Part& part) {
+  bool cutAtPlates(const ThingPart& part) {
     std::map<int, std::vector<int>> flat;
     for (int i : part.samples) {
-      const int r = region_of_[static_cast<std::size_t>(i)];
-      if (r >= 0 && std::abs(regions_[static_cast<std::size_t>(r)].normal.z()) < kUpright) flat[r].push_back(i);
+      const int r = surface_.region_of[static_cast<std::size_t>(i)];
+      if (r >= 0 && std::abs(regions_[static_cast<std::size_t>(r)].normal.z()) < bounds::kUprightPlane)
+        flat[r].push_back(i);
     }
-    std::vector<Part> plates;
+    std::vector<ThingPart> plates;
     std::map<int, char> taken;
     for (const auto& [r, own] : flat) {  // regions come largest first
-      if (static_cast<double>(own.size()) * samples_.area_m2() < kPlate_m2 || taken.count(own.front())) continue;
+      if (static_cast<double>(own.size()) * samples_.area_m2() < bounds::kLeastPlate_m2 || taken.count(own.front()))
+        continue;
       const PlaneRegion& front = regions_[static_cast<std::size_t>(r)];
-      const Plate plate = plateOf(samples_, own, front.normal, front.offset_m, kThinnest_m);
-      Part cut{{}, -1, -1};
+      const Plate plate = plateOf(samples_, own, front.normal, front.offset_m, bounds::kThinnest_m);
+      ThingPart cut{{}, -1, -1};
       for (int i : part.samples) {
         if (taken.count(i)) continue;
-        const Eigen::Vector3d from = at(i) - plate.corner;
+        const Eigen::Vector3d from = samples_.at(i) - plate.corner;
         const double a = from.dot(plate.e1) / plate.e1.squaredNorm(), b = from.dot(plate.e2) / plate.e2.squaredNorm();
-        const double d = front.distance(at(i));
+        const double d = front.distance(samples_.at(i));
         const bool within = a > -0.05 && a < 1.05 && b > -0.05 && b < 1.05;
         // Its back, which faces the other way, and its edges are of it, too.
-        if (region_of_[static_cast<std::size_t>(i)] == r || (within && d < tolerance_m_ && d > -kThickest_m))
+        if (surface_.region_of[static_cast<std::size_t>(i)] == r ||
+            (within && d < planeTolerance(samples_, front) && d > -bounds::kThickestPlate_m))
           cut.samples.push_back(i);
       }
       for (int i : cut.samples) taken[i] = 1;
@@ -457,10 +214,9 @@ class ThingFinder {
     for (int i : part.samples) {
       if (!taken.count(i)) rest.push_back(i);
     }
-    for (const Part& plate : plates) addThing(plate, Cut::kPlate);
-    for (std::vector<int>& own : connected(rest)) {
-      std::sort(own.begin(), own.end());
-      if (static_cast<double>(own.size()) * samples_.area_m2() < kLeastThing_m2) {
+    for (const ThingPart& plate : plates) addThing(plate, Cut::kPlate);
+    for (std::vector<int>& own : surface_.connected(rest)) {
+      if (static_cast<double>(own.size()) * samples_.area_m2() < bounds::kLeastThing_m2) {
         result_.crumbs += own.size();
       } else {
         addThing({std::move(own), -1, part.stands_on}, Cut::kRest);
@@ -485,7 +241,8 @@ class ThingFinder {
 
   double uprightShare(const std::vector<int>& indices) const {
     std::size_t upright = 0;
-    for (int i : indices) upright += std::abs(samples_.normals[static_cast<std::size_t>(i)].z()) < 0.3F;
+    for (int i : indices)
+      upright += std::abs(samples_.normals[static_cast<std::size_t>(i)].z()) < bounds::kUprightNormal;
     return static_cast<double>(upright) / static_cast<double>(indices.size());
   }
 
@@ -494,12 +251,12 @@ class ThingFinder {
   bool addPlatesOrMesh(const std::vector<int>& indices, double least_share, ScanThing& thing) const {
     std::map<int, std::vector<int>> flat;
     for (int i : indices) {
-      const int r = region_of_[static_cast<std::size_t>(i)];
+      const int r = surface_.region_of[static_cast<std::size_t>(i)];
       if (r >= 0) flat[r].push_back(i);
     }
     std::size_t on_plates = 0;
     for (auto r = flat.begin(); r != flat.end();) {
-      const bool large = static_cast<double>(r->second.size()) * samples_.area_m2() > 0.04;
+      const bool large = static_cast<double>(r->second.size()) * samples_.area_m2() > bounds::kLeastPlane_m2;
       if (large) on_plates += r->second.size();
       r = large ? std::next(r) : flat.erase(r);
     }
@@ -511,15 +268,15 @@ class ThingFinder {
       const PlaneRegion& region = regions_[static_cast<std::size_t>(r)];
       squares += region.rms_m * region.rms_m * static_cast<double>(own.size());
       if (isBackOfOther(r, flat)) continue;
-      Plate plate = plateOf(samples_, own, region.normal, region.offset_m, kThinnest_m);
+      Plate plate = plateOf(samples_, own, region.normal, region.offset_m, bounds::kThinnest_m);
       // Plates that meet at an edge end short of each other.
       const Eigen::Vector3d d1 = plate.e1.normalized(), d2 = plate.e2.normalized();
-      plate.corner += kGap_m * (d1 + d2);
-      plate.e1 -= 2 * kGap_m * d1, plate.e2 -= 2 * kGap_m * d2;
+      plate.corner += bounds::kGap_m * (d1 + d2);
+      plate.e1 -= 2 * bounds::kGap_m * d1, plate.e2 -= 2 * bounds::kGap_m * d2;
       if (plate.e1.dot(d1) > 0.03 && plate.e2.dot(d2) > 0.03) addPlate(plate, thing);
     }
     thing.rms_m = std::sqrt(squares / static_cast<double>(on_plates));
-    thing.largest_m = tolerance_m_;
+    thing.largest_m = surface_.toleranceOf(indices);
     return !thing.triangles.empty();
   }
 
@@ -530,7 +287,7 @@ class ThingFinder {
       if (other.first >= r) return false;  // regions come largest first
       const PlaneRegion& front = regions_[static_cast<std::size_t>(other.first)];
       if (front.normal.dot(back.normal) > -0.98 || std::abs(front.distance(back.middle)) > 0.08) return false;
-      const Plate plate = plateOf(samples_, other.second, front.normal, front.offset_m, kThinnest_m);
+      const Plate plate = plateOf(samples_, other.second, front.normal, front.offset_m, bounds::kThinnest_m);
       const Eigen::Vector3d from = back.middle - plate.corner;
       const double a = from.dot(plate.e1) / plate.e1.squaredNorm(), b = from.dot(plate.e2) / plate.e2.squaredNorm();
       return a > 0 && a < 1 && b > 0 && b < 1;
@@ -538,9 +295,10 @@ class ThingFinder {
   }
 
   /// A top as a slab, and each thing below it as a box of its own.
-  void addTable(const Part& part, ScanThing& thing) const {
+  void addTable(const ThingPart& part, ScanThing& thing) const {
     const TableTop& top = tops_[static_cast<std::size_t>(part.top)];
-    UprightBox slab = fitBox(samples_, top.samples, yawsFor(part.samples), std::max(tolerance_m_, 0.015));
+    UprightBox slab = fitBox(samples_, top.samples, yawsFor(part.samples),
+                             std::max(surface_.toleranceOf(top.samples), bounds::kLeastFit_m));
     slab.box.max().z() = top.height_m;
     slab.box.min().z() = std::min(slab.box.min().z(), top.height_m - 0.02);
     clear(slab, false);
@@ -548,38 +306,13 @@ class ThingFinder {
     thing.shape = ThingShape::kBox;
     thing.rms_m = slab.rms_m, thing.largest_m = slab.largest_m;
     std::vector<int> below(part.samples.begin() + static_cast<std::ptrdiff_t>(top.samples.size()), part.samples.end());
-    for (const std::vector<int>& leg : connected(below)) {
+    for (const std::vector<int>& leg : surface_.connected(below)) {
       if (leg.size() < 12) continue;
-      UprightBox box = fitBox(samples_, leg, yawsFor(leg), std::max(tolerance_m_, 0.015));
-      box.box.max().z() = std::min(box.box.max().z(), slab.box.min().z() - kGap_m);
+      UprightBox box = fitBox(samples_, leg, yawsFor(leg), std::max(surface_.toleranceOf(leg), bounds::kLeastFit_m));
+      box.box.max().z() = std::min(box.box.max().z(), slab.box.min().z() - bounds::kGap_m);
       clear(box, false);
       if (box.box.sizes().minCoeff() > 0) addBox(box, thing);
     }
-  }
-
-  std::vector<std::vector<int>> connected(const std::vector<int>& indices) const {
-    std::vector<std::vector<int>> found;
-    std::map<int, bool> open;
-    for (int i : indices) open[i] = true;
-    const auto touching_m = static_cast<float>(std::min(kTouching_voxels * samples_.spacing_m, kTouching_m));
-    for (auto& [start, is_open] : open) {
-      if (!is_open) continue;
-      is_open = false;
-      std::vector<int> queue = {start};
-      for (std::size_t q = 0; q < queue.size(); ++q) {
-        const auto i = static_cast<std::size_t>(queue[q]);
-        for (std::size_t k = samples_.first[i]; k < samples_.first[i + 1]; ++k) {
-          const auto next = open.find(samples_.neighbour[k]);
-          if (next == open.end() || !next->second) continue;
-          if ((samples_.points[i] - samples_.points[static_cast<std::size_t>(next->first)]).norm() > touching_m)
-            continue;
-          next->second = false;
-          queue.push_back(next->first);
-        }
-      }
-      found.push_back(queue);
-    }
-    return found;
   }
 
   /// By class, from the largest to the smallest.
@@ -606,14 +339,12 @@ class ThingFinder {
   const RawScan& scan_;
   const ScanFrame& frame_;
   const ScanOptions& options_;
+  const LooseSurface& surface_;
   const ScanSamples& samples_;
   const std::vector<PlaneRegion>& regions_;
   const RoomPlanes& room_;
-  const double tolerance_m_;
-  std::vector<char> free_;
-  std::vector<int> region_of_, top_of_;
   std::vector<TableTop> tops_;
-  CellRaster floor_{0.05};
+  CellRaster floor_{bounds::kCell_m};
   Things result_;
 };
 
@@ -621,7 +352,8 @@ class ThingFinder {
 
 Things thingsOf(const RawScan& scan, const ScanFrame& frame, const ScanOptions& options, const ScanSamples& samples,
                 const std::vector<PlaneRegion>& regions, const RoomPlanes& room) {
-  return ThingFinder(scan, frame, options, samples, regions, room).run();
+  const LooseSurface surface = looseSurface(samples, regions, room);
+  return ThingFinder(scan, frame, options, surface).run();
 }
 
 }  // namespace mmradartwin
