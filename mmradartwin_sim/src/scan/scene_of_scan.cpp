@@ -87,8 +87,8 @@ void addNotes(ScanScene& scene, const RawScan& scan, const RoomPlanes& room, con
     scene.notes.push_back(line("no ceiling is in the scan; walls end at %.2f m", room.height_m));
   if (room.doubled_m2 > 0.1) {
     scene.notes.push_back(
-        line("%.1f m2 are second copies of a surface some centimetres off, which the scanner's drift makes; a wall is "
-             "the mean of its copies",
+        line("%.1f m2 are second copies of a surface some centimetres off, which the scanner's drift makes; large "
+             "ones are averaged, small ones left out",
              room.doubled_m2));
   }
   if (room.closed_m2 > 0.1)

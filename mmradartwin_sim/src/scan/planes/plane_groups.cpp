@@ -39,29 +39,29 @@ class PlaneGrouping {
         setAxes(room_.groups.back());
       } else if (doubled) {
         home->second_copy.insert(home->second_copy.end(), r.samples.begin(), r.samples.end());
-        home->plane.samples.insert(home->plane.samples.end(), r.samples.begin(), r.samples.end());
-        meanOffset(*home);
+        // What covers little of a wall is no copy of it but stragglers, or a thin thing on it.
+        if (r.area_m2 > bounds::kSeenBehind * home->plane.area_m2) addCopy(r, *home);
+      } else if (home->copies) {
+        addCopy(r, *home);
       } else {
         home->plane.samples.insert(home->plane.samples.end(), r.samples.begin(), r.samples.end());
-        home->second_copy.empty() ? fitOffset(room_.samples, home->plane) : meanOffset(*home);
+        fitOffset(room_.samples, home->plane);
       }
     }
     for (PlaneGroup& g : room_.groups) {
       std::sort(g.plane.samples.begin(), g.plane.samples.end());
-      if (g.second_copy.empty()) {
-        fitOffset(room_.samples, g.plane);
-      } else {
-        meanOffset(g);
-      }
+      if (!g.copies) fitOffset(room_.samples, g.plane);
       measurePlane(room_.samples, g.plane);
     }
   }
 
-  /// Copies of one surface are measurements of it from several places, none of them known better than the others.
-  void meanOffset(PlaneGroup& g) const {
-    double sum = 0;
-    for (int i : g.plane.samples) sum += g.plane.normal.dot(room_.samples.at(i));
-    g.plane.offset_m = sum / static_cast<double>(g.plane.samples.size());
+  /// Copies of one surface are measurements of it from several places, none of them known better than the others: the
+  /// surface is their mean.
+  static void addCopy(const PlaneRegion& r, PlaneGroup& g) {
+    const double own = static_cast<double>(g.plane.samples.size()), added = static_cast<double>(r.samples.size());
+    g.plane.offset_m = (own * g.plane.offset_m + added * r.offset_m) / (own + added);
+    g.plane.samples.insert(g.plane.samples.end(), r.samples.begin(), r.samples.end());
+    g.copies = true;
   }
 
   void shift(const std::vector<PlaneShift>& shifts) {

@@ -10,6 +10,7 @@ namespace mmradartwin {
 struct PlaneGroup {
   PlaneRegion plane;
   std::vector<int> second_copy;  // samples of what drift has doubled
+  bool copies = false;           // the plane is the mean of copies
   Eigen::Vector3d u = Eigen::Vector3d::UnitX(), v = Eigen::Vector3d::UnitY();
   double low_m = 0, high_m = 0;  // of an upright plane: heights of its samples
   bool wall = false;
