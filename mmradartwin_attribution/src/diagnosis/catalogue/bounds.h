@@ -330,6 +330,9 @@ inline constexpr double kLeastScattering = 0.15;
 /// Scattering coefficient S above which a fit is clutter beside its actors: no surface mirrors nothing; see
 /// docs/verification/calibration_of_bounds.md#kleastscattering
 inline constexpr double kMostScattering = 0.98;
+/// Most that a surface reflects beyond what the twin states, dB: from wood, the least of the shipped materials
+/// (permittivity 1.99: |Gamma|^2 is -15.4 dB), to metal.
+inline constexpr double kMostReflectivity_db = 15.4;
 /// Scattering coefficient S (an eighth of the reflected power) from which on scattering is no clutter; see
 /// docs/verification/calibration_of_bounds.md#kleastscattering
 inline constexpr double kStrongScattering = 0.35;

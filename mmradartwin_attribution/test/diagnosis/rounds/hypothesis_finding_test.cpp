@@ -67,6 +67,9 @@ TEST(RejectionReason, NamesValuesThatNoSurfaceHas) {
   EXPECT_NE(reason.find("-0.1 dB"), std::string::npos) << reason;
   EXPECT_EQ(rejectionReason(with(fitOf("transmission", 9), "one_way_db", -6.0), {}), "");
   EXPECT_EQ(rejectionReason(fitOf("range_bias", 9), {}), "") << "no such range";
+  // From wood to metal is 15.4 dB.
+  EXPECT_NE(rejectionReason(with(fitOf("material_reflectivity", 100), "delta_db", 27), {}), "");
+  EXPECT_EQ(rejectionReason(with(fitOf("material_reflectivity", 100), "delta_db", 15), {}), "");
 }
 
 TEST(RejectionReason, AnObjectIsNoneWhereItIsTinyOrSomeoneWalks) {
