@@ -11,9 +11,9 @@ namespace mmradartwin {
 namespace {
 
 constexpr double kSharpEdge = 0.85;      // cosine of the angle between faces that meet at an edge
-constexpr double kUprightPlane = 0.7;    // faces that lie more level return nothing to a radar
+constexpr double kTooLevel = 0.7;        // |cosine| between normal and up: faces beyond return nothing to a radar
 constexpr double kLeastScene_m = 0.001;  // a scanner's own scale, to a ten-thousandth over a room
-constexpr double kNoPlane_m = 0.05;
+constexpr double kNoPlane_m = 0.05;      // stated where nothing upright was measured: an effort
 
 /// Share of a mesh's area that lies within a reach of its sharp edges.
 double shareAtEdges(const ScanThing& thing, double reach_m) {
@@ -35,7 +35,7 @@ double shareAtEdges(const ScanThing& thing, double reach_m) {
   return area_m2 > 0 ? std::min(1.0, 2 * reach_m * length_m / area_m2) : 1.0;
 }
 
-bool returnsEchoes(const ScanPlane& plane) { return std::abs(plane.normal.z()) < kUprightPlane; }
+bool returnsEchoes(const ScanPlane& plane) { return std::abs(plane.normal.z()) < kTooLevel; }
 
 double square(double x) { return x * x; }
 

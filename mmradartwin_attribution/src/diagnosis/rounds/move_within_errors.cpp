@@ -24,7 +24,7 @@ std::optional<HypothesisFit> moveWithinErrors(DiagnosisContext& context, const M
     c.min = std::max(c.min, c.neutral - most_m);
     c.max = std::min(c.max, c.neutral + most_m);
     start.back() = c.scaled(std::clamp(moved, c.min, c.max));
-    smaller.back() = start.back() / 3;
+    smaller.back() = start.back() / 3;  // a standard deviation: the most are three
   }
   context.report("fitting a small move of " + small.subject, 0);
   HypothesisFit fit = context.fitter.fit(null, small, {start, smaller});

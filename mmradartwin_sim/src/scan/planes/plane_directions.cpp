@@ -13,7 +13,7 @@ namespace {
 constexpr double kBend_rad = bounds::kSameTurn_deg * bounds::kDegree;
 constexpr double kWall_m2 = 1;       // drift shows on large planes alone
 constexpr double kFarthest_m = 0.1;  // no piece of a wall is farther off; the tolerance decides
-constexpr double kBendCell_m = 0.1;
+constexpr double kBendCell_m = 0.1;  // side of the cells by which two pieces overlap: some five voxels
 
 /// Angle modulo 90 deg, -45 to 45.
 double quarter(double angle_rad) { return angle_rad - M_PI / 2 * std::round(angle_rad / (M_PI / 2)); }

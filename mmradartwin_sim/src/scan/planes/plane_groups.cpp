@@ -40,7 +40,7 @@ class PlaneGrouping {
       } else if (doubled) {
         home->second_copy.insert(home->second_copy.end(), r.samples.begin(), r.samples.end());
         // What covers little of a wall is no copy of it but stragglers, or a thin thing on it.
-        if (r.area_m2 > bounds::kSeenBehind * home->plane.area_m2) addCopy(r, *home);
+        if (r.area_m2 > bounds::kLeastCopy * home->plane.area_m2) addCopy(r, *home);
       } else if (home->copies) {
         addCopy(r, *home);
       } else {

@@ -233,9 +233,13 @@ double largestOf(const std::vector<HorizontalLevel>& levels) {
   return largest_m2;
 }
 
+double leastFloor_m2(const std::vector<HorizontalLevel>& levels) {
+  return std::max(kLeastFloor_m2, bounds::kShareOfLargestLevel * largestOf(levels));
+}
+
 /// The lowest large one; null where there is none.
 const HorizontalLevel* floorOf(const std::vector<HorizontalLevel>& levels) {
-  const double least_m2 = std::max(kLeastFloor_m2, bounds::kShareOfLargestLevel * largestOf(levels));
+  const double least_m2 = leastFloor_m2(levels);
   const auto lowest =
       std::find_if(levels.begin(), levels.end(), [&](const HorizontalLevel& l) { return l.area_m2 > least_m2; });
   return lowest == levels.end() ? nullptr : &*lowest;
@@ -247,7 +251,7 @@ const HorizontalLevel* floorOf(const std::vector<HorizontalLevel>& levels) {
 double levelLeaningFloor(const ScanSamples& samples, const Eigen::Vector3d& up, std::vector<PlaneRegion>& regions) {
   const std::vector<HorizontalLevel> levels = levelsOf(regions, up);
   const HorizontalLevel* level = floorOf(levels);
-  const double least_m2 = std::max(kLeastFloor_m2, bounds::kShareOfLargestLevel * largestOf(levels));
+  const double least_m2 = leastFloor_m2(levels);
   PlaneRegion* lowest = nullptr;
   for (PlaneRegion& r : regions) {
     if (r.area_m2 < least_m2 || isLevelTo(r, up) || !isLevelTo(r, up, bounds::kCone_deg)) continue;

@@ -50,6 +50,9 @@ inline constexpr double kCone_deg = 12;
 /// Distance of two copies of one wall, floor or ceiling, m. Scanners: drift parts them by up to this; boards and
 /// cabinets stand farther off the wall behind them, steps farther above the floor.
 inline constexpr double kSameSurface_m = 0.045;
+/// Share of a wall's area from which on a second sheet of it is its copy, and counts in its place. Less is stragglers,
+/// or a thin thing on the wall; see docs/verification/scans.md.
+inline constexpr double kLeastCopy = 0.1;
 /// Corners are rounded, hidden or not scanned so far, m: the depth of a shelf or a curtain.
 inline constexpr double kSnap_m = 0.25;
 /// Gap in a wall, of a curtain, a pillar or a cabinet as high as the room, m. Building practice: cabinets are 0.6 deep.

@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::size_t kMostSamples = 450000;  // else the voxels grow: a large flat has 500 m2 of surface
 constexpr double kWide_m = 0.8;               // the scale at which noise is measured: slower than a scanner's ripple
-constexpr std::size_t kWidePlaces = 3000;
+constexpr std::size_t kWidePlaces = 3000;     // at which it is measured: an effort
 constexpr double kLeastSight = 0.17;     // cosine between a plane's normal and the ray of sight: 10 deg above the plane
 constexpr double kWidestReach_m = 0.15;  // of neighbours: corners of furniture are rounded by as much
 
